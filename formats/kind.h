@@ -1,0 +1,32 @@
+#pragma once
+// The kinds of data that travel between programs, and how one is told from another.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+enum class Kind {
+  unknown, particles, vdb, ply, ela, hdf5, nifti, obj, stl, off, dxf, gltf, glb, three_ds, dae, png, ppm, rgb,
+};
+
+/// The name of `--format` and `--to`: "vdb", "3ds", …
+std::string_view kind_name(Kind kind);
+/// The kind of that name ("mesh" is ply), or unknown.
+Kind kind_from_name(std::string_view name);
+/// The kind that a file name's suffix stands for, or unknown. Case does not matter.
+Kind kind_from_suffix(std::string_view path);
+/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, `ela_expl` after blank lines and
+/// comments), or unknown.
+Kind kind_from_magic(std::string_view first_bytes);
+/// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first 4096 bytes.
+/// \throw UsageError if `format` names no kind
+Kind input_kind(std::string_view peeked, std::string_view path, std::string_view format);
+/// --to (wins), else the suffix of `path`, else `fallback`.
+/// \throw UsageError if the kind is not among `writable`: "cannot write KIND, expected one of …"
+Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
+                 const std::vector<Kind>& writable);
+bool is_binary(Kind kind);
+
+} // namespace gewebe
