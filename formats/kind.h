@@ -8,7 +8,24 @@
 namespace gewebe {
 
 enum class Kind {
-  unknown, particles, vdb, ply, ela, hdf5, nifti, obj, stl, off, dxf, gltf, glb, three_ds, dae, png, ppm, rgb,
+  unknown,
+  particles,
+  vdb,
+  ply,
+  ela,
+  hdf5,
+  nifti,
+  obj,
+  stl,
+  off,
+  dxf,
+  gltf,
+  glb,
+  three_ds,
+  dae,
+  png,
+  ppm,
+  rgb,
 };
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …
@@ -17,11 +34,11 @@ std::string_view kind_name(Kind kind);
 Kind kind_from_name(std::string_view name);
 /// The kind that a file name's suffix stands for, or unknown. Case does not matter.
 Kind kind_from_suffix(std::string_view path);
-/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, `ela_expl` after blank lines and
-/// comments), or unknown.
+/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, `ela_expl` after blank
+/// lines and comments), or unknown.
 Kind kind_from_magic(std::string_view first_bytes);
-/// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first 4096 bytes.
-/// \throw UsageError if `format` names no kind
+/// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first
+/// 4096 bytes. \throw UsageError if `format` names no kind
 Kind input_kind(std::string_view peeked, std::string_view path, std::string_view format);
 /// --to (wins), else the suffix of `path`, else `fallback`.
 /// \throw UsageError if the kind is not among `writable`: "cannot write KIND, expected one of …"

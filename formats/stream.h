@@ -1,6 +1,6 @@
 #pragma once
-// Files and pipes as every program treats them: `-` is the pipe, input is read once and forwards, output
-// appears whole or not at all.
+// Files and pipes as every program treats them: `-` is the pipe, input is read once and forwards,
+// output appears whole or not at all.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,18 +15,21 @@ namespace gewebe {
 /// A file, FIFO or standard input ("-" or ""), opened for reading forwards.
 class Input {
 public:
-  /// \throw Error (place = name) if it is missing, unreadable or a directory; UsageError if binary input
-  /// would come from a terminal
-  explicit Input(const std::string& path);
+  /// `binary` says that a person can't type it.
+  /// \throw Error (place = name) if it is missing, unreadable or a directory; UsageError if binary
+  /// input would come from a terminal
+  explicit Input(const std::string& path, bool binary = true);
   ~Input();
   Input(Input&&) noexcept;
 
   /// How messages name it: the path, or "-".
   const std::string& name() const;
-  /// The first bytes (at most `count`, fewer at the end) without consuming them. \pre count <= 4096
+  /// The first bytes (at most `count`, fewer at the end) without consuming them.
+  /// \pre count <= 4096, nothing was read yet   \throw Error on a read error or if there are none
+  /// at all
   std::string_view peek(std::size_t count);
   /// Everything that is left.
-  /// \throw Error on a read error, or when more than `max_bytes` come
+  /// \throw Error on a read error, if there is nothing at all, or when more than `max_bytes` come
   std::string read_all(std::uint64_t max_bytes = UINT64_MAX);
   /// A std::istream over what is left; a read error sets badbit.
   std::istream& stream();
@@ -39,18 +42,20 @@ private:
 /// Where bytes go: standard output ("-" or "") or a file.
 ///
 /// If the file is absent or regular, bytes go to a temporary file beside it (beside the target of a
-/// symlink), with the old mode or 0666 & ~umask, and `commit` renames it. Anything else (/dev/null, a
-/// FIFO) is opened at the first write and written directly. Without `commit` the destructor removes the
-/// temporary file; so do SIGINT, SIGTERM, SIGHUP and SIGPIPE once `install_signal_cleanup` was called.
+/// symlink), with the old mode or 0666 & ~umask, and `commit` renames it. Anything else (/dev/null,
+/// a FIFO) is opened at the first write and written directly. Without `commit` the destructor
+/// removes the temporary file; so do SIGINT, SIGTERM, SIGHUP and SIGPIPE once
+/// `install_signal_cleanup` was called.
 class Output {
 public:
   struct Options {
-    bool keep_unchanged = false; ///< leave the file and its time stamp alone if the bytes would be equal
-    bool sync = false;           ///< fsync before the rename
-    bool binary = true;          ///< refuse a terminal
+    bool keep_unchanged =
+        false;          ///< leave the file and its time stamp alone if the bytes would be equal
+    bool sync = false;  ///< fsync before the rename
+    bool binary = true; ///< refuse a terminal
   };
-  /// \throw Error (place = name) if the folder is not writable or the path is a directory; UsageError if
-  /// binary output would go to a terminal
+  /// \throw Error (place = name) if the folder is not writable or the path is a directory;
+  /// UsageError if binary output would go to a terminal
   Output(const std::string& path, const Options& options);
   ~Output();
   Output(Output&&) noexcept;
@@ -69,7 +74,8 @@ private:
   std::unique_ptr<State> state_;
 };
 
-/// Installs the handlers that remove temporary files when a signal ends the program. For tools only.
+/// Installs the handlers that remove temporary files when a signal ends the program. For tools
+/// only.
 void install_signal_cleanup();
 
 } // namespace gewebe

@@ -58,9 +58,9 @@ private:
 class Run {
 public:
   const Context& context() const { return context_; }
-  const std::string& output() const { return output_; }  ///< -o, "-" for standard output
-  const std::string& to() const { return to_; }          ///< --to, "" if absent
-  const std::string& format() const { return format_; }  ///< --format, "" if absent
+  const std::string& output() const { return output_; } ///< -o, "-" for standard output
+  const std::string& to() const { return to_; }         ///< --to, "" if absent
+  const std::string& format() const { return format_; } ///< --format, "" if absent
   Output::Options output_options(bool binary) const;
   bool verbose() const { return verbose_; }
   Stats& stats() { return stats_; }
@@ -96,10 +96,10 @@ private:
 /// Refines an option just declared.
 class OptionRef {
 public:
-  OptionRef& positive();                  ///< > 0
+  OptionRef& positive(); ///< > 0
   OptionRef& range(double min, double max);
   OptionRef& one_of(std::vector<std::string> words);
-  OptionRef& count(std::size_t n);        ///< a list must have exactly n numbers
+  OptionRef& count(std::size_t n); ///< a list must have exactly n numbers
 
 private:
   friend class Program;
@@ -113,29 +113,37 @@ public:
   Program(std::string name, std::string description);
   ~Program();
 
-  // Options. `names` is "--long" or "-s,--long"; `metavar` names the value; the value before parsing is
-  // the default that --help shows (optionals and empty strings show none). Numbers are strict: the whole
-  // word, finite. A list is one word with commas.
-  OptionRef option(const std::string& names, double& value, const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::optional<double>& value, const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::int64_t& value, const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::optional<std::int64_t>& value, const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::string& value, const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::vector<double>& value, const std::string& metavar, const std::string& help);
+  // Options. `names` is "--long" or "-s,--long"; `metavar` names the value; the value before
+  // parsing is the default that --help shows (optionals and empty strings show none). Numbers are
+  // strict: the whole word, finite. A list is one word with commas.
+  OptionRef option(const std::string& names, double& value, const std::string& metavar,
+                   const std::string& help);
+  OptionRef option(const std::string& names, std::optional<double>& value,
+                   const std::string& metavar, const std::string& help);
+  OptionRef option(const std::string& names, std::int64_t& value, const std::string& metavar,
+                   const std::string& help);
+  OptionRef option(const std::string& names, std::optional<std::int64_t>& value,
+                   const std::string& metavar, const std::string& help);
+  OptionRef option(const std::string& names, std::string& value, const std::string& metavar,
+                   const std::string& help);
+  OptionRef option(const std::string& names, std::vector<double>& value, const std::string& metavar,
+                   const std::string& help);
   void flag(const std::string& names, bool& value, const std::string& help);
 
   // Operands, in order. An optional one keeps its default when absent.
-  void operand(const std::string& name, std::string& value, const std::string& help, bool required = false);
+  void operand(const std::string& name, std::string& value, const std::string& help,
+               bool required = false);
   /// All remaining operands, at least `at_least`.
-  void operands(const std::string& name, std::vector<std::string>& values, const std::string& help, std::size_t at_least);
+  void operands(const std::string& name, std::vector<std::string>& values, const std::string& help,
+                std::size_t at_least);
   /// Declares --to (kinds that this tool writes) and/or --format (kinds that it reads).
   void output_kinds(const std::vector<Kind>& kinds);
   void input_kinds(const std::vector<Kind>& kinds);
   /// Cross-option checks, run after parsing; throw UsageError.
   void check(std::function<void()> check);
 
-  /// Parses, checks, runs `work`, reports. Returns the exit status: 0, 1 (an Error or any exception), 2
-  /// (UsageError). A failure is one line on standard error.
+  /// Parses, checks, runs `work`, reports. Returns the exit status: 0, 1 (an Error or any
+  /// exception), 2 (UsageError). A failure is one line on standard error.
   int run(int argc, char** argv, const std::function<void(Run&)>& work);
 
 private:

@@ -11,6 +11,9 @@
 
 namespace gewebe {
 
+/// 16 hexadecimal digits.
+std::string digest_text(std::uint64_t digest);
+
 class Digest {
 public:
   Digest();
@@ -32,7 +35,6 @@ public:
   void add(double value) { add_bytes(&value, sizeof value); }
 
   std::uint64_t value() const;
-  /// 16 hexadecimal digits.
   std::string hex() const;
 
 private:

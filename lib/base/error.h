@@ -9,8 +9,8 @@
 namespace gewebe {
 
 /// A failure that the user can understand. `what()` is the complaint alone ("3 odd rays, expected a
-/// closed mesh"), `place()` says where it was found ("liver.obj:12", "-: byte 37") and may be empty:
-/// the library knows no files, so formats and tools add the place (see `at`).
+/// closed mesh"), `place()` says where it was found ("liver.obj:12", "-: byte 37") and may be
+/// empty: the library knows no files, so formats and tools add the place (see `at`).
 class Error : public std::runtime_error {
 public:
   explicit Error(const std::string& what) : std::runtime_error(what) {}
@@ -45,7 +45,8 @@ auto at(const std::string& place, Work&& work) -> decltype(work()) {
   } catch (const Cancelled&) {
     throw;
   } catch (const Error& error) {
-    if (!error.place().empty()) throw;
+    if (!error.place().empty())
+      throw;
     throw Error(place, error.what());
   }
 }

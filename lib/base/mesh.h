@@ -31,8 +31,8 @@ double signed_volume(const TriangleMesh& mesh);
 /// Sum of the triangles' areas in mm².
 double surface_area(const TriangleMesh& mesh);
 
-/// \throw Error if an index is out of range, a coordinate is not finite or an optional array has the
-/// wrong size; the message names the first offender.
+/// \throw Error if an index is out of range, a coordinate is not finite or an optional array has
+/// the wrong size; the message names the first offender.
 void check_mesh(const TriangleMesh& mesh);
 
 } // namespace gewebe

@@ -1,6 +1,7 @@
 #pragma once
-// Parallel loops whose result doesn't depend on the number of threads: blocks are cut by `grain` alone,
-// each block writes its own slots, and whoever needs a sum adds the slots in order afterwards.
+// Parallel loops whose result doesn't depend on the number of threads: blocks are cut by `grain`
+// alone, each block writes its own slots, and whoever needs a sum adds the slots in order
+// afterwards.
 
 #include "base/context.h"
 
@@ -9,8 +10,8 @@
 
 namespace gewebe {
 
-/// Calls `body(begin, end)` for consecutive blocks [0,grain), [grain,2 grain), … of [0,count), at most
-/// context.threads at a time. Reports progress and honours the cancel callback between blocks.
+/// Calls `body(begin, end)` for consecutive blocks [0,grain), [grain,2 grain), … of [0,count), at
+/// most context.threads at a time. Reports progress and honours the cancel callback between blocks.
 /// \pre grain > 0; body touches nothing that another block writes.
 /// \throw what the body throws (one of them), Cancelled
 void parallel_blocks(const Context& context, std::size_t count, std::size_t grain,

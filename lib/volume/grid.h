@@ -1,12 +1,12 @@
 #pragma once
-// A sparse volume of float values: our narrow view of an OpenVDB float grid. Everything that computes on
-// volumes goes through this header, so that OpenVDB is compiled in two units only
+// A sparse volume of float values: our narrow view of an OpenVDB float grid. Everything that
+// computes on volumes goes through this header, so that OpenVDB is compiled in two units only
 // (volume/grid.cpp and formats/volume_file.cpp).
 //
-// Voxel (i,j,k) has its centre at world T(i,j,k) and covers ±½ in index space. Values live in leaves of
-// 8×8×8 voxels whose origin is a multiple of 8; offset of a voxel in its leaf: (i&7)*64 + (j&7)*8 + (k&7),
-// so k runs fastest. Larger constant regions are tiles of 8³ (dim 8), 128³ or 4096³ voxels; all else has
-// the background value.
+// Voxel (i,j,k) has its centre at world T(i,j,k) and covers ±½ in index space. Values live in
+// leaves of 8×8×8 voxels whose origin is a multiple of 8; offset of a voxel in its leaf: (i&7)*64 +
+// (j&7)*8 + (k&7), so k runs fastest. Larger constant regions are tiles of 8³ (dim 8), 128³ or
+// 4096³ voxels; all else has the background value.
 
 #include "base/context.h"
 #include "base/vec3.h"
@@ -30,7 +30,9 @@ inline int leaf_offset(const Int3& ijk) {
   return ((ijk[0] & 7) << 6) | ((ijk[1] & 7) << 3) | (ijk[2] & 7);
 }
 /// Origin of the leaf that holds `ijk` (rounds down, for negative indices too).
-inline Int3 leaf_origin(const Int3& ijk) { return {ijk[0] & ~7, ijk[1] & ~7, ijk[2] & ~7}; }
+inline Int3 leaf_origin(const Int3& ijk) {
+  return {ijk[0] & ~7, ijk[1] & ~7, ijk[2] & ~7};
+}
 
 /// Affine map from index space to the world in mm: world = A·index + b, m = [A | b] by rows.
 struct GridTransform {
@@ -43,7 +45,8 @@ struct GridTransform {
   double determinant() const;
   /// Lengths of the three columns of A: the voxel's edges.
   Vec3 voxel_size() const;
-  /// Edges of equal length and at right angles, each to a relative 1e-9; axes may be rotated or mirrored.
+  /// Edges of equal length and at right angles, each to a relative 1e-9; axes may be rotated or
+  /// mirrored.
   bool is_cubic() const;
   /// "voxel 0.5, origin (0, 0, 0)" or the full matrix where it is not axis-aligned; for messages.
   std::string describe() const;
@@ -52,7 +55,8 @@ struct GridTransform {
 /// Transform with voxel edge `size` and centres at integer multiples of it. \pre size > 0
 GridTransform uniform_transform(double size);
 
-/// Equal up to rounding: the two maps differ by less than 1e-6 voxels at every corner of `box` (index space).
+/// Equal up to rounding: the two maps differ by less than 1e-6 voxels at every corner of `box`
+/// (index space).
 bool same_lattice(const GridTransform& a, const GridTransform& b, const Int3& min, const Int3& max);
 
 /// What a volume says about itself beside its values.
@@ -68,8 +72,8 @@ struct GridInfo {
 /// Read-only view of a leaf; valid as long as its grid.
 struct LeafView {
   Int3 origin{};
-  const float* values = nullptr;          ///< 512 values
-  const std::uint64_t* active = nullptr;  ///< 8 words; bit n of word w is offset 64 w + n
+  const float* values = nullptr;         ///< 512 values
+  const std::uint64_t* active = nullptr; ///< 8 words; bit n of word w is offset 64 w + n
 };
 
 /// A constant cube of dim³ voxels from `origin` on.
@@ -97,7 +101,8 @@ public:
 
   /// All leaves, in an order that depends on the content alone.
   std::vector<LeafView> leaves() const;
-  /// All tiles that are active or differ from the background, in an order that depends on the content alone.
+  /// All tiles that are active or differ from the background, in an order that depends on the
+  /// content alone.
   std::vector<TileView> tiles() const;
   /// Number of active voxels, those of tiles included.
   std::uint64_t active_voxels() const;
@@ -127,11 +132,12 @@ public:
   GridAccessor(GridAccessor&&) noexcept;
 
   float value(const Int3& ijk) {
-    if (leaf_origin(ijk) == origin_ && values_ != nullptr) return values_[leaf_offset(ijk)];
+    if (leaf_origin(ijk) == origin_ && values_ != nullptr)
+      return values_[leaf_offset(ijk)];
     return lookup(ijk);
   }
-  /// The leaf that holds `ijk` (values != nullptr), or a view with values == nullptr and in `tile` the
-  /// constant of the region around it.
+  /// The leaf that holds `ijk` (values != nullptr), or a view with values == nullptr and in `tile`
+  /// the constant of the region around it.
   LeafView leaf_at(const Int3& ijk, float& tile);
 
 private:
@@ -149,15 +155,16 @@ public:
   ~GridBuilder();
   GridBuilder(GridBuilder&&) noexcept;
 
-  /// One new leaf per origin, all values background, all voxels inactive. References stay valid until
-  /// `finish`. \pre origins are distinct multiples of 8 where no leaf exists yet
+  /// One new leaf per origin, all values background, all voxels inactive. References stay valid
+  /// until `finish`. \pre origins are distinct multiples of 8 where no leaf exists yet
   std::vector<LeafRef> add_leaves(const Context& context, std::span<const Int3> origins);
   /// \pre dim is 8, 128 or 4096, origin a multiple of it, no leaf inside
   void add_tile(const TileView& tile);
   /// Takes over the leaf of another grid without copying values where the storage allows it.
   void share_leaf(const Grid& from, const LeafView& leaf);
-  /// The grid. Leaves whose values all equal the background and that have no active voxel are dropped;
-  /// leaves that are constant and wholly active become tiles of dim 8 where `prune` is set.
+  /// The grid. Leaves whose values all equal the background and that have no active voxel are
+  /// dropped; leaves that are constant and wholly active become tiles of dim 8 where `prune` is
+  /// set.
   Grid finish(bool prune = true);
 
 private:

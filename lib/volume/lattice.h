@@ -5,13 +5,13 @@
 
 namespace gewebe {
 
-/// Transform of --dim N: voxel edge = longest side of `box` / N, centres at integer multiples of it.
-/// \throw Error if the box is empty or has no extent
+/// Transform of --dim N: voxel edge = longest side of `box` / N, centres at integer multiples of
+/// it. \throw Error if the box is empty or has no extent
 GridTransform lattice_for_dim(const Box3& box, std::int64_t dim);
 
-/// Voxel centres inside a world box, as an inclusive index range (cubic or rotated lattice: the range
-/// covers the box). Returns false if there is none.
-/// \throw Error if an index would leave ±2^30
+/// Voxel centres inside a world box, as an inclusive index range (cubic or rotated lattice: the
+/// range covers the box). Returns false if there is none. \throw Error if an index would leave
+/// ±2^30
 bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int3& max);
 
 } // namespace gewebe
