@@ -134,7 +134,7 @@ openvdb::math::Transform::Ptr native_transform(const GridTransform& transform) {
   if (transform == uniform_transform(m[0]))
     return openvdb::math::Transform::createLinearTransform(m[0]);
   return openvdb::math::Transform::createLinearTransform(openvdb::Mat4R(
-      m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, m[3], m[7], m[11], 1));
+      m[0], m[4], m[8], 0.0, m[1], m[5], m[9], 0.0, m[2], m[6], m[10], 0.0, m[3], m[7], m[11], 1.0));
 }
 
 std::optional<double> number_metadata(const openvdb::GridBase& grid, const char* key,
