@@ -17,7 +17,7 @@ ALLFLAGS = $(CXXSTD) $(flags_$(config)) $(WARNINGS) $(CPPFLAGS_ALL) $(SYSTEM) $(
 LIBS := -lopenvdb -ltbb -lImath -lassimp -lxxhash
 
 LIB_SRC := $(wildcard lib/*/*.cpp formats/*.cpp)
-TOOL_SRC := $(filter-out tools/cli.cpp,$(wildcard tools/*.cpp))
+TOOL_SRC := $(filter-out tools/cli.cpp tools/report.cpp,$(wildcard tools/*.cpp))
 TOOLS := $(TOOL_SRC:tools/%.cpp=%)
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
 obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
@@ -36,7 +36,7 @@ $(BUILD)/libgewebe.a: $(call obj,$(LIB_SRC))
 	@rm -f $@
 	$(AR) rcsD $@ $^
 
-$(TOOLS:%=$(BUILD)/%): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(BUILD)/obj/tools/cli.o $(BUILD)/libgewebe.a
+$(TOOLS:%=$(BUILD)/%): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(BUILD)/obj/tools/cli.o $(BUILD)/obj/tools/report.o $(BUILD)/libgewebe.a
 	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LIBS)
 
 $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(BUILD)/libgewebe.a

@@ -525,6 +525,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     run.keep_unchanged_ = s.keep_unchanged;
     run.verbose_ = s.verbose;
     run.quiet_ = s.quiet;
+    run.stats_wanted_ = s.stats || !s.stats_file.empty();
     run.context_.threads = static_cast<int>(s.threads);
     if (const char* level = std::getenv("GEWEBE_CPU"); level != nullptr && *level != '\0')
       run.context_.cpu = at("GEWEBE_CPU", [&] { return cpu_level_from_name(level); });

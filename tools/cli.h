@@ -63,6 +63,8 @@ public:
   const std::string& format() const { return format_; } ///< --format, "" if absent
   Output::Options output_options(bool binary) const;
   bool verbose() const { return verbose_; }
+  /// Whether --stats was given: figures that cost a pass over the result are worth it only then.
+  bool stats_wanted() const { return stats_wanted_; }
   Stats& stats() { return stats_; }
   /// Runs `work`, adds its wall time under stats "seconds": {name: …}.
   template <class Work>
@@ -89,7 +91,7 @@ private:
   std::string tool_;
   Context context_;
   std::string output_ = "-", to_, format_;
-  bool keep_unchanged_ = false, verbose_ = false, quiet_ = false;
+  bool keep_unchanged_ = false, verbose_ = false, quiet_ = false, stats_wanted_ = false;
   Stats stats_;
 };
 

@@ -1,0 +1,97 @@
+// metaball2vol: particles -> density volume.
+
+#include "formats/particles_file.h"
+#include "formats/volume_file.h"
+#include "tools/cli.h"
+#include "tools/report.h"
+#include "volume/density.h"
+#include "volume/lattice.h"
+
+using namespace gewebe;
+
+namespace {
+
+struct Arguments {
+  std::string particles = "-", like, unit = "mm";
+  std::optional<double> voxel;
+  std::optional<std::int64_t> dim;
+  std::vector<double> bbox;
+};
+
+void check(const Arguments& arguments) {
+  const int lattices = int{arguments.voxel.has_value()} + int{arguments.dim.has_value()} +
+                       int{!arguments.like.empty()};
+  if (lattices != 1)
+    throw UsageError("expected exactly one of --voxel, --dim and --like");
+  cli::check_one_pipe({arguments.particles, arguments.like});
+  for (std::size_t axis = 0; axis < 3 && !arguments.bbox.empty(); ++axis)
+    if (!(arguments.bbox[axis] < arguments.bbox[axis + 3]))
+      throw UsageError("--bbox: expected x0,y0,z0,x1,y1,z1 with x0 < x1, y0 < y1, z0 < z1");
+}
+
+GridInfo lattice(const Arguments& arguments, const Particles& particles, const Context& context) {
+  GridInfo info;
+  if (arguments.voxel) {
+    info.transform = uniform_transform(*arguments.voxel);
+  } else if (arguments.dim) {
+    info.transform = lattice_for_dim(support_box(particles), *arguments.dim);
+  } else {
+    Input input(arguments.like);
+    info.transform = read_volume(input, context).info().transform;
+    if (!info.transform.is_cubic())
+      throw Error(input.name(), "has " + info.transform.describe() + ", expected cubic voxels");
+  }
+  return info;
+}
+
+void work(cli::Run& run, const Arguments& arguments) {
+  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
+  Output output(run.output(), run.output_options(true));
+  Input input(arguments.particles, /*binary=*/false);
+  const Particles particles = run.timed("read", [&] {
+    return read_particles(input.read_all(run.context().max_memory), input.name(),
+                          unit_in_mm(arguments.unit));
+  });
+  DensityOptions options;
+  options.info = lattice(arguments, particles, run.context());
+  if (const auto& b = arguments.bbox; !b.empty())
+    options.clip = Box3{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+  DensityReport report;
+  const Grid grid = run.timed("density", [&] {
+    return at(input.name(),
+              [&] { return metaball_density(run.context(), particles, options, &report); });
+  });
+  if (grid.active_voxels() == 0)
+    run.warn("no voxel centre lies inside a particle's support");
+  run.timed("write", [&] { write_volume(output, grid, run.context()); });
+  output.commit();
+
+  cli::Stats& stats = run.stats();
+  stats.set("particles", static_cast<std::uint64_t>(particles.size()));
+  stats.set("particles_out_of_reach", report.particles_out_of_reach);
+  stats.set("leaves_in_reach", report.leaves);
+  stats.set("voxel_evaluations", report.voxel_evaluations);
+  stats.set("predicted_bytes", report.predicted_bytes);
+  cli::report_volume(run, grid);
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  cli::Program program("metaball2vol", "Turns particles into a volume of their density.");
+  Arguments arguments;
+  program
+      .option("--voxel", arguments.voxel, "S", "edge of a voxel in mm, centres at multiples of S")
+      .positive();
+  program.option("--dim", arguments.dim, "N", "voxels along the longest side of the supports' box")
+      .range(1, 1 << 30);
+  program.option("--like", arguments.like, "VDB", "take the lattice of this volume");
+  program.option("--bbox", arguments.bbox, "X0,Y0,Z0,X1,Y1,Z1", "only voxels inside this box, mm")
+      .count(6);
+  program.option("--unit", arguments.unit, "UNIT", "unit of the particles: m, cm, mm")
+      .one_of({"m", "cm", "mm"});
+  program.output_kinds({Kind::vdb});
+  program.operand("PARTICLES", arguments.particles, "lines of x y z R [weight]");
+  program.check([&] { check(arguments); });
+  return program.run(argc, argv, [&](cli::Run& run) { work(run, arguments); });
+}
