@@ -1,0 +1,91 @@
+// Small things of the base: sizes, digests, parallel blocks, places of errors.
+
+#include "base/bytes.h"
+#include "base/context.h"
+#include "base/digest.h"
+#include "base/error.h"
+#include "base/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <numeric>
+
+using namespace gewebe;
+
+TEST(Bytes, SizesAsPeopleWriteThem) {
+  EXPECT_EQ(bytes_from_text("1000"), 1000U);
+  EXPECT_EQ(bytes_from_text("4G"), 4ULL << 30U);
+  EXPECT_EQ(bytes_from_text("1.5MiB"), 3ULL << 19U);
+  EXPECT_EQ(bytes_from_text("2kB"), 2048U);
+  for (const char* bad : {"", "G", "-1", "nan", "inf", "1X", "1GG", "1e400", "0", "4 G"})
+    EXPECT_THROW((void)bytes_from_text(bad), Error) << bad;
+  EXPECT_EQ(bytes_text(512), "512 B");
+  EXPECT_EQ(bytes_text(1536), "1.5 KiB");
+}
+
+TEST(Digest, IsXxh3) {
+  EXPECT_EQ(Digest().hex(), "2d06800538d394c2"); // XXH3-64 of nothing
+  Digest a;
+  a.add_bytes("gewebe", 6);
+  Digest b;
+  b.add_bytes("gew", 3);
+  b.add_bytes("ebe", 3);
+  EXPECT_EQ(a.value(), b.value());
+  EXPECT_NE(a.value(), Digest().value());
+}
+
+TEST(Parallel, BlocksDependOnTheGrainAlone) {
+  for (const int threads : {1, 2, 5}) {
+    Context context;
+    context.threads = threads;
+    std::vector<int> hits(1003, 0);
+    std::vector<std::size_t> ends(11, 0);
+    parallel_blocks(context, hits.size(), 100, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        ++hits[n];
+      ends[begin / 100] = end;
+    });
+    EXPECT_EQ(std::accumulate(hits.begin(), hits.end(), 0), 1003);
+    EXPECT_EQ(ends.back(), 1003U);
+    EXPECT_EQ(ends[3], 400U);
+  }
+  parallel_blocks({}, 0, 8, [](std::size_t, std::size_t) { FAIL(); });
+}
+
+TEST(Parallel, ErrorsAndCancellingComeThrough) {
+  EXPECT_THROW(parallel_blocks({}, 100, 1,
+                               [](std::size_t b, std::size_t) {
+                                 if (b == 50)
+                                   throw Error("no");
+                               }),
+               Error);
+  Context context;
+  std::atomic<int> asked{0};
+  context.cancelled = [&] { return ++asked > 3; };
+  EXPECT_THROW(parallel_blocks(context, 100, 1, [](std::size_t, std::size_t) {}), Cancelled);
+}
+
+TEST(Error, PlaceIsAddedOnce) {
+  try {
+    at("outer", [] { at("inner", [] { throw Error("wrong"); }); });
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.place(), "inner");
+    EXPECT_STREQ(error.what(), "wrong");
+  }
+  EXPECT_EQ(at("x", [] { return 3; }), 3);
+}
+
+TEST(Memory, LimitIsNamed) {
+  Context context;
+  context.max_memory = 1 << 20;
+  EXPECT_NO_THROW(require_memory(context, 1e6, "it"));
+  EXPECT_THROW(require_memory(context, 1e7, "it"), Error);
+}
+
+TEST(Cpu, LevelsHaveNames) {
+  EXPECT_EQ(cpu_level_from_name("baseline"), CpuLevel::baseline);
+  EXPECT_LE(cpu_level_from_name("avx512"), best_cpu_level());
+  EXPECT_THROW((void)cpu_level_from_name("sse"), Error);
+}

@@ -1,0 +1,121 @@
+// Volumes on disk: round trip, equal bytes, every truncated prefix, damaged heads.
+
+#include "base/error.h"
+#include "formats/volume_file.h"
+#include "tests/unit/scratch.h"
+#include "volume/grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+using namespace gewebe;
+
+namespace {
+
+Grid sample_grid(float value = 0.75F) {
+  GridInfo info;
+  info.transform = uniform_transform(0.5);
+  info.isovalue = 0.25;
+  GridBuilder builder(info);
+  const std::vector<Int3> origins{{0, 0, 0}, {-8, 16, 8}, {128, 0, -16}};
+  const std::vector<LeafRef> leaves = builder.add_leaves({}, origins);
+  for (const LeafRef& leaf : leaves)
+    for (int n = 0; n < leaf_voxels; n += 3) {
+      leaf.values[n] = value * static_cast<float>(n) / 512;
+      leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
+    }
+  builder.add_tile({{64, 64, 64}, 8, 1.0F, true});
+  builder.add_tile({{0, 256, 0}, 128, 0.5F, true});
+  return builder.finish();
+}
+
+std::string bytes_of(const Grid& grid) {
+  const ScratchFile file(".vdb");
+  Output output(file.path(), {});
+  write_volume(output, grid, {});
+  output.commit();
+  Input input(file.path());
+  return input.read_all();
+}
+
+Grid grid_of(const std::string& bytes) {
+  const ScratchFile file(".vdb");
+  std::ofstream(file.path(), std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  Input input(file.path());
+  return read_volume(input, {});
+}
+
+} // namespace
+
+TEST(VolumeFile, RoundTripKeepsEverything) {
+  const Grid grid = sample_grid();
+  const Grid back = grid_of(bytes_of(grid));
+  EXPECT_EQ(back.digest(), grid.digest());
+  EXPECT_EQ(back.info().transform, grid.info().transform);
+  EXPECT_EQ(back.info().isovalue, 0.25);
+  EXPECT_EQ(back.leaves().size(), 3U);
+  EXPECT_EQ(back.tiles().size(), 2U);
+  GridAccessor accessor(back);
+  EXPECT_EQ(accessor.value({70, 70, 70}), 1.0F);
+  EXPECT_EQ(accessor.value({100, 300, 100}), 0.5F);
+  EXPECT_EQ(accessor.value({0, 0, 3}), 0.75F * 3 / 512);
+  EXPECT_EQ(accessor.value({1000, 0, 0}), 0.0F);
+}
+
+TEST(VolumeFile, RotatedTransformSurvivesExactly) {
+  GridInfo info;
+  info.transform.m = {0.3, -0.4, 0, 1.25, 0.4, 0.3, 0, -7.1, 0, 0, 0.5, 1.0 / 3};
+  GridBuilder builder(info);
+  builder.add_tile({{0, 0, 0}, 8, 1.0F, true});
+  const Grid grid = builder.finish();
+  EXPECT_EQ(grid_of(bytes_of(grid)).info().transform, info.transform);
+}
+
+TEST(VolumeFile, EqualContentGivesEqualBytesAndOtherContentAnotherUuid) {
+  const std::string a = bytes_of(sample_grid());
+  EXPECT_EQ(a, bytes_of(sample_grid()));
+  const std::string b = bytes_of(sample_grid(0.5F));
+  EXPECT_NE(a.substr(21, 36), b.substr(21, 36));
+  EXPECT_EQ(a[35], '8'); // version of the UUID
+}
+
+TEST(VolumeFile, EveryTruncatedPrefixIsRefused) {
+  GridBuilder builder(GridInfo{});
+  const Int3 origin{8, 0, 0};
+  const LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
+  for (int n = 0; n < leaf_voxels; n += 7) {
+    leaf.values[n] = static_cast<float>(n);
+    leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
+  }
+  const std::string whole = bytes_of(builder.finish());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_THROW((void)grid_of(whole.substr(0, size)), Error) << size << " of " << whole.size();
+  }
+  EXPECT_NO_THROW((void)grid_of(whole)); // negative control: the whole is fine
+}
+
+TEST(VolumeFile, HugeStringsInTheHeadTakeNoMemory) {
+  std::string bytes = bytes_of(sample_grid());
+  const std::size_t metadata = 21 + 36;
+  const std::uint32_t huge = 0xfffffff0U;
+  std::memcpy(bytes.data() + metadata, &huge, 4); // the count of file metadata
+  EXPECT_THROW((void)grid_of(bytes), Error);
+}
+
+TEST(VolumeFile, ValuesThatAreNotFiniteAreRefused) {
+  GridBuilder builder(GridInfo{});
+  const Int3 origin{0, 0, 0};
+  const auto leaf = builder.add_leaves({}, {&origin, 1}).at(0);
+  leaf.values[5] = NAN;
+  leaf.active[0] = 1U << 5U;
+  EXPECT_THROW((void)grid_of(bytes_of(builder.finish())), Error);
+}
+
+TEST(VolumeFile, OtherBytesAreRefused) {
+  EXPECT_THROW((void)grid_of("ply\nformat ascii 1.0\n"), Error);
+  EXPECT_THROW((void)grid_of(std::string(4096, '\0')), Error);
+}
