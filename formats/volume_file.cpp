@@ -133,8 +133,9 @@ openvdb::math::Transform::Ptr native_transform(const GridTransform& transform) {
   const auto& m = transform.m;
   if (transform == uniform_transform(m[0]))
     return openvdb::math::Transform::createLinearTransform(m[0]);
-  return openvdb::math::Transform::createLinearTransform(openvdb::Mat4R(
-      m[0], m[4], m[8], 0.0, m[1], m[5], m[9], 0.0, m[2], m[6], m[10], 0.0, m[3], m[7], m[11], 1.0));
+  return openvdb::math::Transform::createLinearTransform(
+      openvdb::Mat4R(m[0], m[4], m[8], 0.0, m[1], m[5], m[9], 0.0, m[2], m[6], m[10], 0.0, m[3],
+                     m[7], m[11], 1.0));
 }
 
 std::optional<double> number_metadata(const openvdb::GridBase& grid, const char* key,
@@ -200,9 +201,11 @@ Grid parse_volume(std::string& bytes, const std::string& name) {
 } // namespace
 
 Grid read_volume(Input& input, const Context& context) {
+  return volume_from_bytes(input.read_all(context.max_memory), input.name());
+}
+
+Grid volume_from_bytes(std::string bytes, const std::string& name) {
   initialize_openvdb();
-  const std::string& name = input.name();
-  std::string bytes = input.read_all(context.max_memory);
   check_vdb_head(bytes, name);
   try {
     return parse_volume(bytes, name);

@@ -5,6 +5,7 @@
 #include "formats/stream.h"
 #include "volume/grid.h"
 
+#include <string>
 #include <string_view>
 
 namespace gewebe {
@@ -12,6 +13,9 @@ namespace gewebe {
 /// Reads the grid `density`, or the only float grid if none has that name.
 /// \throw Error with the place for anything that is not a whole, finite, affine float grid
 Grid read_volume(Input& input, const Context& context);
+
+/// The same for bytes that are there already.
+Grid volume_from_bytes(std::string bytes, const std::string& name);
 
 /// Writes one grid; blosc with active mask.
 void write_volume(Output& output, const Grid& grid, const Context& context);

@@ -9,7 +9,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
 
 using namespace gewebe;
 
@@ -42,11 +41,7 @@ std::string bytes_of(const Grid& grid) {
 }
 
 Grid grid_of(const std::string& bytes) {
-  const ScratchFile file(".vdb");
-  std::ofstream(file.path(), std::ios::binary)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  Input input(file.path());
-  return read_volume(input, {});
+  return volume_from_bytes(bytes, "test.vdb");
 }
 
 } // namespace
