@@ -1,47 +1,258 @@
 # Gewebe. `make help` lists the targets.
+
+VERSION := 0.1.0
 config ?= release
 BUILD := build/$(config)
-CXX ?= g++
-AR ?= ar
+
+PREFIX ?= /usr/local
+BINDIR ?= $(PREFIX)/bin
+LIBDIR ?= $(PREFIX)/lib
+INCLUDEDIR ?= $(PREFIX)/include
+MANDIR ?= $(PREFIX)/share/man
+INSTALL ?= install
+
+# --- How to compile ---------------------------------------------------------------------------------
 
 flags_release := -O2 -DNDEBUG
 flags_debug := -O0 -g
 flags_sanitize := -O1 -g1 -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -DGEWEBE_SANITIZE
 flags_coverage := -O0 -g --coverage
-WARNINGS := -Wall -Wextra -Wshadow -Wconversion
-CXXSTD := -std=c++20 -ffp-contract=off -fPIC
-CPPFLAGS_ALL := -Ilib -I. -DGEWEBE_VERSION='"$(VERSION)"' -MMD -MP
-VERSION := 0.1.0
-SYSTEM := -isystem /usr/include/eigen3
-ALLFLAGS = $(CXXSTD) $(flags_$(config)) $(WARNINGS) $(CPPFLAGS_ALL) $(SYSTEM) $(CPPFLAGS) $(CXXFLAGS)
+flags_fuzz := -O1 -g1 -fsanitize=address,fuzzer-no-link -fno-omit-frame-pointer -DGEWEBE_SANITIZE
+ifeq ($(flags_$(config)),)
+$(error config=$(config) is unknown, expected release, debug, sanitize, coverage or fuzz)
+endif
+
+ifeq ($(origin CXX),default)
+CXX := $(if $(filter fuzz,$(config)),clang++-16,g++)
+endif
+
+WARNINGS := -Wall -Wextra -Wshadow -Wconversion $(if $(WERROR),-Werror)
+LANGUAGE := -std=c++20 -ffp-contract=off -fPIC
+# The libraries' headers stand in /usr/include, where no warning is shown; Eigen's have a folder of their own.
+INCLUDES := -Ilib -I. -isystem /usr/include/eigen3
+DEFINES := -DGEWEBE_VERSION='"$(VERSION)"'
+ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
+# Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
 LIBS := -lopenvdb -ltbb -lImath -lassimp -lxxhash
+CHECK_LIBS := -lgmp -lmpfr
+LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
+
+# --- What there is ----------------------------------------------------------------------------------
 
 LIB_SRC := $(wildcard lib/*/*.cpp formats/*.cpp)
-TOOL_SRC := $(filter-out tools/cli.cpp tools/report.cpp,$(wildcard tools/*.cpp))
-TOOLS := $(TOOL_SRC:tools/%.cpp=%)
+# A file of tools/ with a header is shared by the programs; each of the others is one.
+SHARED_SRC := $(patsubst %.h,%.cpp,$(wildcard tools/*.h))
+TOOL_SRC := $(filter-out $(SHARED_SRC),$(wildcard tools/*.cpp))
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
+STRESS_SRC := $(wildcard tests/stress/*.cpp)
+FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
+BENCH_SRC := $(wildcard tests/bench/*.cpp)
+HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*.h))
+MAN := $(wildcard man/*.[1-9])
+SCRIPTS := .ci/run tests/run tests/golden/run $(wildcard scripts/* tests/contract/*)
+
+TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
+UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
+STRESS := $(STRESS_SRC:tests/stress/%.cpp=$(BUILD)/stress_%)
+FUZZ := $(FUZZ_SRC:tests/fuzz/%.cpp=$(BUILD)/%)
+BENCH := $(BENCH_SRC:tests/bench/%.cpp=$(BUILD)/bench_%)
+ARCHIVE := $(BUILD)/libgewebe.a
+SHARED := $(BUILD)/obj/tools/shared.a
+
 obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
+OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) tests/fuzz/replay.cpp)
 
-all: $(TOOLS:%=$(BUILD)/%)
+# --- Packages ---------------------------------------------------------------------------------------
 
-$(BUILD)/obj/%_avx2.o: FLAGS_FILE := -mavx2 -mfma -O3
-$(BUILD)/obj/%_avx512.o: FLAGS_FILE := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -O3
-$(BUILD)/obj/%_cgal.o: FLAGS_FILE := -frounding-math
+# Goals that install what they need; plain `make` is none of them.
+sets_deps := build check
+sets_check := build check
+sets_golden-update := build check
+sets_stress := build check
+sets_demo := build
+sets_bench := build bench
+sets_lint := build check lint
+SETS ?= $(sort $(foreach goal,$(MAKECMDGOALS),$(sets_$(goal))) $(if $(filter fuzz,$(config)),fuzz))
+ifneq ($(filter check golden-update stress demo bench lint,$(MAKECMDGOALS)),)
+ifneq ($(DEPS),no)
+FIRST := deps
+endif
+endif
 
-$(BUILD)/obj/%.o: %.cpp
+# --- Rules ------------------------------------------------------------------------------------------
+
+ifeq ($(config),fuzz)
+all: $(FUZZ)
+else
+all: $(TOOLS) $(ARCHIVE)
+endif
+
+deps:
+	@scripts/deps $(SETS)
+
+# Kernels for one instruction set each, chosen at run time; -O3 is for their loops.
+kernel = $(if $(filter release,$(config)),-O3)
+$(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
+$(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
+# CGAL's interval arithmetic changes the rounding mode.
+$(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math
+
+# Holds the command, so that other flags compile everything again.
+$(BUILD)/flags: FORCE | $(FIRST)
 	@mkdir -p $(@D)
-	$(CXX) $(ALLFLAGS) $(FLAGS_FILE) -c $< -o $@
+	@printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS) $(LDFLAGS))' | cmp -s - $@ || \
+	  printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS) $(LDFLAGS))' > $@
 
-$(BUILD)/libgewebe.a: $(call obj,$(LIB_SRC))
-	@rm -f $@
+$(BUILD)/obj/%.o: %.cpp $(BUILD)/flags | $(FIRST)
+	@mkdir -p $(@D)
+	$(CXX) $(ALLFLAGS) $(FILE_FLAGS) -MMD -MP -c $< -o $@
+
+$(ARCHIVE): $(call obj,$(LIB_SRC))
+$(SHARED): $(call obj,$(SHARED_SRC))
+$(ARCHIVE) $(SHARED):
+	@mkdir -p $(@D) && rm -f $@
 	$(AR) rcsD $@ $^
 
-$(TOOLS:%=$(BUILD)/%): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(BUILD)/obj/tools/cli.o $(BUILD)/obj/tools/report.o $(BUILD)/libgewebe.a
-	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LIBS)
+$(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(SHARED) $(ARCHIVE)
+	$(LINK) $(LIBS)
 
-$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(BUILD)/libgewebe.a
-	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LIBS) -lgtest -lgtest_main -lgmp -lmpfr
+$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE)
+	$(LINK) $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
 
--include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)
+$(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(ARCHIVE)
+	$(LINK) $(LIBS) $(CHECK_LIBS)
 
-.PHONY: all
+$(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(ARCHIVE)
+	$(LINK) $(LIBS) $(CHECK_LIBS)
+
+# libFuzzer brings its own main; elsewhere replay.cpp runs the files of the corpus.
+ifeq ($(config),fuzz)
+$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(ARCHIVE)
+	$(LINK) -fsanitize=fuzzer $(LIBS)
+else
+$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/obj/tests/fuzz/replay.o $(ARCHIVE)
+	$(LINK) $(LIBS)
+endif
+
+-include $(OBJECTS:.o=.d)
+
+# --- Tests ------------------------------------------------------------------------------------------
+
+# T=NAME runs the tests of that name (or pattern) alone; SET=fast unit tests, bad input and fuzz corpora.
+check: $(TOOLS) $(ARCHIVE) $(UNIT) $(FUZZ) | $(FIRST)
+	@CXX='$(CXX)' MAKE='$(MAKE)' tests/run --config '$(config)' $(if $(SET),--set '$(SET)') $(if $(T),--test '$(T)')
+
+golden-update: $(TOOLS) | $(FIRST)
+	@tests/golden/run update --config '$(config)' $(if $(T),--test '$(T)')
+
+stress: $(STRESS) | $(FIRST)
+	@test -n '$(STRESS)' || { echo 'stress: tests/stress has no programs yet' >&2; exit 1; }
+	@for program in $(STRESS); do echo "$$program"; $$program || exit 1; done
+
+bench: $(BENCH) $(TOOLS) | $(FIRST)
+	@test -n '$(BENCH)' || { echo 'bench: tests/bench has no programs yet' >&2; exit 1; }
+	@for program in $(BENCH); do $$program || exit 1; done
+
+demo: | $(FIRST)
+	@echo 'demo: examples/ is still empty; `make check` shows what works' >&2; exit 1
+
+# --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
+
+LINT := build/lint
+LINT_CXX := $(wildcard lib/*/*.cpp formats/*.cpp tools/*.cpp tests/*/*.cpp)
+LINT_HEADERS := $(wildcard lib/*/*.h formats/*.h tools/*.h tests/*/*.h)
+FORMAT_STAMPS := $(patsubst %,$(LINT)/%.format,$(LINT_CXX) $(LINT_HEADERS))
+TIDY_STAMPS := $(LINT_CXX:%=$(LINT)/%.tidy)
+MAN_STAMPS := $(MAN:%=$(LINT)/%.mandoc)
+SHELL_STAMPS := $(SCRIPTS:%=$(LINT)/%.shellcheck)
+INCLUDE_STAMPS := $(patsubst %,$(LINT)/%.includes,$(LINT_CXX) $(LINT_HEADERS))
+
+lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
+
+$(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
+	@mkdir -p $(@D)
+	@echo 'clang-format $<'
+	@clang-format-16 --dry-run -Werror $< && touch $@
+
+$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes | $(FIRST)
+	@mkdir -p $(@D)
+	@scripts/check-includes $< && touch $@
+
+$(MAN_STAMPS): $(LINT)/%.mandoc: % | $(FIRST)
+	@mkdir -p $(@D)
+	@echo 'mandoc $<'
+	@mandoc -Tlint -W warning $< && touch $@
+
+$(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
+	@mkdir -p $(@D)
+	@echo 'shellcheck $<'
+	@shellcheck -x $< && touch $@
+
+# The preprocessor writes which of our headers the file reads, so that their change counts too.
+TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
+$(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
+$(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma
+$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy | $(FIRST)
+	@mkdir -p $(@D)
+	@echo 'clang-tidy $<'
+	@g++ $(TIDY_FLAGS) -MM -MP -MT $@ -MF $@.d $<
+	@clang-tidy-16 --quiet $< -- $(TIDY_FLAGS) 2>$@.log || { cat $@.log >&2; exit 1; }
+	@touch $@
+-include $(TIDY_STAMPS:=.d)
+
+# --- Installation -------------------------------------------------------------------------------------
+
+to = $(DESTDIR)$(1)
+PC := $(call to,$(LIBDIR))/pkgconfig/gewebe.pc
+install: all
+	@test '$(config)' != fuzz || { echo 'install: config=fuzz has no programs' >&2; exit 1; }
+	$(INSTALL) -d '$(call to,$(BINDIR))' '$(call to,$(LIBDIR))/pkgconfig'
+	$(if $(TOOLS),$(INSTALL) $(TOOLS) '$(call to,$(BINDIR))')
+	$(INSTALL) -m 644 $(ARCHIVE) '$(call to,$(LIBDIR))'
+	$(foreach h,$(HEADERS),$(INSTALL) -D -m 644 $h '$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)' &&) true
+	$(foreach m,$(MAN),$(INSTALL) -D -m 644 $m '$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)' &&) true
+	sed -e 's|@VERSION@|$(VERSION)|' -e 's|@LIBS@|$(LIBS)|' -e 's|@PREFIX@|$(PREFIX)|' \
+	  -e 's|@LIBDIR@|$(LIBDIR:$(PREFIX)/%=$${prefix}/%)|' -e 's|@INCLUDEDIR@|$(INCLUDEDIR:$(PREFIX)/%=$${prefix}/%)|' \
+	  gewebe.pc.in > '$(PC)'
+	chmod 644 '$(PC)'
+
+# Takes back what install laid down, then its folders as far as they are empty; a system's own stay.
+ours := $(sort $(dir $(HEADERS:lib/%=%)))
+system_dir := $(filter /usr /usr/local,$(DESTDIR)$(PREFIX))
+uninstall:
+	rm -f $(foreach t,$(TOOLS),'$(call to,$(BINDIR))/$(notdir $t)') '$(call to,$(LIBDIR))/libgewebe.a' '$(PC)'
+	rm -f $(foreach h,$(HEADERS),'$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)')
+	rm -f $(foreach m,$(MAN),'$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)')
+	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') '$(call to,$(INCLUDEDIR))/gewebe' \
+	  '$(call to,$(LIBDIR))/pkgconfig' $(foreach s,1 5 7,'$(call to,$(MANDIR))/man$s'); do \
+	  rmdir "$$folder" 2>/dev/null || true; done
+ifeq ($(system_dir),)
+	@for folder in '$(BINDIR)' '$(LIBDIR)' '$(INCLUDEDIR)' '$(MANDIR)'; do \
+	  while test "$$folder" != / && test "$$folder" != . && rmdir '$(DESTDIR)'"$$folder" 2>/dev/null; do \
+	    folder=$$(dirname "$$folder"); done; done
+endif
+
+clean:
+	rm -rf build
+
+help:
+	@echo 'make [config=release|debug|sanitize|coverage|fuzz] [TARGET…]'
+	@echo
+	@echo '  all            programs and libgewebe.a in build/CONFIG (the default; config=fuzz: the fuzz targets)'
+	@echo '  deps           install the packages that are missing (SETS="build check lint bench fuzz" says which)'
+	@echo '  check          run the tests; T=NAME only that one, SET=fast unit tests, bad input, fuzz corpora'
+	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'
+	@echo '  stress         run the programs of tests/stress'
+	@echo '  bench          measure time against error'
+	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
+	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, library, headers, gewebe.pc'
+	@echo '  uninstall      the reverse'
+	@echo '  clean          remove build/'
+	@echo
+	@echo 'check, golden-update, stress, bench and lint install their packages first; DEPS=no turns that off.'
+	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
+
+FORCE:
+
+.DELETE_ON_ERROR:
+.PHONY: all deps check golden-update stress bench demo lint install uninstall clean help FORCE
