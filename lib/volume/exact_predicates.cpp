@@ -10,16 +10,20 @@ namespace {
 
 constexpr double unit_roundoff = 0x1p-53;
 
-int sign_of(double x) { return (x > 0) - (x < 0); }
+int sign_of(double x) {
+  return (x > 0) - (x < 0);
+}
 
-/// A number as the exact sum of at most N doubles that don't overlap, smallest first, none of them 0.
+/// A number as the exact sum of at most N doubles that don't overlap, smallest first, none of them
+/// 0.
 template <int N>
 struct Expansion {
   std::array<double, N> part;
   int size = 0;
 
   void push(double x) {
-    if (x != 0) part[static_cast<std::size_t>(size++)] = x;
+    if (x != 0)
+      part[static_cast<std::size_t>(size++)] = x;
   }
   double operator[](int n) const { return part[static_cast<std::size_t>(n)]; }
   int sign() const { return size == 0 ? 0 : sign_of((*this)[size - 1]); }
@@ -65,7 +69,8 @@ Expansion<M + N> operator+(const Expansion<M>& e, const Expansion<N>& f) {
     const bool from_e = n == f.size || (m < e.size && std::fabs(e[m]) < std::fabs(f[n]));
     return from_e ? e[m++] : f[n++];
   };
-  if (e.size + f.size == 0) return result;
+  if (e.size + f.size == 0)
+    return result;
   double sum = next();
   while (m < e.size || n < f.size) {
     const Pair s = two_sum(sum, next());
@@ -78,14 +83,16 @@ Expansion<M + N> operator+(const Expansion<M>& e, const Expansion<N>& f) {
 
 template <int N>
 Expansion<N> operator-(Expansion<N> e) {
-  for (int n = 0; n < e.size; ++n) e.part[static_cast<std::size_t>(n)] = -e[n];
+  for (int n = 0; n < e.size; ++n)
+    e.part[static_cast<std::size_t>(n)] = -e[n];
   return e;
 }
 
 template <int N>
 Expansion<2 * N> operator*(const Expansion<N>& e, double factor) {
   Expansion<2 * N> result;
-  if (e.size == 0) return result;
+  if (e.size == 0)
+    return result;
   Pair carry = two_product(e[0], factor);
   result.push(carry.low);
   for (int n = 1; n < e.size; ++n) {
@@ -117,9 +124,12 @@ int turn_sign_exact(double ax, double ay, double bx, double by, double cx, doubl
 }
 
 int side_sign_exact(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& q) {
-  const Expansion<2> ax = difference(a.x, q.x), ay = difference(a.y, q.y), az = difference(a.z, q.z);
-  const Expansion<2> bx = difference(b.x, q.x), by = difference(b.y, q.y), bz = difference(b.z, q.z);
-  const Expansion<2> cx = difference(c.x, q.x), cy = difference(c.y, q.y), cz = difference(c.z, q.z);
+  const Expansion<2> ax = difference(a.x, q.x), ay = difference(a.y, q.y),
+                     az = difference(a.z, q.z);
+  const Expansion<2> bx = difference(b.x, q.x), by = difference(b.y, q.y),
+                     bz = difference(b.z, q.z);
+  const Expansion<2> cx = difference(c.x, q.x), cy = difference(c.y, q.y),
+                     cz = difference(c.z, q.z);
   const auto sum = minor_of(bx, cx, by, cy) * az + minor_of(cx, ax, cy, ay) * bz;
   return -(sum + minor_of(ax, bx, ay, by) * cz).sign();
 }
@@ -131,9 +141,12 @@ int turn_sign(double ax, double ay, double bx, double by, double cx, double cy,
   const double left = (ax - cx) * (by - cy);
   const double right = (ay - cy) * (bx - cx);
   const double det = left - right;
-  // Two roundings in each product's factors, one in it, one in the difference: 3 u and second order.
-  const double bound = (3 + 16 * unit_roundoff) * unit_roundoff * (std::fabs(left) + std::fabs(right));
-  if (det > bound || -det > bound) return sign_of(det);
+  // Two roundings in each product's factors, one in it, one in the difference: 3 u and second
+  // order.
+  const double bound =
+      (3 + 16 * unit_roundoff) * unit_roundoff * (std::fabs(left) + std::fabs(right));
+  if (det > bound || -det > bound)
+    return sign_of(det);
   ++exact_tests;
   return turn_sign_exact(ax, ay, bx, by, cx, cy);
 }
@@ -149,7 +162,8 @@ int side_sign(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& q,
                            (std::fabs(ca) + std::fabs(ac)) * std::fabs(bd.z) +
                            (std::fabs(ab) + std::fabs(ba)) * std::fabs(cd.z);
   const double bound = (7 + 56 * unit_roundoff) * unit_roundoff * permanent;
-  if (det > bound || -det > bound) return -sign_of(det);
+  if (det > bound || -det > bound)
+    return -sign_of(det);
   ++exact_tests;
   return side_sign_exact(a, b, c, q);
 }

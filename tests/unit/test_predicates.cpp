@@ -62,7 +62,8 @@ TEST(Predicates, TurnAgreesWithRationalsNearALine) {
     const Vec3 b{scale * unit(random), scale * unit(random), 0};
     const double t = unit(random);
     Vec3 c{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), 0};
-    for (int s = nudge(random); s > 0; --s) c.y = std::nextafter(c.y, 1e30);
+    for (int s = nudge(random); s > 0; --s)
+      c.y = std::nextafter(c.y, 1e30);
     const int expected = rational_turn(a, b, c);
     ASSERT_EQ(turn(a, b, c, exact), expected);
     ASSERT_EQ(turn(b, a, c, exact), -expected);
@@ -83,7 +84,8 @@ TEST(Predicates, SideAgreesWithRationalsNearAPlane) {
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 20));
     const auto point = [&] {
       Vec3 p{scale * unit(random), scale * unit(random), scale * unit(random)};
-      if (n % 3 == 0) p = {std::round(p.x), std::round(p.y), std::round(p.z)};
+      if (n % 3 == 0)
+        p = {std::round(p.x), std::round(p.y), std::round(p.z)};
       return p;
     };
     const Vec3 a = point(), b = point();
@@ -92,7 +94,8 @@ TEST(Predicates, SideAgreesWithRationalsNearAPlane) {
                  std::round(scale * unit(random))};
     const double s = unit(random), t = unit(random);
     c = q + s * (a - q) + t * (b - q);
-    if (n % 7 == 0) c = a + 2.0 * (q - a);
+    if (n % 7 == 0)
+      c = a + 2.0 * (q - a);
     const int expected = rational_side(a, b, c, q);
     zeros += expected == 0;
     ASSERT_EQ(gewebe::side_sign(a, b, c, q, exact), expected);
