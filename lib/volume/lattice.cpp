@@ -20,8 +20,10 @@ std::string number(double value) {
 } // namespace
 
 GridTransform lattice_for_dim(const Box3& box, std::int64_t dim) {
-  if (dim < 1) throw Error("a lattice of " + std::to_string(dim) + " voxels, expected at least 1");
-  if (box.empty()) throw Error("there is nothing to lay a lattice over, expected at least one point");
+  if (dim < 1)
+    throw Error("a lattice of " + std::to_string(dim) + " voxels, expected at least 1");
+  if (box.empty())
+    throw Error("there is nothing to lay a lattice over, expected at least one point");
   const double side = box.longest_side();
   const double voxel = side / static_cast<double>(dim);
   if (!(side > 0 && std::isfinite(side)) || !(voxel > 0))
@@ -30,7 +32,8 @@ GridTransform lattice_for_dim(const Box3& box, std::int64_t dim) {
 }
 
 bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int3& max) {
-  if (box.empty()) return false;
+  if (box.empty())
+    return false;
   Box3 index_box;
   for (int corner = 0; corner < 8; ++corner)
     index_box.add(transform.to_index({(corner & 1) != 0 ? box.max.x : box.min.x,

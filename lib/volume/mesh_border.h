@@ -1,0 +1,28 @@
+#pragma once
+// Borders of triangle meshes as the parity rule sees them: edges with an odd number of triangles.
+
+#include "base/mesh.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+/// Edges in which an odd number of triangles meet, each {smaller, larger} point index, ascending.
+/// Points at equal position count as one (the smallest index stands for them). Empty: every ray in
+/// general position crosses the mesh an even number of times.
+std::vector<std::array<std::uint32_t, 2>> odd_edges(const std::vector<Vec3>& points,
+                                                    const std::vector<Triangle>& triangles);
+
+/// Number of connected groups of edges; `group[e]` is the group of edge e, numbered by first edge.
+std::uint32_t edge_groups(const std::vector<std::array<std::uint32_t, 2>>& edges,
+                          std::vector<std::uint32_t>& group);
+
+/// Adds for each group of odd edges the mean of its points and a cone from the edges to it.
+/// Afterwards `odd_edges` is empty, since an even number of odd edges meets in every point. \pre
+/// edges == odd_edges(points, triangles)
+void close_with_cones(const std::vector<std::array<std::uint32_t, 2>>& edges,
+                      std::vector<Vec3>& points, std::vector<Triangle>& triangles);
+
+} // namespace gewebe
