@@ -1,0 +1,56 @@
+#pragma once
+// Fewer and better triangles: points of the isosurface that lie near a corner of the lattice are
+// merged there, without ever breaking the mesh (report FZKA 7190, section 3.1.4).
+
+#include "base/context.h"
+#include "base/mesh.h"
+#include "surface/marching_cubes.h"
+
+#include <cstdint>
+
+namespace gewebe {
+
+struct SnapOptions {
+  /// Where merged points go: to the mean of their crossings, or to the corner as in the report.
+  enum class Place { mean, corner };
+  double epsilon = 0.15; ///< 0 … 0.5, fraction of the lattice edge
+  Place place = Place::mean;
+};
+
+struct SnapReport {
+  std::uint64_t points_before = 0, points_after = 0;
+  std::uint64_t triangles_before = 0, triangles_after = 0;
+  std::uint64_t corners = 0;   ///< lattice corners that drew a crossing
+  std::uint64_t fins = 0;      ///< points that snapped by the fin rule
+  std::uint64_t refused = 0;   ///< edges inside a cluster that the link condition kept
+  std::uint64_t zero_area = 0; ///< faces left whose area is 0, relative to their longest edge
+};
+
+struct SnapResult {
+  TriangleMesh mesh;
+  SnapReport report;
+};
+
+/// Snaps the points of an isosurface to the corners of its lattice.
+///
+/// 1. A crossing at distance <= epsilon from a corner joins that corner's cluster (at 0.5 from
+/// both:
+///    the lower one). Epsilon 0 joins the crossings that lie exactly on a corner.
+/// 2. Fin rule: a point outside all clusters whose neighbours lie in at most two clusters would be
+///    left with two opposite faces or none; it joins the nearer of the two.
+/// 3. Each cluster, in the order of its first point, is collapsed edge by edge where the link
+///    condition holds (Dey et al. 1999): the ends have exactly two common neighbours, and the
+///    component is no tetrahedron. So the mesh stays closed, 2-manifold and oriented, with the same
+///    Euler number and components, without equal faces or faces with equal corners.
+///
+/// What the link condition refuses stays as it is, for example the last tetrahedron of a component
+/// that lies in one cluster. With Place::corner such points coincide in space, and flat faces
+/// between corners in one line have no area: these are counted. Place::mean moves only merged
+/// points, Place::corner every point of a cluster (but no point of a fin on its own).
+/// Points and triangles keep the order of their first member; unused points vanish. Linear time.
+///
+/// \pre `surface` as marching_cubes made it: closed and 2-manifold
+/// \throw Error if epsilon is not within 0 … 0.5, or context.max_memory would not do
+SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options);
+
+} // namespace gewebe
