@@ -90,7 +90,7 @@ public:
     const auto* const close = static_cast<const char*>(
         std::memchr(begin, '"', static_cast<std::size_t>(line_end_ - begin)));
     if (close == nullptr)
-      throw Error(std::string("the ") + what + " has no closing quote");
+      throw Error(std::string("the ") + what + " has no closing quote, expected one");
     at_ = close + 1;
     if (at_ != line_end_ && !is_blank(*at_) && *at_ != '#')
       throw Error(std::string("no blank behind the ") + what + ", expected one");

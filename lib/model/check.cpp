@@ -79,7 +79,7 @@ void ModelChecker::node(std::size_t i) {
   require_not_negative(n.mass, "mass");
   require_not_negative(n.drag, "drag");
   if (n.fixed > fixed_all)
-    throw Error("the set of fixed axes is no subset of x, y, z");
+    throw Error("unknown fixed axes, expected a subset of x, y, z");
   if (n.material < 0 || static_cast<std::size_t>(n.material) >= model_.materials.size())
     throw Error("material " + std::to_string(n.material) + " does not exist, expected 0 to " +
                 std::to_string(model_.materials.size() - 1));

@@ -257,7 +257,7 @@ private:
       const char close = text_[at_++];
       end = text_.find(close, at_);
       if (end == std::string_view::npos)
-        fail_at(where + 1, "the file name has no closing quote");
+        fail_at(where + 1, "the file name has no closing quote, expected one");
       name = text_.substr(at_, end - at_);
       at_ = end + 1;
     } else {
