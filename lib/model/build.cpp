@@ -1,0 +1,410 @@
+#include "model/build.h"
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "model/edges.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+// Based on: Van Gelder, Approximate Simulation of Elastic Membranes by Triangulated Spring Meshes,
+// 1998.
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::uint32_t unused = UINT32_MAX;
+constexpr double lightest_node = 1e-3; // of the mean mass; lighter ones would rule the time step
+constexpr double same_place =
+    1e-9; // of a cluster's reach: a node there has no direction to its center
+
+/// The triangles that are used, with corners renumbered to the points that are used.
+struct Surface {
+  std::vector<std::uint32_t> point_of_node; ///< ascending
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> face_of_triangle; ///< in the mesh
+  EdgeTable edges;
+};
+
+/// Marks triangles that have the corners of an earlier one. Such two share the edge of their two
+/// smallest corners and its opposite corner.
+std::vector<bool> duplicates(const Surface& s) {
+  std::vector<bool> marked(s.triangles.size());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> opposite; // corner, face
+  for (std::size_t e = 0; e < s.edges.size(); ++e) {
+    const auto around = s.edges.around(e);
+    if (around.size() < 2)
+      continue;
+    opposite.clear();
+    for (const std::uint32_t c : around)
+      opposite.emplace_back(s.triangles[c / 3][c % 3], c / 3);
+    std::sort(opposite.begin(), opposite.end());
+    for (std::size_t i = 1; i < opposite.size(); ++i)
+      if (opposite[i].first == opposite[i - 1].first)
+        marked[opposite[i].second] = true;
+  }
+  return marked;
+}
+
+Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Context& context) {
+  Surface s;
+  std::vector<std::uint32_t> node_of_point(mesh.points.size(), unused);
+  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
+    const Triangle& t = mesh.triangles[f];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
+      ++report.degenerate_faces;
+      continue;
+    }
+    s.triangles.push_back(t);
+    s.face_of_triangle.push_back(f);
+    for (const std::uint32_t p : t)
+      node_of_point[p] = 0;
+  }
+  if (s.triangles.empty())
+    throw Error("no triangle, expected a surface");
+  for (std::uint32_t p = 0; p < mesh.points.size(); ++p) {
+    if (node_of_point[p] == unused) {
+      ++report.isolated_points;
+      continue;
+    }
+    node_of_point[p] = static_cast<std::uint32_t>(s.point_of_node.size());
+    s.point_of_node.push_back(p);
+  }
+  for (Triangle& t : s.triangles)
+    for (std::uint32_t& corner : t)
+      corner = node_of_point[corner];
+  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
+
+  const std::vector<bool> twice = duplicates(s);
+  report.duplicate_faces = static_cast<std::size_t>(std::count(twice.begin(), twice.end(), true));
+  if (report.duplicate_faces != 0) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+      if (twice[t])
+        continue;
+      s.triangles[kept] = s.triangles[t];
+      s.face_of_triangle[kept++] = s.face_of_triangle[t];
+    }
+    s.triangles.resize(kept);
+    s.face_of_triangle.resize(kept);
+    s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
+  }
+  for (std::size_t e = 0; e < s.edges.size(); ++e) {
+    const std::size_t faces = s.edges.around(e).size();
+    report.boundary_edges += faces == 1 ? 1 : 0;
+    report.nonmanifold_edges += faces > 2 ? 1 : 0;
+  }
+  return s;
+}
+
+/// The double whose shortest text is that of the float, so that 0.1f does not become 0.10000000149…
+double decimal(float value) {
+  std::array<char, 32> text{};
+  const char* const end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  double result = 0;
+  std::from_chars(text.data(), end, result);
+  return result;
+}
+
+class Builder {
+public:
+  Builder(const TriangleMesh& mesh, const BuildOptions& options, const Context& context)
+      : mesh_(mesh), options_(options), context_(context) {
+    context_.progress = nullptr; // steps are short and many
+  }
+
+  BuiltModel build() {
+    surface_ = usable_surface(mesh_, report_, context_);
+    model_.materials = options_.material.materials;
+    if (model_.materials.empty())
+      throw Error("no material, expected at least one");
+    model_.name = model_.materials[0].name;
+    areas_and_materials();
+    surface_nodes();
+    edge_springs();
+    std::vector<Spring> bending;
+    if (options_.bend)
+      bending = bending_springs();
+    std::vector<Spring> central;
+    if (options_.centrals > 0)
+      central = central_nodes();
+    if (options_.normals)
+      normals();
+    model_.springs.insert(model_.springs.end(), bending.begin(), bending.end());
+    model_.springs.insert(model_.springs.end(), central.begin(), central.end());
+    texture_coordinates();
+    model_.triangles = std::move(surface_.triangles);
+    check_model(model_);
+    return {std::move(model_), report_};
+  }
+
+private:
+  const Material& material(std::int32_t index) const {
+    return model_.materials[static_cast<std::size_t>(index)];
+  }
+
+  void areas_and_materials() {
+    const std::size_t count = surface_.triangles.size();
+    area_vector_.resize(count);
+    material_.resize(count);
+    parallel_blocks(context_, count, 8192, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        const Vec3 &a = point(surface_.triangles[t][0]), &b = point(surface_.triangles[t][1]),
+                   &c = point(surface_.triangles[t][2]);
+        area_vector_[t] = 0.5 * cross(b - a, c - a);
+        if (mesh_.part.empty())
+          continue;
+        const std::int32_t part = mesh_.part[surface_.face_of_triangle[t]];
+        const auto& of_part = options_.material.of_part;
+        if (part >= 0 && static_cast<std::size_t>(part) < of_part.size())
+          material_[t] = of_part[static_cast<std::size_t>(part)];
+      }
+    });
+  }
+
+  void surface_nodes() {
+    model_.nodes.resize(surface_.point_of_node.size());
+    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
+      model_.nodes[i].position = point(i);
+      model_.nodes[i].material = -1;
+    }
+    double total = 0;
+    for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
+      const Material& m = material(material_[t]);
+      const double share = m.density * m.thickness * norm(area_vector_[t]) / 3;
+      total += 3 * share;
+      for (const std::uint32_t corner : surface_.triangles[t]) {
+        Node& n = model_.nodes[corner];
+        n.mass += share;
+        if (n.material < 0)
+          n.material = material_[t]; // of its first triangle
+      }
+    }
+    if (!options_.mass && !(total > 0 && std::isfinite(total)))
+      throw Error(total == 0 ? "the surface has no area, expected some"
+                             : "the surface's mass is not finite, expected smaller coordinates");
+    const double floor = lightest_node * total / static_cast<double>(model_.nodes.size());
+    for (Node& n : model_.nodes) {
+      if (options_.mass) {
+        n.mass = *options_.mass;
+      } else if (n.mass < floor) {
+        n.mass = floor;
+        ++report_.light_nodes;
+      }
+      n.drag = options_.drag_rate * n.mass;
+    }
+  }
+
+  /// c = 2 ζ √(k μ): ζ is the damping ratio of the two masses on this spring alone.
+  double damping(const Node& a, const Node& b, double stiffness) const {
+    const double ratio =
+        (material(a.material).damping_ratio + material(b.material).damping_ratio) / 2;
+    const double mass = a.fixed == fixed_all   ? b.mass
+                        : b.fixed == fixed_all ? a.mass
+                        : a.mass + b.mass > 0  ? a.mass * (b.mass / (a.mass + b.mass))
+                                               : 0;
+    return 2 * ratio * std::sqrt(stiffness * mass);
+  }
+
+  Spring spring(std::uint32_t i, std::uint32_t j, SpringKind kind, double stiffness) const {
+    const Node &a = model_.nodes[i], &b = model_.nodes[j];
+    return {i, j, kind, stiffness, damping(a, b, stiffness), norm(b.position - a.position)};
+  }
+
+  double edge_stiffness(std::size_t edge) const {
+    if (options_.stiffness)
+      return *options_.stiffness;
+    const auto [i, j] = surface_.edges.ends[edge];
+    const Vec3 d = point(j) - point(i);
+    double sum = 0; // E h A
+    for (const std::uint32_t corner : surface_.edges.around(edge)) {
+      const Material& m = material(material_[corner / 3]);
+      sum += m.young * m.thickness * norm(area_vector_[corner / 3]);
+    }
+    return sum / dot(d, d);
+  }
+
+  void edge_springs() {
+    const EdgeTable& edges = surface_.edges;
+    std::vector<Spring> springs(edges.size());
+    parallel_blocks(context_, edges.size(), 8192, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t e = begin; e < end; ++e) {
+        const auto [i, j] = edges.ends[e];
+        const Vec3 d = point(j) - point(i);
+        if (dot(d, d) > 0)
+          springs[e] = spring(i, j, SpringKind::edge, edge_stiffness(e));
+      }
+    });
+    const auto kept =
+        std::remove_if(springs.begin(), springs.end(), [](const Spring& s) { return s.i == s.j; });
+    report_.zero_length_edges = static_cast<std::size_t>(springs.end() - kept);
+    springs.erase(kept, springs.end());
+    for (const Spring& s : springs)
+      report_.slack_springs += s.stiffness == 0 ? 1 : 0;
+    model_.springs = std::move(springs);
+  }
+
+  std::vector<Spring> bending_springs() const {
+    const EdgeTable& edges = surface_.edges;
+    using Across = std::array<std::uint32_t, 3>; // node, node, edge between
+    std::vector<Across> across;
+    for (std::uint32_t e = 0; e < edges.size(); ++e) {
+      const auto around = edges.around(e);
+      if (around.size() != 2)
+        continue;
+      const std::uint32_t a = surface_.triangles[around[0] / 3][around[0] % 3];
+      const std::uint32_t b = surface_.triangles[around[1] / 3][around[1] % 3];
+      across.push_back({std::min(a, b), std::max(a, b), e});
+    }
+    std::sort(across.begin(), across.end());
+    std::vector<Spring> springs;
+    std::size_t next = 0; // edge, for the merge
+    for (std::size_t n = 0; n < across.size(); ++n) {
+      const auto [i, j, edge] = across[n];
+      const std::array<std::uint32_t, 2> ends{i, j};
+      if (n > 0 && across[n - 1][0] == i && across[n - 1][1] == j)
+        continue;
+      while (next < edges.size() && edges.ends[next] < ends)
+        ++next;
+      if (next < edges.size() && edges.ends[next] == ends)
+        continue;
+      const Vec3 d = point(j) - point(i),
+                 crossed = point(edges.ends[edge][1]) - point(edges.ends[edge][0]);
+      if (!(dot(d, d) > 0 && dot(crossed, crossed) > 0))
+        continue;
+      springs.push_back(
+          spring(i, j, SpringKind::bend, options_.bend_factor * edge_stiffness(edge)));
+    }
+    return springs;
+  }
+
+  /// Appends the central nodes; returns the springs to them.
+  std::vector<Spring> central_nodes() {
+    const std::size_t surface_nodes = model_.nodes.size();
+    const Components parts = components(model_);
+    std::vector<std::size_t> first(parts.count + std::size_t{1});
+    for (std::size_t i = 0; i < surface_nodes; ++i)
+      ++first[parts.of_node[i] + std::size_t{1}];
+    for (std::size_t c = 0; c < parts.count; ++c)
+      first[c + 1] += first[c];
+    std::vector<std::uint32_t> member(surface_nodes);
+    std::vector<std::size_t> fill(first.begin(), first.end() - 1);
+    for (std::uint32_t i = 0; i < surface_nodes; ++i)
+      member[fill[parts.of_node[i]]++] = i;
+
+    std::vector<double> reach(surface_nodes); // of a node's cluster, squared
+    std::vector<Vec3> points;
+    for (std::size_t c = 0; c < parts.count; ++c) {
+      points.clear();
+      for (std::size_t m = first[c]; m < first[c + 1]; ++m)
+        points.push_back(model_.nodes[member[m]].position);
+      // A center with a single node would coincide with it, hence two nodes per center at least.
+      const std::size_t most = std::max<std::size_t>(1, points.size() / 2);
+      const std::size_t wanted =
+          std::min<std::size_t>(static_cast<std::size_t>(options_.centrals), most);
+      add_cluster_nodes(cluster_points(points, wanted, context_), points,
+                        {member.data() + first[c], points.size()}, reach);
+    }
+    return central_springs(surface_nodes, reach);
+  }
+
+  void add_cluster_nodes(const Clusters& clusters, const std::vector<Vec3>& points,
+                         std::span<const std::uint32_t> member, std::vector<double>& reach) {
+    const std::size_t base = model_.nodes.size();
+    std::vector<double> farthest(clusters.centers.size());
+    for (const Vec3& center : clusters.centers) {
+      Node n;
+      n.position = center;
+      n.fixed = options_.centrals_free ? fixed_none : fixed_all;
+      n.material = -1;
+      model_.nodes.push_back(n);
+    }
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      const std::uint32_t c = clusters.of_point[p];
+      Node& node = model_.nodes[member[p]];
+      Node& center = model_.nodes[base + c];
+      node.central = static_cast<std::int32_t>(base + c);
+      // In proportion to its springs, so that a free center is as quick as a surface node.
+      center.mass += options_.central_factor * node.mass;
+      if (center.material < 0)
+        center.material = node.material;
+      const Vec3 d = points[p] - center.position;
+      farthest[c] = std::max(farthest[c], dot(d, d));
+    }
+    for (std::size_t p = 0; p < points.size(); ++p)
+      reach[member[p]] = farthest[clusters.of_point[p]];
+    for (std::size_t c = base; c < model_.nodes.size(); ++c)
+      model_.nodes[c].drag = options_.drag_rate * model_.nodes[c].mass;
+  }
+
+  std::vector<Spring> central_springs(std::size_t surface_nodes,
+                                      const std::vector<double>& reach) const {
+    std::vector<double> sum(surface_nodes);
+    std::vector<std::uint32_t> count(surface_nodes);
+    for (const Spring& s : model_.springs)
+      for (const std::uint32_t i : {s.i, s.j}) {
+        sum[i] += s.stiffness;
+        ++count[i];
+      }
+    std::vector<Spring> springs;
+    springs.reserve(surface_nodes);
+    for (std::uint32_t i = 0; i < surface_nodes; ++i) {
+      const auto center = static_cast<std::uint32_t>(model_.nodes[i].central);
+      const Vec3 d = model_.nodes[center].position - model_.nodes[i].position;
+      if (!(dot(d, d) > same_place * same_place * reach[i]))
+        continue;
+      const double mean = count[i] > 0 ? sum[i] / count[i] : 0;
+      springs.push_back(spring(i, center, SpringKind::central, options_.central_factor * mean));
+    }
+    return springs;
+  }
+
+  void normals() {
+    model_.normals.resize(model_.nodes.size());
+    for (std::size_t t = 0; t < surface_.triangles.size(); ++t)
+      for (const std::uint32_t corner : surface_.triangles[t])
+        model_.normals[corner] += area_vector_[t];
+    for (Vec3& n : model_.normals) {
+      const double length = norm(n);
+      n = length > 0 ? n / length : Vec3{};
+    }
+  }
+
+  void texture_coordinates() {
+    if (mesh_.texcoords.empty())
+      return;
+    model_.texcoords.resize(surface_.face_of_triangle.size());
+    parallel_blocks(
+        context_, model_.texcoords.size(), 4096, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t t = begin; t < end; ++t) {
+            const auto& from = mesh_.texcoords[surface_.face_of_triangle[t]];
+            std::transform(from.begin(), from.end(), model_.texcoords[t].begin(), decimal);
+          }
+        });
+  }
+
+  const Vec3& point(std::uint32_t node) const { return mesh_.points[surface_.point_of_node[node]]; }
+
+  const TriangleMesh& mesh_;
+  const BuildOptions& options_;
+  Context context_;
+  Surface surface_;
+  std::vector<Vec3> area_vector_;      ///< per triangle, mm²
+  std::vector<std::int32_t> material_; ///< per triangle
+  Model model_;
+  BuildReport report_;
+};
+
+} // namespace
+
+BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
+                       const Context& context) {
+  return Builder(mesh, options, context).build();
+}
+
+} // namespace gewebe

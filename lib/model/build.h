@@ -1,0 +1,67 @@
+#pragma once
+// A deformable model from a triangle mesh (report 3.1.3; DESIGN of exp2ela).
+
+#include "base/context.h"
+#include "base/mesh.h"
+#include "model/material.h"
+#include "model/model.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace gewebe {
+
+struct BuildOptions {
+  MaterialChoice material{{material_preset("generic")}, {}};
+  std::optional<double> stiffness; ///< of every edge spring, g/s²; else from Young's modulus
+  std::optional<double> mass;      ///< of every surface node, g; else density × thickness × area
+  double drag_rate = 1;            ///< drag of a node per mass, 1/s
+  bool bend = false;               ///< springs across edges
+  double bend_factor = 0.1;        ///< their stiffness over that of the edge they cross
+  std::int64_t centrals = 4;       ///< central nodes per component, 0 or more
+  double central_factor =
+      0.1; ///< stiffness of a central spring over the mean of its node's edge springs
+  bool centrals_free = false; ///< else they can't move
+  bool normals = false;       ///< area-weighted vertex normals
+};
+
+/// What had to be left out or mended, and what the mesh is like.
+struct BuildReport {
+  std::size_t isolated_points = 0;   ///< points of no face: left out
+  std::size_t degenerate_faces = 0;  ///< faces with two equal corners: left out
+  std::size_t duplicate_faces = 0;   ///< faces with the same corners as an earlier one: left out
+  std::size_t zero_length_edges = 0; ///< edges between different points at one place: no spring
+  std::size_t light_nodes = 0;       ///< nodes raised to 1/1000 of the mean mass
+  std::size_t slack_springs = 0;     ///< edge springs with stiffness 0, between faces without area
+  std::size_t boundary_edges = 0;    ///< edges of one face
+  std::size_t nonmanifold_edges = 0; ///< edges of more than two faces
+};
+
+struct BuiltModel {
+  Model model;
+  BuildReport report;
+};
+
+/// Nodes are the mesh's points in its order, then central nodes. Edge springs are the mesh's unique
+/// edges with k = E h ΣA / l² summed over their faces (Van Gelder 1998), bending springs join the
+/// corners opposite an edge of two faces where no edge joins them, central springs tie each node to
+/// the nearest central node of its component. Rest lengths are distances. A spring damps with c = 2
+/// ζ √(k μ), μ = m_i m_j / (m_i + m_j), ζ the mean of its nodes' materials. The same result for any
+/// number of threads. \pre check_mesh(mesh) passes   \throw Error if there is no usable triangle or
+/// a result is not finite; Cancelled
+BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
+                       const Context& context);
+
+/// Places for at most `count` central nodes for these points, and the nearest of them for each
+/// point: seeds by farthest points, the first the one farthest from the mean, then Lloyd's
+/// iteration until nothing changes or for 100 rounds. Ties go to the lowest index. No place is
+/// without a point.
+struct Clusters {
+  std::vector<Vec3> centers;
+  std::vector<std::uint32_t> of_point;
+};
+Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, const Context& context);
+
+} // namespace gewebe

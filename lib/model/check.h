@@ -1,0 +1,42 @@
+#pragma once
+// The invariants of model.h, checked element by element while a model is being filled.
+
+#include "model/model.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+/// Sections must be given in the order of ELA_EXPL. Each call checks element `i` of that section,
+/// which must already be in the model, against everything before it. Every call throws Error
+/// without a place.
+class ModelChecker {
+public:
+  explicit ModelChecker(const Model& model) : model_(model) {}
+
+  void name() const;
+  void material(std::size_t i) const;
+  /// Before the first node: `count` nodes will come, and indices are held against that.
+  void begin_nodes(std::size_t count);
+  void node(std::size_t i);
+  /// After the last node.
+  void all_nodes() const;
+  void normal(std::size_t i) const;
+  void spring(std::size_t i);
+  void triangle(std::size_t i) const;
+  void texcoord(std::size_t i) const;
+  void tetrahedron(std::size_t i) const;
+
+private:
+  void corners(const std::uint32_t* index, int count) const;
+
+  const Model& model_;
+  std::size_t node_count_ = 0;
+  std::size_t first_central_ = 0; ///< node_count_ while there is none
+  std::vector<bool> named_;       ///< per node: some node's central
+  std::size_t merge_ = 0;         ///< first edge spring not below the last bending spring
+};
+
+} // namespace gewebe

@@ -1,0 +1,29 @@
+#pragma once
+// Materials by name, with values from the literature.
+
+#include "model/model.h"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+/// The presets: generic, liver, gallbladder, uterus.
+const std::vector<Material>& material_presets();
+
+/// \throw Error naming the presets, if there is none of that name
+Material material_preset(std::string_view name);
+
+/// The materials of a mesh in parts.
+struct MaterialChoice {
+  std::vector<Material> materials;
+  std::vector<std::int32_t> of_part; ///< material of part p; of all further parts: 0
+};
+
+/// Understands "NAME" and, after it or alone, "PART=NAME", separated by commas:
+/// "liver,2=gallbladder". Parts that are not named get NAME, or generic. \throw Error
+MaterialChoice parse_material_choice(std::string_view text);
+
+} // namespace gewebe

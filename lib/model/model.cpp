@@ -1,0 +1,198 @@
+#include "model/model.h"
+
+#include "base/digest.h"
+#include "base/error.h"
+#include "model/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string_view>
+
+namespace gewebe {
+
+namespace {
+
+template <class Check>
+void check_each(const char* what, std::size_t count, Check&& check) {
+  for (std::size_t i = 0; i < count; ++i) {
+    try {
+      check(i);
+    } catch (const Error& error) {
+      throw Error(std::string(what) + " " + std::to_string(i) + ": " + error.what());
+    }
+  }
+}
+
+void require_size(const char* what, std::size_t size, std::size_t expected) {
+  if (size != 0 && size != expected)
+    throw Error(std::to_string(size) + " " + what + ", expected " + std::to_string(expected));
+}
+
+} // namespace
+
+void check_model(const Model& model) {
+  ModelChecker checker(model);
+  checker.name();
+  check_each("material", model.materials.size(), [&](std::size_t i) { checker.material(i); });
+  checker.begin_nodes(model.nodes.size());
+  check_each("node", model.nodes.size(), [&](std::size_t i) { checker.node(i); });
+  checker.all_nodes();
+  require_size("normals", model.normals.size(), model.nodes.size());
+  check_each("normal", model.normals.size(), [&](std::size_t i) { checker.normal(i); });
+  check_each("spring", model.springs.size(), [&](std::size_t i) { checker.spring(i); });
+  check_each("triangle", model.triangles.size(), [&](std::size_t i) { checker.triangle(i); });
+  require_size("texcoords", model.texcoords.size(), model.triangles.size());
+  check_each("texcoord", model.texcoords.size(), [&](std::size_t i) { checker.texcoord(i); });
+  check_each("tetrahedron", model.tetrahedra.size(),
+             [&](std::size_t i) { checker.tetrahedron(i); });
+}
+
+std::size_t surface_count(const Model& model) {
+  std::size_t first = model.nodes.size();
+  for (const Node& n : model.nodes)
+    if (n.central >= 0)
+      first = std::min(first, static_cast<std::size_t>(n.central));
+  return first;
+}
+
+std::size_t spring_count(const Model& model, SpringKind kind) {
+  // Springs are sorted by kind.
+  const auto before = [](const Spring& s, SpringKind k) { return s.kind < k; };
+  const auto behind = [](SpringKind k, const Spring& s) { return k < s.kind; };
+  const auto begin = std::lower_bound(model.springs.begin(), model.springs.end(), kind, before);
+  return static_cast<std::size_t>(std::upper_bound(begin, model.springs.end(), kind, behind) -
+                                  begin);
+}
+
+Components components(const Model& model) {
+  // Union-find whose roots are the smallest nodes of their trees.
+  std::vector<std::uint32_t> parent(model.nodes.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i)
+      i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const Spring& s : model.springs) {
+    if (s.kind != SpringKind::edge)
+      break;
+    const std::uint32_t a = root(s.i), b = root(s.j);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  Components result;
+  result.of_node.resize(model.nodes.size());
+  const std::size_t surface = surface_count(model);
+  for (std::uint32_t i = 0; i < surface; ++i) {
+    const std::uint32_t r = root(i);
+    result.of_node[i] = r == i ? result.count++ : result.of_node[r];
+  }
+  std::vector<bool> named(model.nodes.size());
+  for (std::size_t i = 0; i < surface; ++i) {
+    if (model.nodes[i].central < 0)
+      continue;
+    const auto central = static_cast<std::size_t>(model.nodes[i].central);
+    if (!named[central])
+      result.of_node[central] = result.of_node[i];
+    named[central] = true;
+  }
+  return result;
+}
+
+double total_mass(const Model& model) {
+  const std::size_t surface = surface_count(model);
+  double sum = 0;
+  for (std::size_t i = 0; i < surface; ++i)
+    sum += model.nodes[i].mass;
+  return sum;
+}
+
+double safe_step(const Model& model) {
+  std::vector<double> stiffness(model.nodes.size()), damping(model.nodes.size());
+  for (const Spring& s : model.springs) {
+    stiffness[s.i] += 2 * s.stiffness;
+    stiffness[s.j] += 2 * s.stiffness;
+    damping[s.i] += 2 * s.damping;
+    damping[s.j] += 2 * s.damping;
+  }
+  double omega2 = 0, gamma = 0;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    const Node& n = model.nodes[i];
+    const double brake = damping[i] + n.drag;
+    if (n.fixed == fixed_all || (stiffness[i] == 0 && brake == 0))
+      continue;
+    omega2 = std::max(omega2, stiffness[i] / n.mass);
+    if (brake > 0)
+      gamma = std::max(gamma, brake / n.mass);
+  }
+  if (omega2 == 0 && gamma == 0)
+    return HUGE_VAL;
+  // The same as (√(γ² + 4ω²) - γ)/ω², without its cancellation and its 0/0 at ω = 0.
+  return 4 / (std::sqrt(gamma * gamma + 4 * omega2) + gamma);
+}
+
+std::string model_digest(const Model& model) {
+  Digest digest;
+  const auto add_name = [&](const std::string& name) {
+    digest.add(static_cast<std::uint64_t>(name.size()));
+    digest.add_bytes(name.data(), name.size());
+  };
+  const auto add_count = [&](std::size_t count) { digest.add(static_cast<std::uint64_t>(count)); };
+  const auto add_values = [&](auto... value) {
+    const double values[]{static_cast<double>(value)...};
+    digest.add_bytes(values, sizeof values);
+  };
+  add_name(model.name);
+  add_count(model.materials.size());
+  for (const Material& m : model.materials) {
+    add_name(m.name);
+    add_values(m.density, m.young, m.thickness, m.damping_ratio);
+  }
+  // Indices fit a double exactly, which makes each record one block without padding.
+  add_count(model.nodes.size());
+  for (const Node& n : model.nodes)
+    add_values(n.position.x, n.position.y, n.position.z, n.mass, n.drag, n.fixed, n.central,
+               n.material);
+  add_count(model.normals.size());
+  for (const Vec3& n : model.normals)
+    add_values(n.x, n.y, n.z);
+  add_count(model.springs.size());
+  for (const Spring& s : model.springs)
+    add_values(s.i, s.j, static_cast<int>(s.kind), s.stiffness, s.damping, s.rest);
+  add_count(model.triangles.size());
+  digest.add(model.triangles);
+  add_count(model.texcoords.size());
+  digest.add(model.texcoords);
+  add_count(model.tetrahedra.size());
+  digest.add(model.tetrahedra);
+  return digest.hex();
+}
+
+TriangleMesh surface_mesh(const Model& model) {
+  TriangleMesh mesh;
+  const std::size_t surface = surface_count(model);
+  mesh.points.reserve(surface);
+  for (std::size_t i = 0; i < surface; ++i)
+    mesh.points.push_back(model.nodes[i].position);
+  mesh.triangles = model.triangles;
+  if (!model.normals.empty()) {
+    mesh.normals.reserve(surface);
+    for (std::size_t i = 0; i < surface; ++i) {
+      const Vec3& n = model.normals[i];
+      mesh.normals.push_back(
+          {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+    }
+  }
+  mesh.texcoords.reserve(model.texcoords.size());
+  for (const auto& t : model.texcoords) {
+    std::array<float, 6>& to = mesh.texcoords.emplace_back();
+    std::transform(t.begin(), t.end(), to.begin(),
+                   [](double value) { return static_cast<float>(value); });
+  }
+  if (model.materials.size() > 1)
+    for (const Triangle& t : model.triangles)
+      mesh.material.push_back(model.nodes[t[0]].material);
+  return mesh;
+}
+
+} // namespace gewebe

@@ -1,0 +1,125 @@
+#pragma once
+// The deformable model: point masses, springs and triangles (report 3.1.3, object type ELA_EXPL).
+//
+// Units are mm, g, s: stiffness g/s² (1e-3 N/m), damping and drag g/s, stress Pa.
+//
+// Nodes 0 … S-1 are those of the surface (and of the interior, where there are tetrahedra), in mesh
+// order; nodes S … N-1 are central nodes, to which surface nodes are tied so that the object moves
+// and turns as a whole. Invariants, which `check_model` verifies:
+//   - there is a material and a node; every number is finite; names hold no `"`, `#` or control
+//   character
+//   - density, thickness > 0; young, damping ratio, mass, drag, stiffness, damping, rest >= 0
+//   - a node's material exists; its central is -1 or the index of a node behind it; every node from
+//   the
+//     first one so named to the last is named, and its own central is -1
+//   - `normals`, `texcoords`, `tetrahedra` are empty or complete: one normal per node (0 for
+//   central
+//     nodes), six coordinates per triangle
+//   - a spring has i < j, springs ascend strictly by (kind, i, j), no pair occurs under two kinds,
+//   and
+//     its ends are at different places; a spring of kind central joins a node to its own central
+//     node, the other kinds join no central node
+//   - triangles and tetrahedra have different corners, none of them a central node
+
+#include "base/mesh.h"
+#include "base/vec3.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+struct Material {
+  std::string name;
+  double density = 1e-3;      ///< g/mm³
+  double young = 1e4;         ///< Young's modulus, Pa
+  double thickness = 1;       ///< of the wall that the surface stands for, mm
+  double damping_ratio = 0.2; ///< of a spring with its two masses; 1 is critical
+
+  bool operator==(const Material&) const = default;
+};
+
+/// Axes along which a node can't move, as a set.
+enum FixedAxes : std::uint8_t {
+  fixed_none = 0,
+  fixed_x = 1,
+  fixed_y = 2,
+  fixed_z = 4,
+  fixed_all = 7
+};
+
+struct Node {
+  Vec3 position;             ///< at rest, mm
+  double mass = 0;           ///< g
+  double drag = 0;           ///< force is -drag · velocity, g/s
+  std::uint8_t fixed = 0;    ///< set of FixedAxes
+  std::int32_t central = -1; ///< the central node that it belongs to, or -1
+  std::int32_t material = 0;
+
+  bool operator==(const Node&) const = default;
+};
+
+enum class SpringKind : std::uint8_t { edge, bend, central };
+
+/// Pulls i towards j with stiffness (l - rest) + damping d(l)/dt.
+struct Spring {
+  std::uint32_t i = 0, j = 0; ///< i < j
+  SpringKind kind = SpringKind::edge;
+  double stiffness = 0; ///< g/s²
+  double damping = 0;   ///< g/s
+  double rest = 0;      ///< mm
+
+  bool operator==(const Spring&) const = default;
+};
+
+using Tetrahedron = std::array<std::uint32_t, 4>;
+
+struct Model {
+  std::string name;
+  std::vector<Material> materials;
+  std::vector<Node> nodes;
+  std::vector<Vec3> normals; ///< optional, one per node
+  std::vector<Spring> springs;
+  std::vector<Triangle> triangles;              ///< counter-clockwise seen from outside
+  std::vector<std::array<double, 6>> texcoords; ///< optional, per triangle s0 t0 s1 t1 s2 t2
+  std::vector<Tetrahedron> tetrahedra;          ///< optional
+
+  bool operator==(const Model&) const = default;
+};
+
+/// \throw Error naming the first element that breaks an invariant of this header
+void check_model(const Model& model);
+
+/// Number S of the nodes that are no central nodes. \pre the invariants hold
+std::size_t surface_count(const Model& model);
+
+/// Springs of one kind. \pre the invariants hold
+std::size_t spring_count(const Model& model, SpringKind kind);
+
+/// The part of each node: nodes joined by springs of kind edge share one, numbered from 0 by their
+/// smallest node; a central node has the part of the first node that it is named by.
+struct Components {
+  std::vector<std::uint32_t> of_node;
+  std::uint32_t count = 0;
+};
+Components components(const Model& model);
+
+/// Sum of the masses of the surface nodes, g.
+double total_mass(const Model& model);
+
+/// Largest stable step in s of semi-implicit Euler with explicit damping, for the model at rest:
+/// (√(γ² + 4ω²) - γ)/ω² with ω² = max Σ 2k/m and γ = max (Σ 2c + d)/m over the nodes that may move.
+/// Infinite where nothing pulls or brakes, 0 where a movable node with springs has no mass.
+double safe_step(const Model& model);
+
+/// XXH3-64 of the whole model in file order, 16 hexadecimal digits.
+std::string model_digest(const Model& model);
+
+/// The triangles of the model over its surface nodes (same indices), with normals and texture
+/// coordinates where it has them, and face materials where it has several.
+TriangleMesh surface_mesh(const Model& model);
+
+} // namespace gewebe
