@@ -507,8 +507,9 @@ double voxelize_bytes(const TriangleMesh& mesh, const GridTransform& transform, 
   const double fine_rows = std::fmin(64, 8 * samples), slabs = extent.box.size().x / 8 + 1;
   const double crossings_at_once =
       extent.area * samples * samples / slabs * fine_rows / (8 * samples);
-  return cells(leaf_dim) * leaf_bytes + cells(128) * node_bytes + solid_nodes * 40 + 200 * slabs +
-         (samples == 1 ? 0 : 64 * crossings_at_once) +
+  const double top_bytes = 32768 * 8.25; // a node of 4096³ voxels, one for each octant at least
+  return cells(leaf_dim) * leaf_bytes + cells(128) * node_bytes + cells(4096) * top_bytes +
+         solid_nodes * 40 + 200 * slabs + (samples == 1 ? 0 : 64 * crossings_at_once) +
          60.0 * static_cast<double>(mesh.points.size() + mesh.triangles.size());
 }
 
