@@ -55,7 +55,8 @@ struct CellCase {
 /// inside corners. The segments close to loops; a loop is triangulated without further vertices and
 /// without a diagonal that lies in a face (the neighbour might draw the same one, and four
 /// triangles would share it). Among such triangulations the one with the best worst triangle at
-/// mid-edge crossings is taken.
+/// mid-edge crossings is taken. That choice matters to snapping: of 200 scenes of five metaballs at
+/// 32³ and epsilon 0.15, naive snapping broke 4, but 169 with the first triangulation.
 const std::array<CellCase, 256>& marching_cubes_table();
 
 } // namespace gewebe

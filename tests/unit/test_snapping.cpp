@@ -1,0 +1,187 @@
+#include "surface/snapping.h"
+
+#include "base/error.h"
+#include "tests/unit/surface_scenes.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <string>
+
+namespace gewebe {
+namespace {
+
+using namespace scenes;
+using Place = SnapOptions::Place;
+
+constexpr std::array<double, 7> epsilons{0, 0.05, 0.15, 0.25, 0.35, 0.45, 0.5};
+
+/// Snaps one scene at every epsilon; each mesh must be sound and of the same topology.
+void check_scene(const Grid& grid, const std::string& name) {
+  const IsoSurface surface = marching_cubes({}, grid);
+  const MeshReport before = examine_mesh(surface.mesh);
+  for (const double epsilon : epsilons) {
+    const SnapResult result = snap({}, surface, {epsilon, Place::mean});
+    const MeshReport after = examine_mesh(result.mesh);
+    EXPECT_TRUE(keeps_topology(before, after)) << name << ", epsilon " << epsilon;
+    EXPECT_EQ(result.report.points_after, after.points);
+    EXPECT_EQ(result.report.triangles_after, after.triangles);
+    EXPECT_EQ(result.report.points_before, before.points);
+    EXPECT_EQ(result.report.triangles_before, before.triangles);
+    EXPECT_EQ(result.report.zero_area, after.zero_area_faces);
+    EXPECT_EQ(snap({}, surface, {epsilon, Place::corner}).mesh.triangles, result.mesh.triangles);
+  }
+}
+
+TEST(Snapping, KeepsTopologyOfMetaballs) {
+  for (std::uint32_t seed = 0; seed < 30; ++seed)
+    check_scene(metaballs(16 + 4 * static_cast<int>(seed % 4), seed),
+                "metaballs " + std::to_string(seed));
+}
+
+TEST(Snapping, KeepsTopologyOfWhiteNoise) {
+  for (std::uint32_t seed = 0; seed < 60; ++seed)
+    check_scene(noise(12, seed), "noise " + std::to_string(seed));
+}
+
+TEST(Snapping, KeepsTopologyOfQuantisedNoise) {
+  for (std::uint32_t seed = 0; seed < 60; ++seed)
+    check_scene(noise(12, 1000 + seed, 2 + static_cast<int>(seed % 7)),
+                "quantised noise " + std::to_string(seed));
+}
+
+TEST(Snapping, NaiveSnappingBreaksTheMesh) {
+  // Negative control of the three tests above: the same check fails for the report's method.
+  const auto broken = [](const Grid& grid, double epsilon) {
+    const IsoSurface surface = marching_cubes({}, grid);
+    return !keeps_topology(examine_mesh(surface.mesh),
+                           examine_mesh(snap_naively(surface, epsilon)));
+  };
+  int noises = 0, balls = 0;
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    noises += broken(noise(12, seed), 0.15) ? 1 : 0;
+    balls += broken(metaballs(32, seed), 0.45) ? 1 : 0;
+  }
+  EXPECT_EQ(noises, 20);
+  EXPECT_GT(balls, 0); // few, because the table's diagonals avoid fins
+}
+
+TEST(Snapping, HardCells) {
+  const char* shared = std::getenv("GEWEBE_SHARED");
+  std::ifstream file(std::string(shared ? shared : "../shared") + "/data/mcpro_cells.json");
+  if (!file)
+    GTEST_SKIP() << "no mcpro_cells.json";
+  const nlohmann::json cells = nlohmann::json::parse(file);
+  EXPECT_EQ(cells.size(), 64U);
+  for (const auto& [name, cell] : cells.items()) {
+    const auto values = cell.at("values").get<std::vector<float>>();
+    ASSERT_EQ(values.size(), 8U);
+    GridInfo info; // the cell across a leaf border, outside all round
+    info.background = -*std::ranges::max_element(values, {}, [](float v) { return std::abs(v); });
+    info.isovalue = 0;
+    check_scene(sample(info, {7, 7, 7}, {8, 8, 8},
+                       [&](int i, int j, int k) {
+                         return values[static_cast<std::size_t>(4 * (k - 7) + 2 * (j - 7) + i - 7)];
+                       }),
+                name);
+  }
+}
+
+TEST(Snapping, EpsilonZeroJoinsPointsOnACorner) {
+  // A corner with the isovalue itself: its neighbours' crossings all lie on it.
+  GridInfo info;
+  info.isovalue = 0.5;
+  const Grid grid = sample(info, {0, 0, 0}, {8, 8, 8}, [](int i, int j, int k) {
+    return i == 4 && j == 4 && k == 4 ? 0.5 : i + j + k < 12 ? 1.0 : 0.0;
+  });
+  const IsoSurface surface = marching_cubes({}, grid);
+  const SnapResult result = snap({}, surface, {.epsilon = 0});
+  std::set<std::array<double, 3>> places;
+  for (const Vec3& p : result.mesh.points)
+    EXPECT_TRUE(places.insert({p.x, p.y, p.z}).second) << "two points at one place";
+  EXPECT_LT(result.mesh.points.size(), surface.mesh.points.size());
+  EXPECT_EQ(result.report.zero_area, 0U);
+}
+
+TEST(Snapping, EpsilonZeroLeavesAGenericMeshAlone) {
+  const IsoSurface surface = marching_cubes({}, metaballs(24, 2));
+  const SnapResult result = snap({}, surface, {.epsilon = 0});
+  EXPECT_EQ(result.mesh.points, surface.mesh.points);
+  EXPECT_EQ(result.mesh.triangles, surface.mesh.triangles);
+}
+
+TEST(Snapping, ReducesLinearlyWithEpsilon) {
+  // Report, figure 3-3: the rate is almost proportional to epsilon, about 0.887 epsilon.
+  double points = 0, points_left = 0, triangles = 0, triangles_left = 0;
+  for (std::uint32_t seed = 0; seed < 6; ++seed) {
+    const IsoSurface surface = marching_cubes({}, metaballs(48, seed));
+    const SnapReport report = snap({}, surface, {.epsilon = 0.15}).report;
+    points += static_cast<double>(report.points_before);
+    points_left += static_cast<double>(report.points_after);
+    triangles += static_cast<double>(report.triangles_before);
+    triangles_left += static_cast<double>(report.triangles_after);
+  }
+  EXPECT_NEAR(1 - points_left / points, 0.887 * 0.15, 0.012);
+  EXPECT_NEAR(1 - triangles_left / triangles, 0.887 * 0.15, 0.012);
+}
+
+TEST(Snapping, PointsStayNear) {
+  const IsoSurface surface = marching_cubes({}, metaballs(40, 4));
+  const std::vector<Ball> balls = five_balls(40, 4);
+  const auto worst = [&](const SnapOptions& options) {
+    double largest = 0;
+    for (const Vec3& p : snap({}, surface, options).mesh.points)
+      largest = std::max(largest, std::abs(density(balls, p) - 0.5));
+    return largest;
+  };
+  const double unsnapped = worst({.epsilon = 0});
+  EXPECT_LT(worst({0.15, Place::mean}), 2 * unsnapped);
+  EXPECT_GT(worst({0.15, Place::corner}), 2 * worst({0.15, Place::mean})); // the report's steps
+}
+
+TEST(Snapping, CornerPlacesPointsOnTheLattice) {
+  const IsoSurface surface = marching_cubes({}, metaballs(24, 7));
+  const auto on_lattice = [&](Place place) {
+    std::size_t count = 0;
+    for (const Vec3& p : snap({}, surface, {0.5, place}).mesh.points)
+      count += p.x == std::floor(p.x) && p.y == std::floor(p.y) && p.z == std::floor(p.z) ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(on_lattice(Place::corner), snap({}, surface, {0.5, Place::corner}).mesh.points.size());
+  EXPECT_LT(on_lattice(Place::mean), 20U);
+}
+
+TEST(Snapping, TinyComponentsSurvive) {
+  // One voxel just above the isovalue: all six crossings in one cluster; a tetrahedron must remain.
+  const IsoSurface surface =
+      marching_cubes({}, sample({}, {3, 3, 3}, {3, 3, 3}, [](int, int, int) { return 0.5001; }));
+  const SnapResult result = snap({}, surface, {.epsilon = 0.15, .place = Place::corner});
+  EXPECT_EQ(result.mesh.points.size(), 4U);
+  EXPECT_EQ(result.mesh.triangles.size(), 4U);
+  EXPECT_EQ(result.report.refused, 6U);
+  EXPECT_EQ(result.report.zero_area, 4U);
+  EXPECT_EQ(result.report.corners, 1U);
+}
+
+TEST(Snapping, EmptySurface) {
+  const SnapResult result = snap({}, IsoSurface{}, {});
+  EXPECT_TRUE(result.mesh.points.empty());
+  EXPECT_EQ(result.report.points_before, 0U);
+}
+
+TEST(Snapping, RefusesEpsilonOutOfRange) {
+  const IsoSurface surface = marching_cubes({}, metaballs(16, 1));
+  for (const double epsilon : {-0.01, 0.51, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(snap({}, surface, {.epsilon = epsilon}), Error);
+  Context small;
+  small.max_memory = 1000;
+  EXPECT_THROW(snap(small, surface, {}), Error);
+}
+
+} // namespace
+} // namespace gewebe
