@@ -16,7 +16,6 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::array<std::string_view, 8> axes_words{"-", "x", "y", "xy", "z", "xz", "yz", "xyz"};
 constexpr std::string_view kind_letters = "ebc";
 
 // ---------------------------------------------------------------- reading
@@ -374,10 +373,10 @@ private:
 
   std::uint8_t fixed_axes() {
     const std::string_view word = in_.word();
-    const auto* const found = std::find(axes_words.begin(), axes_words.end(), word);
-    if (found == axes_words.end())
+    const std::optional<std::uint8_t> fixed = fixed_axes_from_name(word);
+    if (!fixed)
       throw Error(shown(word) + " is no set of axes, expected -, x, y, z, xy, xz, yz or xyz");
-    return static_cast<std::uint8_t>(found - axes_words.begin());
+    return *fixed;
   }
 
   Reader in_;
@@ -460,7 +459,7 @@ void emit_model(const Sink& sink, const Model& m, const Context& context) {
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
     const Node& n = m.nodes[i];
-    line.vector(n.position).number(n.mass).number(n.drag).word(axes_words.at(n.fixed));
+    line.vector(n.position).number(n.mass).number(n.drag).word(fixed_axes_name(n.fixed));
     line.number(n.central).number(n.material).end();
   });
   if (!m.normals.empty())

@@ -402,8 +402,23 @@ private:
 
 } // namespace
 
+std::vector<BuildReport::Line> BuildReport::lines() const {
+  return {{"isolated_points", isolated_points, "points without a face were left out"},
+          {"degenerate_faces", degenerate_faces, "faces with equal corners were left out"},
+          {"duplicate_faces", duplicate_faces, "faces that stand twice were left out"},
+          {"zero_length_edges", zero_length_edges, "edges without length got no spring"},
+          {"slack_springs", slack_springs, "edges between faces without area have stiffness 0"},
+          {"light_nodes", light_nodes, nullptr},
+          {"nonmanifold_edges", nonmanifold_edges, nullptr}};
+}
+
 BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
                        const Context& context) {
+  // The model, its edge table, and the springs once more while they are sorted.
+  const auto bytes = 150 * static_cast<double>(mesh.points.size()) +
+                     (options.bend ? 420 : 300) * static_cast<double>(mesh.triangles.size());
+  const std::string what = "the model of " + std::to_string(mesh.triangles.size()) + " triangles";
+  require_memory(context, bytes, what.c_str());
   return Builder(mesh, options, context).build();
 }
 

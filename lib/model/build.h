@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace gewebe {
 
@@ -25,6 +26,8 @@ struct BuildOptions {
       0.1; ///< stiffness of a central spring over the mean of its node's edge springs
   bool centrals_free = false; ///< else they can't move
   bool normals = false;       ///< area-weighted vertex normals
+
+  bool operator==(const BuildOptions&) const = default;
 };
 
 /// What had to be left out or mended, and what the mesh is like.
@@ -37,6 +40,15 @@ struct BuildReport {
   std::size_t slack_springs = 0;     ///< edge springs with stiffness 0, between faces without area
   std::size_t boundary_edges = 0;    ///< edges of one face
   std::size_t nonmanifold_edges = 0; ///< edges of more than two faces
+
+  /// Each count under its name; `warning` says what it means ("faces that stand twice were left
+  /// out") where a user should hear of it.
+  struct Line {
+    const char* key;
+    std::size_t count;
+    const char* warning;
+  };
+  std::vector<Line> lines() const;
 };
 
 struct BuiltModel {

@@ -32,12 +32,6 @@ void require_finite(double value, const char* what) {
     throw Error(std::string(what) + " is " + text(value) + ", expected a finite number");
 }
 
-void require_name(const std::string& name) {
-  for (const char c : name)
-    if (c == '"' || c == '#' || (c >= 0 && c < 0x20) || c == 0x7f)
-      throw Error("the name holds a quote, '#' or a control character, expected none");
-}
-
 std::string pair(const Spring& s) {
   return std::to_string(s.i) + " " + std::to_string(s.j);
 }
@@ -48,13 +42,19 @@ const char* kind_word(SpringKind kind) {
 
 } // namespace
 
+void check_name(const std::string& name) {
+  for (const char c : name)
+    if (c == '"' || c == '#' || (c >= 0 && c < 0x20) || c == 0x7f)
+      throw Error("the name holds a quote, '#' or a control character, expected none");
+}
+
 void ModelChecker::name() const {
-  require_name(model_.name);
+  check_name(model_.name);
 }
 
 void ModelChecker::material(std::size_t i) const {
   const Material& m = model_.materials[i];
-  require_name(m.name);
+  check_name(m.name);
   require_positive(m.density, "density");
   require_not_negative(m.young, "young");
   require_positive(m.thickness, "thickness");

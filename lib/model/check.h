@@ -5,9 +5,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace gewebe {
+
+/// \throw Error if a model or a material can't have this name
+void check_name(const std::string& name);
 
 /// Sections must be given in the order of ELA_EXPL. Each call checks element `i` of that section,
 /// which must already be in the model, against everything before it. Every call throws Error

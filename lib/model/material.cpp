@@ -40,6 +40,15 @@ Material material_preset(std::string_view name) {
   throw Error("no material '" + std::string(name) + "', expected one of " + known);
 }
 
+void override_materials(std::vector<Material>& materials, const MaterialOverrides& values) {
+  for (Material& m : materials) {
+    m.density = values.density.value_or(m.density);
+    m.young = values.young.value_or(m.young);
+    m.thickness = values.thickness.value_or(m.thickness);
+    m.damping_ratio = values.damping_ratio.value_or(m.damping_ratio);
+  }
+}
+
 MaterialChoice parse_material_choice(std::string_view text) {
   constexpr std::int32_t most_parts = 4096;
   MaterialChoice choice;

@@ -4,6 +4,7 @@
 #include "model/model.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,7 +21,15 @@ Material material_preset(std::string_view name);
 struct MaterialChoice {
   std::vector<Material> materials;
   std::vector<std::int32_t> of_part; ///< material of part p; of all further parts: 0
+
+  bool operator==(const MaterialChoice&) const = default;
 };
+
+/// What replaces the values of materials.
+struct MaterialOverrides {
+  std::optional<double> density, young, thickness, damping_ratio;
+};
+void override_materials(std::vector<Material>& materials, const MaterialOverrides& values);
 
 /// Understands "NAME" and, after it or alone, "PART=NAME", separated by commas:
 /// "liver,2=gallbladder". Parts that are not named get NAME, or generic. \throw Error

@@ -29,7 +29,20 @@ void require_size(const char* what, std::size_t size, std::size_t expected) {
     throw Error(std::to_string(size) + " " + what + ", expected " + std::to_string(expected));
 }
 
+constexpr std::array<std::string_view, 8> axes_names{"-", "x", "y", "xy", "z", "xz", "yz", "xyz"};
+
 } // namespace
+
+std::string_view fixed_axes_name(std::uint8_t fixed) {
+  return axes_names.at(fixed);
+}
+
+std::optional<std::uint8_t> fixed_axes_from_name(std::string_view name) {
+  const auto* const found = std::find(axes_names.begin(), axes_names.end(), name);
+  if (found == axes_names.end())
+    return std::nullopt;
+  return static_cast<std::uint8_t>(found - axes_names.begin());
+}
 
 void check_model(const Model& model) {
   ModelChecker checker(model);

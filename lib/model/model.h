@@ -27,7 +27,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gewebe {
@@ -50,6 +52,11 @@ enum FixedAxes : std::uint8_t {
   fixed_z = 4,
   fixed_all = 7
 };
+
+/// "-", "x", "y", "xy", "z", "xz", "yz", "xyz" for the sets 0 … 7.
+std::string_view fixed_axes_name(std::uint8_t fixed);
+/// The set of that name, or nothing.
+std::optional<std::uint8_t> fixed_axes_from_name(std::string_view name);
 
 struct Node {
   Vec3 position;             ///< at rest, mm

@@ -471,6 +471,14 @@ Selector parse_selector(std::string_view text) {
   return Parser(text).parse();
 }
 
+std::vector<std::string> node_list_names(const Selector& selector) {
+  std::vector<std::string> names;
+  for (const Selector::Step& step : selector.steps)
+    if (step.op == Op::file)
+      names.push_back(step.file_name);
+  return names;
+}
+
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
                                         const LoadNodeList& load) {
   std::vector<std::uint32_t> selected;

@@ -55,6 +55,9 @@ struct Selector {
 /// fault is one of use where the text comes from a command line.
 Selector parse_selector(std::string_view text);
 
+/// The names of the node lists that it reads.
+std::vector<std::string> node_list_names(const Selector& selector);
+
 /// Returns the text of the node list that a selector names as @NAME. It may throw Error.
 using LoadNodeList = std::function<std::string(const std::string& name)>;
 
