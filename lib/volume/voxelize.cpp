@@ -246,13 +246,18 @@ Slab<BitLeaf> scan_slab_bits(const Prepared& mesh, std::size_t slab) {
   return result;
 }
 
+std::int32_t floor_divide(std::int32_t n, std::int32_t by) {
+  const std::int32_t quotient = n / by;
+  return quotient - (n % by < 0 ? 1 : 0);
+}
+
 /// Coarse voxel of fine sample f, rounding down, and the sample's place in it.
 struct Place {
   std::int32_t voxel, rest;
 };
 Place place_of(std::int32_t fine, std::int32_t samples) {
-  const std::int32_t rest = (fine % samples + samples) % samples;
-  return {(fine - rest) / samples, rest};
+  const std::int32_t voxel = floor_divide(fine, samples);
+  return {voxel, fine - voxel * samples};
 }
 
 Slab<CountLeaf> scan_slab_counts(const Prepared& mesh, std::size_t slab) {
@@ -314,7 +319,7 @@ Slab<CountLeaf> scan_slab_counts(const Prepared& mesh, std::size_t slab) {
 
 /// Sample rows [row_begin, row_end) that a triangle may cross; empty if none.
 struct Rows {
-  std::int32_t begin, end;
+  std::int32_t begin = 0, end = 0;
 };
 Rows rows_of(const Prepared& mesh, const Triangle& t) {
   const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
@@ -331,21 +336,18 @@ std::uint64_t assign_slabs(const Context& context, Prepared& mesh) {
   std::int32_t low = INT32_MAX, high = INT32_MIN;
   std::uint64_t skipped = 0;
   std::size_t total = 0;
-  const auto slabs_of = [&](const Triangle& t) {
-    const Rows rows = rows_of(mesh, t);
-    return rows.begin >= rows.end ? Rows{0, 0}
-                                  : Rows{place_of(rows.begin, thickness).voxel,
-                                         place_of(rows.end - 1, thickness).voxel + 1};
-  };
-  for (const Triangle& t : mesh.triangles) {
-    const Rows slabs = slabs_of(t);
-    if (slabs.begin == slabs.end) {
+  std::vector<Rows> slabs_of(mesh.triangles.size());
+  for (std::size_t n = 0; n < slabs_of.size(); ++n) {
+    const Rows rows = rows_of(mesh, mesh.triangles[n]);
+    if (rows.begin >= rows.end) {
       ++skipped;
       continue;
     }
-    low = std::min(low, slabs.begin);
-    high = std::max(high, slabs.end);
-    total += static_cast<std::size_t>(slabs.end - slabs.begin);
+    const Rows s{floor_divide(rows.begin, thickness), floor_divide(rows.end - 1, thickness) + 1};
+    slabs_of[n] = s;
+    low = std::min(low, s.begin);
+    high = std::max(high, s.end);
+    total += static_cast<std::size_t>(s.end - s.begin);
   }
   const std::size_t slabs = low < high ? static_cast<std::size_t>(high - low) : 0;
   require_memory(context, 16.0 * static_cast<double>(slabs) + 4.0 * static_cast<double>(total),
@@ -354,7 +356,7 @@ std::uint64_t assign_slabs(const Context& context, Prepared& mesh) {
   mesh.slab_begin.assign(slabs + 1, 0);
   const auto for_each_pair = [&](auto&& visit) {
     for (std::size_t n = 0; n < mesh.triangles.size(); ++n) {
-      const Rows range = slabs_of(mesh.triangles[n]);
+      const Rows range = slabs_of[n];
       for (std::int32_t s = range.begin; s < range.end; ++s)
         visit(static_cast<std::size_t>(s - low), static_cast<std::uint32_t>(n));
     }

@@ -31,13 +31,29 @@ TriangleMesh load_test_mesh(const std::string& name) {
     return mesh;
   }
   const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  std::vector<float> corners; // x y z of all corners of all facets
+  std::uint32_t facets = 0;
+  if (bytes.size() >= 84)
+    std::memcpy(&facets, bytes.data() + 80, 4);
+  if (bytes.size() == 84 + 50 * std::size_t{facets}) {
+    for (std::size_t at = 84; at < bytes.size(); at += 50) {
+      corners.resize(corners.size() + 9);
+      std::memcpy(&corners[corners.size() - 9], bytes.data() + at + 12, 36);
+    }
+  } else {
+    std::istringstream words(bytes);
+    for (std::string word; words >> word;)
+      if (word == "vertex") {
+        corners.resize(corners.size() + 3);
+        float* const p = &corners[corners.size() - 3];
+        words >> p[0] >> p[1] >> p[2];
+      }
+  }
   std::map<std::tuple<float, float, float>, std::uint32_t> index;
-  for (std::size_t at = 84; at + 50 <= bytes.size(); at += 50) {
-    std::array<float, 9> corners{};
-    std::memcpy(corners.data(), bytes.data() + at + 12, sizeof corners);
+  for (std::size_t at = 0; at + 9 <= corners.size(); at += 9) {
     Triangle t{};
     for (std::size_t c = 0; c < 3; ++c) {
-      const float x = corners[3 * c], y = corners[3 * c + 1], z = corners[3 * c + 2];
+      const float x = corners[at + 3 * c], y = corners[at + 3 * c + 1], z = corners[at + 3 * c + 2];
       const auto [it, fresh] =
           index.try_emplace({x, y, z}, static_cast<std::uint32_t>(mesh.points.size()));
       if (fresh)
