@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -15,10 +16,12 @@
 #include <span>
 #include <utility>
 
+#include <assimp/DefaultLogger.hpp>
 #include <assimp/Exporter.hpp>
 #include <assimp/IOStream.hpp>
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
+#include <assimp/LogStream.hpp>
 #include <assimp/MemoryIOWrapper.h>
 #include <assimp/config.h>
 #include <assimp/importerdesc.h>
@@ -151,13 +154,23 @@ struct Affine {
   }
 };
 
+// The double that the float's shortest decimal form stands for: a unit of 0.001 in a text file is
+// meant so, not as 0.001000000047.
+double decimal(float value) {
+  std::array<char, 32> text;
+  const char* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  double result = 0;
+  std::from_chars(text.data(), end, result);
+  return result;
+}
+
 Affine operator*(const Affine& a, const aiMatrix4x4& b) {
   Affine product;
   for (std::size_t i = 0; i < 3; ++i)
     for (unsigned j = 0; j < 4; ++j) {
       double sum = j == 3 ? a.row[i][3] : 0;
       for (unsigned k = 0; k < 3; ++k)
-        sum += a.row[i][k] * static_cast<double>(b[k][j]);
+        sum += a.row[i][k] * decimal(b[k][j]);
       product.row[i][j] = sum;
     }
   return product;
@@ -169,6 +182,8 @@ public:
 
   TriangleMesh read(AssimpStats& stats) {
     Affine root;
+    if (kind_ == Kind::gltf || kind_ == Kind::glb || kind_ == Kind::dae)
+      root.row = {{{1000, 0, 0, 0}, {0, 1000, 0, 0}, {0, 0, 1000, 0}}}; // metres
     // For these two assimp turns the scene about x to make its y point up: turned back here.
     if (kind_ == Kind::dxf || kind_ == Kind::three_ds)
       root.row = {{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}}};
@@ -295,6 +310,45 @@ private:
   std::map<unsigned, std::int32_t> materials_; // assimp's number to ours
 };
 
+// Some importers put right what is broken, or leave out what they don't support, and only log it:
+// an index out of range becomes the last one, a truncated file a shorter one. These words in the
+// log are errors.
+constexpr std::array<std::string_view, 17> broken{
+    "OFF: Vertex index is out of range",
+    "OFF: Number of vertex coordinates higher than 3",
+    "OFF: Faces with zero indices",
+    "3DS: Vertex index overflow",
+    "3DS: Chunk overflow",
+    "OBJ: vertex index out of range",
+    "STL: unexpected EOF while parsing facet",
+    "STL: A new facet begins but the old is not yet complete",
+    "STL: a facet with more than 3 vertices",
+    "DXF: EOF reached, but did not encounter DXF EOF marker",
+    "DXF: BLOCK rotation not currently implemented",
+    "DXF: INSERT within a BLOCK not currently supported",
+    "DXF: Failed to resolve block reference",
+    "DXF: not enough vertices for polymesh",
+    "DXF: more than 4 indices per face",
+    "Collada: Unable to find geometry",
+    "Collada: Unable to resolve reference to instanced node",
+};
+
+class LogReader : public Assimp::LogStream {
+public:
+  explicit LogReader(std::string& first) : first_(first) {}
+  void write(const char* message) override {
+    if (!first_.empty())
+      return;
+    const std::string_view text = message;
+    for (const std::string_view words : broken)
+      if (const std::size_t at = text.find(words); at != std::string_view::npos)
+        first_ = text.substr(at);
+  }
+
+private:
+  std::string& first_;
+};
+
 // assimp knows a DXF file by a word in its first bytes; comments (group 999) before it hide that.
 std::string_view without_dxf_comments(std::string_view bytes) {
   std::string_view rest = bytes;
@@ -325,6 +379,10 @@ std::string without(std::string text, const std::string& name) {
 
 TriangleMesh import(const AssimpSource& source, AssimpStats& stats) {
   const Format& format = format_of(source.kind);
+  std::string logged;
+  Assimp::DefaultLogger::create("", Assimp::Logger::NORMAL, 0);
+  Assimp::DefaultLogger::get()->attachStream(new LogReader(logged),
+                                             Assimp::Logger::Warn | Assimp::Logger::Err);
   Assimp::Importer importer;
   for (std::size_t i = importer.GetImporterCount(); i-- > 0;)
     if (std::strcmp(importer.GetImporterInfo(i)->mName, format.importer) != 0)
@@ -341,6 +399,8 @@ TriangleMesh import(const AssimpSource& source, AssimpStats& stats) {
   const aiScene* scene = importer.ReadFile(name, 0);
   if (scene == nullptr)
     throw Error(without(importer.GetErrorString(), name));
+  if (!logged.empty())
+    throw Error(logged);
   TriangleMesh mesh = SceneReader(*scene, source.kind).read(stats);
   if (mesh.triangles.empty())
     throw Error("no triangle in it");
@@ -356,6 +416,8 @@ struct WireHead {
 
 template <class T>
 void append(std::string& bytes, const std::vector<T>& values) {
+  if (values.empty())
+    return;
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
@@ -363,6 +425,8 @@ template <class T>
 void take(std::string_view& bytes, std::uint64_t count, std::vector<T>& values) {
   if (count > bytes.size() / sizeof(T))
     throw Error("the reader's answer is broken");
+  if (count == 0)
+    return;
   values.resize(static_cast<std::size_t>(count));
   std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
   bytes.remove_prefix(values.size() * sizeof(T));
@@ -405,13 +469,13 @@ TriangleMesh from_wire(std::string_view bytes, AssimpStats* stats) {
   return mesh;
 }
 
-// Room and time that a file of this size may take. Measured at a million triangles: the readers need up to
-// 14 times the file's size and 1 s of processor time for 50 MB. A small file gets 256 MiB and 1 s.
+// Room and time that a file of this size may take. Measured at a million triangles: the readers
+// need up to 14 times the file's size and 1 s of processor time for 50 MB. A small file gets 256
+// MiB and 1 s.
 ChildLimits limits_for(std::uint64_t bytes) {
   ChildLimits limits;
   limits.memory = (std::uint64_t{256} << 20) + 100 * bytes;
-  limits.cpu_seconds =
-      1 + static_cast<unsigned>(std::min<std::uint64_t>(bytes / 2'000'000, 3600));
+  limits.cpu_seconds = 1 + static_cast<unsigned>(std::min<std::uint64_t>(bytes / 2'000'000, 3600));
   limits.seconds = 30.0 * limits.cpu_seconds;
   return limits;
 }
@@ -550,6 +614,9 @@ std::string export_scene(const TriangleMesh& mesh, Kind kind) {
     throw Error(exporter.GetErrorString());
   std::string bytes(static_cast<const char*>(blob->data), blob->size);
   if (kind == Kind::dae) {
+    const std::string unit = "meter=\"0.00100000005\""; // 0.001f as the exporter prints it
+    if (const std::size_t found = bytes.find(unit); found != std::string::npos)
+      bytes.replace(found, unit.size(), "meter=\"0.001\"");
     replace_text(bytes, "author", "gewebe");
     replace_text(bytes, "authoring_tool", "gewebe");
     replace_text(bytes, "created", "1970-01-01T00:00:00");

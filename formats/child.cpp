@@ -96,7 +96,7 @@ void set_limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
   ::setrlimit(what, &limit);
 }
 
-std::uint64_t address_space_in_use() {
+[[maybe_unused]] std::uint64_t address_space_in_use() {
   std::uint64_t pages = 0;
   if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
     unsigned long long value = 0;

@@ -60,8 +60,6 @@ std::string folder_of(const std::string& name) {
 }
 
 double scale_of(const MeshReadOptions& options) {
-  if (states_its_unit(options.kind))
-    return 1000;
   return options.unit.empty() ? 1 : millimetres_per(options.unit);
 }
 
