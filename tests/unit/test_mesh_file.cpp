@@ -504,6 +504,9 @@ TEST(MeshData, OrgansWeldAsCounted) {
            Target{"gca90_large_intestine_20k.stl", automatic, 10000, 30000, 20000, 1},
        })
     expect_target(target);
+  // One copy of the data holds a hexadecimal listing (of another organ) under this name.
+  if (!get(shared("ts_hepatobiliary_union.stl")).starts_with("00000000: "))
+    expect_target({"ts_hepatobiliary_union.stl", automatic, 14512, 43536, 29024, 1});
   MeshReadOptions options; // the negative control: without joining at borders the spleen stays open
   options.weld = Weld::part;
   EXPECT_EQ(read(shared("hubmap_F_spleen_uv.obj"), options).points.size(), 4564u);
