@@ -504,12 +504,18 @@ TEST(MeshData, OrgansWeldAsCounted) {
            Target{"gca90_large_intestine_20k.stl", automatic, 10000, 30000, 20000, 1},
        })
     expect_target(target);
-  // One copy of the data holds a hexadecimal listing (of another organ) under this name.
-  if (!get(shared("ts_hepatobiliary_union.stl")).starts_with("00000000: "))
-    expect_target({"ts_hepatobiliary_union.stl", automatic, 14512, 43536, 29024, 1});
   MeshReadOptions options; // the negative control: without joining at borders the spleen stays open
   options.weld = Weld::part;
   EXPECT_EQ(read(shared("hubmap_F_spleen_uv.obj"), options).points.size(), 4564u);
+}
+
+TEST(MeshData, UnionWeldsAsCounted) {
+  const std::string path = shared("ts_hepatobiliary_union.stl");
+  if (!fs::exists(path))
+    GTEST_SKIP() << "no " << path;
+  if (get(path).starts_with("00000000: ")) // a listing by xxd, of the colon's bytes
+    GTEST_SKIP() << path << " is a hexadecimal listing of another file";
+  expect_target({"ts_hepatobiliary_union.stl", std::nullopt, 14512, 43536, 29024, 1});
 }
 
 TEST(MeshData, MalformedFilesAreErrorsOrMeshes) {
