@@ -9,7 +9,6 @@
 #include "tools/cli.h"
 
 using namespace gewebe;
-
 namespace {
 
 struct Arguments {
