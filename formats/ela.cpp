@@ -500,8 +500,13 @@ Model parse_ela(std::string_view text, const std::string& name) {
   }
 }
 
-Model read_ela(Input& input) {
-  return parse_ela(input.read_all(), input.name());
+Model read_ela(Input& input, const Context& context) {
+  const std::string text = input.read_all(context.max_memory);
+  // The lines that we write take more bytes as text than as data.
+  const std::string what = "the model in " + std::to_string(text.size()) + " bytes of text";
+  at(input.name(),
+     [&] { require_memory(context, 2 * static_cast<double>(text.size()), what.c_str()); });
+  return parse_ela(text, input.name());
 }
 
 std::string ela_text(const Model& model) {

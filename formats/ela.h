@@ -15,8 +15,9 @@ namespace gewebe {
 /// more memory than a small multiple of the text's size, whatever counts it claims.
 Model parse_ela(std::string_view text, const std::string& name);
 
-/// Reads all of the input. \throw as parse_ela, and what Input throws
-Model read_ela(Input& input);
+/// Reads all of the input. \throw as parse_ela, what Input throws, and where text and model exceed
+/// context.max_memory
+Model read_ela(Input& input, const Context& context);
 
 /// The text of a model. Numbers are the shortest that read back exactly, so parse_ela(ela_text(m))
 /// == m. \pre the invariants of model.h hold

@@ -9,7 +9,6 @@
 #include "tools/cli.h"
 
 using namespace gewebe;
-
 namespace {
 
 struct Arguments {
@@ -73,7 +72,7 @@ Model from_mesh(cli::Run& run, Input& input, Kind kind, const Arguments& a) {
 
 void fix(Model& model, const Arguments& a) {
   const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
-  for (const std::uint32_t node : select_nodes(model, *a.fixed, load))
+  for (const auto node : select_nodes(model, *a.fixed, load))
     model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
 }
 
@@ -85,8 +84,9 @@ void work(cli::Run& run, const Arguments& a) {
   // Nothing that was asked for may be ignored.
   refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
-  Model model = from == Kind::ela ? run.timed("read", [&] { return read_ela(input); })
-                                  : from_mesh(run, input, from, a);
+  Model model = from == Kind::ela
+                    ? run.timed("read", [&] { return read_ela(input, run.context()); })
+                    : from_mesh(run, input, from, a);
   if (!a.name.empty())
     model.name = a.name;
   if (a.fixed)

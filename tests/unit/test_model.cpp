@@ -274,6 +274,42 @@ TEST(ModelBuild, CoincidentPointsMakeNoSpring) {
   EXPECT_THROW(build(mesh), Error); // areas overflow
 }
 
+TEST(ModelBuild, AnySoupOfTrianglesGivesAValidModel) {
+  std::mt19937 random(5);
+  std::size_t built_models = 0, refused = 0, duplicates = 0, zero_length = 0;
+  for (int round = 0; round < 400; ++round) {
+    TriangleMesh mesh; // few places and few corners, so that all kinds of faults are common
+    for (int p = 0; p < 12; ++p)
+      mesh.points.push_back({static_cast<double>(random() % 4), static_cast<double>(random() % 3),
+                             static_cast<double>(random() % 2)});
+    const std::size_t faces = 1 + random() % 40;
+    for (std::size_t t = 0; t < faces; ++t)
+      mesh.triangles.push_back({static_cast<std::uint32_t>(random() % 12),
+                                static_cast<std::uint32_t>(random() % 12),
+                                static_cast<std::uint32_t>(random() % 12)});
+    BuildOptions options;
+    options.bend = options.normals = true;
+    options.centrals = static_cast<std::int64_t>(random() % 4);
+    try {
+      const BuiltModel built = build(mesh, options);
+      ASSERT_EQ(complaint(built.model), "");
+      EXPECT_TRUE(safe_step(built.model) > 0);
+      EXPECT_EQ(built.model.triangles.size() + built.report.degenerate_faces +
+                    built.report.duplicate_faces,
+                faces);
+      duplicates += built.report.duplicate_faces;
+      zero_length += built.report.zero_length_edges;
+      ++built_models;
+    } catch (const Error&) { // no triangle, or no area
+      ++refused;
+    }
+  }
+  EXPECT_GT(built_models, 300U);
+  EXPECT_GT(refused, 0U);
+  EXPECT_GT(duplicates, 0U);
+  EXPECT_GT(zero_length, 0U);
+}
+
 TEST(ModelBuild, PartsHaveTheirOwnMaterials) {
   BuildOptions options;
   options.material = parse_material_choice("liver,1=gallbladder");
