@@ -1,0 +1,84 @@
+# `make install`, what it lays down, and `make uninstall`.
+# shellcheck shell=bash
+
+staged_make() { # GOAL PREFIX [VARIABLE=VALUE]
+  "${MAKE:-make}" --no-print-directory -s -C "$GEWEBE_ROOT" "$1" config="$(basename "$BUILD")" DESTDIR="$PWD/stage" PREFIX="$2" "${@:3}" ||
+    fail "make $1 failed"
+}
+
+test_installed_library_compiles_and_links() {
+  local flags compiler=()
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  staged_make install /opt/gewebe
+  cat >small.cpp <<'END'
+#include "base/error.h"
+#include "base/particles.h"
+#include "formats/kind.h"
+#include "volume/lattice.h"
+#include <cstdio>
+int main() {
+  const gewebe::Box3 box = gewebe::support_box({{{1, 2, 3}, 4.0, 1.0}});
+  std::printf("%g %s\n", box.longest_side(), gewebe::kind_name(gewebe::Kind::ply).data());
+}
+END
+  export PKG_CONFIG_SYSROOT_DIR=$PWD/stage PKG_CONFIG_PATH=$PWD/stage/opt/gewebe/lib/pkgconfig
+  [[ $(pkg-config --modversion gewebe) == "$(sed -n 's/^VERSION := //p' "$GEWEBE_ROOT/Makefile")" ]] || fail 'another version in gewebe.pc'
+  read -ra flags <<<"$(pkg-config --cflags --libs gewebe)"
+  read -ra compiler <<<"${CXX:-g++}"
+  "${compiler[@]}" -std=c++20 -Wall -Wextra -Werror small.cpp "${flags[@]}" -o small
+  [[ $(./small) == '8 ply' ]] || fail "the program said: $(./small)"
+}
+
+test_installed_headers_stand_alone() {
+  local header
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  staged_make install /opt/gewebe
+  while read -r header; do
+    echo "#include \"$header\""
+  done < <(cd stage/opt/gewebe/include/gewebe && find . -name '*.h' | sort | sed 's|^\./||') >all.cpp
+  [[ -s all.cpp ]] || fail 'no headers'
+  # Each for itself; together they would help each other.
+  while read -r header; do
+    echo "$header" | ${CXX:-g++} -std=c++20 -Wall -Wextra -Wshadow -Wconversion -Werror -fsyntax-only -I stage/opt/gewebe/include/gewebe -x c++ - ||
+      fail "$header does not stand alone"
+  done <all.cpp
+}
+
+test_uninstall_leaves_nothing() {
+  local left
+  staged_make install /opt/gewebe
+  find stage -type f | sort >laid
+  grep -q 'bin/' laid || fail 'no program was installed'
+  grep -q 'share/man/man1/' laid || fail 'no man page was installed'
+  grep -q 'lib/pkgconfig/gewebe.pc' laid || fail 'no gewebe.pc was installed'
+  ! grep -q _internal laid || fail 'an internal header was installed'
+  staged_make uninstall /opt/gewebe
+  [[ ! -d stage ]] || left=$(find stage -mindepth 1)
+  [[ -z ${left-} ]] || fail 'left after uninstall:' "$left"
+}
+
+test_uninstall_leaves_what_is_not_ours() {
+  mkdir -p stage/usr/local/bin stage/usr/local/include/other
+  echo other >stage/usr/local/bin/other
+  staged_make install /usr/local
+  staged_make uninstall /usr/local
+  [[ $(find stage -type f -o -type d -empty | sort | tr '\n' ' ') == 'stage/usr/local/bin/other stage/usr/local/include/other ' ]] ||
+    fail 'uninstall left or took too much:' "$(find stage)"
+}
+
+loads() { ldd "$BUILD/$1" | grep -q "lib$2[-.0-9_]*\.so"; } # TOOL LIBRARY
+
+test_programs_load_only_what_they_use() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local tool
+  for tool in $(programs); do
+    case $tool in
+      exp2ela) ! loads "$tool" openvdb || fail "$tool loads OpenVDB" ;;
+      voxelize) loads "$tool" openvdb || fail "$tool does not load OpenVDB" ;;
+      *)
+        ! loads "$tool" assimp || fail "$tool loads assimp"
+        loads "$tool" openvdb || fail "$tool does not load OpenVDB" # shows that the test can see it
+        ;;
+    esac
+  done
+}

@@ -1,0 +1,70 @@
+# What the contract tests share. Each test_NAME() of tests/contract/*.sh runs in an empty folder of its own under
+# `bash -euo pipefail`: status 0 passes, 77 skips with its last line as the reason, anything else fails.
+# $GEWEBE_ROOT is the repository, $BUILD the folder of the programs, $GEWEBE_SHARED the real data.
+# shellcheck shell=bash
+
+PATH=$BUILD:$PATH
+
+fail() {
+  printf '%s\n' "$@"
+  exit 1
+}
+skip() {
+  printf '%s\n' "$1"
+  exit 77
+}
+
+# The names of our programs.
+programs() {
+  local file
+  for file in "$GEWEBE_ROOT"/tools/*.cpp; do
+    [[ -e ${file%.cpp}.h ]] || basename "$file" .cpp
+  done
+}
+
+# A run that must fail: expect_failure STATUS TOOL COMMAND... looks for the status and for one line `TOOL: …` alone.
+expect_failure() {
+  local expected=$1 tool=$2 status=0
+  shift 2
+  "$@" 2>stderr.txt || status=$?
+  ((status == expected)) || fail "status $status, expected $expected: $*" "$(<stderr.txt)"
+  [[ $(wc -l <stderr.txt) == 1 && $(<stderr.txt) == "$tool: "* ]] || fail "expected one line '$tool: …' from: $*" "$(<stderr.txt)"
+  rm stderr.txt
+}
+
+# Input and options that let each program work: sample TOOL sets the array `words`, with files made in this folder.
+# shellcheck disable=SC2034 # read by the callers
+sample() {
+  case $1 in
+    metaball2vol)
+      printf '0 0 0 4\n3 0 0 3\n' >in.particles
+      words=(metaball2vol --voxel 0.5 in.particles)
+      ;;
+    voxelize)
+      cube >in.off
+      words=(voxelize --voxel 0.25 in.off)
+      ;;
+    csg)
+      sample metaball2vol
+      metaball2vol --voxel 0.5 in.particles -o in.vdb
+      words=(csg add in.vdb in.vdb)
+      ;;
+    mc-opt)
+      sample metaball2vol
+      metaball2vol --voxel 0.5 in.particles -o in.vdb
+      words=(mc-opt in.vdb)
+      ;;
+    exp2ela)
+      cube >in.off
+      words=(exp2ela in.off)
+      ;;
+    *) fail "tests/contract/lib.bash has no sample for $1" ;;
+  esac
+}
+
+# A cube of edge 2 around the origin, as OFF.
+cube() {
+  printf 'OFF\n8 12 0\n'
+  printf '%s\n' '-1 -1 -1' '1 -1 -1' '1 1 -1' '-1 1 -1' '-1 -1 1' '1 -1 1' '1 1 1' '-1 1 1'
+  printf '3 %s\n' '0 2 1' '0 3 2' '4 5 6' '4 6 7' '0 1 5' '0 5 4' '1 2 6' '1 6 5' '2 3 7' '2 7 6' '3 0 4' '3 4 7'
+}

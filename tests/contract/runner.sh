@@ -1,0 +1,93 @@
+# The test tools themselves: a wrong golden case fails, whatever it is that is wrong.
+# shellcheck shell=bash disable=SC2016 # the cases hold $ of their own
+
+golden() { # CASE LINE [EXPECTED CONTENT]: its status
+  mkdir -p golden/in golden/expected
+  printf '%s\n' "$1" >golden/cases
+  [[ -z ${2-} ]] || printf '%s\n' "$2" >golden/expected/text
+  GOLDEN=$PWD/golden "$GEWEBE_ROOT/tests/golden/run" one "${1%% *}" --config "$(basename "$BUILD")" >said.txt 2>&1 ||
+    return $?
+}
+must_pass() { golden "negative-$1" "${2-}" || fail "a right case failed: $1" "$(<said.txt)"; }
+must_fail() { # WORDS THAT THE COMPLAINT HOLDS, CASE...
+  local words=$1
+  shift
+  ! golden "negative-$1" "${2-}" || fail "a wrong case passed: $1"
+  grep -q "$words" said.txt || fail "another complaint than '$words':" "$(<said.txt)"
+}
+
+test_right_cases_pass() {
+  must_pass 'a | 0 | text | echo hello' hello
+  must_pass 'b | 0 | - | true'
+  must_pass 'c | 0 | digest:00ff | echo "{\"digest\":\"00ff\"}" >&2; echo $RANDOM >/dev/null'
+  must_pass 'd | 0 | text ~ x: warning: * | echo hello; echo "x: warning: empty" >&2' hello
+  must_pass 'e | 1 | x: no | echo "x: no" >&2; exit 1'
+  must_pass 'f | 2 | x: * [y] | echo "x: no [y]" >&2; exit 2'
+  must_pass 'g | 0 | text | echo hello | cat > out.ply; cat out.ply' hello
+}
+
+test_wrong_cases_fail() {
+  must_fail 'standard output differs' 'a | 0 | text | echo goodbye' hello
+  must_fail 'does not exist' 'b | 0 | none | echo goodbye'
+  must_fail 'wrote to standard output' 'c | 0 | - | echo goodbye'
+  must_fail 'status 3, expected 0' 'd | 0 | - | exit 3'
+  must_fail 'status 0, expected 1' 'e | 1 | x: no | echo "x: no" >&2'
+  must_fail 'not silent' 'f | 0 | - | echo "x: note" >&2'
+  must_fail 'not exactly one line' 'g | 1 | x: no | printf "x: no\nx: no\n" >&2; exit 1'
+  must_fail 'not exactly one line' 'h | 1 | x: no | exit 1'
+  must_fail 'differs from' 'i | 1 | x: no | echo "x: yes" >&2; exit 1'
+  must_fail 'wrote to standard output' 'j | 1 | x: no | echo "x: no" | tee /dev/stderr; exit 1'
+  must_fail 'left files' 'k | 1 | x: no | echo "x: no" >&2; touch out.ply; exit 1'
+  must_fail 'left behind' 'l | 0 | - | touch .out.ply.a1b2'
+  must_fail 'left behind' 'm | 0 | - | touch out.ply.tmp'
+  must_fail 'left behind' 'n | 0 | - | touch $TMPDIR/x'
+  must_fail 'digest 00ff, expected 00fe' 'o | 0 | digest:00fe | echo "{\"digest\":\"00ff\"}" >&2'
+  must_fail 'status 1, expected 0' 'p | 0 | - | false | true'
+  must_fail 'may not keep bytes\|needs the data' 'q | 0 | text | echo hello; : $SHARED' hello
+}
+
+test_answers_that_depend_on_threads_or_processor_fail() {
+  must_fail 'with -j2' 'a | 0 | text | echo $J' -j1
+  must_fail 'with -j2' 'b | 0 | - | echo $J > out.ply'
+  must_fail 'with -j2' 'c | 1 | x: * | echo "x: $J" >&2; exit 1'
+  must_fail 'GLIBC_TUNABLES' 'd | 0 | text | echo "${GLIBC_TUNABLES-none}"' none
+  must_fail 'GEWEBE_CPU=baseline' 'e | 0 | text | test "${GEWEBE_CPU-}" = baseline && echo yes || echo no' no
+  must_fail 'GEWEBE_CPU=avx2' 'f | 0 | text | test "${GEWEBE_CPU-}" = avx2 && echo yes || echo no' no
+  must_fail 'GEWEBE_CPU=avx512' 'g | 0 | text | test "${GEWEBE_CPU-}" = avx512 && echo yes || echo no' no
+  must_fail 'with' 'h | 0 | text | test "${GEWEBE_CPU-}" && echo 1 > out || echo 2 > out; echo hello' hello
+}
+
+test_update_writes_what_changed() {
+  mkdir -p golden/in golden/expected
+  echo old >golden/expected/text
+  printf '%s\n' '# head' 'a | 0 | text | echo new | cat' 'b | 0 | digest:0 | echo "{\"digest\":\"00ff\"}" >&2' \
+    'c | 1 | x: old | echo "x: new" >&2; exit 1' 'd | 1 | x: * | echo "x: free" >&2; exit 1' >golden/cases
+  update() { GOLDEN=$PWD/golden "$GEWEBE_ROOT/tests/golden/run" update --config "$(basename "$BUILD")"; }
+  update >said.txt || fail 'update failed' "$(<said.txt)"
+  [[ $(<golden/expected/text) == new ]] || fail 'expected/text was not written'
+  grep -qxF 'b | 0 | digest:00ff | echo "{\"digest\":\"00ff\"}" >&2' golden/cases || fail 'the digest was not written'
+  grep -qxF 'c | 1 | x: new | echo "x: new" >&2; exit 1' golden/cases || fail 'the message was not written'
+  grep -qxF 'd | 1 | x: * | echo "x: free" >&2; exit 1' golden/cases || fail 'a pattern that holds was changed'
+  [[ $(head -1 golden/cases) == '# head' ]] || fail 'the head was lost'
+  [[ $(wc -l <said.txt) -ge 3 ]] || fail 'update did not say what changed:' "$(<said.txt)"
+  cp golden/cases before
+  [[ -z $(update) ]] || fail 'a second update is not silent'
+  cmp golden/cases before
+  # A status is never learned.
+  echo 'e | 0 | - | exit 139' >golden/cases
+  ! update >said.txt 2>&1 || fail 'update took a crash for the truth'
+}
+
+test_nothing_to_run_is_a_failure() {
+  ! "$GEWEBE_ROOT/tests/run" --config no-such-build --test no-such-test >said.txt 2>&1 || fail 'no tests passed'
+  [[ $(tail -1 said.txt) == '0 passed, 0 failed, 0 skipped' ]] || fail "$(<said.txt)"
+  rm -rf "$GEWEBE_ROOT/build/no-such-build"
+}
+
+test_no_expected_file_is_left_over() {
+  local file
+  for file in "$GEWEBE_ROOT"/tests/golden/expected/*; do
+    [[ -e $file ]] || continue
+    grep -qF "| ${file##*/} " "$GEWEBE_ROOT/tests/golden/cases" || fail "no case expects ${file##*/}"
+  done
+}

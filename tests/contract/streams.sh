@@ -1,0 +1,156 @@
+# Files and pipes, alike for every program (gewebe(7)).
+# shellcheck shell=bash disable=SC2317 # functions are called by name
+
+test_a_full_disk_is_status_1_and_one_line() {
+  [[ -c /dev/full ]] || skip 'there is no /dev/full'
+  local tool
+  to_full() { "${words[@]}" >/dev/full; }
+  for tool in $(programs); do
+    sample "$tool"
+    expect_failure 1 "$tool" to_full
+    expect_failure 1 "$tool" "${words[@]}" -o /dev/full
+  done
+}
+
+test_version_and_help_on_a_full_disk() {
+  [[ -c /dev/full ]] || skip 'there is no /dev/full'
+  local tool
+  for tool in $(programs); do
+    [[ $("$tool" --version) == *[0-9]* ]] || fail "$tool --version tells no number"
+    expect_failure 1 "$tool" "$tool" --help >/dev/full
+  done
+}
+
+test_output_to_devices_fifos_and_symlinks() {
+  local tool
+  for tool in $(programs); do
+    sample "$tool"
+    "${words[@]}" >direct
+    "${words[@]}" -o /dev/null || fail "$tool -o /dev/null failed"
+    [[ -c /dev/null ]] || fail "$tool replaced /dev/null"
+
+    mkfifo fifo
+    timeout 60 cat fifo >through &
+    timeout 60 "${words[@]}" -o fifo || fail "$tool -o FIFO failed"
+    wait $!
+    [[ -p fifo ]] || fail "$tool replaced a FIFO"
+    cmp direct through || fail "$tool wrote other bytes into a FIFO"
+
+    mkdir -p folder
+    echo old >folder/target
+    chmod 640 folder/target
+    ln -s folder/target link
+    "${words[@]}" -o link || fail "$tool -o SYMLINK failed"
+    [[ -L link ]] || fail "$tool replaced a symlink"
+    cmp direct folder/target || fail "$tool wrote other bytes through a symlink"
+    [[ $(stat -c %a folder/target) == 640 ]] || fail "$tool changed the file's mode"
+    [[ $(ls -A folder) == target ]] || fail "$tool left files beside the target:" "$(ls -A folder)"
+
+    (umask 027 && "${words[@]}" -o new) || fail "$tool -o NEW failed"
+    [[ $(stat -c %a new) == 640 ]] || fail "$tool ignored the umask"
+    rm -rf fifo through folder link new direct
+  done
+}
+
+test_a_failure_leaves_the_old_file() {
+  local tool
+  for tool in $(programs); do
+    sample "$tool"
+    echo old >out
+    : >empty
+    words[-1]=empty
+    expect_failure 1 "$tool" "${words[@]}" -o out
+    [[ $(<out) == old ]] || fail "$tool changed the output although it failed"
+    rm -f out empty in*
+    [[ -z $(ls -A) ]] || fail "$tool left files:" "$(ls -A)"
+  done
+}
+
+test_a_read_only_folder() {
+  local tool run=()
+  if [[ $(id -u) == 0 ]]; then
+    # Root writes everywhere.
+    command -v setpriv >/dev/null || skip 'root without setpriv'
+    run=(setpriv --reuid=65534 --regid=65534 --clear-groups)
+    chmod 777 .
+    "${run[@]}" "$BUILD/$(programs | head -1)" --version >/dev/null 2>&1 || skip 'another user cannot reach the programs here'
+  fi
+  for tool in $(programs); do
+    sample "$tool"
+    mkdir -m 555 closed
+    expect_failure 1 "$tool" "${run[@]}" "${words[@]}" -o closed/out
+    [[ -z $(ls -A closed) ]] || fail "$tool left files"
+    rmdir closed
+  done
+}
+
+test_an_interrupt_leaves_no_litter() {
+  local tool signal pid status
+  for tool in $(programs); do
+    sample "$tool"
+    # The last operand is a pipe that never ends: the program waits in the midst of its work.
+    words[-1]=-
+    mkdir folder
+    for signal in INT TERM HUP; do
+      mkfifo never
+      sleep 60 >never &
+      local holder=$!
+      # Background jobs of a script ignore SIGINT; env gives its default back.
+      env --default-signal=INT "${words[@]}" -o folder/out <never 2>stderr.txt &
+      pid=$!
+      sleep 0.3
+      kill -"$signal" "$pid"
+      status=0
+      wait "$pid" || status=$?
+      ((status == 128 + $(kill -l "$signal"))) || fail "$tool ended with status $status on SIG$signal" "$(<stderr.txt)"
+      kill "$holder"
+      wait "$holder" 2>/dev/null || true
+      [[ -z $(ls -A folder) ]] || fail "$tool left files on SIG$signal:" "$(ls -A folder)"
+      rm never
+    done
+    rmdir folder
+  done
+}
+
+test_stats_are_one_line_of_json_and_never_the_next_word() {
+  local tool before
+  for tool in $(programs); do
+    sample "$tool"
+    before=$(stat -c '%Y %s %i' "${words[-1]}")
+    cp "${words[-1]}" copy
+    # --stats right before an input: it must not swallow or overwrite it.
+    "${words[0]}" "${words[@]:1:${#words[@]}-2}" --stats "${words[-1]}" 2>stderr.txt >out || fail "$tool --stats failed" "$(<stderr.txt)"
+    [[ $(wc -l <stderr.txt) == 1 && $(<stderr.txt) == "{\"tool\":\"$tool\","*'}' ]] || fail "$tool --stats is not one line of JSON:" "$(<stderr.txt)"
+    grep -q '"seconds":{' stderr.txt || fail "$tool --stats tells no seconds"
+    grep -Eq '"digest":"[0-9a-f]{16}"' stderr.txt || fail "$tool --stats tells no digest"
+    cmp copy "${words[-1]}"
+    [[ $(stat -c '%Y %s %i' "${words[-1]}") == "$before" ]] || fail "$tool --stats touched its input"
+    "${words[@]}" --stats=stats.json >out2
+    cmp out out2
+    [[ $(wc -l <stats.json) == 1 ]] || fail "$tool --stats=FILE wrote no line"
+    rm -f copy out out2 stderr.txt stats.json
+  done
+}
+
+test_keep_unchanged_leaves_the_time_stamp() {
+  local tool
+  for tool in $(programs); do
+    sample "$tool"
+    "${words[@]}" -o out
+    touch -d 2001-01-01 out
+    "${words[@]}" -o out --keep-unchanged
+    [[ $(stat -c %Y out) == "$(date -d 2001-01-01 +%s)" ]] || fail "$tool --keep-unchanged rewrote equal bytes"
+    "${words[@]}" -o out
+    [[ $(stat -c %Y out) != "$(date -d 2001-01-01 +%s)" ]] || fail "$tool did not write without --keep-unchanged"
+    rm out
+  done
+}
+
+test_a_reader_that_stops_early_ends_it_quietly() {
+  local tool
+  for tool in $(programs); do
+    sample "$tool"
+    { "${words[@]}" 2>stderr.txt || true; } | head -c 1 >/dev/null
+    [[ ! -s stderr.txt ]] || fail "$tool spoke on a closed pipe:" "$(<stderr.txt)"
+  done
+}
