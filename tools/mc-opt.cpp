@@ -79,10 +79,10 @@ void work(cli::Run& run, const Arguments& arguments) {
   options.place =
       arguments.place == "corner" ? SnapOptions::Place::corner : SnapOptions::Place::mean;
   const SnapResult snapped = run.timed("snap", [&] { return snap(context, surface, options); });
-  if (snapped.mesh.triangles.empty())
-    run.warn("the surface is empty: no value lies across the isovalue from another");
   run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
   output.commit();
+  if (snapped.mesh.triangles.empty())
+    run.warn("the surface is empty: no value lies across the isovalue from another");
 
   run.say(std::to_string(snapped.report.points_before) + " points, " +
           std::to_string(snapped.report.points_after) + " after snapping");
