@@ -9,16 +9,13 @@ namespace gewebe {
 
 // Where the numbers come from. They set the order of magnitude; tissue varies by factors between
 // people and, being non-linear, with its stretch.
-//   density    liver 1.06, soft tissue about the same: ICRU Report 46, 1992 (g/cm³)
-//   liver      5.5 kPa, healthy persons, transient elastography: Roulot et al., J Hepatol 48, 2008.
-//   10 mm is no
-//              wall: it is the shell as heavy as the organ, for 1.5 kg on 0.15 m².
-//   gallbladder  some 10² kPa in tension: Karimi et al., J Med Eng Technol 41, 2017; a healthy wall
-//   is at most 3 mm
-//              thick in ultrasound
-//   uterus     30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006;
-//   the myometrium is
-//              one to two centimetres thick
+//   density      soft tissue and liver about 1.06 g/cm3: ICRU Report 46, 1992
+//   liver        5.5 kPa, healthy, transient elastography: Roulot et al., J Hepatol 48, 2008;
+//                10 mm is no wall: it is the shell as heavy as the organ, for 1.5 kg on 0.15 m2
+//   gallbladder  some hundred kPa in tension: Karimi et al., J Med Eng Technol 41, 2017;
+//                a healthy wall is at most 3 mm thick in ultrasound
+//   uterus       30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006;
+//                the myometrium is one to two centimetres thick
 // The damping ratio is a choice: motion dies within a few swings.
 const std::vector<Material>& material_presets() {
   static const std::vector<Material> presets{

@@ -34,7 +34,8 @@ void replay(const std::filesystem::path& path) {
   std::fflush(stdout);
   feed(bytes, bytes.size());
   const std::size_t step = std::max<std::size_t>(1, bytes.size() / 300);
-  for (std::size_t size = 0; size < bytes.size(); size += step) feed(bytes, size);
+  for (std::size_t size = 0; size < bytes.size(); size += step)
+    feed(bytes, size);
 }
 
 } // namespace
@@ -48,12 +49,16 @@ int main(int argc, char** argv) {
       continue;
     }
     for (const auto& entry : std::filesystem::directory_iterator(argv[i], error)) {
-      if (entry.is_regular_file()) files.push_back(entry.path());
+      if (entry.is_regular_file())
+        files.push_back(entry.path());
     }
-    if (error) std::fprintf(stderr, "%s: %s\n", argv[i], error.message().c_str());
+    if (error)
+      std::fprintf(stderr, "%s: %s\n", argv[i], error.message().c_str());
   }
   std::sort(files.begin(), files.end());
-  for (const auto& file : files) replay(file);
-  if (files.empty()) std::fprintf(stderr, "empty corpus, expected files to run\n");
+  for (const auto& file : files)
+    replay(file);
+  if (files.empty())
+    std::fprintf(stderr, "empty corpus, expected files to run\n");
   return files.empty() ? 1 : 0;
 }
