@@ -1,4 +1,4 @@
-#include "volume/ray_crossings.h"
+#include "volume/ray_crossings_internal.h"
 // Based on: H. Edelsbrunner, E. P. Mücke, Simulation of Simplicity, 1990 (here the query points
 // move, not the mesh, so three infinitesimals do for all of them).
 

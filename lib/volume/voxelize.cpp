@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "volume/exact_predicates.h"
 #include "volume/mesh_border.h"
-#include "volume/ray_crossings.h"
+#include "volume/ray_crossings_internal.h"
 
 #include <algorithm>
 #include <bit>

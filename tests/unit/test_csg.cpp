@@ -1,0 +1,297 @@
+// CSG: identities, mixtures of tiles and leaves against dense arrays, refusals.
+
+#include "base/error.h"
+#include "mesh_fixtures.h"
+#include "volume/csg.h"
+#include "volume/lattice.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <random>
+
+namespace {
+
+using namespace gewebe;
+using namespace gewebe::test;
+using Op = CsgOperation;
+
+constexpr std::array all_operations{Op::add,       Op::subtract,   Op::unite,
+                                    Op::intersect, Op::difference, Op::exclusive_or};
+
+Grid combine(Op operation, const std::vector<Grid>& grids, CsgReport* report = nullptr,
+             int threads = 1) {
+  std::vector<CsgOperand> operands;
+  for (const Grid& grid : grids)
+    operands.push_back({grid, "volume " + std::to_string(operands.size())});
+  Context context;
+  context.threads = threads;
+  return csg(context, operation, operands, {}, report);
+}
+
+Grid ball(double radius, const Vec3& center, int samples = 1) {
+  return voxelize(Context{}, sphere_mesh(3, radius, center), uniform_transform(1),
+                  {.samples = samples});
+}
+
+/// Leaves and 8³ tiles drawn by chance around the origin, values from -0.5 to 1.5.
+Grid random_grid(std::mt19937& random) {
+  GridInfo info;
+  GridBuilder builder(info);
+  std::uniform_real_distribution<float> value(-0.5f, 1.5f);
+  std::uniform_int_distribution<int> three(0, 2);
+  std::vector<Int3> leaves;
+  for (std::int32_t i = -16; i < 16; i += 8)
+    for (std::int32_t j = -16; j < 16; j += 8)
+      for (std::int32_t k = -16; k < 16; k += 8)
+        switch (three(random)) {
+        case 0:
+          leaves.push_back({i, j, k});
+          break;
+        case 1:
+          builder.add_tile({{i, j, k}, 8, value(random), true});
+          break;
+        default:
+          break;
+        }
+  for (const LeafRef& leaf : builder.add_leaves(Context{}, leaves))
+    for (std::size_t n = 0; n < leaf_voxels; ++n) {
+      leaf.values[n] = random() % 4 == 0 ? 0.0f : value(random);
+      if (leaf.values[n] != 0)
+        leaf.active[n / 64] |= std::uint64_t{1} << (n % 64);
+    }
+  return builder.finish(false);
+}
+
+/// DESIGN 4.3, once more and without cleverness.
+float expected_value(Op operation, const std::vector<float>& v) {
+  const auto clamp = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
+  const bool sum = operation == Op::add || operation == Op::subtract;
+  float a = sum ? v[0] : clamp(v[0]);
+  for (std::size_t n = 1; n < v.size(); ++n) {
+    const float b = clamp(v[n]);
+    switch (operation) {
+    case Op::add:
+      a = a + v[n];
+      break;
+    case Op::subtract:
+      a = a - v[n];
+      break;
+    case Op::unite:
+      a = std::max(a, b);
+      break;
+    case Op::intersect:
+      a = std::min(a, b);
+      break;
+    case Op::difference:
+      a = std::min(a, 1 - b);
+      break;
+    case Op::exclusive_or:
+      a = std::max(std::min(a, 1 - b), std::min(1 - a, b));
+      break;
+    }
+  }
+  return std::max(a, 0.0f);
+}
+
+void expect_dense_equal(Op operation, const std::vector<Grid>& grids, const Grid& result,
+                        std::int32_t reach, bool everything = true) {
+  std::vector<GridAccessor> in;
+  for (const Grid& grid : grids)
+    in.emplace_back(grid);
+  GridAccessor out(result);
+  std::uint64_t active = 0;
+  std::vector<float> v(grids.size());
+  for (std::int32_t i = -reach; i < reach; ++i)
+    for (std::int32_t j = -reach; j < reach; ++j)
+      for (std::int32_t k = -reach; k < reach; ++k) {
+        for (std::size_t g = 0; g < grids.size(); ++g)
+          v[g] = in[g].value({i, j, k});
+        const float expected = expected_value(operation, v);
+        active += expected != 0;
+        ASSERT_EQ(out.value({i, j, k}), expected);
+      }
+  if (everything)
+    EXPECT_EQ(result.active_voxels(), active);
+}
+
+TEST(Csg, MixturesOfTilesAndLeavesAgainstDenseArrays) {
+  std::mt19937 random(1);
+  for (int n = 0; n < 6; ++n) {
+    const std::vector<Grid> grids{random_grid(random), random_grid(random), random_grid(random)};
+    for (const Op operation : all_operations) {
+      expect_dense_equal(operation, {grids[0], grids[1]}, combine(operation, {grids[0], grids[1]}),
+                         20);
+      expect_dense_equal(operation, grids, combine(operation, grids), 20);
+    }
+  }
+}
+
+TEST(Csg, LargeTilesAreSplitOnlyWhereNeeded) {
+  const auto with_tiles = [](std::initializer_list<TileView> tiles) {
+    GridBuilder builder{GridInfo{}};
+    for (const TileView& tile : tiles)
+      builder.add_tile(tile);
+    return builder.finish(false);
+  };
+  const Grid huge = with_tiles({{{0, 0, 0}, 4096, 0.75f, true}});
+  const Grid large = with_tiles({{{128, 0, 0}, 128, 0.5f, true}});
+  const Grid small = with_tiles({{{136, 8, 8}, 8, 1.0f, true}});
+  CsgReport report;
+  const Grid a = combine(Op::difference, {huge, large, small}, &report);
+  GridAccessor value(a);
+  EXPECT_EQ(value.value({5, 5, 5}), 0.75f);
+  EXPECT_EQ(value.value({4095, 4095, 4095}), 0.75f);
+  EXPECT_EQ(value.value({-1, 0, 0}), 0.0f);
+  EXPECT_EQ(value.value({128, 127, 127}), 0.5f);
+  EXPECT_EQ(value.value({140, 12, 12}), 0.0f);
+  EXPECT_EQ(value.value({136, 8, 7}), 0.5f);
+  EXPECT_EQ(a.active_voxels(), 68719476736u - 512u);
+  EXPECT_EQ(report.tiles_combined, 32767u + 4096u);
+  EXPECT_EQ(combine(Op::add, {huge, huge}, &report).active_voxels(), 68719476736u);
+  EXPECT_EQ(report.tiles_combined, 1u);
+}
+
+TEST(Csg, LargeTilesAgainstLeaves) {
+  const Grid block =
+      voxelize(Context{}, box_mesh({-128, -128, -128}, {128, 128, 128}), uniform_transform(1), {});
+  const Grid grey = ball(20, {0.1, 0.2, 0.3}, 3);
+  for (const Op operation : all_operations)
+    expect_dense_equal(operation, {block, grey}, combine(operation, {block, grey}), 32,
+                       /*everything=*/false);
+}
+
+TEST(Csg, Identities) {
+  const Grid a = ball(14, {0.1, 0.2, 0.3}), b = ball(11, {6, -3, 2}), nothing = Grid();
+  const Grid grey = ball(9, {1, 1, 1}, 4);
+  const auto same = [](const Grid& x, const Grid& y) { return x.digest() == y.digest(); };
+  EXPECT_TRUE(same(combine(Op::unite, {a, a}), a));
+  EXPECT_TRUE(same(combine(Op::unite, {grey, grey}), grey));
+  EXPECT_TRUE(same(combine(Op::intersect, {grey, grey}), grey));
+  EXPECT_TRUE(same(combine(Op::unite, {grey, nothing}), grey));
+  EXPECT_TRUE(same(combine(Op::add, {grey, nothing}), grey));
+  EXPECT_EQ(combine(Op::difference, {a, a}).active_voxels(), 0u);
+  EXPECT_EQ(combine(Op::exclusive_or, {a, a}).active_voxels(), 0u);
+  EXPECT_EQ(combine(Op::subtract, {grey, grey}).active_voxels(), 0u);
+  EXPECT_EQ(combine(Op::intersect, {a, nothing}).active_voxels(), 0u);
+  EXPECT_TRUE(same(combine(Op::add, {a, grey}), combine(Op::add, {grey, a})));
+  EXPECT_TRUE(same(combine(Op::unite, {a, grey}), combine(Op::unite, {grey, a})));
+  // On values 0 and 1: A xor B = (A ∪ B) ∖ (A ∩ B), A ∖ B = A ∖ (A ∩ B), A ∪ B = A + (B ∖ A).
+  const Grid both = combine(Op::intersect, {a, b}), either = combine(Op::unite, {a, b});
+  EXPECT_TRUE(same(combine(Op::exclusive_or, {a, b}), combine(Op::difference, {either, both})));
+  EXPECT_TRUE(same(combine(Op::difference, {a, b}), combine(Op::difference, {a, both})));
+  EXPECT_TRUE(same(either, combine(Op::add, {a, combine(Op::difference, {b, a})})));
+  EXPECT_EQ(either.active_voxels() + both.active_voxels(), a.active_voxels() + b.active_voxels());
+  EXPECT_FALSE(same(combine(Op::difference, {a, b}), combine(Op::difference, {b, a}))); // control
+}
+
+TEST(Csg, ClampsOnceAtTheEnd) {
+  GridBuilder builder{GridInfo{}};
+  builder.add_tile({{0, 0, 0}, 8, 0.25f, true});
+  const Grid low = builder.finish(false);
+  GridBuilder other{GridInfo{}};
+  other.add_tile({{0, 0, 0}, 8, 1.0f, true});
+  const Grid one = other.finish(false);
+  const Grid negative = combine(Op::subtract, {low, one});
+  EXPECT_EQ(negative.active_voxels(), 0u); // clamped, so nothing is left
+  GridBuilder minus{GridInfo{}};
+  minus.add_tile({{0, 0, 0}, 8, -1.0f, true});
+  // 0.25 - 1 - (-1) = 0.25: in between nothing is clamped.
+  const Grid back = combine(Op::subtract, {low, one, minus.finish(false)});
+  GridAccessor value(back);
+  EXPECT_EQ(value.value({3, 3, 3}), 0.25f);
+  EXPECT_EQ(value.value({8, 3, 3}), 0.0f);
+}
+
+TEST(Csg, UntouchedLeavesAreShared) {
+  const Grid a = ball(30, {0.1, 0.2, 0.3}, 2), far = ball(5, {80, 0, 0});
+  for (const Op operation : {Op::add, Op::unite, Op::exclusive_or}) {
+    CsgReport report;
+    combine(operation, {a, far}, &report);
+    EXPECT_EQ(report.leaves_computed, 0u);
+    EXPECT_EQ(report.leaves_shared, a.leaves().size() + far.leaves().size());
+  }
+  for (const Op operation : {Op::subtract, Op::difference}) {
+    CsgReport report;
+    combine(operation, {a, far}, &report);
+    EXPECT_EQ(report.leaves_computed, 0u);
+    EXPECT_EQ(report.leaves_shared, a.leaves().size());
+    EXPECT_EQ(report.leaves_constant, far.leaves().size());
+  }
+  CsgReport report; // control: where they overlap there is work
+  combine(Op::add, {a, ball(30, {5, 5, 5}, 2)}, &report);
+  EXPECT_GT(report.leaves_computed, 0u);
+}
+
+TEST(Csg, SameResultForAnyNumberOfThreads) {
+  const Grid a = ball(60, {0.1, 0.2, 0.3}, 2), b = ball(50, {20, 1, 0}, 3);
+  for (const Op operation : all_operations)
+    EXPECT_EQ(combine(operation, {a, b}, nullptr, 1).digest(),
+              combine(operation, {a, b}, nullptr, 2).digest());
+}
+
+std::string complaint(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.place() + ": " + error.what();
+  }
+  return "none";
+}
+
+Grid with_info(const std::function<void(GridInfo&)>& change) {
+  GridInfo info;
+  change(info);
+  GridBuilder builder(info);
+  builder.add_tile({{0, 0, 0}, 8, 1.0f, true});
+  return builder.finish(false);
+}
+
+TEST(Csg, Refusals) {
+  const Grid plain = with_info([](GridInfo&) {});
+  const auto said = [&](Op operation, const Grid& grid, const std::string& words) {
+    const std::string text = complaint([&] { combine(operation, {plain, grid}); });
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  };
+  said(Op::add, with_info([](GridInfo& i) { i.level_set = true; }), "volume 1: is a level set");
+  said(Op::add, with_info([](GridInfo& i) { i.background = 2; }), "volume 1: has the background 2");
+  said(Op::unite, with_info([](GridInfo& i) { i.isovalue = 0.25; }), "volume 0 has 0.5");
+  said(Op::unite, with_info([](GridInfo& i) { i.transform = uniform_transform(2); }),
+       "volume 0 has voxel 1, origin (0, 0, 0), volume 1 has voxel 2");
+  said(Op::unite, with_info([](GridInfo& i) { i.transform.m[0] = 2; }), "expected cubic");
+  const Grid band = with_info([](GridInfo& i) { i.band_isovalue = 0.5; });
+  said(Op::add, band, "volume 1: is exact only near");
+  said(Op::subtract, band, "volume 1: is exact only near");
+  said(Op::unite, band, "none");
+  said(Op::difference, band, "none");
+  said(Op::exclusive_or, with_info([](GridInfo& i) { i.band_isovalue = 0.3; }), "expected 0.5");
+  EXPECT_EQ(combine(Op::unite, {plain, band}).info().band_isovalue, 0.5);
+  EXPECT_NE(complaint([&] { combine(Op::unite, {plain}); }).find("at least 2"), std::string::npos);
+  EXPECT_THROW(csg_operation_from_name("plus"), UsageError);
+  EXPECT_EQ(csg_operation_from_name("xor"), Op::exclusive_or);
+}
+
+TEST(Csg, OverflowIsAnError) {
+  GridBuilder builder{GridInfo{}};
+  builder.add_tile({{0, 0, 0}, 8, std::numeric_limits<float>::max(), true});
+  const Grid grid = builder.finish(false);
+  EXPECT_THROW(combine(Op::add, {grid, grid}), Error);
+  EXPECT_NO_THROW(combine(Op::unite, {grid, grid}));
+}
+
+TEST(Csg, ResampleBringsOperandsToTheFirstLattice) {
+  const Grid a = ball(14, {0.1, 0.2, 0.3}, 2);
+  const Grid fine = voxelize(Context{}, sphere_mesh(3, 6, {30, 0, 0}), uniform_transform(0.5), {});
+  const std::vector<CsgOperand> operands{{a, "a"}, {fine, "fine"}};
+  EXPECT_THROW(csg(Context{}, Op::unite, operands), Error);
+  CsgReport report;
+  const Grid result = csg(Context{}, Op::unite, operands, {.resample = true}, &report);
+  EXPECT_EQ(report.resampled, 1u);
+  EXPECT_EQ(result.info().transform, a.info().transform);
+  GridAccessor value(result);
+  EXPECT_EQ(value.value({30, 0, 0}), 1.0f);
+  EXPECT_EQ(value.value({0, 0, 0}), 1.0f);
+}
+
+} // namespace
