@@ -487,7 +487,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       CLI::Option* option = operand.values != nullptr
                                 ? app.add_option(operand.name, *operand.values, operand.help)
                                 : app.add_option(operand.name, *operand.value, operand.help);
-      option->type_name("");
+      option->type_name("")->required(operand.at_least > 0);
     }
     std::vector<std::string> words = preprocess(argc, argv, s.stats);
     try {
@@ -512,7 +512,8 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       const std::size_t count =
           operand.values != nullptr ? operand.values->size() : app.count(operand.name);
       if (count < operand.at_least)
-        throw UsageError("missing " + operand.name + ", see " + s.name + " --help");
+        throw UsageError("expected at least " + std::to_string(operand.at_least) + " " +
+                         operand.name + ", see " + s.name + " --help");
     }
     for (const auto& check : s.checks)
       check();
