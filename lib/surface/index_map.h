@@ -35,13 +35,17 @@ private:
     Int3 key{};
     std::uint32_t value = none;
   };
+  /// operator== of arrays calls memcmp.
+  static bool equal(const Int3& a, const Int3& b) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+  }
   std::size_t position(const Int3& key) const {
     const auto word = [](std::int32_t n) { return std::uint64_t{static_cast<std::uint32_t>(n)}; };
     std::uint64_t h = (word(key[0]) << 32 | word(key[1])) * 0x9e3779b97f4a7c15U;
     h = (h ^ h >> 29 ^ word(key[2])) * 0xbf58476d1ce4e5b9U;
     h = (h ^ h >> 32) * 0x94d049bb133111ebU;
     std::size_t n = static_cast<std::size_t>(h >> shift_);
-    while (slots_[n].value != none && slots_[n].key != key)
+    while (slots_[n].value != none && !equal(slots_[n].key, key))
       n = (n + 1) & (slots_.size() - 1);
     return n;
   }

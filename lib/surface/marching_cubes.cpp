@@ -10,7 +10,9 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <emmintrin.h>
 #include <limits>
+#include <utility>
 
 // Based on: Lorensen and Cline, Marching Cubes: A High Resolution 3D Surface Construction
 // Algorithm, 1987.
@@ -38,11 +40,15 @@ Inside make_inside(double isovalue, bool level_set) {
 }
 
 Bits inside_bits(const float* values, const Inside& inside) {
+  const __m128 bound = _mm_set1_ps(inside.bound); // SSE2 is in every x86-64
   Bits bits;
   for (std::uint64_t& word : bits) {
     word = 0;
-    for (unsigned n = 0; n < 64; ++n)
-      word |= std::uint64_t{inside(values[n])} << n;
+    for (unsigned n = 0; n < 64; n += 4) {
+      const __m128 four = _mm_loadu_ps(values + n);
+      const __m128 mask = inside.below ? _mm_cmplt_ps(four, bound) : _mm_cmpgt_ps(four, bound);
+      word |= static_cast<std::uint64_t>(_mm_movemask_ps(mask)) << n;
+    }
     values += 64;
   }
   return bits;

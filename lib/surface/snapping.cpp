@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -277,7 +276,7 @@ Vec3 merged_position(const IsoSurface& surface, const CollapsingMesh& mesh,
 
 bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = b - a, v = c - a, w = c - b;
-  const double longest = std::fmax(dot(u, u), std::fmax(dot(v, v), dot(w, w)));
+  const double longest = std::max({dot(u, u), dot(v, v), dot(w, w)});
   return !(norm(cross(u, v)) > 1e-12 * longest);
 }
 
