@@ -112,8 +112,9 @@ void expect_dense_equal(Op operation, const std::vector<Grid>& grids, const Grid
         active += expected != 0;
         ASSERT_EQ(out.value({i, j, k}), expected);
       }
-  if (everything)
+  if (everything) {
     EXPECT_EQ(result.active_voxels(), active);
+  }
 }
 
 TEST(Csg, MixturesOfTilesAndLeavesAgainstDenseArrays) {
