@@ -10,17 +10,17 @@ namespace gewebe {
 // Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge e = 4 axis + n runs along
 // `axis`; n numbers the four edges of that axis by the corner where they start.
 //
-//            6 ----e3---- 7                z
-//           /|           /|                |   y
-//         e6 |         e7 |                |  /
-//         / e10        / e11               | /
-//        4 ----e2---- 5   |                |/____ x
-//        |   |        |   |
-//        |   2 ---e1--|-- 3
-//       e8  /        e9  /
-//        | e4         | e5
-//        |/           |/
-//        0 ----e0---- 1
+//          6 ---- e3 ---- 7
+//         /|             /|
+//       e6 |           e7 |
+//       /  e10         /  e11         z  y
+//      4 ---- e2 ---- 5   |           | /
+//      |   |          |   |           |/
+//      |   2 ---- e1 -|-- 3           +--- x
+//     e8  /          e9  /
+//      | e4           | e5
+//      |/             |/
+//      0 ---- e0 ---- 1
 
 /// An edge from corner `corner` to corner `corner | 1 << axis`.
 struct CellEdge {
