@@ -85,11 +85,12 @@ void work(cli::Run& run, const Arguments& a) {
               [&] { return scan_inside(run.context(), mesh, transform, a.options, &counts); });
   });
   if (counts.boundary_edges > 0)
-    run.warn(input.name() + ": the mesh is open: " + std::to_string(counts.boundary_edges) +
-             " boundary edges, " +
-             (a.options.on_open == OpenMesh::fill
-                  ? std::to_string(counts.holes) + " holes closed"
-                  : std::to_string(counts.odd_rays) + " odd rays left empty"));
+    run.warn(
+        input.name() + ": the mesh is open: " + std::to_string(counts.boundary_edges) +
+        " boundary edges, " +
+        (a.options.on_open == OpenMesh::fill
+             ? std::to_string(counts.holes) + (counts.holes == 1 ? " hole closed" : " holes closed")
+             : std::to_string(counts.odd_rays) + " odd rays left empty"));
   const Grid grid =
       run.timed("grid", [&] { return grid_from_scan(run.context(), scan, transform); });
   if (scan.origins.empty() && scan.tiles.empty())

@@ -523,6 +523,9 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
                 " samples along an edge, expected 1 to 64");
   if (mesh.triangles.empty())
     throw Error("the mesh has no triangle, expected at least one");
+  if (const double edge = transform.voxel_size().x; !(edge >= 1e-100 && edge <= 1e100))
+    throw Error("the voxels are too " + std::string(edge < 1 ? "small" : "large") +
+                ", expected an edge from 1e-100 to 1e100 mm");
   if (!transform.is_cubic())
     throw Error("the lattice is not cubic (" + transform.describe() +
                 "), expected voxels with equal edges");

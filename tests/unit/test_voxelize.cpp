@@ -349,6 +349,8 @@ TEST(Voxelize, AbsurdSizesAreRefusedWithTheNumber) {
   }
   EXPECT_THROW(scan_inside(Context{}, mesh, uniform_transform(1e-9), {}), Error); // 2^30
   EXPECT_THROW(scan_inside(Context{}, {}, unit_lattice, {}), Error);
+  for (const double voxel : {1e-300, 1e300})
+    EXPECT_THROW(scan_inside(Context{}, mesh, uniform_transform(voxel), {}), Error);
 }
 
 TEST(Voxelize, TheEstimateHolds) {
