@@ -188,16 +188,14 @@ $(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
 	@echo 'shellcheck $<'
 	@shellcheck -x $< && touch $@
 
-# The preprocessor writes which of our headers the file reads, so that their change counts too.
+# Writes beside the stamp which of our headers the file reads, so that their change counts too.
 TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
 $(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
 $(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma
-$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy | $(FIRST)
+$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy scripts/tidy | $(FIRST)
 	@mkdir -p $(@D)
 	@echo 'clang-tidy $<'
-	@g++ $(TIDY_FLAGS) -MM -MP -MT $@ -MF $@.d $<
-	@clang-tidy-16 --quiet $< -- $(TIDY_FLAGS) 2>$@.log || { cat $@.log >&2; exit 1; }
-	@touch $@
+	@scripts/tidy $< $@.d $(TIDY_FLAGS) && touch $@
 -include $(TIDY_STAMPS:=.d)
 
 # --- Installation -------------------------------------------------------------------------------------
