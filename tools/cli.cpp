@@ -467,9 +467,8 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     flag("--keep-unchanged", s.keep_unchanged, "leave FILE alone if its bytes would be equal");
 
     CLI::App app(s.description, s.name);
-    bool version = false;
     app.set_help_flag("--help", "this text");
-    app.add_flag("--version", version, "the version");
+    app.set_version_flag("--version", s.name + " (Gewebe) " GEWEBE_VERSION, "the version");
     app.get_formatter()->column_width(34);
     for (const auto& owned : s.specs) {
       Spec& spec = *owned;
@@ -495,15 +494,14 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     } catch (const CLI::CallForHelp&) {
       write_text("-", app.help());
       return 0;
+    } catch (const CLI::CallForVersion& version) {
+      write_text("-", std::string(version.what()) + "\n");
+      return 0;
     } catch (const CLI::ExtrasError&) {
       throw UsageError("unexpected argument '" + app.remaining().front() + "', see " + s.name +
                        " --help");
     } catch (const CLI::ParseError& error) {
       throw UsageError(std::string(error.what()) + ", see " + s.name + " --help");
-    }
-    if (version) {
-      write_text("-", s.name + " (Gewebe) " GEWEBE_VERSION "\n");
-      return 0;
     }
     for (const auto& spec : s.specs)
       if (spec->given)

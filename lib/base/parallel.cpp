@@ -37,7 +37,8 @@ void parallel_blocks(const Context& context, std::size_t count, std::size_t grai
       run_block(block);
     return;
   }
-  oneapi::tbb::task_arena arena(threads);
+  // More threads than cores would only make TBB print a warning.
+  oneapi::tbb::task_arena arena(std::min(threads, oneapi::tbb::info::default_concurrency()));
   arena.execute([&] {
     oneapi::tbb::parallel_for(
         oneapi::tbb::blocked_range<std::size_t>(0, blocks, 1),

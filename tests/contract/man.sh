@@ -74,7 +74,7 @@ test_pages_have_their_sections() {
       grep -q "^\.Sh $section\$" "$GEWEBE_ROOT/man/$tool.1" || fail "man/$tool.1 has no section $section"
     done
     grep -q "^\.Nm $tool\$" "$GEWEBE_ROOT/man/$tool.1" || fail "man/$tool.1 does not name $tool"
-    mandoc -Tutf8 "$GEWEBE_ROOT/man/$tool.1" | grep -q . || fail "man/$tool.1 does not render"
+    [[ $(mandoc -Tutf8 "$GEWEBE_ROOT/man/$tool.1") ]] || fail "man/$tool.1 does not render"
   done
   [[ -f $GEWEBE_ROOT/man/gewebe.7 ]] || fail 'man/gewebe.7 is missing'
 }
