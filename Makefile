@@ -192,7 +192,7 @@ $(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
 TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
 $(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
 $(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma
-$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy scripts/tidy | $(FIRST)
+$(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy tests/.clang-tidy scripts/tidy | $(FIRST)
 	@mkdir -p $(@D)
 	@echo 'clang-tidy $<'
 	@scripts/tidy $< $@.d $(TIDY_FLAGS) && touch $@
