@@ -34,7 +34,7 @@
 namespace gewebe {
 namespace {
 
-// ---------------------------------------------------------------------------------------- formats
+// ---- formats
 
 struct Format {
   Kind kind;
@@ -77,8 +77,7 @@ std::string one_line(std::string text) {
   return text.empty() ? "no reason given" : text;
 }
 
-// ---------------------------------------------------------------------------------------- side
-// files
+// ---- side files
 
 constexpr std::size_t max_side_file = std::size_t{1} << 30;
 
@@ -133,8 +132,7 @@ private:
   bool side_files_;
 };
 
-// ---------------------------------------------------------------------------------------- scene to
-// mesh
+// ---- scene to mesh
 
 // Rows of an affine transform.
 struct Affine {
@@ -407,7 +405,7 @@ TriangleMesh import(const AssimpSource& source, AssimpStats& stats) {
   return mesh;
 }
 
-// ---------------------------------------------------------------------------------------- the pipe
+// ---- the pipe
 
 struct WireHead {
   std::uint64_t points, triangles, texcoords, part, material;
@@ -480,8 +478,7 @@ ChildLimits limits_for(std::uint64_t bytes) {
   return limits;
 }
 
-// ---------------------------------------------------------------------------------------- mesh to
-// scene
+// ---- mesh to scene
 
 // The triangles of one part and material.
 struct Group {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kind_letters = "ebc";
 
-// ---------------------------------------------------------------- reading
+// ---- reading
 
 bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
@@ -387,7 +387,7 @@ private:
   std::size_t last_count_ = 0;
 };
 
-// ---------------------------------------------------------------- writing
+// ---- writing
 
 /// Appends words to a line of a preallocated block.
 class LineWriter {

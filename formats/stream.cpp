@@ -111,7 +111,7 @@ bool same_bytes(const std::string& a, const std::string& b) {
 
 } // namespace
 
-// ---------------------------------------------------------------------------------------- Input
+// ---- Input
 
 struct Input::State final : std::streambuf {
   ~State() override {
@@ -242,7 +242,7 @@ std::istream& Input::stream() {
   return *state_->stream;
 }
 
-// --------------------------------------------------------------------------------------- Output
+// ---- Output
 
 struct Output::State final : std::streambuf {
   State() { setp(buffer.data(), buffer.data() + buffer.size()); }

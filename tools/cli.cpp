@@ -163,7 +163,7 @@ void write_text(const std::string& path, const std::string& text) {
 
 } // namespace
 
-// ---------------------------------------------------------------------------------------- Stats
+// ---- Stats
 
 struct Stats::State {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
@@ -220,7 +220,7 @@ std::string Stats::json() const {
   return state_->whole().dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-// ------------------------------------------------------------------------------------------ Run
+// ---- Run
 
 Output::Options Run::output_options(bool binary) const {
   return {.keep_unchanged = keep_unchanged_, .binary = binary};
@@ -242,7 +242,7 @@ Run::Timer::~Timer() {
   run_.stats_.seconds(name_, now_seconds() - start_);
 }
 
-// ------------------------------------------------------------------------------------ OptionRef
+// ---- OptionRef
 
 namespace {
 Spec& spec_of(void* spec) {
@@ -268,7 +268,7 @@ OptionRef& OptionRef::count(std::size_t n) {
   return *this;
 }
 
-// -------------------------------------------------------------------------------------- Program
+// ---- Program
 
 struct Program::State {
   std::string name, description;

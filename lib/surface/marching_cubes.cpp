@@ -171,8 +171,7 @@ Int3 shifted(const Int3& origin, unsigned octant, int step) {
   return {origin[0] + part(0), origin[1] + part(1), origin[2] + part(2)};
 }
 
-// ------------------------------------------------------------------------------ which blocks to
-// visit
+// ---- which blocks to visit
 
 /// The voxels of layer 0 along the axes of `octant` (all axes: one voxel) that differ from `side`.
 bool layer_differs(const Content& content, unsigned octant, bool side) {
@@ -270,7 +269,7 @@ std::vector<Int3> candidate_blocks(const Context& context, const Field& field) {
   return blocks;
 }
 
-// ------------------------------------------------------------------------------------- one block
+// ---- one block
 
 /// Inside bits of the 9³ corners of a block's cells: word[i][n] holds for each (j, k) the corner
 /// (i, j + (n & 1), k + (n >> 1)).

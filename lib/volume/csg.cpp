@@ -24,7 +24,6 @@ std::string number(double value) {
 }
 
 // ---- what an operation does to values
-// ----------------------------------------------------------------
 
 // Written so that NaN becomes 0.
 float at_least_0(float a) {
@@ -87,7 +86,6 @@ void fold(CsgOperation operation, std::span<const Source> sources, std::array<fl
 }
 
 // ---- what may be combined
-// ---------------------------------------------------------------------------------
 
 void check_operand(const CsgOperand& operand) {
   const GridInfo& info = operand.grid.info();
@@ -171,7 +169,6 @@ std::vector<Grid> on_one_lattice(const Context& context, std::span<const CsgOper
 }
 
 // ---- where there is something to combine
-// -------------------------------------------------------------
 
 /// All operands' leaves in one place.
 struct LeafGroup {
@@ -286,7 +283,6 @@ Regions find_regions(std::span<const Grid> grids) {
 }
 
 // ---- combining
-// -------------------------------------------------------------------------------------------
 
 using LeafValues = std::array<float, leaf_voxels>;
 

@@ -108,7 +108,7 @@ std::uint64_t Grid::digest() const {
   return digest.value();
 }
 
-// --------------------------------------------------------------------------------- GridAccessor
+// ---- GridAccessor
 
 struct GridAccessor::Cache {
   explicit Cache(const Grid& grid) : native(grid.native()), accessor(*native->tree) {}
@@ -138,7 +138,7 @@ LeafView GridAccessor::leaf_at(const Int3& ijk, float& tile) {
   return {};
 }
 
-// ---------------------------------------------------------------------------------- GridBuilder
+// ---- GridBuilder
 
 struct GridBuilder::State {
   explicit State(GridInfo i)

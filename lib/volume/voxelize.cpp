@@ -22,7 +22,8 @@ namespace {
 constexpr double index_limit = 1 << 30;
 
 // ---- leaves under construction
-// ----------------------------------------------------------------------- A leaf first holds flips:
+//
+// A leaf first holds flips:
 // where along k the state of a column changes. `integrate` sums them up along k, starting from what
 // the column carries over from the leaf before.
 
@@ -138,7 +139,6 @@ struct Slab {
 };
 
 // ---- one slab
-// -------------------------------------------------------------------------------------------
 
 /// Mesh in the index space of the samples, and the triangles of each slab.
 struct Prepared {
@@ -315,7 +315,6 @@ Slab<CountLeaf> scan_slab_counts(const Prepared& mesh, std::size_t slab) {
 }
 
 // ---- all slabs
-// ------------------------------------------------------------------------------------------
 
 /// Sample rows [row_begin, row_end) that a triangle may cross; empty if none.
 struct Rows {

@@ -149,7 +149,7 @@ std::string unit_square_obj(const std::string& more = "") {
 
 } // namespace
 
-// ------------------------------------------------------------------------------------------- child
+// ---- child
 
 TEST(Child, GivesItsBytes) {
   std::string large(3'000'000, 'x');
@@ -462,8 +462,7 @@ TEST(MeshFile, EveryPrefixOfSmallFilesEndsInOrder) {
   }
 }
 
-// ------------------------------------------------------------------------------------------- real
-// data
+// ---- real data
 
 namespace {
 

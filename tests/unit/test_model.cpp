@@ -347,7 +347,7 @@ TEST(ModelBuild, NormalsAndTextureCoordinates) {
   EXPECT_EQ(surface_mesh(model).triangles, mesh.triangles);
 }
 
-// ---------------------------------------------------------------- the safe step
+// ---- the safe step
 
 Model two_masses(double mass, double stiffness, double damping, double drag) {
   Model m;
@@ -441,7 +441,7 @@ TEST(ModelSafeStep, SemiImplicitEulerStaysBoundedBelowItAndNotFarAbove) {
                1e-3); // the bound is a bound, not an equality, on a mesh
 }
 
-// ---------------------------------------------------------------- invariants
+// ---- invariants
 
 TEST(ModelCheck, EachInvariantIsGuarded) {
   BuildOptions options;
@@ -536,7 +536,7 @@ TEST(ModelDigest, SeesEveryField) {
   change([](Model& m) { m.tetrahedra = {{0, 1, 2, 3}}; });
 }
 
-// ---------------------------------------------------------------- real organs
+// ---- real organs
 
 /// v and f lines of an OBJ, points welded at equal position: an independent little reader.
 TriangleMesh read_obj(const std::string& path) {

@@ -189,7 +189,7 @@ TEST(Weld, DegenerateTrianglesAndUnusedPoints) {
   EXPECT_EQ(kept.points[0], (Vec3{9, 9, 9}));
 }
 
-// ------------------------------------------------------------------------------------- triangulate
+// ---- triangulate
 
 namespace {
 
