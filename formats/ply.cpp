@@ -20,8 +20,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the codec copies little-endian memory");
 
-// ----------------------------------------------------------------------------------------------
-// header
+// ---- header
 
 enum class Type : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
@@ -278,8 +277,7 @@ private:
   std::size_t at_ = 0, line_ = 0, properties_ = 0;
 };
 
-// ----------------------------------------------------------------------------------------------
-// body
+// ---- body
 
 // Both sources give the numbers of the body one after the other as double, which holds every type
 // exactly.
@@ -741,8 +739,7 @@ private:
   std::optional<double> vertex_count_;
 };
 
-// ----------------------------------------------------------------------------------------------
-// writing
+// ---- writing
 
 class PieceWriter {
 public:
