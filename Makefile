@@ -149,9 +149,11 @@ stress: $(STRESS) | $(FIRST)
 	@test -n '$(STRESS)' || { echo 'stress: tests/stress has no programs yet' >&2; exit 1; }
 	@for program in $(STRESS); do echo "$$program"; $$program || exit 1; done
 
+# Each program writes CSV; gnuplot, where there is one, draws it.
 bench: $(BENCH) $(TOOLS) | $(FIRST)
 	@test -n '$(BENCH)' || { echo 'bench: tests/bench has no programs yet' >&2; exit 1; }
-	@for program in $(BENCH); do $$program || exit 1; done
+	@for program in $(BENCH); do $$program > $$program.csv.part && mv $$program.csv.part $$program.csv && \
+	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
 
 demo: | $(FIRST)
 	@echo 'demo: examples/ is still empty; `make check` shows what works' >&2; exit 1

@@ -1,0 +1,182 @@
+// Work against error of the geometry stages, with OpenVDB's own tools on the same input in the same
+// run. Writes CSV to standard output: stage, program, voxel (mm), size (what the work follows),
+// threads, median and spread of the times, error (what it means stands in the column `measure`).
+
+#include "surface/marching_cubes.h"
+#include "surface/snapping.h"
+#include "tests/unit/mesh_fixtures.h"
+#include "volume/density.h"
+#include "volume/grid_internal.h"
+#include "volume/volume_stats.h"
+#include "volume/voxelize.h"
+
+#include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/VolumeToMesh.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <random>
+
+using namespace gewebe;
+
+namespace {
+
+struct Times {
+  double median, fastest, slowest; // ms
+};
+
+Times measure(const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int run = 0; run < 7; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    times.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
+  }
+  std::ranges::sort(times);
+  return {times[times.size() / 2], times.front(), times.back()};
+}
+
+void report(const char* stage, const char* program, double voxel, std::size_t size, int threads,
+            const Times& times, double error, const char* measure) {
+  std::printf("%s,%s,%g,%zu,%d,%.3f,%.3f,%.3f,%.3g,%s\n", stage, program, voxel, size, threads,
+              times.median, times.fastest, times.slowest, error, measure);
+  std::fflush(stdout);
+}
+
+Context with_threads(int threads) {
+  Context context;
+  context.threads = threads;
+  return context;
+}
+
+Grid ball(double voxel, double support) {
+  DensityOptions options;
+  options.info.transform = uniform_transform(voxel);
+  return metaball_density({}, {{{0.1, 0.2, 0.3}, support, 1}}, options);
+}
+
+void bench_density(double voxel) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Particles particles;
+  for (int n = 0; n < 100; ++n)
+    particles.push_back(
+        {{40 * unit(random), 40 * unit(random), 40 * unit(random)}, 10 + 4 * unit(random), 1});
+  DensityOptions options;
+  options.info.transform = uniform_transform(voxel);
+  Grid grid;
+  DensityReport counts;
+  for (const int threads : {1, 2}) {
+    const Times times = measure(
+        [&] { grid = metaball_density(with_threads(threads), particles, options, &counts); });
+    double error = 0;
+    for (const LeafView& leaf : grid.leaves())
+      for (int n = static_cast<int>(leaf.origin[0] & 63); n < leaf_voxels; n += 61) {
+        const Vec3 x = options.info.transform.to_world({1.0 * (leaf.origin[0] + (n >> 6)),
+                                                        1.0 * (leaf.origin[1] + (n >> 3 & 7)),
+                                                        1.0 * (leaf.origin[2] + (n & 7))});
+        double sum = 0;
+        for (const Particle& p : particles) {
+          const double t = dot(x - p.center, x - p.center) / (p.support_radius * p.support_radius);
+          if (t < 1)
+            sum += (1 - t) * (1 - t) * (1 - 4 * t / 9);
+        }
+        error = std::fmax(error, std::fabs(sum - static_cast<double>(leaf.values[n])));
+      }
+    report("density", "metaball2vol", voxel, counts.voxel_evaluations, threads, times, error,
+           "max |D - double|");
+  }
+}
+
+template <class Points>
+double radial_error(const Points& points, double radius) {
+  double sum = 0;
+  for (const auto& p : points)
+    sum += std::fabs(norm(Vec3{p[0], p[1], p[2]} - Vec3{0.1, 0.2, 0.3}) - radius);
+  return sum / static_cast<double>(points.size());
+}
+
+void bench_surface(double voxel) {
+  constexpr double support = 40; // so the surface at 0.5 has radius 20
+  const Grid grid = ball(voxel, support);
+  for (const int threads : {1, 2}) {
+    IsoSurface surface;
+    const Context context = with_threads(threads);
+    Times times = measure([&] { surface = marching_cubes(context, grid); });
+    report("surface", "marching cubes", voxel, surface.mesh.triangles.size(), threads, times,
+           radial_error(surface.mesh.points, support / 2), "mean distance mm");
+    SnapResult snapped;
+    times = measure([&] {
+      surface = marching_cubes(context, grid);
+      snapped = snap(context, surface, {});
+    });
+    report("surface", "mc-opt 0.15", voxel, snapped.mesh.triangles.size(), threads, times,
+           radial_error(snapped.mesh.points, support / 2), "mean distance mm");
+  }
+  const auto native = openvdb::FloatGrid::create(grid.native()->tree);
+  native->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec4I> quads;
+  const Times times = measure([&] { openvdb::tools::volumeToMesh(*native, points, quads, 0.5); });
+  std::vector<std::array<double, 3>> plain;
+  for (const openvdb::Vec3s& p : points)
+    plain.push_back(
+        {static_cast<double>(p.x()), static_cast<double>(p.y()), static_cast<double>(p.z())});
+  report("surface", "OpenVDB volumeToMesh", voxel, quads.size() * 2, 0, times,
+         radial_error(plain, support / 2), "mean distance mm");
+}
+
+void bench_voxelize(double voxel) {
+  const TriangleMesh mesh = test::sphere_mesh(5, 30, {0.1, 0.2, 0.3});
+  const double exact = signed_volume(mesh);
+  GridInfo info;
+  info.transform = uniform_transform(voxel);
+  for (const int samples : {1, 4})
+    for (const int threads : {1, 2}) {
+      VoxelizeOptions options;
+      options.samples = samples;
+      Grid grid;
+      const Times times =
+          measure([&] { grid = voxelize(with_threads(threads), mesh, info.transform, options); });
+      report("voxelize", samples == 1 ? "voxelize none" : "voxelize box:4", voxel,
+             mesh.triangles.size(), threads, times,
+             std::fabs(volume_stats({}, grid).volume / exact - 1), "relative volume");
+    }
+  std::vector<openvdb::Vec3s> points;
+  for (const Vec3& p : mesh.points)
+    points.emplace_back(p.x, p.y, p.z);
+  std::vector<openvdb::Vec3I> triangles;
+  for (const Triangle& t : mesh.triangles)
+    triangles.emplace_back(t[0], t[1], t[2]);
+  openvdb::FloatGrid::Ptr grid;
+  const Times times = measure([&] {
+    grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(
+        *openvdb::math::Transform::createLinearTransform(voxel), points, triangles, 3.0F);
+  });
+  std::uint64_t inside = 0;
+  for (auto value = grid->cbeginValueAll(); value; ++value)
+    if (*value < 0)
+      inside += value.getVoxelCount();
+  report("voxelize", "OpenVDB meshToLevelSet", voxel, mesh.triangles.size(), 0, times,
+         std::fabs(static_cast<double>(inside) * voxel * voxel * voxel / exact - 1),
+         "relative volume");
+}
+
+} // namespace
+
+int main() {
+  openvdb::initialize();
+  std::puts("stage,program,voxel,size,threads,median_ms,fastest_ms,slowest_ms,error,measure");
+  for (const double voxel : {2.0, 1.0, 0.5, 0.25})
+    bench_density(voxel);
+  for (const double voxel : {2.0, 1.0, 0.5, 0.25})
+    bench_surface(voxel);
+  for (const double voxel : {2.0, 1.0, 0.5, 0.25})
+    bench_voxelize(voxel);
+  return 0;
+}
