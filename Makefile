@@ -141,6 +141,9 @@ endif
 # T=NAME runs the tests of that name (or pattern) alone; SET=fast unit tests, bad input and fuzz corpora.
 check: $(TOOLS) $(ARCHIVE) $(UNIT) $(FUZZ) | $(FIRST)
 	@CXX='$(CXX)' MAKE='$(MAKE_COMMAND)' tests/run --config '$(config)' $(if $(SET),--set '$(SET)') $(if $(T),--test '$(T)')
+ifeq ($(config),coverage)
+	@scripts/coverage $(BUILD)
+endif
 
 golden-update: $(TOOLS) | $(FIRST)
 	@tests/golden/run update --config '$(config)' $(if $(T),--test '$(T)')
