@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <new>
 
 #include <fcntl.h>
@@ -98,12 +99,7 @@ void set_limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
 
 [[maybe_unused]] std::uint64_t address_space_in_use() {
   std::uint64_t pages = 0;
-  if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
-    unsigned long long value = 0;
-    if (std::fscanf(file, "%llu", &value) == 1)
-      pages = value;
-    std::fclose(file);
-  }
+  std::ifstream("/proc/self/statm") >> pages;
   return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 

@@ -715,8 +715,9 @@ private:
         mesh_.triangles.push_back({corners[t[0]], corners[t[1]], corners[t[2]]});
         if (!faces_.texcoords.empty()) {
           const float* st = faces_.texcoords.data() + 2 * first;
-          mesh_.texcoords.push_back({st[2 * t[0]], st[2 * t[0] + 1], st[2 * t[1]], st[2 * t[1] + 1],
-                                     st[2 * t[2]], st[2 * t[2] + 1]});
+          const std::size_t a = t[0], b = t[1], c = t[2];
+          mesh_.texcoords.push_back(
+              {st[2 * a], st[2 * a + 1], st[2 * b], st[2 * b + 1], st[2 * c], st[2 * c + 1]});
         }
         if (!faces_.sizes.empty() && !faces_.part.empty())
           mesh_.part.push_back(faces_.part[f]);

@@ -13,7 +13,8 @@ Vec3 column(const GridTransform& transform, std::size_t axis) {
 
 } // namespace
 
-Vec3 GridTransform::to_world(const Vec3& p) const {
+Vec3 GridTransform::to_world(const Vec3& index) const {
+  const Vec3& p = index;
   return {m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
           m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
 }

@@ -70,7 +70,7 @@ test_a_read_only_folder() {
   local tool run=()
   if [[ $(id -u) == 0 ]]; then
     # Root writes everywhere, unless it gives up that right.
-    run=(setpriv --bounding-set=-dac_override,-dac_read_search --inh-caps=-all)
+    run=(setpriv "--bounding-set=-dac_override,-dac_read_search" --inh-caps=-all)
     "${run[@]}" true 2>/dev/null || skip 'root that cannot give up its rights'
   fi
   for tool in $(programs); do

@@ -174,7 +174,7 @@ public:
     std::set<std::uint32_t> result;
     if (kind == 1) {
       for (std::uint32_t i = 0; i < 26; ++i)
-        if (nodes.count(i) == 0)
+        if (!nodes.contains(i))
           result.insert(i);
       return {"not (" + text + ")", result};
     }
