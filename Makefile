@@ -29,11 +29,11 @@ endif
 WARNINGS := -Wall -Wextra -Wshadow -Wconversion $(if $(WERROR),-Werror)
 LANGUAGE := -std=c++20 -ffp-contract=off -fPIC
 # The libraries' headers stand in /usr/include, where no warning is shown; Eigen's have a folder of their own.
-INCLUDES := -Ilib -I. -isystem /usr/include/eigen3
+INCLUDES := -Ilib -I. $(addprefix -isystem /usr/include/,eigen3 suitesparse hdf5/serial)
 DEFINES := -DGEWEBE_VERSION='"$(VERSION)"'
 ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
-LIBS := -lopenvdb -ltbb -lImath -lassimp -lxxhash
+LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lxxhash
 CHECK_LIBS := -lgmp -lmpfr
 LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
 

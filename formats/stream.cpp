@@ -402,6 +402,13 @@ std::ostream& Output::stream() {
   return *state_->stream;
 }
 
+const std::string& Output::temporary() const {
+  if (state_->temporary.empty())
+    throw Error(state_->name,
+                "is no regular file, but this kind can't be written to a pipe or a device");
+  return state_->temporary;
+}
+
 void Output::commit() {
   State& state = *state_;
   state.flush_buffer();

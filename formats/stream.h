@@ -66,6 +66,10 @@ public:
   void write(std::string_view bytes) { write(bytes.data(), bytes.size()); }
   /// A std::ostream that ends in `write`; errors of `write` are thrown from it.
   std::ostream& stream();
+  /// For libraries that write by name and not forwards (HDF5): the temporary file, empty at first;
+  /// close the library's file before `commit`, and `write` nothing yourself.
+  /// \throw Error if this is standard output or no regular file
+  const std::string& temporary() const;
   /// Flushes, checks, closes, renames. \throw Error
   void commit();
 

@@ -1,0 +1,44 @@
+#pragma once
+// Dense columns of a compliance matrix C = K⁻¹, node by node: who makes them and who keeps them
+// know nothing of each other. formats/ implements both interfaces over HDF5, sim/ uses them.
+//
+// The columns of a node are three rows of 3n doubles: entry [axis][3 i + a] is the displacement
+// (mm) of node i along a under a unit force (1e-6 N) along `axis` at that node; 0 where either axis
+// is fixed.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class ColumnSource {
+public:
+  ColumnSource() = default;
+  ColumnSource(const ColumnSource&) = delete;
+  ColumnSource& operator=(const ColumnSource&) = delete;
+  virtual ~ColumnSource() = default;
+
+  /// n, of all nodes of the model.
+  virtual std::size_t node_count() const = 0;
+  /// The nodes that have columns, ascending.
+  virtual const std::vector<std::uint32_t>& nodes() const = 0;
+  /// Reads the columns of nodes()[k]. \pre out.size() == 9 n \throw Error if they can't be read or
+  /// are damaged
+  virtual void read(std::size_t k, std::span<double> out) const = 0;
+};
+
+class ColumnSink {
+public:
+  ColumnSink() = default;
+  ColumnSink(const ColumnSink&) = delete;
+  ColumnSink& operator=(const ColumnSink&) = delete;
+  virtual ~ColumnSink() = default;
+
+  /// Takes the columns of the k-th node asked for; k ascends by one from call to call.
+  /// \pre columns.size() == 9 n \throw Error if they can't be written
+  virtual void write(std::size_t k, std::span<const double> columns) = 0;
+};
+
+} // namespace gewebe

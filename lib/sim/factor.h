@@ -1,0 +1,61 @@
+#pragma once
+// The sparse Cholesky factor of a stiffness matrix, K = Pᵀ L Lᵀ P: a compliance for any load.
+// CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008) stands behind it.
+
+#include "base/context.h"
+#include "sim/stiffness.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// A supernodal factor as plain arrays, named as in cholmod_factor (lower, int64, 0-based), so that
+/// it can be stored.
+struct FactorData {
+  std::int64_t order = 0;
+  std::int64_t max_column_size = 0, max_row_size = 0; ///< maxcsize, maxesize
+  std::vector<std::int64_t> permutation;              ///< Perm, order
+  std::vector<std::int64_t> column_count;             ///< ColCount, order
+  std::vector<std::int64_t> super;                    ///< nsuper + 1
+  std::vector<std::int64_t> pi, px;                   ///< nsuper + 1
+  std::vector<std::int64_t> s;                        ///< row indices
+  std::vector<double> x;                              ///< values
+};
+
+class Factor {
+public:
+  /// \throw Error if K isn't positive definite by its pivots alone (see compliance checks in
+  /// sim/condition.h for what decides), or memory exceeds the context's; Cancelled
+  Factor(const StiffnessMatrix& matrix, const Context& context);
+  /// \throw Error if the arrays contradict each other (every index is checked: they come from
+  /// files)
+  explicit Factor(const FactorData& data);
+  ~Factor();
+  Factor(Factor&&) noexcept;
+  Factor& operator=(Factor&&) noexcept;
+
+  std::size_t order() const noexcept;
+  FactorData data() const;
+  /// Doubles in L, zeros of the supernodes counted.
+  std::size_t entries() const noexcept;
+
+  /// u = K⁻¹ f for `columns` right-hand sides, each of order() numbers one behind the other. Safe
+  /// from many threads at once; the same bytes whatever the other threads do.
+  /// \pre f.size() == u.size() == order() * columns
+  void solve(std::span<const double> f, std::span<double> u, std::size_t columns = 1) const;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// u = C f over all 3 n axes: forces on fixed axes are ignored, displacements there are 0.
+/// \pre f.size() == u.size() == matrix.row_of_axis.size(), the factor is of this matrix
+void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,
+                std::span<double> u);
+
+} // namespace gewebe

@@ -1,0 +1,41 @@
+#pragma once
+// The stiffness matrix of a model linearised at rest (Bro-Nielsen 1998; report 3.3.2).
+//
+// Per spring from i to j with rest length l0, length l and direction n: the block
+// k [n nᵀ + (1 - l0/l)(I - n nᵀ)] at (i,i) and (j,j), its negative at (i,j) and (j,i); all springs
+// count, edge, bending and central. Axis a of node i has the number 3 i + a; rows of K are the
+// free axes in ascending order. Units: g/s² = 1e-3 N/m.
+
+#include "base/context.h"
+#include "model/model.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// The lower triangle of K on free axes, by columns, rows ascending, the diagonal always present.
+struct StiffnessMatrix {
+  std::vector<std::int64_t> column_start; ///< order() + 1
+  std::vector<std::int64_t> row;
+  std::vector<double> value;
+  std::vector<std::int64_t> row_of_axis; ///< 3 n: row of an axis, or -1 where it is fixed
+  std::vector<std::int64_t> axis_of_row; ///< order()
+
+  std::size_t order() const noexcept { return axis_of_row.size(); }
+};
+
+/// K of `model`. `fixed` (empty, or 3 n flags) names further axes to leave out, as where
+/// displacements are prescribed. \pre check_model(model) passes \throw Error if no axis is free
+StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed = {});
+
+/// f = K u over all 3 n axes, the fixed ones too, whose f are what the supports must hold against:
+/// reactions. \pre u.size() == f.size() == 3 n
+void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f);
+
+/// ‖K‖∞ (= ‖K‖₁) of the matrix.
+double stiffness_norm(const StiffnessMatrix& matrix);
+
+} // namespace gewebe
