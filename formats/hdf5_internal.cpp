@@ -216,8 +216,14 @@ Object::~Object() {
   if (id < 0 || file_->gone())
     return;
   // What was still in memory is written now.
-  if (H5Idec_ref(id) < 0 && file_->writing)
+  if (H5Idec_ref(id) < 0 && file_->writing) {
     file_->failed = true;
+    try {
+      file_->reason = system_reason();
+    } catch (...) {
+      (void)file_->failed; // the reason alone is lost
+    }
+  }
 }
 
 bool Object::has_attribute(const std::string& name) const {
@@ -632,11 +638,12 @@ File File::open_image(std::span<const std::uint8_t> bytes, const std::string& na
 }
 
 File::~File() {
+  if (file_ == nullptr)
+    return;
   // What wasn't closed in writing is given up: see FileState.
-  if (file_ != nullptr && (file_->gone() || file_->writing)) {
-    file_->closed = true;
+  if (file_->gone() || file_->writing)
     (void)handle_.release();
-  }
+  file_->closed = true;
 }
 
 void File::close() {
@@ -646,7 +653,7 @@ void File::close() {
   good = good && H5Fclose(id) >= 0;
   file_->closed = true;
   if (!good)
-    throw Error(file_->path, "cannot write" + system_reason());
+    throw Error(file_->path, "cannot write" + (file_->failed ? file_->reason : system_reason()));
 }
 
 } // namespace gewebe::hdf5

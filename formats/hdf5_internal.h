@@ -72,6 +72,7 @@ struct FileState {
   bool writing = false;
   bool failed = false; ///< a write has
   bool closed = false; ///< and everything in it
+  std::string reason;  ///< of the failure, as far as it was seen late
 
   bool gone() const noexcept { return failed || closed; }
 };
