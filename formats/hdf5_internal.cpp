@@ -555,7 +555,7 @@ File File::create(const std::string& path) {
   Handle handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, made.id(), how.id()));
   if (handle.id() < 0)
     throw Error(path, "cannot be made as an HDF5 file" + system_reason());
-  return {std::move(handle), std::make_shared<FileState>(FileState{path, true})};
+  return {std::move(handle), std::make_shared<FileState>(FileState{.path = path, .writing = true})};
 }
 
 namespace {
@@ -614,7 +614,7 @@ File File::open(const std::string& path) {
   Handle handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, how.id()));
   if (handle.id() < 0)
     fail_open(path);
-  return {std::move(handle), std::make_shared<FileState>(FileState{path})};
+  return {std::move(handle), std::make_shared<FileState>(FileState{.path = path})};
 }
 
 File File::open_image(std::span<const std::uint8_t> bytes, const std::string& name) {
@@ -634,7 +634,7 @@ File File::open_image(std::span<const std::uint8_t> bytes, const std::string& na
   Handle handle(H5Fopen(name.c_str(), H5F_ACC_RDONLY, how.id()));
   if (handle.id() < 0)
     fail_open(name);
-  return {std::move(handle), std::make_shared<FileState>(FileState{name})};
+  return {std::move(handle), std::make_shared<FileState>(FileState{.path = name})};
 }
 
 File::~File() {

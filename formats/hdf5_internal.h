@@ -68,11 +68,11 @@ private:
 /// neither write nor forget what it holds, and crashes when it tries: handles of such a file are
 /// left alone.
 struct FileState {
-  std::string path;
+  std::string path{};
   bool writing = false;
-  bool failed = false; ///< a write has
-  bool closed = false; ///< and everything in it
-  std::string reason;  ///< of the failure, as far as it was seen late
+  bool failed = false;  ///< a write has
+  bool closed = false;  ///< and everything in it
+  std::string reason{}; ///< of the failure, as far as it was seen late
 
   bool gone() const noexcept { return failed || closed; }
 };
