@@ -3,6 +3,7 @@
 // CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008) stands behind it.
 
 #include "base/context.h"
+#include "base/error.h"
 #include "sim/stiffness.h"
 
 #include <cstddef>
@@ -26,20 +27,44 @@ struct FactorData {
   std::vector<double> x;                              ///< values
 };
 
+/// The same arrays where they are.
+struct FactorView {
+  std::int64_t order = 0;
+  std::int64_t max_column_size = 0, max_row_size = 0;
+  std::span<const std::int64_t> permutation, column_count, super, pi, px, s;
+  std::span<const double> x;
+};
+
+/// Thrown where a pivot isn't positive. By itself this decides nothing: sim/condition.h finds out
+/// what it means.
+class NotPositiveDefinite : public Error {
+public:
+  explicit NotPositiveDefinite(std::size_t row);
+  /// Of K, where the factorisation stopped (or near it: a block of columns stops together).
+  std::size_t row() const noexcept { return row_; }
+
+private:
+  std::size_t row_;
+};
+
 class Factor {
 public:
-  /// \throw Error if K isn't positive definite by its pivots alone (see compliance checks in
-  /// sim/condition.h for what decides), or memory exceeds the context's; Cancelled
+  /// The order of elimination is that of AMD or METIS, whichever fills less; the factor is always
+  /// supernodal. The same bytes from call to call on one machine; BLAS decides the last bits.
+  /// \throw NotPositiveDefinite by its pivots alone; Error if memory exceeds the context's;
+  /// Cancelled
   Factor(const StiffnessMatrix& matrix, const Context& context);
   /// \throw Error if the arrays contradict each other (every index is checked: they come from
   /// files)
-  explicit Factor(const FactorData& data);
+  explicit Factor(FactorData data);
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
 
   std::size_t order() const noexcept;
+  /// Copies, and the arrays themselves, valid as long as the factor lives.
   FactorData data() const;
+  FactorView view() const noexcept;
   /// Doubles in L, zeros of the supernodes counted.
   std::size_t entries() const noexcept;
 

@@ -16,7 +16,8 @@
 
 namespace gewebe {
 
-/// The lower triangle of K on free axes, by columns, rows ascending, the diagonal always present.
+/// The lower triangle of K on free axes, by columns, rows ascending, the diagonal always present,
+/// springs of stiffness 0 left out.
 struct StiffnessMatrix {
   std::vector<std::int64_t> column_start; ///< order() + 1
   std::vector<std::int64_t> row;
@@ -28,12 +29,16 @@ struct StiffnessMatrix {
 };
 
 /// K of `model`. `fixed` (empty, or 3 n flags) names further axes to leave out, as where
-/// displacements are prescribed. \pre check_model(model) passes \throw Error if no axis is free
+/// displacements are prescribed. The same bytes on every machine. \pre check_model(model) passes
+/// \throw Error if no axis is free, or a sum isn't finite
 StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed = {});
 
 /// f = K u over all 3 n axes, the fixed ones too, whose f are what the supports must hold against:
 /// reactions. \pre u.size() == f.size() == 3 n
 void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f);
+
+/// y = K x. \pre x.size() == y.size() == matrix.order(), they don't overlap
+void multiply(const StiffnessMatrix& matrix, std::span<const double> x, std::span<double> y);
 
 /// ‖K‖∞ (= ‖K‖₁) of the matrix.
 double stiffness_norm(const StiffnessMatrix& matrix);

@@ -1,0 +1,282 @@
+#include "formats/scene.h"
+
+#include "base/error.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r';
+}
+
+/// A word as a message may show it: short, printable.
+std::string shown(std::string_view word) {
+  std::string text = "'";
+  for (const char c : word.substr(0, 40))
+    text += static_cast<unsigned char>(c) >= 0x20 && c != 0x7f ? c : '?';
+  return text + (word.size() > 40 ? "…'" : "'");
+}
+
+/// Words between blanks; quotes may stand around a word or a part of it and hold blanks and #.
+std::vector<std::string> split(std::string_view line) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < line.size();) {
+    if (is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    if (line[at] == '#')
+      break;
+    std::string& word = words.emplace_back();
+    while (at < line.size() && !is_blank(line[at]) && line[at] != '#') {
+      if (line[at] != '"') {
+        word += line[at++];
+        continue;
+      }
+      const std::size_t close = line.find('"', at + 1);
+      if (close == std::string_view::npos)
+        throw Error("a quote without an end, expected one more '\"'");
+      word += line.substr(at + 1, close - at - 1);
+      at = close + 1;
+    }
+    if (word.find('\0') != std::string::npos)
+      throw Error("a zero byte, expected text");
+  }
+  return words;
+}
+
+/// Takes the words of a line one by one; the complaints name what the command looks like.
+class Words {
+public:
+  Words(std::vector<std::string> words, const char* usage)
+      : words_(std::move(words)), usage_(usage) {}
+
+  bool done() const { return at_ == words_.size(); }
+
+  const std::string& word(const char* what) {
+    if (done())
+      fail(std::string("no ") + what);
+    return words_[at_++];
+  }
+
+  /// Takes the next word if it is this one.
+  bool take(std::string_view word) {
+    const bool same = !done() && words_[at_] == word;
+    at_ += same ? 1 : 0;
+    return same;
+  }
+
+  double number(const char* what) {
+    const std::string& text = word(what);
+    const char* const end = text.data() + text.size();
+    const char* const begin = text.data() + (text.starts_with('+') && text.size() > 1 ? 1 : 0);
+    double value = 0;
+    const auto [rest, status] = std::from_chars(begin, end, value);
+    if (status != std::errc{} || rest != end)
+      fail(shown(text) + " is no " + what);
+    if (!std::isfinite(value))
+      fail(shown(text) + " is not finite");
+    return value;
+  }
+
+  Vec3 vector(const char* what) {
+    Vec3 v;
+    for (int a = 0; a < 3; ++a)
+      v[a] = number(what);
+    return v;
+  }
+
+  std::string name() {
+    const std::string& text = word("NAME");
+    const auto allowed = [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+             c == '_' || c == '-' || c == '.';
+    };
+    if (text.empty() || text.size() > 100 || text[0] == '.' ||
+        !std::all_of(text.begin(), text.end(), allowed))
+      throw Error(shown(text) + " is no name, expected up to 100 letters, digits, '_', '-', '.'");
+    return text;
+  }
+
+  Selector nodes() { return parse_selector(word("NODES")); }
+
+  void end() const {
+    if (!done())
+      fail("surplus word " + shown(words_[at_]));
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(what + ", expected " + usage_);
+  }
+
+  Words rest(const char* usage) const {
+    return {{words_.begin() + static_cast<std::ptrdiff_t>(at_), words_.end()}, usage};
+  }
+
+private:
+  std::vector<std::string> words_;
+  const char* usage_;
+  std::size_t at_ = 0;
+};
+
+using What = decltype(Command::what);
+
+What parse_object(Words& in) {
+  ObjectCommand c;
+  c.name = in.name();
+  c.model = in.word("model");
+  if (c.model.empty())
+    in.fail("an empty file name");
+  std::optional<Method> method;
+  while (!in.done()) {
+    const std::string word = in.word("");
+    if (word.starts_with("store=") && word.size() > 6 && c.store.empty())
+      c.store = word.substr(6);
+    else if ((word == "method=ffe" || word == "method=ela") && !method)
+      method = word == "method=ffe" ? Method::ffe : Method::ela;
+    else
+      in.fail(shown(word) + " is no use here");
+  }
+  if (method == Method::ela && !c.store.empty())
+    throw Error("method=ela has no use for a store, expected one of them");
+  c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
+  return c;
+}
+
+What parse_force(Words& in) {
+  ForceCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.force = in.vector("number");
+  c.total = in.take("total");
+  return c;
+}
+
+What parse_displace(Words& in) {
+  DisplaceCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.displacement = in.vector("number");
+  return c;
+}
+
+What parse_release(Words& in) {
+  ReleaseCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  return c;
+}
+
+What parse_gravity(Words& in) {
+  return GravityCommand{in.vector("number")};
+}
+
+What parse_timestep(Words& in) {
+  const TimestepCommand c{in.number("time")};
+  if (!(c.dt > 0))
+    in.fail("a timestep that is not positive");
+  return c;
+}
+
+What parse_emit(Words& in) {
+  const std::string& word = in.word("word");
+  if (word != "shapes" && word != "forces")
+    in.fail(shown(word) + " can't be emitted");
+  return EmitCommand{word == "forces"};
+}
+
+What parse_step(Words& in) {
+  StepCommand c;
+  if (in.done())
+    return c;
+  c.dt = in.number("time");
+  if (!(*c.dt >= 0))
+    in.fail("a step back in time");
+  return c;
+}
+
+What parse_run(Words& in) {
+  RunCommand c;
+  c.until = in.number("time");
+  if (!in.take("every"))
+    in.fail(in.done() ? "no 'every'" : shown(in.word("")) + " is not 'every'");
+  c.every = in.number("time");
+  if (!(c.every > 0))
+    in.fail("DT is not positive");
+  return c;
+}
+
+struct Verb {
+  std::string_view name;
+  const char* usage;
+  bool at; ///< may stand behind `at T`
+  std::function<What(Words&)> parse;
+};
+
+const std::array<Verb, 9>& verbs() {
+  static const std::array<Verb, 9> all{{
+      {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela]", false, parse_object},
+      {"force", "force NAME NODES fx fy fz [total]", true, parse_force},
+      {"displace", "displace NAME NODES dx dy dz", true, parse_displace},
+      {"release", "release NAME NODES", true, parse_release},
+      {"gravity", "gravity gx gy gz", true, parse_gravity},
+      {"timestep", "timestep dt", true, parse_timestep},
+      {"emit", "emit shapes|forces", true, parse_emit},
+      {"step", "step [dt], dt 0 or more", false, parse_step},
+      {"run", "run UNTIL every DT", false, parse_run},
+  }};
+  return all;
+}
+
+std::string verb_list(bool at_only) {
+  std::string list;
+  for (const Verb& verb : verbs())
+    if (verb.at || !at_only)
+      list += (list.empty() ? "" : ", ") + std::string(verb.name);
+  return at_only ? list : list + ", at";
+}
+
+/// \param line all words, the command's own first
+What parse_command(std::vector<std::string> line, bool behind_at) {
+  const std::string verb_name = line[0];
+  for (const Verb& verb : verbs())
+    if (verb.name == verb_name && (verb.at || !behind_at)) {
+      line.erase(line.begin());
+      Words in(std::move(line), verb.usage);
+      What what = verb.parse(in);
+      in.end();
+      return what;
+    }
+  throw Error(shown(verb_name) + " is no command" + (behind_at ? " behind at T" : "") +
+              ", expected one of " + verb_list(behind_at));
+}
+
+} // namespace
+
+std::optional<Command> parse_scene_line(std::string_view line) {
+  std::vector<std::string> words = split(line);
+  if (words.empty())
+    return std::nullopt;
+  Command command;
+  if (words[0] == "at") {
+    words.erase(words.begin());
+    Words in(words, "at T COMMAND...");
+    command.at = in.number("time");
+    if (in.done())
+      in.fail("no command");
+    words.erase(words.begin());
+  }
+  command.what = parse_command(std::move(words), command.at.has_value());
+  return command;
+}
+
+} // namespace gewebe

@@ -1,0 +1,62 @@
+#pragma once
+// The commands of a scene, scene(5), as data.
+
+#include "base/vec3.h"
+#include "model/selector.h"
+
+#include <optional>
+#include <string>
+#include <variant>
+
+namespace gewebe {
+
+enum class Method { ffe, ela }; ///< elastostatic (with stored stiffness), elastodynamic
+
+/// "ffe", "ela".
+constexpr const char* method_name(Method method) {
+  return method == Method::ffe ? "ffe" : "ela";
+}
+
+struct ObjectCommand {
+  std::string name, model, store; ///< files as the scene names them; no store: ""
+  Method method = Method::ela;
+};
+struct ForceCommand {
+  std::string object;
+  Selector nodes;
+  Vec3 force;
+  bool total = false; ///< divided among the nodes
+};
+struct DisplaceCommand {
+  std::string object;
+  Selector nodes;
+  Vec3 displacement;
+};
+struct ReleaseCommand {
+  std::string object;
+  Selector nodes;
+};
+struct GravityCommand {
+  Vec3 gravity;
+};
+struct TimestepCommand {
+  double dt = 0; ///< > 0
+};
+struct EmitCommand {
+  bool forces = false; ///< else shapes
+};
+struct StepCommand {
+  std::optional<double> dt; ///< >= 0
+};
+struct RunCommand {
+  double until = 0, every = 0; ///< every > 0
+};
+
+struct Command {
+  std::optional<double> at; ///< when; absent: now. Never for object, step and run.
+  std::variant<ObjectCommand, ForceCommand, DisplaceCommand, ReleaseCommand, GravityCommand,
+               TimestepCommand, EmitCommand, StepCommand, RunCommand>
+      what;
+};
+
+} // namespace gewebe
