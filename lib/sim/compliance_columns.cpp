@@ -13,7 +13,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t block_nodes = 16; // solved together; decides the last bits
+constexpr std::size_t block_nodes = 16; // solved by one job
 
 /// The blocks that are computed at the same time, while those before them are handed over.
 std::size_t wave_blocks(std::size_t nodes, const Context& context) {
@@ -90,10 +90,10 @@ private:
 
 double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context) {
-  // A block has right-hand sides, solutions, two of CHOLMOD's own and the columns; those of the
-  // wave before wait to be handed over.
+  // A block has right-hand sides, solutions, a panel of them and the columns; those of the wave
+  // before wait to be handed over.
   const double block = 8.0 * 3 * static_cast<double>(block_nodes) *
-                       (static_cast<double>(matrix.order()) * 4 +
+                       (static_cast<double>(matrix.order()) * 3 +
                         static_cast<double>(matrix.row_of_axis.size()) * 2);
   return block * static_cast<double>(wave_blocks(nodes, context));
 }

@@ -386,13 +386,14 @@ namespace {
 [[noreturn]] void refuse(const Model& model, const StiffnessMatrix& matrix, const Context& context,
                          double condition) {
   const std::optional<FreeMotion> motion = weakest_motion(model, matrix, context);
-  const std::string how = condition > 0 ? "condition " + short_number(condition) + ", at most " +
-                                              short_number(max_condition)
-                                        : "no condition";
+  const std::string how = condition > 0 && std::isfinite(condition)
+                              ? "nearly singular (condition " + short_number(condition) +
+                                    ", at most " + short_number(max_condition) + ")"
+                              : "singular";
   if (!motion)
     throw Error("the model is unstable at rest: springs shorter than their rest length push nodes "
                 "aside, expected springs near it");
-  throw Error("the stiffness matrix is singular (" + how + "): " + motion_text(*motion) + ", " +
+  throw Error("the stiffness matrix is " + how + ": " + motion_text(*motion) + ", " +
               remedy(motion->kind));
 }
 
