@@ -148,7 +148,7 @@ void check_data(const FactorData& d) {
   check_bounds(d.super, n, true, "its supernodes don't divide its columns");
   check_bounds(d.pi, d.s.size(), true, "its supernodes don't divide its rows");
   check_bounds(d.px, d.x.size(), true, "its supernodes don't divide its values");
-  std::int64_t longest = 0;
+  std::int64_t longest = 1; // as CHOLMOD counts
   for (std::size_t k = 0; k + 1 < d.super.size(); ++k)
     check_supernode(d, k, longest);
   require(d.max_row_size == longest && d.max_column_size >= 0, "its largest sizes are wrong");
