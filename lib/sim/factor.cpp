@@ -54,10 +54,10 @@ private:
   cholmod_common common_{};
 };
 
-/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A threaded
-/// one would fight with the threads that are here, and change bytes: it gets one thread. OpenBLAS
-/// compiled without threads has no locks either and gives wrong numbers when two threads call it
-/// (Debian's libopenblas0-serial does): factorisations take turns.
+/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A
+/// threaded one would fight with the threads that are here, and change bytes: it gets one thread.
+/// OpenBLAS compiled without threads has no locks either and gives wrong numbers when two threads
+/// call it (Debian's libopenblas0-serial does): factorisations take turns.
 std::unique_lock<std::mutex> blas_turn() {
   static std::mutex mutex; // one for all, as the library behind it
   std::unique_lock turn(mutex);
