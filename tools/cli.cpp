@@ -363,21 +363,49 @@ OptionRef Program::option(const std::string& names, std::string& value, const st
   return OptionRef(&spec);
 }
 
+namespace {
+std::vector<double> parse_list(const Spec& spec, std::string_view word) {
+  std::vector<double> values;
+  for (std::size_t begin = 0; begin <= word.size();) {
+    const std::size_t comma = std::min(word.find(',', begin), word.size());
+    values.push_back(parse_number<double>(spec.long_name(), word.substr(begin, comma - begin)));
+    spec.check(values.back());
+    begin = comma + 1;
+  }
+  if (spec.list_count != 0 && values.size() != spec.list_count)
+    throw UsageError(spec.long_name() + ": expected " + std::to_string(spec.list_count) +
+                     " numbers, not " + std::to_string(values.size()));
+  return values;
+}
+
+Vec3 parse_vec3(const Spec& spec, std::string_view word) {
+  const std::vector<double> values = parse_list(spec, word);
+  return {values[0], values[1], values[2]};
+}
+} // namespace
+
 OptionRef Program::option(const std::string& names, std::vector<double>& value,
                           const std::string& metavar, const std::string& help) {
   Spec& spec = state_->add(names, metavar, help);
-  spec.set = [&value](Spec& self, std::string_view word) {
-    value.clear();
-    for (std::size_t begin = 0; begin <= word.size();) {
-      const std::size_t comma = std::min(word.find(',', begin), word.size());
-      value.push_back(parse_number<double>(self.long_name(), word.substr(begin, comma - begin)));
-      self.check(value.back());
-      begin = comma + 1;
-    }
-    if (self.list_count != 0 && value.size() != self.list_count)
-      throw UsageError(self.long_name() + ": expected " + std::to_string(self.list_count) +
-                       " numbers, not " + std::to_string(value.size()));
-  };
+  spec.set = [&value](Spec& self, std::string_view word) { value = parse_list(self, word); };
+  return OptionRef(&spec);
+}
+
+OptionRef Program::option(const std::string& names, Vec3& value, const std::string& metavar,
+                          const std::string& help) {
+  Spec& spec = state_->add(names, metavar, help);
+  spec.default_text =
+      number_text(value.x) + "," + number_text(value.y) + "," + number_text(value.z);
+  spec.list_count = 3;
+  spec.set = [&value](Spec& self, std::string_view word) { value = parse_vec3(self, word); };
+  return OptionRef(&spec);
+}
+
+OptionRef Program::option(const std::string& names, std::optional<Vec3>& value,
+                          const std::string& metavar, const std::string& help) {
+  Spec& spec = state_->add(names, metavar, help);
+  spec.list_count = 3;
+  spec.set = [&value](Spec& self, std::string_view word) { value = parse_vec3(self, word); };
   return OptionRef(&spec);
 }
 

@@ -131,6 +131,11 @@ public:
                    const std::string& help);
   OptionRef option(const std::string& names, std::vector<double>& value, const std::string& metavar,
                    const std::string& help);
+  /// Three numbers: a place, a direction, a colour.
+  OptionRef option(const std::string& names, Vec3& value, const std::string& metavar,
+                   const std::string& help);
+  OptionRef option(const std::string& names, std::optional<Vec3>& value, const std::string& metavar,
+                   const std::string& help);
   void flag(const std::string& names, bool& value, const std::string& help);
 
   // Operands, in order. An optional one keeps its default when absent.

@@ -1,0 +1,37 @@
+#include "formats/image_file.h"
+
+#include "base/error.h"
+#include "formats/png.h"
+#include "formats/pnm.h"
+
+#include <string>
+
+namespace gewebe {
+
+Image read_image(Input& input, const Context& context) {
+  const bool is_png = kind_from_magic(input.peek(8)) == Kind::png;
+  const std::string_view start = input.peek(2);
+  if (!is_png && !(start.size() == 2 && start[0] == 'P' && start[1] >= '2' && start[1] <= '6' &&
+                   start[1] != '4'))
+    throw Error(input.name(), "byte 0: no image, expected PNG or PNM (P2, P3, P5, P6)");
+  const std::string bytes = input.read_all(context.max_memory);
+  Image image = is_png ? read_png(bytes, input.name()) : read_pnm(bytes, input.name());
+  at(input.name(), [&] {
+    require_memory(context, static_cast<double>(bytes.size() + image.values.size()), "the image");
+  });
+  return image;
+}
+
+const std::vector<Kind>& picture_kinds() {
+  static const std::vector<Kind> kinds{Kind::png, Kind::ppm, Kind::rgb};
+  return kinds;
+}
+
+void write_image(Output& output, const Image& image, Kind kind) {
+  if (kind == Kind::rgb)
+    output.write(image.values.data(), image.values.size());
+  else
+    output.write(kind == Kind::ppm ? write_ppm(image) : write_png(image));
+}
+
+} // namespace gewebe

@@ -1,0 +1,63 @@
+#pragma once
+// What both backends draw: vertices with texture coordinates and emboss offsets. Report 3.2.3.
+
+#include "base/context.h"
+#include "base/mesh.h"
+#include "base/vec3.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// In single precision, as OpenGL takes them, so that both backends draw the same geometry.
+struct DrawVertex {
+  std::array<float, 3> position{}; ///< (p - origin) / scale, within -1 … 1
+  std::array<float, 2> st{};       ///< of the base texture, and of the structure
+  std::array<float, 2> shifted{};  ///< (s + ds, t + dt), towards the light
+  float shade = 1;                 ///< factor of the base colour, 0 … 1
+};
+
+struct Drawing {
+  Box3 box; ///< of the points, mm
+  Vec3 origin;
+  double scale = 1; ///< > 0
+  std::vector<DrawVertex> vertices;
+  std::vector<Triangle> triangles;
+};
+
+/// A mesh to draw.
+struct Surface {
+  TriangleMesh mesh;
+  std::vector<Vec3> rest; ///< where its points were at rest; empty: where they are
+};
+
+struct DrawingOptions {
+  bool texcoords = false; ///< a base or a structure texture is there
+  bool structure = false; ///< a structure texture is there: offsets are computed
+  Vec3 light;             ///< lP, mm, in the space of the mesh
+  double offset = 0.005;  ///< length of the offset, in texture coordinates
+  double shade = 0;       ///< share of Lambert's law in the base colour, 0 … 1
+};
+
+/// All surfaces in one, in order. Per vertex (report eq. 3.2)
+///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
+/// with the frame of tangents.h, and shade = 1 - k + k max(0, L·N) for a share k. L is 0 for a
+/// vertex at the light. Nothing that was not asked for is computed.
+/// \pre check_mesh passes for every mesh; with `texcoords` all meshes have them
+/// \throw Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
+Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
+                     const Context& context);
+
+/// Bytes that make_drawing and a backend need at most, without pictures and textures.
+double drawing_bytes(std::span<const Surface> surfaces);
+
+std::uint64_t triangle_count(std::span<const Surface> surfaces);
+
+/// The box of the rest shapes of all surfaces.
+Box3 rest_box(std::span<const Surface> surfaces);
+
+} // namespace gewebe

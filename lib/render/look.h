@@ -1,0 +1,45 @@
+#pragma once
+// How a surface looks: its textures and colours, and the formula that joins them. Report 3.2.
+
+#include "base/vec3.h"
+#include "render/texture.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+
+namespace gewebe {
+
+/// Absent textures are neither read nor computed with: without base the colour alone, without
+/// structure r = 0.5, which leaves the base as it is.
+struct Look {
+  std::optional<Texture> base;
+  std::optional<Texture> structure; ///< the height f, one channel
+  Vec3 color{1, 1, 1};              ///< factor of the base, 0 … 1
+  Vec3 background{1, 1, 1};         ///< 0 … 1
+};
+
+/// s of the composition: makes up for r being 0.5 where the structure is flat.
+constexpr double emboss_scale = 2;
+
+/// r = 0.5 + 0.5 (f(s, t) - f(s + ds, t + dt)) (report 3.2.3).
+inline double relief(double height, double height_to_light) {
+  return 0.5 + 0.5 * (height - height_to_light);
+}
+
+/// min(1, s r min(1, base)) on stored values.
+inline double compose(double base, double r) {
+  return std::min(1.0, emboss_scale * r * std::min(1.0, base));
+}
+
+/// A value 0 … 1 as 8 bits, rounded; values outside are clamped.
+inline std::uint8_t stored(double value) {
+  return static_cast<std::uint8_t>(std::clamp(value, 0.0, 1.0) * 255 + 0.5);
+}
+
+inline std::array<std::uint8_t, 3> stored(const Vec3& color) {
+  return {stored(color.x), stored(color.y), stored(color.z)};
+}
+
+} // namespace gewebe
