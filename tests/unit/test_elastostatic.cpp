@@ -162,9 +162,10 @@ TEST(Elastostatic, ShapeOfForcesAndGravityEqualsADenseSolve) {
   EXPECT_LT(difference(as_vector(object.displacement()), expected), tolerance);
   EXPECT_LT(object.counts().backward_error, 1e-14);
   EXPECT_GT(object.counts().backward_error, 0);
-  // The comparison can fail: a spring less is another shape.
+  // The comparison can fail: stiffer springs give another shape.
   Model other = model;
-  std::erase_if(other.springs, [&](const Spring& s) { return s.i == free_nodes(model)[0]; });
+  for (Spring& s : other.springs)
+    s.stiffness *= s.i == free_nodes(model)[0] ? 1.001 : 1;
   EXPECT_GT(difference(as_vector(object.displacement()), dense_shape(other, load)), tolerance);
 }
 
