@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <dlfcn.h>
+#include <mutex>
 #include <new>
 #include <string>
 
@@ -53,12 +54,35 @@ private:
   cholmod_common common_{};
 };
 
-/// A threaded BLAS would fight with the threads that are here, and change bytes. Which BLAS there
-/// is, is known only at run time.
-void use_one_blas_thread() {
-  using Set = void (*)(int);
-  if (void* const set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); set != nullptr)
-    reinterpret_cast<Set>(set)(1);
+/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A threaded
+/// one would fight with the threads that are here, and change bytes: it gets one thread. OpenBLAS
+/// compiled without threads has no locks either and gives wrong numbers when two threads call it
+/// (Debian's libopenblas0-serial does): there calls take turns.
+class Blas {
+public:
+  Blas() {
+    using Set = void (*)(int);
+    if (void* const set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); set != nullptr)
+      reinterpret_cast<Set>(set)(1);
+    using Get = int (*)();
+    constexpr int with_locks = 1; // 0: without threads, 2: OpenMP
+    if (void* const get = dlsym(RTLD_DEFAULT, "openblas_get_parallel"); get != nullptr)
+      many_ = reinterpret_cast<Get>(get)() == with_locks;
+  }
+
+  /// To be held during a call.
+  std::unique_lock<std::mutex> turn() {
+    return many_ ? std::unique_lock<std::mutex>() : std::unique_lock(mutex_);
+  }
+
+private:
+  bool many_ = true;
+  std::mutex mutex_;
+};
+
+std::unique_lock<std::mutex> blas_turn() {
+  static Blas blas; // one for all, as the library behind it
+  return blas.turn();
 }
 
 /// The matrix as CHOLMOD wants it, without a copy; it changes nothing in it.
@@ -183,7 +207,6 @@ Factor& Factor::operator=(Factor&&) noexcept = default;
 
 Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
     : state_(std::make_unique<State>()) {
-  use_one_blas_thread();
   Common& common = state_->common;
   cholmod_sparse a = sparse_view(matrix);
   check_cancelled(context);
@@ -193,7 +216,10 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
     throw Error("the analysis of the stiffness matrix made no supernodes");
   require_memory(context, factor_bytes(*state_->owned), "the factor of the stiffness matrix");
   check_cancelled(context);
-  (void)cholmod_l_factorize(&a, state_->owned, common.get());
+  {
+    const auto turn = blas_turn();
+    (void)cholmod_l_factorize(&a, state_->owned, common.get());
+  }
   common.check("the factorisation of the stiffness matrix");
   check_cancelled(context);
   if (state_->owned->minor < matrix.order())
@@ -202,7 +228,6 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
 }
 
 Factor::Factor(FactorData data) : state_(std::make_unique<State>()) {
-  use_one_blas_thread();
   check_data(data);
   state_->data = std::move(data);
   FactorData& d = state_->data;
@@ -273,7 +298,11 @@ void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t c
   Common common;
   // A shallow copy, so that whatever CHOLMOD notes in the factor is noted in our own.
   cholmod_factor l = state_->factor();
-  cholmod_dense* x = cholmod_l_solve(CHOLMOD_A, &l, &b, common.get());
+  cholmod_dense* x = nullptr;
+  {
+    const auto turn = blas_turn();
+    x = cholmod_l_solve(CHOLMOD_A, &l, &b, common.get());
+  }
   common.check("a solution of the stiffness matrix");
   if (x == nullptr)
     throw std::bad_alloc();
