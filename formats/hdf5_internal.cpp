@@ -548,14 +548,16 @@ File::File(Handle handle, std::shared_ptr<FileState> file)
   root_.reset(new Group(std::move(root), file_, "/"));
 }
 
-File File::create(const std::string& path) {
+File File::create(const std::string& path, const std::string& name) {
   silence();
+  const std::string& called = name.empty() ? path : name;
   const Handle made = properties(H5P_FILE_CREATE);
   const Handle how = access();
   Handle handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, made.id(), how.id()));
   if (handle.id() < 0)
-    throw Error(path, "cannot be made as an HDF5 file" + system_reason());
-  return {std::move(handle), std::make_shared<FileState>(FileState{.path = path, .writing = true})};
+    throw Error(called, "cannot be made as an HDF5 file" + system_reason());
+  return {std::move(handle),
+          std::make_shared<FileState>(FileState{.path = called, .writing = true})};
 }
 
 namespace {

@@ -225,8 +225,8 @@ private:
 
 class File {
 public:
-  /// Empties or makes it.
-  static File create(const std::string& path);
+  /// Empties or makes it. `name` is what messages call it, the path itself if empty.
+  static File create(const std::string& path, const std::string& name = "");
   /// For reading. \throw Error too if it is missing, a folder, empty, no HDF5 or cut off
   static File open(const std::string& path);
   /// A file that stands in memory; `name` is what messages call it.

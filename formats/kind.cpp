@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 16> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 17> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -27,6 +27,7 @@ constexpr std::array<std::pair<Kind, std::string_view>, 16> names{{
     {Kind::dae, "dae"},
     {Kind::png, "png"},
     {Kind::ppm, "ppm"},
+    {Kind::csv, "csv"},
 }};
 
 std::string list_names(const std::vector<Kind>& kinds) {
@@ -149,7 +150,7 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
 
 bool is_binary(Kind kind) {
   return kind != Kind::particles && kind != Kind::ela && kind != Kind::obj && kind != Kind::off &&
-         kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae;
+         kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae && kind != Kind::csv;
 }
 
 } // namespace gewebe

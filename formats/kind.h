@@ -26,6 +26,7 @@ enum class Kind {
   png,
   ppm,
   rgb,
+  csv,
 };
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …

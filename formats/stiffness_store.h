@@ -1,13 +1,14 @@
 #pragma once
-// The stiffness store, an HDF5 file with one group per object; stiffness_store(5).
+// The stiffness store, an HDF5 file with one group per object; stiffness_store(5). This header is
+// what readers need.
 
 #include "base/columns.h"
-#include "formats/stream.h"
 #include "model/model.h"
 #include "sim/factor.h"
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,37 +16,49 @@ namespace gewebe {
 
 /// What one says of an object's stiffness, beside the arrays.
 struct StiffnessFacts {
-  std::string object;      ///< the model's name: the group
+  std::string object;      ///< the model's name
+  std::string group;       ///< what the store calls it
   std::uint64_t hash = 0;  ///< stiffness_hash of the model
   std::uint64_t nodes = 0; ///< n, central nodes too
+  std::uint64_t order = 0; ///< of K
   double norm = 0;         ///< ‖K‖₁
   double condition = 0;    ///< estimate of cond₁(K)
   double residual = 0;     ///< largest backward error seen of the checks made
   bool single = false;     ///< columns are float32
 };
 
-/// XXH3-64 of what K and gravity depend on: nodes, springs, constraints, materials.
+/// XXH3-64 of what K and gravity depend on: rest positions, masses and constraints of the nodes,
+/// stiffness and rest length of the springs. Neither names nor damping count.
 std::uint64_t stiffness_hash(const Model& model);
 
-/// Opens and checks a store for reading; columns are read when asked for.
+/// Opens and checks a store for reading; factors and columns are read when asked for, and their
+/// checksums compared. Not to be used from several threads at once, nor beside another HDF5 file.
 class StiffnessStore {
 public:
   /// \throw Error, place = path: missing, no HDF5, no store, truncated, of a newer version, damaged
   explicit StiffnessStore(const std::string& path);
+  /// One that stands in memory; `name` is what messages call it.
+  StiffnessStore(std::span<const std::uint8_t> bytes, const std::string& name);
   ~StiffnessStore();
   StiffnessStore(StiffnessStore&&) noexcept;
 
   const std::string& path() const;
+  /// Groups, in order of the alphabet.
   std::vector<std::string> objects() const;
+  /// \throw Error if there is no such group, or what it says contradicts itself
+  StiffnessFacts facts(const std::string& group) const;
   /// The object that belongs to this model, by hash. \throw Error "is of another model …"
   StiffnessFacts facts(const Model& model) const;
+  /// The matrix itself. \throw Error if it is damaged
+  StiffnessMatrix matrix(const StiffnessFacts& facts) const;
+  /// Its order is facts.order. \throw Error if it is damaged
   Factor factor(const StiffnessFacts& facts) const;
-  /// Null where the object has none.
+  /// Null where the object has none. They may outlive the store. \throw Error if they are damaged
   std::unique_ptr<ColumnSource> columns(const StiffnessFacts& facts) const;
 
 private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 } // namespace gewebe

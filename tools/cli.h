@@ -63,6 +63,7 @@ public:
   const std::string& format() const { return format_; } ///< --format, "" if absent
   Output::Options output_options(bool binary) const;
   bool verbose() const { return verbose_; }
+  bool quiet() const { return quiet_; }
   /// Whether --stats was given: figures that cost a pass over the result are worth it only then.
   bool stats_wanted() const { return stats_wanted_; }
   Stats& stats() { return stats_; }

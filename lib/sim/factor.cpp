@@ -28,7 +28,9 @@ public:
     common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.final_asis = true; // supernodal stays supernodal
     common_.quick_return_if_not_posdef = true;
-    common_.prefer_zomplex = false;
+    common_.nmethods = 2; // the one that fills less
+    common_.method[0].ordering = CHOLMOD_AMD;
+    common_.method[1].ordering = CHOLMOD_METIS;
   }
   ~Common() { (void)cholmod_l_finish(&common_); }
   Common(const Common&) = delete;

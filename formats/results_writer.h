@@ -1,0 +1,46 @@
+#pragma once
+// What a run leaves: gewebe_results(5). HDF5 with an XDMF beside it, the last shape as a mesh, or
+// the contact forces as CSV.
+
+#include "formats/kind.h"
+#include "formats/stream.h"
+#include "model/model.h"
+#include "sim/load.h"
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+/// An object in one frame.
+struct FrameObject {
+  std::span<const double> displacement; ///< 3 n numbers
+  std::span<const NodeVector> forces;   ///< at displaced nodes
+};
+
+class ResultWriter {
+public:
+  ResultWriter() = default;
+  ResultWriter(const ResultWriter&) = delete;
+  ResultWriter& operator=(const ResultWriter&) = delete;
+  virtual ~ResultWriter() = default;
+
+  /// An object that is in all frames to come; in those before it was at rest. Names differ and need
+  /// no quoting. The model must live as long as the writer.
+  virtual void add_object(const std::string& name, const Model& model) = 0;
+  /// \pre as many objects as were added, in their order
+  virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
+  /// Nothing appears without it. \throw Error
+  virtual void commit() = 0;
+};
+
+/// The kinds that there are: h5, ply, obj, csv.
+const std::vector<Kind>& result_kinds();
+
+/// \throw Error, UsageError as Output; h5 needs a file, and writes PATH with suffix .xdmf beside it
+std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
+                                          const Output::Options& options);
+
+} // namespace gewebe

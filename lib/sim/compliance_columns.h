@@ -1,0 +1,31 @@
+#pragma once
+// Columns of the compliance matrix C = K⁻¹ for chosen nodes: what the whole object does when one of
+// them is pulled.
+
+#include "base/columns.h"
+#include "base/context.h"
+#include "sim/factor.h"
+#include "sim/stiffness.h"
+
+#include <cstdint>
+#include <span>
+
+namespace gewebe {
+
+/// Solves for the columns of `nodes` in blocks, in parallel, and hands them to `sink` in the order
+/// of `nodes` while later ones are being computed. The same bytes for any number of threads. Memory
+/// is bounded by the number of threads, not by that of nodes.
+///
+/// `norm` is ‖K‖₁. Returns the largest backward error of a column of each node.
+/// \pre nodes < n, ascending; the factor is of this matrix
+/// \throw Error if that exceeds max_backward_error, if memory exceeds the context's, what the sink
+/// throws; Cancelled
+double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
+                          std::span<const std::uint32_t> nodes, const Context& context,
+                          ColumnSink& sink);
+
+/// Bytes that it takes beside matrix and factor.
+double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
+                                const Context& context);
+
+} // namespace gewebe
