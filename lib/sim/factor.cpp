@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <dlfcn.h>
+#include <mutex>
 #include <string>
 
 // Based on: Chen, Davis, Hager, Rajamanickam, Algorithm 887: CHOLMOD, Supernodal Sparse Cholesky
@@ -53,12 +54,17 @@ private:
   cholmod_common common_{};
 };
 
-/// A threaded BLAS would fight with the threads that are here, and change bytes. Which BLAS there
-/// is, is known only at run time.
-void use_one_blas_thread() {
+/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A
+/// threaded one would fight with the threads that are here, and change bytes: it gets one thread.
+/// OpenBLAS compiled without threads has no locks either and gives wrong numbers when two threads
+/// call it (Debian's libopenblas0-serial does): factorisations take turns.
+std::unique_lock<std::mutex> blas_turn() {
+  static std::mutex mutex; // one for all, as the library behind it
+  std::unique_lock turn(mutex);
   using Set = void (*)(int);
   if (void* const set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); set != nullptr)
     reinterpret_cast<Set>(set)(1);
+  return turn;
 }
 
 /// The matrix as CHOLMOD wants it, without a copy; it changes nothing in it.
@@ -181,7 +187,6 @@ Factor& Factor::operator=(Factor&&) noexcept = default;
 
 Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
     : state_(std::make_unique<State>(context.cpu)) {
-  use_one_blas_thread();
   Common& common = state_->common;
   cholmod_sparse a = sparse_view(matrix);
   check_cancelled(context);
@@ -191,7 +196,10 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
     throw Error("the analysis of the stiffness matrix made no supernodes");
   require_memory(context, factor_bytes(*state_->owned), "the factor of the stiffness matrix");
   check_cancelled(context);
-  (void)cholmod_l_factorize(&a, state_->owned, common.get());
+  {
+    const auto turn = blas_turn();
+    (void)cholmod_l_factorize(&a, state_->owned, common.get());
+  }
   common.check("the factorisation of the stiffness matrix");
   check_cancelled(context);
   if (state_->owned->minor < matrix.order())
