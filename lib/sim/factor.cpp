@@ -190,16 +190,14 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
   Common& common = state_->common;
   cholmod_sparse a = sparse_view(matrix);
   check_cancelled(context);
+  const auto turn = blas_turn(); // METIS, with its one sequence of random numbers, needs it as well
   state_->owned = cholmod_l_analyze(&a, common.get());
   common.check("the analysis of the stiffness matrix");
   if (state_->owned == nullptr || state_->owned->is_super == 0)
     throw Error("the analysis of the stiffness matrix made no supernodes");
   require_memory(context, factor_bytes(*state_->owned), "the factor of the stiffness matrix");
   check_cancelled(context);
-  {
-    const auto turn = blas_turn();
-    (void)cholmod_l_factorize(&a, state_->owned, common.get());
-  }
+  (void)cholmod_l_factorize(&a, state_->owned, common.get());
   common.check("the factorisation of the stiffness matrix");
   check_cancelled(context);
   if (state_->owned->minor < matrix.order())

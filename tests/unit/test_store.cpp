@@ -8,7 +8,7 @@
 #include "scratch.h"
 #include "sim/compliance_columns.h"
 #include "sim/condition.h"
-#include "sim_models.h"
+#include "stiffness_models.h"
 
 #include <algorithm>
 #include <cmath>
