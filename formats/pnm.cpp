@@ -27,9 +27,9 @@ public:
     at_ = 2;
     Image image;
     image.channels = letter == '3' || letter == '6' ? 3 : 1;
-    image.width = number("a width", 1, max_side);
-    image.height = number("a height", 1, max_side);
-    maxval_ = number("a maxval", 1, 65535);
+    image.width = number("width", 1, max_side);
+    image.height = number("height", 1, max_side);
+    maxval_ = number("maxval", 1, 65535);
     const std::size_t count = std::size_t{image.width} * image.height * image.channels;
     if (letter < '4')
       read_text(image, count);
@@ -61,7 +61,7 @@ private:
   std::uint32_t number(const char* what, std::uint32_t min, std::uint32_t max) {
     skip_blanks();
     if (at_ == bytes_.size())
-      fail(std::string("ends before ") + what + ", expected a complete file");
+      fail(std::string("ends before the ") + what + ", expected a complete file");
     std::uint32_t value = 0;
     const char* const end = bytes_.data() + bytes_.size();
     const auto [rest, status] = std::from_chars(bytes_.data() + at_, end, value);
@@ -83,7 +83,7 @@ private:
       fail("too few bytes for " + std::to_string(count) + " values, expected a complete file");
     image.values.reserve(count);
     for (std::size_t n = 0; n < count; ++n)
-      image.values.push_back(scaled(number("a value", 0, maxval_)));
+      image.values.push_back(scaled(number("value", 0, maxval_)));
     skip_blanks();
     if (at_ != bytes_.size())
       fail("goes on after the last value, expected the end");

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "formats/ela.h"
 #include "formats/mesh_file.h"
+#include "formats/results.h"
 
 #include <utility>
 
@@ -15,12 +16,39 @@ std::vector<Surface> one(TriangleMesh mesh) {
   return surfaces;
 }
 
+std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& options) {
+  const std::string& path = input.name();
+  if (path == "-")
+    throw Error(path, "a result comes by a pipe, expected the name of its file");
+  const ResultIndex index = read_result_index(path);
+  const auto frames = static_cast<std::int64_t>(index.times.size());
+  const std::int64_t frame = options.frame.value_or(-1);
+  if (frame < -1 || frame >= frames || frames == 0)
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(frames - 1));
+  std::vector<Surface> surfaces;
+  const std::vector<std::string> names =
+      options.object.empty() ? index.objects : std::vector<std::string>{options.object};
+  for (const std::string& name : names) {
+    const std::int64_t which = frame < 0 ? frames - 1 : frame;
+    ResultSurface read = read_result_surface(path, name, static_cast<std::size_t>(which));
+    surfaces.push_back({std::move(read.mesh), std::move(read.rest)});
+  }
+  return surfaces;
+}
+
+void refuse(bool wrong, const Input& input, const char* what) {
+  if (wrong)
+    throw UsageError(input.name(), what);
+}
+
 } // namespace
 
 const std::vector<Kind>& readable_surface_kinds() {
   static const std::vector<Kind> kinds = [] {
     std::vector<Kind> all = readable_mesh_kinds();
     all.push_back(Kind::ela);
+    all.push_back(Kind::hdf5);
     return all;
   }();
   return kinds;
@@ -32,11 +60,16 @@ const std::vector<std::string>& surface_unit_names() {
 
 std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
                                    const Context& context) {
-  if (options.kind != Kind::ela)
-    return one(read_mesh(input, {options.kind, options.unit, std::nullopt, false}));
-  if (!options.unit.empty())
-    throw UsageError(input.name(), "--unit for a model, which is in mm, expected no --unit");
-  return one(surface_mesh(read_ela(input, context)));
+  const bool is_result = options.kind == Kind::hdf5, is_model = options.kind == Kind::ela;
+  refuse(!is_result && (!options.object.empty() || options.frame), input,
+         "--object or --frame for no result of a run, expected neither");
+  refuse((is_result || is_model) && !options.unit.empty(), input,
+         "--unit for what is in mm, expected no --unit");
+  if (is_result)
+    return read_frame(input, options);
+  if (is_model)
+    return one(surface_mesh(read_ela(input, context)));
+  return one(read_mesh(input, {options.kind, options.unit, std::nullopt, false}));
 }
 
 } // namespace gewebe

@@ -1,29 +1,34 @@
 #pragma once
-// Whatever has a surface to draw: a mesh, a model.
+// Whatever has a surface to draw: a mesh, a model, a frame of a run.
 
 #include "base/context.h"
 #include "formats/kind.h"
 #include "formats/stream.h"
 #include "render/drawing.h"
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace gewebe {
 
 struct SurfaceReadOptions {
-  Kind kind = Kind::unknown; ///< of input_kind()
-  std::string unit;          ///< of a mesh, as in MeshReadOptions
+  Kind kind = Kind::unknown;         ///< of input_kind()
+  std::string unit;                  ///< of a mesh, as in MeshReadOptions
+  std::string object;                ///< of a result, by name; "": all
+  std::optional<std::int64_t> frame; ///< of a result, from 0; -1 is the last one, and the default
 };
 
-/// Mesh kinds and ela.
+/// Mesh kinds, ela and h5.
 const std::vector<Kind>& readable_surface_kinds();
 
 /// The words of --unit.
 const std::vector<std::string>& surface_unit_names();
 
-/// The surfaces of `input` in mm, in order.
-/// \throw Error with place; UsageError for options that the kind has no use for
+/// The surfaces of `input` in mm, in order; those of a result with their points at rest.
+/// \throw Error with place, also if a result comes by a pipe, or has no such object or frame;
+/// UsageError for options that the kind has no use for
 std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
                                    const Context& context);
 

@@ -1,4 +1,4 @@
-// emboss-render: mesh or model -> picture.
+// emboss-render: mesh, model or result -> picture.
 
 #include "formats/image_file.h"
 #include "formats/surface_file.h"
@@ -88,11 +88,11 @@ int main(int argc, char** argv) {
   // Mesa reads these when EGL starts: no talk, and textures filtered in floats instead of 8 bits.
   (void)::setenv("EGL_LOG_LEVEL", "fatal", 0);
   (void)::setenv("GALLIVM_PERF", "no_aos_sampling", 0);
-  cli::Program p("emboss-render", "Draws a mesh or a model with embossed textures.");
+  cli::Program p("emboss-render", "Draws a mesh, a model or a result with embossed textures.");
   cli::RenderArguments a;
   declare(p, a);
   p.output_kinds(picture_kinds());
   p.input_kinds(readable_surface_kinds());
-  p.operand("SURFACE", a.surface, "the mesh or model");
+  p.operand("SURFACE", a.surface, "the mesh, model or result of a run");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
 }

@@ -66,6 +66,9 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--supersample", a.supersample, "N", "a pixel is the mean of N x N samples").range(1, 8);
   p.option("--backend", a.backend, "NAME", "gl, cpu; auto: gl or else cpu").one_of(backend_names());
   p.option("--passes", a.passes, "N", "OpenGL passes with a structure").one_of({"2"});
+  p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
+  p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
+      .range(-1, 1e15);
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
   p.check([&a] { complete(a); });
 }

@@ -39,7 +39,7 @@ struct DrawingOptions {
   bool texcoords = false; ///< a base or a structure texture is there
   bool structure = false; ///< a structure texture is there: offsets are computed
   Vec3 light;             ///< lP, mm, in the space of the mesh
-  double offset = 0.005;  ///< length of the offset, in texture coordinates
+  double offset = 0.02;   ///< length of the offset, in texture coordinates
   double shade = 0;       ///< share of Lambert's law in the base colour, 0 … 1
 };
 

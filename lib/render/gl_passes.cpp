@@ -108,6 +108,11 @@ GLuint make_texture(Names& names, const Texture& texture) {
   return name;
 }
 
+void stop_if_cancelled(const Context& context) {
+  if (context.cancelled && context.cancelled())
+    throw Cancelled();
+}
+
 /// The geometry in buffers of OpenGL, drawn once a pass.
 class Geometry {
 public:
@@ -141,8 +146,7 @@ public:
   void draw(const Context& context) const {
     constexpr std::size_t piece = 3U << 20; // indices
     for (std::size_t from = 0; from < indices_; from += piece) {
-      if (context.cancelled && context.cancelled())
-        throw Cancelled();
+      stop_if_cancelled(context);
       glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(std::min(piece, indices_ - from)),
                      GL_UNSIGNED_INT, at(from * sizeof(std::uint32_t)));
     }
@@ -255,7 +259,7 @@ void check_gl() {
 }
 
 /// The target's colours as 8 bits, rows from the top; the background where nothing was drawn.
-Image read_back(std::uint32_t width, std::uint32_t height, const Look& look,
+Image read_back(std::uint32_t width, std::uint32_t height, const Look& look, const Context& context,
                 std::uint64_t& covered) {
   Image image{width, height, 3, {}};
   image.values.resize(std::size_t{3} * width * height);
@@ -264,6 +268,7 @@ Image read_back(std::uint32_t width, std::uint32_t height, const Look& look,
   std::vector<std::array<float, 4>> rows(std::size_t{rows_at_once} * width);
   covered = 0;
   for (std::uint32_t from = 0; from < height; from += rows_at_once) {
+    stop_if_cancelled(context);
     const std::uint32_t count = std::min(rows_at_once, height - from);
     glReadPixels(0, static_cast<GLint>(from), static_cast<GLsizei>(width),
                  static_cast<GLsizei>(count), GL_RGBA, GL_FLOAT, rows.data());
@@ -335,7 +340,7 @@ Image render_gl(GlContext& gl, const Drawing& drawing, const Projection& project
     glDisableClientState(GL_VERTEX_ARRAY);
   }
   std::uint64_t covered = 0;
-  Image image = read_back(width, height, look, covered);
+  Image image = read_back(width, height, look, context, covered);
   check_gl();
   if (report != nullptr)
     *report = {look.structure ? 2 : 1, target.format(), covered};

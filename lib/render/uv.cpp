@@ -20,9 +20,11 @@ struct Side {
 };
 
 Side side_of(const Vec3& normal) {
+  // By a margin, so that symmetric shapes don't depend on the last digit.
+  constexpr double clearly = 1 + 1e-6;
   Side side{0, true};
   for (int axis = 1; axis < 3; ++axis)
-    if (std::fabs(normal[axis]) > std::fabs(normal[side.axis]))
+    if (std::fabs(normal[axis]) > clearly * std::fabs(normal[side.axis]))
       side.axis = axis;
   side.positive = !(normal[side.axis] < 0);
   return side;

@@ -13,7 +13,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t block_nodes = 16; // solved together; decides the last bits
+constexpr std::size_t block_nodes = 8; // solved by one job
 
 /// The blocks that are computed at the same time, while those before them are handed over.
 std::size_t wave_blocks(std::size_t nodes, const Context& context) {
@@ -24,6 +24,7 @@ std::size_t wave_blocks(std::size_t nodes, const Context& context) {
 /// The columns of a few nodes, and their largest backward error.
 struct Block {
   std::vector<double> columns; ///< [node][axis][3 n]
+  std::vector<double> f, u;    ///< kept from block to block
   double residual = 0;
 };
 
@@ -44,7 +45,9 @@ public:
       for (std::size_t a = 0; a < 3; ++a)
         if (row_of(nodes[k], a) >= 0)
           asked.push_back(3 * k + a);
-    std::vector<double> f(n * asked.size()), u(f.size());
+    std::vector<double>&f = out.f, &u = out.u;
+    f.assign(n * asked.size(), 0.0);
+    u.resize(f.size());
     for (std::size_t c = 0; c < asked.size(); ++c)
       f[c * n + static_cast<std::size_t>(row_of(nodes[asked[c] / 3], asked[c] % 3))] = 1;
     factor_.solve(f, u, asked.size());
@@ -90,10 +93,10 @@ private:
 
 double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context) {
-  // A block has right-hand sides, solutions, two of CHOLMOD's own and the columns; those of the
-  // wave before wait to be handed over.
+  // A block has right-hand sides, solutions, a panel of them and the columns; those of the wave
+  // before wait to be handed over.
   const double block = 8.0 * 3 * static_cast<double>(block_nodes) *
-                       (static_cast<double>(matrix.order()) * 4 +
+                       (static_cast<double>(matrix.order()) * 3 +
                         static_cast<double>(matrix.row_of_axis.size()) * 2);
   return block * static_cast<double>(wave_blocks(nodes, context));
 }

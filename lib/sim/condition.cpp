@@ -170,14 +170,15 @@ Six rigid_at(const Vec3& position, int axis, const Vec3& center, double size) {
 }
 
 /// Rigid motions of a part in order of the stiffness against them: columns of `motions` are
-/// combinations of unit translations and turns.
+/// combinations of unit translations and turns, orthonormal as displacements of the part's rows.
 struct RigidMotions {
   Eigen::VectorXd stiffness;
   Eigen::MatrixXd motions;
+  Eigen::VectorXd share; ///< of a unit displacement that was asked for in each of them
 };
 
 RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, const Parts& parts,
-                           std::size_t part) {
+                           std::size_t part, const std::vector<double>& x) {
   const std::vector<std::size_t>& rows = parts.rows[part];
   Box3 box;
   for (const std::size_t row : rows)
@@ -190,9 +191,11 @@ RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, co
   };
   // A = RᵀKR and B = RᵀR of the six columns R over the part's rows.
   Matrix6 a = Matrix6::Zero(), b = Matrix6::Zero();
+  Eigen::Matrix<double, 6, 1> rx = Eigen::Matrix<double, 6, 1>::Zero();
   for (const std::size_t c : rows) {
     const Eigen::Matrix<double, 6, 1> rc(rigid(c).data());
     b += rc * rc.transpose();
+    rx += rc * x[c];
     for (std::int64_t at = matrix.column_start[c]; at < matrix.column_start[c + 1]; ++at) {
       const auto r = static_cast<std::size_t>(matrix.row[static_cast<std::size_t>(at)]);
       const double value = matrix.value[static_cast<std::size_t>(at)];
@@ -211,7 +214,8 @@ RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, co
       mass.eigenvectors().rightCols(rank) *
       mass.eigenvalues().tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(basis.transpose() * a * basis);
-  return {solver.eigenvalues(), basis * solver.eigenvectors()};
+  const Eigen::MatrixXd motions = basis * solver.eigenvectors();
+  return {solver.eigenvalues(), motions, motions.transpose() * rx};
 }
 
 /// What the softest `count` rigid motions are, together.
@@ -304,18 +308,20 @@ std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatr
   motion.stiffness = stiffness[part];
   const std::vector<std::size_t>& rows = parts.rows[part];
   motion.node = static_cast<std::uint32_t>(place_of(matrix, rows.front()).node);
-  const RigidMotions rigid = rigid_motions(model, matrix, parts, part);
+  const RigidMotions rigid = rigid_motions(model, matrix, parts, part, x);
   const double bound = 10 * level(motion.stiffness);
   const auto soft = std::count_if(rigid.stiffness.begin(), rigid.stiffness.end(),
                                   [&](double value) { return value <= bound; });
+  // Where more than rigid motions are free, as in a flat sheet, the one found is no rigid one.
+  const bool is_rigid = soft > 0 && rigid.share.head(soft).squaredNorm() > 0.99;
   const bool alone = place_of(matrix, rows.back()).node == motion.node;
   if (alone) {
     motion.kind = FreeMotion::Kind::isolated;
     motion.translations = static_cast<int>(soft);
-  } else if (soft > 0) {
+  } else if (is_rigid) {
     name_rigid(rigid, soft, motion);
   }
-  if (alone || soft == 0) {
+  if (alone || !is_rigid) {
     const std::size_t most = *std::max_element(
         rows.begin(), rows.end(), [&](auto a, auto b) { return std::abs(x[a]) < std::abs(x[b]); });
     motion.node = static_cast<std::uint32_t>(place_of(matrix, most).node);
@@ -386,13 +392,14 @@ namespace {
 [[noreturn]] void refuse(const Model& model, const StiffnessMatrix& matrix, const Context& context,
                          double condition) {
   const std::optional<FreeMotion> motion = weakest_motion(model, matrix, context);
-  const std::string how = condition > 0 ? "condition " + short_number(condition) + ", at most " +
-                                              short_number(max_condition)
-                                        : "no condition";
+  const std::string how = condition > 0 && std::isfinite(condition)
+                              ? "nearly singular (condition " + short_number(condition) +
+                                    ", at most " + short_number(max_condition) + ")"
+                              : "singular";
   if (!motion)
     throw Error("the model is unstable at rest: springs shorter than their rest length push nodes "
                 "aside, expected springs near it");
-  throw Error("the stiffness matrix is singular (" + how + "): " + motion_text(*motion) + ", " +
+  throw Error("the stiffness matrix is " + how + ": " + motion_text(*motion) + ", " +
               remedy(motion->kind));
 }
 

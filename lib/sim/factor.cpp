@@ -1,6 +1,7 @@
 #include "sim/factor.h"
 
 #include "base/error.h"
+#include "sim/supernodal_solve_internal.h"
 
 #include <cholmod.h>
 
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <dlfcn.h>
 #include <mutex>
-#include <new>
 #include <string>
 
 // Based on: Chen, Davis, Hager, Rajamanickam, Algorithm 887: CHOLMOD, Supernodal Sparse Cholesky
@@ -54,35 +54,17 @@ private:
   cholmod_common common_{};
 };
 
-/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A threaded
-/// one would fight with the threads that are here, and change bytes: it gets one thread. OpenBLAS
-/// compiled without threads has no locks either and gives wrong numbers when two threads call it
-/// (Debian's libopenblas0-serial does): there calls take turns.
-class Blas {
-public:
-  Blas() {
-    using Set = void (*)(int);
-    if (void* const set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); set != nullptr)
-      reinterpret_cast<Set>(set)(1);
-    using Get = int (*)();
-    constexpr int with_locks = 1; // 0: without threads, 2: OpenMP
-    if (void* const get = dlsym(RTLD_DEFAULT, "openblas_get_parallel"); get != nullptr)
-      many_ = reinterpret_cast<Get>(get)() == with_locks;
-  }
-
-  /// To be held during a call.
-  std::unique_lock<std::mutex> turn() {
-    return many_ ? std::unique_lock<std::mutex>() : std::unique_lock(mutex_);
-  }
-
-private:
-  bool many_ = true;
-  std::mutex mutex_;
-};
-
+/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A
+/// threaded one would fight with the threads that are here, and change bytes: it gets one thread.
+/// OpenBLAS compiled without threads has no locks either and gives wrong numbers when two threads
+/// call it (Debian's libopenblas0-serial does): factorisations take turns.
 std::unique_lock<std::mutex> blas_turn() {
-  static Blas blas; // one for all, as the library behind it
-  return blas.turn();
+  static std::mutex mutex; // one for all, as the library behind it
+  std::unique_lock turn(mutex);
+  using Set = void (*)(int);
+  if (void* const set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); set != nullptr)
+    reinterpret_cast<Set>(set)(1);
+  return turn;
 }
 
 /// The matrix as CHOLMOD wants it, without a copy; it changes nothing in it.
@@ -186,19 +168,17 @@ NotPositiveDefinite::NotPositiveDefinite(std::size_t row)
     : Error("the stiffness matrix is not positive definite (row " + std::to_string(row) + ")"),
       row_(row) {}
 
-/// Either CHOLMOD's own factor, or a shell around the arrays in `data`.
+/// Either CHOLMOD's own factor, or the arrays in `data`.
 struct Factor::State {
   Common common;
   cholmod_factor* owned = nullptr;
   FactorData data;
-  cholmod_factor shell{};
+  CpuLevel cpu;
 
-  State() = default;
+  explicit State(CpuLevel level) : cpu(level) {}
   ~State() { (void)cholmod_l_free_factor(&owned, common.get()); }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
-
-  const cholmod_factor& factor() const noexcept { return owned != nullptr ? *owned : shell; }
 };
 
 Factor::~Factor() = default;
@@ -206,7 +186,7 @@ Factor::Factor(Factor&&) noexcept = default;
 Factor& Factor::operator=(Factor&&) noexcept = default;
 
 Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
-    : state_(std::make_unique<State>()) {
+    : state_(std::make_unique<State>(context.cpu)) {
   Common& common = state_->common;
   cholmod_sparse a = sparse_view(matrix);
   check_cancelled(context);
@@ -227,42 +207,35 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
         static_cast<const std::int64_t*>(state_->owned->Perm)[state_->owned->minor]));
 }
 
-Factor::Factor(FactorData data) : state_(std::make_unique<State>()) {
+Factor::Factor(FactorData data, CpuLevel cpu) : state_(std::make_unique<State>(cpu)) {
   check_data(data);
   state_->data = std::move(data);
-  FactorData& d = state_->data;
-  cholmod_factor& l = state_->shell;
-  l.n = l.minor = static_cast<std::size_t>(d.order);
-  l.Perm = d.permutation.data();
-  l.ColCount = d.column_count.data();
-  l.nsuper = d.super.size() - 1;
-  l.ssize = d.s.size();
-  l.xsize = d.x.size();
-  l.maxcsize = static_cast<std::size_t>(d.max_column_size);
-  l.maxesize = static_cast<std::size_t>(d.max_row_size);
-  l.super = d.super.data();
-  l.pi = d.pi.data();
-  l.px = d.px.data();
-  l.s = d.s.data();
-  l.x = d.x.data();
-  l.ordering = CHOLMOD_GIVEN;
-  l.is_ll = l.is_super = l.is_monotonic = true;
-  l.itype = CHOLMOD_LONG;
-  l.xtype = CHOLMOD_REAL;
-  l.dtype = CHOLMOD_DOUBLE;
 }
 
 std::size_t Factor::order() const noexcept {
-  return state_->factor().n;
+  return state_->owned != nullptr ? state_->owned->n : static_cast<std::size_t>(state_->data.order);
 }
 
 std::size_t Factor::entries() const noexcept {
-  return state_->factor().xsize;
+  return state_->owned != nullptr ? state_->owned->xsize : state_->data.x.size();
 }
 
 FactorView Factor::view() const noexcept {
-  const cholmod_factor& l = state_->factor();
   FactorView v;
+  if (state_->owned == nullptr) {
+    const FactorData& d = state_->data;
+    return {d.order,
+            d.max_column_size,
+            d.max_row_size,
+            d.permutation,
+            d.column_count,
+            d.super,
+            d.pi,
+            d.px,
+            d.s,
+            d.x};
+  }
+  const cholmod_factor& l = *state_->owned;
   v.order = static_cast<std::int64_t>(l.n);
   v.max_column_size = static_cast<std::int64_t>(l.maxcsize);
   v.max_row_size = static_cast<std::int64_t>(l.maxesize);
@@ -285,29 +258,26 @@ FactorData Factor::data() const {
 }
 
 void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {
+  const FactorView v = view();
   const std::size_t n = order();
-  if (columns == 0)
-    return;
-  cholmod_dense b{};
-  b.nrow = b.d = n;
-  b.ncol = columns;
-  b.nzmax = n * columns;
-  b.x = const_cast<double*>(f.data()); // only read
-  b.xtype = CHOLMOD_REAL;
-  b.dtype = CHOLMOD_DOUBLE;
-  Common common;
-  // A shallow copy, so that whatever CHOLMOD notes in the factor is noted in our own.
-  cholmod_factor l = state_->factor();
-  cholmod_dense* x = nullptr;
-  {
-    const auto turn = blas_turn();
-    x = cholmod_l_solve(CHOLMOD_A, &l, &b, common.get());
+  const SupernodalArrays l{v.super.size() - 1, v.super.data(), v.pi.data(),
+                           v.px.data(),        v.s.data(),     v.x.data()};
+  const bool wide = state_->cpu != CpuLevel::baseline;
+  for (std::size_t first = 0; first < columns;) {
+    const std::size_t count = std::min(panel_width, columns - first);
+    const std::size_t width = count == 1 ? 1 : panel_width;
+    std::vector<double> x(n * width), work(static_cast<std::size_t>(v.max_row_size) * width);
+    for (std::size_t j = 0; j < count; ++j)
+      for (std::size_t k = 0; k < n; ++k) // + 0.0 leaves no -0, whose sign zeros skipped would lose
+        x[k * width + j] = f[(first + j) * n + static_cast<std::size_t>(v.permutation[k])] + 0.0;
+    const SupernodalSolve run = count == 1 ? (wide ? solve_single_avx2 : solve_single_baseline)
+                                           : (wide ? solve_panel_avx2 : solve_panel_baseline);
+    run(l, x.data(), work.data());
+    for (std::size_t j = 0; j < count; ++j)
+      for (std::size_t k = 0; k < n; ++k)
+        u[(first + j) * n + static_cast<std::size_t>(v.permutation[k])] = x[k * width + j];
+    first += count;
   }
-  common.check("a solution of the stiffness matrix");
-  if (x == nullptr)
-    throw std::bad_alloc();
-  std::copy_n(static_cast<const double*>(x->x), n * columns, u.begin());
-  (void)cholmod_l_free_dense(&x, common.get());
 }
 
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,

@@ -50,13 +50,14 @@ private:
 class Factor {
 public:
   /// The order of elimination is that of AMD or METIS, whichever fills less; the factor is always
-  /// supernodal. The same bytes from call to call on one machine; BLAS decides the last bits.
+  /// supernodal. The same bytes from call to call on one machine; BLAS decides the last bits. Not
+  /// from several threads at once: there are BLAS that don't bear it.
   /// \throw NotPositiveDefinite by its pivots alone; Error if memory exceeds the context's;
   /// Cancelled
   Factor(const StiffnessMatrix& matrix, const Context& context);
   /// \throw Error if the arrays contradict each other (every index is checked: they come from
   /// files)
-  explicit Factor(FactorData data);
+  explicit Factor(FactorData data, CpuLevel cpu = best_cpu_level());
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
@@ -69,7 +70,8 @@ public:
   std::size_t entries() const noexcept;
 
   /// u = K⁻¹ f for `columns` right-hand sides, each of order() numbers one behind the other. Safe
-  /// from many threads at once; the same bytes whatever the other threads do.
+  /// from many threads at once. The same bytes whatever the other threads do, for each right-hand
+  /// side whatever the others are, and on every machine that has the same factor.
   /// \pre f.size() == u.size() == order() * columns
   void solve(std::span<const double> f, std::span<double> u, std::size_t columns = 1) const;
 

@@ -1,0 +1,33 @@
+#pragma once
+// Solving with a supernodal factor, once per CPU level; every level gives the same bits, and so
+// does every number of right-hand sides. Nothing is shared between calls, so any number of threads
+// may solve at once, which not every BLAS allows.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace gewebe {
+
+/// L as in cholmod_factor: supernode k has columns super[k] … super[k+1]-1, rows s[pi[k] …
+/// pi[k+1]-1], its own columns first, and values x[px[k] …], column by column.
+struct SupernodalArrays {
+  std::size_t supernodes = 0;
+  const std::int64_t* super = nullptr;
+  const std::int64_t* pi = nullptr;
+  const std::int64_t* px = nullptr;
+  const std::int64_t* s = nullptr;
+  const double* x = nullptr;
+};
+
+inline constexpr std::size_t panel_width = 8;
+
+/// x = L⁻ᵀ L⁻¹ x in place, for one vector or for panel_width of them side by side, x[row][vector].
+/// `work` holds at least as many rows as the longest supernode has below its own columns.
+using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, double* work);
+
+void solve_single_baseline(const SupernodalArrays& l, double* x, double* work);
+void solve_panel_baseline(const SupernodalArrays& l, double* x, double* work);
+void solve_single_avx2(const SupernodalArrays& l, double* x, double* work);
+void solve_panel_avx2(const SupernodalArrays& l, double* x, double* work);
+
+} // namespace gewebe

@@ -1,0 +1,187 @@
+#pragma once
+// The body of supernodal_solve_*.cpp, each of which compiles it for its instruction set. A result
+// is the same bits whatever the width: each unknown sees its subtractions in one fixed order, and
+// there is no fused multiplication.
+
+#include "sim/supernodal_solve_internal.h"
+
+namespace gewebe {
+namespace {
+
+#if defined(__AVX2__)
+constexpr std::size_t lanes = 4;
+#else
+constexpr std::size_t lanes = 2;
+#endif
+/// What a register holds.
+using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
+/// The same at any address of a double.
+using Unaligned =
+    double __attribute__((vector_size(lanes * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+/// The right-hand sides of one row: one number, or a panel of them.
+struct Single {
+  static constexpr std::size_t width = 1, registers = 1, rows = 8;
+  using Value = double;
+  using Stored = double;
+};
+struct Wide {
+  static constexpr std::size_t width = panel_width, registers = panel_width / lanes, rows = lanes;
+  using Value = Lanes;
+  using Stored = Unaligned;
+};
+
+template <class Of>
+struct Row {
+  typename Of::Value part[Of::registers];
+
+  void load(const double* from) {
+    for (std::size_t i = 0; i < Of::registers; ++i)
+      part[i] = reinterpret_cast<const typename Of::Stored*>(from)[i];
+  }
+  void store(double* to) const {
+    for (std::size_t i = 0; i < Of::registers; ++i)
+      reinterpret_cast<typename Of::Stored*>(to)[i] = part[i];
+  }
+  void subtract(double l, const Row& x) {
+    for (std::size_t i = 0; i < Of::registers; ++i)
+      part[i] -= l * x.part[i];
+  }
+  void divide(double l) {
+    for (std::size_t i = 0; i < Of::registers; ++i)
+      part[i] /= l;
+  }
+};
+
+/// A supernode: `columns` of its own, `below` rows under them, `rows` = both.
+struct Supernode {
+  std::size_t columns, below, rows;
+  std::size_t first;       ///< own column
+  const std::int64_t* row; ///< of those below
+  const double* l;
+
+  double at(std::size_t r, std::size_t c) const { return l[c * rows + r]; }
+};
+
+Supernode supernode(const SupernodalArrays& a, std::size_t k) {
+  const auto first = static_cast<std::size_t>(a.super[k]);
+  const auto columns = static_cast<std::size_t>(a.super[k + 1]) - first;
+  const auto rows = static_cast<std::size_t>(a.pi[k + 1] - a.pi[k]);
+  return {columns, rows - columns, rows, first, a.s + a.pi[k] + columns, a.x + a.px[k]};
+}
+
+/// N rows from `r` on lose what columns [0, count) contribute; `x` are the supernode's own.
+template <class Of, std::size_t N>
+void lose_columns(const Supernode& n, std::size_t r, std::size_t count, const double* x,
+                  Row<Of> (&sum)[N]) {
+  for (std::size_t c = 0; c < count; ++c) {
+    Row<Of> xc;
+    xc.load(x + c * Of::width);
+    const double* const l = n.l + c * n.rows + r;
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i].subtract(l[i], xc);
+  }
+}
+
+/// N own columns from `c` on, once all before them are solved.
+template <class Of, std::size_t N>
+void forward_own(const Supernode& n, std::size_t c, double* x) {
+  Row<Of> sum[N];
+  for (std::size_t i = 0; i < N; ++i)
+    sum[i].load(x + (c + i) * Of::width);
+  lose_columns<Of, N>(n, c, c, x, sum);
+  for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t j = 0; j < i; ++j)
+      sum[i].subtract(n.at(c + i, c + j), sum[j]);
+    sum[i].divide(n.at(c + i, c + i));
+    sum[i].store(x + (c + i) * Of::width);
+  }
+}
+
+template <class Of, std::size_t N>
+void forward_below(const Supernode& n, std::size_t r, const double* own, double* x) {
+  Row<Of> sum[N];
+  for (std::size_t i = 0; i < N; ++i)
+    sum[i].load(x + static_cast<std::size_t>(n.row[r + i]) * Of::width);
+  lose_columns<Of, N>(n, n.columns + r, n.columns, own, sum);
+  for (std::size_t i = 0; i < N; ++i)
+    sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * Of::width);
+}
+
+template <class Of>
+bool all_zero(const double* x, std::size_t count) {
+  for (std::size_t i = 0; i < count * Of::width; ++i)
+    if (x[i] != 0)
+      return false;
+  return true;
+}
+
+template <class Of>
+void forward(const Supernode& n, double* x) {
+  double* const own = x + n.first * Of::width;
+  if (all_zero<Of>(own, n.columns)) // and so stays everything that only hears from it
+    return;
+  std::size_t c = 0;
+  for (; c + Of::rows <= n.columns; c += Of::rows)
+    forward_own<Of, Of::rows>(n, c, own);
+  for (; c < n.columns; ++c)
+    forward_own<Of, 1>(n, c, own);
+  std::size_t r = 0;
+  for (; r + Of::rows <= n.below; r += Of::rows)
+    forward_below<Of, Of::rows>(n, r, own, x);
+  for (; r < n.below; ++r)
+    forward_below<Of, 1>(n, r, own, x);
+}
+
+/// N own columns from `c` on, once all behind them are solved; `below` are the rows below.
+template <class Of, std::size_t N>
+void backward_own(const Supernode& n, std::size_t c, const double* below, double* x) {
+  Row<Of> sum[N];
+  for (std::size_t i = 0; i < N; ++i)
+    sum[i].load(x + (c + i) * Of::width);
+  const double* const l = n.l + c * n.rows;
+  for (std::size_t r = 0; r < n.below; ++r) {
+    Row<Of> xr;
+    xr.load(below + r * Of::width);
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i].subtract(l[i * n.rows + n.columns + r], xr);
+  }
+  for (std::size_t r = n.columns; r-- > c + N;) {
+    Row<Of> xr;
+    xr.load(x + r * Of::width);
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i].subtract(l[i * n.rows + r], xr);
+  }
+  for (std::size_t i = N; i-- > 0;) {
+    for (std::size_t j = N; j-- > i + 1;)
+      sum[i].subtract(n.at(c + j, c + i), sum[j]);
+    sum[i].divide(n.at(c + i, c + i));
+    sum[i].store(x + (c + i) * Of::width);
+  }
+}
+
+template <class Of>
+void backward(const Supernode& n, double* x, double* work) {
+  for (std::size_t r = 0; r < n.below; ++r) {
+    Row<Of> xr;
+    xr.load(x + static_cast<std::size_t>(n.row[r]) * Of::width);
+    xr.store(work + r * Of::width);
+  }
+  double* const own = x + n.first * Of::width;
+  std::size_t c = n.columns;
+  for (; c >= Of::rows; c -= Of::rows)
+    backward_own<Of, Of::rows>(n, c - Of::rows, work, own);
+  for (; c > 0; --c)
+    backward_own<Of, 1>(n, c - 1, work, own);
+}
+
+template <class Of>
+void solve(const SupernodalArrays& l, double* x, double* work) {
+  for (std::size_t k = 0; k < l.supernodes; ++k)
+    forward<Of>(supernode(l, k), x);
+  for (std::size_t k = l.supernodes; k-- > 0;)
+    backward<Of>(supernode(l, k), x, work);
+}
+
+} // namespace
+} // namespace gewebe

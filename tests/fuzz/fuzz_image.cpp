@@ -1,0 +1,32 @@
+// Any bytes are an image or an Error, by both readers, and an image survives being written and
+// read.
+#include "base/error.h"
+#include "formats/png.h"
+#include "formats/pnm.h"
+
+#include <cstdlib>
+#include <string_view>
+
+namespace {
+
+template <class Read>
+void survive(Read&& read, std::string_view bytes) {
+  using namespace gewebe;
+  try {
+    const Image image = read(bytes, "fuzz");
+    if (image.values.size() != std::size_t{image.width} * image.height * image.channels)
+      std::abort();
+    if (image.values.size() < 100000 && read_png(write_png(image), "again") != image)
+      std::abort();
+  } catch (const Error&) {
+  }
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  survive(gewebe::read_png, bytes);
+  survive(gewebe::read_pnm, bytes);
+  return 0;
+}

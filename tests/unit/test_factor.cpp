@@ -1,0 +1,317 @@
+// The factor: C = K⁻¹ to rounding, from any thread, taken apart and put together again.
+
+#include "sim/factor.h"
+
+#include "sim/compliance_columns.h"
+#include "sim/condition.h"
+#include "sim_models.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <gtest/gtest.h>
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+namespace {
+
+/// Keeps columns in memory.
+class KeptColumns final : public ColumnSink {
+public:
+  void write(std::size_t k, std::span<const double> columns) override {
+    EXPECT_EQ(k, kept.size());
+    kept.emplace_back(columns.begin(), columns.end());
+  }
+  std::vector<std::vector<double>> kept;
+};
+
+Context threads(int count) {
+  Context context;
+  context.threads = count;
+  return context;
+}
+
+Context memory(std::uint64_t bytes) {
+  Context context;
+  context.max_memory = bytes;
+  return context;
+}
+
+std::vector<std::uint32_t> every(std::size_t count, std::uint32_t step) {
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < count; i += step)
+    nodes.push_back(i);
+  return nodes;
+}
+
+/// max |K C - I| over the free axes of some nodes.
+double identity_error(const Model& model, std::uint32_t step) {
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  KeptColumns sink;
+  const auto nodes = every(model.nodes.size(), step);
+  EXPECT_LE(compliance_columns(k, factor, stiffness_norm(k), nodes, {}, sink), max_backward_error);
+  double worst = 0;
+  std::vector<double> f(3 * model.nodes.size());
+  for (std::size_t c = 0; c < nodes.size(); ++c)
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::size_t axis = 3 * std::size_t{nodes[c]} + a;
+      const std::span<const double> u(sink.kept[c].data() + a * f.size(), f.size());
+      if (k.row_of_axis[axis] < 0) {
+        EXPECT_TRUE(std::all_of(u.begin(), u.end(), [](double value) { return value == 0; }));
+        continue;
+      }
+      multiply_stiffness(model, u, f);
+      for (std::size_t i = 0; i < f.size(); ++i)
+        if (k.row_of_axis[i] >= 0)
+          worst = std::max(worst, std::abs(f[i] - (i == axis ? 1 : 0)));
+    }
+  return worst;
+}
+
+TEST(Factor, InvertsTheMatrixOfABall) {
+  EXPECT_LT(identity_error(model_of(ball(3)), 7), 1e-9);
+  EXPECT_LT(identity_error(model_of(joined(ball(2), ball(3, 2, {5, 0, 0})), 5), 5), 1e-9);
+}
+
+TEST(Factor, InvertsTheMatrixOfALiver) {
+  const std::string liver = shared_file("sofa_liver_smooth.obj");
+  if (liver.empty())
+    GTEST_SKIP() << "no shared data";
+  EXPECT_LT(identity_error(model_of_file(liver, "cm"), 100), 1e-9);
+}
+
+TEST(Factor, InvertsTheMatrixOfAColon) {
+  const std::string colon = shared_file("gca90_large_intestine_20k.stl");
+  if (colon.empty())
+    GTEST_SKIP() << "no shared data";
+  EXPECT_LT(identity_error(model_of_file(colon, "mm"), 1000), 1e-9);
+}
+
+TEST(Factor, SolvesTheSameBitsWhateverIsBesideIt) {
+  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
+  Context baseline;
+  baseline.cpu = CpuLevel::baseline;
+  const Factor factor(k, {}), plain(k, baseline);
+  const std::size_t n = k.order(), count = 19;
+  std::vector<double> f = random_vector(n * count, 1), all(f.size()), one(n), u(f.size());
+  std::fill_n(f.begin() + static_cast<std::ptrdiff_t>(3 * n), n, -0.0); // a zero right-hand side
+  f[5 * n] = 0;
+  factor.solve(f, all, count);
+  EXPECT_EQ(factor.data().x, plain.data().x); // the factorisation repeats, bit by bit
+  EXPECT_EQ(factor.data().permutation, plain.data().permutation);
+  plain.solve(f, u, count);
+  EXPECT_EQ(0, std::memcmp(u.data(), all.data(), u.size() * sizeof(double)));
+  for (std::size_t c = 0; c < count; ++c) {
+    factor.solve({f.data() + c * n, n}, one);
+    EXPECT_EQ(0, std::memcmp(one.data(), all.data() + c * n, n * sizeof(double))) << c;
+    plain.solve({f.data() + c * n, n}, one);
+    EXPECT_EQ(0, std::memcmp(one.data(), all.data() + c * n, n * sizeof(double))) << c;
+  }
+  // Many threads at once.
+  std::vector<double> again(f.size() * 8);
+  parallel_blocks(threads(2), 8 * count, 1, [&](std::size_t c, std::size_t) {
+    factor.solve({f.data() + c % count * n, n}, {again.data() + c * n, n});
+  });
+  for (std::size_t c = 0; c < 8 * count; ++c)
+    EXPECT_TRUE(std::equal(again.begin() + static_cast<std::ptrdiff_t>(c * n),
+                           again.begin() + static_cast<std::ptrdiff_t>((c + 1) * n),
+                           all.begin() + static_cast<std::ptrdiff_t>(c % count * n)));
+}
+
+TEST(Factor, KeepsTheBackwardErrorAndItsMeasureCanFail) {
+  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
+  const Factor factor(k, {});
+  const double norm = stiffness_norm(k);
+  const std::vector<double> f = random_vector(k.order(), 3);
+  std::vector<double> x(k.order());
+  factor.solve(f, x);
+  EXPECT_LE(backward_error(k, norm, x, f), 1e-15);
+  x[7] *= 1 + 1e-10;
+  EXPECT_FALSE(backward_error(k, norm, x, f) <= max_backward_error);
+  x[7] = NAN;
+  EXPECT_FALSE(backward_error(k, norm, x, f) <= max_backward_error);
+}
+
+TEST(Factor, SolvesOnAllAxes) {
+  const Model model = model_of(ball(2));
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  const std::vector<double> f = random_vector(3 * model.nodes.size(), 3);
+  std::vector<double> u(f.size()), g(f.size());
+  solve_axes(k, factor, f, u);
+  multiply_stiffness(model, u, g);
+  Vec3 sum; // applied forces and the reactions of the supports cancel
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (k.row_of_axis[i] >= 0) {
+      EXPECT_NEAR(g[i], f[i], 1e-12);
+    } else {
+      EXPECT_EQ(u[i], 0);
+    }
+    sum[static_cast<int>(i % 3)] += g[i];
+  }
+  EXPECT_LE(gewebe::norm(sum), 1e-10);
+}
+
+TEST(Factor, OrderAndUnitsDoNotMatterBeyondTheCondition) {
+  const Model model = stretched(model_of(ball(3)), 1.05);
+  const StiffnessMatrix k = stiffness_matrix(model);
+  StiffnessCheck check;
+  const Factor factor = checked_factor(model, k, {}, check);
+  const std::vector<double> f = random_vector(k.order(), 6);
+  std::vector<double> u(f.size());
+  factor.solve(f, u);
+  const double size = *std::max_element(u.begin(), u.end());
+  const double tolerance = 10 * 0x1p-52 * check.condition * size;
+
+  // Backwards: row r becomes row n - 1 - r.
+  const std::size_t n = k.order();
+  std::vector<std::vector<std::pair<std::int64_t, double>>> columns(n);
+  for (std::size_t c = 0; c < n; ++c)
+    for (auto at = static_cast<std::size_t>(k.column_start[c]);
+         at < static_cast<std::size_t>(k.column_start[c + 1]); ++at)
+      columns[n - 1 - static_cast<std::size_t>(k.row[at])].emplace_back(
+          static_cast<std::int64_t>(n - 1 - c), k.value[at]);
+  StiffnessMatrix back;
+  back.axis_of_row = k.axis_of_row;
+  for (auto& column : columns) {
+    std::sort(column.begin(), column.end());
+    back.column_start.push_back(static_cast<std::int64_t>(back.row.size()));
+    for (const auto& [row, value] : column) {
+      back.row.push_back(row);
+      back.value.push_back(value);
+    }
+  }
+  back.column_start.push_back(static_cast<std::int64_t>(back.row.size()));
+  std::vector<double> g(f.rbegin(), f.rend()), v(n);
+  Factor(back, {}).solve(g, v);
+  for (std::size_t r = 0; r < n; ++r)
+    EXPECT_NEAR(v[n - 1 - r], u[r], tolerance);
+
+  for (const double scale : {1e-9, 1e9}) {
+    Model scaled = model;
+    for (Node& node : scaled.nodes)
+      node.position *= scale;
+    for (Spring& s : scaled.springs)
+      s.rest *= scale;
+    const StiffnessMatrix ks = stiffness_matrix(scaled);
+    Factor(ks, {}).solve(f, v);
+    for (std::size_t r = 0; r < n; ++r)
+      EXPECT_NEAR(v[r], u[r], tolerance);
+  }
+}
+
+TEST(Factor, ComesApartAndTogether) {
+  const StiffnessMatrix k = stiffness_matrix(model_of(ball(2)));
+  const Factor factor(k, {});
+  const Factor again(factor.data());
+  const std::vector<double> f = random_vector(k.order(), 1);
+  std::vector<double> a(f.size()), b(f.size());
+  factor.solve(f, a);
+  again.solve(f, b);
+  EXPECT_EQ(a, b);
+  EXPECT_EQ(again.order(), factor.order());
+  EXPECT_EQ(again.entries(), factor.entries());
+}
+
+TEST(Factor, RefusesArraysThatContradictThemselves) {
+  const FactorData good = Factor(stiffness_matrix(model_of(ball(1))), {}).data();
+  EXPECT_NO_THROW(Factor{good});
+  using Spoil = std::function<void(FactorData&)>;
+  const std::vector<Spoil> spoils{
+      [](FactorData& d) { ++d.order; },
+      [](FactorData& d) { d.order = 0; },
+      [](FactorData& d) { d.order = -1; },
+      [](FactorData& d) { d.order = INT64_MAX; },
+      [](FactorData& d) { d.permutation[0] = d.permutation[1]; },
+      [](FactorData& d) { d.permutation[0] = -1; },
+      [](FactorData& d) { d.permutation[0] = d.order; },
+      [](FactorData& d) { d.permutation.pop_back(); },
+      [](FactorData& d) { d.column_count[2] = 0; },
+      [](FactorData& d) { d.column_count[2] = d.order + 1; },
+      [](FactorData& d) { d.super[1] = 0; },
+      [](FactorData& d) { d.super[0] = 1; },
+      [](FactorData& d) { d.super.back() -= 1; },
+      [](FactorData& d) { d.super[1] = d.super[2] + 1; },
+      [](FactorData& d) { d.super = {0}; },
+      [](FactorData& d) { d.super.clear(); },
+      [](FactorData& d) { d.pi[1] += 1; },
+      [](FactorData& d) { d.pi[1] = INT64_MAX; },
+      [](FactorData& d) { d.pi[1] = INT64_MIN; },
+      [](FactorData& d) { d.pi.back() = 1; },
+      [](FactorData& d) { d.px[1] -= 1; },
+      [](FactorData& d) { d.px.back() = -1; },
+      [](FactorData& d) { d.s[0] = 1; },
+      [](FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = d.order; },
+      [](FactorData& d) { d.s[static_cast<std::size_t>(d.pi[1] - 1)] = -5; },
+      [](FactorData& d) { d.s.pop_back(); },
+      [](FactorData& d) { d.x.pop_back(); },
+      [](FactorData& d) { d.x[0] = 0; },
+      [](FactorData& d) { d.x[0] = NAN; },
+      [](FactorData& d) { d.x[1] = HUGE_VAL; },
+      [](FactorData& d) { d.max_row_size = 0; },
+      [](FactorData& d) { d.max_column_size = -1; },
+  };
+  for (std::size_t i = 0; i < spoils.size(); ++i) {
+    FactorData bad = good;
+    spoils[i](bad);
+    EXPECT_THROW(Factor{bad}, Error) << i;
+  }
+}
+
+TEST(Factor, RefusesTooMuchMemory) {
+  const StiffnessMatrix k = stiffness_matrix(model_of(ball(3)));
+  EXPECT_THROW(Factor(k, memory(10000)), Error);
+  Context stopped;
+  stopped.cancelled = [] { return true; };
+  EXPECT_THROW(Factor(k, stopped), Cancelled);
+}
+
+TEST(ComplianceColumns, AreTheSameForAnyNumberOfThreadsAndNeighbours) {
+  const Model model = model_of(ball(3));
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  const double norm = stiffness_norm(k);
+  std::array<KeptColumns, 4> sinks;
+  const auto nodes = every(model.nodes.size(), 1);
+  const auto some = every(model.nodes.size(), 13);
+  int told = 0;
+  Context single = threads(1);
+  single.progress = [&](double) { ++told; };
+  compliance_columns(k, factor, norm, nodes, single, sinks[0]);
+  compliance_columns(k, factor, norm, nodes, threads(2), sinks[1]);
+  compliance_columns(k, factor, norm, nodes, threads(7), sinks[2]);
+  compliance_columns(k, factor, norm, some, threads(2), sinks[3]);
+  EXPECT_GT(told, 2);
+  EXPECT_EQ(sinks[0].kept.size(), nodes.size());
+  EXPECT_EQ(sinks[0].kept, sinks[1].kept);
+  EXPECT_EQ(sinks[0].kept, sinks[2].kept);
+  for (std::size_t i = 0; i < some.size(); ++i)
+    EXPECT_EQ(sinks[3].kept[i], sinks[0].kept[some[i]]);
+  // C is symmetric.
+  const std::size_t row = 3 * model.nodes.size();
+  EXPECT_NEAR(sinks[0].kept[4][3 * 9 + 2], sinks[0].kept[9][2 * row + 3 * 4], 1e-18);
+}
+
+TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {
+  struct Full final : ColumnSink {
+    void write(std::size_t k, std::span<const double>) override {
+      if (k == 20)
+        throw Error("full");
+    }
+  } full;
+  const Model model = model_of(ball(3));
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  const auto nodes = every(100, 1);
+  EXPECT_THROW(compliance_columns(k, factor, stiffness_norm(k), nodes, {}, full), Error);
+  KeptColumns sink;
+  EXPECT_THROW(compliance_columns(k, factor, stiffness_norm(k), nodes, memory(1000), sink), Error);
+  EXPECT_TRUE(sink.kept.empty());
+  EXPECT_EQ(compliance_columns(k, factor, stiffness_norm(k), {}, {}, sink), 0);
+}
+
+} // namespace

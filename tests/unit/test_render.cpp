@@ -1,0 +1,350 @@
+// The parts of rendering: camera, coordinates, tangents, images.
+
+#include "base/error.h"
+#include "mesh_fixtures.h"
+#include "model_meshes.h"
+#include "render/angles.h"
+#include "render/camera.h"
+#include "render/drawing.h"
+#include "render/image.h"
+#include "render/picture.h"
+#include "render/tangents.h"
+#include "render/texture.h"
+#include "render/uv.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace gewebe {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+
+TEST(RenderAngles, AgreeWithLibm) {
+  for (double degrees = 0; degrees < 89.5; degrees += 0.37)
+    EXPECT_NEAR(tangent(degrees), std::tan(degrees * pi / 180),
+                1e-13 * (1 + std::tan(degrees * pi / 180)));
+  for (double a = 0; a < 2 * pi; a += 0.01)
+    EXPECT_NEAR(turn(3 * std::cos(a), 3 * std::sin(a)), a / (2 * pi), 1e-15);
+  EXPECT_EQ(turn(0, 0), 0);
+  EXPECT_EQ(turn(-1, 0), 0.5);
+  EXPECT_EQ(turn(0, -1), 0.75);
+}
+
+std::array<double, 4> clip_of(const Projection& projection, const Vec3& q) {
+  std::array<double, 4> clip{};
+  for (std::size_t r = 0; r < 4; ++r) {
+    const auto& m = projection.matrix[r];
+    clip[r] = m[0] * q.x + m[1] * q.y + m[2] * q.z + m[3];
+  }
+  return clip;
+}
+
+TEST(RenderCamera, EveryViewShowsTheWholeBoxAndFillsThePicture) {
+  const Box3 box{{-30, 10, 5}, {50, 40, 125}};
+  for (const std::string& view : view_names())
+    for (const auto& [w, h] : {std::pair{512U, 512U}, {640U, 200U}, {100U, 900U}}) {
+      CameraOptions options;
+      options.view = view;
+      const Camera camera = make_camera(options, box, w, h);
+      EXPECT_NEAR(dot(cross(camera.right, camera.up), camera.back), 1, 1e-12);
+      const Projection projection = make_projection(camera, box, {1, 2, 3}, 7);
+      double most = 0;
+      for (int c = 0; c < 8; ++c) {
+        const Vec3 p{(c & 1) != 0 ? box.max.x : box.min.x, (c & 2) != 0 ? box.max.y : box.min.y,
+                     (c & 4) != 0 ? box.max.z : box.min.z};
+        const auto clip = clip_of(projection, (p - Vec3{1, 2, 3}) / 7);
+        EXPECT_GT(clip[3], projection.near);
+        EXPECT_LE(std::fabs(clip[2]), clip[3]) << view;
+        most = std::max({most, std::fabs(clip[0]) / clip[3], std::fabs(clip[1]) / clip[3]});
+      }
+      EXPECT_LT(most, 1);
+      EXPECT_GT(most, 0.9) << view;
+    }
+}
+
+TEST(RenderCamera, SidesAreThePatients) {
+  const Box3 box{{-1, -1, -1}, {1, 1, 1}};
+  const auto camera = [&](const char* view) {
+    CameraOptions options;
+    options.view = view;
+    return make_camera(options, box, 8, 8);
+  };
+  EXPECT_EQ(camera("front").right, (Vec3{-1, 0, 0})); // the right hand (+x) is at the left
+  EXPECT_EQ(camera("front").up, (Vec3{0, 0, 1}));
+  EXPECT_GT(camera("front").eye.y, 1);
+  EXPECT_LT(camera("left").eye.x, -1);
+  EXPECT_GT(camera("right").eye.x, 1);
+  EXPECT_EQ(camera("top").up, (Vec3{0, 1, 0}));
+  EXPECT_EQ(camera("top").right, (Vec3{1, 0, 0}));
+  EXPECT_EQ(camera("bottom").right, (Vec3{-1, 0, 0}));
+  const Camera front = camera("front");
+  const Vec3 light = default_light(front) - front.target;
+  EXPECT_GT(dot(light, front.up), 0);
+  EXPECT_LT(dot(light, front.right), 0);
+  EXPECT_GT(dot(light, front.back), 0);
+}
+
+TEST(RenderCamera, RefusesWhatIsNoView) {
+  const Box3 box{{-1, -1, -1}, {1, 1, 1}};
+  CameraOptions options;
+  options.eye = Vec3{0, 0, 0};
+  EXPECT_THROW((void)make_camera(options, box, 8, 8), Error); // eye is target
+  options.eye = Vec3{0, 0, 9};
+  EXPECT_NO_THROW((void)make_camera(options, box, 8, 8)); // along the usual up: another is taken
+  options.up = Vec3{0, 0, -3};
+  EXPECT_THROW((void)make_camera(options, box, 8, 8), Error);
+  options = {};
+  EXPECT_THROW((void)make_camera(options, {{-1e308, -1e308, 0}, {1e308, 1e308, 1}}, 8, 8), Error);
+  EXPECT_NO_THROW((void)make_camera(options, {}, 8, 8));
+  EXPECT_NO_THROW((void)make_camera(options, {{3, 3, 3}, {3, 3, 3}}, 8, 8));
+}
+
+TEST(RenderUv, SphereFollowsLongitudeAndLatitudeWithoutATear) {
+  const TriangleMesh ball = test::sphere_mesh(4, 5, {1, 2, 3});
+  const UvFrame frame{UvMapping::sphere, bounding_box(ball), 1};
+  const auto texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  int across = 0;
+  for (std::size_t t = 0; t < texcoords.size(); ++t) {
+    double low = 9, high = -9;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Vec3 p = ball.points[ball.triangles[t][c]] - Vec3{1, 2, 3};
+      const double s = texcoords[t][2 * c];
+      low = std::min(low, s);
+      high = std::max(high, s);
+      if (std::hypot(p.x, p.y) > 1e-6) {
+        const double expected = std::atan2(p.y, p.x) / (2 * pi);
+        EXPECT_NEAR(std::remainder(s - expected, 1.0), 0, 1e-6);
+      }
+      EXPECT_NEAR(texcoords[t][2 * c + 1], std::asin(p.z / 5) / pi + 0.5, 1e-6);
+    }
+    const double height = std::fabs(ball.points[ball.triangles[t][0]].z - 3);
+    if (height < 4.5) {
+      EXPECT_LT(high - low, 0.2) << t;
+    }
+    across += high > 1 ? 1 : 0;
+  }
+  EXPECT_GT(across, 10); // the seam was met
+}
+
+TEST(RenderUv, BoxIsUprightAndUnmirroredSeenFromOutside) {
+  const TriangleMesh cube = test::sphere_mesh(3, 10, {0, 0, 0});
+  const UvFrame frame{UvMapping::box, bounding_box(cube), 4};
+  const auto texcoords = make_texcoords(cube.points, cube.triangles, frame, {});
+  for (std::size_t t = 0; t < texcoords.size(); ++t) {
+    const auto& st = texcoords[t];
+    const double area =
+        double{st[2] - st[0]} * (st[5] - st[1]) - double{st[4] - st[0]} * (st[3] - st[1]);
+    EXPECT_GT(area, 0) << t; // counter-clockwise outside, counter-clockwise in the texture
+    for (const float value : st) {
+      EXPECT_GE(value, -5.1);
+      EXPECT_LE(value, 5.1);
+    }
+  }
+}
+
+TEST(RenderUv, BoxStaysInPlaceFarAwayAndOnMovedTissue) {
+  const TriangleMesh near = test::sphere_mesh(2, 10, {0, 0, 0});
+  TriangleMesh far = near;
+  for (Vec3& p : far.points)
+    p += Vec3{4e6, -8e6, 12e6}; // whole texture edges
+  std::vector<Surface> surfaces(2);
+  surfaces[0].mesh = near;
+  std::vector<Surface> moved(1);
+  moved[0].mesh = far;
+  UvOptions options;
+  options.mapping = UvMapping::box;
+  options.edge = 4;
+  surfaces.resize(1);
+  EXPECT_EQ(add_texcoords(surfaces, options, {}), 1U);
+  EXPECT_EQ(add_texcoords(moved, options, {}), 1U);
+  for (std::size_t t = 0; t < near.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 6; ++k)
+      EXPECT_NEAR(surfaces[0].mesh.texcoords[t][k], moved[0].mesh.texcoords[t][k], 1e-6);
+  // The same tissue somewhere else has the coordinates of its rest.
+  std::vector<Surface> pulled(1);
+  pulled[0].mesh = far;
+  pulled[0].rest = near.points;
+  (void)add_texcoords(pulled, options, {});
+  EXPECT_EQ(pulled[0].mesh.texcoords, surfaces[0].mesh.texcoords);
+  // Coordinates of a surface's own stay unless a mapping is asked for.
+  EXPECT_EQ(add_texcoords(pulled, {}, {}), 0U);
+}
+
+TEST(RenderTangents, OfASphereAreEastAndNorth) {
+  TriangleMesh ball = test::sphere_mesh(5, 5, {0, 0, 0});
+  const UvFrame frame{UvMapping::sphere, bounding_box(ball), 1};
+  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  const std::vector<Vec3> normals = render_normals(ball);
+  const TexturedVertices v = split_vertices(ball, ball.texcoords, &normals, {});
+  int checked = 0;
+  for (std::size_t n = 0; n < v.point.size(); ++n) {
+    const Vec3 p = ball.points[v.point[n]] / 5;
+    if (std::fabs(p.z) > 0.9)
+      continue;
+    const Vec3 east = cross(Vec3{0, 0, 1}, p) / norm(cross(Vec3{0, 0, 1}, p));
+    EXPECT_GT(dot(v.tangent[n], east), 0.995);
+    EXPECT_GT(dot(v.bitangent[n], cross(p, east)), 0.995);
+    EXPECT_NEAR(dot(v.tangent[n], v.bitangent[n]), 0, 1e-12);
+    ++checked;
+  }
+  EXPECT_GT(checked, 8000);
+  for (std::size_t t = 0; t < v.triangles.size(); ++t)
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(v.point[v.triangles[t][c]], ball.triangles[t][c]);
+      EXPECT_EQ(v.st[v.triangles[t][c]][0], ball.texcoords[t][2 * c]);
+    }
+}
+
+TEST(RenderTangents, SeamsSplitAndMirrorsTurn) {
+  // Two squares side by side; the right one's texture runs back.
+  TriangleMesh m = test::sheet(2, 1);
+  const auto coordinate = [&](std::uint32_t p, bool mirror) {
+    return std::array{static_cast<float>(mirror ? 2 - m.points[p].x : m.points[p].x),
+                      static_cast<float>(m.points[p].y)};
+  };
+  for (std::size_t t = 0; t < 4; ++t) {
+    std::array<float, 6> st{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto at = coordinate(m.triangles[t][c], t >= 2);
+      st[2 * c] = at[0];
+      st[2 * c + 1] = at[1];
+    }
+    m.texcoords.push_back(st);
+  }
+  const std::vector<Vec3> normals = render_normals(m);
+  const TexturedVertices v = split_vertices(m, m.texcoords, &normals, {});
+  ASSERT_EQ(v.point.size(), 8U); // 6 points, the two of the mirror line twice
+  for (std::size_t t = 0; t < 4; ++t)
+    for (const std::uint32_t n : v.triangles[t]) {
+      EXPECT_EQ(v.tangent[n], (Vec3{t < 2 ? 1.0 : -1.0, 0, 0}));
+      EXPECT_EQ(v.bitangent[n], (Vec3{0, 1, 0}));
+    }
+  // Without frames mirrored halves may share vertices.
+  EXPECT_EQ(split_vertices(m, m.texcoords, nullptr, {}).point.size(), 6U);
+}
+
+TEST(RenderTangents, DegenerateTexturesAndTrianglesGiveNone) {
+  TriangleMesh m = test::sheet(1, 1);
+  m.texcoords = {{0.5, 0.5, 0.5, 0.5, 0.5, 0.5}, {0, 0, 1, 1, 2, 2}};
+  std::vector<Vec3> normals = render_normals(m);
+  TexturedVertices v = split_vertices(m, m.texcoords, &normals, {});
+  for (std::size_t n = 0; n < v.point.size(); ++n) {
+    EXPECT_EQ(v.tangent[n], Vec3{});
+    EXPECT_EQ(v.bitangent[n], Vec3{});
+  }
+  // No area in space.
+  for (Vec3& p : m.points)
+    p = {p.x, 0, 0};
+  m.texcoords = {{0, 0, 1, 0, 1, 1}, {0, 0, 1, 1, 0, 1}};
+  normals = render_normals(m);
+  v = split_vertices(m, m.texcoords, &normals, {});
+  for (const Vec3& t : v.tangent)
+    EXPECT_EQ(t, Vec3{});
+}
+
+TEST(RenderTangents, AFanOfManySeamsIsQuick) {
+  TriangleMesh m;
+  constexpr std::uint32_t count = 200000;
+  m.points.push_back({0, 0, 0});
+  for (std::uint32_t n = 0; n <= count; ++n)
+    m.points.push_back({1.0 * n, 1, 0});
+  for (std::uint32_t n = 0; n < count; ++n) {
+    m.triangles.push_back({0, n + 2, n + 1});
+    const auto s = static_cast<float>(n);
+    m.texcoords.push_back({s, 0, s, 1, s + 1, 1});
+  }
+  const std::vector<Vec3> normals = render_normals(m);
+  EXPECT_EQ(split_vertices(m, m.texcoords, &normals, {}).point.size(), 3 * count);
+}
+
+TEST(RenderDrawing, SameForAnyThreadsAndOffsetsPointToTheLight) {
+  std::vector<Surface> surfaces(2);
+  surfaces[0].mesh = test::sphere_mesh(4, 10, {0, 0, 0});
+  surfaces[1].mesh = test::sphere_mesh(4, 3, {0, 0, 20});
+  (void)add_texcoords(surfaces, {}, {});
+  DrawingOptions options;
+  options.texcoords = options.structure = true;
+  options.light = {0, 0, 0}; // within the first: nothing to shift
+  options.offset = 0.1;
+  options.shade = 0.5;
+  Context one, two;
+  one.threads = 1;
+  two.threads = 2;
+  const Drawing a = make_drawing(surfaces, options, one), b = make_drawing(surfaces, options, two);
+  ASSERT_EQ(a.vertices.size(), b.vertices.size());
+  EXPECT_EQ(a.triangles, b.triangles);
+  bool shifted = false;
+  for (std::size_t n = 0; n < a.vertices.size(); ++n) {
+    const DrawVertex &v = a.vertices[n], &w = b.vertices[n];
+    EXPECT_TRUE(v.position == w.position && v.st == w.st && v.shifted == w.shifted &&
+                v.shade == w.shade);
+    const Vec3 p = a.origin + Vec3{v.position[0], v.position[1], v.position[2]} * a.scale;
+    const double moved = std::hypot(v.shifted[0] - v.st[0], v.shifted[1] - v.st[1]);
+    if (p.z < 11) {
+      EXPECT_LT(moved, 0.002); // light from within: along the normal
+      EXPECT_NEAR(v.shade, 0.5, 1e-6);
+    }
+    shifted = shifted || moved > 0.08;
+    for (const float x : v.position)
+      EXPECT_LE(std::fabs(x), 1.0001F);
+  }
+  EXPECT_TRUE(shifted);
+}
+
+TEST(RenderDrawing, LightOnAVertexAndNothingToDraw) {
+  std::vector<Surface> surfaces(1);
+  DrawingOptions options;
+  options.shade = 1;
+  EXPECT_TRUE(make_drawing(surfaces, options, {}).triangles.empty());
+  surfaces[0].mesh = test::sheet(1, 1);
+  surfaces[0].mesh.texcoords = {{0, 0, 1, 0, 1, 1}, {0, 0, 1, 1, 0, 1}};
+  options.light = {0, 0, 0};
+  options.texcoords = options.structure = true;
+  const Drawing drawing = make_drawing(surfaces, options, {});
+  for (const DrawVertex& v : drawing.vertices) {
+    EXPECT_TRUE(std::isfinite(v.shifted[0]) && std::isfinite(v.shifted[1]));
+    EXPECT_TRUE(std::isfinite(v.shade));
+  }
+  surfaces[0].mesh.points[0].x = -1.5e308;
+  surfaces[0].mesh.points[1].x = 1.5e308;
+  EXPECT_THROW((void)make_drawing(surfaces, options, {}), Error);
+}
+
+TEST(RenderImage, LuminanceAndShrinking) {
+  const Image gray{2, 1, 1, {3, 9}};
+  EXPECT_EQ(luminance(gray), gray);
+  const Image colors{4, 1, 3, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}};
+  EXPECT_EQ(luminance(colors), (Image{4, 1, 1, {54, 182, 18, 255}}));
+  const Image large{4, 2, 1, {0, 1, 10, 20, 2, 3, 30, 40}};
+  EXPECT_EQ(shrunk(large, 2), (Image{2, 1, 1, {2, 25}}));
+  EXPECT_EQ(shrunk(large, 1), large);
+  EXPECT_NE(image_digest(large), image_digest(gray));
+}
+
+TEST(RenderTexture, BilinearRepeatedAndFromBelow) {
+  const Texture texture = texture_from({2, 2, 1, {200, 100, 0, 50}}); // 200 100 above 0 50
+  const auto at = [&](double s, double t) { return 255 * sample(texture, s, t)[2]; };
+  EXPECT_NEAR(at(0.25, 0.25), 0, 1e-12);
+  EXPECT_NEAR(at(0.75, 0.25), 50, 1e-12);
+  EXPECT_NEAR(at(0.25, 0.75), 200, 1e-12);
+  EXPECT_NEAR(at(0.5, 0.5), 87.5, 1e-12);
+  EXPECT_NEAR(at(0, 0.25), 25, 1e-12); // across the edge
+  for (const double shift : {-3.0, 1.0, 1000.0})
+    EXPECT_NEAR(at(0.3 + shift, 0.9 - shift), at(0.3, 0.9), 1e-9);
+  for (const double huge : {1e30, -1e30, -1e-30, 3.4e38})
+    EXPECT_GE(at(huge, huge), 0);
+  EXPECT_THROW((void)texture_from({0, 0, 1, {}}), Error);
+}
+
+TEST(RenderPicture, SizesAsWords) {
+  EXPECT_EQ(picture_size_from_text("640x480"), std::pair(640U, 480U));
+  EXPECT_EQ(picture_size_from_text("640,480"), std::pair(640U, 480U));
+  EXPECT_EQ(picture_size_from_text("32768"), std::pair(32768U, 32768U));
+  for (const char* bad : {"", "0", "x", "5x", "x5", "5x5x5", "-1", "32769", "1e3", " 5", "5.0"})
+    EXPECT_THROW((void)picture_size_from_text(bad), Error) << bad;
+}
+
+} // namespace
+} // namespace gewebe

@@ -1,0 +1,284 @@
+// Both backends against the formula of the report.
+
+#include "base/error.h"
+#include "formats/mesh_file.h"
+#include "formats/png.h"
+#include "mesh_fixtures.h"
+#include "render/gl_context.h"
+#include "render/gl_passes.h"
+#include "render/picture.h"
+#include "render/raster_cpu.h"
+#include "render/uv.h"
+#include "render_oracle.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+namespace gewebe {
+namespace {
+
+using test::compare;
+using test::OracleComparison;
+using test::OracleScene;
+
+// What the program does before EGL starts.
+const int float_filter = ::setenv("GALLIVM_PERF", "no_aos_sampling", 0);
+
+constexpr double pi = 3.14159265358979323846;
+
+/// A texture of odd sides with soft spots, all channels different.
+Image spots(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
+  Image image{width, height, channels, {}};
+  std::mt19937 random(7);
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; ++x)
+      for (std::uint32_t c = 0; c < channels; ++c) {
+        const double wave = std::sin(2 * pi * (3.0 * x / width + 0.3 * c)) *
+                            std::cos(2 * pi * (2.0 * y / height + 0.2 * c));
+        const double noise = static_cast<double>(random()) / 4294967296.0;
+        image.values.push_back(static_cast<std::uint8_t>(128 + 90 * wave + 36 * noise));
+      }
+  return image;
+}
+
+/// A torus with exact coordinates, one quad a patch, part of them mirrored.
+TriangleMesh torus(std::uint32_t around, std::uint32_t across, bool mirror) {
+  TriangleMesh m;
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (std::uint32_t j = 0; j < across; ++j) {
+      const double u = 2 * pi * i / around, v = 2 * pi * j / across, r = 20 + 8 * std::cos(v);
+      m.points.push_back({r * std::cos(u), r * std::sin(u), 8 * std::sin(v)});
+    }
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (std::uint32_t j = 0; j < across; ++j) {
+      const std::uint32_t i1 = (i + 1) % around, j1 = (j + 1) % across;
+      const std::uint32_t a = i * across + j, b = i1 * across + j, c = i1 * across + j1,
+                          d = i * across + j1;
+      // Mirrored: s runs back in the second half.
+      const auto s_at = [&](std::uint32_t k) {
+        const double s = 2.0 * k / around;
+        return static_cast<float>(mirror && s > 1 ? 2 - s : s);
+      };
+      const auto t_at = [&](std::uint32_t k) {
+        return static_cast<float>(static_cast<double>(k) / across);
+      };
+      const float s0 = s_at(i), s1 = s_at(i + 1), t0 = t_at(j), t1 = t_at(j + 1);
+      m.triangles.push_back({a, b, c});
+      m.texcoords.push_back({s0, t0, s1, t0, s1, t1});
+      m.triangles.push_back({a, c, d});
+      m.texcoords.push_back({s0, t0, s1, t1, s0, t1});
+    }
+  return m;
+}
+
+TriangleMesh quad(double width, double height, float s, float t) {
+  TriangleMesh m;
+  m.points = {{0, 0, 0}, {width, 0, 0}, {width, height, 0}, {0, height, 0}};
+  m.triangles = {{0, 1, 2}, {0, 2, 3}};
+  m.texcoords = {{0, 0, s, 0, s, t}, {0, 0, s, t, 0, t}};
+  return m;
+}
+
+struct Case {
+  OracleScene scene;
+  CameraOptions camera;
+  std::uint32_t width = 224, height = 160;
+};
+
+Case textured(TriangleMesh mesh, const std::string& view) {
+  Case c;
+  c.scene.mesh = std::move(mesh);
+  c.scene.base = spots(45, 37, 3);
+  c.scene.structure = spots(64, 51, 1);
+  c.scene.offset = 0.03;
+  c.camera.view = view;
+  return c;
+}
+
+Image draw(const Case& c, Backend backend, Camera& camera, Vec3& light, double sign = 1) {
+  std::vector<Surface> surfaces(1);
+  surfaces[0].mesh = c.scene.mesh;
+  camera = make_camera(c.camera, rest_box(surfaces), c.width, c.height);
+  light = default_light(camera);
+  DrawingOptions options;
+  options.texcoords = true;
+  options.structure = c.scene.structure.has_value();
+  options.light = light;
+  options.offset = sign * c.scene.offset;
+  options.shade = c.scene.shade;
+  Look look;
+  if (c.scene.base)
+    look.base = texture_from(*c.scene.base);
+  if (c.scene.structure)
+    look.structure = texture_from(*c.scene.structure);
+  look.color = c.scene.color;
+  look.background = {0, 0, 0};
+  PictureOptions picture;
+  picture.backend = backend;
+  picture.width = c.width;
+  picture.height = c.height;
+  return make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
+}
+
+OracleComparison held_against_oracle(Case c, Backend backend, double sign = 1,
+                                     bool clamp_early = false) {
+  Camera camera;
+  const Image image = draw(c, backend, camera, c.scene.light, sign);
+  c.scene.clamp_early = clamp_early;
+  return compare(image, c.scene, camera);
+}
+
+class RenderOracle : public testing::TestWithParam<Backend> {
+protected:
+  void SetUp() override {
+    if (GetParam() != Backend::gl)
+      return;
+    try {
+      const GlContext gl;
+    } catch (const Error& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+
+  static void expect_equal(const Case& c, const char* name, double most_rms = 0.35) {
+    const OracleComparison result = held_against_oracle(c, GetParam());
+    RecordProperty(std::string(name) + ".max", std::to_string(result.max));
+    RecordProperty(std::string(name) + ".rms", std::to_string(result.rms));
+    EXPECT_GT(result.covered, 3000U);
+    EXPECT_GT(static_cast<double>(result.interior), 0.85 * static_cast<double>(result.covered));
+    EXPECT_LE(result.max, 2) << name;
+    EXPECT_LE(result.rms, most_rms) << name; // rounding to 8 bits alone is 0.29
+  }
+};
+
+TEST_P(RenderOracle, Sphere) {
+  TriangleMesh ball = test::sphere_mesh(4, 30, {100, -20, 7});
+  UvFrame frame{UvMapping::sphere, bounding_box(ball), 1};
+  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  expect_equal(textured(ball, "iso"), "sphere");
+}
+
+TEST_P(RenderOracle, BoxMappedSphereFarAway) {
+  TriangleMesh ball = test::sphere_mesh(3, 30, {1e5, -20, 7});
+  UvFrame frame{UvMapping::box, bounding_box(ball), 25};
+  ball.texcoords = make_texcoords(ball.points, ball.triangles, frame, {});
+  for (const char* view : {"front", "left", "right", "bottom"})
+    expect_equal(textured(ball, view), view);
+}
+
+TEST_P(RenderOracle, Torus) {
+  expect_equal(textured(torus(60, 30, false), "top"), "torus");
+}
+
+TEST_P(RenderOracle, MirroredTorus) {
+  expect_equal(textured(torus(60, 30, true), "iso"), "mirrored torus");
+}
+
+TEST_P(RenderOracle, ShadedAndColored) {
+  Case c = textured(torus(40, 20, false), "iso");
+  c.scene.shade = 0.6;
+  c.scene.color = {1, 0.5, 0.8};
+  expect_equal(c, "shaded");
+  c.scene.base.reset();
+  expect_equal(c, "without base");
+  c.scene.structure.reset();
+  expect_equal(c, "without any texture");
+  c.scene.base = spots(31, 8, 1);
+  expect_equal(c, "without structure");
+}
+
+TEST_P(RenderOracle, CameraInsideTheSurface) {
+  Case c = textured(torus(40, 20, false), "top");
+  c.camera.eye = Vec3{20, 1, 0.5};
+  c.camera.target = Vec3{0, 20, 2};
+  c.camera.fov = 75;
+  expect_equal(c, "from inside");
+}
+
+TEST_P(RenderOracle, StrongPerspective) {
+  Case c = textured(quad(200, 30, 20, 3), "top");
+  c.camera.eye = Vec3{-4, 15, 6};
+  c.camera.target = Vec3{60, 15, 0};
+  c.camera.fov = 70;
+  expect_equal(c, "plain to the horizon");
+}
+
+TEST_P(RenderOracle, SpleenWithItsOwnCoordinates) {
+  const std::string folder = test::shared_folder() + "/data/";
+  std::ifstream png(folder + "sofa_liver_texture_square.png", std::ios::binary);
+  if (!png)
+    GTEST_SKIP() << "no " << folder;
+  Input input(folder + "hubmap_F_spleen_uv.obj");
+  Case c = textured(read_mesh(input, {Kind::obj, "m", {}, false}), "front");
+  ASSERT_FALSE(c.scene.mesh.texcoords.empty());
+  const std::string bytes((std::istreambuf_iterator<char>(png)), {});
+  c.scene.base = read_png(bytes, "png");
+  c.scene.offset = 0.005;
+  expect_equal(c, "spleen");
+}
+
+// What the comparison must see.
+TEST_P(RenderOracle, WrongSignOfTheOffsetIsSeen) {
+  const Case c = textured(torus(60, 30, false), "top");
+  EXPECT_LE(held_against_oracle(c, GetParam()).max, 2);
+  const OracleComparison wrong = held_against_oracle(c, GetParam(), -1);
+  EXPECT_GT(wrong.max, 20);
+  EXPECT_GT(wrong.rms, 5);
+}
+
+TEST_P(RenderOracle, EarlyClampIsSeen) {
+  const OracleComparison wrong =
+      held_against_oracle(textured(torus(60, 30, false), "top"), GetParam(), 1, true);
+  EXPECT_GT(wrong.max, 20);
+}
+
+// A ramp has the same slope everywhere, so the relief is a number that can be written down.
+TEST_P(RenderOracle, FlatRampHasItsAnalyticValue) {
+  for (const bool to_right : {true, false}) {
+    Case c;
+    c.scene.mesh = quad(100, 100, 1, 1);
+    c.camera.view = "top";
+    Image ramp{256, 1, 1, {}};
+    for (unsigned x = 0; x < 256; ++x)
+      ramp.values.push_back(static_cast<std::uint8_t>(x));
+    c.scene.structure = ramp;
+    c.scene.color = {0.5, 0.25, 1};
+    std::vector<Surface> surfaces(1);
+    surfaces[0].mesh = c.scene.mesh;
+    const Camera camera = make_camera(c.camera, rest_box(surfaces), 64, 64);
+    DrawingOptions options;
+    options.texcoords = options.structure = true;
+    options.offset = 0.2;
+    // 30 degrees above the plane, so far that it is the same at every vertex.
+    options.light = Vec3{(to_right ? 1 : -1) * std::sqrt(0.75), 0, 0.5} * 1e9;
+    Look look;
+    look.structure = texture_from(ramp);
+    look.color = c.scene.color;
+    PictureOptions picture;
+    picture.width = picture.height = 64;
+    picture.backend = GetParam();
+    const Image image =
+        make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
+    const double ds = (to_right ? 1 : -1) * 0.2 * std::sqrt(0.75);
+    const double r = 0.5 - 0.5 * ds * 256 / 255;
+    const std::size_t middle = 3 * (32 * 64 + 32);
+    for (std::size_t n = 0; n < 3; ++n)
+      EXPECT_NEAR(image.values[middle + n],
+                  255 * std::min(1.0, 2 * r * c.scene.color[static_cast<int>(n)]), 0.51)
+          << to_right << n;
+    // A height that grows to the right is lit from the left.
+    EXPECT_EQ(image.values[middle] > 128, !to_right);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, RenderOracle, testing::Values(Backend::cpu, Backend::gl),
+                         [](const auto& parameter) {
+                           return backend_names()[static_cast<std::size_t>(parameter.param)];
+                         });
+
+} // namespace
+} // namespace gewebe

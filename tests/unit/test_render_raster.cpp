@@ -1,0 +1,199 @@
+// The rasteriser's rules, which no picture of an organ shows.
+
+#include "base/error.h"
+#include "mesh_fixtures.h"
+#include "model_meshes.h"
+#include "render/picture.h"
+#include "render/raster_cpu.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace gewebe {
+namespace {
+
+/// x, y are pixels from the upper left, w the depth.
+Projection pixels(double width, double height) {
+  Projection p;
+  p.matrix[0] = {2 / width, 0, 0, -1};
+  p.matrix[1] = {0, -2 / height, 0, 1};
+  p.matrix[2] = {0, 0, 1, 0};
+  p.matrix[3] = {0, 0, 0, 1};
+  p.near = 0.5;
+  return p;
+}
+
+DrawVertex vertex(double x, double y) {
+  DrawVertex v;
+  v.position = {static_cast<float>(x), static_cast<float>(y), 0};
+  return v;
+}
+
+std::uint64_t count(const Drawing& drawing, std::uint32_t width, std::uint32_t height,
+                    std::size_t only = SIZE_MAX) {
+  Drawing part = drawing;
+  if (only != SIZE_MAX)
+    part.triangles = {drawing.triangles[only]};
+  RenderReport report;
+  (void)render_cpu(part, pixels(width, height), {}, width, height, {}, &report);
+  return report.covered;
+}
+
+/// A sheet of nx × ny cells over the whole picture whose inner points are shaken; in steps of
+/// 1 / grain pixel, so that centres lie on edges and corners too.
+Drawing shaken_sheet(std::uint32_t nx, std::uint32_t ny, double size, std::uint32_t seed,
+                     double grain) {
+  std::mt19937 random(seed);
+  Drawing drawing;
+  drawing.triangles = test::sheet(nx, ny).triangles;
+  for (std::uint32_t y = 0; y <= ny; ++y)
+    for (std::uint32_t x = 0; x <= nx; ++x) {
+      const auto shake = [&](std::uint32_t k, std::uint32_t n) {
+        const double amount = static_cast<double>(random()) / 4294967296.0 - 0.5;
+        const double at = (k + (k == 0 || k == n ? 0 : 0.7 * amount)) * size / n;
+        return std::floor(at * grain + 0.5) / grain;
+      };
+      drawing.vertices.push_back(vertex(shake(x, nx), shake(y, ny)));
+    }
+  return drawing;
+}
+
+TEST(RenderRaster, EveryPixelOfASheetIsOwnedByExactlyOneTriangle) {
+  for (std::uint32_t seed = 0; seed < 8; ++seed)
+    for (const double grain : {2.0, 1000.0}) {
+      const Drawing drawing = shaken_sheet(7, 5, 64, seed, grain);
+      EXPECT_EQ(count(drawing, 64, 64), 64U * 64U);
+      std::uint64_t sum = 0;
+      for (std::size_t t = 0; t < drawing.triangles.size(); ++t)
+        sum += count(drawing, 64, 64, t);
+      EXPECT_EQ(sum, 64U * 64U) << seed << " " << grain;
+    }
+}
+
+TEST(RenderRaster, TopLeftRuleOnPixelCentres) {
+  Drawing drawing;
+  drawing.vertices = {vertex(0.5, 0.5), vertex(4.5, 0.5), vertex(4.5, 4.5), vertex(0.5, 4.5)};
+  drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
+  EXPECT_EQ(count(drawing, 8, 8), 16U); // rows and columns 0 to 3
+  Look look;
+  look.background = {0, 0, 0};
+  const Image image = render_cpu(drawing, pixels(8, 8), look, 8, 8, {});
+  for (std::size_t y = 0; y < 8; ++y)
+    for (std::size_t x = 0; x < 8; ++x)
+      EXPECT_EQ(image.values[3 * (8 * y + x)], x < 4 && y < 4 ? 255 : 0) << x << " " << y;
+  for (Triangle& t : drawing.triangles)
+    std::swap(t[1], t[2]); // seen from behind
+  EXPECT_EQ(count(drawing, 8, 8), 16U);
+}
+
+TEST(RenderRaster, FirstOfCoincidentAndNearestOfAllIsSeen) {
+  Drawing drawing;
+  for (const double depth : {1.0, 1.0, 0.9}) {
+    for (const auto& [x, y] : {std::pair{-9.0, -9.0}, {40.0, -9.0}, {-9.0, 40.0}})
+      drawing.vertices.push_back(vertex(x, y));
+    const auto n = static_cast<std::uint32_t>(drawing.vertices.size());
+    for (std::uint32_t k = n - 3; k < n; ++k) {
+      drawing.vertices[k].position[2] = static_cast<float>(depth - 1);
+      drawing.vertices[k].shade = static_cast<float>(n) / 10;
+    }
+    drawing.triangles.push_back({n - 3, n - 2, n - 1});
+  }
+  Projection projection = pixels(8, 8);
+  const auto seen = [&](std::size_t triangles) {
+    Drawing part = drawing;
+    part.triangles.resize(triangles);
+    return render_cpu(part, projection, {}, 8, 8, {}).values[0];
+  };
+  EXPECT_EQ(seen(2), 77); // 0.3
+  projection.matrix[3] = {0, 0, 1, 1};
+  EXPECT_EQ(seen(2), 77);
+  EXPECT_EQ(seen(3), 229); // 0.9, a little less in single precision
+}
+
+TEST(RenderRaster, ASurfaceAroundTheCameraFillsThePictureWhateverIsClipped) {
+  std::vector<Surface> surfaces(1);
+  surfaces[0].mesh = test::sphere_mesh(2, 10, {0, 0, 0});
+  CameraOptions options;
+  for (const double x : {0.0, 9.0, 9.7, -9.3})
+    for (const double fov : {20.0, 100.0, 170.0}) {
+      options.eye = Vec3{x, 0.1, 0.2};
+      options.target = Vec3{x + 0.3, 5, 1};
+      options.fov = fov;
+      const Camera camera = make_camera(options, {}, 61, 47);
+      PictureOptions picture;
+      picture.width = 61;
+      picture.height = 47;
+      picture.backend = Backend::cpu;
+      PictureReport report;
+      (void)make_picture(make_drawing(surfaces, {}, {}), camera, {}, picture, {}, &report);
+      EXPECT_EQ(report.covered, 61U * 47U) << x << " " << fov;
+    }
+}
+
+TEST(RenderRaster, HugeAndTinyTrianglesAreExact) {
+  // A triangle that reaches far beyond the guard band covers the picture.
+  Drawing drawing;
+  drawing.vertices = {vertex(-1e7, -1e7), vertex(3e7, -1e7), vertex(-1e7, 3e7)};
+  drawing.triangles = {{0, 1, 2}};
+  EXPECT_EQ(count(drawing, 640, 480), 640U * 480U);
+  // Slivers and points cover nothing and break nothing.
+  drawing.vertices = {vertex(1, 1), vertex(1, 1), vertex(6, 6)};
+  EXPECT_EQ(count(drawing, 8, 8), 0U);
+  drawing.vertices = {vertex(1.1, 1.1), vertex(1.2, 1.1), vertex(1.1, 1.2)};
+  EXPECT_EQ(count(drawing, 8, 8), 0U);
+}
+
+TEST(RenderRaster, SameBytesForAnyThreads) {
+  std::vector<Surface> surfaces(1);
+  surfaces[0].mesh = test::sphere_mesh(5, 10, {0, 0, 0});
+  const Camera camera = make_camera({}, bounding_box(surfaces[0].mesh), 301, 203);
+  DrawingOptions options;
+  options.shade = 0.8;
+  options.light = default_light(camera);
+  PictureOptions picture;
+  picture.width = 301;
+  picture.height = 203;
+  picture.backend = Backend::cpu;
+  std::string digest;
+  for (const int threads : {1, 2, 7}) {
+    Context context;
+    context.threads = threads;
+    const Image image =
+        make_picture(make_drawing(surfaces, options, context), camera, {}, picture, context);
+    if (digest.empty())
+      digest = image_digest(image);
+    EXPECT_EQ(image_digest(image), digest) << threads;
+  }
+}
+
+TEST(RenderPicture, BackgroundAloneAndLimits) {
+  PictureOptions options;
+  options.width = 5;
+  options.height = 3;
+  options.supersample = 2;
+  options.backend = Backend::cpu;
+  Look look;
+  look.background = {1, 0.5, 0};
+  const Camera camera = make_camera({}, {}, 5, 3);
+  const Image image = make_picture({}, camera, look, options, {});
+  ASSERT_EQ(image.values.size(), 45U);
+  EXPECT_EQ(image.values[0], 255);
+  EXPECT_EQ(image.values[1], 128);
+  EXPECT_EQ(image.values[44], 0);
+  options.width = 32768;
+  options.supersample = 3;
+  EXPECT_THROW((void)make_picture({}, camera, look, options, {}), Error);
+  options.supersample = 1;
+  options.height = 32768;
+  Context small;
+  small.max_memory = 1 << 20;
+  EXPECT_THROW((void)make_picture({}, camera, look, options, small), Error);
+  Context stopped;
+  stopped.cancelled = [] { return true; };
+  options = {};
+  EXPECT_THROW((void)make_picture({}, camera, look, options, stopped), Cancelled);
+}
+
+} // namespace
+} // namespace gewebe
