@@ -141,7 +141,7 @@ StiffnessFacts StiffnessStore::facts(const Model& model) const {
   const std::uint64_t hash = stiffness_hash(model);
   std::string names;
   for (const std::string& name : objects()) {
-    const StiffnessFacts found = facts(name);
+    StiffnessFacts found = facts(name);
     if (found.hash == hash && found.nodes == model.nodes.size())
       return found;
     names += (names.empty() ? "'" : ", '") + found.object + "' (" + std::to_string(found.nodes) +

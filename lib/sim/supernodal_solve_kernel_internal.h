@@ -9,9 +9,9 @@ namespace gewebe {
 namespace {
 
 #if defined(__AVX2__)
-constexpr std::size_t lanes = 4;
+inline constexpr std::size_t lanes = 4;
 #else
-constexpr std::size_t lanes = 2;
+inline constexpr std::size_t lanes = 2;
 #endif
 /// What a register holds.
 using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
@@ -63,7 +63,7 @@ struct Supernode {
   double at(std::size_t r, std::size_t c) const { return l[c * rows + r]; }
 };
 
-Supernode supernode(const SupernodalArrays& a, std::size_t k) {
+inline Supernode supernode(const SupernodalArrays& a, std::size_t k) {
   const auto first = static_cast<std::size_t>(a.super[k]);
   const auto columns = static_cast<std::size_t>(a.super[k + 1]) - first;
   const auto rows = static_cast<std::size_t>(a.pi[k + 1] - a.pi[k]);

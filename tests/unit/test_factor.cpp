@@ -293,7 +293,8 @@ TEST(ComplianceColumns, AreTheSameForAnyNumberOfThreadsAndNeighbours) {
     EXPECT_EQ(sinks[3].kept[i], sinks[0].kept[some[i]]);
   // C is symmetric.
   const std::size_t row = 3 * model.nodes.size();
-  EXPECT_NEAR(sinks[0].kept[4][3 * 9 + 2], sinks[0].kept[9][2 * row + 3 * 4], 1e-18);
+  const std::size_t x4 = 12, z9 = 29;
+  EXPECT_NEAR(sinks[0].kept[4][z9], sinks[0].kept[9][2 * row + x4], 1e-18);
 }
 
 TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {

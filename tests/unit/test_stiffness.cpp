@@ -26,8 +26,8 @@ std::vector<double> spring_forces(const Model& model, const std::vector<double>&
     const double l = norm(d);
     for (int a = 0; a < 3; ++a) {
       const double force = s.stiffness * (l - s.rest) * d[a] / l;
-      f[3 * s.i + static_cast<std::size_t>(a)] += force;
-      f[3 * s.j + static_cast<std::size_t>(a)] -= force;
+      f[3 * std::size_t{s.i} + static_cast<std::size_t>(a)] += force;
+      f[3 * std::size_t{s.j} + static_cast<std::size_t>(a)] -= force;
     }
   }
   return f;

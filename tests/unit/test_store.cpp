@@ -192,8 +192,8 @@ TEST(Store, BoundsAreNeverBelowTheColumns) {
   const hdf5::Dataset bound = group.dataset("bound", hdf5::Number::float32);
   const std::size_t n = model.nodes.size(), blocks = (n + 255) / 256;
   bound.require_shape({2, 3, blocks});
-  std::vector<double> x(2 * 9 * n);
-  std::vector<float> b(2 * 3 * blocks);
+  std::vector<double> x(18 * n);
+  std::vector<float> b(6 * blocks);
   values.read_rows(0, std::span<double>(x));
   bound.read_rows(0, std::span<float>(b));
   for (std::size_t c = 0; c < 6; ++c)

@@ -1,0 +1,117 @@
+# Stiffness stores: what other programs read in them, equal bytes, refusals.
+# shellcheck shell=bash disable=SC2317 # functions are called by name
+
+# cube.ela: a cube of 2 mm whose lower corners are held.
+held_cube() {
+  cube >cube.off
+  exp2ela --bend --fix 'z<0' --name cube cube.off -o cube.ela
+  rm cube.off
+}
+
+# A python3 that has h5py and numpy.
+python_with_h5py() {
+  local python
+  for python in python3 /usr/bin/python3; do
+    if "$python" -c 'import h5py, numpy' 2>/dev/null; then
+      echo "$python"
+      return
+    fi
+  done
+  return 1
+}
+
+test_h5py_reads_matrix_factor_and_columns() {
+  local python
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  held_cube
+  ffe-precompute --columns all cube.ela -o cube.h5
+  cat >read.py <<'PYTHON'
+import h5py, numpy
+store = h5py.File("cube.h5", "r")["cube"]
+p, i, x = (store["K"][name][:] for name in ("p", "i", "x"))
+n = len(p) - 1
+K = numpy.zeros((n, n))
+for c in range(n):
+    K[i[p[c]:p[c+1]], c] = K[c, i[p[c]:p[c+1]]] = x[p[c]:p[c+1]]
+axis, columns = store["K/axis"][:], store["columns"]
+C = columns["values"][:].reshape(-1, columns["values"].shape[2])[:, axis][axis]
+assert n == store.attrs["order"] and n >= 12
+assert abs(K @ C - numpy.eye(n)).max() < 1e-12, abs(K @ C - numpy.eye(n)).max()
+
+l = {name: store["L"][name][:] for name in store["L"]}
+L = numpy.zeros((n, n))
+for k in range(len(l["super"]) - 1):
+    rows = l["s"][l["pi"][k]:l["pi"][k+1]]
+    own = range(l["super"][k], l["super"][k+1])
+    L[numpy.ix_(rows, own)] = l["x"][l["px"][k]:l["px"][k+1]].reshape(len(own), len(rows)).T
+L = numpy.tril(L)
+assert abs(L @ L.T - K[numpy.ix_(l["Perm"], l["Perm"])]).max() < 1e-12 * abs(K).max()
+K[0, 0] *= 1 + 1e-9 # the check can fail
+assert not abs(K @ C - numpy.eye(n)).max() < 1e-12
+PYTHON
+  "$python" read.py || fail 'h5py reads something else'
+  rm read.py cube.ela cube.h5
+}
+
+test_equal_models_make_equal_bytes() {
+  held_cube
+  ffe-precompute -j1 --columns surface cube.ela -o a.h5
+  sleep 1.1 # a time stamp would show
+  ffe-precompute -j2 --columns surface cube.ela -o b.h5
+  cmp a.h5 b.h5 || fail 'other bytes from run to run'
+  if command -v h5diff >/dev/null; then
+    h5diff a.h5 b.h5 || fail 'h5diff sees a difference'
+  fi
+  sed 's/^\(0 1 e\) [^ ]*/\1 3/' cube.ela >stiffer.ela
+  ffe-precompute --columns surface stiffer.ela -o b.h5
+  ! cmp -s a.h5 b.h5 || fail 'another model made the same bytes'
+  ffe-precompute --columns surface cube.ela -o b.h5
+  touch -d 2001-01-01 b.h5
+  ffe-precompute --keep-unchanged --columns surface cube.ela -o b.h5
+  [[ $(date -r b.h5 +%Y) == 2001 ]] || fail '--keep-unchanged wrote the file'
+  ! strings -a a.h5 2>/dev/null | grep -q "$PWD" || fail 'a path stands in the store'
+  rm a.h5 b.h5 cube.ela stiffer.ela
+}
+
+test_what_is_no_file_is_refused() {
+  held_cube
+  mkfifo pipe
+  expect_failure 2 ffe-precompute ffe-precompute cube.ela
+  expect_failure 2 ffe-precompute ffe-precompute cube.ela -o -
+  expect_failure 1 ffe-precompute ffe-precompute cube.ela -o /dev/null
+  expect_failure 1 ffe-precompute ffe-precompute cube.ela -o pipe
+  expect_failure 1 ffe-precompute ffe-precompute cube.ela -o .
+  expect_failure 1 ffe-precompute ffe-precompute cube.ela -o none/x.h5
+  rm pipe cube.ela
+}
+
+test_a_full_disk_leaves_nothing() {
+  held_cube
+  local blocks
+  for blocks in 1 4 20; do
+    # Beyond the limit writing fails, as on a full disk.
+    expect_failure 1 ffe-precompute bash -c "ulimit -f $blocks; trap '' XFSZ; exec ffe-precompute --columns all cube.ela -o out.h5"
+    [[ ! -e out.h5 ]] || fail 'a store was left behind'
+  done
+  rm cube.ela
+}
+
+test_damaged_and_foreign_stores_are_refused() {
+  command -v ffe-run >/dev/null || skip 'no ffe-run'
+  held_cube
+  ffe-precompute --columns surface cube.ela -o whole.h5
+  printf '%s\n' 'object cube cube.ela store=store.h5' 'force cube 6 0 0 1' step >scene
+  cp whole.h5 store.h5
+  ffe-run scene >/dev/null || fail 'the whole store is refused'
+  local size at
+  size=$(stat -c %s whole.h5)
+  for at in 0 7 47 500 $((size / 2)) $((size - 1)); do
+    head -c "$at" whole.h5 >store.h5
+    expect_failure 1 ffe-run ffe-run scene
+  done
+  sed 's/^\(0 1 e\) [^ ]*/\1 3/' cube.ela | ffe-precompute -o store.h5
+  expect_failure 1 ffe-run ffe-run scene
+  rm -f store.h5
+  expect_failure 1 ffe-run ffe-run scene
+  rm whole.h5 scene cube.ela
+}
