@@ -158,8 +158,9 @@ bench: $(BENCH) $(TOOLS) | $(FIRST)
 	@for program in $(BENCH); do $$program > $$program.csv.part && mv $$program.csv.part $$program.csv && \
 	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
 
-demo: | $(FIRST)
-	@echo 'demo: examples/ is still empty; `make check` shows what works' >&2; exit 1
+# The example's own Makefile is a user's: it finds the programs in the PATH.
+demo: $(TOOLS) | $(FIRST)
+	@PATH='$(abspath $(BUILD))':"$$PATH" $(MAKE) --no-print-directory -C examples/myoma
 
 # --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
 
@@ -243,6 +244,7 @@ help:
 	@echo
 	@echo '  all            programs and libgewebe.a in build/CONFIG (the default; config=fuzz: the fuzz targets)'
 	@echo '  deps           install the packages that are missing (SETS="build check lint bench fuzz" says which)'
+	@echo '  demo           examples/myoma: from particles to the pictures of a pulled organ'
 	@echo '  check          run the tests; T=NAME only that one, SET=fast unit tests, bad input, fuzz corpora'
 	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'
 	@echo '  stress         run the programs of tests/stress'
@@ -252,7 +254,7 @@ help:
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo
-	@echo 'check, golden-update, stress, bench and lint install their packages first; DEPS=no turns that off.'
+	@echo 'demo, check, golden-update, stress, bench and lint install their packages first; DEPS=no turns that off.'
 	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
 
 FORCE:

@@ -378,9 +378,11 @@ std::vector<std::string> Group::groups() const {
                        void* data) -> herr_t {
     auto* const to = static_cast<Visit*>(data);
     H5O_info_t object;
-    if (link->type != H5L_TYPE_HARD ||
-        H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) < 0 ||
-        object.type != H5O_TYPE_GROUP)
+    if (link->type != H5L_TYPE_HARD)
+      return 0;
+    if (H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) < 0)
+      return -1;
+    if (object.type != H5O_TYPE_GROUP)
       return 0;
     try {
       to->found->emplace_back(name);

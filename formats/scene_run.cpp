@@ -153,9 +153,9 @@ struct SceneRun::State {
     if (!(exact <= most_samples))
       throw Error("over 1e9 steps, expected fewer");
     // A hair more than a whole number of steps is rounding; a last one may be shorter.
-    const double count = std::ceil(exact * (1 - 1e-12));
-    for (double k = 1; k < count; ++k) {
-      simulation.step_to(start + k * c.every);
+    const auto count = static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12)));
+    for (std::int64_t k = 1; k < count; ++k) {
+      simulation.step_to(start + static_cast<double>(k) * c.every);
       answer();
     }
     if (!(span == 0)) {

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "sim/condition.h"
 #include "sim/stiffness.h"
 
 #include <Eigen/Cholesky>
@@ -102,7 +103,16 @@ struct Elastostatic::State {
     outer.assign(axes, 0);
   }
 
-  Solver factorise(std::span<const std::uint8_t> fixed) {
+  /// K itself is checked for what it determines; with more axes held it can only get better.
+  Solver factorise() {
+    StiffnessMatrix matrix = stiffness_matrix(model);
+    ++counts.factors;
+    StiffnessCheck check;
+    Factor factor = checked_factor(model, matrix, context, check);
+    norm = stiffness_norm(matrix);
+    return {std::move(factor), std::move(matrix.row_of_axis)};
+  }
+  Solver factorise_held(std::span<const std::uint8_t> fixed) {
     StiffnessMatrix matrix = stiffness_matrix(model, fixed);
     ++counts.factors;
     return {Factor(matrix, context), std::move(matrix.row_of_axis)};
@@ -112,7 +122,7 @@ struct Elastostatic::State {
     if (solver)
       return *solver;
     if (!parts.factor) {
-      solver.emplace(factorise({}));
+      solver.emplace(factorise());
       return *solver;
     }
     std::vector<std::int64_t> rows(axes, -1);
@@ -270,7 +280,7 @@ struct Elastostatic::State {
     if (options.block_limit != SIZE_MAX)
       return m <= options.block_limit;
     // Columns that are not stored cost three solves each, a fresh factor some dozens.
-    const std::size_t most = all_stored(now.displacement) ? 128 : 24;
+    const std::size_t most = all_stored(now.displacement) ? 128 : 32;
     return m <= std::min(most, nodes_in_memory());
   }
 
@@ -359,7 +369,7 @@ struct Elastostatic::State {
         any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model, i, a));
       }
     if (any_free)
-      held.emplace(factorise(fixed));
+      held.emplace(factorise_held(fixed));
     held_nodes = now.displacement;
   }
 

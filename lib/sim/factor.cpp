@@ -54,10 +54,10 @@ private:
   cholmod_common common_{};
 };
 
-/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A threaded
-/// one would fight with the threads that are here, and change bytes: it gets one thread. OpenBLAS
-/// compiled without threads has no locks either and gives wrong numbers when two threads call it
-/// (Debian's libopenblas0-serial does): factorisations take turns.
+/// CHOLMOD's inner loops are those of whichever BLAS is installed, known only at run time. A
+/// threaded one would fight with the threads that are here, and change bytes: it gets one thread.
+/// OpenBLAS compiled without threads has no locks either and gives wrong numbers when two threads
+/// call it (Debian's libopenblas0-serial does): factorisations take turns.
 std::unique_lock<std::mutex> blas_turn() {
   static std::mutex mutex; // one for all, as the library behind it
   std::unique_lock turn(mutex);
@@ -154,7 +154,7 @@ void check_data(const FactorData& d) {
   check_bounds(d.super, n, true, "its supernodes don't divide its columns");
   check_bounds(d.pi, d.s.size(), true, "its supernodes don't divide its rows");
   check_bounds(d.px, d.x.size(), true, "its supernodes don't divide its values");
-  std::int64_t longest = 0;
+  std::int64_t longest = 1; // as CHOLMOD counts
   for (std::size_t k = 0; k + 1 < d.super.size(); ++k)
     check_supernode(d, k, longest);
   require(d.max_row_size == longest && d.max_column_size >= 0, "its largest sizes are wrong");
@@ -190,16 +190,14 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
   Common& common = state_->common;
   cholmod_sparse a = sparse_view(matrix);
   check_cancelled(context);
+  const auto turn = blas_turn(); // METIS, with its one sequence of random numbers, needs it as well
   state_->owned = cholmod_l_analyze(&a, common.get());
   common.check("the analysis of the stiffness matrix");
   if (state_->owned == nullptr || state_->owned->is_super == 0)
     throw Error("the analysis of the stiffness matrix made no supernodes");
   require_memory(context, factor_bytes(*state_->owned), "the factor of the stiffness matrix");
   check_cancelled(context);
-  {
-    const auto turn = blas_turn();
-    (void)cholmod_l_factorize(&a, state_->owned, common.get());
-  }
+  (void)cholmod_l_factorize(&a, state_->owned, common.get());
   common.check("the factorisation of the stiffness matrix");
   check_cancelled(context);
   if (state_->owned->minor < matrix.order())

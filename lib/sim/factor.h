@@ -50,8 +50,8 @@ private:
 class Factor {
 public:
   /// The order of elimination is that of AMD or METIS, whichever fills less; the factor is always
-  /// supernodal. The same bytes from call to call on one machine; BLAS decides the last bits. Not
-  /// from several threads at once: there are BLAS that don't bear it.
+  /// supernodal. The same bytes from call to call on one machine; BLAS decides the last bits. Of
+  /// several threads that call it, one works and the others wait.
   /// \throw NotPositiveDefinite by its pivots alone; Error if memory exceeds the context's;
   /// Cancelled
   Factor(const StiffnessMatrix& matrix, const Context& context);

@@ -20,9 +20,9 @@ struct NodeVector {
 /// Nodes without a force have none, nodes without a displacement are free. Where both are given the
 /// displacement holds, and its support carries the force too.
 struct Load {
-  std::map<std::uint32_t, Vec3> force;        ///< 1e-6 N
-  std::map<std::uint32_t, Vec3> displacement; ///< from rest, mm
-  Vec3 gravity;                               ///< mm/s²
+  std::map<std::uint32_t, Vec3> force{};        ///< 1e-6 N
+  std::map<std::uint32_t, Vec3> displacement{}; ///< from rest, mm
+  Vec3 gravity{};                               ///< mm/s²
 
   bool operator==(const Load&) const = default;
   bool empty() const { return force.empty() && displacement.empty() && gravity == Vec3{}; }

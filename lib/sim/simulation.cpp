@@ -63,8 +63,8 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   } else {
     object->safe = safe_step(object->model);
     object->moving.emplace(object->model);
-    object->moving->set_load(object->load);
   }
+  object->shown = object->load.empty();
   objects_.push_back(std::move(object));
 }
 

@@ -48,8 +48,8 @@ struct Emit {
 using Change = std::variant<SetForce, SetDisplacement, Release, SetGravity, SetTimestep, Emit>;
 
 struct SimulationOptions {
-  bool measure_error = false;                   ///< see ElastostaticOptions
-  std::function<void(const std::string&)> warn; ///< told of each trouble once per object
+  bool measure_error = false;                     ///< see ElastostaticOptions
+  std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
 };
 
 struct SimulationCounts {

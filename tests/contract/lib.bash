@@ -22,6 +22,27 @@ programs() {
   done
 }
 
+# Those whose result is a stream; the others write files by name (ffe-run's standard output is its replies).
+filters() { programs | grep -v '^ffe-'; }
+
+# A file name that the program writes its own kind to.
+target() {
+  case $1 in
+    ffe-*) echo out.h5 ;;
+    *) echo out ;;
+  esac
+}
+
+# Runs the sample in `words` and leaves its result in FILE: result FILE.
+result() {
+  if [[ ${words[0]} == ffe-precompute ]]; then
+    "${words[@]}" -o "$1.h5"
+    mv "$1.h5" "$1"
+  else
+    "${words[@]}" >"$1"
+  fi
+}
+
 # A run that must fail: expect_failure STATUS TOOL COMMAND... looks for the status and for one line `TOOL: …` alone.
 expect_failure() {
   local expected=$1 tool=$2 status=0
@@ -57,6 +78,19 @@ sample() {
     exp2ela)
       cube >in.off
       words=(exp2ela in.off)
+      ;;
+    ffe-precompute)
+      cube | exp2ela --format off -o in.ela
+      words=(ffe-precompute in.ela)
+      ;;
+    ffe-run)
+      cube | exp2ela --format off -o in.ela
+      printf '%s\n' 'object cube in.ela' 'emit forces' 'displace cube 0 0.1 0 0' step >in.scene
+      words=(ffe-run in.scene)
+      ;;
+    emboss-render)
+      cube >in.off
+      words=(emboss-render --backend cpu --size 64 in.off)
       ;;
     *) fail "tests/contract/lib.bash has no sample for $1" ;;
   esac

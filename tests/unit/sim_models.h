@@ -1,57 +1,52 @@
 #pragma once
-// Models for the tests of stiffness and what is built on it.
+// Models for the tests of the simulation.
 
-#include "base/error.h"
-#include "base/parallel.h"
-#include "formats/mesh_file.h"
 #include "model/build.h"
 #include "model_meshes.h"
-#include "sim/stiffness.h"
+#include "sim/spring_force.h"
 
-#include <cstdlib>
-#include <filesystem>
-#include <random>
-#include <string>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace gewebe::test {
 
-inline Model model_of(const TriangleMesh& mesh, std::int64_t centrals = 4,
-                      const BuildOptions& more = {}) {
-  BuildOptions options = more;
-  options.centrals = centrals;
-  Model model = build_model(mesh, options, Context{}).model;
-  model.name = "ball";
+/// Two masses on one spring of length 2 along x.
+inline Model two_masses(double mass = 1, double stiffness = 1, double damping = 0,
+                        double drag = 0) {
+  Model m;
+  m.name = "two";
+  m.materials.resize(1);
+  m.materials[0].name = "m";
+  for (const double x : {-1.0, 1.0}) {
+    Node n;
+    n.position = {x, 0, 0};
+    n.mass = mass;
+    n.drag = drag;
+    m.nodes.push_back(n);
+  }
+  m.springs = {{0, 1, SpringKind::edge, stiffness, damping, 2}};
+  return m;
+}
+
+/// A ball on fixed central nodes, with some nodes held below.
+inline Model organ(int rounds = 2, bool bend = true) {
+  BuildOptions options;
+  options.bend = bend;
+  Model model = build_model(ball(rounds, 20, {100, -50, 30}), options, Context{}).model;
+  for (std::size_t i = 0; i < surface_count(model); ++i)
+    if (model.nodes[i].position.z < 14)
+      model.nodes[i].fixed = i % 3 == 0 ? fixed_z : fixed_all;
   return model;
 }
 
-/// A point cloud's worth of random springs: every kind of direction, and rest lengths that differ
-/// from the lengths where `stretch` isn't 1.
-inline Model stretched(Model model, double stretch) {
-  for (Spring& s : model.springs)
-    s.rest = norm(model.nodes[s.j].position - model.nodes[s.i].position) / stretch;
-  return model;
-}
-
-inline std::vector<double> random_vector(std::size_t size, unsigned seed) {
-  std::mt19937 engine(seed);
-  std::vector<double> values(size);
-  for (double& value : values)
-    value = static_cast<double>(engine()) / 2147483648.0 - 1;
-  return values;
-}
-
-/// Real data, "" where there is none.
-inline std::string shared_file(const std::string& name) {
-  const char* const folder = std::getenv("GEWEBE_SHARED");
-  const std::string path = std::string(folder != nullptr ? folder : "../shared") + "/data/" + name;
-  return std::filesystem::exists(path) ? path : "";
-}
-
-inline Model model_of_file(const std::string& path, const std::string& unit) {
-  Input input(path);
-  const Kind kind = input_kind(input.peek(4096), path, "");
-  return model_of(read_mesh(input, {kind, unit, weld_from_name("auto")}));
+/// The nodes of the surface that no axis holds.
+inline std::vector<std::uint32_t> free_nodes(const Model& model) {
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (model.nodes[i].fixed == fixed_none)
+      nodes.push_back(i);
+  return nodes;
 }
 
 } // namespace gewebe::test

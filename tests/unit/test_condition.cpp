@@ -2,7 +2,7 @@
 
 #include "sim/condition.h"
 
-#include "sim_models.h"
+#include "stiffness_models.h"
 
 #include <Eigen/Dense>
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include "sim/compliance_columns.h"
 #include "sim/condition.h"
-#include "sim_models.h"
+#include "stiffness_models.h"
 
 #include <algorithm>
 #include <array>

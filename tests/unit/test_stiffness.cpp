@@ -3,7 +3,7 @@
 #include "sim/stiffness.h"
 
 #include "base/digest.h"
-#include "sim_models.h"
+#include "stiffness_models.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,34 @@
+// Any bytes as a stiffness store: an Error or arrays that can be used, never a crash.
+
+#include "base/error.h"
+#include "formats/stiffness_store.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace {
+
+void use(const gewebe::StiffnessStore& store, const gewebe::StiffnessFacts& facts) {
+  const gewebe::StiffnessMatrix matrix = store.matrix(facts);
+  const gewebe::Factor factor = store.factor(facts);
+  std::vector<double> f(3 * facts.nodes, 1.0), u(f.size());
+  gewebe::solve_axes(matrix, factor, f, u);
+  if (const auto columns = store.columns(facts)) {
+    std::vector<double> row(9 * columns->node_count());
+    for (std::size_t k = 0; k < columns->nodes().size(); ++k)
+      columns->read(k, row);
+  }
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    const gewebe::StiffnessStore store(std::span(data, size), "fuzz");
+    for (const std::string& name : store.objects())
+      use(store, store.facts(name));
+  } catch (const gewebe::Error&) { // what bad input is for
+  }
+  return 0;
+}

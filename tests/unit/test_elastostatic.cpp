@@ -1,0 +1,447 @@
+#include "base/error.h"
+#include "sim/elastodynamic.h"
+#include "sim/elastostatic.h"
+#include "sim/stiffness.h"
+#include "sim_models.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <memory>
+#include <random>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+using Vector = Eigen::VectorXd;
+
+/// K over all axes, from its definition alone.
+Eigen::MatrixXd dense_stiffness(const Model& model) {
+  const auto size = static_cast<Eigen::Index>(3 * model.nodes.size());
+  Eigen::MatrixXd k = Eigen::MatrixXd::Zero(size, size);
+  for (const Spring& s : model.springs) {
+    const Vec3 along = model.nodes[s.j].position - model.nodes[s.i].position;
+    const Eigen::Vector3d d(along.x, along.y, along.z), n = d.normalized();
+    const Eigen::Matrix3d block =
+        s.stiffness * (n * n.transpose() +
+                       (1 - s.rest / d.norm()) * (Eigen::Matrix3d::Identity() - n * n.transpose()));
+    const Eigen::Index i = 3 * Eigen::Index{s.i}, j = 3 * Eigen::Index{s.j};
+    k.block<3, 3>(i, i) += block;
+    k.block<3, 3>(j, j) += block;
+    k.block<3, 3>(i, j) -= block;
+    k.block<3, 3>(j, i) -= block;
+  }
+  return k;
+}
+
+/// Displacements under a load by dense LU: prescribed axes and fixed ones are held.
+Vector dense_shape(const Model& model, const Load& load) {
+  const Eigen::MatrixXd k = dense_stiffness(model);
+  const Eigen::Index size = k.rows();
+  Vector u = Vector::Zero(size), f = Vector::Zero(size);
+  std::vector<Eigen::Index> free;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Index axis = 3 * Eigen::Index{i} + a;
+      f[axis] = model.nodes[i].mass * load.gravity[a];
+      if (load.force.contains(i))
+        f[axis] += load.force.at(i)[a];
+      if (load.displacement.contains(i))
+        u[axis] = load.displacement.at(i)[a];
+      else if (!is_fixed(model, i, a))
+        free.push_back(axis);
+    }
+  const Vector rhs = (f - k * u)(free);
+  const Eigen::MatrixXd k_free = k(free, free);
+  const Vector u_free = k_free.lu().solve(rhs);
+  for (std::size_t r = 0; r < free.size(); ++r)
+    u[free[r]] = u_free[static_cast<Eigen::Index>(r)];
+  return u;
+}
+
+double cond(const Model& model) {
+  std::vector<Eigen::Index> free;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      if (!is_fixed(model, i, a))
+        free.push_back(static_cast<Eigen::Index>(3 * i) + a);
+  const Eigen::MatrixXd k = dense_stiffness(model)(free, free);
+  const Vector values = k.selfadjointView<Eigen::Lower>().eigenvalues();
+  return values.maxCoeff() / values.minCoeff();
+}
+
+Vector as_vector(std::span<const double> values) {
+  return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+double difference(const Vector& a, const Vector& b) {
+  return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
+}
+
+/// Columns in memory, of some nodes.
+class Columns final : public ColumnSource {
+public:
+  Columns(const Model& model, std::vector<std::uint32_t> nodes) : nodes_(std::move(nodes)) {
+    count_ = model.nodes.size();
+    const StiffnessMatrix matrix = stiffness_matrix(model);
+    const Factor factor(matrix, Context{});
+    for (const std::uint32_t node : nodes_) {
+      std::vector<double>& column = columns_.emplace_back(9 * count_);
+      for (std::size_t a = 0; a < 3; ++a) {
+        std::vector<double> f(3 * count_);
+        f[3 * node + a] = 1;
+        solve_axes(matrix, factor, f, std::span(column).subspan(a * 3 * count_, 3 * count_));
+      }
+    }
+  }
+  std::size_t node_count() const override { return count_; }
+  const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
+  void read(std::size_t k, std::span<double> out) const override {
+    ++reads;
+    std::copy(columns_.at(k).begin(), columns_.at(k).end(), out.begin());
+  }
+  mutable int reads = 0;
+
+private:
+  std::size_t count_ = 0;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<std::vector<double>> columns_;
+};
+
+/// The factor may be asked for only where `factor_asked` is given.
+StiffnessParts parts_with_columns(const Model& model, std::vector<std::uint32_t> nodes,
+                                  int* factor_asked = nullptr) {
+  StiffnessParts parts;
+  parts.columns = std::make_unique<Columns>(model, std::move(nodes));
+  parts.factor = [&model, factor_asked] {
+    if (factor_asked == nullptr)
+      throw Error("nobody should need the factor");
+    ++*factor_asked;
+    return Factor(stiffness_matrix(model), Context{});
+  };
+  return parts;
+}
+
+Elastostatic plain(const Model& model, std::size_t block_limit = SIZE_MAX) {
+  return {model, {}, Context{}, {.measure_error = true, .block_limit = block_limit}};
+}
+
+/// Forces, displacements and gravity at several nodes.
+Load rich_load(const Model& model, std::size_t displaced) {
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  EXPECT_GT(nodes.size(), displaced + 6);
+  Load load{.gravity = {1000, 0, -9810}};
+  for (std::size_t k = 0; k < displaced; ++k)
+    load.displacement[nodes[3 * k % nodes.size()]] = {0.01 * static_cast<double>(k), -0.02, 0.03};
+  load.force[nodes[1]] = {10, -20, 30};
+  load.force[nodes[4]] = {0, 0, 5};
+  load.force[nodes[0]] = {7, 7, 7}; // a displaced node, if there is one
+  // A node that is held along z alone can be displaced along x and y.
+  for (std::uint32_t i = 0; displaced > 0 && i < model.nodes.size(); ++i)
+    if (model.nodes[i].fixed == fixed_z) {
+      load.displacement[i] = {0.05, 0.01, 0};
+      break;
+    }
+  return load;
+}
+
+TEST(Elastostatic, ShapeOfForcesAndGravityEqualsADenseSolve) {
+  const Model model = organ();
+  const double tolerance = 10 * 2.2e-16 * cond(model);
+  EXPECT_LT(tolerance, 1e-9);
+  Elastostatic object = plain(model);
+  const Load load = rich_load(model, 0);
+  object.update(load);
+  const Vector expected = dense_shape(model, load);
+  EXPECT_GT(expected.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_LT(difference(as_vector(object.displacement()), expected), tolerance);
+  EXPECT_LT(object.counts().backward_error, 1e-14);
+  EXPECT_GT(object.counts().backward_error, 0);
+  // The comparison can fail: stiffer springs give another shape.
+  Model other = model;
+  for (Spring& s : other.springs)
+    s.stiffness *= s.i == free_nodes(model)[0] ? 1.001 : 1;
+  EXPECT_GT(difference(as_vector(object.displacement()), dense_shape(other, load)), tolerance);
+}
+
+TEST(Elastostatic, BothWaysOfContactEqualADenseSolve) {
+  const Model model = organ();
+  const double tolerance = 10 * 2.2e-16 * cond(model);
+  for (const std::size_t m : {1U, 3U, 10U}) {
+    const Load load = rich_load(model, m);
+    const Vector expected = dense_shape(model, load);
+    Elastostatic block = plain(model, SIZE_MAX - 1), constrained = plain(model, 0);
+    for (Elastostatic* object : {&block, &constrained}) {
+      object->update(load);
+      EXPECT_LT(difference(as_vector(object->displacement()), expected), tolerance) << m;
+      EXPECT_LT(object->counts().backward_error, 1e-14);
+      for (const auto& [node, d] : load.displacement)
+        for (std::size_t a = 0; a < 3; ++a)
+          EXPECT_EQ(object->displacement()[3 * node + a], d[static_cast<int>(a)]);
+    }
+    EXPECT_EQ(block.counts().factors, 1U);
+    EXPECT_EQ(constrained.counts().factors, 2U);
+    ASSERT_EQ(block.contact_forces().size(), load.displacement.size());
+    double scale = 0;
+    for (const NodeVector& f : block.contact_forces())
+      scale = std::max(scale, norm(f.value));
+    for (std::size_t k = 0; k < block.contact_forces().size(); ++k) {
+      const NodeVector &a = block.contact_forces()[k], &b = constrained.contact_forces()[k];
+      EXPECT_EQ(a.node, b.node);
+      EXPECT_LT(norm(a.value - b.value), tolerance * scale);
+    }
+  }
+}
+
+TEST(Elastostatic, ForcesAndReactionsBalance) {
+  const Model model = organ();
+  for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
+    Elastostatic object = plain(model, limit);
+    const Load load = rich_load(model, 5);
+    object.update(load);
+    std::vector<double> product(3 * model.nodes.size());
+    multiply_stiffness(model, object.displacement(), product);
+    Vec3 sum, turn;
+    double scale = 0;
+    const auto acts = [&](std::size_t i, const Vec3& f) {
+      sum += f;
+      turn += cross(model.nodes[i].position, f); // moments about rest: the object is linearised
+      scale += norm(f);
+    };
+    for (const NodeVector& c : object.contact_forces())
+      acts(c.node, c.value);
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+      Vec3 outer = model.nodes[i].mass * load.gravity, reaction;
+      if (load.force.contains(i))
+        outer += load.force.at(i);
+      for (int a = 0; a < 3; ++a)
+        if (is_fixed(model, i, a))
+          reaction[a] = product[3 * i + static_cast<std::size_t>(a)] - outer[a];
+      acts(i, outer + reaction);
+    }
+    EXPECT_GT(scale, 100);
+    EXPECT_LT(norm(sum), 1e-12 * scale);
+    EXPECT_LT(norm(turn), 1e-12 * scale * 200);
+    // Without the contact forces it does not balance.
+    for (const NodeVector& c : object.contact_forces())
+      sum -= c.value;
+    EXPECT_GT(norm(sum), 1e-3 * scale);
+  }
+}
+
+TEST(Elastostatic, ShapesOfForcesAddUp) {
+  const Model model = organ();
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  const auto shape = [&](const Load& load) {
+    Elastostatic object = plain(model);
+    object.update(load);
+    return as_vector(object.displacement()).eval();
+  };
+  Load a, b, both;
+  a.force[nodes[2]] = {30, 0, 10};
+  b.force[nodes[2]] = {0, 5, 0};
+  b.force[nodes[8]] = {1, 2, 3};
+  b.gravity = {0, 0, -9810};
+  both = b;
+  both.force[nodes[2]] += a.force[nodes[2]];
+  EXPECT_LT(difference(shape(a) + shape(b), shape(both)), 1e-12);
+  EXPECT_GT(difference(shape(a), shape(both)), 1e-3);
+  // As do prescribed displacements of the same nodes.
+  a = b = both = {};
+  a.displacement[nodes[0]] = {0.1, 0, 0};
+  a.displacement[nodes[5]] = {0, 0, 0};
+  b.displacement[nodes[0]] = {0, 0.2, 0};
+  b.displacement[nodes[5]] = {0.3, 0, 0.1};
+  both.displacement[nodes[0]] = {0.1, 0.2, 0};
+  both.displacement[nodes[5]] = {0.3, 0, 0.1};
+  EXPECT_LT(difference(shape(a) + shape(b), shape(both)), 1e-11);
+}
+
+TEST(Elastostatic, OnlyWhatChangedIsComputed) {
+  const Model model = organ();
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  Elastostatic object(model, {}, Context{});
+  Load load;
+  object.update(load);
+  EXPECT_EQ(object.counts().unchanged, 1U);
+  EXPECT_EQ(object.counts().solves, 0U);
+  load.gravity = {0, 0, -9810};
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 1U);
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 1U);
+  EXPECT_EQ(object.counts().unchanged, 2U);
+  load.force[nodes[0]] = {1, 2, 3}; // gravity is kept
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 2U);
+  load.displacement[nodes[1]] = {0.1, 0, 0}; // three columns, then sums of columns
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 5U);
+  load.displacement[nodes[1]] = {0.2, 0, 0};
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 5U);
+  load.displacement[nodes[2]] = {0, 0, 0};
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 8U);
+  load = {};
+  object.update(load);
+  EXPECT_EQ(object.counts().solves, 8U);
+  EXPECT_EQ(object.counts().factors, 1U);
+  for (const double value : object.displacement())
+    EXPECT_EQ(value, 0);
+  EXPECT_TRUE(object.contact_forces().empty());
+
+  Elastostatic held(model, {}, Context{}, {.block_limit = 0});
+  load.displacement[nodes[1]] = {0.1, 0, 0};
+  held.update(load);
+  load.displacement[nodes[1]] = {0.1, 0, 0.1};
+  held.update(load);
+  EXPECT_EQ(held.counts().factors, 2U); // of K, and with node 1 held
+  load.displacement[nodes[3]] = {0.1, 0, 0.1};
+  held.update(load);
+  EXPECT_EQ(held.counts().factors, 3U);
+}
+
+TEST(Elastostatic, ALoadGivesTheSameBytesWhateverCameBefore) {
+  const Model model = organ();
+  const Load load = rich_load(model, 4), other = rich_load(model, 2);
+  for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
+    Elastostatic fresh(model, {}, Context{}, {.block_limit = limit});
+    fresh.update(load);
+    Elastostatic used(model, {}, Context{}, {.block_limit = limit});
+    used.update(other);
+    used.update({});
+    used.update(load);
+    EXPECT_TRUE(std::ranges::equal(fresh.displacement(), used.displacement()));
+    EXPECT_EQ(fresh.contact_forces(), used.contact_forces());
+  }
+}
+
+TEST(Elastostatic, StoredColumnsNeedNoFactor) {
+  const Model model = organ();
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  const std::vector<std::uint32_t> some(nodes.begin(), nodes.begin() + 6);
+  Elastostatic object(model, parts_with_columns(model, some), Context{});
+  Load load;
+  load.force[nodes[1]] = {10, -20, 30};
+  load.displacement[nodes[0]] = {0.1, 0.2, 0.3};
+  load.displacement[nodes[5]] = {0, 0, -0.1};
+  object.update(load);
+  EXPECT_EQ(object.counts().columns_read, 3U);
+  EXPECT_EQ(object.counts().factors, 0U);
+  const double tolerance = 10 * 2.2e-16 * cond(model);
+  EXPECT_LT(difference(as_vector(object.displacement()), dense_shape(model, load)), tolerance);
+  load.force[nodes[1]] = {1, 2, 3}; // kept in memory
+  object.update(load);
+  EXPECT_EQ(object.counts().columns_read, 3U);
+  // A node without a column asks for the factor.
+  load.force[nodes[7]] = {1, 2, 3};
+  EXPECT_THROW(object.update(load), Error);
+  int asked = 0;
+  Elastostatic both(model, parts_with_columns(model, some, &asked), Context{});
+  EXPECT_EQ(asked, 0);
+  both.update(load);
+  EXPECT_EQ(asked, 1);
+  EXPECT_LT(difference(as_vector(both.displacement()), dense_shape(model, load)), tolerance);
+}
+
+TEST(Elastostatic, LittleMemoryKeepsFewColumns) {
+  const Model model = organ();
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  Context context;
+  context.max_memory = 4 * 72 * model.nodes.size() * 2; // two nodes' columns
+  int asked = 0;
+  Elastostatic object(model, parts_with_columns(model, nodes, &asked), context);
+  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
+    Load load;
+    load.force[nodes[k]] = load.force[nodes[k + 1]] = {1, 2, 3};
+    object.update(load);
+    if (k == 9) {
+      EXPECT_LT(difference(as_vector(object.displacement()), dense_shape(model, load)), 1e-10);
+    }
+  }
+  EXPECT_EQ(object.counts().columns_read, nodes.size()); // each once, its neighbour was still there
+  EXPECT_EQ(asked, 0);
+}
+
+TEST(Elastostatic, AllNodesDisplaced) {
+  const Model model = organ(1);
+  Load load;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].fixed == fixed_none)
+      load.displacement[i] = {0.01 * i, 0, 0};
+    else if (model.nodes[i].fixed != fixed_all)
+      load.displacement[i] = {};
+  for (const std::size_t limit : {std::size_t{0}, SIZE_MAX}) {
+    Elastostatic object(model, {}, Context{}, {.block_limit = limit});
+    object.update(load);
+    for (const auto& [node, d] : load.displacement)
+      EXPECT_EQ(object.displacement()[3 * node], d.x);
+    std::vector<double> product(3 * model.nodes.size());
+    multiply_stiffness(model, object.displacement(), product);
+    for (const NodeVector& f : object.contact_forces())
+      EXPECT_NEAR(f.value.x, is_fixed(model, f.node, 0) ? 0 : product[3 * f.node], 1e-6);
+  }
+}
+
+TEST(Elastostatic, IsTheLimitOfElastodynamicsForSmallForces) {
+  const Model model = organ();
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  Context one;
+  one.threads = 1;
+  std::vector<double> differences;
+  for (const double part : {1.0, 0.1, 0.01}) {
+    Load load;
+    for (std::size_t k = 0; k < 5; ++k)
+      load.force[nodes[7 * k]] = {1000 * part, -500 * part, 1500 * part};
+    Elastostatic still(model, {}, Context{});
+    still.update(load);
+    Elastodynamic moving(model);
+    moving.set_load(load);
+    for (int k = 0; k < 400 && !moving.resting(); ++k)
+      (void)moving.advance(0.25, 0.9 * safe_step(model), one);
+    ASSERT_TRUE(moving.resting());
+    Vector u(static_cast<Eigen::Index>(3 * model.nodes.size()));
+    for (std::size_t i = 0; i < model.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        u[static_cast<Eigen::Index>(3 * i) + a] = moving.motion()[i].displacement[a];
+    differences.push_back(difference(as_vector(still.displacement()), u));
+  }
+  EXPECT_LT(differences[2], 1e-3);
+  EXPECT_GT(differences[0], 1e-4); // they do differ
+  EXPECT_NEAR(differences[1] / differences[2], 10, 1);
+}
+
+TEST(Elastostatic, RefusesASingularModelAndAnEndlessShape) {
+  Model loose = organ();
+  for (Node& n : loose.nodes)
+    n.fixed = fixed_none;
+  EXPECT_THROW(Elastostatic(loose, {}, Context{}), Error);
+  const Model model = organ();
+  Elastostatic object(model, {}, Context{});
+  Load load;
+  load.force[free_nodes(model)[0]] = {1e308, 1e308, 1e308};
+  load.gravity = {1e308, 1e308, 1e308};
+  EXPECT_THROW(object.update(load), Error);
+}
+
+TEST(LinearRangeOf, StrainAndTurn) {
+  const Model model = test::two_masses();
+  const auto range = [&](const Vec3& u) {
+    return linear_range(model, std::vector<double>{0, 0, 0, u.x, u.y, u.z});
+  };
+  EXPECT_EQ(range({}).strain, 0);
+  EXPECT_DOUBLE_EQ(range({0.5, 0, 0}).strain, 0.25);
+  EXPECT_DOUBLE_EQ(range({-0.5, 0, 0}).strain, 0.25);
+  EXPECT_EQ(range({0.5, 0, 0}).turn, 0);
+  EXPECT_DOUBLE_EQ(range({0, 0.6, 0.8}).turn, 0.5);
+  EXPECT_NEAR(range({0, 0.6, 0.8}).strain, std::sqrt(1.25) - 1, 1e-15);
+}
+
+} // namespace
+} // namespace gewebe

@@ -1,0 +1,248 @@
+#include "base/error.h"
+#include "formats/hdf5_internal.h"
+#include "formats/ply.h"
+#include "formats/results.h"
+#include "formats/results_writer.h"
+#include "scratch.h"
+#include "sim_models.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <gtest/gtest.h>
+#include <iterator>
+#include <string>
+
+namespace gewebe {
+namespace {
+
+/// A folder of its own, removed with all that is in it.
+class ScratchFolder {
+public:
+  ScratchFolder() : path_(std::filesystem::temp_directory_path() / "gewebe-test-XXXXXX") {
+    std::string name = path_.string();
+    if (::mkdtemp(name.data()) == nullptr)
+      throw std::runtime_error("no scratch folder");
+    path_ = name;
+  }
+  ~ScratchFolder() { std::filesystem::remove_all(path_); }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
+  }
+
+private:
+  std::filesystem::path path_;
+};
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Model textured() {
+  Model model = test::organ(1);
+  model.texcoords.assign(model.triangles.size(), {0, 0.25, 0.5, 0.75, 1, 0.125});
+  model.name = "Größe <&>";
+  return model;
+}
+
+/// Two objects, the second from the second frame on; displacement k / 8 of value k.
+void write(Kind kind, const std::string& path, const Model& a, const Model& b) {
+  const std::unique_ptr<ResultWriter> result =
+      open_result(kind, path, Output::Options{.binary = is_binary(kind)});
+  std::vector<double> ua(3 * a.nodes.size()), ub(3 * b.nodes.size());
+  const std::vector<NodeVector> none, forces{{3, {1, 2, 3}}, {7, {-0.5, 0, 1e-3}}};
+  result->add_object("z-a", a);
+  result->add_frame(0, std::vector<FrameObject>{{ua, none}});
+  result->add_object("b", b);
+  for (std::size_t k = 0; k < ua.size(); ++k)
+    ua[k] = static_cast<double>(k) / 8;
+  for (std::size_t k = 0; k < ub.size(); ++k)
+    ub[k] = -static_cast<double>(k) / 8;
+  result->add_frame(0.1, std::vector<FrameObject>{{ua, forces}, {ub, none}});
+  result->add_frame(1, std::vector<FrameObject>{{ua, none}, {ub, forces}});
+  result->commit();
+}
+
+TEST(Results, WhatIsWrittenIsRead) {
+  const ScratchFolder folder;
+  const Model a = textured(), b = test::two_masses();
+  const std::string path = folder / "run.h5";
+  write(Kind::hdf5, path, a, b);
+  EXPECT_EQ(folder.files(), 2U); // and run.xdmf
+  const ResultIndex index = read_result_index(path);
+  EXPECT_EQ(index.objects,
+            (std::vector<std::string>{"z-a", "b"})); // of the scene, not the alphabet
+  EXPECT_EQ(index.times, (std::vector<double>{0, 0.1, 1}));
+  const ResultSurface first = read_result_surface(path, "z-a", 0);
+  const ResultSurface second = read_result_surface(path, "z-a", 1);
+  const TriangleMesh surface = surface_mesh(a);
+  EXPECT_EQ(first.mesh.points, surface.points);
+  EXPECT_EQ(first.rest, surface.points);
+  EXPECT_EQ(second.rest, surface.points);
+  EXPECT_EQ(second.mesh.triangles, surface.triangles);
+  EXPECT_EQ(second.mesh.texcoords, surface.texcoords);
+  ASSERT_EQ(second.mesh.points.size(), surface.points.size());
+  for (std::size_t i = 0; i < surface.points.size(); ++i) {
+    const double k = 3 * static_cast<double>(i);
+    EXPECT_EQ(second.mesh.points[i], surface.points[i] + Vec3(k / 8, (k + 1) / 8, (k + 2) / 8));
+  }
+  // Before it came it was at rest.
+  EXPECT_EQ(read_result_surface(path, "b", 0).mesh.points, read_result_surface(path, "b", 0).rest);
+  EXPECT_NE(read_result_surface(path, "b", 1).mesh.points, read_result_surface(path, "b", 0).rest);
+
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group forces = file.root().group("objects").group("z-a").group("forces");
+  EXPECT_EQ(forces.read<std::uint64_t>("frame", 2), (std::vector<std::uint64_t>{1, 1}));
+  EXPECT_EQ(forces.read<std::uint32_t>("node", 2), (std::vector<std::uint32_t>{3, 7}));
+}
+
+TEST(Results, EqualRunsMakeEqualBytes) {
+  const ScratchFolder folder, other;
+  const Model a = textured(), b = test::two_masses();
+  write(Kind::hdf5, folder / "run.h5", a, b);
+  write(Kind::hdf5, other / "run.h5", a, b);
+  for (const char* name : {"run.h5", "run.xdmf"}) {
+    EXPECT_GT(bytes_of(folder / name).size(), 1000U);
+    EXPECT_EQ(bytes_of(folder / name), bytes_of(other / name));
+    EXPECT_EQ(bytes_of(folder / name).find(other / ""), std::string::npos); // no path
+  }
+  Model c = a;
+  c.nodes[0].position.x += 1;
+  write(Kind::hdf5, other / "run.h5", c, b);
+  EXPECT_NE(bytes_of(folder / "run.h5"), bytes_of(other / "run.h5"));
+}
+
+TEST(Results, TheXdmfNamesTheFileBesideIt) {
+  const ScratchFolder folder;
+  const Model a = textured(), b = test::two_masses();
+  write(Kind::hdf5, folder / "a & b.out.h5", a, b);
+  const std::string text = bytes_of(folder / "a & b.out.xdmf");
+  EXPECT_NE(text.find(">a &amp; b.out.h5:/objects/z-a/triangles<"), std::string::npos);
+  EXPECT_EQ(text.find('/' + std::string("tmp")), std::string::npos);
+  write(Kind::hdf5, folder / "plain", a, b);
+  EXPECT_NE(bytes_of(folder / "plain.xdmf").find(">plain:/objects/"), std::string::npos);
+}
+
+TEST(Results, NothingAppearsWithoutCommit) {
+  const ScratchFolder folder;
+  for (const Kind kind : result_kinds()) {
+    const std::unique_ptr<ResultWriter> result = open_result(kind, folder / "r", {});
+    const Model model = textured();
+    result->add_object("a", model);
+    const std::vector<double> u(3 * model.nodes.size());
+    result->add_frame(0, std::vector<FrameObject>{{u, {}}});
+  }
+  EXPECT_EQ(folder.files(), 0U);
+  EXPECT_THROW((void)open_result(Kind::hdf5, "/dev/null", {}), Error);
+  EXPECT_THROW((void)open_result(Kind::hdf5, "-", {.binary = false}), Error);
+}
+
+TEST(Results, ShapesOfSeveralObjectsBecomeParts) {
+  const ScratchFolder folder;
+  const Model a = textured(), b = test::organ(1);
+  write(Kind::ply, folder / "r.ply", a, b);
+  const TriangleMesh mesh = read_ply(bytes_of(folder / "r.ply"), "r.ply");
+  const TriangleMesh surface = surface_mesh(a);
+  EXPECT_EQ(mesh.points.size(), 2 * surface.points.size());
+  EXPECT_EQ(mesh.triangles.size(), 2 * surface.triangles.size());
+  EXPECT_EQ(mesh.part.front(), 0);
+  EXPECT_EQ(mesh.part.back(), 1);
+  EXPECT_EQ(mesh.texcoords.front(), surface.texcoords.front());
+  EXPECT_EQ(mesh.points[1], surface.points[1] + Vec3(3.0 / 8, 4.0 / 8, 5.0 / 8));
+  EXPECT_EQ(mesh.points[surface.points.size()], surface.points[0] - Vec3(0, 1.0 / 8, 2.0 / 8));
+  write(Kind::obj, folder / "r.obj", a, b);
+  EXPECT_NE(bytes_of(folder / "r.obj").find("\no part1\n"), std::string::npos);
+}
+
+TEST(Results, ForcesAsCsv) {
+  const ScratchFolder folder;
+  const Model a = textured(), b = test::organ(1);
+  write(Kind::csv, folder / "r.csv", a, b);
+  EXPECT_EQ(bytes_of(folder / "r.csv"), "time,object,node,fx,fy,fz\n"
+                                        "0.1,z-a,3,1,2,3\n"
+                                        "0.1,z-a,7,-0.5,0,0.001\n"
+                                        "1,b,3,1,2,3\n"
+                                        "1,b,7,-0.5,0,0.001\n");
+}
+
+std::string complaint(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.place() + ": " + error.what();
+  }
+  return "";
+}
+
+TEST(Results, ReadingNamesWhatIsMissing) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  write(Kind::hdf5, path, textured(), test::two_masses());
+  const auto of = [&](const std::string& object, std::size_t frame) {
+    return complaint([&] { (void)read_result_surface(path, object, frame); });
+  };
+  EXPECT_EQ(of("b", 2), "");
+  EXPECT_EQ(of("c", 0), path + ": there is no object 'c', expected one of z-a, b");
+  EXPECT_EQ(of("b", 3), path + ": there is no frame 3, expected 0 to 2");
+  EXPECT_NE(of("..", 0), "");
+  EXPECT_NE(complaint([&] { (void)read_result_index(folder / "none.h5"); }), "");
+  {
+    hdf5::File other = hdf5::File::create(folder / "other.h5");
+    other.root().set("format", "stiffness_store");
+    other.close();
+    hdf5::File newer = hdf5::File::create(folder / "newer.h5");
+    newer.root().set("format", "gewebe_results");
+    newer.root().set("version", std::uint32_t{2});
+    newer.close();
+  }
+  EXPECT_EQ(complaint([&] { (void)read_result_index(folder / "other.h5"); }),
+            (folder / "other.h5") + ": holds no results, expected a file that ffe-run made");
+  EXPECT_EQ(complaint([&] { (void)read_result_index(folder / "newer.h5"); }),
+            (folder / "newer.h5") + ": is of version 2, expected 1");
+}
+
+TEST(Results, CutAndDamagedFilesAreErrors) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5", copy = folder / "copy.h5";
+  write(Kind::hdf5, path, test::two_masses(), test::two_masses());
+  const std::string whole = bytes_of(path);
+  for (std::size_t size = 0; size < whole.size(); size += 1 + size / 16) {
+    std::ofstream(copy, std::ios::binary) << whole.substr(0, size);
+    EXPECT_NE(complaint([&] { (void)read_result_index(copy); }), "") << size;
+  }
+  // A byte changed anywhere: an error, or a result whose mesh is sound.
+  std::size_t errors = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 1 + whole.size() / 500) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 0x15);
+    std::ofstream(copy, std::ios::binary) << changed;
+    errors += complaint([&] {
+                for (const std::string& object : read_result_index(copy).objects)
+                  check_mesh(read_result_surface(copy, object, 1).mesh);
+              }).empty()
+                  ? 0
+                  : 1;
+  }
+  EXPECT_GT(errors, 0U);
+}
+
+TEST(Results, NumbersThatDoNotFitSinglePrecision) {
+  const ScratchFolder folder;
+  const Model model = test::two_masses();
+  const std::unique_ptr<ResultWriter> result = open_result(Kind::hdf5, folder / "r.h5", {});
+  result->add_object("a", model);
+  const std::vector<double> u{0, 0, 1e39, 0, 0, 0};
+  EXPECT_NE(complaint([&] {
+              result->add_frame(0, std::vector<FrameObject>{{u, {}}});
+            }).find("does not fit single precision"),
+            std::string::npos);
+}
+
+} // namespace
+} // namespace gewebe

@@ -1,0 +1,172 @@
+#include "base/error.h"
+#include "sim/simulation.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+Context threads(int count) {
+  Context context;
+  context.threads = count;
+  return context;
+}
+
+Vec3 moved(const Simulation& s, std::size_t object, std::size_t node) {
+  const std::span<const double> u = s.displacement(object);
+  return {u[3 * node], u[3 * node + 1], u[3 * node + 2]};
+}
+
+TEST(Simulation, DisplacedNodesStandExactlyInBothMethods) {
+  Simulation s(threads(1), {});
+  s.add_object("still", organ(), Method::ffe);
+  s.add_object("moving", organ(), Method::ela);
+  const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
+  const Vec3 d{0.1, -1.0 / 3, 0.7};
+  for (const std::size_t object : {0U, 1U})
+    s.apply(SetDisplacement{object, {nodes[0], nodes[9]}, d});
+  for (int k = 0; k < 3; ++k) {
+    s.step(0.01);
+    for (const std::size_t object : {0U, 1U})
+      for (const std::uint32_t node : {nodes[0], nodes[9]})
+        EXPECT_EQ(moved(s, object, node), d);
+  }
+  EXPECT_NE(moved(s, 0, nodes[3]), Vec3{});
+  EXPECT_NE(moved(s, 1, nodes[3]), Vec3{});
+  // Both hold with about the same force once the moving one rests.
+  s.step(20);
+  const std::vector<NodeVector>&a = s.contact_forces(0), &b = s.contact_forces(1);
+  ASSERT_EQ(a.size(), 2U);
+  ASSERT_EQ(b.size(), 2U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(a[k].node, b[k].node);
+    EXPECT_LT(norm(a[k].value - b[k].value), 0.1 * norm(a[k].value));
+  }
+}
+
+TEST(Simulation, ReleaseReturnsToRest) {
+  Simulation s(threads(1), {});
+  s.add_object("still", organ(), Method::ffe);
+  s.add_object("moving", organ(), Method::ela);
+  const std::uint32_t node = free_nodes(s.model(0))[2];
+  for (const std::size_t object : {0U, 1U}) {
+    s.apply(SetDisplacement{object, {node}, {0.1, 0.2, 0}});
+    s.apply(SetForce{object, {node + 1}, {10, 0, 0}});
+  }
+  s.step(0.1);
+  for (const std::size_t object : {0U, 1U})
+    s.apply(Release{object, {node, node + 1}});
+  s.step(30);
+  for (const double value : s.displacement(0))
+    EXPECT_EQ(value, 0);
+  for (const double value : s.displacement(1))
+    EXPECT_LT(std::abs(value), 1e-7);
+  EXPECT_TRUE(s.contact_forces(0).empty());
+}
+
+TEST(Simulation, WithoutLoadNothingIsDone) {
+  Simulation s(threads(1), {});
+  s.add_object("still", organ(), Method::ffe);
+  s.add_object("moving", organ(), Method::ela);
+  const std::uint64_t solves = s.counts().elastostatic.solves;
+  for (int k = 0; k < 10; ++k)
+    s.step(1);
+  EXPECT_EQ(s.counts().elastostatic.solves, solves);
+  EXPECT_EQ(s.counts().elastostatic.updates, 0U);
+  EXPECT_EQ(s.counts().integration, 0U);
+  EXPECT_EQ(s.counts().resting, 10U);
+  s.apply(SetForce{1, {free_nodes(s.model(1))[0]}, {1, 0, 0}});
+  s.step(0.01);
+  EXPECT_GT(s.counts().integration, 0U); // the counters count
+}
+
+TEST(Simulation, GravityIsOneSolution) {
+  Simulation s(threads(1), {.measure_error = true});
+  s.apply(SetGravity{{0, 0, -9810}});
+  s.add_object("a", organ(), Method::ffe); // under the present gravity
+  s.step(1);
+  EXPECT_EQ(s.counts().elastostatic.solves, 1U);
+  const Vec3 once = moved(s, 0, 0);
+  s.apply(SetGravity{{0, 0, -2 * 9810}});
+  s.step(1);
+  EXPECT_LT(norm(moved(s, 0, 0) - 2 * once), 1e-12 * norm(once));
+  EXPECT_LT(once.z, 0);
+  EXPECT_LT(s.counts().elastostatic.backward_error, 1e-14);
+  s.apply(SetGravity{});
+  s.step(1);
+  EXPECT_EQ(moved(s, 0, 0), Vec3{});
+}
+
+TEST(Simulation, EventsSplitSteps) {
+  const auto run = [](bool events) {
+    Simulation s(threads(1), {});
+    s.add_object("a", organ(), Method::ela);
+    const std::uint32_t node = free_nodes(s.model(0))[1];
+    const SetForce push{0, {node}, {100, 0, 0}};
+    const Release let_go{0, {node}};
+    if (events) {
+      s.schedule(0.002, let_go);
+      s.schedule(0.001, push);
+      s.step(0.004);
+    } else {
+      s.step_to(0.001);
+      s.apply(push);
+      s.step_to(0.002);
+      s.apply(let_go);
+      s.step_to(0.004);
+    }
+    return std::vector<double>(s.displacement(0).begin(), s.displacement(0).end());
+  };
+  EXPECT_EQ(run(true), run(false));
+}
+
+TEST(Simulation, TheSameBytesForAnyNumberOfThreads) {
+  std::vector<std::vector<double>> results;
+  for (const int count : {1, 2, 3}) {
+    Simulation s(threads(count), {});
+    BuildOptions options;
+    s.add_object("still", build_model(test::ball(5, 20), options, Context{}).model, Method::ffe);
+    s.add_object("moving", build_model(test::ball(5, 20), options, Context{}).model, Method::ela);
+    s.apply(SetGravity{{0, 0, -9810}});
+    for (const std::size_t object : {0U, 1U}) {
+      s.apply(SetForce{object, {1, 7, 100}, {10, 20, 30}});
+      s.apply(SetDisplacement{object, {5, 900}, {0, 0.1, 0.2}});
+    }
+    s.step(0.002);
+    std::vector<double>& result = results.emplace_back();
+    for (const std::size_t object : {0U, 1U}) {
+      result.insert(result.end(), s.displacement(object).begin(), s.displacement(object).end());
+      for (const NodeVector& f : s.contact_forces(object))
+        result.insert(result.end(), {f.value.x, f.value.y, f.value.z});
+    }
+    ASSERT_EQ(0, std::memcmp(result.data(), results[0].data(), result.size() * sizeof(double)));
+  }
+}
+
+TEST(Simulation, RefusesDisplacementAlongFixedAxesAndThePast) {
+  Simulation s(threads(1), {});
+  s.add_object("a", organ(), Method::ela);
+  EXPECT_THROW(s.add_object("a", organ(), Method::ela), Error);
+  std::uint32_t node = 0;
+  while (s.model(0).nodes[node].fixed != fixed_z)
+    ++node;
+  EXPECT_NO_THROW(s.apply(SetDisplacement{0, {node}, {1, 1, 0}}));
+  EXPECT_THROW(s.apply(SetDisplacement{0, {node}, {0, 0, 1e-300}}), Error);
+  s.step(1);
+  EXPECT_THROW(s.schedule(0.5, Emit{true}), Error);
+  EXPECT_THROW(s.step_to(0.5), Error);
+  EXPECT_THROW((void)s.find("b"), Error);
+  EXPECT_EQ(s.find("a"), 0U);
+  EXPECT_FALSE(s.emits_forces());
+  s.schedule(1, Emit{true}); // now
+  EXPECT_TRUE(s.emits_forces());
+  EXPECT_EQ(s.pending(), 0U);
+}
+
+} // namespace
+} // namespace gewebe

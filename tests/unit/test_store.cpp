@@ -1,0 +1,415 @@
+// The stiffness store: what is read is what was written, and damage is found.
+
+#include "formats/stiffness_store.h"
+
+#include "base/crc32c.h"
+#include "formats/hdf5_internal.h"
+#include "formats/stiffness_store_writer.h"
+#include "scratch.h"
+#include "sim/compliance_columns.h"
+#include "sim/condition.h"
+#include "stiffness_models.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <iterator>
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_bytes(const std::string& path, const Bytes& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+}
+
+std::uint64_t write_store(const std::string& path, const Model& model,
+                          const std::vector<std::uint32_t>& nodes, bool single = false,
+                          int threads = 1) {
+  const StiffnessMatrix k = stiffness_matrix(model);
+  StiffnessFacts facts;
+  StiffnessCheck check;
+  const Factor factor = checked_factor(model, k, {}, check);
+  facts.object = model.name;
+  facts.hash = stiffness_hash(model);
+  facts.nodes = model.nodes.size();
+  facts.order = k.order();
+  facts.norm = check.norm;
+  facts.condition = check.condition;
+  facts.single = single;
+  Output output(path, {});
+  StiffnessStoreWriter writer(output, facts, k, factor, nodes);
+  Context context;
+  context.threads = threads;
+  const double residual = compliance_columns(k, factor, check.norm, nodes, context, writer);
+  writer.close(std::max(residual, check.residual));
+  output.commit();
+  return writer.digest();
+}
+
+/// Everything that a store says, as bytes.
+std::vector<double> contents(const StiffnessStore& store) {
+  std::vector<double> all;
+  const auto add = [&](const auto& list) {
+    all.push_back(static_cast<double>(list.size()));
+    all.insert(all.end(), list.begin(), list.end());
+  };
+  for (const std::string& name : store.objects()) {
+    const StiffnessFacts facts = store.facts(name);
+    add(facts.object);
+    for (const double value :
+         {static_cast<double>(facts.hash >> 32), static_cast<double>(facts.hash & UINT32_MAX),
+          static_cast<double>(facts.nodes), static_cast<double>(facts.order), facts.norm,
+          facts.condition, facts.residual, facts.single ? 1.0 : 0.0})
+      all.push_back(value);
+    const StiffnessMatrix k = store.matrix(facts);
+    add(k.column_start);
+    add(k.row);
+    add(k.value);
+    add(k.axis_of_row);
+    const FactorData l = store.factor(facts).data();
+    for (const auto* list : {&l.permutation, &l.column_count, &l.super, &l.pi, &l.px, &l.s})
+      add(*list);
+    add(l.x);
+    if (const auto columns = store.columns(facts)) {
+      add(columns->nodes());
+      std::vector<double> row(9 * columns->node_count());
+      for (std::size_t i = 0; i < columns->nodes().size(); ++i) {
+        columns->read(i, row);
+        add(row);
+      }
+    }
+  }
+  return all;
+}
+
+std::string refusal(const std::string& path) {
+  try {
+    (void)contents(StiffnessStore(path));
+  } catch (const Error& error) {
+    return error.place() + ": " + error.what();
+  }
+  return "accepted";
+}
+
+Model small_model() {
+  Model model = model_of(octahedron(), 1);
+  model.nodes[0].fixed = model.nodes[2].fixed = fixed_all;
+  model.nodes[4].fixed = fixed_x | fixed_z;
+  model.name = "two/parts of it";
+  return model;
+}
+
+} // namespace
+
+TEST(Crc32c, KnownValues) {
+  EXPECT_EQ(crc32c("123456789", 9), 0xE3069283U);
+  EXPECT_EQ(crc32c("", 0), 0U);
+  const std::vector<std::uint8_t> zeros(32), ones(32, 0xff);
+  EXPECT_EQ(crc32c(zeros), 0x8A9136AAU); // RFC 3720, B.4
+  EXPECT_EQ(crc32c(ones), 0x62A8AB43U);
+  EXPECT_EQ(crc32c("56789", 5, crc32c("1234", 4)), 0xE3069283U);
+}
+
+TEST(Store, GivesBackTheSameBits) {
+  const Model model = small_model();
+  const StiffnessMatrix k = stiffness_matrix(model);
+  for (const bool single : {false, true}) {
+    const ScratchFile file(".h5");
+    write_store(file.path(), model, {0, 1, 5}, single);
+    const StiffnessStore store(file.path());
+    EXPECT_EQ(store.objects(), std::vector<std::string>{"two_parts of it"});
+    const StiffnessFacts facts = store.facts(model);
+    EXPECT_EQ(facts.object, model.name);
+    EXPECT_EQ(facts.order, k.order());
+    EXPECT_EQ(facts.single, single);
+    EXPECT_LE(facts.residual, max_backward_error);
+    const StiffnessMatrix read = store.matrix(facts);
+    EXPECT_EQ(read.value, k.value);
+    EXPECT_EQ(read.row, k.row);
+    EXPECT_EQ(read.column_start, k.column_start);
+    EXPECT_EQ(read.axis_of_row, k.axis_of_row);
+    EXPECT_EQ(read.row_of_axis, k.row_of_axis);
+    const Factor factor(k, {}), again = store.factor(facts);
+    const std::vector<double> f = random_vector(3 * model.nodes.size(), 1);
+    std::vector<double> a(f.size()), b(f.size());
+    solve_axes(k, factor, f, a);
+    solve_axes(k, again, f, b);
+    EXPECT_EQ(a, b);
+    const auto columns = store.columns(facts);
+    ASSERT_NE(columns, nullptr);
+    EXPECT_EQ(columns->node_count(), model.nodes.size());
+    EXPECT_EQ(columns->nodes(), (std::vector<std::uint32_t>{0, 1, 5}));
+    std::vector<double> row(9 * model.nodes.size());
+    columns->read(1, row);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::fill(a.begin(), a.end(), 0.0);
+      a[3 + axis] = 1;
+      solve_axes(k, factor, a, b);
+      for (std::size_t i = 0; i < b.size(); ++i)
+        EXPECT_EQ(row[axis * b.size() + i],
+                  single ? static_cast<double>(static_cast<float>(b[i])) : b[i]);
+    }
+  }
+}
+
+TEST(Store, ColumnsOutliveTheStoreAndMayBeAbsent) {
+  const Model model = small_model();
+  const ScratchFile file(".h5"), without(".h5");
+  write_store(file.path(), model, {3});
+  std::unique_ptr<ColumnSource> columns;
+  {
+    const StiffnessStore store(file.path());
+    columns = store.columns(store.facts(model));
+  }
+  std::vector<double> row(9 * model.nodes.size());
+  EXPECT_NO_THROW(columns->read(0, row));
+  EXPECT_THROW(columns->read(1, row), Error);
+  write_store(without.path(), model, {});
+  const StiffnessStore store(without.path());
+  EXPECT_EQ(store.columns(store.facts(model)), nullptr);
+}
+
+TEST(Store, BoundsAreNeverBelowTheColumns) {
+  const Model model = model_of(ball(3));
+  const ScratchFile file(".h5");
+  write_store(file.path(), model, {1, 100});
+  const hdf5::File raw = hdf5::File::open(file.path());
+  const hdf5::Group group = raw.root().group("ball").group("columns");
+  const hdf5::Dataset values = group.dataset("values", hdf5::Number::float64);
+  const hdf5::Dataset bound = group.dataset("bound", hdf5::Number::float32);
+  const std::size_t n = model.nodes.size(), blocks = (n + 255) / 256;
+  bound.require_shape({2, 3, blocks});
+  std::vector<double> x(2 * 9 * n);
+  std::vector<float> b(2 * 3 * blocks);
+  values.read_rows(0, std::span<double>(x));
+  bound.read_rows(0, std::span<float>(b));
+  for (std::size_t c = 0; c < 6; ++c)
+    for (std::size_t k = 0; k < blocks; ++k) {
+      double most = 0;
+      for (std::size_t i = k * 768; i < std::min(k * 768 + 768, 3 * n); ++i)
+        most = std::max(most, std::abs(x[c * 3 * n + i]));
+      EXPECT_GE(b[c * blocks + k], most);
+      EXPECT_LE(b[c * blocks + k], most * (1 + 1e-6));
+    }
+}
+
+TEST(Store, BytesAreTheSameFromRunToRunAndForAnyThreads) {
+  const Model model = model_of(ball(2));
+  const ScratchFile a(".h5"), b(".h5"), c(".h5");
+  std::vector<std::uint32_t> nodes(40);
+  for (std::uint32_t i = 0; i < 40; ++i)
+    nodes[i] = i;
+  const std::uint64_t digest = write_store(a.path(), model, nodes, false, 1);
+  EXPECT_EQ(write_store(b.path(), model, nodes, false, 2), digest);
+  EXPECT_EQ(bytes_of(a.path()), bytes_of(b.path()));
+  nodes.pop_back();
+  EXPECT_NE(write_store(c.path(), model, nodes, false, 2), digest);
+  EXPECT_NE(bytes_of(a.path()), bytes_of(c.path()));
+}
+
+TEST(Store, HashFollowsWhatCounts) {
+  const Model model = model_of(ball(1));
+  const std::uint64_t hash = stiffness_hash(model);
+  Model other = model;
+  other.name = "other";
+  other.springs[3].damping *= 2;
+  other.nodes[3].drag *= 2;
+  EXPECT_EQ(stiffness_hash(other), hash);
+  const auto changes = [&](auto&& change) {
+    Model changed = model;
+    change(changed);
+    return stiffness_hash(changed) != hash;
+  };
+  EXPECT_TRUE(changes([](Model& m) { m.springs[3].stiffness *= 1 + 1e-15; }));
+  EXPECT_TRUE(changes([](Model& m) { m.springs[3].rest += 1e-12; }));
+  EXPECT_TRUE(changes([](Model& m) { m.springs.pop_back(); }));
+  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].fixed = fixed_x; }));
+  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].mass *= 2; }));
+  EXPECT_TRUE(changes([](Model& m) { m.nodes[2].position.z += 1e-12; }));
+}
+
+TEST(Store, OfAnotherModelIsRefusedByName) {
+  const ScratchFile file(".h5");
+  Model model = small_model();
+  write_store(file.path(), model, {});
+  const StiffnessStore store(file.path());
+  model.name = "renamed"; // is still the same model
+  EXPECT_NO_THROW((void)store.facts(model));
+  model.springs[0].stiffness *= 2;
+  try {
+    (void)store.facts(model);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.place(), file.path());
+    const std::string what = error.what();
+    EXPECT_EQ(what.find("is of another model: it holds 'two/parts of it' ("), 0) << what;
+    EXPECT_NE(what.find("expected 'renamed' ("), std::string::npos) << what;
+  }
+}
+
+TEST(Store, WhatIsNoStoreIsRefusedByName) {
+  EXPECT_EQ(refusal("/nonexistent/x.h5"),
+            "/nonexistent/x.h5: cannot open: No such file or directory");
+  EXPECT_EQ(refusal("/tmp"), "/tmp: is a directory, expected a file");
+  EXPECT_EQ(refusal("/dev/null"),
+            "/dev/null: is no regular file, expected one, since HDF5 is not read forwards");
+  const ScratchFile file(".h5");
+  EXPECT_EQ(refusal(file.path()), file.path() + ": is empty");
+  write_bytes(file.path(), Bytes(1000, 'x'));
+  EXPECT_EQ(refusal(file.path()),
+            file.path() + ": byte 0: no HDF5 file, expected the magic bytes of one");
+  const auto with_root = [&](auto&& fill) {
+    hdf5::File made = hdf5::File::create(file.path());
+    fill(made.root());
+    made.close();
+    return refusal(file.path()).substr(file.path().size() + 2);
+  };
+  EXPECT_EQ(with_root([](hdf5::Group&) {}),
+            "is an HDF5 file of another kind, expected a gewebe stiffness store");
+  EXPECT_EQ(with_root([](hdf5::Group& root) { root.set("format", "gewebe results"); }),
+            "is a gewebe results, expected a gewebe stiffness store");
+  EXPECT_EQ(with_root([](hdf5::Group& root) {
+              root.set("format", "gewebe stiffness store");
+              root.set("version", std::int64_t{2});
+            }),
+            "is of version 2, expected 1");
+  EXPECT_EQ(with_root([](hdf5::Group& root) {
+              root.set("format", "gewebe stiffness store");
+              root.set("version", "1");
+            }),
+            "'/': attribute version is not what was expected: 1 int64");
+  EXPECT_EQ(with_root([](hdf5::Group& root) {
+              root.set("format", "gewebe stiffness store");
+              root.set("version", std::int64_t{1});
+              root.create_group("liver").set("name", "liver");
+            }),
+            "'/liver': no attribute hash, expected uint64");
+}
+
+TEST(Store, EveryBeginningOfAFileIsRefused) {
+  const ScratchFile file(".h5");
+  write_store(file.path(), small_model(), {1});
+  const Bytes whole = bytes_of(file.path());
+  EXPECT_NO_THROW(contents(StiffnessStore(whole, "whole")));
+  for (std::size_t size = 0; size < whole.size(); size += size < 128 ? 1 : 97)
+    EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), size), "cut")), Error) << size;
+  EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), whole.size() - 1), "cut")), Error);
+}
+
+TEST(Store, EveryFlippedBitIsFoundOrHarmless) {
+  const ScratchFile file(".h5");
+  write_store(file.path(), small_model(), {1});
+  Bytes bytes = bytes_of(file.path());
+  const std::vector<double> expected = contents(StiffnessStore(bytes, "whole"));
+  std::size_t refused = 0, tried = 0;
+  for (std::size_t i = 0; i < bytes.size(); i += 7) {
+    const auto bit = static_cast<std::uint8_t>(1U << (i % 8));
+    bytes[i] ^= bit;
+    ++tried;
+    try {
+      EXPECT_EQ(contents(StiffnessStore(bytes, "flipped")), expected) << i;
+    } catch (const Error&) {
+      ++refused;
+    }
+    bytes[i] ^= bit;
+  }
+  // The rest lies between the arrays and in the bounds, which are not read here.
+  EXPECT_GT(refused, tried * 3 / 4);
+  EXPECT_EQ(contents(StiffnessStore(bytes, "whole")), expected);
+}
+
+TEST(Store, ArraysOfOtherSizesAreRefused) {
+  const Model model = small_model();
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const ScratchFile file(".h5");
+  const auto write = [&](auto&& spoil) {
+    StiffnessFacts facts;
+    facts.object = "x";
+    facts.hash = stiffness_hash(model);
+    facts.nodes = model.nodes.size();
+    facts.order = k.order();
+    facts.norm = facts.condition = 1;
+    spoil(facts);
+    const Factor factor(k, {});
+    Output output(file.path(), {});
+    StiffnessStoreWriter writer(output, facts, k, factor, {});
+    writer.close(0);
+    output.commit();
+    return refusal(file.path());
+  };
+  EXPECT_EQ(write([](StiffnessFacts&) {}), "accepted");
+  EXPECT_NE(write([](StiffnessFacts& f) { ++f.order; }).find("has shape"), std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.order = 0; }).find("its order"), std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = 3; }).find("its order"), std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = 4; }).find("its axes"), std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.nodes = UINT64_MAX; }).find("its number of nodes"),
+            std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.norm = NAN; }).find("its norm"), std::string::npos);
+  EXPECT_NE(write([](StiffnessFacts& f) { f.condition = -1; }).find("its condition"),
+            std::string::npos);
+}
+
+TEST(Store, LeavesNoFileWhereAColumnDoesNotFit) {
+  // Displacements beyond float32: a model so soft that 1 / k exceeds 3e38.
+  Model model = small_model();
+  for (Spring& s : model.springs)
+    s.stiffness *= 1e-60;
+  const ScratchFile file(".h5");
+  (void)std::remove(file.path().c_str());
+  EXPECT_THROW(write_store(file.path(), model, {1}, true), Error);
+  EXPECT_FALSE(std::ifstream(file.path()).good());
+}
+
+TEST(Hdf5, KeepsTextsNumbersAndGrowingArrays) {
+  const ScratchFile file(".h5");
+  const std::vector<float> frame{1, 2, 3, 4, 5, 6};
+  const std::vector<std::int64_t> list{4, -5};
+  {
+    hdf5::File made = hdf5::File::create(file.path());
+    hdf5::Group group = made.root().create_group(hdf5::link_name("a/b"));
+    group.set("empty", "");
+    group.set("text", "Leber, außen");
+    group.set("list", std::span<const std::int64_t>(list));
+    group.write_texts("names", {"one", "", "three"});
+    hdf5::Dataset grown = group.create_growing("frames", hdf5::Number::float32, {2, 3});
+    for (int i = 0; i < 5; ++i)
+      grown.append(std::span<const float>(frame));
+    EXPECT_THROW(grown.append(std::span<const float>(frame.data(), 5)), Error);
+    hdf5::Dataset place = group.create_dataset("place", hdf5::Number::float32, {3, 2, 3});
+    place.write_rows(1, std::span<const float>(frame));
+    EXPECT_THROW(place.write_rows(3, std::span<const float>(frame)), Error);
+    made.close();
+  }
+  const hdf5::File read = hdf5::File::open(file.path());
+  EXPECT_EQ(read.root().groups(), std::vector<std::string>{"a_b"});
+  const hdf5::Group group = read.root().group("a_b");
+  EXPECT_EQ(group.text("empty"), "");
+  EXPECT_EQ(group.text("text"), "Leber, außen");
+  EXPECT_EQ(group.numbers<std::int64_t>("list", 2), list);
+  EXPECT_THROW((void)group.numbers<std::int64_t>("list", 3), Error);
+  EXPECT_THROW((void)group.numbers<double>("list", 2), Error);
+  EXPECT_EQ(group.read_texts("names"), (std::vector<std::string>{"one", "", "three"}));
+  const hdf5::Dataset grown = group.dataset("frames", hdf5::Number::float32);
+  EXPECT_EQ(grown.shape(), (hdf5::Shape{5, 2, 3}));
+  std::vector<float> back(6);
+  grown.read_rows(4, std::span<float>(back));
+  EXPECT_EQ(back, frame);
+  group.dataset("place", hdf5::Number::float32).read_rows(0, std::span<float>(back));
+  EXPECT_EQ(back, std::vector<float>(6));
+  EXPECT_FALSE(group.has("none"));
+  EXPECT_FALSE(group.has("../a_b"));
+  EXPECT_THROW((void)group.dataset("frames", hdf5::Number::float64), Error);
+}
