@@ -80,7 +80,7 @@ sample() {
       words=(exp2ela in.off)
       ;;
     ffe-precompute)
-      cube | exp2ela --format off -o in.ela
+      cube | exp2ela --format off --fix 'z<0' -o in.ela
       words=(ffe-precompute in.ela)
       ;;
     ffe-run)
