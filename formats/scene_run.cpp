@@ -10,6 +10,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <exception>
 #include <istream>
 
 namespace gewebe {
@@ -44,6 +45,20 @@ auto at_line(const std::string& name, std::uint64_t line, Work&& work) {
   } catch (const Error& error) {
     throw Error(name + ":" + std::to_string(line),
                 (error.place().empty() ? "" : error.place() + ": ") + error.what());
+  }
+}
+
+/// A failure of what takes answers and results is no fault of the line.
+struct Undelivered {
+  std::exception_ptr error;
+};
+
+template <class Work>
+void deliver(Work&& work) {
+  try {
+    work();
+  } catch (const Error&) {
+    throw Undelivered{std::current_exception()};
   }
 }
 
@@ -111,7 +126,9 @@ struct SceneRun::State {
     counts.nodes += model.nodes.size();
     simulation.add_object(c.name, std::move(model), c.method, std::move(parts));
     if (options.result != nullptr)
-      options.result->add_object(c.name, simulation.model(simulation.object_count() - 1));
+      deliver([&] {
+        options.result->add_object(c.name, simulation.model(simulation.object_count() - 1));
+      });
   }
 
   void execute(const Command& command) {
@@ -153,9 +170,9 @@ struct SceneRun::State {
     if (!(exact <= most_samples))
       throw Error("over 1e9 steps, expected fewer");
     // A hair more than a whole number of steps is rounding; a last one may be shorter.
-    const double count = std::ceil(exact * (1 - 1e-12));
-    for (double k = 1; k < count; ++k) {
-      simulation.step_to(start + k * c.every);
+    const auto count = static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12)));
+    for (std::int64_t k = 1; k < count; ++k) {
+      simulation.step_to(start + static_cast<double>(k) * c.every);
       answer();
     }
     if (!(span == 0)) {
@@ -176,7 +193,7 @@ struct SceneRun::State {
       rest.emplace_back(3 * simulation.model(i).nodes.size());
       frame.push_back({rest.back(), {}});
     }
-    options.result->add_frame(0, frame);
+    deliver([&] { options.result->add_frame(0, frame); });
     ++counts.frames;
   }
 
@@ -186,13 +203,13 @@ struct SceneRun::State {
       std::vector<FrameObject> frame;
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
         frame.push_back({simulation.displacement(i), simulation.contact_forces(i)});
-      options.result->add_frame(simulation.time(), frame);
+      deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }
     if (options.measure)
       measure();
     if (options.reply)
-      options.reply(reply());
+      deliver([&] { options.reply(reply()); });
   }
 
   std::string reply() const {
@@ -242,22 +259,30 @@ SceneRun::~SceneRun() = default;
 void SceneRun::line(std::string_view text) {
   State& s = *state_;
   ++s.line;
-  at_line(s.name, s.line, [&] {
-    const std::optional<Command> command = parse_scene_line(text);
-    if (!command)
-      return;
-    ++s.counts.commands;
-    s.execute(*command);
-  });
+  try {
+    at_line(s.name, s.line, [&] {
+      const std::optional<Command> command = parse_scene_line(text);
+      if (!command)
+        return;
+      ++s.counts.commands;
+      s.execute(*command);
+    });
+  } catch (const Undelivered& failure) {
+    std::rethrow_exception(failure.error);
+  }
 }
 
 void SceneRun::finish() {
   State& s = *state_;
-  at(s.name, [&] {
-    if (s.counts.commands == 0)
-      throw Error("no command, expected object, step or another, see scene(5)");
-    s.first_frame();
-  });
+  try {
+    at(s.name, [&] {
+      if (s.counts.commands == 0)
+        throw Error("no command, expected object, step or another, see scene(5)");
+      s.first_frame();
+    });
+  } catch (const Undelivered& failure) {
+    std::rethrow_exception(failure.error);
+  }
   if (!s.options.warn)
     return;
   if (s.steps == 0)

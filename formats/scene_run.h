@@ -51,7 +51,8 @@ public:
   SceneRun(const SceneRun&) = delete;
   SceneRun& operator=(const SceneRun&) = delete;
 
-  /// The next line, without its end. \throw Error, place "NAME:LINE"; the run is over then
+  /// The next line, without its end. \throw Error, place "NAME:LINE"; what reply and result throw,
+  /// as it is; the run is over then
   void line(std::string_view text);
   /// Behind the last line. \throw Error, place NAME, if there was no command or no object
   void finish();

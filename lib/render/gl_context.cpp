@@ -128,7 +128,7 @@ struct GlContext::State {
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (context != EGL_NO_CONTEXT)
       eglDestroyContext(display, context);
-    eglTerminate(display);
+    // The display is the process's and stays open: another context may live on it.
     display = EGL_NO_DISPLAY;
     context = EGL_NO_CONTEXT;
   }

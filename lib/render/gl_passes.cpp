@@ -132,7 +132,10 @@ public:
     glVertexPointer(3, GL_FLOAT, sizeof(DrawVertex), at(offsetof(DrawVertex, position)));
   }
 
-  static const void* at(std::size_t offset) { return reinterpret_cast<const void*>(offset); }
+  /// OpenGL takes offsets into buffers as pointers.
+  static const void* at(std::size_t offset) {
+    return reinterpret_cast<const void*>(offset); // NOLINT(performance-no-int-to-ptr)
+  }
 
   /// Coordinates of one texture unit: of the base, or shifted towards the light.
   void use_texcoords(GLenum unit, bool shifted) const {

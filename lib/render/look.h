@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -35,7 +36,7 @@ inline double compose(double base, double r) {
 
 /// A value 0 … 1 as 8 bits, rounded; values outside are clamped.
 inline std::uint8_t stored(double value) {
-  return static_cast<std::uint8_t>(std::clamp(value, 0.0, 1.0) * 255 + 0.5);
+  return static_cast<std::uint8_t>(std::floor(std::clamp(value, 0.0, 1.0) * 255 + 0.5));
 }
 
 inline std::array<std::uint8_t, 3> stored(const Vec3& color) {

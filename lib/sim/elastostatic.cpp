@@ -280,7 +280,7 @@ struct Elastostatic::State {
     if (options.block_limit != SIZE_MAX)
       return m <= options.block_limit;
     // Columns that are not stored cost three solves each, a fresh factor some dozens.
-    const std::size_t most = all_stored(now.displacement) ? 128 : 24;
+    const std::size_t most = all_stored(now.displacement) ? 128 : 32;
     return m <= std::min(most, nodes_in_memory());
   }
 

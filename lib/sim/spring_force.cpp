@@ -40,7 +40,7 @@ Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> moti
     const double length = norm(along);
     if (length == 0)
       continue;
-    const Vec3 direction = along / length;
+    const Vec3 direction = along * (1 / length);
     const double pull = half.stiffness * (length - half.rest) +
                         half.damping * dot(other.velocity - own.velocity, direction);
     force += pull * direction;

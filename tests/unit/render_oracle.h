@@ -138,9 +138,11 @@ private:
         box.add({(dot(d, camera_.right) / depth / camera_.tan_x + 1) / 2 * width_,
                  (1 - dot(d, camera_.up) / depth / camera_.tan_y) / 2 * height_, 0});
       }
-      for (double row = std::max(0.0, std::floor(box.min.y - 1));
-           row < std::min(height_, box.max.y + 1); ++row)
-        rows_[static_cast<std::size_t>(row)].push_back(t);
+      const auto clamped = [&](double row) {
+        return static_cast<std::size_t>(std::clamp(row, 0.0, height_ - 1));
+      };
+      for (std::size_t row = clamped(box.min.y - 1); row <= clamped(box.max.y + 1); ++row)
+        rows_[row].push_back(t);
     }
   }
 

@@ -22,11 +22,15 @@ namespace {
 constexpr double pi = 3.14159265358979323846;
 
 TEST(RenderAngles, AgreeWithLibm) {
-  for (double degrees = 0; degrees < 89.5; degrees += 0.37)
+  for (int n = 0; n < 242; ++n) {
+    const double degrees = 0.37 * n;
     EXPECT_NEAR(tangent(degrees), std::tan(degrees * pi / 180),
                 1e-13 * (1 + std::tan(degrees * pi / 180)));
-  for (double a = 0; a < 2 * pi; a += 0.01)
+  }
+  for (int n = 0; n < 628; ++n) {
+    const double a = 0.01 * n;
     EXPECT_NEAR(turn(3 * std::cos(a), 3 * std::sin(a)), a / (2 * pi), 1e-15);
+  }
   EXPECT_EQ(turn(0, 0), 0);
   EXPECT_EQ(turn(-1, 0), 0.5);
   EXPECT_EQ(turn(0, -1), 0.75);

@@ -265,7 +265,7 @@ TEST_P(RenderOracle, FlatRampHasItsAnalyticValue) {
         make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
     const double ds = (to_right ? 1 : -1) * 0.2 * std::sqrt(0.75);
     const double r = 0.5 - 0.5 * ds * 256 / 255;
-    const std::size_t middle = 3 * (32 * 64 + 32);
+    constexpr std::size_t middle = std::size_t{3} * 64 * 32 + 96;
     for (std::size_t n = 0; n < 3; ++n)
       EXPECT_NEAR(image.values[middle + n],
                   255 * std::min(1.0, 2 * r * c.scene.color[static_cast<int>(n)]), 0.51)
