@@ -206,10 +206,11 @@ struct Elastostatic::State {
     }
   }
 
-  /// Nodes whose columns cost as much to add up as one solve.
+  /// Nodes whose columns cost as much to add up as one solve, which reads L twice. Measured, 10,246
+  /// nodes: 0.09 ms a node while columns are in a cache, 0.26 ms beyond, 5 to 8 ms a solve.
   std::size_t break_even() const {
     const std::size_t entries = solver ? solver->factor.entries() : typical_fill * axes;
-    return std::max<std::size_t>(1, 2 * entries / (3 * axes));
+    return std::max<std::size_t>(1, entries / (3 * axes));
   }
 
   /// Adds the displacement under these forces to `sum`, by columns or by a solve.
