@@ -7,6 +7,7 @@
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tree/ValueAccessor.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace gewebe {
@@ -14,6 +15,42 @@ namespace {
 
 using openvdb::Coord;
 using Leaf = FloatTree::LeafNodeType;
+using LeafBuffer = Leaf::Buffer;
+
+// OpenVDB has no call that lets a leaf's values lie in memory of ours. An explicit instantiation
+// may name private members, which gives the address of the pointer without any trick on the layout.
+float*& values_of(LeafBuffer& buffer);
+template <auto Member>
+struct Reveal {
+  friend float*& values_of(LeafBuffer& buffer) { return buffer.*Member; }
+};
+template struct Reveal<&LeafBuffer::mData>;
+
+constexpr openvdb::Index32 borrowed = 1; // Leaf::transientData
+
+/// A leaf whose values lie at `values`.
+std::unique_ptr<Leaf> borrowing_leaf(const Coord& origin, float* values) {
+  auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), origin);
+  values_of(leaf->buffer()) = values;
+  leaf->setTransientData(borrowed);
+  return leaf;
+}
+
+void give_back(Leaf& leaf) {
+  if (leaf.transientData() == borrowed)
+    values_of(leaf.buffer()) = nullptr;
+}
+
+struct TreeDeleter {
+  std::shared_ptr<LeafStorage> storage;
+  void operator()(FloatTree* tree) const {
+    for (auto upper = tree->root().beginChildOn(); upper; ++upper)
+      for (auto lower = upper->beginChildOn(); lower; ++lower)
+        for (auto leaf = lower->beginChildOn(); leaf; ++leaf)
+          give_back(*leaf);
+    delete tree;
+  }
+};
 
 static_assert(Leaf::DIM == leaf_dim && Leaf::SIZE == leaf_voxels);
 
@@ -34,9 +71,14 @@ LeafView view_of(const Leaf& leaf) {
 
 } // namespace
 
-Grid make_grid(GridInfo info, FloatTree::Ptr tree) {
+FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage) {
+  return {new FloatTree(background), TreeDeleter{storage}};
+}
+
+Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage) {
   auto native = std::make_shared<Grid::Native>();
   native->tree = std::move(tree);
+  native->storage = std::move(storage);
   return Grid(std::move(info), std::move(native));
 }
 
@@ -142,10 +184,13 @@ LeafView GridAccessor::leaf_at(const Int3& ijk, float& tile) {
 
 struct GridBuilder::State {
   explicit State(GridInfo i)
-      : info(std::move(i)), tree(std::make_shared<FloatTree>(info.background)), accessor(*tree) {}
+      : info(std::move(i)), storage(std::make_shared<LeafStorage>()),
+        tree(make_tree(info.background, storage)), accessor(*tree) {}
   GridInfo info;
+  std::shared_ptr<LeafStorage> storage;
   FloatTree::Ptr tree;
   openvdb::tree::ValueAccessor<FloatTree> accessor;
+  int threads = 1; // the last caller's
 };
 
 GridBuilder::GridBuilder(GridInfo info) : state_(std::make_unique<State>(std::move(info))) {}
@@ -154,20 +199,27 @@ GridBuilder::GridBuilder(GridBuilder&&) noexcept = default;
 
 std::vector<LeafRef> GridBuilder::add_leaves(const Context& context,
                                              std::span<const Int3> origins) {
+  state_->threads = context.threads;
+  auto* const values = reinterpret_cast<float*>(
+      state_->storage->pages.emplace_back(origins.size() * leaf_voxels * sizeof(float)).data());
   std::vector<std::unique_ptr<Leaf>> leaves(origins.size());
+  std::vector<LeafRef> refs(origins.size());
+  const float background = state_->info.background;
   Context quiet = context;
   quiet.progress = nullptr;
   parallel_blocks(quiet, origins.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      leaves[i] = std::make_unique<Leaf>(to_coord(origins[i]), state_->info.background, false);
+    for (std::size_t i = begin; i < end; ++i) {
+      float* const own = values + i * leaf_voxels;
+      if (background != 0) // fresh pages are 0
+        std::fill_n(own, leaf_voxels, background);
+      leaves[i] = borrowing_leaf(to_coord(origins[i]), own);
+      refs[i] = {
+          origins[i], own,
+          &const_cast<Leaf::NodeMaskType&>(leaves[i]->getValueMask()).getWord<std::uint64_t>(0)};
+    }
   });
-  std::vector<LeafRef> refs(origins.size());
-  for (std::size_t i = 0; i < origins.size(); ++i) {
-    Leaf* const leaf = leaves[i].release();
-    state_->accessor.addLeaf(leaf);
-    refs[i] = {origins[i], leaf->buffer().data(),
-               &const_cast<Leaf::NodeMaskType&>(leaf->getValueMask()).getWord<std::uint64_t>(0)};
-  }
+  for (std::unique_ptr<Leaf>& leaf : leaves)
+    state_->accessor.addLeaf(leaf.release());
   return refs;
 }
 
@@ -180,13 +232,50 @@ void GridBuilder::share_leaf(const Grid& from, const LeafView& leaf) {
   const Leaf* const original = from.native()->tree->probeConstLeaf(to_coord(leaf.origin));
   if (original == nullptr)
     throw Error("no leaf to take over");
-  state_->accessor.addLeaf(new Leaf(*original));
+  std::vector<std::shared_ptr<const void>>& lenders = state_->storage->lenders;
+  if (lenders.empty() || lenders.back() != from.native())
+    lenders.push_back(from.native());
+  // Nobody writes through the pointer: both grids are immutable.
+  std::unique_ptr<Leaf> shared =
+      borrowing_leaf(original->origin(), const_cast<float*>(original->buffer().data()));
+  shared->setValueMask(original->getValueMask());
+  state_->accessor.addLeaf(shared.release());
 }
 
+namespace {
+
+bool is_constant(const Leaf& leaf) {
+  if (!leaf.getValueMask().isOn() && !leaf.getValueMask().isOff())
+    return false;
+  const float* const values = leaf.buffer().data();
+  return std::all_of(values + 1, values + leaf_voxels, [&](float v) { return v == values[0]; });
+}
+
+} // namespace
+
 Grid GridBuilder::finish(bool prune) {
-  if (prune)
-    openvdb::tools::prune(*state_->tree, 0.0F, /*threaded=*/false);
-  return make_grid(state_->info, state_->tree);
+  if (prune) {
+    std::vector<Leaf*> leaves;
+    leaves.reserve(state_->tree->leafCount());
+    state_->tree->getNodes(leaves);
+    std::vector<std::uint8_t> constant(leaves.size());
+    Context context;
+    context.threads = state_->threads;
+    parallel_blocks(context, leaves.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        constant[n] = is_constant(*leaves[n]) ? 1 : 0;
+    });
+    for (std::size_t n = 0; n < leaves.size(); ++n)
+      if (constant[n] != 0) {
+        const Coord origin = leaves[n]->origin();
+        const float value = leaves[n]->getFirstValue();
+        const bool active = leaves[n]->getValueMask().isOn();
+        give_back(*leaves[n]);
+        state_->accessor.addTile(1, origin, value, active);
+      }
+    openvdb::tools::pruneTiles(*state_->tree, 0.0F, /*threaded=*/false);
+  }
+  return make_grid(state_->info, state_->tree, state_->storage);
 }
 
 } // namespace gewebe

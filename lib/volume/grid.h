@@ -156,15 +156,18 @@ public:
   GridBuilder(GridBuilder&&) noexcept;
 
   /// One new leaf per origin, all values background, all voxels inactive. References stay valid
-  /// until `finish`. \pre origins are distinct multiples of 8 where no leaf exists yet
+  /// until `finish`. The leaves of one call lie together in ZeroPages, untouched if the background
+  /// is 0, so few calls with many leaves each are cheap and the caller's first write is the first
+  /// one. \pre origins are distinct multiples of 8 where no leaf exists yet
   std::vector<LeafRef> add_leaves(const Context& context, std::span<const Int3> origins);
   /// \pre dim is 8, 128 or 4096, origin a multiple of it, no leaf inside
   void add_tile(const TileView& tile);
-  /// Takes over the leaf of another grid without copying values where the storage allows it.
+  /// A leaf with the values of another grid's, which stay where they are: this grid keeps the other
+  /// one's memory alive. \pre no leaf exists there yet
   void share_leaf(const Grid& from, const LeafView& leaf);
-  /// The grid. Leaves whose values all equal the background and that have no active voxel are
-  /// dropped; leaves that are constant and wholly active become tiles of dim 8 where `prune` is
-  /// set.
+  /// The grid. With `prune`, leaves whose values are all equal and all active or all inactive
+  /// become tiles (nothing, if background and inactive), and so do larger blocks of equal
+  /// tiles. Costs a look at each leaf: not needed where the caller knows that there are none.
   Grid finish(bool prune = true);
 
 private:

@@ -1,11 +1,13 @@
 // The narrow view of sparse volumes: transforms, leaves, tiles, access, figures.
 
 #include "base/error.h"
+#include "base/zero_pages.h"
 #include "volume/grid.h"
 #include "volume/volume_stats.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -117,4 +119,69 @@ TEST(VolumeStats, CountsLeavesAndTiles) {
   EXPECT_EQ(stats.box.min, (Vec3{-0.25, -0.25, -0.25}));
   EXPECT_EQ(stats.box.max, (Vec3{7.75, 3.75, 3.75}));
   EXPECT_TRUE(volume_stats({}, Grid()).box.empty());
+}
+
+TEST(ZeroPages, AreZeroAlignedAndMovable) {
+  for (const std::size_t bytes :
+       {std::size_t{1}, std::size_t{5000}, std::size_t{2} << 20, std::size_t{5000000}}) {
+    ZeroPages pages(bytes);
+    ASSERT_GE(pages.size(), bytes);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(pages.data()) % 64, 0U);
+    EXPECT_TRUE(std::all_of(pages.data(), pages.data() + pages.size(),
+                            [](std::byte b) { return b == std::byte{0}; }));
+    pages.data()[pages.size() - 1] = std::byte{7};
+    EXPECT_TRUE(pages.holds(pages.data() + bytes - 1));
+    EXPECT_FALSE(pages.holds(pages.data() + pages.size()));
+    const ZeroPages taken = std::move(pages);
+    EXPECT_EQ(taken.data()[taken.size() - 1], std::byte{7});
+  }
+  EXPECT_EQ(ZeroPages(0).data(), nullptr);
+  EXPECT_THROW(ZeroPages(SIZE_MAX - 10), std::bad_alloc);
+}
+
+TEST(Grid, PruneMakesTilesOfConstantLeavesAndOfBlocksOfThem) {
+  for (const float background : {0.0F, 2.0F}) {
+    GridInfo info;
+    info.background = background;
+    GridBuilder builder(info);
+    std::vector<Int3> origins;
+    for (std::int32_t i = 0; i < 128; i += 8)
+      for (std::int32_t j = 0; j < 128; j += 8)
+        for (std::int32_t k = 0; k < 128; k += 8)
+          origins.push_back({i, j, k});
+    origins.insert(origins.end(), {{-8, 0, 0}, {-16, 0, 0}, {-24, 0, 0}});
+    const std::vector<LeafRef> refs = builder.add_leaves({}, origins);
+    for (std::size_t n = 0; n < 4096; ++n) {
+      std::fill_n(refs[n].values, leaf_voxels, 0.5F);
+      std::fill_n(refs[n].active, 8, ~std::uint64_t{0});
+    }
+    for (std::size_t n = 4096; n < refs.size(); ++n)
+      EXPECT_EQ(refs[n].values[511], background);
+    refs[4096].values[100] = 9;         // one value
+    refs[4097].active[3] = 1;           // one active voxel, so it stays too
+    const Grid grid = builder.finish(); // the third of them is background
+    EXPECT_EQ(grid.leaves().size(), 2U);
+    ASSERT_EQ(grid.tiles().size(), 1U);
+    EXPECT_EQ(grid.tiles()[0].dim, 128);
+    EXPECT_EQ(grid.tiles()[0].value, 0.5F);
+    EXPECT_TRUE(grid.tiles()[0].active);
+    EXPECT_EQ(grid.active_voxels(), 128U * 128 * 128 + 1);
+  }
+}
+
+TEST(Grid, SharedLeafOutlivesItsLender) {
+  const Int3 origin{0, 0, 0};
+  GridBuilder builder(GridInfo{});
+  const float* place = nullptr;
+  {
+    GridBuilder lender(GridInfo{});
+    const LeafRef leaf = lender.add_leaves({}, {&origin, 1}).at(0);
+    std::fill_n(leaf.values, leaf_voxels, 0.75F);
+    const Grid lent = lender.finish(false);
+    place = lent.leaves().at(0).values;
+    builder.share_leaf(lent, lent.leaves().at(0));
+  }
+  const Grid grid = builder.finish(false);
+  EXPECT_EQ(grid.leaves().at(0).values, place); // not copied
+  EXPECT_EQ(GridAccessor(grid).value({3, 4, 5}), 0.75F);
 }
