@@ -63,17 +63,15 @@ struct LeafKey {
   auto operator<=>(const LeafKey&) const = default;
 };
 
-/// The leaves of a slab by place: an open-addressing hash table that remembers the last answer.
+/// The leaves of a slab by place: an open-addressing hash table.
 template <class Leaf>
 class LeafMap {
 public:
-  LeafMap() : slots_(64) {}
+  LeafMap() : slots_(512) {}
 
   Leaf& at(LeafKey key) {
     const std::uint64_t word = static_cast<std::uint64_t>(static_cast<std::uint32_t>(key.j)) << 32 |
                                static_cast<std::uint32_t>(key.k);
-    if (word == last_.word && last_.leaf != none)
-      return leaves[last_.leaf];
     std::size_t slot = find(word);
     if (slots_[slot].leaf == none) {
       if (2 * (keys.size() + 1) > slots_.size()) {
@@ -84,8 +82,7 @@ public:
       keys.push_back(key);
       leaves.emplace_back();
     }
-    last_ = slots_[slot];
-    return leaves[last_.leaf];
+    return leaves[slots_[slot].leaf];
   }
 
   std::vector<LeafKey> keys;
@@ -114,7 +111,6 @@ private:
   }
 
   std::vector<Slot> slots_;
-  Slot last_;
 };
 
 /// Leaves [k_begin, k_end) of a column of leaves that are wholly inside.

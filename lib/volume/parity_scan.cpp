@@ -8,6 +8,9 @@
 #include "base/parallel.h"
 #include "volume/inside_scan_internal.h"
 #include "volume/ray_crossings_internal.h"
+#include "volume/ray_crossings_kernel_internal.h"
+
+#include <memory>
 
 namespace gewebe {
 namespace {
@@ -130,15 +133,32 @@ Chunks sort_triangles(const Context& context, const SampleMesh& mesh) {
 template <class Visit>
 void for_each_crossing(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk, Range rows,
                        std::uint64_t& exact_tests, Visit&& visit) {
+  const auto scalar = [&](std::uint32_t member) {
+    const Triangle& t = mesh.triangles[member];
+    cross_triangle(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], rows.begin, rows.end,
+                   exact_tests, visit);
+  };
+  std::unique_ptr<CrossingBuffer> buffer;
+  if (mesh.cpu != CpuLevel::baseline)
+    buffer.reset(new CrossingBuffer); // left as it is: the kernel says how much of it holds
   for (const Block& block : chunks.blocks) {
     const std::int32_t c = chunk - block.first;
     if (c < 0 || c + 1 >= static_cast<std::int32_t>(block.begin.size()))
       continue;
     const auto n = static_cast<std::size_t>(c);
-    for (std::uint32_t m = block.begin[n]; m < block.begin[n + 1]; ++m) {
-      const Triangle& t = mesh.triangles[block.members[m]];
-      cross_triangle(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], rows.begin, rows.end,
-                     exact_tests, visit);
+    const std::uint32_t* const members = block.members.data() + block.begin[n];
+    const std::size_t count = block.begin[n + 1] - block.begin[n];
+    if (!buffer) {
+      std::for_each_n(members, count, scalar);
+      continue;
+    }
+    const TriangleList list{&mesh.points[0].x, &mesh.triangles[0][0], members, count, rows.begin,
+                            rows.end};
+    for (std::size_t next = 0; next < count;) {
+      next = cross_small_triangles_avx2(list, next, *buffer);
+      for (std::size_t m = 0; m < buffer->count; ++m)
+        visit(buffer->i[m], buffer->j[m], buffer->k[m]);
+      std::for_each_n(buffer->left, buffer->left_count, scalar);
     }
   }
 }

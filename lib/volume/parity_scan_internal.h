@@ -15,6 +15,7 @@ struct SampleMesh {
   int samples = 1; ///< along the edge of a voxel
   std::span<const Vec3> points;
   std::span<const Triangle> triangles;
+  CpuLevel cpu = CpuLevel::baseline;
 };
 
 /// Scans the mesh along k. `beside` is run once, on any thread, while the scan goes on. Adds to the

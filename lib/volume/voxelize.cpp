@@ -149,7 +149,7 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     r.holes = edge_groups(border, group);
     return border;
   };
-  SampleMesh samples{options.samples, index.points, mesh.triangles};
+  SampleMesh samples{options.samples, index.points, mesh.triangles, context.cpu};
   if (options.on_open == OpenMesh::fill)
     if (const auto border = look_at_border(); !border.empty()) {
       std::vector<Triangle> closed = mesh.triangles;
