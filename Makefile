@@ -35,6 +35,7 @@ ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(C
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
 LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lxxhash
 CHECK_LIBS := -lgmp -lmpfr
+BENCH_LIBS := -lembree3
 LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
 
 # --- What there is ----------------------------------------------------------------------------------
@@ -123,7 +124,7 @@ $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS)
 
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(ARCHIVE)
-	$(LINK) $(LIBS) $(CHECK_LIBS)
+	$(LINK) $(LIBS) $(CHECK_LIBS) $(BENCH_LIBS)
 
 # libFuzzer brings its own main; elsewhere replay.cpp runs the files of the corpus.
 ifeq ($(config),fuzz)

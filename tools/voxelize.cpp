@@ -15,6 +15,7 @@ namespace {
 
 struct Arguments {
   std::string mesh = "-", like, unit, weld = "auto", antialias = "none", on_open = "error";
+  std::string rule = "parity";
   std::optional<double> voxel;
   std::optional<std::int64_t> dim;
   VoxelizeOptions options;
@@ -33,10 +34,15 @@ int samples_from_text(const std::string& text) {
   throw UsageError("--antialias: '" + text + "' is unknown, expected none or box:N with N 1 to 64");
 }
 
+VoxelRule rule_from_text(const std::string&) {
+  return VoxelRule::parity;
+}
+
 void complete(Arguments& a) {
   if (int{a.voxel.has_value()} + int{a.dim.has_value()} + int{!a.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
+  a.options.rule = rule_from_text(a.rule);
   a.options.samples = samples_from_text(a.antialias);
   a.options.on_open = a.on_open == "error"  ? OpenMesh::refuse
                       : a.on_open == "warn" ? OpenMesh::skip
@@ -110,6 +116,7 @@ int main(int argc, char** argv) {
   p.option("--dim", a.dim, "N", "voxels along the longest side of the mesh's box")
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
+  p.option("--rule", a.rule, "RULE", "when a point is inside: parity").one_of({"parity"});
   p.option("--antialias", a.antialias, "FILTER", "none: 0 or 1; box:N: mean of N^3 samples");
   p.option("--on-open", a.on_open, "WHAT",
            "an open mesh: error, warn (odd rays stay empty), fill (close the holes)")

@@ -10,7 +10,7 @@ namespace {
 using Edge = std::array<std::uint32_t, 2>;
 
 /// Edges with an odd number of triangles by index alone.
-std::vector<Edge> odd_by_index(std::size_t points, const std::vector<Triangle>& triangles) {
+std::vector<Edge> odd_by_index(std::size_t points, std::span<const Triangle> triangles) {
   // The larger ends of all edges, in one bucket per smaller end.
   std::vector<std::size_t> first(points + 1, 0);
   const auto for_each_edge = [&](auto&& visit) {
@@ -43,7 +43,7 @@ std::vector<Edge> odd_by_index(std::size_t points, const std::vector<Triangle>& 
 }
 
 /// For each point the smallest index of a point at the same position.
-std::vector<std::uint32_t> first_at_position(const std::vector<Vec3>& points) {
+std::vector<std::uint32_t> first_at_position(std::span<const Vec3> points) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -60,13 +60,51 @@ std::vector<std::uint32_t> first_at_position(const std::vector<Vec3>& points) {
 
 } // namespace
 
-std::vector<Edge> odd_edges(const std::vector<Vec3>& points,
-                            const std::vector<Triangle>& triangles) {
+bool closed_by_index(std::size_t points, std::span<const Triangle> triangles) {
+  // Per point the larger ends of edges that were met an odd number of times so far.
+  constexpr std::size_t places = 8;
+  constexpr std::uint32_t none = UINT32_MAX;
+  struct Waiting {
+    std::array<std::uint32_t, places> end;
+  };
+  Waiting empty{};
+  empty.end.fill(none);
+  std::vector<Waiting> waiting(points, empty);
+  std::size_t count = 0;
+  for (const Triangle& t : triangles)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t from = t[c], to = t[c == 2 ? 0 : c + 1];
+      const std::uint32_t low = std::min(from, to), high = std::max(from, to);
+      if (low == high)
+        continue;
+      // The ends stand before the first `none`.
+      std::array<std::uint32_t, places>& ends = waiting[low].end;
+      std::size_t n = 0;
+      while (n < places && ends[n] != high && ends[n] != none)
+        ++n;
+      if (n == places)
+        return false;
+      if (ends[n] == none) {
+        ends[n] = high;
+        ++count;
+        continue;
+      }
+      std::size_t last = n;
+      while (last + 1 < places && ends[last + 1] != none)
+        ++last;
+      ends[n] = ends[last];
+      ends[last] = none;
+      --count;
+    }
+  return count == 0;
+}
+
+std::vector<Edge> odd_edges(std::span<const Vec3> points, std::span<const Triangle> triangles) {
   std::vector<Edge> odd = odd_by_index(points.size(), triangles);
   if (odd.empty())
     return odd; // closed by index is closed by position
   const std::vector<std::uint32_t> representative = first_at_position(points);
-  std::vector<Triangle> welded = triangles;
+  std::vector<Triangle> welded(triangles.begin(), triangles.end());
   for (Triangle& t : welded)
     for (std::uint32_t& corner : t)
       corner = representative[corner];

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace gewebe {
@@ -12,8 +13,12 @@ namespace gewebe {
 /// Edges in which an odd number of triangles meet, each {smaller, larger} point index, ascending.
 /// Points at equal position count as one (the smallest index stands for them). Empty: every ray in
 /// general position crosses the mesh an even number of times.
-std::vector<std::array<std::uint32_t, 2>> odd_edges(const std::vector<Vec3>& points,
-                                                    const std::vector<Triangle>& triangles);
+std::vector<std::array<std::uint32_t, 2>> odd_edges(std::span<const Vec3> points,
+                                                    std::span<const Triangle> triangles);
+
+/// True only if every edge has an even number of triangles by index alone; quick. False says
+/// nothing: the mesh may be closed by position, or an edge crowded.
+bool closed_by_index(std::size_t points, std::span<const Triangle> triangles);
 
 /// Number of connected groups of edges; `group[e]` is the group of edge e, numbered by first edge.
 std::uint32_t edge_groups(const std::vector<std::array<std::uint32_t, 2>>& edges,

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 namespace gewebe {
 
@@ -34,84 +35,111 @@ std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, std::
                               std::int32_t j, std::int32_t low, std::int32_t high,
                               std::uint64_t& exact_tests);
 
-/// Where an edge meets the plane of a row of rays.
-struct EdgeHit {
-  std::int32_t first; ///< smallest j past the edge, exact
-  double y, z;        ///< approximate place
-  double y_error, z_error;
+/// Where an edge crosses rows of rays: y = p.y + (i - p.x) slope.
+struct EdgeLine {
+  const Vec3& p;
+  const Vec3& q;
+  double slope, error;
+
+  /// \pre p.x < q.x
+  EdgeLine(const Vec3& from, const Vec3& to) : p(from), q(to) {
+    // For p.x <= i <= q.x the place errs by at most 6 u |q.y - p.y| + u |p.y| to first order, u =
+    // 2^-53.
+    const double dy = q.y - p.y;
+    slope = dy / (q.x - p.x);
+    error = 0x1p-49 * (std::fabs(p.y) + std::fabs(dy));
+  }
+  /// Smallest j past the edge, exact. \pre p.x <= i < q.x
+  std::int32_t first(std::int32_t i, std::uint64_t& exact_tests) const {
+    const double y = p.y + (i - p.x) * slope;
+    const std::int32_t below = floor_int(y);
+    const double rest = y - below;
+    if (rest > error && rest < 1 - error)
+      return below + 1;
+    const std::int32_t nearest = rest < 0.5 ? below : below + 1;
+    return past_edge(p, q, i, nearest, exact_tests) ? nearest : nearest + 1;
+  }
 };
 
-/// \pre p.x <= i < q.x
-inline EdgeHit hit_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::uint64_t& exact_tests) {
-  // With t in [0, 1], p + t (q - p) errs by at most 6 u |q - p| + u |p| to first order, u = 2^-53.
-  constexpr double error_factor = 0x1p-49;
-  const double t = (i - p.x) / (q.x - p.x);
-  const double dy = q.y - p.y, dz = q.z - p.z;
-  EdgeHit hit;
-  hit.y = p.y + t * dy;
-  hit.z = p.z + t * dz;
-  hit.y_error = error_factor * (std::fabs(p.y) + std::fabs(dy));
-  hit.z_error = error_factor * (std::fabs(p.z) + std::fabs(dz));
-  const std::int32_t below = floor_int(hit.y);
-  const double rest = hit.y - below;
-  if (rest > hit.y_error && rest < 1 - hit.y_error) {
-    hit.first = below + 1;
-  } else {
-    const std::int32_t nearest = rest < 0.5 ? below : below + 1;
-    hit.first = past_edge(p, q, i, nearest, exact_tests) ? nearest : nearest + 1;
+/// z of a triangle's plane above (i, j) and a bound of its error for rays that cross the triangle;
+/// 1 where rounding leaves no bound.
+struct PlaneHeight {
+  double x, y, z, slope_x = 0, slope_y = 0, error = 1;
+
+  /// \pre a.x <= b.x <= c.x
+  PlaneHeight(const Vec3& a, const Vec3& b, const Vec3& c) : x(a.x), y(a.y), z(a.z) {
+    const Vec3 u = b - a, v = c - a;
+    const double nx = u.y * v.z - u.z * v.y;
+    const double ny = u.z * v.x - u.x * v.z;
+    const double nz = u.x * v.y - u.y * v.x;
+    const double sx = u.x + v.x, sy = std::fabs(u.y) + std::fabs(v.y),
+                 sz = std::fabs(u.z) + std::fabs(v.z);
+    // A component of the normal errs by 4 u times its two sizes, which a ray in the triangle
+    // multiplies by at most the third size; the rest is ten roundings of terms of that product.
+    // 22 u together to first order, which the second test keeps good.
+    const double size = std::fabs(nz);
+    if (!(size > 0x1p-47 * sx * sy))
+      return;
+    const double inverse = 1 / nz;
+    slope_x = -nx * inverse;
+    slope_y = -ny * inverse;
+    error = 0x1p-47 * (sx * sy * sz) * std::fabs(inverse) + 0x1p-50 * (std::fabs(a.z) + sz);
   }
-  return hit;
-}
+};
 
 /// Calls `emit(i, j, k)` for each ray (i, j) with row_begin <= i < row_end that crosses the
 /// triangle; k is the first sample beyond it. Each edge is rounded to rays by itself, so triangles
 /// that share it agree. \pre coordinates as in exact_predicates.h, magnitudes below 2^30
 template <class Emit>
-void cross_triangle(Vec3 a, Vec3 b, Vec3 c, std::int32_t row_begin, std::int32_t row_end,
-                    std::uint64_t& exact_tests, Emit&& emit) {
-  if (b.x < a.x)
-    std::swap(a, b);
-  if (c.x < b.x)
-    std::swap(b, c);
-  if (b.x < a.x)
-    std::swap(a, b);
+void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner2,
+                    std::int32_t row_begin, std::int32_t row_end, std::uint64_t& exact_tests,
+                    Emit&& emit) {
+  const Vec3 *lowest = &corner0, *middle = &corner1, *highest = &corner2;
+  if (middle->x < lowest->x)
+    std::swap(lowest, middle);
+  if (highest->x < middle->x)
+    std::swap(middle, highest);
+  if (middle->x < lowest->x)
+    std::swap(lowest, middle);
+  const Vec3 &a = *lowest, &b = *middle, &c = *highest;
   row_begin = std::max(row_begin, ceil_int(a.x));
   row_end = std::min(row_end, ceil_int(c.x));
-  for (std::int32_t i = row_begin; i < row_end; ++i) {
-    const EdgeHit long_edge = hit_edge(a, c, i, exact_tests);
-    const EdgeHit short_edge =
-        i < b.x ? hit_edge(a, b, i, exact_tests) : hit_edge(b, c, i, exact_tests);
-    if (long_edge.first == short_edge.first)
-      continue;
-    const bool long_is_low = long_edge.first < short_edge.first;
-    const EdgeHit& low = long_is_low ? long_edge : short_edge;
-    const EdgeHit& high = long_is_low ? short_edge : long_edge;
-    // Between the two hits z is linear in j: a shift of both ends by y_error moves it by 3 y_error
-    // / width of the rise.
-    const double width = high.y - low.y, rise = high.z - low.z;
-    const double y_error = std::max(low.y_error, high.y_error);
-    double error = 1;
-    if (width > 8 * y_error)
-      error = 4 * (low.z_error + high.z_error) + 4 * y_error / width * std::fabs(rise);
-    const double slope = rise / width;
-    for (std::int32_t j = low.first; j < high.first; ++j) {
-      if (error < 0.25) {
-        const double z = low.z + (j - low.y) * slope;
-        const std::int32_t below = floor_int(z);
-        const double rest = z - below;
-        if (rest > error && rest < 1 - error) {
-          emit(i, j, below + 1);
+  if (row_begin >= row_end)
+    return;
+  const EdgeLine long_edge(a, c);
+  const PlaneHeight plane(a, b, c);
+  const auto cross_rows = [&](const EdgeLine& short_edge, std::int32_t begin, std::int32_t end) {
+    for (std::int32_t i = begin; i < end; ++i) {
+      const std::int32_t first = long_edge.first(i, exact_tests);
+      const std::int32_t second = short_edge.first(i, exact_tests);
+      const std::int32_t low = std::min(first, second), high = std::max(first, second);
+      if (low == high)
+        continue;
+      const double row_z = plane.z + (i - plane.x) * plane.slope_x;
+      for (std::int32_t j = low; j < high; ++j) {
+        const double z = row_z + (j - plane.y) * plane.slope_y;
+        if (plane.error < 0.25) {
+          const std::int32_t below = floor_int(z);
+          const double rest = z - below;
+          if (rest > plane.error && rest < 1 - plane.error) {
+            emit(i, j, below + 1);
+          } else {
+            const std::int32_t nearest = rest < 0.5 ? below : below + 1;
+            emit(i, j, first_past_plane(a, b, c, i, j, nearest, nearest + 1, exact_tests));
+          }
         } else {
-          const std::int32_t nearest = rest < 0.5 ? below : below + 1;
-          emit(i, j, first_past_plane(a, b, c, i, j, nearest, nearest + 1, exact_tests));
+          const auto [z_min, z_max] = std::minmax({a.z, b.z, c.z});
+          emit(i, j,
+               first_past_plane(a, b, c, i, j, ceil_int(z_min), floor_int(z_max) + 1, exact_tests));
         }
-      } else {
-        const auto [z_min, z_max] = std::minmax({a.z, b.z, c.z});
-        emit(i, j,
-             first_past_plane(a, b, c, i, j, ceil_int(z_min), floor_int(z_max) + 1, exact_tests));
       }
     }
-  }
+  };
+  const std::int32_t turn = std::clamp(ceil_int(b.x), row_begin, row_end);
+  if (row_begin < turn)
+    cross_rows(EdgeLine(a, b), row_begin, turn);
+  if (turn < row_end)
+    cross_rows(EdgeLine(b, c), turn, row_end);
 }
 
 } // namespace gewebe

@@ -24,7 +24,13 @@ enum class OpenMesh {
   fill,   ///< each hole is closed by a cone over its border to the mean of the border's points
 };
 
+/// When a sample point is inside.
+enum class VoxelRule {
+  parity, ///< a ray from it crosses the surface an odd number of times
+};
+
 struct VoxelizeOptions {
+  VoxelRule rule = VoxelRule::parity;
   /// 1: a voxel is its centre, value 0 or 1. N > 1: the mean of N³ samples at
   /// i - ½ + (2a+1)/(2N), a = 0 … N-1, along each axis of the voxel. 1 … 64.
   int samples = 1;

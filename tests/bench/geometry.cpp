@@ -4,13 +4,9 @@
 
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
-#include "tests/unit/mesh_fixtures.h"
 #include "volume/density.h"
 #include "volume/grid_internal.h"
-#include "volume/volume_stats.h"
-#include "volume/voxelize.h"
 
-#include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
@@ -131,42 +127,6 @@ void bench_surface(double voxel) {
          radial_error(plain, support / 2), "mean distance mm");
 }
 
-void bench_voxelize(double voxel) {
-  const TriangleMesh mesh = test::sphere_mesh(5, 30, {0.1, 0.2, 0.3});
-  const double exact = signed_volume(mesh);
-  GridInfo info;
-  info.transform = uniform_transform(voxel);
-  for (const int samples : {1, 4})
-    for (const int threads : {1, 2}) {
-      VoxelizeOptions options;
-      options.samples = samples;
-      Grid grid;
-      const Times times =
-          measure([&] { grid = voxelize(with_threads(threads), mesh, info.transform, options); });
-      report("voxelize", samples == 1 ? "voxelize none" : "voxelize box:4", voxel,
-             mesh.triangles.size(), threads, times,
-             std::fabs(volume_stats({}, grid).volume / exact - 1), "relative volume");
-    }
-  std::vector<openvdb::Vec3s> points;
-  for (const Vec3& p : mesh.points)
-    points.emplace_back(p.x, p.y, p.z);
-  std::vector<openvdb::Vec3I> triangles;
-  for (const Triangle& t : mesh.triangles)
-    triangles.emplace_back(t[0], t[1], t[2]);
-  openvdb::FloatGrid::Ptr grid;
-  const Times times = measure([&] {
-    grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(
-        *openvdb::math::Transform::createLinearTransform(voxel), points, triangles, 3.0F);
-  });
-  std::uint64_t inside = 0;
-  for (auto value = grid->cbeginValueAll(); value; ++value)
-    if (*value < 0)
-      inside += value.getVoxelCount();
-  report("voxelize", "OpenVDB meshToLevelSet", voxel, mesh.triangles.size(), 0, times,
-         std::fabs(static_cast<double>(inside) * voxel * voxel * voxel / exact - 1),
-         "relative volume");
-}
-
 } // namespace
 
 int main() {
@@ -176,7 +136,5 @@ int main() {
     bench_density(voxel);
   for (const double voxel : {2.0, 1.0, 0.5, 0.25})
     bench_surface(voxel);
-  for (const double voxel : {2.0, 1.0, 0.5, 0.25})
-    bench_voxelize(voxel);
   return 0;
 }
