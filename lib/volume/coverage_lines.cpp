@@ -10,9 +10,32 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <string>
+#include <utility>
 
 namespace gewebe {
 namespace {
+
+/// Where an edge meets the plane of a row of rays.
+struct EdgePlace {
+  std::int32_t first; ///< smallest j past the edge, exact
+  double y, z;        ///< approximate place
+};
+
+/// \pre p.x <= i < q.x
+EdgePlace place_on_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::uint64_t& exact_tests) {
+  // y errs by at most 6 u |q.y - p.y| + u |p.y| to first order, u = 2^-53.
+  const double t = (i - p.x) / (q.x - p.x);
+  const double y = p.y + t * (q.y - p.y), z = p.z + t * (q.z - p.z);
+  const double error = 0x1p-49 * (std::fabs(p.y) + std::fabs(q.y - p.y));
+  const std::int32_t below = floor_int(y);
+  const double rest = y - below;
+  if (rest > error && rest < 1 - error)
+    return {below + 1, y, z};
+  const std::int32_t nearest = rest < 0.5 ? below : below + 1;
+  return {past_edge(p, q, i, nearest, exact_tests) ? nearest : nearest + 1, y, z};
+}
 
 /// Calls `emit(i, j, z)` for each ray (i, j) with row_begin <= i < row_end that crosses the
 /// triangle at height z. Which rays do is exact, as in cross_triangle; z is rounded. \pre as there
@@ -28,12 +51,12 @@ void heights_on_triangle(Vec3 a, Vec3 b, Vec3 c, std::int32_t row_begin, std::in
   row_begin = std::max(row_begin, ceil_int(a.x));
   row_end = std::min(row_end, ceil_int(c.x));
   for (std::int32_t i = row_begin; i < row_end; ++i) {
-    const EdgeHit long_edge = hit_edge(a, c, i, exact_tests);
-    const EdgeHit short_edge =
-        i < b.x ? hit_edge(a, b, i, exact_tests) : hit_edge(b, c, i, exact_tests);
+    const EdgePlace long_edge = place_on_edge(a, c, i, exact_tests);
+    const EdgePlace short_edge =
+        i < b.x ? place_on_edge(a, b, i, exact_tests) : place_on_edge(b, c, i, exact_tests);
     const bool long_is_low = long_edge.first < short_edge.first;
-    const EdgeHit& low = long_is_low ? long_edge : short_edge;
-    const EdgeHit& high = long_is_low ? short_edge : long_edge;
+    const EdgePlace& low = long_is_low ? long_edge : short_edge;
+    const EdgePlace& high = long_is_low ? short_edge : long_edge;
     const double width = high.y - low.y, rise = high.z - low.z;
     for (std::int32_t j = low.first; j < high.first; ++j) {
       const double t = width > 0 ? std::clamp((j - low.y) / width, 0.0, 1.0) : 0.5;
@@ -64,8 +87,7 @@ public:
       if ((end - n) % 2 != 0) {
         ++odd_rays;
       } else {
-        const std::int32_t j =
-            row[n].j >= 0 ? row[n].j / rays_ : -((-row[n].j + rays_ - 1) / rays_);
+        const std::int32_t j = row[n].j / rays_ - (row[n].j % rays_ < 0 ? 1 : 0);
         for (std::size_t m = n; m < end; ++m)
           add(i, j, row[m].z, (m - n) % 2 == 0 ? weight_ : -weight_);
       }
