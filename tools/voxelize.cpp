@@ -3,36 +3,23 @@
 #include "volume/voxelize.h"
 #include "formats/mesh_file.h"
 #include "formats/volume_file.h"
+#include "tools/antialias.h"
 #include "tools/cli.h"
 #include "tools/report.h"
 #include "volume/lattice.h"
-
-#include <charconv>
 
 using namespace gewebe;
 
 namespace {
 
 struct Arguments {
-  std::string mesh = "-", like, unit, weld = "auto", antialias = "none", on_open = "error";
+  std::string mesh = "-", like, unit, weld = "auto", antialias, on_open = "error";
   std::string rule = "parity";
   std::optional<double> voxel;
   std::optional<std::int64_t> dim;
+  AntialiasChoice choice;
   VoxelizeOptions options;
 };
-
-/// "none", "box:N" or "box=N" with N from 1 to 64.
-int samples_from_text(const std::string& text) {
-  if (text == "none")
-    return 1;
-  int n = 0;
-  const char* const end = text.data() + text.size();
-  if (text.starts_with("box:") || text.starts_with("box="))
-    if (const auto [rest, error] = std::from_chars(text.data() + 4, end, n);
-        error == std::errc() && rest == end && n >= 1 && n <= 64)
-      return n;
-  throw UsageError("--antialias: '" + text + "' is unknown, expected none or box:N with N 1 to 64");
-}
 
 VoxelRule rule_from_text(const std::string&) {
   return VoxelRule::parity;
@@ -43,7 +30,13 @@ void complete(Arguments& a) {
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
   a.options.rule = rule_from_text(a.rule);
-  a.options.samples = samples_from_text(a.antialias);
+  if (a.antialias.empty())
+    a.antialias = a.options.rule == VoxelRule::parity ? "exact" : "none";
+  a.choice = antialias_from_text(a.antialias);
+  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none &&
+      a.choice.filter != Antialias::box)
+    throw UsageError("--antialias " + a.antialias + " goes with --rule parity, not with --rule " +
+                     a.rule);
   a.options.on_open = a.on_open == "error"  ? OpenMesh::refuse
                       : a.on_open == "warn" ? OpenMesh::skip
                                             : OpenMesh::fill;
@@ -62,15 +55,18 @@ GridTransform lattice(const Arguments& a, const Input& input, const TriangleMesh
   return transform;
 }
 
-void report(cli::Run& run, const VoxelizeReport& r) {
+void report(cli::Run& run, const Arguments& a, const CoverageReport& r) {
   cli::Stats& stats = run.stats();
-  stats.set("triangles", r.triangles);
-  stats.set("triangles_skipped", r.triangles_skipped);
-  stats.set("boundary_edges", r.boundary_edges);
-  stats.set("holes", r.holes);
-  stats.set("odd_rays", r.odd_rays);
-  stats.set("crossings", r.crossings);
-  stats.set("exact_tests", r.exact_tests);
+  stats.set("antialias", a.antialias);
+  stats.set("triangles", r.mesh.triangles);
+  stats.set("triangles_skipped", r.mesh.triangles_skipped);
+  stats.set("boundary_edges", r.mesh.boundary_edges);
+  stats.set("holes", r.mesh.holes);
+  stats.set("odd_rays", r.mesh.odd_rays);
+  stats.set("crossings", r.mesh.crossings);
+  stats.set("exact_tests", r.mesh.exact_tests);
+  stats.set("surface_voxels", r.surface_voxels);
+  stats.set("overlap_voxels", r.overlap_voxels);
 }
 
 void work(cli::Run& run, const Arguments& a) {
@@ -85,25 +81,15 @@ void work(cli::Run& run, const Arguments& a) {
   const TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
   const GridTransform transform = lattice(a, input, mesh, run.context());
 
-  VoxelizeReport counts;
-  const InsideScan scan = run.timed("scan", [&] {
-    return at(input.name(),
-              [&] { return scan_inside(run.context(), mesh, transform, a.options, &counts); });
+  CoverageReport counts;
+  const Grid grid = run.timed("voxelize", [&] {
+    return antialiased(run, input.name(), mesh, transform, a.choice, a.options, counts);
   });
-  if (counts.boundary_edges > 0)
-    run.warn(
-        input.name() + ": the mesh is open: " + std::to_string(counts.boundary_edges) +
-        " boundary edges, " +
-        (a.options.on_open == OpenMesh::fill
-             ? std::to_string(counts.holes) + (counts.holes == 1 ? " hole closed" : " holes closed")
-             : std::to_string(counts.odd_rays) + " odd rays left empty"));
-  const Grid grid =
-      run.timed("grid", [&] { return grid_from_scan(run.context(), scan, transform); });
-  if (scan.origins.empty() && scan.tiles.empty())
+  if (grid.active_voxels() == 0)
     run.warn(input.name() + ": no voxel centre lies inside the mesh");
   run.timed("write", [&] { write_volume(output, grid, run.context()); });
   output.commit();
-  report(run, counts);
+  report(run, a, counts);
   cli::report_volume(run, grid);
 }
 
@@ -117,7 +103,9 @@ int main(int argc, char** argv) {
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity").one_of({"parity"});
-  p.option("--antialias", a.antialias, "FILTER", "none: 0 or 1; box:N: mean of N^3 samples");
+  p.option("--antialias", a.antialias, "FILTER",
+           "grey values: exact, lines:N, box:N, jones, sramek, none; default exact with --rule "
+           "parity, else none");
   p.option("--on-open", a.on_open, "WHAT",
            "an open mesh: error, warn (odd rays stay empty), fill (close the holes)")
       .one_of({"error", "warn", "fill"});

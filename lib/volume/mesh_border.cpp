@@ -42,7 +42,8 @@ std::vector<Edge> odd_by_index(std::size_t points, std::span<const Triangle> tri
   return odd;
 }
 
-/// For each point the smallest index of a point at the same position.
+} // namespace
+
 std::vector<std::uint32_t> first_at_position(std::span<const Vec3> points) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -57,8 +58,6 @@ std::vector<std::uint32_t> first_at_position(std::span<const Vec3> points) {
   }
   return representative;
 }
-
-} // namespace
 
 bool closed_by_index(std::size_t points, std::span<const Triangle> triangles) {
   // Per point the larger ends of edges that were met an odd number of times so far.

@@ -20,6 +20,9 @@ std::vector<std::array<std::uint32_t, 2>> odd_edges(std::span<const Vec3> points
 /// nothing: the mesh may be closed by position, or an edge crowded.
 bool closed_by_index(std::size_t points, std::span<const Triangle> triangles);
 
+/// For each point the smallest index of a point at the same position.
+std::vector<std::uint32_t> first_at_position(std::span<const Vec3> points);
+
 /// Number of connected groups of edges; `group[e]` is the group of edge e, numbered by first edge.
 std::uint32_t edge_groups(const std::vector<std::array<std::uint32_t, 2>>& edges,
                           std::vector<std::uint32_t>& group);

@@ -5,6 +5,7 @@
 #include "volume/exact_predicates.h"
 #include "volume/mesh_border.h"
 #include "volume/parity_scan_internal.h"
+#include "volume/voxelize_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -118,12 +119,7 @@ double voxelize_bytes(const TriangleMesh& mesh, const GridTransform& transform, 
   return scan_bytes(index_mesh(Context{}, mesh, transform).extent, mesh, samples);
 }
 
-InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
-                       const GridTransform& transform, const VoxelizeOptions& options,
-                       VoxelizeReport* report) {
-  if (options.samples < 1 || options.samples > 64)
-    throw Error("voxelize: " + std::to_string(options.samples) +
-                " samples along an edge, expected 1 to 64");
+void check_voxelize_input(const TriangleMesh& mesh, const GridTransform& transform) {
   if (mesh.triangles.empty())
     throw Error("the mesh has no triangle, expected at least one");
   if (const double edge = transform.voxel_size().x; !(edge >= 1e-100 && edge <= 1e100))
@@ -132,6 +128,15 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
   if (!transform.is_cubic())
     throw Error("the lattice is not cubic (" + transform.describe() +
                 "), expected voxels with equal edges");
+}
+
+InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
+                       const GridTransform& transform, const VoxelizeOptions& options,
+                       VoxelizeReport* report) {
+  if (options.samples < 1 || options.samples > 64)
+    throw Error("voxelize: " + std::to_string(options.samples) +
+                " samples along an edge, expected 1 to 64");
+  check_voxelize_input(mesh, transform);
   IndexMesh index = index_mesh(context, mesh, transform);
   require_memory(context, scan_bytes(index.extent, mesh, options.samples), "the voxelized mesh");
   refine(index.points, options.samples);

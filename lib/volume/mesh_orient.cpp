@@ -1,0 +1,304 @@
+#include "volume/mesh_orient.h"
+// Based on: the propagation of orientation over edges is folklore; the nesting by parity of the
+// crossings of a ray follows F. S. Nooruddin, G. Turk, Simplification and Repair of Polygonal
+// Models Using Volumetric Techniques, 2003.
+
+#include "volume/mesh_border.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+/// One triangle at an edge, seen from the edge's smaller point index.
+struct Side {
+  std::uint32_t high; ///< larger point index
+  std::uint32_t
+      triangle; ///< 2 t, and 1 more where the triangle runs from the larger to the smaller
+
+  std::uint32_t index() const { return triangle >> 1; }
+  bool backward() const { return (triangle & 1) != 0; }
+};
+
+bool degenerate(const Triangle& t) {
+  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
+
+/// The sides of all triangles, in one bucket per smaller point, sorted in it.
+class Edges {
+public:
+  Edges(std::size_t points, const std::vector<Triangle>& triangles) : first_(points + 1, 0) {
+    const auto for_each_side = [&](auto&& visit) {
+      for (std::size_t n = 0; n < triangles.size(); ++n) {
+        const Triangle& t = triangles[n];
+        if (degenerate(t)) // has no area and its sides cancel
+          continue;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::uint32_t from = t[c], to = t[c == 2 ? 0 : c + 1];
+          visit(std::min(from, to), Side{std::max(from, to), static_cast<std::uint32_t>(2 * n) |
+                                                                 (from > to ? 1u : 0u)});
+        }
+      }
+    };
+    for_each_side([&](std::uint32_t low, const Side&) { ++first_[low + 1]; });
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    sides_.resize(first_.back());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for_each_side([&](std::uint32_t low, const Side& side) { sides_[next[low]++] = side; });
+    for (std::size_t p = 0; p < points; ++p) // few in each: insertion sort
+      for (std::size_t n = first_[p] + 1; n < first_[p + 1]; ++n)
+        for (std::size_t m = n; m > first_[p] && sides_[m].high < sides_[m - 1].high; --m)
+          std::swap(sides_[m], sides_[m - 1]);
+  }
+
+  /// Calls `visit(span of sides)` for each edge.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::size_t p = 0; p + 1 < first_.size(); ++p)
+      for (std::size_t n = first_[p]; n < first_[p + 1];) {
+        std::size_t end = n + 1;
+        while (end < first_[p + 1] && sides_[end].high == sides_[n].high)
+          ++end;
+        visit(std::span(&sides_[n], end - n));
+        n = end;
+      }
+  }
+
+  bool balanced() const {
+    bool all = true;
+    for_each([&](std::span<const Side> edge) {
+      std::size_t backward = 0;
+      for (const Side& side : edge)
+        backward += side.backward();
+      all = all && 2 * backward == edge.size();
+    });
+    return all;
+  }
+
+private:
+  std::vector<std::uint32_t> first_;
+  std::vector<Side> sides_;
+};
+
+/// Which triangles to flip so that neighbours over edges of two triangles agree; empty where that
+/// cannot be.
+std::vector<char> agreeing_flips(const Edges& edges, std::size_t triangles) {
+  constexpr std::uint32_t none = UINT32_MAX;
+  // Per triangle up to three neighbours: 2 t, and 1 more where one of the two must be flipped.
+  std::vector<std::array<std::uint32_t, 3>> neighbours(triangles, {none, none, none});
+  const auto link = [&](const Side& a, const Side& b) {
+    auto& list = neighbours[a.index()];
+    *std::find(list.begin(), list.end() - 1, none) =
+        2 * b.index() + (a.backward() == b.backward() ? 1 : 0);
+  };
+  edges.for_each([&](std::span<const Side> edge) {
+    if (edge.size() == 2) {
+      link(edge[0], edge[1]);
+      link(edge[1], edge[0]);
+    }
+  });
+  constexpr char unknown = 2;
+  std::vector<char> flip(triangles, unknown);
+  std::vector<std::uint32_t> queue;
+  for (std::size_t seed = 0; seed < triangles; ++seed) {
+    if (flip[seed] != unknown)
+      continue;
+    flip[seed] = 0;
+    queue.assign(1, static_cast<std::uint32_t>(seed));
+    while (!queue.empty()) {
+      const std::uint32_t t = queue.back();
+      queue.pop_back();
+      for (const std::uint32_t neighbour : neighbours[t]) {
+        if (neighbour == none)
+          break;
+        const auto wanted = static_cast<char>(flip[t] ^ static_cast<char>(neighbour & 1));
+        char& there = flip[neighbour >> 1];
+        if (there == unknown) {
+          there = wanted;
+          queue.push_back(neighbour >> 1);
+        } else if (there != wanted) {
+          return {};
+        }
+      }
+    }
+  }
+  return flip;
+}
+
+/// The part of each triangle, numbered by first triangle; returns how many there are.
+std::uint32_t parts_of(const Edges& edges, std::size_t triangles,
+                       std::vector<std::uint32_t>& part) {
+  part.resize(triangles);
+  std::iota(part.begin(), part.end(), 0u);
+  const auto root = [&](std::uint32_t n) {
+    while (part[n] != n)
+      n = part[n] = part[part[n]];
+    return n;
+  };
+  edges.for_each([&](std::span<const Side> edge) {
+    for (std::size_t n = 1; n < edge.size(); ++n) {
+      const auto [low, high] = std::minmax({root(edge[0].index()), root(edge[n].index())});
+      part[high] = low;
+    }
+  });
+  for (std::uint32_t n = 0; n < triangles; ++n)
+    part[n] = root(n);
+  std::vector<std::uint32_t> number(triangles);
+  std::uint32_t parts = 0;
+  for (std::uint32_t n = 0; n < triangles; ++n) { // a root is the smallest of its part
+    if (part[n] == n)
+      number[n] = parts++;
+    part[n] = number[part[n]];
+  }
+  return parts;
+}
+
+/// Triangles by cells of the (x, y) plane, for rays along z.
+class Columns {
+public:
+  Columns(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
+      : points_(points), triangles_(triangles) {
+    for (const Triangle& t : triangles)
+      for (const std::uint32_t corner : t)
+        box_.add(points[corner]);
+    cells_ = static_cast<std::size_t>(
+        std::clamp(std::sqrt(static_cast<double>(triangles.size())), 1.0, 2048.0));
+    first_.assign(cells_ * cells_ + 1, 0);
+    for_each_cell([&](std::size_t cell, std::uint32_t) { ++first_[cell + 1]; });
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    members_.resize(first_.back());
+    std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+    for_each_cell([&](std::size_t cell, std::uint32_t n) { members_[next[cell]++] = n; });
+  }
+
+  /// Is the number of faces of parts other than `own` below p odd?
+  bool odd_below(const Vec3& p, const std::vector<std::uint32_t>& part, std::uint32_t own) const {
+    const std::size_t cell = cell_of(p.x, 0) * cells_ + cell_of(p.y, 1);
+    bool odd = false;
+    for (std::size_t m = first_[cell]; m < first_[cell + 1]; ++m)
+      if (part[members_[m]] != own && below(triangles_[members_[m]], p))
+        odd = !odd;
+    return odd;
+  }
+
+private:
+  std::size_t cell_of(double x, int axis) const {
+    const double size = box_.max[axis] - box_.min[axis];
+    const double cell = size > 0 ? (x - box_.min[axis]) / size * static_cast<double>(cells_) : 0;
+    return std::min(static_cast<std::size_t>(std::fmax(cell, 0)), cells_ - 1);
+  }
+  template <class Visit>
+  void for_each_cell(Visit&& visit) const {
+    for (std::size_t n = 0; n < triangles_.size(); ++n) {
+      Box3 box;
+      for (const std::uint32_t corner : triangles_[n])
+        box.add(points_[corner]);
+      for (std::size_t i = cell_of(box.min.x, 0); i <= cell_of(box.max.x, 0); ++i)
+        for (std::size_t j = cell_of(box.min.y, 1); j <= cell_of(box.max.y, 1); ++j)
+          visit(i * cells_ + j, static_cast<std::uint32_t>(n));
+    }
+  }
+  bool below(const Triangle& t, const Vec3& p) const {
+    bool in = false;
+    for (std::size_t c = 0; c < 3; ++c) {
+      Vec3 a = points_[t[c]], b = points_[t[c == 2 ? 0 : c + 1]];
+      if ((a.x > p.x) == (b.x > p.x))
+        continue;
+      if (a.x > b.x)
+        std::swap(a, b); // so that triangles that share the edge agree
+      in ^= a.y + (p.x - a.x) / (b.x - a.x) * (b.y - a.y) > p.y;
+    }
+    if (!in)
+      return false;
+    const Vec3& a = points_[t[0]];
+    const Vec3 normal = cross(points_[t[1]] - a, points_[t[2]] - a);
+    return (dot(p - a, normal) > 0) == (normal.z > 0);
+  }
+
+  const std::vector<Vec3>& points_;
+  const std::vector<Triangle>& triangles_;
+  Box3 box_;
+  std::size_t cells_ = 1;
+  std::vector<std::size_t> first_;
+  std::vector<std::uint32_t> members_;
+};
+
+/// Flips parts as the header says.
+void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t>& part,
+                std::uint32_t parts, std::vector<Triangle>& triangles) {
+  std::vector<double> volume(parts, 0);
+  std::vector<std::vector<std::uint32_t>> members(parts);
+  for (std::uint32_t n = 0; n < triangles.size(); ++n)
+    members[part[n]].push_back(n);
+  for (std::uint32_t c = 0; c < parts; ++c) {
+    const Vec3 origin = points[triangles[members[c][0]][0]];
+    for (const std::uint32_t n : members[c]) {
+      const Triangle& t = triangles[n];
+      volume[c] += dot(points[t[0]] - origin, cross(points[t[1]] - origin, points[t[2]] - origin));
+    }
+  }
+  std::vector<char> flip(parts, 0);
+  if (parts == 1) {
+    flip[0] = volume[0] < 0;
+  } else {
+    const Columns columns(points, triangles);
+    for (std::uint32_t c = 0; c < parts; ++c) {
+      int votes = 0; // a point may lie on another part, so more than one is asked
+      constexpr std::size_t asked = 5;
+      for (std::size_t v = 0; v < asked; ++v) {
+        const Triangle& t = triangles[members[c][v * members[c].size() / asked]];
+        const Vec3 p = points[t[0]] * 0.375 + points[t[1]] * 0.3125 + points[t[2]] * 0.3125;
+        votes += columns.odd_below(p, part, c) ? 1 : -1;
+      }
+      flip[c] = (volume[c] < 0) != (votes > 0);
+    }
+  }
+  for (std::size_t n = 0; n < triangles.size(); ++n)
+    if (flip[part[n]] != 0)
+      std::swap(triangles[n][1], triangles[n][2]);
+}
+
+} // namespace
+
+bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
+                   OrientReport* report) {
+  std::vector<Triangle> turned = triangles;
+  std::vector<Triangle> welded = triangles;
+  Edges edges(points.size(), welded);
+  if (!edges.balanced()) {
+    const std::vector<std::uint32_t> representative = first_at_position(points);
+    for (Triangle& t : welded)
+      for (std::uint32_t& corner : t)
+        corner = representative[corner];
+    edges = Edges(points.size(), welded);
+  }
+  if (!edges.balanced()) {
+    const std::vector<char> flip = agreeing_flips(edges, triangles.size());
+    for (std::size_t n = 0; n < flip.size(); ++n)
+      if (flip[n] != 0) {
+        std::swap(turned[n][1], turned[n][2]);
+        std::swap(welded[n][1], welded[n][2]);
+      }
+    edges = Edges(points.size(), welded);
+    if (flip.empty() || !edges.balanced())
+      return false;
+  }
+  std::vector<std::uint32_t> part;
+  const std::uint32_t parts = parts_of(edges, triangles.size(), part);
+  turn_parts(points, part, parts, turned);
+  if (report != nullptr) {
+    report->parts = parts;
+    report->flipped = 0;
+    for (std::size_t n = 0; n < triangles.size(); ++n)
+      report->flipped += turned[n] != triangles[n];
+  }
+  triangles = std::move(turned);
+  return true;
+}
+
+} // namespace gewebe

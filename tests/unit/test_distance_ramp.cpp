@@ -1,0 +1,193 @@
+// Grey values by distance: planes, edges, corners, the band against a search over all triangles.
+
+#include "base/error.h"
+#include "mesh_fixtures.h"
+#include "volume/distance_band_internal.h"
+#include "volume/distance_ramp.h"
+#include "volume/volume_stats.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace {
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+const GridTransform unit_lattice = uniform_transform(1);
+
+Context with(int threads) {
+  Context context;
+  context.threads = threads;
+  return context;
+}
+
+double at(GridAccessor& grid, const Int3& ijk) {
+  return static_cast<double>(grid.value(ijk));
+}
+
+TEST(NearestPoint, IsTheMinimumOverTheTriangle) {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto point = [&] { return Vec3{unit(random), unit(random), unit(random)}; };
+  std::array<int, 7> seen{};
+  for (int n = 0; n < 2000; ++n) {
+    const Vec3 a = point(), b = point(), c = point(), p = point() * 2;
+    const NearestPoint nearest = nearest_on_triangle(p, a, b, c);
+    ++seen[static_cast<std::size_t>(nearest.feature)];
+    const double distance = norm(p - nearest.point);
+    constexpr int steps = 40;
+    double least = 1e9;
+    for (int u = 0; u <= steps; ++u)
+      for (int v = 0; u + v <= steps; ++v)
+        least = std::fmin(least,
+                          norm(p - a - (b - a) * (u / 1.0 / steps) - (c - a) * (v / 1.0 / steps)));
+    EXPECT_LE(distance, least + 1e-12);
+    EXPECT_GE(distance, least - 0.1);
+    // It lies in the triangle: inside all three edges' half-planes.
+    const Vec3 normal = cross(b - a, c - a);
+    EXPECT_NEAR(dot(nearest.point - a, normal), 0, 1e-12);
+    EXPECT_GE(dot(cross(b - a, nearest.point - a), normal), -1e-12);
+    EXPECT_GE(dot(cross(c - b, nearest.point - b), normal), -1e-12);
+    EXPECT_GE(dot(cross(a - c, nearest.point - c), normal), -1e-12);
+  }
+  EXPECT_GT(*std::ranges::min_element(seen), 20);
+}
+
+/// The ramp of a distance, positive outside.
+double ramp(double distance, double half_width) {
+  return std::clamp(0.5 - distance / (2 * half_width), 0.0, 1.0);
+}
+
+TEST(DistanceRamp, FacesAreLinearAndEdgesAsPromised) {
+  const Vec3 low{-6.3, -6.2, -6.1}, high{6.4, 6.2, 6.3};
+  const TriangleMesh mesh = box_mesh(low, high);
+  const Grid round = jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
+  const Grid sharp = sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
+  GridAccessor jones(round), sramek(sharp);
+  std::size_t beyond_edges = 0;
+  for (std::int32_t i = -10; i <= 10; ++i)
+    for (std::int32_t j = -10; j <= 10; ++j)
+      for (std::int32_t k = -10; k <= 10; ++k) {
+        const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
+        double outside = 0, largest = -1e9;
+        for (int a = 0; a < 3; ++a) {
+          const double d = std::fmax(low[a] - p[a], p[a] - high[a]);
+          largest = std::fmax(largest, d);
+          outside += d > 0 ? d * d : 0;
+        }
+        const double euclidean = largest > 0 ? std::sqrt(outside) : largest;
+        beyond_edges += euclidean > largest && euclidean < 1;
+        // Outside an edge the sharp ramp follows the planes.
+        EXPECT_NEAR(at(jones, {i, j, k}), ramp(euclidean, jones_half_width), 1e-7);
+        // The band ends at the Euclidean distance.
+        const double wanted =
+            euclidean < sramek_half_width ? ramp(largest, sramek_half_width) : euclidean < 0;
+        EXPECT_NEAR(at(sramek, {i, j, k}), wanted, 1e-7) << i << ' ' << j << ' ' << k;
+      }
+  EXPECT_GT(beyond_edges, 20u);
+  EXPECT_GT(std::fabs(at(jones, {7, 0, 0}) - at(sramek, {7, 0, 0})), 0.05); // negative control
+}
+
+TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
+  TriangleMesh mesh = sphere_mesh(1, 7, {0.3, -0.2, 0.1});
+  rotate(mesh, 1);
+  append(mesh, sphere_mesh(1, 3, {1, 0, 0}));
+  CoverageReport report;
+  const Grid grid = jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse, &report);
+  const std::set<Int3> inside = inside_voxels(scan_inside(with(1), mesh, unit_lattice, {}));
+  GridAccessor value(grid);
+  double sum = 0;
+  for (std::int32_t i = -10; i <= 10; ++i)
+    for (std::int32_t j = -10; j <= 10; ++j)
+      for (std::int32_t k = -10; k <= 10; ++k) {
+        const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
+        double least = 1e9;
+        for (const auto& [a, b, c] : mesh.triangles)
+          least = std::fmin(
+              least,
+              norm(p -
+                   nearest_on_triangle(p, mesh.points[a], mesh.points[b], mesh.points[c]).point));
+        const bool in = inside.contains({i, j, k});
+        EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -least : least, jones_half_width), 1e-7);
+        sum += at(value, {i, j, k});
+      }
+  EXPECT_NEAR(report.volume, sum, 1e-9 * sum);
+  EXPECT_GT(report.surface_voxels, 500u);
+}
+
+TEST(DistanceRamp, LargeInteriorsKeepTheirTiles) {
+  // The wall at 129.4 has its band in the leaf from 128 on: only tiles without it stay whole.
+  const TriangleMesh mesh = box_mesh({-10.2, -10.3, -10.4}, {140.2, 140.3, 129.4});
+  for (const Grid& grid : {jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse),
+                           sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse)}) {
+    GridAccessor value(grid);
+    for (const Int3& v : {Int3{60, 60, 60}, Int3{0, 0, 127}, Int3{120, 120, 120}})
+      EXPECT_EQ(value.value(v), 1.0f);
+    EXPECT_EQ(value.value({60, 60, 133}), 0.0f);
+    const double volume = volume_stats(with(1), grid).volume;
+    EXPECT_LT(std::fabs(volume / (150.4 * 150.6 * 139.8) - 1), 1e-3);
+  }
+}
+
+TEST(DistanceRamp, SurfaceStaysWhereItIs) {
+  // Along a lattice line through a plane in general position interpolation at ½ finds it again.
+  TriangleMesh mesh = box_mesh({-12, -12, -12}, {12, 12, 4.3});
+  rotate(mesh, 0.6);
+  const Vec3 normal = [&] { // of the face z = 4.3
+    const Vec3 n = cross(mesh.points[5] - mesh.points[4], mesh.points[6] - mesh.points[4]);
+    return n / norm(n);
+  }();
+  const double height = dot(normal, mesh.points[4]);
+  for (const bool sharp : {false, true}) {
+    const Grid grid = sharp ? sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse)
+                            : jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse);
+    GridAccessor value(grid);
+    for (std::int32_t i = -2; i <= 2; ++i)
+      for (std::int32_t j = -2; j <= 2; ++j)
+        for (std::int32_t k = -12; k < 12; ++k) {
+          const double a = at(value, {i, j, k}), b = at(value, {i, j, k + 1});
+          if ((a > 0.5) == (b > 0.5))
+            continue;
+          const double t = (a - 0.5) / (a - b);
+          const Vec3 p{1.0 * i, 1.0 * j, k + t};
+          if (dot(normal, p) > height - 1) {
+            EXPECT_NEAR(dot(normal, p), height, 1e-6);
+          }
+        }
+  }
+}
+
+TEST(DistanceRamp, SameBytesForAnyThreads) {
+  const TriangleMesh mesh = sphere_mesh(3, 40, {0.3, 0.1, 0.2});
+  EXPECT_EQ(jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse).digest(),
+            jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse).digest());
+  EXPECT_EQ(sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse).digest(),
+            sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse).digest());
+}
+
+TEST(DistanceRamp, OpenMeshesAndNeedles) {
+  TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2});
+  open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);
+  EXPECT_THROW(jones_density(with(1), open, unit_lattice, OpenMesh::refuse), Error);
+  const Grid filled = jones_density(with(1), open, unit_lattice, OpenMesh::fill);
+  const Grid whole = jones_density(with(1), box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2}),
+                                   unit_lattice, OpenMesh::refuse);
+  GridAccessor a(filled), b(whole);
+  for (std::int32_t i = -1; i < 12; ++i)
+    for (std::int32_t k = -1; k < 12; ++k)
+      EXPECT_NEAR(at(a, {i, 5, k}), at(b, {i, 5, k}), 1e-6);
+  const Grid skipped = sramek_density(with(1), open, unit_lattice, OpenMesh::skip);
+  EXPECT_LE(volume_stats(with(1), skipped).max, 0.5); // nothing is inside
+  TriangleMesh needle;                                // no area to speak of: values stay finite
+  needle.points = {{-3, -3, -3}, {3, 3, 3}, {0, 0, 0}, {0, 0, 1e-13}};
+  needle.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+  const VolumeStats stats =
+      volume_stats(with(1), sramek_density(with(1), needle, unit_lattice, OpenMesh::refuse));
+  EXPECT_GE(stats.min, 0);
+  EXPECT_LE(stats.max, 1);
+}
+
+} // namespace
