@@ -1,4 +1,4 @@
-// voxelize: closed mesh -> volume.
+// voxelize: closed mesh or labels -> volume.
 
 #include "volume/voxelize.h"
 #include "formats/mesh_file.h"
@@ -6,6 +6,7 @@
 #include "tools/antialias.h"
 #include "tools/cli.h"
 #include "tools/report.h"
+#include "tools/voxelize_labels.h"
 #include "volume/lattice.h"
 
 using namespace gewebe;
@@ -18,6 +19,7 @@ struct Arguments {
   std::optional<double> voxel;
   std::optional<std::int64_t> dim;
   AntialiasChoice choice;
+  std::vector<double> labels;
   VoxelizeOptions options;
 };
 
@@ -26,6 +28,12 @@ VoxelRule rule_from_text(const std::string&) {
 }
 
 void complete(Arguments& a) {
+  if (!a.labels.empty()) {
+    (void)labels_from_numbers(a.labels);
+    if (a.dim || !a.like.empty())
+      throw UsageError("--label: the labels give the lattice, expected --voxel or nothing");
+    return;
+  }
   if (int{a.voxel.has_value()} + int{a.dim.has_value()} + int{!a.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
@@ -96,12 +104,14 @@ void work(cli::Run& run, const Arguments& a) {
 } // namespace
 
 int main(int argc, char** argv) {
-  cli::Program p("voxelize", "Turns a closed mesh into a volume, exactly.");
+  cli::Program p("voxelize", "Turns a closed mesh, exactly, or labels into a volume.");
   Arguments a;
   p.option("--voxel", a.voxel, "S", "edge of a voxel in mm, centres at multiples of S").positive();
   p.option("--dim", a.dim, "N", "voxels along the longest side of the mesh's box")
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
+  p.option("--label", a.labels, "L[,L...]",
+           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity").one_of({"parity"});
   p.option("--antialias", a.antialias, "FILTER",
            "grey values: exact, lines:N, box:N, jones, sramek, none; default exact with --rule "
@@ -116,5 +126,10 @@ int main(int argc, char** argv) {
   p.input_kinds(readable_mesh_kinds());
   p.operand("MESH", a.mesh, "the mesh");
   p.check([&] { complete(a); });
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
+  return p.run(argc, argv, [&](cli::Run& run) {
+    if (a.labels.empty())
+      work(run, a);
+    else
+      voxelize_labels(run, a.mesh, labels_from_numbers(a.labels), a.voxel);
+  });
 }

@@ -1,0 +1,133 @@
+#include "volume/label_field_internal.h"
+
+#include "base/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gewebe {
+namespace {
+
+constexpr std::size_t block_voxels = 512;
+
+/// What a block lacks, and how much of that a shift by 1 mm would bring, in voxels.
+struct Lack {
+  double lack = 0, gain = 0;
+};
+
+Int3 voxel_of(const Int3& first, std::size_t n) {
+  return {first[0] + static_cast<std::int32_t>(n & 7),
+          first[1] + static_cast<std::int32_t>(n >> 3 & 7),
+          first[2] + static_cast<std::int32_t>(n >> 6)};
+}
+
+/// dF/da in mm/mm, by what neighbours there are.
+double slope(const LabelField& field, const Int3& v, float f, std::size_t a) {
+  Int3 low = v, high = v;
+  --low[a];
+  ++high[a];
+  const float before = field.value_at(low), after = field.value_at(high);
+  const bool has_before = before == before, has_after = after == after;
+  if (has_before && has_after)
+    return (static_cast<double>(after) - static_cast<double>(before)) / (2 * field.spacing[a]);
+  if (has_after)
+    return (static_cast<double>(after) - static_cast<double>(f)) / field.spacing[a];
+  if (has_before)
+    return (static_cast<double>(f) - static_cast<double>(before)) / field.spacing[a];
+  return 0;
+}
+
+Lack lack_of(const LabelField& field, std::size_t block, double reach) {
+  Lack sum;
+  for (std::size_t n = 0; n < block_voxels; ++n) {
+    const float f = field.value[block * block_voxels + n];
+    if (!(std::fabs(static_cast<double>(f)) <= reach))
+      continue;
+    std::array<double, 3> gradient{};
+    double square = 0, width = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      gradient.at(a) = slope(field, voxel_of(field.band[block], n), f, a);
+      square += gradient.at(a) * gradient.at(a);
+      width += field.spacing[a] * std::fabs(gradient.at(a));
+    }
+    if (!(square > 0))
+      continue;
+    // The voxel's extent along the normal is width / |gradient|, the distance F / |gradient|.
+    const double fraction = 0.5 + static_cast<double>(f) / width;
+    sum.lack += (f > 0 ? 1 : 0) - std::clamp(fraction, 0.0, 1.0);
+    if (fraction > 0 && fraction < 1)
+      sum.gain += 1 / width;
+  }
+  return sum;
+}
+
+} // namespace
+
+void keep_volume(const Context& context, LabelField& field) {
+  const LabelBounds bounds = label_bounds(field);
+  const std::size_t blocks = field.band.size();
+  std::vector<Lack> lacks(blocks);
+  parallel_blocks(context, blocks, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b)
+      lacks[b] = lack_of(field, b, bounds.half_diagonal);
+  });
+  std::vector<float> shift(blocks);
+  parallel_blocks(context, blocks, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      Lack sum;
+      for (int n = 0; n < 27; ++n) {
+        const Int3 step{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+        const std::int32_t other =
+            field.block_at({field.band[b][0] + 8 * step[0], field.band[b][1] + 8 * step[1],
+                            field.band[b][2] + 8 * step[2]});
+        if (other < 0)
+          continue;
+        const double weight = 8 >> (std::abs(step[0]) + std::abs(step[1]) + std::abs(step[2]));
+        sum.lack += weight * lacks[static_cast<std::size_t>(other)].lack;
+        sum.gain += weight * lacks[static_cast<std::size_t>(other)].gain;
+      }
+      shift[b] = sum.gain > 0 ? static_cast<float>(sum.lack / sum.gain) : 0.0F;
+    }
+  });
+  parallel_blocks(context, blocks, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      // Shifts of the 27 blocks around, the block's own where there is none.
+      std::array<float, 27> around{};
+      for (int n = 0; n < 27; ++n) {
+        const std::int32_t other = field.block_at({field.band[b][0] + 8 * (n % 3 - 1),
+                                                   field.band[b][1] + 8 * (n / 3 % 3 - 1),
+                                                   field.band[b][2] + 8 * (n / 9 - 1)});
+        around.at(static_cast<std::size_t>(n)) =
+            shift[other < 0 ? b : static_cast<std::size_t>(other)];
+      }
+      for (std::size_t n = 0; n < block_voxels; ++n) {
+        float& f = field.value[b * block_voxels + n];
+        if (!(f == f))
+          continue;
+        std::array<std::size_t, 3> low{};
+        std::array<float, 3> part{};
+        for (std::size_t a = 0; a < 3; ++a) {
+          const std::size_t place = n >> (3 * a) & 7;
+          low.at(a) = place < 4 ? 0 : 1;
+          part.at(a) = (static_cast<float>(place) + 4.5F) / 8 - static_cast<float>(low.at(a));
+        }
+        float c = 0;
+        for (std::size_t corner = 0; corner < 8; ++corner) {
+          float weight = 1;
+          std::size_t at = 0, stride = 1;
+          for (std::size_t a = 0; a < 3; ++a, stride *= 3) {
+            const bool high = (corner >> a & 1) != 0;
+            weight *= high ? part.at(a) : 1 - part.at(a);
+            at += stride * (low.at(a) + (high ? 1 : 0));
+          }
+          c += weight * around.at(at);
+        }
+        const float d = field.distance[b * block_voxels + n], size = std::fabs(d);
+        const float moved = std::copysign(1.0F, d) * (f + c);
+        f = std::copysign(1.0F, d) * std::clamp(moved, bounds.least(size), bounds.most(size));
+      }
+    }
+  });
+}
+
+} // namespace gewebe

@@ -1,0 +1,21 @@
+#pragma once
+// voxelize --label: the density of labels of a radiological volume.
+
+#include "tools/cli.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+/// The numbers of --label. \throw UsageError if one is no whole number
+std::vector<std::int64_t> labels_from_numbers(const std::vector<double>& numbers);
+
+/// Reads the label volume `path`, writes the density of `labels` with voxels of edge `voxel`
+/// (absent: the smallest spacing), reports.
+void voxelize_labels(cli::Run& run, const std::string& path,
+                     const std::vector<std::int64_t>& labels, std::optional<double> voxel);
+
+} // namespace gewebe
