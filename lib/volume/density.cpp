@@ -6,7 +6,9 @@
 #include "volume/lattice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 // Based on: G. Wyvill, C. McPheeters, B. Wyvill, Data structure for soft objects, 1986.
@@ -30,8 +32,8 @@ bool index_box(const Particles& particles, const DensityOptions& options, IndexB
   return true;
 }
 
-/// Leaves that one particle fills at the least, by the cube in its ball: refuses absurd radii before
-/// anything is listed.
+/// Leaves that one particle fills at the least, by the cube in its ball: refuses absurd radii
+/// before anything is listed.
 double least_leaves(std::span<const IndexParticle> particles, const IndexBox& clip) {
   double most = 0;
   for (const IndexParticle& p : particles) {
@@ -39,8 +41,9 @@ double least_leaves(std::span<const IndexParticle> particles, const IndexBox& cl
     const double half = p.radius / std::numbers::sqrt3;
     double voxels = 1;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      voxels *= std::max(0.0, std::min(center[axis] + half, static_cast<double>(clip.max[axis])) -
-                                  std::max(center[axis] - half, static_cast<double>(clip.min[axis])));
+      voxels *=
+          std::max(0.0, std::min(center[axis] + half, static_cast<double>(clip.max[axis])) -
+                            std::max(center[axis] - half, static_cast<double>(clip.min[axis])));
     most = std::max(most, voxels / leaf_voxels);
   }
   return most;
@@ -104,9 +107,12 @@ Grid metaball_density(const Context& context, const Particles& particles,
     throw Error("more than 4294967295 particles");
   GridInfo info = options.info;
   if (options.band) {
-    if (!(std::fabs(*options.band) <= 1e30))
-      throw Error("the band's isovalue is " + std::to_string(*options.band) +
+    if (!(std::fabs(*options.band) <= 1e30)) {
+      std::array<char, 32> text{};
+      (void)std::snprintf(text.data(), text.size(), "%g", *options.band);
+      throw Error("the band's isovalue is " + std::string(text.data()) +
                   ", expected a number up to 1e30");
+    }
     info.isovalue = *options.band;
     info.band_isovalue = options.band;
   }

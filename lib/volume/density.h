@@ -44,11 +44,11 @@ struct DensityOptions {
 ///
 /// With a band (isovalue v) the result is the same grid as far as marching cubes at v can tell, and
 /// says so (info().isovalue and band_isovalue are v). A leaf is stored exactly where an edge of the
-/// lattice, whose ends lie on different sides of v (inside: value > v), has an end in it; it has the
-/// bits of the plain evaluation. Everything else is the background on the background's side, and
-/// on the other side tiles of one constant: 1 or, beyond v = 1, 2v; below a negative v −1 or 2v.
-/// Interval bounds spare most evaluations, first on large cubes, last on parts of 4³ voxels; where
-/// they don't pay they are left out. They are proven for single precision, so what is stored
+/// lattice, whose ends lie on different sides of v (inside: value > v), has an end in it; it has
+/// the bits of the plain evaluation. Everything else is the background on the background's side,
+/// and on the other side tiles of one constant: 1 or, beyond v = 1, 2v; below a negative v −1 or
+/// 2v. Interval bounds spare most evaluations, first on large cubes, last on parts of 4³ voxels;
+/// where they don't pay they are left out. They are proven for single precision, so what is stored
 /// doesn't depend on them.
 ///
 /// \throw Error if the lattice is not cubic, an index leaves ±2^30, a band's isovalue exceeds 1e30,

@@ -30,9 +30,9 @@ Sides sides_of(const float* values, float bound, bool background_above) {
   std::array<std::uint64_t, 8> above{};
   const __m128 limit = _mm_set1_ps(bound); // SSE2 is in every x86-64
   for (std::size_t n = 0; n < leaf_voxels; n += 4)
-    above[n >> 6] |= static_cast<std::uint64_t>(
-                         _mm_movemask_ps(_mm_cmpgt_ps(_mm_loadu_ps(values + n), limit)))
-                     << (n & 63);
+    above[n >> 6] |=
+        static_cast<std::uint64_t>(_mm_movemask_ps(_mm_cmpgt_ps(_mm_loadu_ps(values + n), limit)))
+        << (n & 63);
   std::uint64_t some = 0, all = ~std::uint64_t{0};
   for (const std::uint64_t word : above) {
     some |= word;
@@ -41,9 +41,12 @@ Sides sides_of(const float* values, float bound, bool background_above) {
   constexpr std::uint64_t row = 0xff, column = 0x0101010101010101U;
   const std::array<std::uint64_t, 6> some_at{above[0],   above[7],      some & row,
                                              some >> 56, some & column, some & column << 7};
-  const std::array<bool, 6> all_at{above[0] == ~std::uint64_t{0},   above[7] == ~std::uint64_t{0},
-                                   (all & row) == row,              all >> 56 == row,
-                                   (all & column) == column,        (all & column << 7) == column << 7};
+  const std::array<bool, 6> all_at{above[0] == ~std::uint64_t{0},
+                                   above[7] == ~std::uint64_t{0},
+                                   (all & row) == row,
+                                   all >> 56 == row,
+                                   (all & column) == column,
+                                   (all & column << 7) == column << 7};
   std::uint8_t faces_above = 0, faces_below = 0;
   for (unsigned face = 0; face < 6; ++face) {
     faces_above = static_cast<std::uint8_t>(faces_above | (some_at[face] != 0 ? 1U : 0U) << face);
@@ -127,8 +130,10 @@ void add_tiles(GridBuilder& builder, const ConstantCube& cube, float value) {
   for (std::int32_t i = 0; i < cube.dim; i += step)
     for (std::int32_t j = 0; j < cube.dim; j += step)
       for (std::int32_t k = 0; k < cube.dim; k += step)
-        builder.add_tile(
-            {{cube.origin[0] + i, cube.origin[1] + j, cube.origin[2] + k}, step, value, value != 0});
+        builder.add_tile({{cube.origin[0] + i, cube.origin[1] + j, cube.origin[2] + k},
+                          step,
+                          value,
+                          value != 0});
 }
 
 } // namespace

@@ -24,10 +24,10 @@ bool block_range(const IndexParticle& particle, const IndexBox& clip, int shift,
                  BlockRange& range) {
   const double center[3] = {particle.x, particle.y, particle.z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double low = std::max(std::ceil(center[axis] - particle.radius),
-                                static_cast<double>(clip.min[axis]));
-    const double high = std::min(std::floor(center[axis] + particle.radius),
-                                 static_cast<double>(clip.max[axis]));
+    const double low =
+        std::max(std::ceil(center[axis] - particle.radius), static_cast<double>(clip.min[axis]));
+    const double high =
+        std::min(std::floor(center[axis] + particle.radius), static_cast<double>(clip.max[axis]));
     if (!(low <= high))
       return false;
     range.first[axis] = static_cast<std::int32_t>(low) >> shift;
@@ -250,8 +250,7 @@ bool BlockTree::in_clip(const Int3& origin, std::int32_t size, std::int32_t marg
 
 bool BlockTree::outside_clip(const Int3& origin, std::int32_t size) const {
   for (std::size_t axis = 0; axis < 3; ++axis)
-    if (origin[axis] > clip_.max[axis] ||
-        std::int64_t{origin[axis]} + size - 1 < clip_.min[axis])
+    if (origin[axis] > clip_.max[axis] || std::int64_t{origin[axis]} + size - 1 < clip_.min[axis])
       return true;
   return false;
 }
@@ -399,8 +398,7 @@ std::vector<LeafLists> plan_blocks(const Context& context, std::span<const Index
     for (std::size_t n = begin; n < end; ++n) {
       tree.load(particles, blocks, n);
       tree.list_leaves(plans[n], bytes < list_budget);
-      require_memory(context,
-                     static_cast<double>(leaves += plans[n].leaves.size()) * leaf_bytes,
+      require_memory(context, static_cast<double>(leaves += plans[n].leaves.size()) * leaf_bytes,
                      "the volume, at the least,");
       const std::uint64_t kept = plans[n].pairs.size() * sizeof(std::uint32_t);
       if (bytes.fetch_add(kept) + kept > list_budget) {

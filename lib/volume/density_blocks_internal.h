@@ -36,8 +36,8 @@ std::vector<IndexParticle> to_index_space(const Context& context, const Particle
 struct Blocks {
   std::int32_t size = 0;
   std::vector<Int3> origins;
-  std::vector<std::uint64_t> first;      ///< particles of block n: list[first[n]] … list[first[n+1]]
-  std::vector<std::uint32_t> particles;  ///< ascending in each block
+  std::vector<std::uint64_t> first; ///< particles of block n: list[first[n]] … list[first[n+1]]
+  std::vector<std::uint32_t> particles; ///< ascending in each block
 };
 Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> particles,
                         const IndexBox& clip);

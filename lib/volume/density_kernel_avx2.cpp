@@ -50,8 +50,8 @@ std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c
     if (!(rest[0] > z2_least && rest[7] > z2_least && rest[56] > z2_least && rest[63] > z2_least)) {
       reached = 0;
       for (int i = 0; i < 8; ++i) {
-        const int rows = _mm256_movemask_ps(_mm256_cmp_ps(
-            _mm256_load_ps(rest + i * 8), _mm256_set1_ps(z2_least), _CMP_GT_OQ));
+        const int rows = _mm256_movemask_ps(
+            _mm256_cmp_ps(_mm256_load_ps(rest + i * 8), _mm256_set1_ps(z2_least), _CMP_GT_OQ));
         reached |= ((rows & 15) != 0 ? 1U : 0U) << 2 * i | ((rows >> 4) != 0 ? 2U : 0U) << 2 * i;
       }
     }
@@ -63,8 +63,7 @@ std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c
 
 /// u² (4w/9 u + 5w/9) added to a row.
 __m256 add_row(__m256 sum, const float* rest, __m256 z2, __m256 cubic, __m256 square) {
-  const __m256 u =
-      _mm256_max_ps(_mm256_sub_ps(_mm256_broadcast_ss(rest), z2), _mm256_setzero_ps());
+  const __m256 u = _mm256_max_ps(_mm256_sub_ps(_mm256_broadcast_ss(rest), z2), _mm256_setzero_ps());
   return _mm256_fmadd_ps(_mm256_mul_ps(u, u), _mm256_fmadd_ps(cubic, u, square), sum);
 }
 
@@ -118,9 +117,8 @@ __m256 clamped(__m256 v) {
   return _mm256_max_ps(v, _mm256_setzero_ps());
 }
 __m256 density(__m256 u) {
-  return _mm256_mul_ps(
-      _mm256_mul_ps(u, u),
-      _mm256_fmadd_ps(_mm256_set1_ps(4.0F / 9), u, _mm256_set1_ps(5.0F / 9)));
+  return _mm256_mul_ps(_mm256_mul_ps(u, u),
+                       _mm256_fmadd_ps(_mm256_set1_ps(4.0F / 9), u, _mm256_set1_ps(5.0F / 9)));
 }
 
 /// The children's centres along each axis, relative to the origin.
@@ -164,17 +162,15 @@ void reach_children_avx2(const IndexParticle* particles, const std::uint32_t* li
     const IndexParticle& p = particles[list[n]];
     const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
     const auto axis2 = [&](__m256 center, double x, double origin) {
-      const __m256 offset =
-          _mm256_sub_ps(center, _mm256_set1_ps(static_cast<float>(x - origin)));
-      const __m256 low =
-          _mm256_mul_ps(clamped(_mm256_sub_ps(magnitude(offset), half)), inverse);
+      const __m256 offset = _mm256_sub_ps(center, _mm256_set1_ps(static_cast<float>(x - origin)));
+      const __m256 low = _mm256_mul_ps(clamped(_mm256_sub_ps(magnitude(offset), half)), inverse);
       return _mm256_mul_ps(low, low);
     };
     const __m256 nearest2 = _mm256_add_ps(_mm256_add_ps(axis2(centers.x, p.x, children.origin[0]),
                                                         axis2(centers.y, p.y, children.origin[1])),
                                           axis2(centers.z, p.z, children.origin[2]));
-    masks[n] = static_cast<std::uint8_t>(
-        _mm256_movemask_ps(_mm256_cmp_ps(nearest2, limit, _CMP_LT_OQ)));
+    masks[n] =
+        static_cast<std::uint8_t>(_mm256_movemask_ps(_mm256_cmp_ps(nearest2, limit, _CMP_LT_OQ)));
   }
 }
 
@@ -192,8 +188,7 @@ void bound_children_avx2(const IndexParticle* particles, const std::uint32_t* li
     const __m256 inverse2 = _mm256_set1_ps(p.inverse_radius * p.inverse_radius);
     __m256 nearest2 = zero, nearer2 = zero, farthest2 = zero, farthest = zero, center2 = zero;
     const auto along = [&](__m256 center, double x, double origin) {
-      const __m256 offset =
-          _mm256_sub_ps(center, _mm256_set1_ps(static_cast<float>(x - origin)));
+      const __m256 offset = _mm256_sub_ps(center, _mm256_set1_ps(static_cast<float>(x - origin)));
       const __m256 d = magnitude(offset);
       const __m256 low = clamped(_mm256_sub_ps(d, half));
       const __m256 further = clamped(_mm256_sub_ps(low, one)); // one voxel further out
@@ -240,8 +235,8 @@ void bound_children_avx2(const IndexParticle* particles, const std::uint32_t* li
   spread = _mm256_add_ps(spread, _mm256_max_ps(_mm256_max_ps(gx, gy), gz));
   spread = _mm256_fmadd_ps(_mm256_set1_ps(0.5F * curvature_bound * reach2), curvature, spread);
   const __m256 terms = _mm256_set1_ps(accumulation_rounding * static_cast<float>(count + 8));
-  const __m256 rounding = _mm256_fmadd_ps(terms, absolute,
-                                          _mm256_mul_ps(_mm256_set1_ps(term_rounding), weights));
+  const __m256 rounding =
+      _mm256_fmadd_ps(terms, absolute, _mm256_mul_ps(_mm256_set1_ps(term_rounding), weights));
   _mm256_storeu_ps(bounds.lower,
                    _mm256_sub_ps(_mm256_max_ps(lower, _mm256_sub_ps(value, spread)), rounding));
   _mm256_storeu_ps(bounds.upper,
