@@ -1,5 +1,6 @@
 // metaball2vol: particles -> density volume.
 
+#include "base/bytes.h"
 #include "formats/particles_file.h"
 #include "formats/volume_file.h"
 #include "tools/cli.h"
@@ -7,13 +8,16 @@
 #include "volume/density.h"
 #include "volume/lattice.h"
 
+#include <array>
+#include <cstdio>
+
 using namespace gewebe;
 
 namespace {
 
 struct Arguments {
   std::string particles = "-", like, unit = "mm";
-  std::optional<double> voxel;
+  std::optional<double> voxel, band;
   std::optional<std::int64_t> dim;
   std::vector<double> bbox;
 };
@@ -44,6 +48,12 @@ GridInfo lattice(const Arguments& arguments, const Particles& particles, const C
   return info;
 }
 
+std::string count_text(double count) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "%.3g", count);
+  return text.data();
+}
+
 void work(cli::Run& run, const Arguments& arguments) {
   (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
   Output output(run.output(), run.output_options(true));
@@ -56,6 +66,12 @@ void work(cli::Run& run, const Arguments& arguments) {
   options.info = lattice(arguments, particles, run.context());
   if (const auto& b = arguments.bbox; !b.empty())
     options.clip = Box3{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+  options.band = arguments.band;
+  options.planned = [&](const DensityReport& plan) {
+    run.say("at most " + count_text(plan.predicted_voxels) + " voxels in " +
+            bytes_text(plan.predicted_bytes) + ", about " + count_text(plan.predicted_evaluations) +
+            " evaluations");
+  };
   DensityReport report;
   const Grid grid = run.timed("density", [&] {
     return at(input.name(),
@@ -69,9 +85,13 @@ void work(cli::Run& run, const Arguments& arguments) {
   cli::Stats& stats = run.stats();
   stats.set("particles", static_cast<std::uint64_t>(particles.size()));
   stats.set("particles_out_of_reach", report.particles_out_of_reach);
-  stats.set("leaves_in_reach", report.leaves);
-  stats.set("voxel_evaluations", report.voxel_evaluations);
+  stats.set("predicted_voxels", report.predicted_voxels);
   stats.set("predicted_bytes", report.predicted_bytes);
+  stats.set("predicted_evaluations", report.predicted_evaluations);
+  stats.set("leaves_skipped", report.leaves_skipped);
+  stats.set("leaves_evaluated", report.leaves_evaluated);
+  stats.set("leaves_stored", report.leaves);
+  stats.set("voxel_evaluations", report.voxel_evaluations);
   cli::report_volume(run, grid);
 }
 
@@ -88,6 +108,8 @@ int main(int argc, char** argv) {
   program.option("--like", arguments.like, "VDB", "take the lattice of this volume");
   program.option("--bbox", arguments.bbox, "X0,Y0,Z0,X1,Y1,Z1", "only voxels inside this box, mm")
       .count(6);
+  program.option("--band", arguments.band, "ISO",
+                 "keep only what the isosurface of ISO needs, for mc-opt");
   program.option("--unit", arguments.unit, "UNIT", "unit of the particles: m, cm, mm")
       .one_of({"m", "cm", "mm"});
   program.output_kinds({Kind::vdb});

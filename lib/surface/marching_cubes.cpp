@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "surface/index_map.h"
+#include "base/index_map.h"
 #include "surface/marching_cubes_table.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "surface/snapping.h"
 
 #include "base/error.h"
-#include "surface/index_map.h"
+#include "base/index_map.h"
 
 #include <algorithm>
 #include <array>

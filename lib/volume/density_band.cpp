@@ -1,0 +1,274 @@
+#include "base/index_map.h"
+#include "base/parallel.h"
+#include "volume/density_blocks_internal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <emmintrin.h>
+
+namespace gewebe {
+namespace {
+
+constexpr std::size_t batch_leaves = 8192; // whose values wait for their place: 16 MiB
+
+/// What the neighbours of an evaluated leaf need to know. Face 2 axis + (far ? 1 : 0).
+struct Sides {
+  std::uint8_t background = 0; ///< faces where some voxel is on the background's side
+  std::uint8_t opposite = 0;   ///< on the other
+  bool mixed = false;
+};
+
+/// The largest float not above the isovalue: value > isovalue is value > bound.
+float float_bound(double isovalue) {
+  const auto nearest = static_cast<float>(isovalue);
+  return static_cast<double>(nearest) > isovalue ? std::nextafter(nearest, -HUGE_VALF) : nearest;
+}
+
+Sides sides_of(const float* values, float bound, bool background_above) {
+  std::array<std::uint64_t, 8> above{};
+  const __m128 limit = _mm_set1_ps(bound); // SSE2 is in every x86-64
+  for (std::size_t n = 0; n < leaf_voxels; n += 4)
+    above[n >> 6] |=
+        static_cast<std::uint64_t>(_mm_movemask_ps(_mm_cmpgt_ps(_mm_loadu_ps(values + n), limit)))
+        << (n & 63);
+  std::uint64_t some = 0, all = ~std::uint64_t{0};
+  for (const std::uint64_t word : above) {
+    some |= word;
+    all &= word;
+  }
+  constexpr std::uint64_t row = 0xff, column = 0x0101010101010101U;
+  const std::array<std::uint64_t, 6> some_at{above[0],   above[7],      some & row,
+                                             some >> 56, some & column, some & column << 7};
+  const std::array<bool, 6> all_at{above[0] == ~std::uint64_t{0},
+                                   above[7] == ~std::uint64_t{0},
+                                   (all & row) == row,
+                                   all >> 56 == row,
+                                   (all & column) == column,
+                                   (all & column << 7) == column << 7};
+  std::uint8_t faces_above = 0, faces_below = 0;
+  for (unsigned face = 0; face < 6; ++face) {
+    faces_above = static_cast<std::uint8_t>(faces_above | (some_at[face] != 0 ? 1U : 0U) << face);
+    faces_below = static_cast<std::uint8_t>(faces_below | (all_at[face] ? 0U : 1U) << face);
+  }
+  Sides sides;
+  sides.background = background_above ? faces_above : faces_below;
+  sides.opposite = background_above ? faces_below : faces_above;
+  sides.mixed = some != 0 && all != ~std::uint64_t{0};
+  return sides;
+}
+
+Int3 neighbour(const Int3& origin, unsigned face) {
+  Int3 other = origin;
+  other[face / 2] += (face & 1) != 0 ? leaf_dim : -leaf_dim;
+  return other;
+}
+
+/// Puts evaluated leaves into the grid. `slots` tells where in `values` each leaf's lie.
+void store(const Context& context, GridBuilder& builder, std::span<const Int3> origins,
+           std::span<const std::size_t> slots, const std::vector<float>& values) {
+  const std::vector<LeafRef> refs = builder.add_leaves(context, origins);
+  Context quiet = context;
+  quiet.progress = nullptr;
+  parallel_blocks(quiet, refs.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      std::memcpy(refs[n].values, values.data() + slots[n] * leaf_voxels,
+                  leaf_voxels * sizeof(float));
+      (void)activate(refs[n]);
+    }
+  });
+}
+
+/// The constant on the side where the background isn't.
+float opposite_value(double isovalue) {
+  if (isovalue < 0)
+    return static_cast<float>(isovalue >= -1 ? -1 : 2 * isovalue);
+  return static_cast<float>(isovalue < 1 ? 1 : 2 * isovalue);
+}
+
+/// The cubes proven to lie on the opposite side, and leaves found to.
+class OppositeRegion {
+public:
+  explicit OppositeRegion(const std::vector<LeafLists>& plans) {
+    std::array<std::size_t, 32> counts{};
+    for (const LeafLists& plan : plans)
+      for (const ConstantCube& cube : plan.opposite)
+        ++counts[level(cube.dim)];
+    for (const std::size_t count : counts)
+      maps_.emplace_back(count);
+    for (std::size_t l = 0; l < counts.size(); ++l)
+      used_[l] = counts[l] > 0;
+    for (const LeafLists& plan : plans)
+      for (const ConstantCube& cube : plan.opposite)
+        maps_[level(cube.dim)].insert(cube.origin, 0);
+  }
+  bool contains(const Int3& origin) const {
+    for (std::size_t l = 0; l < maps_.size(); ++l) {
+      if (!used_[l])
+        continue;
+      const std::int32_t mask = -(std::int32_t{1} << l);
+      if (maps_[l].find({origin[0] & mask, origin[1] & mask, origin[2] & mask}) != IndexMap::none)
+        return true;
+    }
+    return false;
+  }
+
+private:
+  static std::size_t level(std::int32_t dim) {
+    std::size_t l = 0;
+    while (std::int32_t{1} << l < dim)
+      ++l;
+    return l;
+  }
+  std::vector<IndexMap> maps_;
+  std::array<bool, 32> used_{};
+};
+
+void add_tiles(GridBuilder& builder, const ConstantCube& cube, float value) {
+  const std::int32_t step = cube.dim >= 4096 ? 4096 : cube.dim >= 128 ? 128 : 8;
+  for (std::int32_t i = 0; i < cube.dim; i += step)
+    for (std::int32_t j = 0; j < cube.dim; j += step)
+      for (std::int32_t k = 0; k < cube.dim; k += step)
+        builder.add_tile({{cube.origin[0] + i, cube.origin[1] + j, cube.origin[2] + k},
+                          step,
+                          value,
+                          value != 0});
+}
+
+} // namespace
+
+Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
+               const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
+               const GridInfo& info, DensityReport& report) {
+  const double isovalue = *info.band_isovalue;
+  const float bound = float_bound(isovalue);
+  const DensityKernels kernels = density_kernels(context.cpu);
+  Context quiet = context;
+  quiet.progress = nullptr;
+  GridBuilder builder(info);
+
+  std::vector<std::size_t> first{0}; // leaf m of block n has the number first[n] + m
+  for (const LeafLists& plan : plans)
+    first.push_back(first.back() + plan.leaves.size());
+  std::vector<Sides> sides(first.back());
+  std::vector<std::uint64_t> pairs(plans.size());
+
+  // Evaluates the leaves of some blocks; `wanted` says which, all where it is empty.
+  std::vector<float> values;
+  std::vector<Int3> origins;
+  std::vector<std::size_t> slots;
+  const auto evaluate = [&](std::size_t begin, std::size_t end,
+                            const std::vector<std::vector<std::uint32_t>>& wanted) {
+    std::vector<std::size_t> slot{0}; // of the first leaf of block begin + n
+    for (std::size_t n = begin; n < end; ++n)
+      slot.push_back(slot.back() + (wanted.empty() ? plans[n].leaves.size() : wanted[n].size()));
+    values.resize(std::max(values.size(), slot.back() * leaf_voxels));
+    parallel_blocks(quiet, end - begin, 1, [&](std::size_t low, std::size_t high) {
+      BlockTree tree(context, clip, {});
+      std::vector<LeafParticle> scratch;
+      for (std::size_t b = low; b < high; ++b) {
+        const std::size_t n = begin + b;
+        const LeafLists& plan = plans[n];
+        if (slot[b] == slot[b + 1])
+          continue;
+        tree.load(particles, blocks, n);
+        const auto work = [&](std::size_t leaf, std::size_t place,
+                              std::span<const std::uint32_t> list) {
+          float* const here = values.data() + place * leaf_voxels;
+          std::fill_n(here, leaf_voxels, 0.0F);
+          evaluate_leaf(kernels, clip, tree.particles(), list, plan.leaves[leaf], scratch, here);
+          sides[first[n] + leaf] = sides_of(here, bound, isovalue < 0);
+          pairs[n] += list.size();
+        };
+        if (wanted.empty()) {
+          visit_plan(tree, plan, [&](std::size_t leaf, std::span<const std::uint32_t> list) {
+            work(leaf, slot[b] + leaf, list);
+          });
+          continue;
+        }
+        std::vector<Int3> some;
+        for (const std::uint32_t leaf : wanted[n])
+          some.push_back(plan.leaves[leaf]);
+        tree.visit_leaves(some, [&](std::size_t m, std::span<const std::uint32_t> list) {
+          work(wanted[n][m], slot[b] + m, list);
+        });
+      }
+    });
+    origins.clear();
+    slots.clear();
+    for (std::size_t n = begin; n < end; ++n)
+      for (std::size_t m = 0; m < slot[n - begin + 1] - slot[n - begin]; ++m) {
+        const std::size_t leaf = wanted.empty() ? m : wanted[n][m];
+        if (wanted.empty() && !sides[first[n] + leaf].mixed)
+          continue;
+        origins.push_back(plans[n].leaves[leaf]);
+        slots.push_back(slot[n - begin] + m);
+      }
+    store(context, builder, origins, slots, values);
+    report.leaves += origins.size();
+    report.leaves_evaluated += slot.back();
+  };
+  const auto in_batches = [&](const std::vector<std::vector<std::uint32_t>>& wanted) {
+    for (std::size_t begin = 0, end = 0; begin < plans.size(); begin = end) {
+      std::size_t leaves = 0;
+      while (end < plans.size() && (leaves < batch_leaves || end == begin)) {
+        leaves += wanted.empty() ? plans[end].leaves.size() : wanted[end].size();
+        ++end;
+      }
+      evaluate(begin, end, wanted);
+      if (context.progress && wanted.empty())
+        context.progress(static_cast<double>(end) / static_cast<double>(plans.size()));
+    }
+  };
+  if (!plans.empty())
+    in_batches({});
+
+  // A leaf on one side is needed where a neighbour's facing layer isn't wholly on this side.
+  IndexMap numbers(first.back());
+  for (std::size_t n = 0; n < plans.size(); ++n)
+    for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
+      numbers.insert(plans[n].leaves[m], static_cast<std::uint32_t>(first[n] + m));
+  const OppositeRegion region(plans);
+  std::vector<std::vector<std::uint32_t>> needed(plans.size());
+  std::vector<std::vector<std::uint32_t>> constant(plans.size());
+  parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      for (std::size_t m = 0; m < plans[n].leaves.size(); ++m) {
+        const Sides& own = sides[first[n] + m];
+        if (own.mixed)
+          continue;
+        const bool opposite = own.opposite != 0;
+        bool crossed = false;
+        for (unsigned face = 0; face < 6 && !crossed; ++face) {
+          const Int3 origin = neighbour(plans[n].leaves[m], face);
+          const std::uint32_t number = numbers.find(origin);
+          if (number != IndexMap::none) {
+            const Sides& other = sides[number];
+            crossed = ((opposite ? other.background : other.opposite) >> (face ^ 1U) & 1) != 0;
+          } else { // proven, or out of reach
+            crossed = opposite && !region.contains(origin);
+          }
+        }
+        if (crossed)
+          needed[n].push_back(static_cast<std::uint32_t>(m));
+        else if (opposite)
+          constant[n].push_back(static_cast<std::uint32_t>(m));
+      }
+  });
+  if (!plans.empty())
+    in_batches(needed);
+
+  const float value = opposite_value(isovalue);
+  for (std::size_t n = 0; n < plans.size(); ++n) {
+    for (const ConstantCube& cube : plans[n].opposite)
+      add_tiles(builder, cube, value);
+    for (const std::uint32_t leaf : constant[n])
+      builder.add_tile({plans[n].leaves[leaf], leaf_dim, value, true});
+  }
+  for (const std::uint64_t count : pairs)
+    report.leaf_particle_pairs += count;
+  return builder.finish();
+}
+
+} // namespace gewebe
