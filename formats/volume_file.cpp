@@ -168,47 +168,38 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
   return floats[0];
 }
 
-void check_finite(const Grid& grid, const std::string& name) {
-  const auto fail = [&] { throw Error(name, "a voxel's value is not finite"); };
-  if (!std::isfinite(grid.info().background))
-    fail();
-  for (const TileView& tile : grid.tiles())
-    if (!std::isfinite(tile.value))
-      fail();
-  for (const LeafView& leaf : grid.leaves())
-    if (!std::all_of(leaf.values, leaf.values + leaf_voxels,
-                     [](float v) { return std::isfinite(v); }))
-      fail();
-}
-
-Grid parse_volume(std::string& bytes, const std::string& name) {
+Grid parse_volume(std::string& bytes, const std::string& name, const Context& context) {
   MemoryBuffer buffer(bytes, name);
   std::istream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
   openvdb::io::Stream archive(stream, /*delayLoad=*/false);
-  const openvdb::FloatGrid::Ptr native = choose_grid(*archive.getGrids(), name);
+  openvdb::FloatGrid::Ptr native = choose_grid(*archive.getGrids(), name);
   GridInfo info;
   info.transform = transform_of(native->transform(), name);
   info.background = native->background();
   info.level_set = native->getGridClass() == openvdb::GRID_LEVEL_SET;
   info.isovalue = number_metadata(*native, isovalue_key, name).value_or(info.level_set ? 0 : 0.5);
   info.band_isovalue = number_metadata(*native, band_key, name);
-  Grid grid = make_grid(std::move(info), native->treePtr());
-  check_finite(grid, name);
+  const auto storage = std::make_shared<LeafStorage>();
+  openvdb::FloatTree::Ptr tree = native->treePtr();
+  native.reset(); // the tree has one owner
+  Grid grid = make_grid(std::move(info), adopt_tree(std::move(tree), storage), storage);
+  if (!grid.summary(context).finite)
+    throw Error(name, "a voxel's value is not finite");
   return grid;
 }
 
 } // namespace
 
 Grid read_volume(Input& input, const Context& context) {
-  return volume_from_bytes(input.read_all(context.max_memory), input.name());
+  return volume_from_bytes(input.read_all(context.max_memory), input.name(), context);
 }
 
-Grid volume_from_bytes(std::string bytes, const std::string& name) {
+Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context) {
   initialize_openvdb();
   check_vdb_head(bytes, name);
   try {
-    return parse_volume(bytes, name);
+    return parse_volume(bytes, name, context);
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {

@@ -15,7 +15,7 @@ namespace gewebe {
 Grid read_volume(Input& input, const Context& context);
 
 /// The same for bytes that are there already.
-Grid volume_from_bytes(std::string bytes, const std::string& name);
+Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context = {});
 
 /// Writes one grid; blosc with active mask.
 void write_volume(Output& output, const Grid& grid, const Context& context);

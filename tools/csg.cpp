@@ -39,11 +39,12 @@ void work(cli::Run& run, const Arguments& a) {
 
   cli::Stats& stats = run.stats();
   stats.set("operation", a.word);
-  stats.set("operands", static_cast<std::uint64_t>(operands.size()));
+  stats.set("operands", static_cast<std::uint64_t>(a.volumes.size()));
   stats.set("resampled", counts.resampled);
   stats.set("leaves_computed", counts.leaves_computed);
   stats.set("leaves_shared", counts.leaves_shared);
   stats.set("leaves_constant", counts.leaves_constant);
+  stats.set("leaves_skipped", counts.leaves_skipped);
   stats.set("tiles_combined", counts.tiles_combined);
   cli::report_volume(run, grid);
 }

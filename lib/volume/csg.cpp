@@ -4,11 +4,12 @@
 // densities).
 
 #include "base/error.h"
-#include "base/parallel.h"
+#include "volume/grid_fold.h"
 #include "volume/resample.h"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <limits>
@@ -33,56 +34,83 @@ float clamp_01(float a) {
   return a > 0 ? (a < 1 ? a : 1.0f) : 0.0f;
 }
 
-/// An operand in one leaf: 512 values, or one for all.
-struct Source {
-  const float* values = nullptr;
-  float constant = 0;
-};
-
-template <std::size_t N, class Function>
-void apply(std::array<float, N>& a, const Source& b, Function&& function) {
-  if (b.values != nullptr)
-    for (std::size_t n = 0; n < N; ++n)
-      a[n] = function(a[n], b.values[n]);
-  else
-    for (std::size_t n = 0; n < N; ++n)
-      a[n] = function(a[n], b.constant);
+bool is_sum(CsgOperation operation) {
+  return operation == CsgOperation::add || operation == CsgOperation::subtract;
 }
 
-/// Folds N values of each source.
-template <std::size_t N>
-void fold(CsgOperation operation, std::span<const Source> sources, std::array<float, N>& a) {
-  const bool sum = operation == CsgOperation::add || operation == CsgOperation::subtract;
-  apply(a, sources[0], [&](float, float b) { return sum ? b : clamp_01(b); });
-  for (const Source& source : sources.subspan(1))
-    switch (operation) {
-    case CsgOperation::add:
-      apply(a, source, [](float x, float y) { return x + y; });
-      break;
-    case CsgOperation::subtract:
-      apply(a, source, [](float x, float y) { return x - y; });
-      break;
-    case CsgOperation::unite:
-      apply(a, source, [](float x, float y) { return std::max(x, clamp_01(y)); });
-      break;
-    case CsgOperation::intersect:
-      apply(a, source, [](float x, float y) { return std::min(x, clamp_01(y)); });
-      break;
-    case CsgOperation::difference:
-      apply(a, source, [](float x, float y) { return std::min(x, 1 - clamp_01(y)); });
-      break;
-    case CsgOperation::exclusive_or:
-      apply(a, source, [](float x, float y) {
-        const float b = clamp_01(y);
-        return std::max(std::min(x, 1 - b), std::min(1 - x, b));
-      });
-      break;
-    }
-  if (sum)
-    apply(a, {}, [](float x, float) { return at_least_0(x); });
-  if (!std::all_of(a.begin(), a.end(),
-                   [](float x) { return x <= std::numeric_limits<float>::max(); }))
+/// The first operand's value as the result so far.
+float start_value(CsgOperation operation, float a) {
+  return is_sum(operation) ? a : clamp_01(a);
+}
+
+/// Calls apply(f) with f(result so far, next operand's value).
+template <class Apply>
+void with_function(CsgOperation operation, Apply&& apply) {
+  switch (operation) {
+  case CsgOperation::add:
+    return apply([](float x, float y) { return x + y; });
+  case CsgOperation::subtract:
+    return apply([](float x, float y) { return x - y; });
+  case CsgOperation::unite:
+    return apply([](float x, float y) { return std::max(x, clamp_01(y)); });
+  case CsgOperation::intersect:
+    return apply([](float x, float y) { return std::min(x, clamp_01(y)); });
+  case CsgOperation::difference:
+    return apply([](float x, float y) { return std::min(x, 1 - clamp_01(y)); });
+  case CsgOperation::exclusive_or:
+    return apply([](float x, float y) {
+      const float b = clamp_01(y);
+      return std::max(std::min(x, 1 - b), std::min(1 - x, b));
+    });
+  }
+}
+
+float next_value(CsgOperation operation, float a, float b) {
+  with_function(operation, [&](auto&& function) { a = function(a, b); });
+  return a;
+}
+
+void check_range(float a) {
+  if (!(a <= std::numeric_limits<float>::max()))
     throw Error("the sum of the densities leaves the range of single precision");
+}
+
+float end_value(CsgOperation operation, float a) {
+  if (is_sum(operation))
+    a = at_least_0(a);
+  check_range(a);
+  return a;
+}
+
+/// Folds a leaf.
+void fold(CsgOperation operation, std::span<const BlockSource> sources, LeafValues& a) {
+  const BlockSource& first = sources[0];
+  for (std::size_t n = 0; n < a.size(); ++n)
+    a[n] = start_value(operation, first.detail ? first.leaf.values[n] : first.constant);
+  for (const BlockSource& source : sources.subspan(1))
+    with_function(operation, [&](auto&& function) {
+      if (source.detail)
+        for (std::size_t n = 0; n < a.size(); ++n)
+          a[n] = function(a[n], source.leaf.values[n]);
+      else
+        for (float& value : a)
+          value = function(value, source.constant);
+    });
+  if (is_sum(operation))
+    for (float& value : a)
+      value = at_least_0(value);
+  for (const float value : a)
+    check_range(value);
+}
+
+/// Whether a leaf has these values, active exactly where they aren't 0.
+bool is_leaf(const LeafView& leaf, const LeafValues& values) {
+  if (std::memcmp(leaf.values, values.data(), sizeof values) != 0)
+    return false;
+  std::array<std::uint64_t, 8> active{};
+  for (std::size_t n = 0; n < values.size(); ++n)
+    active[n / 64] |= static_cast<std::uint64_t>(values[n] != 0) << (n % 64);
+  return std::memcmp(leaf.active, active.data(), sizeof active) == 0;
 }
 
 // ---- what may be combined
@@ -128,39 +156,37 @@ std::optional<double> common_band(CsgOperation operation, std::span<const CsgOpe
   return first == nullptr ? std::nullopt : first->grid.info().band_isovalue;
 }
 
-/// Box of the active voxels of both grids, for the comparison of their lattices.
-void common_box(const Grid& a, const Grid& b, Int3& min, Int3& max) {
-  min = max = {0, 0, 0};
-  bool some = a.active_box(min, max);
-  Int3 b_min{}, b_max{};
-  if (!b.active_box(b_min, b_max))
-    return;
-  for (std::size_t n = 0; n < 3; ++n) {
-    min[n] = some ? std::min(min[n], b_min[n]) : b_min[n];
-    max[n] = some ? std::max(max[n], b_max[n]) : b_max[n];
-  }
+/// Compares where there is something: in the box of the active voxels of both grids.
+bool equal_lattices(const Grid& a, const Grid& b) {
+  Int3 min{}, max{}, b_min{}, b_max{};
+  const bool some = a.active_box(min, max);
+  if (b.active_box(b_min, b_max))
+    for (std::size_t n = 0; n < 3; ++n) {
+      min[n] = some ? std::min(min[n], b_min[n]) : b_min[n];
+      max[n] = some ? std::max(max[n], b_max[n]) : b_max[n];
+    }
+  return same_lattice(a.info().transform, b.info().transform, min, max);
 }
 
 /// Grids of all operands on the first one's lattice.
-std::vector<Grid> on_one_lattice(const Context& context, std::span<const CsgOperand> operands,
+std::vector<Grid> on_one_lattice(const Context& context, std::vector<CsgOperand> operands,
                                  const CsgOptions& options, CsgReport& report) {
-  const CsgOperand& first = operands[0];
-  std::vector<Grid> grids{first.grid};
-  for (const CsgOperand& operand : operands.subspan(1)) {
-    const GridInfo &a = first.grid.info(), &b = operand.grid.info();
+  const std::string first_name = operands[0].name;
+  const GridInfo a = operands[0].grid.info();
+  std::vector<Grid> grids;
+  for (CsgOperand& operand : operands) {
+    const GridInfo& b = operand.grid.info();
     if (a.isovalue != b.isovalue)
-      throw Error("isovalues differ: " + first.name + " has " + number(a.isovalue) + ", " +
+      throw Error("isovalues differ: " + first_name + " has " + number(a.isovalue) + ", " +
                   operand.name + " has " + number(b.isovalue) + ", expected equal ones");
-    Int3 min{}, max{};
-    common_box(first.grid, operand.grid, min, max);
-    if (same_lattice(a.transform, b.transform, min, max)) {
-      grids.push_back(operand.grid);
+    if (a.transform == b.transform || equal_lattices(grids[0], operand.grid)) {
+      grids.push_back(std::move(operand.grid));
     } else if (options.resample) {
       grids.push_back(
           at(operand.name, [&] { return resample(context, operand.grid, a.transform); }));
       ++report.resampled;
     } else {
-      throw Error("lattices differ: " + first.name + " has " + a.transform.describe() + ", " +
+      throw Error("lattices differ: " + first_name + " has " + a.transform.describe() + ", " +
                   operand.name + " has " + b.transform.describe() +
                   ", expected equal ones or --resample");
     }
@@ -168,180 +194,123 @@ std::vector<Grid> on_one_lattice(const Context& context, std::span<const CsgOper
   return grids;
 }
 
-// ---- where there is something to combine
-
-/// All operands' leaves in one place.
-struct LeafGroup {
-  Int3 origin;
-  std::size_t begin, end; ///< in Regions::leaves
-};
-
-struct OperandLeaf {
-  std::size_t operand;
-  LeafView view;
-};
-
-/// Disjoint regions that cover all leaves and tiles of the operands.
-struct Regions {
-  std::vector<OperandLeaf> leaves; ///< by origin, then operand
-  std::vector<LeafGroup> groups;   ///< by origin
-  std::vector<TileView> constant;  ///< regions in which every operand is constant; values unset
-};
-
-Int3 corner_of(const Int3& ijk, std::int32_t dim) {
-  return {ijk[0] & -dim, ijk[1] & -dim, ijk[2] & -dim};
-}
-
-void sort_unique(std::vector<Int3>& origins) {
-  std::sort(origins.begin(), origins.end());
-  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
-}
-
-bool contains(const std::vector<Int3>& sorted, const Int3& origin) {
-  return std::binary_search(sorted.begin(), sorted.end(), origin);
-}
-
-/// Cuts those `tiles` of edge `dim` that hold some of `taken` (sorted origins of blocks of edge
-/// `part`) into blocks of that edge; returns the blocks that aren't taken and leaves the whole
-/// tiles.
-std::vector<Int3> split_tiles(std::vector<Int3>& tiles, std::int32_t dim,
-                              const std::vector<Int3>& taken, std::int32_t part) {
-  std::vector<Int3> occupied;
-  for (const Int3& origin : taken)
-    occupied.push_back(corner_of(origin, dim));
-  sort_unique(occupied);
-  std::vector<Int3> blocks;
-  std::erase_if(tiles, [&](const Int3& tile) {
-    if (!contains(occupied, tile))
-      return false;
-    for (std::int32_t i = 0; i < dim; i += part)
-      for (std::int32_t j = 0; j < dim; j += part)
-        for (std::int32_t k = 0; k < dim; k += part)
-          if (const Int3 block{tile[0] + i, tile[1] + j, tile[2] + k}; !contains(taken, block))
-            blocks.push_back(block);
-    return true;
-  });
-  return blocks;
-}
-
-Regions find_regions(std::span<const Grid> grids) {
-  Regions regions;
-  std::vector<Int3> tiles_8, tiles_128, tiles_4096, leaf_origins;
-  for (std::size_t g = 0; g < grids.size(); ++g) {
-    for (const LeafView& leaf : grids[g].leaves())
-      regions.leaves.push_back({g, leaf});
-    for (const TileView& tile : grids[g].tiles())
-      (tile.dim == 8 ? tiles_8 : tile.dim == 128 ? tiles_128 : tiles_4096).push_back(tile.origin);
-  }
-  std::sort(regions.leaves.begin(), regions.leaves.end(),
-            [](const OperandLeaf& a, const OperandLeaf& b) {
-              return a.view.origin != b.view.origin ? a.view.origin < b.view.origin
-                                                    : a.operand < b.operand;
-            });
-  for (std::size_t n = 0; n < regions.leaves.size(); ++n) {
-    const Int3& origin = regions.leaves[n].view.origin;
-    if (n == 0 || regions.groups.back().origin != origin) {
-      regions.groups.push_back({origin, n, n});
-      leaf_origins.push_back(origin);
-    }
-    regions.groups.back().end = n + 1;
-  }
-
-  sort_unique(tiles_8);
-  sort_unique(tiles_128);
-  sort_unique(tiles_4096);
-  std::erase_if(tiles_8, [&](const Int3& origin) { return contains(leaf_origins, origin); });
-  std::vector<Int3> taken_8 = leaf_origins; // blocks of 8³ that are leaves or tiles
-  taken_8.insert(taken_8.end(), tiles_8.begin(), tiles_8.end());
-  sort_unique(taken_8);
-  std::vector<Int3> taken_128 = tiles_128;
-  for (const Int3& origin : taken_8)
-    taken_128.push_back(corner_of(origin, 128));
-  sort_unique(taken_128);
-
-  // A large tile that holds smaller things is cut; what is taken of it then may itself have to be
-  // cut.
-  std::vector<Int3> cut_4096 = tiles_4096;
-  const std::vector<Int3> new_128 = split_tiles(tiles_4096, 4096, taken_128, 128);
-  std::erase_if(cut_4096, [&](const Int3& tile) { return contains(tiles_4096, tile); });
-  for (const Int3& block : taken_128)
-    if (contains(cut_4096, corner_of(block, 4096)))
-      tiles_128.push_back(block);
-  tiles_128.insert(tiles_128.end(), new_128.begin(), new_128.end());
-  sort_unique(tiles_128);
-  const std::vector<Int3> new_8 = split_tiles(tiles_128, 128, taken_8, 8);
-  tiles_8.insert(tiles_8.end(), new_8.begin(), new_8.end());
-  sort_unique(tiles_8);
-
-  for (const Int3& origin : tiles_4096)
-    regions.constant.push_back({origin, 4096, 0, false});
-  for (const Int3& origin : tiles_128)
-    regions.constant.push_back({origin, 128, 0, false});
-  for (const Int3& origin : tiles_8)
-    regions.constant.push_back({origin, 8, 0, false});
-  return regions;
-}
-
 // ---- combining
 
-using LeafValues = std::array<float, leaf_voxels>;
-
-struct Folder {
-  CsgOperation operation;
-  std::vector<GridAccessor> accessors;
-  std::vector<Source> sources;
-
-  Folder(CsgOperation op, std::span<const Grid> grids) : operation(op), sources(grids.size()) {
-    for (const Grid& grid : grids)
-      accessors.emplace_back(grid);
-  }
-  /// \pre every operand is constant around `origin`
-  float constant(const Int3& origin) {
-    for (std::size_t g = 0; g < sources.size(); ++g) {
-      sources[g] = {};
-      (void)accessors[g].leaf_at(origin, sources[g].constant);
-    }
-    std::array<float, 1> value{};
-    fold(operation, sources, value);
-    return value[0];
-  }
-  void leaf(const Regions& regions, const LeafGroup& group, LeafValues& values) {
-    std::size_t n = group.begin;
-    for (std::size_t g = 0; g < sources.size(); ++g) {
-      sources[g] = {};
-      if (n < group.end && regions.leaves[n].operand == g)
-        sources[g].values = regions.leaves[n++].view.values;
-      else
-        (void)accessors[g].leaf_at(group.origin, sources[g].constant);
-    }
-    fold(operation, sources, values);
-  }
+/// What is known of an operand's values beforehand.
+struct Known {
+  bool kept = false;         ///< alone it would be the result, leaf by leaf and tile by tile
+  bool not_negative = false; ///< no value is below 0
 };
 
-std::array<std::uint64_t, 8> active_bits(const LeafValues& values) {
-  std::array<std::uint64_t, 8> active{};
-  for (std::size_t n = 0; n < values.size(); ++n)
-    active[n / 64] |= static_cast<std::uint64_t>(values[n] != 0) << (n % 64);
-  return active;
+Known known_of(const ValueSummary& values, CsgOperation operation) {
+  const bool not_negative = values.min >= 0;
+  return {not_negative && !std::signbit(values.min) && (is_sum(operation) || values.max <= 1) &&
+              values.active_where_not_0 && values.varied_leaves,
+          not_negative};
 }
 
-/// What becomes of a group of leaves.
-struct Outcome {
-  enum class Kind { computed, shared, constant } kind = Kind::computed;
-  std::size_t leaf = 0; ///< shared: in Regions::leaves
-  float value = 0;      ///< constant
+/// Decides a block from the operands that are constant in it, by the neutral and the absorbing
+/// elements of the operations.
+class Rule {
+public:
+  Rule(CsgOperation operation, std::vector<Known> known)
+      : operation_(operation), known_(std::move(known)) {}
+
+  BlockDecision operator()(std::span<const BlockSource> sources) const {
+    if (operation_ == CsgOperation::subtract && nothing_left(sources))
+      return {Decided::constant, 0, 0};
+    State state = first(sources[0]);
+    for (std::size_t g = 1; g < sources.size(); ++g)
+      state = sources[g].detail ? with_detail(state, g) : with_constant(state, sources[g].constant);
+    if (state.kind == State::Kind::constant)
+      return {Decided::constant, end_value(operation_, state.value), 0};
+    if (state.kind == State::Kind::operand && known_[state.operand].kept)
+      return {Decided::take, 0, state.operand};
+    return {};
+  }
+
+private:
+  /// The result so far.
+  struct State {
+    enum class Kind { constant, operand, unknown } kind = Kind::unknown;
+    float value = 0;         ///< constant
+    std::size_t operand = 0; ///< operand: equal to that one, limited as the operation does
+  };
+  using Kind = State::Kind;
+  using Decided = BlockDecision::Kind;
+
+  State first(const BlockSource& source) const {
+    if (source.detail)
+      return {Kind::operand, 0, 0};
+    return {Kind::constant, start_value(operation_, source.constant), 0};
+  }
+  State with_constant(const State& state, float b) const {
+    if (state.kind == Kind::constant)
+      return {Kind::constant, next_value(operation_, state.value, b), 0};
+    if (!is_sum(operation_))
+      b = clamp_01(b);
+    switch (operation_) {
+    case CsgOperation::unite:
+      if (b == 1)
+        return {Kind::constant, 1, 0};
+      break;
+    case CsgOperation::intersect:
+      if (b == 0)
+        return {Kind::constant, 0, 0};
+      return b == 1 ? state : State{};
+    case CsgOperation::difference:
+      if (b == 1)
+        return {Kind::constant, 0, 0};
+      break;
+    case CsgOperation::add:
+    case CsgOperation::subtract:
+    case CsgOperation::exclusive_or:
+      break;
+    }
+    return b == 0 ? state : State{};
+  }
+  State with_detail(const State& state, std::size_t operand) const {
+    if (state.kind != Kind::constant)
+      return {};
+    const State its{Kind::operand, 0, operand};
+    const float a = state.value;
+    switch (operation_) {
+    case CsgOperation::add:
+    case CsgOperation::exclusive_or:
+      return a == 0 ? its : State{};
+    case CsgOperation::unite:
+      return a == 1 ? state : a == 0 ? its : State{};
+    case CsgOperation::intersect:
+      return a == 0 ? state : a == 1 ? its : State{};
+    case CsgOperation::difference:
+      return a == 0 ? state : State{};
+    case CsgOperation::subtract:
+      break;
+    }
+    return {};
+  }
+  /// Of nothing no more is left, whatever is taken away.
+  bool nothing_left(std::span<const BlockSource> sources) const {
+    if (sources[0].detail || sources[0].constant > 0)
+      return false;
+    for (std::size_t g = 1; g < sources.size(); ++g)
+      if (sources[g].detail ? !known_[g].not_negative : sources[g].constant < 0)
+        return false;
+    return true;
+  }
+
+  CsgOperation operation_;
+  std::vector<Known> known_;
 };
 
-Outcome outcome_of(const Regions& regions, const LeafGroup& group, const LeafValues& values) {
+BlockDecision combine_leaf(CsgOperation operation, std::span<const BlockSource> sources,
+                           LeafValues& values) {
+  fold(operation, sources, values);
   if (std::all_of(values.begin(), values.end(), [&](float v) { return v == values[0]; }))
-    return {Outcome::Kind::constant, 0, values[0]};
-  const std::array<std::uint64_t, 8> active = active_bits(values);
-  for (std::size_t n = group.begin; n < group.end; ++n) {
-    const LeafView& view = regions.leaves[n].view;
-    if (std::memcmp(view.values, values.data(), sizeof values) == 0 &&
-        std::memcmp(view.active, active.data(), sizeof active) == 0)
-      return {Outcome::Kind::shared, n, 0};
-  }
+    return {BlockDecision::Kind::constant, values[0], 0};
+  for (std::size_t g = 0; g < sources.size(); ++g)
+    if (sources[g].detail && is_leaf(sources[g].leaf, values))
+      return {BlockDecision::Kind::take, 0, g};
   return {};
 }
 
@@ -365,7 +334,7 @@ CsgOperation csg_operation_from_name(std::string_view name) {
   return static_cast<CsgOperation>(it - names.begin());
 }
 
-Grid csg(const Context& context, CsgOperation operation, std::span<const CsgOperand> operands,
+Grid csg(const Context& context, CsgOperation operation, std::vector<CsgOperand> operands,
          const CsgOptions& options, CsgReport* report) {
   if (operands.size() < 2)
     throw Error("csg: " + std::to_string(operands.size()) + " volumes, expected at least 2");
@@ -376,65 +345,23 @@ Grid csg(const Context& context, CsgOperation operation, std::span<const CsgOper
     check_operand(operand);
   GridInfo info = operands[0].grid.info();
   info.band_isovalue = common_band(operation, operands);
-  const std::vector<Grid> grids = on_one_lattice(context, operands, options, r);
-  const Regions regions = find_regions(grids);
-
-  // First what becomes of each leaf, so that no more memory is taken than the result needs; those
-  // with values of their own are computed again in place.
-  Context quiet = context;
-  quiet.progress = nullptr;
-  std::vector<Outcome> outcomes(regions.groups.size());
-  parallel_blocks(quiet, outcomes.size(), 256, [&](std::size_t begin, std::size_t end) {
-    Folder folder(operation, grids);
-    LeafValues values{};
-    for (std::size_t n = begin; n < end; ++n) {
-      folder.leaf(regions, regions.groups[n], values);
-      outcomes[n] = outcome_of(regions, regions.groups[n], values);
-    }
-  });
-
-  GridBuilder builder(info);
-  Folder folder(operation, grids);
-  const auto add_tile = [&](const Int3& origin, std::int32_t dim, float value) {
-    if (value != 0)
-      builder.add_tile({origin, dim, value, true});
-  };
-  r.tiles_combined = regions.constant.size();
-  for (const TileView& tile : regions.constant) // large ones first
-    add_tile(tile.origin, tile.dim, folder.constant(tile.origin));
-  std::vector<Int3> computed_origins;
-  std::vector<std::size_t> computed;
-  for (std::size_t n = 0; n < outcomes.size(); ++n) {
-    if (outcomes[n].kind == Outcome::Kind::constant) {
-      add_tile(regions.groups[n].origin, leaf_dim, outcomes[n].value);
-      ++r.leaves_constant;
-    } else if (outcomes[n].kind == Outcome::Kind::shared) {
-      ++r.leaves_shared;
-    } else {
-      computed.push_back(n);
-      computed_origins.push_back(regions.groups[n].origin);
-    }
-  }
-  r.leaves_computed = computed.size();
-  require_memory(context, 2400.0 * static_cast<double>(r.leaves_computed + r.leaves_shared),
-                 "the combined volume");
-  for (const Outcome& outcome : outcomes)
-    if (outcome.kind == Outcome::Kind::shared) {
-      const OperandLeaf& leaf = regions.leaves[outcome.leaf];
-      builder.share_leaf(grids[leaf.operand], leaf.view);
-    }
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, computed_origins);
-  parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
-    Folder block_folder(operation, grids);
-    LeafValues values{};
-    for (std::size_t n = begin; n < end; ++n) {
-      block_folder.leaf(regions, regions.groups[computed[n]], values);
-      std::copy(values.begin(), values.end(), leaves[n].values);
-      const std::array<std::uint64_t, 8> active = active_bits(values);
-      std::copy(active.begin(), active.end(), leaves[n].active);
-    }
-  });
-  return builder.finish(false);
+  std::vector<Grid> grids = on_one_lattice(context, std::move(operands), options, r);
+  std::vector<Known> known;
+  for (const Grid& grid : grids)
+    known.push_back(known_of(grid.summary(context), operation));
+  FoldReport counts;
+  Grid result = fold_grids(
+      context, info, std::move(grids), Rule(operation, std::move(known)),
+      [&](std::span<const BlockSource> sources, LeafValues& values) {
+        return combine_leaf(operation, sources, values);
+      },
+      counts);
+  r.leaves_computed = counts.leaves_computed;
+  r.leaves_shared = counts.leaves_taken;
+  r.leaves_constant = counts.leaves_constant;
+  r.leaves_skipped = counts.leaves_skipped;
+  r.tiles_combined = counts.tiles_combined;
+  return result;
 }
 
 } // namespace gewebe

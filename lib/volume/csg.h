@@ -5,7 +5,6 @@
 #include "volume/grid.h"
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,13 +40,18 @@ struct CsgReport {
   std::uint64_t leaves_computed = 0; ///< with values of their own
   std::uint64_t leaves_shared = 0;   ///< equal to an operand's leaf
   std::uint64_t leaves_constant = 0; ///< that came out constant: tiles, or nothing where 0
-  std::uint64_t tiles_combined = 0;  ///< constant regions combined in O(1) each
+  std::uint64_t leaves_skipped = 0;  ///< operands', in blocks constant whatever they hold
+  std::uint64_t tiles_combined = 0;  ///< constant regions, not all 0, combined in O(1) each
   std::uint64_t resampled = 0;       ///< operands
 };
 
 /// Folds the operands from left to right, voxel by voxel in single precision. The result has the
 /// first one's lattice, isovalue and name, and is active where its value isn't 0. Work follows the
 /// operands' leaves and tiles; the result is the same for any number of threads.
+///
+/// Operands that nobody else holds (move them in) are used up: the largest one's tree becomes the
+/// result's, and then the cost follows the other operands, not this one, where they leave it
+/// untouched. Leaves taken over from operands that live on are shared, never copied.
 ///
 /// A band volume (exact only near one isovalue v) can be united and intersected, and with v = ½
 /// used in the other set operations, together with volumes that have no band or the same; the
@@ -57,7 +61,7 @@ struct CsgReport {
 /// operands, a level set, a background other than 0, voxels that aren't cubic, different isovalues,
 /// a band where it can't be used, different lattices without options.resample, a sum beyond single
 /// precision, context.max_memory
-Grid csg(const Context& context, CsgOperation operation, std::span<const CsgOperand> operands,
+Grid csg(const Context& context, CsgOperation operation, std::vector<CsgOperand> operands,
          const CsgOptions& options = {}, CsgReport* report = nullptr);
 
 } // namespace gewebe

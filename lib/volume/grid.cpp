@@ -3,6 +3,7 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "volume/value_summary_internal.h"
 
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tree/ValueAccessor.h>
@@ -14,8 +15,10 @@ namespace gewebe {
 namespace {
 
 using openvdb::Coord;
-using Leaf = FloatTree::LeafNodeType;
+using Leaf = FloatLeaf;
 using LeafBuffer = Leaf::Buffer;
+
+static_assert(Leaf::DIM == leaf_dim && Leaf::SIZE == leaf_voxels);
 
 // OpenVDB has no call that lets a leaf's values lie in memory of ours. An explicit instantiation
 // may name private members, which gives the address of the pointer without any trick on the layout.
@@ -28,7 +31,22 @@ template struct Reveal<&LeafBuffer::mData>;
 
 constexpr openvdb::Index32 borrowed = 1; // Leaf::transientData
 
-/// A leaf whose values lie at `values`.
+struct TreeDeleter {
+  std::shared_ptr<LeafStorage> storage;
+  FloatTree::Ptr adopted; // null: the tree was made here
+  void operator()(FloatTree* tree) {
+    for (auto upper = tree->root().beginChildOn(); upper; ++upper)
+      for (auto lower = upper->beginChildOn(); lower; ++lower)
+        for (auto leaf = lower->beginChildOn(); leaf; ++leaf)
+          give_back(*leaf);
+    if (adopted == nullptr)
+      delete tree;
+    adopted.reset();
+  }
+};
+
+} // namespace
+
 std::unique_ptr<Leaf> borrowing_leaf(const Coord& origin, float* values) {
   auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), origin);
   values_of(leaf->buffer()) = values;
@@ -41,38 +59,30 @@ void give_back(Leaf& leaf) {
     values_of(leaf.buffer()) = nullptr;
 }
 
-struct TreeDeleter {
-  std::shared_ptr<LeafStorage> storage;
-  void operator()(FloatTree* tree) const {
-    for (auto upper = tree->root().beginChildOn(); upper; ++upper)
-      for (auto lower = upper->beginChildOn(); lower; ++lower)
-        for (auto leaf = lower->beginChildOn(); leaf; ++leaf)
-          give_back(*leaf);
-    delete tree;
-  }
-};
-
-static_assert(Leaf::DIM == leaf_dim && Leaf::SIZE == leaf_voxels);
-
-Int3 to_int3(const Coord& c) {
-  return {c.x(), c.y(), c.z()};
+void borrow_values(Leaf& leaf, float* values) {
+  if (leaf.transientData() != borrowed)
+    delete[] values_of(leaf.buffer()); // as ~LeafBuffer does
+  values_of(leaf.buffer()) = values;
+  leaf.setTransientData(borrowed);
 }
-Coord to_coord(const Int3& i) {
-  return {i[0], i[1], i[2]};
+
+std::uint64_t* mask_words(Leaf& leaf) {
+  // NodeMask keeps its eight words in one array; the non-const accessor is the only way to its
+  // address.
+  return &const_cast<Leaf::NodeMaskType&>(leaf.getValueMask()).getWord<std::uint64_t>(0);
 }
 
 LeafView view_of(const Leaf& leaf) {
-  // NodeMask keeps its eight words in one array; the non-const accessor is the only way to its
-  // address.
-  auto& mask = const_cast<Leaf&>(leaf).getValueMask();
-  return {to_int3(leaf.origin()), leaf.buffer().data(),
-          &const_cast<Leaf::NodeMaskType&>(mask).getWord<std::uint64_t>(0)};
+  return {to_int3(leaf.origin()), leaf.buffer().data(), mask_words(const_cast<Leaf&>(leaf))};
 }
 
-} // namespace
-
 FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage) {
-  return {new FloatTree(background), TreeDeleter{storage}};
+  return {new FloatTree(background), TreeDeleter{storage, nullptr}};
+}
+
+FloatTree::Ptr adopt_tree(FloatTree::Ptr tree, const std::shared_ptr<LeafStorage>& storage) {
+  FloatTree* const raw = tree.get();
+  return {raw, TreeDeleter{storage, std::move(tree)}};
 }
 
 Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage) {
@@ -83,7 +93,8 @@ Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> 
 }
 
 Grid::Grid() : native_(std::make_shared<Native>()) {
-  native_->tree = std::make_shared<FloatTree>(0.0F);
+  native_->storage = std::make_shared<LeafStorage>();
+  native_->tree = make_tree(0, native_->storage);
 }
 
 Grid::Grid(GridInfo info, std::shared_ptr<Native> native)
@@ -109,6 +120,12 @@ std::vector<TileView> Grid::tiles() const {
     views.push_back({to_int3(box.min()), box.dim().x(), *value, active});
   }
   return views;
+}
+
+const ValueSummary& Grid::summary(const Context& context) const {
+  std::call_once(native_->summary_once,
+                 [&] { native_->summary = summarize_values(context, leaves(), tiles(), info_); });
+  return native_->summary;
 }
 
 std::uint64_t Grid::active_voxels() const {

@@ -1,7 +1,7 @@
 #pragma once
 // A sparse volume of float values: our narrow view of an OpenVDB float grid. Everything that
-// computes on volumes goes through this header, so that OpenVDB is compiled in two units only
-// (volume/grid.cpp and formats/volume_file.cpp).
+// computes on volumes goes through this header, so that OpenVDB is compiled in three units only
+// (volume/grid.cpp, volume/grid_fold.cpp and formats/volume_file.cpp).
 //
 // Voxel (i,j,k) has its centre at world T(i,j,k) and covers ±½ in index space. Values live in
 // leaves of 8×8×8 voxels whose origin is a multiple of 8; offset of a voxel in its leaf: (i&7)*64 +
@@ -84,6 +84,14 @@ struct TileView {
   bool active = false;
 };
 
+/// What the values of a grid have in common, those of inactive voxels included.
+struct ValueSummary {
+  bool finite = true;             ///< no infinity, no NaN
+  float min = 0, max = 0;         ///< over leaves and tiles; background if there are none
+  bool active_where_not_0 = true; ///< a voxel or tile is active exactly if its value isn't 0
+  bool varied_leaves = true;      ///< no leaf's values are all equal
+};
+
 /// Writable leaf of a grid under construction.
 struct LeafRef {
   Int3 origin{};
@@ -104,6 +112,8 @@ public:
   /// All tiles that are active or differ from the background, in an order that depends on the
   /// content alone.
   std::vector<TileView> tiles() const;
+  /// Found at the first call, which looks at all values, and kept.
+  const ValueSummary& summary(const Context& context) const;
   /// Number of active voxels, those of tiles included.
   std::uint64_t active_voxels() const;
   /// Bytes of memory that the tree holds.

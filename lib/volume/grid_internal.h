@@ -1,5 +1,6 @@
 #pragma once
-// The OpenVDB grid behind a Grid; for volume/grid.cpp and formats/volume_file.cpp only.
+// The OpenVDB grid behind a Grid; for volume/grid.cpp, grid_fold.cpp and formats/volume_file.cpp
+// only.
 
 #include "base/zero_pages.h"
 #include "volume/grid.h"
@@ -7,6 +8,7 @@
 #include <openvdb/openvdb.h>
 
 #include <memory>
+#include <mutex>
 #include <vector>
 
 namespace gewebe {
@@ -19,18 +21,41 @@ struct LeafStorage {
   std::vector<std::shared_ptr<const void>> lenders; ///< whoever owns values that are shared
 };
 
-/// The tree comes from make_tree, or from OpenVDB with values of its own. Leaves that borrow their
-/// values are marked (transientData) and let go of them before the tree dies, so nothing may delete
-/// or steal such a leaf behind its back; copying is safe.
+/// Leaves that borrow their values are marked (transientData) and let go of them before the tree
+/// dies, so nothing may delete or steal such a leaf behind its back; copying is safe.
 struct Grid::Native {
-  FloatTree::Ptr tree;
-  std::shared_ptr<LeafStorage> storage; ///< null: all leaves own their values
+  FloatTree::Ptr tree; ///< from make_tree or adopt_tree
+  std::shared_ptr<LeafStorage> storage;
+  std::once_flag summary_once;
+  ValueSummary summary;
 };
 
 /// An empty tree whose leaves may borrow from `storage`, which lives as long as the tree.
 FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage);
+/// The same for a tree of OpenVDB's making. \pre nobody else holds it
+FloatTree::Ptr adopt_tree(FloatTree::Ptr tree, const std::shared_ptr<LeafStorage>& storage);
 
-/// A Grid over a tree that nobody changes any more.
-Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage = nullptr);
+/// A Grid over a tree that nobody changes any more, from make_tree or adopt_tree with `storage`.
+Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage);
+
+using FloatLeaf = FloatTree::LeafNodeType;
+
+/// A leaf, all voxels inactive, whose values lie at `values`.
+std::unique_ptr<FloatLeaf> borrowing_leaf(const openvdb::Coord& origin, float* values);
+/// Gives `leaf` these values instead of those that it has.
+void borrow_values(FloatLeaf& leaf, float* values);
+/// A borrowing leaf forgets its values, so that it may be deleted.
+void give_back(FloatLeaf& leaf);
+
+inline Int3 to_int3(const openvdb::Coord& c) {
+  return {c.x(), c.y(), c.z()};
+}
+inline openvdb::Coord to_coord(const Int3& i) {
+  return {i[0], i[1], i[2]};
+}
+
+/// The eight words of a leaf's mask.
+std::uint64_t* mask_words(FloatLeaf& leaf);
+LeafView view_of(const FloatLeaf& leaf);
 
 } // namespace gewebe
