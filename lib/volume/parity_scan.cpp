@@ -7,10 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "volume/inside_scan_internal.h"
-#include "volume/ray_crossings_internal.h"
-#include "volume/ray_crossings_kernel_internal.h"
-
-#include <memory>
+#include "volume/triangle_chunks_internal.h"
 
 namespace gewebe {
 namespace {
@@ -18,149 +15,6 @@ namespace {
 std::int32_t floor_divide(std::int32_t n, std::int32_t by) {
   const std::int32_t quotient = n / by;
   return quotient - (n % by < 0 ? 1 : 0);
-}
-
-// ---- which triangles a chunk of slabs meets
-
-/// Half-open range.
-struct Range {
-  std::int32_t begin = 0, end = 0;
-};
-
-/// Sample rows that a triangle may cross; empty if none.
-Range rows_of(const SampleMesh& mesh, const Triangle& t) {
-  const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
-  const double y_min = std::min(std::min(a.y, b.y), c.y), y_max = std::max(std::max(a.y, b.y), c.y);
-  if (ceil_int(y_min) > floor_int(y_max))
-    return {0, 0};
-  const double x_min = std::min(std::min(a.x, b.x), c.x), x_max = std::max(std::max(a.x, b.x), c.x);
-  return {ceil_int(x_min), ceil_int(x_max)};
-}
-
-/// A block of consecutive triangles, sorted into the chunks that they cross.
-struct Block {
-  std::int32_t first = 0;           ///< chunk
-  std::vector<std::uint32_t> begin; ///< per chunk from `first` on and one more: place in `members`
-  std::vector<std::uint32_t> members;
-  std::uint64_t skipped = 0;
-};
-
-Block sort_block(const Context& context, const SampleMesh& mesh, std::size_t begin, std::size_t end,
-                 std::int32_t chunk_rows) {
-  Block block;
-  std::vector<Range> chunks(end - begin);
-  Range all{INT32_MAX, INT32_MIN};
-  const double chunks_per_row = 1.0 / chunk_rows;
-  for (std::size_t n = begin; n < end; ++n) {
-    const Range rows = rows_of(mesh, mesh.triangles[n]);
-    if (rows.begin >= rows.end) {
-      ++block.skipped;
-      continue;
-    }
-    // Half a row keeps the quotient away from integers, by more than rounding can move it.
-    const Range c{floor_int((rows.begin + 0.5) * chunks_per_row),
-                  floor_int((rows.end - 0.5) * chunks_per_row) + 1};
-    chunks[n - begin] = c;
-    all = {std::min(all.begin, c.begin), std::max(all.end, c.end)};
-  }
-  if (all.begin >= all.end)
-    return block;
-  block.first = all.begin;
-  block.begin.assign(static_cast<std::size_t>(all.end - all.begin) + 1, 0);
-  const auto place = [&](std::int32_t chunk) -> std::uint32_t& {
-    return block.begin[static_cast<std::size_t>(chunk - all.begin)];
-  };
-  double members = 0;
-  for (const Range& c : chunks)
-    members += c.end - c.begin;
-  require_memory(context, members < 0x1p32 ? 4 * members : HUGE_VAL, "a block of long triangles");
-  std::uint32_t total = 0;
-  for (const Range& c : chunks)
-    for (std::int32_t chunk = c.begin; chunk < c.end; ++chunk)
-      ++place(chunk);
-  for (std::uint32_t& b : block.begin) // to the ends of the chunks' places
-    b = total += b;
-  block.members.resize(total);
-  for (std::size_t n = chunks.size(); n-- > 0;) // which become the beginnings again
-    for (std::int32_t chunk = chunks[n].begin; chunk < chunks[n].end; ++chunk)
-      block.members[--place(chunk)] = static_cast<std::uint32_t>(begin + n);
-  return block;
-}
-
-/// Slabs in chunks of a few, so that a triangle is seldom set up more than once.
-struct Chunks {
-  std::int32_t slabs_each = 1;
-  Range range; ///< of all chunks that are met
-  std::vector<Block> blocks;
-
-  std::size_t count() const { return static_cast<std::size_t>(range.end - range.begin); }
-};
-
-Chunks sort_triangles(const Context& context, const SampleMesh& mesh) {
-  Box3 box;
-  for (const Vec3& p : mesh.points) {
-    box.min.x = std::min(box.min.x, p.x);
-    box.max.x = std::max(box.max.x, p.x);
-  }
-  const double slabs = (box.max.x - box.min.x) / (leaf_dim * mesh.samples) + 1;
-  Chunks chunks;
-  // Samples that are counted take a list of crossings per row, so one slab is much.
-  if (mesh.samples == 1)
-    chunks.slabs_each = static_cast<std::int32_t>(std::clamp(slabs / 32, 1.0, 4.0));
-  const double count = slabs / chunks.slabs_each + 2;
-  const std::size_t grain = 8192 + static_cast<std::size_t>(count);
-  const double blocks = static_cast<double>(mesh.triangles.size()) / static_cast<double>(grain) + 1;
-  require_memory(context, 4 * count * blocks + 16.0 * static_cast<double>(mesh.triangles.size()),
-                 "sorting the triangles into slabs");
-  chunks.blocks.resize((mesh.triangles.size() + grain - 1) / grain);
-  Context quiet = context;
-  quiet.progress = nullptr;
-  parallel_blocks(quiet, mesh.triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
-    chunks.blocks[begin / grain] =
-        sort_block(context, mesh, begin, end, chunks.slabs_each * leaf_dim * mesh.samples);
-  });
-  chunks.range = {INT32_MAX, INT32_MIN};
-  for (const Block& b : chunks.blocks)
-    if (!b.members.empty())
-      chunks.range = {
-          std::min(chunks.range.begin, b.first),
-          std::max(chunks.range.end, b.first + static_cast<std::int32_t>(b.begin.size()) - 1)};
-  if (chunks.range.begin > chunks.range.end)
-    chunks.range = {0, 0};
-  return chunks;
-}
-
-template <class Visit>
-void for_each_crossing(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk, Range rows,
-                       std::uint64_t& exact_tests, Visit&& visit) {
-  const auto scalar = [&](std::uint32_t member) {
-    const Triangle& t = mesh.triangles[member];
-    cross_triangle(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], rows.begin, rows.end,
-                   exact_tests, visit);
-  };
-  std::unique_ptr<CrossingBuffer> buffer;
-  if (mesh.cpu != CpuLevel::baseline)
-    buffer.reset(new CrossingBuffer); // left as it is: the kernel says how much of it holds
-  for (const Block& block : chunks.blocks) {
-    const std::int32_t c = chunk - block.first;
-    if (c < 0 || c + 1 >= static_cast<std::int32_t>(block.begin.size()))
-      continue;
-    const auto n = static_cast<std::size_t>(c);
-    const std::uint32_t* const members = block.members.data() + block.begin[n];
-    const std::size_t count = block.begin[n + 1] - block.begin[n];
-    if (!buffer) {
-      std::for_each_n(members, count, scalar);
-      continue;
-    }
-    const TriangleList list{&mesh.points[0].x, &mesh.triangles[0][0], members, count, rows.begin,
-                            rows.end};
-    for (std::size_t next = 0; next < count;) {
-      next = cross_small_triangles_avx2(list, next, *buffer);
-      for (std::size_t m = 0; m < buffer->count; ++m)
-        visit(buffer->i[m], buffer->j[m], buffer->k[m]);
-      std::for_each_n(buffer->left, buffer->left_count, scalar);
-    }
-  }
 }
 
 // ---- one chunk
@@ -175,7 +29,8 @@ void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk
   std::array<LeafMap<BitLeaf>, 4> maps;
   const std::int32_t first = chunk * chunks.slabs_each * leaf_dim;
   for_each_crossing(mesh, chunks, chunk, {first, first + chunks.slabs_each * leaf_dim},
-                    counters.exact_tests, [&](std::int32_t i, std::int32_t j, std::int32_t k) {
+                    TieOrder::xyz, counters.exact_tests,
+                    [&](std::int32_t i, std::int32_t j, std::int32_t k) {
                       const int bit = (j & 7) * 8 + (k & 7);
                       maps[static_cast<std::size_t>((i - first) >> 3)]
                           .at({j >> 3, k >> 3})
@@ -206,7 +61,7 @@ void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk
   constexpr std::uint32_t bias = 0x80000000u;
   for (std::int32_t row = first; row < last; row += rows_at_once) {
     const std::int32_t row_end = std::min(last, row + rows_at_once);
-    for_each_crossing(mesh, chunks, chunk, {row, row_end}, counters.exact_tests,
+    for_each_crossing(mesh, chunks, chunk, {row, row_end}, TieOrder::xyz, counters.exact_tests,
                       [&](std::int32_t i, std::int32_t j, std::int32_t k) {
                         rows[static_cast<std::size_t>(i - row)].push_back(
                             std::uint64_t{static_cast<std::uint32_t>(j) + bias} << 32 |

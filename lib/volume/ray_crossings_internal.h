@@ -25,6 +25,10 @@ inline std::int32_t ceil_int(double x) {
   return n + (x > n ? 1 : 0);
 }
 
+/// Which coordinate of a sample point is moved by e1, e2, e3. Rays along other axes than k permute
+/// the coordinates, and the infinitesimals with them; x is always moved by more than y.
+enum class TieOrder { xyz, xzy, zxy };
+
 /// Is sample row (i, j) past the edge p-q in the direction of j? \pre p.x <= i < q.x
 bool past_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::int32_t j,
                std::uint64_t& exact_tests);
@@ -32,7 +36,7 @@ bool past_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::int32_t j,
 /// Smallest k in [low, high] whose sample (i, j, k) lies past the plane of a, b, c in the direction
 /// of k. \pre ray (i, j) crosses the triangle; sample `high` lies past it
 std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, std::int32_t i,
-                              std::int32_t j, std::int32_t low, std::int32_t high,
+                              std::int32_t j, std::int32_t low, std::int32_t high, TieOrder ties,
                               std::uint64_t& exact_tests);
 
 /// Where an edge crosses rows of rays: y = p.y + (i - p.x) slope.
@@ -92,8 +96,8 @@ struct PlaneHeight {
 /// that share it agree. \pre coordinates as in exact_predicates.h, magnitudes below 2^30
 template <class Emit>
 void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner2,
-                    std::int32_t row_begin, std::int32_t row_end, std::uint64_t& exact_tests,
-                    Emit&& emit) {
+                    std::int32_t row_begin, std::int32_t row_end, TieOrder ties,
+                    std::uint64_t& exact_tests, Emit&& emit) {
   const Vec3 *lowest = &corner0, *middle = &corner1, *highest = &corner2;
   if (middle->x < lowest->x)
     std::swap(lowest, middle);
@@ -125,12 +129,13 @@ void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner
             emit(i, j, below + 1);
           } else {
             const std::int32_t nearest = rest < 0.5 ? below : below + 1;
-            emit(i, j, first_past_plane(a, b, c, i, j, nearest, nearest + 1, exact_tests));
+            emit(i, j, first_past_plane(a, b, c, i, j, nearest, nearest + 1, ties, exact_tests));
           }
         } else {
           const auto [z_min, z_max] = std::minmax({a.z, b.z, c.z});
           emit(i, j,
-               first_past_plane(a, b, c, i, j, ceil_int(z_min), floor_int(z_max) + 1, exact_tests));
+               first_past_plane(a, b, c, i, j, ceil_int(z_min), floor_int(z_max) + 1, ties,
+                                exact_tests));
         }
       }
     }

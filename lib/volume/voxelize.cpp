@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "volume/depth_buffers_internal.h"
 #include "volume/exact_predicates.h"
 #include "volume/mesh_border.h"
 #include "volume/parity_scan_internal.h"
@@ -136,6 +137,8 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
   if (options.samples < 1 || options.samples > 64)
     throw Error("voxelize: " + std::to_string(options.samples) +
                 " samples along an edge, expected 1 to 64");
+  if (options.samples > 1 && options.rule != VoxelRule::parity)
+    throw Error("voxelize: more than one sample in a voxel, expected one with this rule");
   check_voxelize_input(mesh, transform);
   IndexMesh index = index_mesh(context, mesh, transform);
   require_memory(context, scan_bytes(index.extent, mesh, options.samples), "the voxelized mesh");
@@ -155,16 +158,20 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     return border;
   };
   SampleMesh samples{options.samples, index.points, mesh.triangles, context.cpu};
-  if (options.on_open == OpenMesh::fill)
-    if (const auto border = look_at_border(); !border.empty()) {
-      std::vector<Triangle> closed = mesh.triangles;
+  std::vector<Triangle> closed;
+  const bool looked = options.on_open == OpenMesh::fill || options.rule != VoxelRule::parity;
+  if (looked)
+    if (const auto border = look_at_border();
+        options.on_open == OpenMesh::fill && !border.empty()) {
+      closed = mesh.triangles;
       close_with_cones(border, index.points, closed);
       samples.points = index.points;
       samples.triangles = closed;
-      return parity_scan(context, samples, r, [] {});
     }
+  if (options.rule == VoxelRule::zbuffer)
+    return depth_buffer_scan(context, samples, r);
   InsideScan scan = parity_scan(context, samples, r, [&] {
-    if (options.on_open != OpenMesh::fill)
+    if (!looked)
       (void)look_at_border();
   });
   if (r.boundary_edges > 0 && options.on_open == OpenMesh::refuse)

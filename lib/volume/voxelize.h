@@ -19,14 +19,15 @@ namespace gewebe {
 
 /// What becomes of a mesh that has boundary edges.
 enum class OpenMesh {
-  refuse, ///< an Error with the counts
-  skip,   ///< rays with an odd number of crossings leave their samples outside
+  refuse, ///< an Error with the counts, if the rule is parity
+  skip,   ///< parity: rays with an odd number of crossings leave their samples outside
   fill,   ///< each hole is closed by a cone over its border to the mean of the border's points
 };
 
 /// When a sample point is inside.
 enum class VoxelRule {
-  parity, ///< a ray from it crosses the surface an odd number of times
+  parity,  ///< a ray from it crosses the surface an odd number of times
+  zbuffer, ///< along each axis it lies between the first and the last crossing (FZKA 7190, 3.1.5)
 };
 
 struct VoxelizeOptions {
