@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <memory>
+#include <mutex>
 #include <numeric>
 #include <string>
+#include <utility>
 
 namespace gewebe {
 namespace {
@@ -151,6 +153,8 @@ ValueSlab sum_slab(const DifferenceLeaves& map, SumRule rule) {
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::sort(order, {}, [&](std::uint32_t n) { return map.places[n]; });
   ValueSlab slab;
+  slab.places.reserve(order.size());
+  slab.leaves.reserve(order.size());
   ColumnSum sum(rule, slab);
   const LeafPlace* last = nullptr;
   for (const std::uint32_t n : order) {
@@ -159,11 +163,34 @@ ValueSlab sum_slab(const DifferenceLeaves& map, SumRule rule) {
       sum.start();
     else if (last->k + 1 < place.k)
       sum.add_gap({place.j, last->k + 1}, place.k);
-    sum.add(map.leaves[n], place);
+    sum.add(map.leaf(n), place);
     last = &place;
   }
   return slab;
 }
+
+/// Keeps the memory of leaves from slab to slab: touching it for the first time costs as much as
+/// the sums.
+class LeavesPool {
+public:
+  std::unique_ptr<DifferenceLeaves> take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty())
+      return std::make_unique<DifferenceLeaves>();
+    std::unique_ptr<DifferenceLeaves> leaves = std::move(free_.back());
+    free_.pop_back();
+    return leaves;
+  }
+  void give_back(std::unique_ptr<DifferenceLeaves> leaves) {
+    leaves->clear();
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(leaves));
+  }
+
+private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<DifferenceLeaves>> free_;
+};
 
 /// Adds the runs as tiles of 8³ and, where all 256 columns of a node of 128³ are full, of 128³.
 void add_tiles(const std::vector<ValueSlab>& slabs, std::int32_t first_slab, GridBuilder& builder) {
@@ -202,6 +229,12 @@ std::size_t DifferenceLeaves::slot_of(LeafPlace place) const {
   return slot;
 }
 
+void DifferenceLeaves::clear() {
+  std::ranges::fill(slots_, empty);
+  places.clear();
+  last_ = nullptr;
+}
+
 DifferenceLeaf& DifferenceLeaves::find(LeafPlace place) {
   std::size_t slot = slot_of(place);
   if (slots_[slot] == empty) {
@@ -212,11 +245,14 @@ DifferenceLeaf& DifferenceLeaves::find(LeafPlace place) {
       slot = slot_of(place);
     }
     slots_[slot] = static_cast<std::uint32_t>(places.size());
+    if (places.size() < leaves_.size())
+      leaves_[places.size()] = {};
+    else
+      leaves_.emplace_back();
     places.push_back(place);
-    leaves.emplace_back();
   }
   last_place_ = place;
-  last_ = &leaves[slots_[slot]];
+  last_ = &leaves_[slots_[slot]];
   return *last_;
 }
 
@@ -287,11 +323,13 @@ Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransf
                SumRule rule, CoverageReport& report,
                const std::function<void(std::size_t, DifferenceLeaves&)>& fill) {
   std::vector<ValueSlab> slabs(mesh.slab_begin.size() - 1);
+  LeavesPool pool;
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      DifferenceLeaves leaves;
-      fill(s, leaves);
-      slabs[s] = sum_slab(leaves, rule);
+      std::unique_ptr<DifferenceLeaves> leaves = pool.take();
+      fill(s, *leaves);
+      slabs[s] = sum_slab(*leaves, rule);
+      pool.give_back(std::move(leaves));
     }
   });
   GridInfo info;

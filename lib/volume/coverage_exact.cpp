@@ -15,62 +15,75 @@
 namespace gewebe {
 namespace {
 
-/// A convex polygon in space: a triangle cut by up to six planes has at most nine corners, and the
-/// walk keeps one plane more.
-struct Polygon {
-  static constexpr int capacity = 12;
-  int count = 0;
-  std::array<std::array<double, capacity>, 3> at; ///< per axis the corners' coordinates
+/// A corner, padded so that it is copied in two moves.
+struct alignas(16) Corner {
+  std::array<double, 4> at;
+};
 
-  void add(double x, double y, double z) {
-    const auto n = static_cast<std::size_t>(count);
-    at[0][n] = x;
-    at[1][n] = y;
-    at[2][n] = z;
-    ++count;
-  }
-  double min(std::size_t axis) const {
-    return *std::min_element(at[axis].begin(), at[axis].begin() + count);
-  }
-  double max(std::size_t axis) const {
-    return *std::max_element(at[axis].begin(), at[axis].begin() + count);
+/// A convex polygon in space: a triangle cut by up to six planes has at most nine corners, and the
+/// walk keeps one plane more; a place to spare is written by `split`.
+struct Polygon {
+  static constexpr std::size_t capacity = 12;
+  std::size_t count = 0;
+  std::array<Corner, capacity> corners;
+
+  struct Range {
+    double min, max;
+  };
+  Range range(std::size_t axis) const {
+    Range r{corners[0].at[axis], corners[0].at[axis]};
+    for (std::size_t n = 1; n < count; ++n) {
+      const double x = corners[n].at[axis];
+      r.min = x < r.min ? x : r.min;
+      r.max = x > r.max ? x : r.max;
+    }
+    return r;
   }
 };
 
 /// Cuts `whole` at coordinate `h` of `axis`.
 template <std::size_t axis>
 void split(const Polygon& whole, double h, Polygon& below, Polygon& above) {
-  below.count = above.count = 0;
-  const auto count = static_cast<std::size_t>(whole.count);
-  for (std::size_t n = 0, last = count - 1; n < count; last = n++) {
-    const double a = whole.at[axis][last], b = whole.at[axis][n];
-    if ((a < h && b > h) || (a > h && b < h)) {
+  std::size_t low = 0, high = 0;
+  const Corner* last = &whole.corners[whole.count - 1];
+  for (std::size_t n = 0; n < whole.count; ++n) {
+    const Corner* const corner = &whole.corners[n];
+    const double a = last->at[axis], b = corner->at[axis];
+    if ((a < h) != (b < h) && a != h && b != h) {
       const double t = (h - a) / (b - a);
-      std::array<double, 3> p;
+      Corner cut;
       for (std::size_t other = 0; other < 3; ++other)
-        p[other] = other == axis
-                       ? h
-                       : whole.at[other][last] + t * (whole.at[other][n] - whole.at[other][last]);
-      below.add(p[0], p[1], p[2]);
-      above.add(p[0], p[1], p[2]);
+        cut.at[other] = last->at[other] + t * (corner->at[other] - last->at[other]);
+      cut.at[axis] = h;
+      cut.at[3] = 0;
+      below.corners[low++] = cut;
+      above.corners[high++] = cut;
     }
-    if (b <= h)
-      below.add(whole.at[0][n], whole.at[1][n], whole.at[2][n]);
-    if (b >= h)
-      above.add(whole.at[0][n], whole.at[1][n], whole.at[2][n]);
+    // Written always and kept or not: which side a corner lies on cannot be predicted.
+    below.corners[low] = *corner;
+    low += b <= h;
+    above.corners[high] = *corner;
+    high += b >= h;
+    last = corner;
   }
+  below.count = low;
+  above.count = high;
 }
 
 /// Calls `visit(cell, polygon)` for the part of `rest` in each unit cell along `axis`, from the
-/// lowest up. Both polygons are used up.
+/// lowest up. `rest` is used up.
 template <std::size_t axis, class Visit>
 void for_each_cell(Polygon& rest, Visit&& visit) {
-  const double max = rest.max(axis);
-  std::int32_t cell = floor_int(rest.min(axis));
+  const Polygon::Range range = rest.range(axis);
+  std::int32_t cell = floor_int(range.min);
+  if (range.max <= cell + 1) { // the usual case
+    visit(cell, rest);
+    return;
+  }
   Polygon part, above;
   Polygon* from = &rest;
   Polygon* to = &above;
-  while (max > cell + 1) {
+  while (range.max > cell + 1) {
     split<axis>(*from, cell + 1, part, *to);
     if (part.count > 2)
       visit(cell, part);
@@ -93,19 +106,17 @@ public:
     // From here on relative to a voxel nearby, which loses no bits.
     for (int axis = 0; axis < 3; ++axis)
       base_[static_cast<std::size_t>(axis)] = floor_int(std::min({a[axis], b[axis], c[axis]}));
-    Polygon whole;
+    Polygon whole, cut, outside;
     for (const Vec3* p : {&a, &b, &c})
-      whole.add(p->x - base_[0], p->y - base_[1], p->z - base_[2]);
+      whole.corners[whole.count++].at = {p->x - base_[0], p->y - base_[1], p->z - base_[2], 0};
     const std::int32_t begin = first_row_ - base_[0], end = begin + leaf_dim;
-    if (whole.max(0) > end) {
-      Polygon outside, inside;
-      split<0>(whole, end, inside, outside);
-      whole = inside;
+    if (whole.range(0).max > end) {
+      split<0>(whole, end, cut, outside);
+      whole = cut;
     }
-    if (begin > 0) {
-      Polygon outside, inside;
-      split<0>(whole, begin, outside, inside);
-      whole = inside;
+    if (begin > 0 && whole.count > 2) {
+      split<0>(whole, begin, outside, cut);
+      whole = cut;
     }
     if (whole.count < 3)
       return;
@@ -121,13 +132,20 @@ public:
 
 private:
   void add_piece(std::size_t i, std::int32_t j, std::int32_t k, double top, const Polygon& piece) {
-    const auto& [x, y, z] = piece.at;
+    const auto corner = [&](std::size_t n) -> const std::array<double, 4>& {
+      return piece.corners[n].at;
+    };
     double area = 0, moment = 0; // twice the area, six times the volume up to `top`
-    const double h0 = top - z[0];
-    for (std::size_t n = 2; n < static_cast<std::size_t>(piece.count); ++n) {
-      const double twice = (x[n - 1] - x[0]) * (y[n] - y[0]) - (x[n] - x[0]) * (y[n - 1] - y[0]);
+    const double x0 = corner(0)[0], y0 = corner(0)[1], h0 = top - corner(0)[2];
+    double x1 = corner(1)[0] - x0, y1 = corner(1)[1] - y0, h1 = top - corner(1)[2];
+    for (std::size_t n = 2; n < piece.count; ++n) {
+      const double x2 = corner(n)[0] - x0, y2 = corner(n)[1] - y0, h2 = top - corner(n)[2];
+      const double twice = x1 * y2 - x2 * y1;
       area += twice;
-      moment += twice * (h0 + (top - z[n - 1]) + (top - z[n]));
+      moment += twice * (h0 + h1 + h2);
+      x1 = x2;
+      y1 = y2;
+      h1 = h2;
     }
     // Seen from below a face that looks down enters the solid.
     leaves_.at({j >> 3, k >> 3})

@@ -46,14 +46,17 @@ public:
       return *last_;
     return find(place);
   }
-  std::vector<LeafPlace> places;
-  std::deque<DifferenceLeaf> leaves; ///< in the order of `places`
+  /// Empties it but keeps its memory.
+  void clear();
+  const DifferenceLeaf& leaf(std::size_t n) const { return leaves_[n]; }
+  std::vector<LeafPlace> places; ///< of leaf 0, 1, …
 
 private:
   static constexpr std::uint32_t empty = UINT32_MAX;
   DifferenceLeaf& find(LeafPlace place);
   std::size_t slot_of(LeafPlace place) const;
   std::vector<std::uint32_t> slots_;
+  std::deque<DifferenceLeaf> leaves_; ///< the first places.size() are in use
   LeafPlace last_place_{};
   DifferenceLeaf* last_ = nullptr;
 };
