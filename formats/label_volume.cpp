@@ -7,6 +7,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <unordered_map>
 #include <utility>
@@ -80,6 +81,14 @@ std::optional<std::int64_t> label_of(T stored, const VoxelLayout& layout) {
   return static_cast<std::int64_t>(value);
 }
 
+template <class T>
+std::string value_text(T stored, const VoxelLayout& layout) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "%.9g",
+                      layout.slope * static_cast<double>(stored) + layout.intercept);
+  return text.data();
+}
+
 /// Rows of voxels of type T to bits.
 template <class T>
 std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayout& layout,
@@ -108,7 +117,7 @@ std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayo
         throw Error(name, "voxel (" + std::to_string(i) + ", " +
                               std::to_string(r % static_cast<std::size_t>(layout.size[1])) + ", " +
                               std::to_string(r / static_cast<std::size_t>(layout.size[1])) +
-                              ") is no whole number, expected labels");
+                              ") is " + value_text(stored, layout) + ", expected whole numbers");
       const bool wanted = at(name, [&] { return counter.count(*label); });
       set += wanted ? 1 : 0;
       words[i >> 6] |= static_cast<std::uint64_t>(wanted) << (i & 63);

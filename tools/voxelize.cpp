@@ -1,6 +1,7 @@
 // voxelize: closed mesh or labels -> volume.
 
 #include "volume/voxelize.h"
+#include "formats/label_volume.h"
 #include "formats/mesh_file.h"
 #include "formats/volume_file.h"
 #include "tools/antialias.h"
@@ -81,6 +82,8 @@ void work(cli::Run& run, const Arguments& a) {
   (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
   Output output(run.output(), run.output_options(true));
   Input input(a.mesh);
+  if (is_label_volume(input.peek(4096)))
+    throw Error(input.name(), "is a label volume, expected a mesh or --label L");
   MeshReadOptions read;
   read.kind = input_kind(input.peek(4096), a.mesh, run.format());
   read.unit = a.unit;

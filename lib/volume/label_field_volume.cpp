@@ -21,20 +21,16 @@ Int3 voxel_of(const Int3& first, std::size_t n) {
           first[2] + static_cast<std::int32_t>(n >> 6)};
 }
 
-/// dF/da in mm/mm, by what neighbours there are.
-double slope(const LabelField& field, const Int3& v, float f, std::size_t a) {
+/// F at the neighbour before and after v along axis a; where one is unknown, by extrapolation.
+std::array<double, 2> neighbours(const LabelField& field, const Int3& v, float f, std::size_t a) {
   Int3 low = v, high = v;
   --low[a];
   ++high[a];
   const float before = field.value_at(low), after = field.value_at(high);
   const bool has_before = before == before, has_after = after == after;
-  if (has_before && has_after)
-    return (static_cast<double>(after) - static_cast<double>(before)) / (2 * field.spacing[a]);
-  if (has_after)
-    return (static_cast<double>(after) - static_cast<double>(f)) / field.spacing[a];
-  if (has_before)
-    return (static_cast<double>(f) - static_cast<double>(before)) / field.spacing[a];
-  return 0;
+  if (!has_before && !has_after)
+    return {f, f};
+  return {has_before ? before : 2.0 * f - after, has_after ? after : 2.0 * f - before};
 }
 
 Lack lack_of(const LabelField& field, std::size_t block, double reach) {
@@ -43,20 +39,27 @@ Lack lack_of(const LabelField& field, std::size_t block, double reach) {
     const float f = field.value[block * block_voxels + n];
     if (!(std::fabs(static_cast<double>(f)) <= reach))
       continue;
-    std::array<double, 3> gradient{};
-    double square = 0, width = 0;
+    std::array<std::array<double, 2>, 3> change{}; // of F over half a voxel, by side
     for (std::size_t a = 0; a < 3; ++a) {
-      gradient.at(a) = slope(field, voxel_of(field.band[block], n), f, a);
-      square += gradient.at(a) * gradient.at(a);
-      width += field.spacing[a] * std::fabs(gradient.at(a));
+      const auto next = neighbours(field, voxel_of(field.band[block], n), f, a);
+      for (std::size_t side = 0; side < 2; ++side)
+        change.at(a).at(side) = (next.at(side) - static_cast<double>(f)) / 2;
     }
-    if (!(square > 0))
-      continue;
-    // The voxel's extent along the normal is width / |gradient|, the distance F / |gradient|.
-    const double fraction = 0.5 + static_cast<double>(f) / width;
-    sum.lack += (f > 0 ? 1 : 0) - std::clamp(fraction, 0.0, 1.0);
-    if (fraction > 0 && fraction < 1)
-      sum.gain += 1 / width;
+    // In each octant F is linear, so that a sheet of one voxel has its two sides.
+    double fraction = 0;
+    for (std::size_t octant = 0; octant < 8; ++octant) {
+      double centre = f, width = 0;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double c = change.at(a).at(octant >> a & 1);
+        centre += c / 2;
+        width += std::fabs(c);
+      }
+      const double part = width > 0 ? 0.5 + centre / width : centre > 0 ? 1 : 0;
+      fraction += std::clamp(part, 0.0, 1.0) / 8;
+      if (part > 0 && part < 1)
+        sum.gain += 0.125 / width;
+    }
+    sum.lack += (f > 0 ? 1 : 0) - fraction;
   }
   return sum;
 }

@@ -1,0 +1,30 @@
+// Any bytes as a label volume: an Error or a mask, never a crash, and no memory beyond the limit;
+// small ones become a density too.
+
+#include "base/error.h"
+#include "formats/label_volume.h"
+#include "volume/label_density.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace gewebe;
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  Context context;
+  context.threads = 1;
+  context.max_memory = std::uint64_t{64} << 20U;
+  (void)is_label_volume(bytes.substr(0, 4096));
+  try {
+    const LabelVolume volume = label_volume_from_bytes(bytes, "fuzz", {3}, context);
+    const Int3& n = volume.mask.size;
+    if (volume.mask.bits.size() != volume.mask.row(0, n[2]) || volume.voxels == 0)
+      std::abort();
+    if (std::int64_t{n[0]} * n[1] * n[2] < 4096)
+      (void)label_density(context, volume.mask, {}).digest();
+  } catch (const Error&) { // what bad input is for
+  }
+  return 0;
+}

@@ -1,0 +1,319 @@
+// Readers of label volumes: the three formats say the same, damage is refused.
+
+#include "base/error.h"
+#include "formats/label_volume.h"
+#include "tests/unit/scratch.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+using namespace gewebe;
+
+namespace {
+
+constexpr Int3 size{5, 4, 3};
+/// Axes of 1, 2 and 4 mm, turned and mirrored.
+constexpr std::array<double, 12> affine{0, -2, 0, 10, 1, 0, 0, 20, 0, 0, -4, 30};
+
+/// Label 9 at (1, 2, 1) and (4, 3, 2), label 200 at (0, 0, 0).
+template <class T>
+std::vector<T> voxels() {
+  std::vector<T> values(60);
+  values[1 + 5 * (2 + 4 * 1)] = 9;
+  values[4 + 5 * (3 + 4 * 2)] = 9;
+  values[0] = static_cast<T>(200);
+  return values;
+}
+
+template <class T>
+std::string raw(const std::vector<T>& values, bool big_endian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::array<char, sizeof(T)> b = std::bit_cast<std::array<char, sizeof(T)>>(value);
+    if (big_endian)
+      std::reverse(b.begin(), b.end());
+    bytes.append(b.data(), b.size());
+  }
+  return bytes;
+}
+
+/// A header under construction.
+class Header {
+public:
+  Header(std::size_t length, bool big_endian) : bytes(length, '\0'), big_(big_endian) {}
+  template <class T>
+  void put(std::size_t at, std::initializer_list<T> values) {
+    const std::string text = raw(std::vector<T>(values), big_);
+    bytes.replace(at, text.size(), text);
+  }
+  std::string bytes;
+
+private:
+  bool big_;
+};
+
+struct Nifti {
+  std::int16_t datatype = 2, bitpix = 8;
+  std::int16_t qform = 0, sform = 1;
+  bool big_endian = false;
+  float slope = 1, intercept = 0;
+  std::array<float, 3> quaternion{};
+  float qfac = 1;
+  char unit = 2;
+  float offset = 352;
+};
+
+std::string nifti_1(const Nifti& n, const std::string& data) {
+  Header h(352, n.big_endian);
+  h.put<std::int32_t>(0, {348});
+  h.put<std::int16_t>(40, {3, 5, 4, 3, 1, 1, 1, 1});
+  h.put<std::int16_t>(70, {n.datatype, n.bitpix});
+  h.put<float>(76, {n.qfac, 1, 2, 4});
+  h.put<float>(108, {n.offset, n.slope, n.intercept});
+  h.bytes[123] = n.unit;
+  h.put<std::int16_t>(252, {n.qform, n.sform});
+  h.put<float>(256, {n.quaternion[0], n.quaternion[1], n.quaternion[2], 10, 20, 30});
+  h.put<float>(280, {0, -2, 0, 10, 1, 0, 0, 20, 0, 0, -4, 30});
+  h.bytes.replace(344, 4, std::string("n+1\0", 4));
+  return h.bytes + data;
+}
+
+std::string nifti_2(const std::string& data, bool big_endian) {
+  Header h(544, big_endian);
+  h.put<std::int32_t>(0, {540});
+  h.bytes.replace(4, 8, std::string("n+2\0\r\n\032\n", 8));
+  h.put<std::int16_t>(12, {64, 64});
+  h.put<std::int64_t>(16, {3, 5, 4, 3, 1, 1, 1, 1});
+  h.put<double>(104, {1, 1, 2, 4});
+  h.put<std::int64_t>(168, {544});
+  h.put<double>(176, {1, 0});
+  h.put<std::int32_t>(344, {0, 1});
+  h.put<double>(400, {0, -2, 0, 10, 1, 0, 0, 20, 0, 0, -4, 30});
+  h.put<std::int32_t>(500, {2});
+  return h.bytes + data;
+}
+
+std::string nrrd(const std::string& fields, const std::string& data) {
+  return "NRRD0005\ndimension: 3\nsizes: 5 4 3\n" + fields + "\n" + data;
+}
+const std::string lps = "space: left-posterior-superior\nspace directions: (0,-1,0) (2,0,0) "
+                        "(0,0,-4)\nspace origin: (-10,-20,30)\n";
+
+std::string meta(const std::string& fields, const std::string& data) {
+  return "ObjectType = Image\nNDims = 3\nDimSize = 5 4 3\nElementSpacing = 1 2 4\n"
+         "TransformMatrix = 0 -1 0 1 0 0 0 0 -1\nOffset = -10 -20 30\n" +
+         fields + "ElementDataFile = LOCAL\n" + data;
+}
+
+std::string deflated(const std::string& bytes, int window_bits) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string out(bytes.size() + 1000, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  (void)deflateEnd(&stream);
+  return out;
+}
+std::string gzipped(const std::string& bytes) {
+  return deflated(bytes, 31);
+}
+
+LabelVolume read(const std::string& bytes, const std::vector<std::int64_t>& labels = {9}) {
+  return label_volume_from_bytes(bytes, "test", labels, {});
+}
+
+std::string message(const std::string& bytes, const std::vector<std::int64_t>& labels = {9}) {
+  try {
+    (void)read(bytes, labels);
+  } catch (const Error& error) {
+    return error.place() + ": " + error.what();
+  }
+  return "";
+}
+
+void expect_sample(const std::string& bytes) {
+  const LabelVolume volume = read(bytes);
+  EXPECT_EQ(volume.mask.size, size);
+  EXPECT_EQ(volume.voxels, 2U);
+  EXPECT_TRUE(volume.mask.inside({1, 2, 1}));
+  EXPECT_TRUE(volume.mask.inside({4, 3, 2}));
+  EXPECT_FALSE(volume.mask.inside({0, 0, 0}));
+  EXPECT_FALSE(volume.mask.inside({5, 3, 2}));
+  const std::vector<std::pair<std::int64_t, std::uint64_t>> labels{{0, 57}, {9, 2}, {200, 1}};
+  EXPECT_EQ(volume.labels, labels);
+  for (std::size_t n = 0; n < 12; ++n)
+    EXPECT_NEAR(volume.mask.transform.m[n], affine[n], 1e-12) << n;
+  EXPECT_TRUE(volume.warnings.empty());
+}
+
+std::string nifti_of_bytes() {
+  return nifti_1({}, raw(voxels<std::uint8_t>()));
+}
+
+} // namespace
+
+TEST(LabelVolume, AllFormatsAndTypesSayTheSame) {
+  expect_sample(nifti_of_bytes());
+  expect_sample(gzipped(nifti_of_bytes()));
+  for (const bool big : {false, true}) {
+    expect_sample(nifti_1({.datatype = 4, .bitpix = 16, .big_endian = big},
+                          raw(voxels<std::int16_t>(), big)));
+    expect_sample(
+        nifti_1({.datatype = 16, .bitpix = 32, .big_endian = big}, raw(voxels<float>(), big)));
+    expect_sample(nifti_1({.datatype = 1280, .bitpix = 64, .big_endian = big},
+                          raw(voxels<std::uint64_t>(), big)));
+    expect_sample(nifti_2(raw(voxels<double>(), big), big));
+    const std::string endian = big ? "endian: big\n" : "endian: little\n";
+    expect_sample(
+        nrrd(lps + endian + "type: int\nencoding: raw\n", raw(voxels<std::int32_t>(), big)));
+    expect_sample(meta(std::string("ElementByteOrderMSB = ") + (big ? "True" : "False") +
+                           "\nElementType = MET_UINT\n",
+                       raw(voxels<std::uint32_t>(), big)));
+  }
+  expect_sample(nrrd(lps + "type: uchar\nencoding: gzip\n", gzipped(raw(voxels<std::uint8_t>()))));
+  expect_sample(meta("CompressedData = True\nElementType = MET_UCHAR\n",
+                     deflated(raw(voxels<std::uint8_t>()), 15)));
+}
+
+TEST(LabelVolume, ScaledLabelsAreThoseThatAreMeant) {
+  std::vector<float> values = voxels<float>();
+  for (float& value : values)
+    value = (value - 3) / 0.5F;
+  expect_sample(
+      nifti_1({.datatype = 16, .bitpix = 32, .slope = 0.5F, .intercept = 3}, raw(values)));
+}
+
+TEST(LabelVolume, JoinedGzipMembersAreOne) {
+  const std::string bytes = nifti_of_bytes();
+  expect_sample(gzipped(bytes.substr(0, 200)) + gzipped(bytes.substr(200)));
+  EXPECT_NE(message(gzipped(bytes) + "x"), "");
+}
+
+TEST(LabelVolume, QformIsTheQuaternion) {
+  // A quarter turn about z, mirrored along k: what `affine` is.
+  const float half = std::sqrt(0.5F);
+  const LabelVolume volume = read(nifti_1(
+      {.qform = 1, .sform = 0, .quaternion = {0, 0, half}, .qfac = -1}, raw(voxels<char>())));
+  for (std::size_t n = 0; n < 12; ++n)
+    EXPECT_NEAR(volume.mask.transform.m[n], affine[n], 1e-6) << n;
+  // sform goes before qform, and without both the place is guessed.
+  expect_sample(nifti_1({.qform = 1, .quaternion = {1, 0, 0}}, raw(voxels<std::uint8_t>())));
+  const LabelVolume guessed = read(nifti_1({.sform = 0}, raw(voxels<std::uint8_t>())));
+  EXPECT_EQ(guessed.warnings.size(), 1U);
+  EXPECT_EQ(guessed.mask.transform.m,
+            (std::array<double, 12>{-1, 0, 0, 2, 0, 2, 0, -3, 0, 0, 4, -4}));
+  EXPECT_NE(message(nifti_1({.qform = 1, .sform = 0, .quaternion = {1, 1, 0}},
+                            raw(voxels<std::uint8_t>()))),
+            "");
+}
+
+TEST(LabelVolume, UnitsBecomeMillimetres) {
+  const LabelVolume metres = read(nifti_1({.unit = 1}, raw(voxels<std::uint8_t>())));
+  EXPECT_EQ(metres.mask.transform.m[3], 10000);
+  EXPECT_EQ(metres.mask.transform.m[4], 1000);
+  EXPECT_NE(message(nifti_1({.unit = 5}, raw(voxels<std::uint8_t>()))), "");
+}
+
+TEST(LabelVolume, SpacesOfNrrd) {
+  const std::string data = "type: uchar\nencoding: raw\n";
+  const std::string bytes = raw(voxels<std::uint8_t>());
+  const std::string ras = "space directions: (0,1,0) (-2,0,0) (0,0,-4)\nspace origin: (10,20,30)\n";
+  expect_sample(nrrd("space: RAS\n" + ras + data, bytes));
+  expect_sample(nrrd("space: left-anterior-superior\nspace directions: (0,1,0) (2,0,0) (0,0,-4)\n"
+                     "space origin: (-10,20,30)\n" +
+                         data,
+                     bytes));
+  const LabelVolume unknown = read(nrrd("space dimension: 3\n" + ras + data, bytes));
+  EXPECT_EQ(unknown.warnings.size(), 1U);
+  EXPECT_EQ(unknown.mask.transform.m[3], 10);
+  EXPECT_NE(message(nrrd("space: 3D-left-handed\n" + ras + data, bytes)), "");
+  // An axis that is none of space counts if it has one sample only.
+  const std::string four = "NRRD0005\ndimension: 4\nsizes: 1 5 4 3\nspace: RAS\nspace directions: "
+                           "none (0,1,0) (-2,0,0) (0,0,-4)\nspace origin: (10,20,30)\n" +
+                           data + "\n";
+  expect_sample(four + bytes);
+  std::string two = four;
+  two.replace(two.find("sizes: 1"), 8, "sizes: 2");
+  EXPECT_NE(message(two + bytes + bytes), "");
+}
+
+TEST(LabelVolume, UnknownLabelNamesThoseThereAre) {
+  EXPECT_EQ(message(nifti_of_bytes(), {9, 8}), "test: has no label 8, expected some of 0, 9, 200");
+}
+
+TEST(LabelVolume, EveryTruncatedPrefixIsRefused) {
+  const std::string plain = raw(voxels<std::uint8_t>());
+  for (const std::string& whole :
+       {nifti_of_bytes(), gzipped(nifti_of_bytes()), nifti_2(raw(voxels<double>()), false),
+        nrrd(lps + "type: uchar\nencoding: raw\n", plain),
+        nrrd(lps + "type: uchar\nencoding: gzip\n", gzipped(plain)),
+        meta("ElementType = MET_UCHAR\n", plain),
+        meta("CompressedData = True\nElementType = MET_UCHAR\n", deflated(plain, 15))}) {
+    for (std::size_t length = 0; length < whole.size(); ++length)
+      EXPECT_NE(message(whole.substr(0, length)), "") << length << " of " << whole.size();
+    EXPECT_EQ(message(whole), "");
+    EXPECT_NE(message(whole + '\0'), "") << "a byte more";
+  }
+}
+
+TEST(LabelVolume, DamagedCompressedDataIsRefused) {
+  std::string bytes = gzipped(nifti_of_bytes());
+  bytes[bytes.size() - 6] = static_cast<char>(bytes[bytes.size() - 6] ^ 1); // of the checksum
+  EXPECT_NE(message(bytes), "");
+}
+
+TEST(LabelVolume, ValuesThatAreNoLabelsAreRefused) {
+  for (const float bad : {0.5F, NAN, HUGE_VALF, 1e30F}) {
+    std::vector<float> values = voxels<float>();
+    values[7] = bad;
+    EXPECT_NE(message(nifti_1({.datatype = 16, .bitpix = 32}, raw(values))).find("voxel (2, 1, 0)"),
+              std::string::npos)
+        << bad;
+  }
+}
+
+TEST(LabelVolume, HugeClaimsTakeNoMemory) {
+  Header h(352, false);
+  h.bytes = nifti_of_bytes();
+  h.put<std::int16_t>(40, {3, 30000, 30000, 30000});
+  Context context;
+  context.max_memory = std::uint64_t{1} << 30U;
+  EXPECT_THROW((void)label_volume_from_bytes(h.bytes, "test", {9}, context), Error);
+  EXPECT_THROW((void)read(h.bytes), Error); // the bytes end first
+}
+
+TEST(LabelVolume, FirstBytesTellOne) {
+  EXPECT_TRUE(is_label_volume(nifti_of_bytes()));
+  EXPECT_TRUE(is_label_volume(gzipped(nifti_of_bytes()).substr(0, 80)) ||
+              gzipped(nifti_of_bytes()).size() < 100);
+  EXPECT_TRUE(is_label_volume(gzipped(nifti_of_bytes())));
+  EXPECT_TRUE(is_label_volume(meta("", "")));
+  EXPECT_FALSE(is_label_volume("ply\nformat ascii 1.0\n"));
+  EXPECT_FALSE(is_label_volume("0 0 0 1\n"));
+  EXPECT_FALSE(is_label_volume(""));
+}
+
+TEST(LabelVolume, FilesOfTwoParts) {
+  const ScratchFile header(".nhdr"), data(".raw");
+  const std::string name = data.path().substr(data.path().find_last_of('/') + 1);
+  {
+    std::ofstream(header.path()) << nrrd(
+        lps + "type: uchar\nencoding: raw\ndata file: " + name + "\n", "");
+    std::ofstream(data.path()) << raw(voxels<std::uint8_t>());
+  }
+  Input input(header.path());
+  EXPECT_EQ(read_label_volume(input, {9}, {}).voxels, 2U);
+  std::ofstream(data.path()) << "short";
+  Input again(header.path());
+  EXPECT_THROW((void)read_label_volume(again, {9}, {}), Error);
+}
