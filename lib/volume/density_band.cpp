@@ -6,12 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <emmintrin.h>
 
 namespace gewebe {
 namespace {
 
-constexpr std::size_t batch_leaves = 8192; // whose values wait for their place: 16 MiB
+constexpr std::size_t batch_leaves = 1024; // a thread's, whose values wait for their place: 2 MiB
 
 /// What the neighbours of an evaluated leaf need to know. Face 2 axis + (far ? 1 : 0).
 struct Sides {
@@ -27,12 +26,7 @@ float float_bound(double isovalue) {
 }
 
 Sides sides_of(const float* values, float bound, bool background_above) {
-  std::array<std::uint64_t, 8> above{};
-  const __m128 limit = _mm_set1_ps(bound); // SSE2 is in every x86-64
-  for (std::size_t n = 0; n < leaf_voxels; n += 4)
-    above[n >> 6] |=
-        static_cast<std::uint64_t>(_mm_movemask_ps(_mm_cmpgt_ps(_mm_loadu_ps(values + n), limit)))
-        << (n & 63);
+  const std::array<std::uint64_t, 8> above = compare_leaf(values, bound);
   std::uint64_t some = 0, all = ~std::uint64_t{0};
   for (const std::uint64_t word : above) {
     some |= word;
@@ -209,10 +203,11 @@ Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
     report.leaves += origins.size();
     report.leaves_evaluated += slot.back();
   };
+  const std::size_t batch = batch_leaves * static_cast<std::size_t>(thread_count(context));
   const auto in_batches = [&](const std::vector<std::vector<std::uint32_t>>& wanted) {
     for (std::size_t begin = 0, end = 0; begin < plans.size(); begin = end) {
       std::size_t leaves = 0;
-      while (end < plans.size() && (leaves < batch_leaves || end == begin)) {
+      while (end < plans.size() && (leaves < batch || end == begin)) {
         leaves += wanted.empty() ? plans[end].leaves.size() : wanted[end].size();
         ++end;
       }

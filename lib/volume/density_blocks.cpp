@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <emmintrin.h>
@@ -427,17 +428,29 @@ bool contains(const IndexBox& box, const Int3& origin) {
   return true;
 }
 
+std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal) {
+  const __m128 limit = _mm_set1_ps(bound); // SSE2 is in every x86-64
+  const auto four = [&](const float* at) {
+    const __m128 v = _mm_loadu_ps(at);
+    return _mm_castps_si128(unequal ? _mm_cmpneq_ps(v, limit) : _mm_cmpgt_ps(v, limit));
+  };
+  std::array<std::uint64_t, 8> words{};
+  for (std::uint64_t& word : words)
+    for (unsigned n = 0; n < 64; n += 16, values += 16) {
+      const __m128i low = _mm_packs_epi32(four(values), four(values + 4));
+      const __m128i high = _mm_packs_epi32(four(values + 8), four(values + 12));
+      const int bits = _mm_movemask_epi8(_mm_packs_epi16(low, high));
+      word |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(bits)) << n;
+    }
+  return words;
+}
+
 bool activate(const LeafRef& leaf) {
+  const std::array<std::uint64_t, 8> words = compare_leaf(leaf.values, 0, /*unequal=*/true);
   std::uint64_t any = 0;
   for (std::size_t word = 0; word < 8; ++word) {
-    std::uint64_t bits = 0;
-    for (std::size_t n = 0; n < 64; n += 4) {
-      const __m128 four = _mm_loadu_ps(leaf.values + word * 64 + n);
-      bits |= static_cast<std::uint64_t>(_mm_movemask_ps(_mm_cmpneq_ps(four, _mm_setzero_ps())))
-              << n;
-    }
-    leaf.active[word] = bits;
-    any |= bits;
+    leaf.active[word] = words[word];
+    any |= words[word];
   }
   return any != 0;
 }

@@ -7,6 +7,7 @@
 #include "volume/density.h"
 #include "volume/density_kernel_internal.h"
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -118,6 +119,9 @@ bool contains(const IndexBox& box, const Int3& origin);
 void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
                    std::span<const IndexParticle> particles, std::span<const std::uint32_t> list,
                    const Int3& origin, std::vector<LeafParticle>& scratch, float* values);
+
+/// Bit n of word w: is value 64 w + n above `bound`, or with `unequal`, is it another one?
+std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal = false);
 
 /// Sets the active mask of a leaf: where the value isn't 0. False if that is nowhere.
 bool activate(const LeafRef& leaf);
