@@ -103,21 +103,48 @@ Grid::Grid(GridInfo info, std::shared_ptr<Native> native)
 std::vector<LeafView> Grid::leaves() const {
   std::vector<LeafView> views;
   views.reserve(native_->tree->leafCount());
-  for (auto leaf = std::as_const(*native_->tree).cbeginLeaf(); leaf; ++leaf)
-    views.push_back(view_of(*leaf));
+  for (auto upper = std::as_const(*native_->tree).root().cbeginChildOn(); upper; ++upper)
+    for (auto lower = upper->cbeginChildOn(); lower; ++lower)
+      for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
+        views.push_back(view_of(*leaf));
   return views;
 }
 
-std::vector<TileView> Grid::tiles() const {
-  std::vector<TileView> views;
-  auto value = std::as_const(*native_->tree).cbeginValueAll();
-  value.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; value; ++value) {
-    const bool active = value.isValueOn();
-    if (!active && *value == info_.background)
+namespace {
+
+/// Appends the tiles of a node and its children, by place. OpenVDB's own iterator over all tiles
+/// takes 20 times as long.
+template <class Node>
+void append_tiles(const Node& node, float background, std::vector<TileView>& views) {
+  const auto* const table = node.getTable();
+  for (openvdb::Index n = 0; n < Node::NUM_VALUES; ++n) {
+    if (node.isChildMaskOn(n)) {
+      if constexpr (Node::LEVEL > 1)
+        append_tiles(*table[n].getChild(), background, views);
       continue;
-    const openvdb::CoordBBox box = value.getBoundingBox();
-    views.push_back({to_int3(box.min()), box.dim().x(), *value, active});
+    }
+    const float value = table[n].getValue();
+    const bool active = node.isValueMaskOn(n);
+    if (active || value != background)
+      views.push_back(
+          {to_int3(node.offsetToGlobalCoord(n)), Node::ChildNodeType::DIM, value, active});
+  }
+}
+
+} // namespace
+
+std::vector<TileView> Grid::tiles() const {
+  const auto& root = std::as_const(*native_->tree).root();
+  std::vector<TileView> views;
+  for (auto child = root.cbeginChildAll(); child; ++child) {
+    float value = 0;
+    if (const auto* const node = child.probeChild(value)) {
+      append_tiles(*node, info_.background, views);
+      continue;
+    }
+    const bool active = root.isValueOn(child.getCoord());
+    if (active || value != info_.background)
+      views.push_back({to_int3(child.getCoord()), 4096, value, active});
   }
   return views;
 }

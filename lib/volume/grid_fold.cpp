@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <optional>
 #include <set>
 #include <utility>
@@ -85,10 +86,11 @@ struct LeafTask {
 class Plan {
 public:
   Plan(std::span<const Grid> grids, std::optional<std::size_t> base, const BlockRule& rule,
-       FoldReport& report)
+       FoldReport& report, const Context& context)
       : base_(base), rule_(rule), report_(report), sources_(grids.size()) {
     std::set<Coord> origins;
     for (const Grid& grid : grids) {
+      by_mask_.push_back(grid.summary(context).active_where_not_0);
       const auto& root = std::as_const(*grid.native()->tree).root();
       for (auto child = root.cbeginChildOn(); child; ++child)
         origins.insert(child.getCoord());
@@ -166,18 +168,36 @@ private:
       const Node* const some =
           std::ranges::find_if(items, [](const Item<Node>& i) { return i.node != nullptr; })->node;
       std::vector<Item<Child>> children(items.size());
-      for (openvdb::Index n = 0; n < Node::NUM_VALUES; ++n) {
-        for (std::size_t g = 0; g < items.size(); ++g)
-          children[g] = child_item(items[g], n);
-        block<Child>(children, some->offsetToGlobalCoord(n));
-      }
+      for (openvdb::Index word = 0; word < Node::NUM_VALUES / 64; ++word)
+        for (std::uint64_t bits = slots_in_use(items, word); bits != 0; bits &= bits - 1) {
+          const auto n = word * 64 + static_cast<openvdb::Index>(std::countr_zero(bits));
+          for (std::size_t g = 0; g < items.size(); ++g)
+            children[g] = child_item(items[g], n);
+          block<Child>(children, some->offsetToGlobalCoord(n));
+        }
     }
+  }
+
+  /// Which of 64 children may be anything but inactive 0.
+  template <class Node>
+  std::uint64_t slots_in_use(std::span<const Item<Node>> items, openvdb::Index word) const {
+    std::uint64_t bits = 0;
+    for (std::size_t g = 0; g < items.size(); ++g) {
+      const Item<Node>& item = items[g];
+      if (item.node == nullptr ? item.value != 0 || item.active : !by_mask_[g])
+        return ~std::uint64_t{0};
+      if (item.node != nullptr)
+        bits |= item.node->getChildMask().template getWord<std::uint64_t>(word) |
+                item.node->getValueMask().template getWord<std::uint64_t>(word);
+    }
+    return bits;
   }
 
   std::optional<std::size_t> base_;
   const BlockRule& rule_;
   FoldReport& report_;
   std::vector<BlockSource> sources_;
+  std::vector<bool> by_mask_; ///< masks tell where a grid isn't 0
 };
 
 /// The tree under change.
@@ -306,7 +326,7 @@ Grid fold_grids(const Context& context, const GridInfo& info, std::vector<Grid> 
                 const BlockRule& block_rule, const LeafRule& leaf_rule, FoldReport& report) {
   const std::optional<std::size_t> base = choose_base(grids);
   report = {};
-  Plan plan(grids, base, block_rule, report);
+  Plan plan(grids, base, block_rule, report, context);
   require_memory(context,
                  static_cast<double>(plan.leaves.size()) * (sizeof(LeafValues) + 128) +
                      static_cast<double>(plan.shared_leaves) * 128,
