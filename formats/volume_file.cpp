@@ -2,8 +2,11 @@
 
 #include "base/digest.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "volume/grid_internal.h"
 
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/util/logging.h>
 
@@ -14,6 +17,7 @@
 #include <istream>
 #include <mutex>
 #include <ostream>
+#include <sstream>
 #include <streambuf>
 
 namespace gewebe {
@@ -36,14 +40,19 @@ void initialize_openvdb() {
 /// its buffers for data.
 class MemoryBuffer final : public std::streambuf {
 public:
-  MemoryBuffer(std::string& bytes, const std::string& name) : name_(name) {
-    setg(bytes.data(), bytes.data(), bytes.data() + bytes.size());
+  MemoryBuffer(std::string_view bytes, const std::string& name) : name_(name) {
+    auto* const begin = const_cast<char*>(bytes.data()); // streambuf asks for it, nothing writes
+    setg(begin, begin, begin + bytes.size());
   }
-
-private:
   [[noreturn]] void fail() const {
     throw Error(name_, "byte " + std::to_string(egptr() - eback()) + ": ends early");
   }
+  std::string_view all() const { return {eback(), static_cast<std::size_t>(egptr() - eback())}; }
+  std::string_view rest() const { return {gptr(), static_cast<std::size_t>(egptr() - gptr())}; }
+  void skip(std::size_t count) { setg(eback(), gptr() + count, egptr()); }
+  const std::string& name() const { return name_; }
+
+private:
   int_type underflow() override { fail(); }
   std::streamsize xsgetn(char* target, std::streamsize count) override {
     if (count > egptr() - gptr())
@@ -67,6 +76,199 @@ private:
   }
 
   const std::string& name_;
+};
+
+// ---- leaves, many at a time
+
+constexpr std::size_t leaves_at_once = 64;
+constexpr std::uint32_t usual_compression =
+    openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
+
+Context without_progress(const Context& context) {
+  Context quiet = context;
+  quiet.progress = nullptr;
+  return quiet;
+}
+
+/// Bytes of the first leaf in `bytes`, as OpenVDB writes it since file version 222 with these
+/// flags: a mask, a byte that says which inactive values follow, they, a mask that chooses between
+/// them, then the number of compressed bytes (negative: raw ones) and the bytes.
+std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes) {
+  constexpr std::size_t mask = leaf_voxels / 8;
+  const auto need = [&](std::size_t count) {
+    if (count > bytes.size())
+      buffer.fail();
+  };
+  need(mask + 1);
+  std::size_t size = mask + 1;
+  using namespace openvdb::io;
+  switch (static_cast<int>(bytes[mask])) {
+  case NO_MASK_OR_INACTIVE_VALS:
+  case NO_MASK_AND_MINUS_BG:
+  case NO_MASK_AND_ALL_VALS:
+    break;
+  case NO_MASK_AND_ONE_INACTIVE_VAL:
+    size += sizeof(float);
+    break;
+  case MASK_AND_NO_INACTIVE_VALS:
+    size += mask;
+    break;
+  case MASK_AND_ONE_INACTIVE_VAL:
+    size += sizeof(float) + mask;
+    break;
+  case MASK_AND_TWO_INACTIVE_VALS:
+    size += 2 * sizeof(float) + mask;
+    break;
+  default:
+    throw Error(buffer.name(), "byte " + std::to_string(bytes.data() + mask - buffer.all().data()) +
+                                   ": unknown kind of leaf");
+  }
+  std::int64_t count = 0;
+  need(size + sizeof count);
+  std::memcpy(&count, bytes.data() + size, sizeof count);
+  size += sizeof count;
+  if (count > static_cast<std::int64_t>(bytes.size()) || -count > leaf_voxels * 4)
+    buffer.fail();
+  size += static_cast<std::size_t>(count < 0 ? -count : count);
+  need(size);
+  return size;
+}
+
+/// A grid whose leaves are read in parallel, with all their values in one block of memory.
+class ReadGrid final : public openvdb::FloatGrid {
+public:
+  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage)
+      : openvdb::FloatGrid(make_tree(0, storage)), context_(without_progress(context)),
+        storage_(storage) {}
+
+  void readBuffers(std::istream& stream) override {
+    std::vector<FloatLeaf*> leaves;
+    leaves.reserve(tree().leafCount());
+    tree().getNodes(leaves);
+    require_memory(context_, static_cast<double>(leaves.size()) * leaf_voxels * sizeof(float),
+                   "the volume");
+    auto& buffer = dynamic_cast<MemoryBuffer&>(*stream.rdbuf());
+    std::vector<std::string_view> parts; // one for each block of leaves
+    std::size_t done = 0;
+    for (std::size_t n = 0; n < leaves.size(); ++n) {
+      if (n % leaves_at_once == 0)
+        parts.push_back(buffer.rest().substr(done, 0));
+      const std::size_t size = leaf_bytes(buffer, buffer.rest().substr(done));
+      done += size;
+      parts.back() = {parts.back().data(), parts.back().size() + size};
+    }
+    buffer.skip(done);
+
+    auto* const values = reinterpret_cast<float*>(
+        storage_->pages.emplace_back(leaves.size() * leaf_voxels * sizeof(float)).data());
+    const auto metadata = openvdb::io::getStreamMetadataPtr(stream);
+    parallel_blocks(context_, leaves.size(), leaves_at_once,
+                    [&](std::size_t begin, std::size_t end) {
+                      MemoryBuffer part_buffer(parts[begin / leaves_at_once], buffer.name());
+                      std::istream part(&part_buffer);
+                      part.copyfmt(stream); // what OpenVDB knows of the stream is kept there
+                      auto own = std::make_shared<openvdb::io::StreamMetadata>(*metadata);
+                      openvdb::io::setStreamMetadataPtr(part, own, /*transfer=*/false);
+                      for (std::size_t n = begin; n < end; ++n) {
+                        borrow_values(*leaves[n], values + n * leaf_voxels);
+                        leaves[n]->readBuffers(part, /*fromHalf=*/false);
+                      }
+                    });
+  }
+  using openvdb::FloatGrid::readBuffers;
+
+private:
+  Context context_;
+  std::shared_ptr<LeafStorage> storage_;
+};
+
+/// A stream with one float grid, the usual case. What else there may be is left to OpenVDB.
+class ReadArchive final : public openvdb::io::Archive {
+public:
+  /// The grid, or null if this is another kind of stream.
+  std::shared_ptr<ReadGrid> read(std::istream& stream, const Context& context,
+                                 const std::shared_ptr<LeafStorage>& storage) {
+    readHeader(stream);
+    auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
+    openvdb::io::setStreamMetadataPtr(stream, metadata, /*transfer=*/false);
+    setFormatVersion(stream);
+    setLibraryVersion(stream);
+    setDataCompression(stream);
+    openvdb::MetaMap ignored;
+    ignored.readMeta(stream);
+    if (readGridCount(stream) != 1)
+      return nullptr;
+    openvdb::io::GridDescriptor descriptor;
+    (void)descriptor.read(stream);
+    if (descriptor.gridType() != openvdb::FloatGrid::gridType() || descriptor.isInstance() ||
+        descriptor.saveFloatAsHalf())
+      return nullptr;
+    const auto position = stream.tellg();
+    readGridCompression(stream);
+    if (openvdb::io::getDataCompression(stream) != usual_compression)
+      return nullptr;
+    stream.seekg(position);
+    auto grid = std::make_shared<ReadGrid>(context, storage);
+    readGrid(grid, descriptor, stream);
+    return grid;
+  }
+};
+
+/// A grid whose leaves are compressed in parallel; the bytes are the same.
+class WriteGrid final : public openvdb::FloatGrid {
+public:
+  WriteGrid(openvdb::FloatTree::Ptr tree, const Context& context)
+      : openvdb::FloatGrid(std::move(tree)), context_(without_progress(context)) {}
+
+  void writeBuffers(std::ostream& stream) const override {
+    std::vector<const FloatLeaf*> leaves;
+    leaves.reserve(tree().leafCount());
+    tree().getNodes(leaves);
+    const auto metadata = openvdb::io::getStreamMetadataPtr(stream);
+    // So many blocks of leaves are held at once that all threads have work.
+    const std::size_t batch = leaves_at_once * 64;
+    for (std::size_t first = 0; first < leaves.size(); first += batch) {
+      const std::size_t count = std::min(batch, leaves.size() - first);
+      std::vector<std::string> parts((count + leaves_at_once - 1) / leaves_at_once);
+      parallel_blocks(context_, count, leaves_at_once, [&](std::size_t begin, std::size_t end) {
+        std::ostringstream part;
+        part.copyfmt(stream); // what OpenVDB knows of the stream is kept there
+        auto own = std::make_shared<openvdb::io::StreamMetadata>(*metadata);
+        openvdb::io::setStreamMetadataPtr(part, own, /*transfer=*/false);
+        for (std::size_t n = begin; n < end; ++n)
+          leaves[first + n]->writeBuffers(part, /*toHalf=*/false);
+        parts[begin / leaves_at_once] = std::move(part).str();
+      });
+      for (const std::string& part : parts)
+        stream.write(part.data(), static_cast<std::streamsize>(part.size()));
+    }
+  }
+
+private:
+  Context context_;
+};
+
+/// A stream with one grid. OpenVDB's own writer compresses all leaves twice, the first time to tell
+/// their sizes to readers that load on demand.
+class WriteArchive final : public openvdb::io::Archive {
+public:
+  void write_grid(std::ostream& stream, const WriteGrid& grid) {
+    setCompression(usual_compression);
+    auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
+    openvdb::io::setStreamMetadataPtr(stream, metadata, /*transfer=*/false);
+    writeHeader(stream, /*seekable=*/false);
+    openvdb::MetaMap().writeMeta(stream);
+    const std::int32_t count = 1;
+    stream.write(reinterpret_cast<const char*>(&count), sizeof count);
+    const openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type());
+    descriptor.writeHeader(stream);
+    descriptor.writeStreamPos(stream);
+    setGridCompression(stream, grid);
+    grid.writeMeta(stream);
+    grid.writeTransform(stream);
+    grid.writeTopology(stream);
+    grid.writeBuffers(stream);
+  }
 };
 
 /// Passes bytes on, with the random UUID replaced by one made of the content's digest.
@@ -168,22 +370,31 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
   return floats[0];
 }
 
-Grid parse_volume(std::string& bytes, const std::string& name, const Context& context) {
+Grid parse_volume(const std::string& bytes, const std::string& name, const Context& context) {
   MemoryBuffer buffer(bytes, name);
   std::istream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
-  openvdb::io::Stream archive(stream, /*delayLoad=*/false);
-  openvdb::FloatGrid::Ptr native = choose_grid(*archive.getGrids(), name);
+  const auto storage = std::make_shared<LeafStorage>();
+  openvdb::FloatGrid::Ptr native = ReadArchive().read(stream, context, storage);
+  openvdb::FloatTree::Ptr tree;
+  if (native) {
+    tree = native->treePtr();
+  } else {
+    MemoryBuffer again(bytes, name);
+    std::istream whole(&again);
+    whole.exceptions(stream.exceptions());
+    openvdb::io::Stream archive(whole, /*delayLoad=*/false);
+    native = choose_grid(*archive.getGrids(), name);
+    tree = adopt_tree(native->treePtr(), storage);
+  }
   GridInfo info;
   info.transform = transform_of(native->transform(), name);
   info.background = native->background();
   info.level_set = native->getGridClass() == openvdb::GRID_LEVEL_SET;
   info.isovalue = number_metadata(*native, isovalue_key, name).value_or(info.level_set ? 0 : 0.5);
   info.band_isovalue = number_metadata(*native, band_key, name);
-  const auto storage = std::make_shared<LeafStorage>();
-  openvdb::FloatTree::Ptr tree = native->treePtr();
   native.reset(); // the tree has one owner
-  Grid grid = make_grid(std::move(info), adopt_tree(std::move(tree), storage), storage);
+  Grid grid = make_grid(std::move(info), std::move(tree), storage);
   if (!grid.summary(context).finite)
     throw Error(name, "a voxel's value is not finite");
   return grid;
@@ -209,10 +420,10 @@ Grid volume_from_bytes(std::string bytes, const std::string& name, const Context
   }
 }
 
-void write_volume(Output& output, const Grid& grid, const Context&) {
+void write_volume(Output& output, const Grid& grid, const Context& context) {
   initialize_openvdb();
   const GridInfo& info = grid.info();
-  const auto native = openvdb::FloatGrid::create(grid.native()->tree);
+  const auto native = std::make_shared<WriteGrid>(grid.native()->tree, context);
   native->setTransform(native_transform(info.transform));
   native->setName(info.name);
   native->setGridClass(info.level_set ? openvdb::GRID_LEVEL_SET : openvdb::GRID_FOG_VOLUME);
@@ -220,12 +431,13 @@ void write_volume(Output& output, const Grid& grid, const Context&) {
     native->insertMeta(isovalue_key, openvdb::DoubleMetadata(info.isovalue));
   if (info.band_isovalue)
     native->insertMeta(band_key, openvdb::DoubleMetadata(*info.band_isovalue));
+  native->addStatsMetadata(); // as OpenVDB does
+  native->insertMeta(openvdb::GridBase::META_FILE_COMPRESSION,
+                     openvdb::StringMetadata("blosc + active values"));
   UuidBuffer buffer(*output.stream().rdbuf(), uuid_of(grid.digest()));
   std::ostream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
-  openvdb::io::Stream archive(stream);
-  archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-  archive.write(openvdb::GridCPtrVec{native});
+  WriteArchive().write_grid(stream, *native);
 }
 
 } // namespace gewebe

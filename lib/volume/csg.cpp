@@ -70,15 +70,18 @@ float next_value(CsgOperation operation, float a, float b) {
   return a;
 }
 
-void check_range(float a) {
-  if (!(a <= std::numeric_limits<float>::max()))
-    throw Error("the sum of the densities leaves the range of single precision");
+bool fits(float a) {
+  return a <= std::numeric_limits<float>::max();
+}
+[[noreturn]] void fail_range() {
+  throw Error("the sum of the densities leaves the range of single precision");
 }
 
 float end_value(CsgOperation operation, float a) {
   if (is_sum(operation))
     a = at_least_0(a);
-  check_range(a);
+  if (!fits(a))
+    fail_range();
   return a;
 }
 
@@ -99,8 +102,11 @@ void fold(CsgOperation operation, std::span<const BlockSource> sources, LeafValu
   if (is_sum(operation))
     for (float& value : a)
       value = at_least_0(value);
+  unsigned beyond = 0;
   for (const float value : a)
-    check_range(value);
+    beyond |= fits(value) ? 0U : 1U;
+  if (beyond != 0)
+    fail_range();
 }
 
 /// Whether a leaf has these values, active exactly where they aren't 0.
