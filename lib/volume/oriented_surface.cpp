@@ -6,6 +6,7 @@
 #include <array>
 #include <numeric>
 #include <tuple>
+#include <unordered_map>
 
 namespace gewebe {
 namespace {
@@ -175,6 +176,91 @@ void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
   }
 }
 
+/// Takes directed edges, of which as many end as begin in each point, apart into loops that meet no
+/// point twice. Walks on until a point comes again, and prefers to close the shortest loop it can.
+std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::array<std::uint32_t, 2>> edges) {
+  std::sort(edges.begin(), edges.end());
+  constexpr std::uint32_t none = UINT32_MAX;
+  std::vector<bool> used(edges.size(), false);
+  const auto first_from = [&](std::uint32_t point) {
+    return static_cast<std::size_t>(
+        std::lower_bound(edges.begin(), edges.end(), std::array<std::uint32_t, 2>{point, 0}) -
+        edges.begin());
+  };
+  std::vector<std::vector<std::uint32_t>> loops;
+  std::unordered_map<std::uint32_t, std::uint32_t> place; // in the walk
+  std::vector<std::uint32_t> walk;
+  for (std::size_t start = 0; start < edges.size(); ++start) {
+    if (used[start])
+      continue;
+    walk.assign(1, edges[start][0]);
+    place.clear();
+    place[walk[0]] = 0;
+    while (!walk.empty()) {
+      std::size_t best = edges.size();
+      std::uint32_t best_place = none;
+      for (std::size_t e = first_from(walk.back()); e < edges.size() && edges[e][0] == walk.back();
+           ++e) {
+        if (used[e])
+          continue;
+        const auto at = place.find(edges[e][1]);
+        const std::uint32_t there = at == place.end() ? none : at->second;
+        if (best == edges.size() || (there != none && (best_place == none || there > best_place))) {
+          best = e;
+          best_place = there;
+        }
+      }
+      if (best == edges.size())
+        break; // back at the start, and nothing left there
+      used[best] = true;
+      if (best_place == none) {
+        place[edges[best][1]] = static_cast<std::uint32_t>(walk.size());
+        walk.push_back(edges[best][1]);
+        continue;
+      }
+      loops.emplace_back(walk.begin() + best_place, walk.end());
+      while (walk.size() > best_place + 1) {
+        place.erase(walk.back());
+        walk.pop_back();
+      }
+    }
+  }
+  return loops;
+}
+
+/// The cone of a loop in rings about as wide as the loop's edges are long, lest its triangles be
+/// long and thin.
+void add_cone(std::vector<Vec3>& points, const std::vector<std::uint32_t>& loop, const Vec3& tip,
+              std::vector<Triangle>& cones) {
+  const std::size_t size = loop.size();
+  double around = 0, across = 0;
+  for (std::size_t n = 0; n < size; ++n) {
+    around += norm(points[loop[(n + 1) % size]] - points[loop[n]]);
+    across += norm(tip - points[loop[n]]);
+  }
+  const auto rings = static_cast<std::size_t>(std::clamp(across / around, 1.0, 64.0));
+  std::vector<std::uint32_t> outer = loop;
+  for (std::size_t ring = 1; ring < rings; ++ring) {
+    const double t = static_cast<double>(ring) / static_cast<double>(rings);
+    std::vector<std::uint32_t> inner(size);
+    for (std::size_t n = 0; n < size; ++n) {
+      const Vec3 corner = points[loop[n]];
+      inner[n] = static_cast<std::uint32_t>(points.size());
+      points.push_back(corner + t * (tip - corner));
+    }
+    for (std::size_t n = 0; n < size; ++n) {
+      const std::size_t next = (n + 1) % size;
+      cones.push_back({outer[n], outer[next], inner[next]});
+      cones.push_back({outer[n], inner[next], inner[n]});
+    }
+    outer = std::move(inner);
+  }
+  const auto apex = static_cast<std::uint32_t>(points.size());
+  points.push_back(tip);
+  for (std::size_t n = 0; n < size; ++n)
+    cones.push_back({outer[n], outer[(n + 1) % size], apex});
+}
+
 } // namespace
 
 OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Triangle> triangles,
@@ -194,44 +280,33 @@ OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Tri
 
 std::vector<Triangle> closing_cones(std::vector<Vec3>& points,
                                     std::span<const Triangle> triangles) {
-  std::vector<std::array<std::uint32_t, 2>> edges;
-  std::vector<int> surplus; // how often more up than down
+  std::vector<std::array<std::uint32_t, 2>> missing; // from, to: what would balance the edges
   const std::vector<Side> sides = sorted_sides(triangles, {});
   for_each_edge(sides, [&](std::span<const Side> edge) {
     int up = 0;
     for (const Side& side : edge)
       up += side.upward ? 1 : -1;
-    if (up != 0) {
-      edges.push_back({edge[0].low, edge[0].high});
-      surplus.push_back(up);
-    }
+    for (; up > 0; --up)
+      missing.push_back({edge[0].high, edge[0].low});
+    for (; up < 0; ++up)
+      missing.push_back({edge[0].low, edge[0].high});
   });
-  std::vector<std::uint32_t> group;
-  const std::uint32_t groups = edge_groups(edges, group);
-  struct Hole {
-    Vec3 sum;
-    double ends = 0;
-    Box3 box;
-  };
-  std::vector<Hole> holes(groups);
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const std::uint32_t end : edges[e]) {
-      Hole& hole = holes[group[e]];
-      hole.sum += points[end];
-      hole.ends += 1;
-      hole.box.add(points[end]);
-    }
-  const auto first_apex = static_cast<std::uint32_t>(points.size());
-  // Off the mean, lest the inner edges of a cone run through sample points.
-  for (const Hole& hole : holes)
-    points.push_back(hole.sum / hole.ends +
-                     Vec3{0.013717, 0.007129, 0.011317} * hole.box.longest_side());
   std::vector<Triangle> cones;
-  for (std::size_t e = 0; e < edges.size(); ++e) {
-    const auto [low, high] = edges[e];
-    const std::uint32_t apex = first_apex + group[e];
-    for (int n = 0; n < std::abs(surplus[e]); ++n)
-      cones.push_back(surplus[e] > 0 ? Triangle{high, low, apex} : Triangle{low, high, apex});
+  for (const std::vector<std::uint32_t>& loop : loops_of(std::move(missing))) {
+    if (loop.size() == 3) {
+      cones.push_back({loop[0], loop[1], loop[2]});
+      continue;
+    }
+    Vec3 sum;
+    Box3 box;
+    for (const std::uint32_t corner : loop) {
+      sum += points[corner];
+      box.add(points[corner]);
+    }
+    // Off the mean, lest the inner edges of a cone run through sample points.
+    const Vec3 tip = sum / static_cast<double>(loop.size()) +
+                     Vec3{0.013717, 0.007129, 0.011317} * box.longest_side();
+    add_cone(points, loop, tip, cones);
   }
   return cones;
 }

@@ -73,7 +73,7 @@ SolidAngleTree::SolidAngleTree(std::span<const Vec3> points, std::span<const Tri
 }
 
 void SolidAngleTree::build(std::uint32_t n) {
-  constexpr std::uint32_t leaf_size = 4;
+  constexpr std::uint32_t leaf_size = 1;
   Node node = nodes_[n];
   Vec3 sum;
   Box3 middles;
@@ -93,6 +93,12 @@ void SolidAngleTree::build(std::uint32_t n) {
     for (const std::uint32_t corner : triangles_[t])
       node.radius = std::max(node.radius, norm(points_[corner] - node.center));
   node.radius *= 1 + 0x1p-40; // rounding
+  for (std::uint32_t t = node.begin; t < node.end; ++t) {
+    const auto& [a, b, c] = triangles_[t];
+    const Vec3 normal = normal_of(points_[a], points_[b], points_[c]) / 2;
+    for (int i = 0; i < 3; ++i)
+      node.moment[static_cast<std::size_t>(i)] += normal[i] * (middle(triangles_[t]) - node.center);
+  }
   if (node.end - node.begin > leaf_size) {
     const Vec3 size = middles.size();
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -117,8 +123,17 @@ void SolidAngleTree::build(std::uint32_t n) {
   }
 }
 
-// The kernel n.q/|q|³ changes by at most 2/|q|³ per length, so a node of radius r at distance d
-// errs by at most 2 area r/(d - r)³ as a dipole at its centre.
+// The kernel n.q/|q|³ is a first derivative of 1/|q|, whose derivatives of order m along unit
+// vectors are at most m!/|q|^(m+1). Expanded to first order over displacements of at most r, it
+// errs by at most 3 r²/(d - r)⁴.
+
+/// Value of a node, by a dipole and its first moments; q from the point to the centre, d = |q|.
+double SolidAngleTree::expansion(const Node& node, const Vec3& q, double d) {
+  const auto& m = node.moment;
+  const double trace = m[0].x + m[1].y + m[2].z;
+  const double along = q.x * dot(m[0], q) + q.y * dot(m[1], q) + q.z * dot(m[2], q);
+  return (dot(node.normal, q) + trace - 3 * along / (d * d)) / (4 * pi * d * d * d);
+}
 
 WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
   WindingSum sum;
@@ -131,9 +146,10 @@ WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
     const Vec3 q = node.center - p;
     const double d = norm(q), gap = d - node.radius;
     if (gap > 0 && tolerance > 0) {
-      const double error = 2 * node.area * node.radius / (4 * pi * gap * gap * gap);
+      const double error =
+          3 * node.area * node.radius * node.radius / (4 * pi * gap * gap * gap * gap);
       if (error < tolerance) {
-        sum.value += dot(node.normal, q) / (4 * pi * d * d * d);
+        sum.value += expansion(node, q, d);
         sum.error += error;
         continue;
       }
@@ -152,8 +168,9 @@ WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
   return sum;
 }
 
-double SolidAngleTree::bound(const Vec3& p, double radius) const {
-  double value = 0, error = 0;
+WindingSum SolidAngleTree::within(const Vec3& p, double radius) const {
+  WindingSum sum;
+  Vec3 gradient;
   std::uint32_t stack[128];
   int depth = 0;
   if (!nodes_.empty())
@@ -163,10 +180,13 @@ double SolidAngleTree::bound(const Vec3& p, double radius) const {
     const Vec3 q = node.center - p;
     const double d = norm(q), gap = d - node.radius - radius;
     if (gap > 0) {
-      const double change = 2 * node.area * (node.radius + radius) / (4 * pi * gap * gap * gap);
-      if (change < 0.01) {
-        value += dot(node.normal, q) / (4 * pi * d * d * d);
-        error += change;
+      const double reach = node.radius + radius;
+      const double error = 3 * node.area * reach * reach / (4 * pi * gap * gap * gap * gap);
+      const double crude = node.area / (4 * pi * gap * gap);
+      if (error < 1e-4 || (node.children == 0 && error < crude)) {
+        sum.value += expansion(node, q, d);
+        sum.error += error;
+        gradient += (node.normal - 3 * dot(node.normal, q) / (d * d) * q) / (4 * pi * d * d * d);
         continue;
       }
     }
@@ -175,10 +195,11 @@ double SolidAngleTree::bound(const Vec3& p, double radius) const {
       stack[depth++] = node.children;
       continue;
     }
-    const double all = 0.5 * (node.end - node.begin); // half of all directions each
-    error += gap > 0 ? std::min(all, node.area / (4 * pi * gap * gap)) : all;
+    // Half of all directions at most.
+    sum.error += gap > 0 ? std::min(0.5, node.area / (4 * pi * gap * gap)) : 0.5;
   }
-  return std::fabs(value) + error;
+  sum.error += radius * norm(gradient);
+  return sum;
 }
 
 double SolidAngleTree::reach() const {

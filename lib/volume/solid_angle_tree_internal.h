@@ -4,6 +4,7 @@
 
 #include "base/mesh.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -19,19 +20,19 @@ struct WindingSum {
 /// bits; errs by less than 1e-15. 0 for x = y = 0.
 double angle_of(double x, double y);
 
-/// (Jacobson et al. 2013; the tree after Barill et al. 2018, with a bound instead of their ratio of
-/// distances.)
+/// (Jacobson et al. 2013; the tree after Barill et al. 2018, with a bound of the error instead of
+/// their ratio of distances.)
 class SolidAngleTree {
 public:
   /// \pre the points stay as they are as long as the tree
   SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles);
 
-  /// At sample p, moved by the infinitesimals of the scan. Nodes that as a dipole err by at most
+  /// At sample p, moved by the infinitesimals of the scan. Nodes whose expansion errs by at most
   /// `tolerance` are not opened; 0 sums all triangles, and the error is that of rounding.
   WindingSum at(const Vec3& p, double tolerance) const;
 
-  /// Bound of the magnitude at all points within `radius` of p.
-  double bound(const Vec3& p, double radius) const;
+  /// Value and error for all points within `radius` of p.
+  WindingSum within(const Vec3& p, double radius) const;
 
   /// Farther from `box()` than this the magnitude is below 1/2.
   double reach() const;
@@ -39,12 +40,14 @@ public:
 
 private:
   struct Node {
-    Vec3 center, normal; ///< normals of length area, added
+    Vec3 center, normal;        ///< normals of length area, added
+    std::array<Vec3, 3> moment; ///< row i: integral of normal_i (x - center)
     double area = 0, radius = 0;
     std::uint32_t begin = 0, end = 0; ///< triangles
     std::uint32_t children = 0;       ///< the first of two; 0: a leaf
   };
   void build(std::uint32_t node);
+  static double expansion(const Node& node, const Vec3& q, double d);
 
   std::span<const Vec3> points_;
   std::vector<Triangle> triangles_;

@@ -39,7 +39,8 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
     const double half = (leaf_dim * static_cast<double>(cube.side) - 1) / 2;
     const Vec3 middle = Vec3{1.0 * cube.low[0], 1.0 * cube.low[1], 1.0 * cube.low[2]} * leaf_dim +
                         Vec3{half, half, half};
-    if (cones.bound(middle, half * 1.7320508075688774) < 0.5)
+    const WindingSum sum = cones.within(middle, half * 1.7320508075688774);
+    if (std::fabs(sum.value) + sum.error < 0.5)
       continue;
     if (cube.side == 1) {
       near.push_back(cube.low);
@@ -50,9 +51,10 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
     }
     const std::int32_t next = cube.side / 2;
     for (int c = 0; c < 8; ++c)
-      cubes.push_back({{cube.low[0] + (c & 4 ? next : 0), cube.low[1] + (c & 2 ? next : 0),
-                        cube.low[2] + (c & 1 ? next : 0)},
-                       next});
+      cubes.push_back(
+          {{cube.low[0] + ((c & 4) != 0 ? next : 0), cube.low[1] + ((c & 2) != 0 ? next : 0),
+            cube.low[2] + ((c & 1) != 0 ? next : 0)},
+           next});
   }
   std::sort(near.begin(), near.end());
   return near;
@@ -60,7 +62,7 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
 
 /// Is |whole - w(cones)| > 1/2 at p?
 bool winds(const SolidAngleTree& cones, const Vec3& p, std::int32_t whole) {
-  for (const double tolerance : {1e-3, 1e-5, 0.0}) {
+  for (const double tolerance : {1e-4, 1e-6, 0.0}) {
     const WindingSum sum = cones.at(p, tolerance);
     const double distance = std::fabs(whole - sum.value) - 0.5;
     if (std::fabs(distance) > sum.error || tolerance == 0)
@@ -81,16 +83,41 @@ BitLeaf bits_of(const CountLeaf& leaf) {
   return bits;
 }
 
-BitLeaf bits_near_cones(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& origin) {
-  BitLeaf bits;
-  for (std::int32_t v = 0; v < leaf_voxels; ++v) {
-    const Vec3 p{1.0 * (origin[0] + v / 64), 1.0 * (origin[1] + v / 8 % 8),
-                 1.0 * (origin[2] + v % 8)};
-    const auto n = static_cast<std::size_t>(v);
-    bits.word[n / 64] |= std::uint64_t{winds(cones, p, static_cast<std::int32_t>(leaf.count[n]))}
-                         << (n % 64);
+/// Decides the samples of a cube of a leaf, together where the cones' winding number varies little
+/// enough in it, else in eight parts down to single samples.
+void decide(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& origin, const Int3& low,
+            std::int32_t side, BitLeaf& bits, std::uint64_t& summed) {
+  const double half = (side - 1) / 2.0;
+  const Vec3 middle{origin[0] + low[0] + half, origin[1] + low[1] + half,
+                    origin[2] + low[2] + half};
+  const auto place = [&](std::int32_t n) { // the samples of the cube
+    return static_cast<std::size_t>(
+        leaf_offset({low[0] + n / (side * side), low[1] + n / side % side, low[2] + n % side}));
+  };
+  const auto whole = [&](std::size_t at) { return static_cast<std::int32_t>(leaf.count[at]); };
+  const auto set = [&](std::size_t at, bool inside) {
+    bits.word[at / 64] |= std::uint64_t{inside} << (at % 64);
+  };
+  if (side == 1) {
+    set(place(0), winds(cones, middle, whole(place(0))));
+    ++summed;
+    return;
   }
-  return bits;
+  const WindingSum sum = cones.within(middle, half * 1.7320508075688774);
+  bool clear = true;
+  for (std::int32_t n = 0; clear && n < side * side * side; ++n)
+    clear = std::fabs(std::fabs(whole(place(n)) - sum.value) - 0.5) > sum.error;
+  if (clear) {
+    for (std::int32_t n = 0; n < side * side * side; ++n)
+      set(place(n), std::fabs(whole(place(n)) - sum.value) > 0.5);
+    return;
+  }
+  const std::int32_t next = side / 2;
+  for (int c = 0; c < 8; ++c)
+    decide(cones, leaf, origin,
+           {low[0] + ((c & 4) != 0 ? next : 0), low[1] + ((c & 2) != 0 ? next : 0),
+            low[2] + ((c & 1) != 0 ? next : 0)},
+           next, bits, summed);
 }
 
 /// Sums the flips of a slab up along k. `near` are its leaves near the cones.
@@ -131,9 +158,10 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
     CountLeaf& leaf = map.leaves[order[n]];
     leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
     if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k})) {
-      put(bits_near_cones(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}),
-          key, key.k + 1);
-      counters.summed += leaf_voxels;
+      BitLeaf bits;
+      decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
+             leaf_dim, bits, counters.summed);
+      put(bits, key, key.k + 1);
     } else {
       put(bits_of(leaf), key, key.k + 1);
     }
