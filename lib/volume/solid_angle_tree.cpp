@@ -128,21 +128,20 @@ void SolidAngleTree::build(std::uint32_t n) {
 // errs by at most 3 r²/(d - r)⁴.
 
 /// Value of a node, by a dipole and its first moments; q from the point to the centre, d = |q|.
-double SolidAngleTree::expansion(const Node& node, const Vec3& q, double d) {
+template <class Node>
+double expansion(const Node& node, const Vec3& q, double d) {
   const auto& m = node.moment;
   const double trace = m[0].x + m[1].y + m[2].z;
   const double along = q.x * dot(m[0], q) + q.y * dot(m[1], q) + q.z * dot(m[2], q);
   return (dot(node.normal, q) + trace - 3 * along / (d * d)) / (4 * pi * d * d * d);
 }
 
-WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
-  WindingSum sum;
-  std::uint32_t stack[128];
-  int depth = 0;
-  if (!nodes_.empty())
-    stack[depth++] = 0;
-  while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
+WindingSum SolidAngleTree::at(const View& view, const Vec3& p, double tolerance) const {
+  WindingSum sum{view.value + dot(view.gradient, p - view.center), view.error};
+  std::vector<std::uint32_t> stack = view.near;
+  while (!stack.empty()) {
+    const Node& node = nodes_[stack.back()];
+    stack.pop_back();
     const Vec3 q = node.center - p;
     const double d = norm(q), gap = d - node.radius;
     if (gap > 0 && tolerance > 0) {
@@ -155,8 +154,8 @@ WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
       }
     }
     if (node.children != 0) {
-      stack[depth++] = node.children + 1;
-      stack[depth++] = node.children;
+      stack.push_back(node.children + 1);
+      stack.push_back(node.children);
       continue;
     }
     for (std::uint32_t t = node.begin; t < node.end; ++t) {
@@ -168,35 +167,65 @@ WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
   return sum;
 }
 
-WindingSum SolidAngleTree::within(const Vec3& p, double radius) const {
-  WindingSum sum;
-  Vec3 gradient;
-  std::uint32_t stack[128];
-  int depth = 0;
+SolidAngleTree::View SolidAngleTree::whole() const {
+  View view;
   if (!nodes_.empty())
-    stack[depth++] = 0;
-  while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
-    const Vec3 q = node.center - p;
-    const double d = norm(q), gap = d - node.radius - radius;
+    view.near.push_back(0);
+  return view;
+}
+
+void SolidAngleTree::add(View& view, std::uint32_t n, double radius) const {
+  const Node& node = nodes_[n];
+  const Vec3 q = node.center - view.center;
+  const double d = norm(q), reach = node.radius + radius, gap = d - reach;
+  if (gap > 0) {
+    const double error = 3 * node.area * reach * reach / (4 * pi * gap * gap * gap * gap);
+    if (error < 2e-5) {
+      view.value += expansion(node, q, d);
+      view.error += error;
+      view.gradient += (3 * dot(node.normal, q) / (d * d) * q - node.normal) / (4 * pi * d * d * d);
+      return;
+    }
+  }
+  if (node.children == 0 || node.radius < radius) { // to open it would not help much
+    view.near.push_back(n);
+    return;
+  }
+  add(view, node.children, radius);
+  add(view, node.children + 1, radius);
+}
+
+SolidAngleTree::View SolidAngleTree::narrowed(const View& view, const Vec3& center,
+                                              double radius) const {
+  View narrow;
+  narrow.center = center;
+  narrow.value = view.value + dot(view.gradient, center - view.center);
+  narrow.error = view.error;
+  narrow.gradient = view.gradient;
+  for (const std::uint32_t node : view.near)
+    add(narrow, node, radius);
+  return narrow;
+}
+
+WindingSum SolidAngleTree::range(const View& view, double radius) const {
+  WindingSum sum{view.value, view.error};
+  Vec3 gradient = view.gradient;
+  for (const std::uint32_t n : view.near) {
+    const Node& node = nodes_[n];
+    const Vec3 q = node.center - view.center;
+    const double d = norm(q), reach = node.radius + radius, gap = d - reach;
+    double crude = 0.5 * (node.end - node.begin); // half of all directions each
     if (gap > 0) {
-      const double reach = node.radius + radius;
+      crude = std::min(crude, node.area / (4 * pi * gap * gap));
       const double error = 3 * node.area * reach * reach / (4 * pi * gap * gap * gap * gap);
-      const double crude = node.area / (4 * pi * gap * gap);
-      if (error < 1e-4 || (node.children == 0 && error < crude)) {
+      if (error < crude) {
         sum.value += expansion(node, q, d);
         sum.error += error;
-        gradient += (node.normal - 3 * dot(node.normal, q) / (d * d) * q) / (4 * pi * d * d * d);
+        gradient += (3 * dot(node.normal, q) / (d * d) * q - node.normal) / (4 * pi * d * d * d);
         continue;
       }
     }
-    if (node.children != 0) {
-      stack[depth++] = node.children + 1;
-      stack[depth++] = node.children;
-      continue;
-    }
-    // Half of all directions at most.
-    sum.error += gap > 0 ? std::min(0.5, node.area / (4 * pi * gap * gap)) : 0.5;
+    sum.error += crude;
   }
   sum.error += radius * norm(gradient);
   return sum;

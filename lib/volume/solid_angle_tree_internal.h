@@ -27,12 +27,23 @@ public:
   /// \pre the points stay as they are as long as the tree
   SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles);
 
+  /// The tree as seen from a ball: a linear field for what is far from it, and the nodes that are
+  /// not.
+  struct View {
+    Vec3 center;
+    double value = 0, error = 0;
+    Vec3 gradient;
+    std::vector<std::uint32_t> near;
+  };
+  View whole() const;
+  /// What a ball within the view's own sees. Far nodes err by at most 2e-5 each.
+  View narrowed(const View& view, const Vec3& center, double radius) const;
+  /// Value and error for all points of the ball for which the view was made.
+  WindingSum range(const View& view, double radius) const;
+
   /// At sample p, moved by the infinitesimals of the scan. Nodes whose expansion errs by at most
   /// `tolerance` are not opened; 0 sums all triangles, and the error is that of rounding.
-  WindingSum at(const Vec3& p, double tolerance) const;
-
-  /// Value and error for all points within `radius` of p.
-  WindingSum within(const Vec3& p, double radius) const;
+  WindingSum at(const View& view, const Vec3& p, double tolerance) const;
 
   /// Farther from `box()` than this the magnitude is below 1/2.
   double reach() const;
@@ -47,7 +58,7 @@ private:
     std::uint32_t children = 0;       ///< the first of two; 0: a leaf
   };
   void build(std::uint32_t node);
-  static double expansion(const Node& node, const Vec3& q, double d);
+  void add(View& view, std::uint32_t node, double radius) const;
 
   std::span<const Vec3> points_;
   std::vector<Triangle> triangles_;
