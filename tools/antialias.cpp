@@ -10,11 +10,25 @@ namespace {
 
 constexpr int lines_instead = 4; ///< N of lines:N where exact cannot be
 
-std::string open_text(const VoxelizeReport& mesh, OpenMesh on_open) {
-  return "the mesh is open: " + std::to_string(mesh.boundary_edges) + " boundary edges, " +
-         (on_open == OpenMesh::fill
-              ? std::to_string(mesh.holes) + (mesh.holes == 1 ? " hole closed" : " holes closed")
-              : std::to_string(mesh.odd_rays) + " odd rays left empty");
+/// What is wrong with the mesh, "" if nothing.
+std::string defects_of(const VoxelizeReport& mesh, const VoxelizeOptions& options) {
+  std::string text;
+  const auto add = [&](std::uint64_t count, const char* one, const char* many) {
+    if (count > 0)
+      text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
+  };
+  const bool open = mesh.boundary_edges > 0;
+  add(mesh.boundary_edges, "boundary edge", "boundary edges");
+  if (open && options.on_open == OpenMesh::fill)
+    add(mesh.holes, "hole closed", "holes closed");
+  else if (open && options.rule == VoxelRule::parity)
+    text += ", " + std::to_string(mesh.odd_rays) + " odd rays left empty";
+  else
+    add(mesh.holes, "hole", "holes");
+  add(mesh.parts_turned, "part turned outward", "parts turned outward");
+  add(mesh.triangles_turned, "triangle turned", "triangles turned");
+  add(mesh.triangles_duplicate, "duplicate triangle left out", "duplicate triangles left out");
+  return text.empty() ? text : (open ? "the mesh is open: " : "the mesh had ") + text;
 }
 
 } // namespace
@@ -75,9 +89,7 @@ Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& me
     return run.timed("grid", [&] { return grid_from_scan(context, scan, transform); });
   };
   Grid grid = at(place, volume);
-  std::string warning;
-  if (report.mesh.boundary_edges > 0)
-    warning = open_text(report.mesh, on_open);
+  std::string warning = defects_of(report.mesh, options);
   if (!instead.empty())
     warning += (warning.empty() ? "" : "; ") + instead;
   if (!warning.empty())

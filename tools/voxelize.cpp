@@ -24,8 +24,10 @@ struct Arguments {
   VoxelizeOptions options;
 };
 
-VoxelRule rule_from_text(const std::string&) {
-  return VoxelRule::parity;
+VoxelRule rule_from_text(const std::string& text) {
+  return text == "winding"   ? VoxelRule::winding
+         : text == "zbuffer" ? VoxelRule::zbuffer
+                             : VoxelRule::parity;
 }
 
 void complete(Arguments& a) {
@@ -42,8 +44,7 @@ void complete(Arguments& a) {
   if (a.antialias.empty())
     a.antialias = a.options.rule == VoxelRule::parity ? "exact" : "none";
   a.choice = antialias_from_text(a.antialias);
-  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none &&
-      a.choice.filter != Antialias::box)
+  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none)
     throw UsageError("--antialias " + a.antialias + " goes with --rule parity, not with --rule " +
                      a.rule);
   a.options.on_open = a.on_open == "error"  ? OpenMesh::refuse
@@ -76,6 +77,11 @@ void report(cli::Run& run, const Arguments& a, const CoverageReport& r) {
   stats.set("exact_tests", r.mesh.exact_tests);
   stats.set("surface_voxels", r.surface_voxels);
   stats.set("overlap_voxels", r.overlap_voxels);
+  stats.set("parts", r.mesh.parts);
+  stats.set("parts_turned", r.mesh.parts_turned);
+  stats.set("triangles_turned", r.mesh.triangles_turned);
+  stats.set("triangles_duplicate", r.mesh.triangles_duplicate);
+  stats.set("samples_summed", r.mesh.samples_summed);
 }
 
 void work(cli::Run& run, const Arguments& a) {
@@ -115,7 +121,8 @@ int main(int argc, char** argv) {
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
   p.option("--label", a.labels, "L[,L...]",
            "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels");
-  p.option("--rule", a.rule, "RULE", "when a point is inside: parity").one_of({"parity"});
+  p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
+      .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.antialias, "FILTER",
            "grey values: exact, lines:N, box:N, jones, sramek, none; default exact with --rule "
            "parity, else none");

@@ -7,6 +7,7 @@
 #include "volume/mesh_border.h"
 #include "volume/parity_scan_internal.h"
 #include "volume/voxelize_internal.h"
+#include "volume/winding_scan_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -141,7 +142,10 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     throw Error("voxelize: more than one sample in a voxel, expected one with this rule");
   check_voxelize_input(mesh, transform);
   IndexMesh index = index_mesh(context, mesh, transform);
-  require_memory(context, scan_bytes(index.extent, mesh, options.samples), "the voxelized mesh");
+  require_memory(
+      context,
+      scan_bytes(index.extent, mesh, options.rule == VoxelRule::winding ? 2 : options.samples),
+      "the voxelized mesh");
   refine(index.points, options.samples);
 
   VoxelizeReport local;
@@ -168,6 +172,12 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
       samples.points = index.points;
       samples.triangles = closed;
     }
+  if (options.rule == VoxelRule::winding) {
+    // Cones that fill holes belong to no part, so with them edges alone connect.
+    const std::span<const std::int32_t> part(mesh.part.data(),
+                                             closed.empty() ? mesh.part.size() : 0);
+    return winding_scan(context, index.points, samples.triangles, part, r);
+  }
   if (options.rule == VoxelRule::zbuffer)
     return depth_buffer_scan(context, samples, r);
   InsideScan scan = parity_scan(context, samples, r, [&] {

@@ -27,6 +27,7 @@ enum class OpenMesh {
 /// When a sample point is inside.
 enum class VoxelRule {
   parity,  ///< a ray from it crosses the surface an odd number of times
+  winding, ///< |generalised winding number| > 1/2, parts turned outward (Jacobson et al. 2013)
   zbuffer, ///< along each axis it lies between the first and the last crossing (FZKA 7190, 3.1.5)
 };
 
@@ -47,6 +48,10 @@ struct VoxelizeReport {
   std::uint64_t odd_rays = 0;          ///< rays (along k) with an odd number of crossings
   std::uint64_t crossings = 0;         ///< of rays with triangles
   std::uint64_t exact_tests = 0;       ///< signs that needed exact arithmetic
+
+  // Rule winding alone, as in oriented_surface.h:
+  std::uint64_t parts = 0, parts_turned = 0, triangles_turned = 0, triangles_duplicate = 0;
+  std::uint64_t samples_summed = 0; ///< near holes, where solid angles were added up
 };
 
 /// The samples inside, kept as bits or counts: only what the surface touches is stored voxel by

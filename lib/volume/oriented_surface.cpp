@@ -1,0 +1,314 @@
+#include "volume/oriented_surface.h"
+
+#include "volume/mesh_border.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <tuple>
+#include <unordered_map>
+
+namespace gewebe {
+namespace {
+
+/// A side of a triangle; sides of one edge stand together when sorted.
+struct Side {
+  std::int32_t part;
+  std::uint32_t low, high;
+  std::uint32_t triangle;
+  bool upward; ///< the triangle runs from low to high
+
+  auto edge() const { return std::tie(part, low, high); }
+};
+
+std::vector<Side> sorted_sides(std::span<const Triangle> triangles,
+                               std::span<const std::int32_t> part) {
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (std::size_t n = 0; n < triangles.size(); ++n)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t from = triangles[n][c], to = triangles[n][c == 2 ? 0 : c + 1];
+      sides.push_back({part.empty() ? 0 : part[n], std::min(from, to), std::max(from, to),
+                       static_cast<std::uint32_t>(n), from < to});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.part, a.low, a.high, a.triangle) <
+           std::tie(b.part, b.low, b.high, b.triangle);
+  });
+  return sides;
+}
+
+/// Calls visit with the span of sides of each edge.
+template <class Visit>
+void for_each_edge(std::span<const Side> sides, Visit&& visit) {
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].edge() == sides[begin].edge())
+      ++end;
+    visit(sides.subspan(begin, end - begin));
+  }
+}
+
+class Groups {
+public:
+  explicit Groups(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  std::uint32_t of(std::uint32_t n) {
+    while (parent_[n] != n)
+      n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t x = of(a), y = of(b);
+    parent_[std::max(x, y)] = std::min(x, y);
+  }
+
+private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// Takes degenerate and repeated triangles out; `part` follows.
+void drop_repeated(OrientedSurface& surface, std::vector<std::int32_t>& part) {
+  std::vector<std::tuple<std::int32_t, Triangle, std::uint32_t>> keys;
+  for (std::size_t n = 0; n < surface.triangles.size(); ++n) {
+    Triangle t = surface.triangles[n];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
+      continue;
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    keys.emplace_back(part.empty() ? 0 : part[n], t, static_cast<std::uint32_t>(n));
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> keep;
+  for (std::size_t n = 0; n < keys.size(); ++n)
+    if (n > 0 && std::get<0>(keys[n]) == std::get<0>(keys[n - 1]) &&
+        std::get<1>(keys[n]) == std::get<1>(keys[n - 1]))
+      ++surface.triangles_duplicate;
+    else
+      keep.push_back(std::get<2>(keys[n]));
+  std::sort(keep.begin(), keep.end());
+  for (std::size_t n = 0; n < keep.size(); ++n) {
+    surface.triangles[n] = surface.triangles[keep[n]];
+    if (!part.empty())
+      part[n] = part[keep[n]];
+  }
+  surface.triangles.resize(keep.size());
+  if (!part.empty())
+    part.resize(keep.size());
+}
+
+/// Makes the triangles of each patch agree with most of its area.
+void agree(std::span<const Vec3> points, std::span<const Side> sides, OrientedSurface& surface) {
+  struct Neighbour {
+    std::uint32_t triangle;
+    bool against;
+  };
+  std::vector<std::array<Neighbour, 3>> neighbours(surface.triangles.size());
+  std::vector<std::uint8_t> count(surface.triangles.size(), 0);
+  for_each_edge(sides, [&](std::span<const Side> edge) {
+    if (edge.size() != 2)
+      return;
+    const bool against = edge[0].upward == edge[1].upward;
+    neighbours[edge[0].triangle][count[edge[0].triangle]++] = {edge[1].triangle, against};
+    neighbours[edge[1].triangle][count[edge[1].triangle]++] = {edge[0].triangle, against};
+  });
+  std::vector<bool> seen(surface.triangles.size(), false), turned(surface.triangles.size(), false);
+  std::vector<std::uint32_t> patch;
+  for (std::uint32_t seed = 0; seed < surface.triangles.size(); ++seed) {
+    if (seen[seed])
+      continue;
+    seen[seed] = true;
+    patch.assign(1, seed);
+    double area[2] = {0, 0};
+    for (std::size_t n = 0; n < patch.size(); ++n) {
+      const std::uint32_t t = patch[n];
+      const auto& [a, b, c] = surface.triangles[t];
+      area[turned[t] ? 1 : 0] += norm(cross(points[b] - points[a], points[c] - points[a]));
+      for (std::uint8_t m = 0; m < count[t]; ++m) {
+        const Neighbour next = neighbours[t][m];
+        if (seen[next.triangle])
+          continue;
+        seen[next.triangle] = true;
+        turned[next.triangle] = turned[t] != next.against;
+        patch.push_back(next.triangle);
+      }
+    }
+    for (const std::uint32_t t : patch)
+      if (turned[t] != (area[1] > area[0])) {
+        std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+        ++surface.triangles_turned;
+      }
+  }
+}
+
+/// Turns the parts of negative volume.
+void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
+                  OrientedSurface& surface) {
+  Groups groups(surface.triangles.size());
+  for_each_edge(sides, [&](std::span<const Side> edge) {
+    for (const Side& side : edge)
+      groups.join(edge[0].triangle, side.triangle);
+  });
+  struct Sum {
+    Vec3 middle;
+    double corners = 0, volume = 0;
+  };
+  std::vector<Sum> sums(surface.triangles.size());
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    Sum& sum = sums[groups.of(t)];
+    for (const std::uint32_t corner : surface.triangles[t])
+      sum.middle += points[corner];
+    sum.corners += 3;
+  }
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    Sum& sum = sums[groups.of(t)];
+    const Vec3 middle = sum.middle / sum.corners;
+    const auto& [a, b, c] = surface.triangles[t];
+    sum.volume += dot(points[a] - middle, cross(points[b] - middle, points[c] - middle));
+  }
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    const Sum& sum = sums[groups.of(t)];
+    if (groups.of(t) == t) {
+      ++surface.parts;
+      surface.parts_turned += sum.volume < 0 ? 1 : 0;
+    }
+    if (sum.volume < 0)
+      std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+  }
+}
+
+/// Takes directed edges, of which as many end as begin in each point, apart into loops that meet no
+/// point twice. Walks on until a point comes again, and prefers to close the shortest loop it can.
+std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::array<std::uint32_t, 2>> edges) {
+  std::sort(edges.begin(), edges.end());
+  constexpr std::uint32_t none = UINT32_MAX;
+  std::vector<bool> used(edges.size(), false);
+  const auto first_from = [&](std::uint32_t point) {
+    return static_cast<std::size_t>(
+        std::lower_bound(edges.begin(), edges.end(), std::array<std::uint32_t, 2>{point, 0}) -
+        edges.begin());
+  };
+  std::vector<std::vector<std::uint32_t>> loops;
+  std::unordered_map<std::uint32_t, std::uint32_t> place; // in the walk
+  std::vector<std::uint32_t> walk;
+  for (std::size_t start = 0; start < edges.size(); ++start) {
+    if (used[start])
+      continue;
+    walk.assign(1, edges[start][0]);
+    place.clear();
+    place[walk[0]] = 0;
+    while (!walk.empty()) {
+      std::size_t best = edges.size();
+      std::uint32_t best_place = none;
+      for (std::size_t e = first_from(walk.back()); e < edges.size() && edges[e][0] == walk.back();
+           ++e) {
+        if (used[e])
+          continue;
+        const auto at = place.find(edges[e][1]);
+        const std::uint32_t there = at == place.end() ? none : at->second;
+        if (best == edges.size() || (there != none && (best_place == none || there > best_place))) {
+          best = e;
+          best_place = there;
+        }
+      }
+      if (best == edges.size())
+        break; // back at the start, and nothing left there
+      used[best] = true;
+      if (best_place == none) {
+        place[edges[best][1]] = static_cast<std::uint32_t>(walk.size());
+        walk.push_back(edges[best][1]);
+        continue;
+      }
+      loops.emplace_back(walk.begin() + best_place, walk.end());
+      while (walk.size() > best_place + 1) {
+        place.erase(walk.back());
+        walk.pop_back();
+      }
+    }
+  }
+  return loops;
+}
+
+/// The cone of a loop in rings about as wide as the loop's edges are long, lest its triangles be
+/// long and thin.
+void add_cone(std::vector<Vec3>& points, const std::vector<std::uint32_t>& loop, const Vec3& tip,
+              std::vector<Triangle>& cones) {
+  const std::size_t size = loop.size();
+  double around = 0, across = 0;
+  for (std::size_t n = 0; n < size; ++n) {
+    around += norm(points[loop[(n + 1) % size]] - points[loop[n]]);
+    across += norm(tip - points[loop[n]]);
+  }
+  const auto rings = static_cast<std::size_t>(std::clamp(across / around, 1.0, 64.0));
+  std::vector<std::uint32_t> outer = loop;
+  for (std::size_t ring = 1; ring < rings; ++ring) {
+    const double t = static_cast<double>(ring) / static_cast<double>(rings);
+    std::vector<std::uint32_t> inner(size);
+    for (std::size_t n = 0; n < size; ++n) {
+      const Vec3 corner = points[loop[n]];
+      inner[n] = static_cast<std::uint32_t>(points.size());
+      points.push_back(corner + t * (tip - corner));
+    }
+    for (std::size_t n = 0; n < size; ++n) {
+      const std::size_t next = (n + 1) % size;
+      cones.push_back({outer[n], outer[next], inner[next]});
+      cones.push_back({outer[n], inner[next], inner[n]});
+    }
+    outer = std::move(inner);
+  }
+  const auto apex = static_cast<std::uint32_t>(points.size());
+  points.push_back(tip);
+  for (std::size_t n = 0; n < size; ++n)
+    cones.push_back({outer[n], outer[(n + 1) % size], apex});
+}
+
+} // namespace
+
+OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Triangle> triangles,
+                               std::span<const std::int32_t> part) {
+  OrientedSurface surface;
+  surface.triangles.assign(triangles.begin(), triangles.end());
+  std::vector<std::int32_t> parts(part.begin(), part.end());
+  const std::vector<std::uint32_t> first = first_at_position(points);
+  for (Triangle& t : surface.triangles)
+    for (std::uint32_t& corner : t)
+      corner = first[corner];
+  drop_repeated(surface, parts);
+  agree(points, sorted_sides(surface.triangles, parts), surface);
+  turn_outward(points, sorted_sides(surface.triangles, parts), surface);
+  return surface;
+}
+
+std::vector<Triangle> closing_cones(std::vector<Vec3>& points,
+                                    std::span<const Triangle> triangles) {
+  std::vector<std::array<std::uint32_t, 2>> missing; // from, to: what would balance the edges
+  const std::vector<Side> sides = sorted_sides(triangles, {});
+  for_each_edge(sides, [&](std::span<const Side> edge) {
+    int up = 0;
+    for (const Side& side : edge)
+      up += side.upward ? 1 : -1;
+    for (; up > 0; --up)
+      missing.push_back({edge[0].high, edge[0].low});
+    for (; up < 0; ++up)
+      missing.push_back({edge[0].low, edge[0].high});
+  });
+  std::vector<Triangle> cones;
+  for (const std::vector<std::uint32_t>& loop : loops_of(std::move(missing))) {
+    if (loop.size() == 3) {
+      cones.push_back({loop[0], loop[1], loop[2]});
+      continue;
+    }
+    Vec3 sum;
+    Box3 box;
+    for (const std::uint32_t corner : loop) {
+      sum += points[corner];
+      box.add(points[corner]);
+    }
+    // Off the mean, lest the inner edges of a cone run through sample points.
+    const Vec3 tip = sum / static_cast<double>(loop.size()) +
+                     Vec3{0.013717, 0.007129, 0.011317} * box.longest_side();
+    add_cone(points, loop, tip, cones);
+  }
+  return cones;
+}
+
+} // namespace gewebe

@@ -1,0 +1,68 @@
+#pragma once
+// The winding number of a few triangles, by a tree whose far nodes are taken as dipoles. Internal
+// to the winding rule.
+
+#include "base/mesh.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// Sum of solid angles / 4 pi with a bound of its error.
+struct WindingSum {
+  double value = 0, error = 0;
+};
+
+/// arg(x + i y) in [0, pi] for y >= 0, by +, -, x, / alone, so that every machine has the same
+/// bits; errs by less than 1e-15. 0 for x = y = 0.
+double angle_of(double x, double y);
+
+/// (Jacobson et al. 2013; the tree after Barill et al. 2018, with a bound of the error instead of
+/// their ratio of distances.)
+class SolidAngleTree {
+public:
+  /// \pre the points stay as they are as long as the tree
+  SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles);
+
+  /// The tree as seen from a ball: a linear field for what is far from it, and the nodes that are
+  /// not.
+  struct View {
+    Vec3 center;
+    double value = 0, error = 0;
+    Vec3 gradient;
+    std::vector<std::uint32_t> near;
+  };
+  View whole() const;
+  /// What a ball within the view's own sees. Far nodes err by at most 2e-5 each.
+  View narrowed(const View& view, const Vec3& center, double radius) const;
+  /// Value and error for all points of the ball for which the view was made.
+  WindingSum range(const View& view, double radius) const;
+
+  /// At sample p, moved by the infinitesimals of the scan. Nodes whose expansion errs by at most
+  /// `tolerance` are not opened; 0 sums all triangles, and the error is that of rounding.
+  WindingSum at(const View& view, const Vec3& p, double tolerance) const;
+
+  /// Farther from `box()` than this the magnitude is below 1/2.
+  double reach() const;
+  Box3 box() const;
+
+private:
+  struct Node {
+    Vec3 center, normal;        ///< normals of length area, added
+    std::array<Vec3, 3> moment; ///< row i: integral of normal_i (x - center)
+    double area = 0, radius = 0;
+    std::uint32_t begin = 0, end = 0; ///< triangles
+    std::uint32_t children = 0;       ///< the first of two; 0: a leaf
+  };
+  void build(std::uint32_t node);
+  void add(View& view, std::uint32_t node, double radius) const;
+
+  std::span<const Vec3> points_;
+  std::vector<Triangle> triangles_;
+  std::vector<Node> nodes_;
+};
+
+} // namespace gewebe
