@@ -17,9 +17,9 @@
 #include "volume/voxelize.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -42,16 +42,23 @@ struct Times {
   double median, fastest, slowest; // ms
 };
 
-/// Runs all works in turn, round by round, so that a busy machine is busy for all of them.
-std::vector<Times> measure(const std::vector<std::function<void()>>& works) {
-  std::vector<std::vector<double>> times(works.size());
+struct Filter {
+  std::string name;
+  std::function<Grid()> work;
+  Grid grid;
+};
+
+/// Runs all filters in turn, round by round, so that a busy machine is busy for all of them. Times
+/// are the processor's for this one thread: other programs don't count.
+std::vector<Times> measure(std::vector<Filter>& filters) {
+  const auto now = [] { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+  std::vector<std::vector<double>> times(filters.size());
   for (int run = 0; run < runs; ++run)
-    for (std::size_t n = 0; n < works.size(); ++n) {
-      const auto start = std::chrono::steady_clock::now();
-      works[n]();
-      times[n].push_back(
-          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-              .count());
+    for (std::size_t n = 0; n < filters.size(); ++n) {
+      filters[n].grid = Grid();
+      const double start = now();
+      filters[n].grid = filters[n].work();
+      times[n].push_back(now() - start);
     }
   std::vector<Times> result;
   for (auto& t : times) {
@@ -258,12 +265,6 @@ Error2 position_error(const Distances& distances, const Grid& grid) {
 
 // ---- one mesh
 
-struct Filter {
-  std::string name;
-  std::function<Grid()> work;
-  Grid grid;
-};
-
 void bench(const char* name, const TriangleMesh& mesh) {
   const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
   const auto refuse = OpenMesh::refuse;
@@ -288,10 +289,7 @@ void bench(const char* name, const TriangleMesh& mesh) {
       {"sramek", [&] { return sramek_density(one_thread, mesh, lattice, refuse); }, {}});
   filters.push_back({"none", [&] { return voxelize(one_thread, mesh, lattice, {}); }, {}});
   filters.push_back({"768 to 128", [&] { return literally(mesh, lattice); }, {}});
-  std::vector<std::function<void()>> works;
-  for (Filter& filter : filters)
-    works.emplace_back([&filter] { filter.grid = filter.work(); });
-  const std::vector<Times> times = measure(works);
+  const std::vector<Times> times = measure(filters);
 
   // How far rounding goes in `exact` itself: the sums run along another axis.
   GridTransform turned = lattice;
