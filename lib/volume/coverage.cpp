@@ -295,8 +295,8 @@ void sort_into_slabs(const Context& context, SlabbedMesh& mesh, double margin) {
   std::size_t total = 0;
   for (std::size_t n = 0; n < slabs_of.size(); ++n) {
     const Triangle& t = mesh.triangles[n];
-    const auto [x_min, x_max] =
-        std::minmax({mesh.points[t[0]].x, mesh.points[t[1]].x, mesh.points[t[2]].x});
+    const double a = mesh.points[t[0]].x, b = mesh.points[t[1]].x, c = mesh.points[t[2]].x;
+    const double x_min = std::min(std::min(a, b), c), x_max = std::max(std::max(a, b), c);
     slabs_of[n] = {floor_int(x_min - margin) >> 3, floor_int(x_max + margin) >> 3};
     low = std::min(low, slabs_of[n].first);
     high = std::max(high, slabs_of[n].last);

@@ -130,32 +130,72 @@ std::vector<char> agreeing_flips(const Edges& edges, std::size_t triangles) {
   return flip;
 }
 
-/// The part of each triangle, numbered by first triangle; returns how many there are.
-std::uint32_t parts_of(const Edges& edges, std::size_t triangles,
-                       std::vector<std::uint32_t>& part) {
-  part.resize(triangles);
-  std::iota(part.begin(), part.end(), 0u);
-  const auto root = [&](std::uint32_t n) {
-    while (part[n] != n)
-      n = part[n] = part[part[n]];
-    return n;
-  };
-  edges.for_each([&](std::span<const Side> edge) {
-    for (std::size_t n = 1; n < edge.size(); ++n) {
-      const auto [low, high] = std::minmax({root(edge[0].index()), root(edge[n].index())});
-      part[high] = low;
-    }
-  });
-  for (std::uint32_t n = 0; n < triangles; ++n)
-    part[n] = root(n);
-  std::vector<std::uint32_t> number(triangles);
-  std::uint32_t parts = 0;
-  for (std::uint32_t n = 0; n < triangles; ++n) { // a root is the smallest of its part
-    if (part[n] == n)
-      number[n] = parts++;
-    part[n] = number[part[n]];
+/// Sets of triangles, each known by its smallest.
+class Sets {
+public:
+  explicit Sets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
   }
-  return parts;
+  std::uint32_t root(std::uint32_t n) {
+    while (parent_[n] != n)
+      n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  void unite(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+  /// The set of each, numbered by smallest; returns how many there are.
+  std::uint32_t number(std::vector<std::uint32_t>& set) {
+    set.resize(parent_.size());
+    std::uint32_t sets = 0;
+    for (std::uint32_t n = 0; n < set.size(); ++n) {
+      const std::uint32_t r = root(n);
+      set[n] = r == n ? sets++ : set[r];
+    }
+    return sets;
+  }
+
+private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// Pairs the sides of each edge that run in opposite directions, in one pass, and unites their
+/// triangles. False if a side stays alone or more than eight wait at a point.
+bool pair_sides(std::size_t points, const std::vector<Triangle>& triangles, Sets& sets) {
+  constexpr std::size_t places = 8;
+  struct Waiting {
+    std::uint32_t count = 0;
+    std::array<Side, places> sides; ///< without a partner so far
+  };
+  std::vector<Waiting> waiting(points);
+  std::size_t alone = 0;
+  for (std::uint32_t n = 0; n < triangles.size(); ++n) {
+    const Triangle& t = triangles[n];
+    if (degenerate(t))
+      continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t from = t[c], to = t[c == 2 ? 0 : c + 1];
+      const Side side{std::max(from, to), 2 * n | (from > to ? 1u : 0u)};
+      Waiting& at = waiting[std::min(from, to)];
+      std::size_t w = 0;
+      while (w < at.count &&
+             (at.sides[w].high != side.high || at.sides[w].backward() == side.backward()))
+        ++w;
+      if (w < at.count) {
+        sets.unite(at.sides[w].index(), n);
+        at.sides[w] = at.sides[--at.count];
+        --alone;
+      } else {
+        if (w == places)
+          return false;
+        at.sides[at.count++] = side;
+        ++alone;
+      }
+    }
+  }
+  return alone == 0;
 }
 
 /// Triangles by cells of the (x, y) plane, for rays along z.
@@ -232,32 +272,38 @@ private:
 void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t>& part,
                 std::uint32_t parts, std::vector<Triangle>& triangles) {
   std::vector<double> volume(parts, 0);
-  std::vector<std::vector<std::uint32_t>> members(parts);
-  for (std::uint32_t n = 0; n < triangles.size(); ++n)
-    members[part[n]].push_back(n);
-  for (std::uint32_t c = 0; c < parts; ++c) {
-    const Vec3 origin = points[triangles[members[c][0]][0]];
-    for (const std::uint32_t n : members[c]) {
-      const Triangle& t = triangles[n];
-      volume[c] += dot(points[t[0]] - origin, cross(points[t[1]] - origin, points[t[2]] - origin));
-    }
+  std::vector<std::size_t> first(parts + 1, 0);
+  std::vector<Vec3> origin(parts);
+  for (std::size_t n = 0; n < triangles.size(); ++n) {
+    const Triangle& t = triangles[n];
+    Vec3& o = origin[part[n]];
+    if (first[part[n] + 1]++ == 0)
+      o = points[t[0]];
+    volume[part[n]] += dot(points[t[0]] - o, cross(points[t[1]] - o, points[t[2]] - o));
   }
   std::vector<char> flip(parts, 0);
   if (parts == 1) {
     flip[0] = volume[0] < 0;
   } else {
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    std::vector<std::uint32_t> members(triangles.size());
+    std::vector<std::size_t> next(first.begin(), first.end() - 1);
+    for (std::uint32_t n = 0; n < triangles.size(); ++n)
+      members[next[part[n]]++] = n;
     const Columns columns(points, triangles);
     for (std::uint32_t c = 0; c < parts; ++c) {
       int votes = 0; // a point may lie on another part, so more than one is asked
       constexpr std::size_t asked = 5;
       for (std::size_t v = 0; v < asked; ++v) {
-        const Triangle& t = triangles[members[c][v * members[c].size() / asked]];
+        const Triangle& t = triangles[members[first[c] + v * (first[c + 1] - first[c]) / asked]];
         const Vec3 p = points[t[0]] * 0.375 + points[t[1]] * 0.3125 + points[t[2]] * 0.3125;
         votes += columns.odd_below(p, part, c) ? 1 : -1;
       }
       flip[c] = (volume[c] < 0) != (votes > 0);
     }
   }
+  if (std::ranges::all_of(flip, [](char f) { return f == 0; }))
+    return;
   for (std::size_t n = 0; n < triangles.size(); ++n)
     if (flip[part[n]] != 0)
       std::swap(triangles[n][1], triangles[n][2]);
@@ -267,29 +313,34 @@ void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t
 
 bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
                    OrientReport* report) {
+  Sets sets(triangles.size());
   std::vector<Triangle> turned = triangles;
-  std::vector<Triangle> welded = triangles;
-  Edges edges(points.size(), welded);
-  if (!edges.balanced()) {
+  if (!pair_sides(points.size(), triangles, sets)) {
+    sets = Sets(triangles.size());
+    std::vector<Triangle> welded = triangles;
     const std::vector<std::uint32_t> representative = first_at_position(points);
     for (Triangle& t : welded)
       for (std::uint32_t& corner : t)
         corner = representative[corner];
-    edges = Edges(points.size(), welded);
-  }
-  if (!edges.balanced()) {
-    const std::vector<char> flip = agreeing_flips(edges, triangles.size());
-    for (std::size_t n = 0; n < flip.size(); ++n)
-      if (flip[n] != 0) {
-        std::swap(turned[n][1], turned[n][2]);
-        std::swap(welded[n][1], welded[n][2]);
-      }
-    edges = Edges(points.size(), welded);
-    if (flip.empty() || !edges.balanced())
-      return false;
+    Edges edges(points.size(), welded);
+    if (!edges.balanced()) {
+      const std::vector<char> flip = agreeing_flips(edges, triangles.size());
+      for (std::size_t n = 0; n < flip.size(); ++n)
+        if (flip[n] != 0) {
+          std::swap(turned[n][1], turned[n][2]);
+          std::swap(welded[n][1], welded[n][2]);
+        }
+      edges = Edges(points.size(), welded);
+      if (flip.empty() || !edges.balanced())
+        return false;
+    }
+    edges.for_each([&](std::span<const Side> edge) {
+      for (const Side& side : edge)
+        sets.unite(edge[0].index(), side.index());
+    });
   }
   std::vector<std::uint32_t> part;
-  const std::uint32_t parts = parts_of(edges, triangles.size(), part);
+  const std::uint32_t parts = sets.number(part);
   turn_parts(points, part, parts, turned);
   if (report != nullptr) {
     report->parts = parts;

@@ -10,7 +10,7 @@ namespace gewebe {
 
 /// What became of a mesh.
 struct OrientReport {
-  std::uint64_t parts = 0;   ///< groups of triangles connected by edges
+  std::uint64_t parts = 0;   ///< groups of triangles that hang together by edges
   std::uint64_t flipped = 0; ///< triangles whose corners were reordered
 };
 

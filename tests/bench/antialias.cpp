@@ -4,8 +4,11 @@
 // the mesh to the sparse volume. CSV on standard output: stage, program, voxel (mm), size
 // (triangles), threads, median and spread of the times, error (what it means stands in `measure`).
 //
+// `bench_antialias FOLDER` draws in place of that a slice of each volume, FOLDER/MESH-FILTER.png.
+//
 // Meshes are the liver and the colon of $GEWEBE_SHARED/data where they are, else made ones.
 
+#include "formats/image_file.h"
 #include "formats/mesh_file.h"
 #include "surface/marching_cubes.h"
 #include "tests/unit/mesh_fixtures.h"
@@ -17,9 +20,9 @@
 #include "volume/voxelize.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -42,16 +45,23 @@ struct Times {
   double median, fastest, slowest; // ms
 };
 
-/// Runs all works in turn, round by round, so that a busy machine is busy for all of them.
-std::vector<Times> measure(const std::vector<std::function<void()>>& works) {
-  std::vector<std::vector<double>> times(works.size());
+struct Filter {
+  std::string name;
+  std::function<Grid()> work;
+  Grid grid;
+};
+
+/// Runs all filters in turn, round by round, so that a busy machine is busy for all of them. Times
+/// are the processor's for this one thread: other programs don't count.
+std::vector<Times> measure(std::vector<Filter>& filters) {
+  const auto now = [] { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+  std::vector<std::vector<double>> times(filters.size());
   for (int run = 0; run < runs; ++run)
-    for (std::size_t n = 0; n < works.size(); ++n) {
-      const auto start = std::chrono::steady_clock::now();
-      works[n]();
-      times[n].push_back(
-          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-              .count());
+    for (std::size_t n = 0; n < filters.size(); ++n) {
+      filters[n].grid = Grid();
+      const double start = now();
+      filters[n].grid = filters[n].work();
+      times[n].push_back(now() - start);
     }
   std::vector<Times> result;
   for (auto& t : times) {
@@ -258,40 +268,71 @@ Error2 position_error(const Distances& distances, const Grid& grid) {
 
 // ---- one mesh
 
-struct Filter {
-  std::string name;
-  std::function<Grid()> work;
-  Grid grid;
-};
+/// The slice through the middle across the second axis, a voxel 4 x 4 pixels, black to white.
+Image slice(const Range& range, const std::function<double(const Int3&)>& value) {
+  constexpr std::int32_t edge = 4;
+  Image image;
+  image.width = static_cast<std::uint32_t>(edge * (range.max[0] - range.min[0] + 1));
+  image.height = static_cast<std::uint32_t>(edge * (range.max[2] - range.min[2] + 1));
+  const std::int32_t j = (range.min[1] + range.max[1]) / 2;
+  for (std::uint32_t y = 0; y < image.height; ++y)
+    for (std::uint32_t x = 0; x < image.width; ++x) {
+      const double v = value({range.min[0] + static_cast<std::int32_t>(x) / edge, j,
+                              range.max[2] - static_cast<std::int32_t>(y) / edge});
+      image.values.insert(image.values.end(), 3, static_cast<std::uint8_t>(std::lround(255 * v)));
+    }
+  return image;
+}
 
-void bench(const char* name, const TriangleMesh& mesh) {
-  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
-  const auto refuse = OpenMesh::refuse;
+std::vector<Filter> filters_of(const TriangleMesh& mesh, const GridTransform& lattice) {
+  constexpr auto refuse = OpenMesh::refuse;
   std::vector<Filter> filters;
   filters.push_back(
-      {"exact", [&] { return *exact_coverage(one_thread, mesh, lattice, refuse); }, {}});
+      {"exact",
+       [&mesh, &lattice] { return *exact_coverage(one_thread, mesh, lattice, refuse); },
+       {}});
   for (const int n : {2, 4, 6})
-    filters.push_back({"lines:" + std::to_string(n),
-                       [&, n] { return line_coverage(one_thread, mesh, lattice, n, refuse); },
-                       {}});
+    filters.push_back(
+        {"lines:" + std::to_string(n),
+         [&mesh, &lattice, n] { return line_coverage(one_thread, mesh, lattice, n, refuse); },
+         {}});
   for (const int n : {2, 4, 6, 8})
     filters.push_back({"box:" + std::to_string(n),
-                       [&, n] {
+                       [&mesh, &lattice, n] {
                          VoxelizeOptions options;
                          options.samples = n;
                          return voxelize(one_thread, mesh, lattice, options);
                        },
                        {}});
+  filters.push_back({"jones",
+                     [&mesh, &lattice] { return jones_density(one_thread, mesh, lattice, refuse); },
+                     {}});
   filters.push_back(
-      {"jones", [&] { return jones_density(one_thread, mesh, lattice, refuse); }, {}});
+      {"sramek",
+       [&mesh, &lattice] { return sramek_density(one_thread, mesh, lattice, refuse); },
+       {}});
   filters.push_back(
-      {"sramek", [&] { return sramek_density(one_thread, mesh, lattice, refuse); }, {}});
-  filters.push_back({"none", [&] { return voxelize(one_thread, mesh, lattice, {}); }, {}});
-  filters.push_back({"768 to 128", [&] { return literally(mesh, lattice); }, {}});
-  std::vector<std::function<void()>> works;
-  for (Filter& filter : filters)
-    works.emplace_back([&filter] { filter.grid = filter.work(); });
-  const std::vector<Times> times = measure(works);
+      {"none", [&mesh, &lattice] { return voxelize(one_thread, mesh, lattice, {}); }, {}});
+  filters.push_back({"768 to 128", [&mesh, &lattice] { return literally(mesh, lattice); }, {}});
+  return filters;
+}
+
+void draw(const std::string& folder, const std::string& name, const TriangleMesh& mesh) {
+  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
+  for (const Filter& filter : filters_of(mesh, lattice)) {
+    std::string file = filter.name;
+    std::ranges::replace_if(
+        file, [](char c) { return c == ' ' || c == ':'; }, '-');
+    Output output(folder + "/" + name + "-" + file + ".png", {});
+    write_image(output, slice(range_of(mesh, lattice), values_of(filter.work())), Kind::png);
+    output.commit();
+  }
+}
+
+void bench(const char* name, const TriangleMesh& mesh) {
+  const GridTransform lattice = lattice_for_dim(bounding_box(mesh), dim);
+  std::vector<Filter> filters = filters_of(mesh, lattice);
+  const std::vector<Times> times = measure(filters);
 
   // How far rounding goes in `exact` itself: the sums run along another axis.
   GridTransform turned = lattice;
@@ -300,7 +341,7 @@ void bench(const char* name, const TriangleMesh& mesh) {
     turned.m[4 * row + 1] = lattice.m[4 * row + 2];
     turned.m[4 * row + 2] = lattice.m[4 * row];
   }
-  const Grid other = *exact_coverage(one_thread, mesh, turned, refuse);
+  const Grid other = *exact_coverage(one_thread, mesh, turned, OpenMesh::refuse);
   const auto exact = values_of(filters[0].grid);
   const Range range = range_of(mesh, lattice);
   const Distances distances(mesh, lattice);
@@ -354,9 +395,16 @@ TriangleMesh organ(const char* file, bool tube) {
 
 } // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  const TriangleMesh liver = organ("sofa_liver_smooth.obj", false);
+  const TriangleMesh colon = organ("gca90_large_intestine_20k.stl", true);
+  if (argc > 1) {
+    draw(argv[1], "liver", liver);
+    draw(argv[1], "colon", colon);
+    return 0;
+  }
   std::puts("stage,program,voxel,size,threads,median_ms,fastest_ms,slowest_ms,error,measure");
-  bench("liver", organ("sofa_liver_smooth.obj", false));
-  bench("colon", organ("gca90_large_intestine_20k.stl", true));
+  bench("liver", liver);
+  bench("colon", colon);
   return 0;
 }
