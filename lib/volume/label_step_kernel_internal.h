@@ -55,7 +55,7 @@ inline float label_step(const LabelStep& step, const float* y,
     return n < 2 ? neighbours[2 * a] : n < 10 ? y : neighbours[2 * a + 1];
   };
   for (int n = 0; n < 12; ++n) {
-    const float* const from = slice(2, n) + 64 * ((n + 6) & 7);
+    const float* const from = slice(2, n) + (((n + 6) & 7) << 6);
     for (int m = 0; m < 64; ++m)
       line[n][m] = from[m];
   }
@@ -65,7 +65,7 @@ inline float label_step(const LabelStep& step, const float* y,
       (&gradient[k][0][0])[m] = sum[k][m];
 
   for (int n = 0; n < 12; ++n) {
-    const float* const from = slice(1, n) + 8 * ((n + 6) & 7);
+    const float* const from = slice(1, n) + (((n + 6) & 7) << 3);
     for (int k = 0; k < 8; ++k)
       for (int i = 0; i < 8; ++i)
         line[n][8 * k + i] = from[64 * k + i];
@@ -83,19 +83,22 @@ inline float label_step(const LabelStep& step, const float* y,
     float row[12];
     float second[16] = {};
     float fourth[8];
-    row[0] = before[8 * m + 6];
-    row[1] = before[8 * m + 7];
+    const float* const from = y + (m << 3);
+    const float* const left = before + (m << 3);
+    const float* const right = after + (m << 3);
+    row[0] = left[6];
+    row[1] = left[7];
     for (int i = 0; i < 8; ++i)
-      row[i + 2] = y[8 * m + i];
-    row[10] = after[8 * m];
-    row[11] = after[8 * m + 1];
+      row[i + 2] = from[i];
+    row[10] = right[0];
+    row[11] = right[1];
     for (int n = 0; n < 10; ++n) {
       const float d = (row[n] - 2 * row[n + 1]) + row[n + 2];
       second[n] = d == d ? d : 0.0F;
     }
     for (int n = 0; n < 8; ++n)
       fourth[n] = step.weight[0] * ((second[n] - 2 * second[n + 1]) + second[n + 2]);
-    float* const to = &gradient[0][0][0] + 8 * m;
+    float* const to = &gradient[0][0][0] + (m << 3);
     for (int i = 0; i < 8; ++i)
       to[i] += fourth[i];
   }
