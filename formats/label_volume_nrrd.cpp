@@ -19,7 +19,7 @@ struct Field {
 /// The fields of a header by name.
 class Fields {
 public:
-  Fields(BufferedBytes& bytes) : name_(bytes.name()) {
+  explicit Fields(BufferedBytes& bytes) : name_(bytes.name()) {
     std::size_t number = 1;
     std::optional<std::string> line = bytes.line();
     if (!line || line->size() != 8 || !line->starts_with("NRRD000") || (*line)[7] < '1' ||
@@ -189,8 +189,8 @@ Vec3 to_ras(const Fields& fields, const std::string& name, LabelVolume& volume) 
   const Field* const space = fields.find("space");
   const std::string text = space != nullptr ? space->value : "";
   std::string lower;
-  for (const unsigned char c : text)
-    lower += static_cast<char>(std::tolower(c));
+  for (const char c : text)
+    lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (lower == "right-anterior-superior" || lower == "ras")
     return {1, 1, 1};
   if (lower == "left-anterior-superior" || lower == "las")

@@ -60,7 +60,7 @@ std::int32_t kind_of_block(const LabelMask& mask, const Int3& first, const Int3&
 /// Squared distances of a block's centres to the nearest voxel of one kind, each a box.
 class DistanceToKind {
 public:
-  DistanceToKind(const LabelField& field) : field_(field) {
+  explicit DistanceToKind(const LabelField& field) : field_(field) {
     for (std::size_t a = 0; a < 3; ++a)
       for (std::int32_t d = 0; d <= field.reach[a]; ++d) {
         const double gap = d == 0 ? 0 : (d - 0.5) * field.spacing[a];

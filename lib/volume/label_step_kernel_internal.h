@@ -55,7 +55,7 @@ inline float label_step(const LabelStep& step, const float* y,
     return n < 2 ? neighbours[2 * a] : n < 10 ? y : neighbours[2 * a + 1];
   };
   for (int n = 0; n < 12; ++n) {
-    const float* const from = slice(2, n) + 64 * ((n + 6) & 7);
+    const float* const from = slice(2, n) + (((n + 6) & 7) << 6);
     for (int m = 0; m < 64; ++m)
       line[n][m] = from[m];
   }
@@ -65,7 +65,7 @@ inline float label_step(const LabelStep& step, const float* y,
       (&gradient[k][0][0])[m] = sum[k][m];
 
   for (int n = 0; n < 12; ++n) {
-    const float* const from = slice(1, n) + 8 * ((n + 6) & 7);
+    const float* const from = slice(1, n) + (((n + 6) & 7) << 3);
     for (int k = 0; k < 8; ++k)
       for (int i = 0; i < 8; ++i)
         line[n][8 * k + i] = from[64 * k + i];
@@ -76,33 +76,63 @@ inline float label_step(const LabelStep& step, const float* y,
       for (int i = 0; i < 8; ++i)
         gradient[k][j][i] += sum[j][8 * k + i];
 
-  for (int n = 0; n < 12; ++n) {
-    const float* const from = slice(0, n) + ((n + 6) & 7);
-    for (int m = 0; m < 64; ++m)
-      line[n][m] = from[8 * m];
+  // Along i the values are neighbours in memory, so that rows serve as they are.
+  const float* const before = neighbours[0];
+  const float* const after = neighbours[1];
+  for (int m = 0; m < 64; ++m) {
+    float row[12];
+    float second[16] = {};
+    float fourth[8];
+    const float* const from = y + (m << 3);
+    const float* const left = before + (m << 3);
+    const float* const right = after + (m << 3);
+    row[0] = left[6];
+    row[1] = left[7];
+    for (int i = 0; i < 8; ++i)
+      row[i + 2] = from[i];
+    row[10] = right[0];
+    row[11] = right[1];
+    for (int n = 0; n < 10; ++n) {
+      const float d = (row[n] - 2 * row[n + 1]) + row[n + 2];
+      second[n] = d == d ? d : 0.0F;
+    }
+    for (int n = 0; n < 8; ++n)
+      fourth[n] = step.weight[0] * ((second[n] - 2 * second[n + 1]) + second[n + 2]);
+    float* const to = &gradient[0][0][0] + (m << 3);
+    for (int i = 0; i < 8; ++i)
+      to[i] += fourth[i];
   }
-  add_fourth_difference(line, step.weight[0], sum);
-  for (int k = 0; k < 8; ++k)
-    for (int j = 0; j < 8; ++j)
-      for (int i = 0; i < 8; ++i)
-        gradient[k][j][i] += sum[i][8 * k + j];
 
   float change[64] = {};
   const float* const g = &gradient[0][0][0];
-  for (int n = 0; n < 512; n += 64)
+  for (int n = 0; n < 512; n += 64) {
+    // Copies, so that the compiler need not fear that the arrays overlap.
+    float d[64], at[64], to[64], old[64];
     for (int m = 0; m < 64; ++m) {
-      const float d = distance[n + m];
-      const float size = d < 0 ? -d : d;
-      const float least =
-          size - step.half_diagonal > 0.1F * size ? size - step.half_diagonal : 0.1F * size;
-      const float low = d < 0 ? -2 * size : least, high = d < 0 ? -least : 2 * size;
-      float v = y[n + m] - step.size * (g[n + m] + step.pull * (y[n + m] - target[n + m]));
-      v = v < low ? low : v;
-      v = v > high ? high : v;
-      const float c = v > value[n + m] ? v - value[n + m] : value[n + m] - v;
-      change[m] = c > change[m] ? c : change[m];
-      value[n + m] = v;
+      d[m] = distance[n + m];
+      at[m] = y[n + m];
+      to[m] = target[n + m];
+      old[m] = value[n + m];
     }
+    for (int m = 0; m < 64; ++m) {
+      const float v = at[m] - step.size * (g[n + m] + step.pull * (at[m] - to[m]));
+      const float opposite = -v, size_of_negative = -d[m];
+      const float size = d[m] < 0 ? size_of_negative : d[m];
+      const float inward = d[m] < 0 ? opposite : v; // so that both kinds have the same bounds
+      const float rest = size - step.half_diagonal, tenth = 0.1F * size, high = 2 * size;
+      const float low = rest > tenth ? rest : tenth;
+      const float above = inward < low ? low : inward;
+      const float within = above > high ? high : above;
+      const float back = -within;
+      const float next = d[m] < 0 ? back : within;
+      const float up = next - old[m], down = old[m] - next;
+      const float c = up > down ? up : down;
+      change[m] = c > change[m] ? c : change[m];
+      old[m] = next;
+    }
+    for (int m = 0; m < 64; ++m)
+      value[n + m] = old[m];
+  }
   float largest = 0;
   for (const float c : change)
     largest = c > largest ? c : largest;
