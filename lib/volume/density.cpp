@@ -62,6 +62,27 @@ double expected_pairs(std::span<const IndexParticle> particles) {
   return sum;
 }
 
+/// Bytes of a tree with these leaves: its inner nodes hold 16³ and 32³ pointers.
+double tree_bytes(const std::vector<LeafLists>& plans) {
+  double bytes = 0;
+  for (const int shift : {7, 12}) {
+    std::vector<Int3> nodes;
+    for (const LeafLists& plan : plans)
+      for (const Int3& leaf : plan.leaves) {
+        const Int3 node{leaf[0] >> shift, leaf[1] >> shift, leaf[2] >> shift};
+        if (nodes.empty() || nodes.back() != node)
+          nodes.push_back(node);
+      }
+    std::ranges::sort(nodes);
+    const auto rest = std::ranges::unique(nodes);
+    const auto count = static_cast<double>(nodes.size() - rest.size());
+    bytes += count * (shift == 7 ? 4096 : 32768) * (sizeof(void*) + 0.25);
+  }
+  for (const LeafLists& plan : plans)
+    bytes += static_cast<double>(plan.leaves.size()) * leaf_bytes;
+  return bytes;
+}
+
 Grid plain_grid(const Context& context, std::span<const IndexParticle> particles,
                 const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
                 const GridInfo& info, DensityReport& report) {
@@ -134,7 +155,7 @@ Grid metaball_density(const Context& context, const Particles& particles,
     counts.leaves_skipped += plan.skipped;
   }
   counts.predicted_voxels = planned * leaf_voxels;
-  counts.predicted_bytes = planned * leaf_bytes;
+  counts.predicted_bytes = tree_bytes(plans);
   require_memory(context, counts.predicted_bytes, "the volume");
   if (options.planned)
     options.planned(counts);

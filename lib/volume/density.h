@@ -20,7 +20,7 @@ struct DensityReport {
   // Known before the work.
   std::uint64_t particles_out_of_reach = 0; ///< touch no voxel centre inside the clip box
   double predicted_voxels = 0;              ///< of the leaves to evaluate; a band keeps fewer
-  double predicted_bytes = 0;               ///< of these leaves
+  double predicted_bytes = 0;               ///< of the grid's tree with these leaves
   double predicted_evaluations = 0;         ///< of all voxels in reach, on average over positions
   std::uint64_t leaves_skipped = 0;         ///< proven by the band's bounds to lie on one side
   // Known after it.
@@ -39,7 +39,7 @@ struct DensityOptions {
 
 /// Density in mm⁰ of `particles` on the lattice; sums in the order of the particles, so any thread
 /// count gives the same bytes. Float arithmetic in leaf-local coordinates, the leaf's origin
-/// subtracted in double: error below 2e-6 per unit weight, wherever in the world the particles lie.
+/// subtracted in double: error below 1e-6 per unit weight in reach, wherever in the world they lie.
 /// Only leaves in reach of a particle exist. Voxels are active where the density is not 0.
 ///
 /// With a band (isovalue v) the result is the same grid as far as marching cubes at v can tell, and

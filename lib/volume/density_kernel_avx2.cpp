@@ -13,7 +13,8 @@ struct Chunk {
   alignas(32) float rest[chunk][64];
   alignas(32) float z2[chunk][8];
   float cubic[chunk], square[chunk];
-  std::uint32_t reached[chunk]; // bit h: reaches half slice h, four rows
+  /// Bit h of byte n: particle n reaches half slice h (four rows), and half slice 8 + h.
+  alignas(32) std::uint8_t low[chunk], high[chunk];
 };
 
 __m256 scaled_square(__m256 ramp, float center, __m256 inverse) {
@@ -55,7 +56,8 @@ std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c
         reached |= ((rows & 15) != 0 ? 1U : 0U) << 2 * i | ((rows >> 4) != 0 ? 2U : 0U) << 2 * i;
       }
     }
-    c.reached[n] = reached;
+    c.low[n] = static_cast<std::uint8_t>(reached);
+    c.high[n] = static_cast<std::uint8_t>(reached >> 8);
     common &= reached;
   }
   return common;
@@ -67,8 +69,10 @@ __m256 add_row(__m256 sum, const float* rest, __m256 z2, __m256 cubic, __m256 sq
   return _mm256_fmadd_ps(_mm256_mul_ps(u, u), _mm256_fmadd_ps(cubic, u, square), sum);
 }
 
-/// Eight rows stay in registers while all particles pass.
-void add_slice(const Chunk& c, std::size_t count, int slice, float* rows) {
+/// Eight rows stay in registers while all particles pass. (Inlined, GCC 12 makes it a fifth
+/// slower.)
+__attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, int slice,
+                                         float* rows) {
   __m256 sum[8];
   for (int row = 0; row < 8; ++row)
     sum[row] = _mm256_loadu_ps(rows + row * 8);
@@ -84,21 +88,23 @@ void add_slice(const Chunk& c, std::size_t count, int slice, float* rows) {
     _mm256_storeu_ps(rows + row * 8, sum[row]);
 }
 
+/// Bit n: particle n reaches the half slice.
+std::uint32_t reaching(const Chunk& c, std::size_t count, int half) {
+  const std::uint8_t* const bytes = half < 8 ? c.low : c.high;
+  const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(bytes));
+  const int bits = _mm256_movemask_epi8(_mm256_sll_epi16(all, _mm_cvtsi32_si128(7 - (half & 7))));
+  return static_cast<std::uint32_t>(bits) &
+         static_cast<std::uint32_t>(~(~std::uint64_t{0} << count));
+}
+
 /// Four rows, and only the particles that reach them.
-void add_half_slice(const Chunk& c, std::size_t count, int half, float* rows) {
-  std::uint8_t list[chunk];
-  std::size_t listed = 0;
-  for (std::size_t n = 0; n < count; ++n) {
-    list[listed] = static_cast<std::uint8_t>(n);
-    listed += c.reached[n] >> half & 1;
-  }
-  if (listed == 0)
-    return;
+__attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t particles, int half,
+                                              float* rows) {
   __m256 sum[4];
   for (int row = 0; row < 4; ++row)
     sum[row] = _mm256_loadu_ps(rows + row * 8);
-  for (std::size_t m = 0; m < listed; ++m) {
-    const std::size_t n = list[m];
+  for (; particles != 0; particles &= particles - 1) {
+    const int n = __builtin_ctz(particles);
     const __m256 z2 = _mm256_load_ps(c.z2[n]);
     const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
     const __m256 square = _mm256_broadcast_ss(c.square + n);
@@ -148,8 +154,9 @@ void add_density_avx2(const LeafParticle* particles, std::size_t count, float* v
         add_slice(c, some, slice, rows);
         continue;
       }
-      add_half_slice(c, some, 2 * slice, rows);
-      add_half_slice(c, some, 2 * slice + 1, rows + 32);
+      for (int half = 2 * slice; half < 2 * slice + 2; ++half)
+        if (const std::uint32_t some_reach = reaching(c, some, half); some_reach != 0)
+          add_half_slice(c, some_reach, half, values + half * 32);
     }
   }
 }

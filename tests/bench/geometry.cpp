@@ -14,7 +14,6 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <random>
 
 using namespace gewebe;
 
@@ -54,39 +53,6 @@ Grid ball(double voxel, double support) {
   DensityOptions options;
   options.info.transform = uniform_transform(voxel);
   return metaball_density({}, {{{0.1, 0.2, 0.3}, support, 1}}, options);
-}
-
-void bench_density(double voxel) {
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  Particles particles;
-  for (int n = 0; n < 100; ++n)
-    particles.push_back(
-        {{40 * unit(random), 40 * unit(random), 40 * unit(random)}, 10 + 4 * unit(random), 1});
-  DensityOptions options;
-  options.info.transform = uniform_transform(voxel);
-  Grid grid;
-  DensityReport counts;
-  for (const int threads : {1, 2}) {
-    const Times times = measure(
-        [&] { grid = metaball_density(with_threads(threads), particles, options, &counts); });
-    double error = 0;
-    for (const LeafView& leaf : grid.leaves())
-      for (int n = static_cast<int>(leaf.origin[0] & 63); n < leaf_voxels; n += 61) {
-        const Vec3 x = options.info.transform.to_world({1.0 * (leaf.origin[0] + (n >> 6)),
-                                                        1.0 * (leaf.origin[1] + (n >> 3 & 7)),
-                                                        1.0 * (leaf.origin[2] + (n & 7))});
-        double sum = 0;
-        for (const Particle& p : particles) {
-          const double t = dot(x - p.center, x - p.center) / (p.support_radius * p.support_radius);
-          if (t < 1)
-            sum += (1 - t) * (1 - t) * (1 - 4 * t / 9);
-        }
-        error = std::fmax(error, std::fabs(sum - static_cast<double>(leaf.values[n])));
-      }
-    report("density", "metaball2vol", voxel, counts.voxel_evaluations, threads, times, error,
-           "max |D - double|");
-  }
 }
 
 template <class Points>
@@ -132,8 +98,6 @@ void bench_surface(double voxel) {
 int main() {
   openvdb::initialize();
   std::puts("stage,program,voxel,size,threads,median_ms,fastest_ms,slowest_ms,error,measure");
-  for (const double voxel : {2.0, 1.0, 0.5, 0.25})
-    bench_density(voxel);
   for (const double voxel : {2.0, 1.0, 0.5, 0.25})
     bench_surface(voxel);
   return 0;

@@ -1,22 +1,21 @@
 // Density: against the expanded polynomial in long double, at the right places.
 
 #include "base/error.h"
+#include "tests/unit/density_stress.h"
 #include "volume/density.h"
+#include "volume/density_kernel_internal.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
+#include <cstring>
 
 using namespace gewebe;
+using test::random_particles;
 
 namespace {
 
-long double expanded(long double r2, long double R2) {
-  const long double t = r2 / R2;
-  return t < 1 ? 1 - 22.0L / 9 * t + 17.0L / 9 * t * t - 4.0L / 9 * t * t * t : 0;
-}
-
+/// The same polynomial as the report writes it, in long double.
 long double reference(const Particles& particles, const Vec3& x) {
   long double sum = 0;
   for (const Particle& p : particles) {
@@ -24,20 +23,12 @@ long double reference(const Particles& particles, const Vec3& x) {
     const long double dy = static_cast<long double>(x.y) - static_cast<long double>(p.center.y);
     const long double dz = static_cast<long double>(x.z) - static_cast<long double>(p.center.z);
     const auto R = static_cast<long double>(p.support_radius);
-    sum += static_cast<long double>(p.weight) * expanded(dx * dx + dy * dy + dz * dz, R * R);
+    const long double t = (dx * dx + dy * dy + dz * dz) / (R * R);
+    if (t < 1)
+      sum += static_cast<long double>(p.weight) *
+             (1 - 22.0L / 9 * t + 17.0L / 9 * t * t - 4.0L / 9 * t * t * t);
   }
   return sum;
-}
-
-Particles random_particles(int count, double spread, double radius, const Vec3& offset,
-                           unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  Particles particles;
-  for (int n = 0; n < count; ++n)
-    particles.push_back({offset + Vec3{unit(random), unit(random), unit(random)} * spread,
-                         radius * (1.2 + unit(random)), n % 5 == 4 ? -0.7 : 1.0});
-  return particles;
 }
 
 /// Largest |grid − reference| over a box of centres around all supports, evaluated at centre +
@@ -185,4 +176,84 @@ TEST(Density, RefusesWhatItCannotHold) {
   DensityOptions stretched = options_for(1);
   stretched.info.transform.m[0] = 2;
   EXPECT_THROW((void)metaball_density({}, particles, stretched), Error);
+}
+
+TEST(Density, StressStaysWithinItsErrorBounds) {
+  for (const test::StressResult& result :
+       {test::stress_offset(1e6, 0.2), test::stress_offset(1e3, 0.1), test::stress_scale(1e-9),
+        test::stress_scale(1e-4), test::stress_scale(1e9), test::stress_mixed(30),
+        test::stress_many(3000, 30, 100), test::stress_cancelling(10), test::stress_edge(40)}) {
+    EXPECT_LE(result.error, result.allowed) << result.name;
+    EXPECT_TRUE(result.never_negative) << result.name;
+  }
+}
+
+TEST(Density, NegativeControlAbsoluteFloatsFailTheOffset) {
+  // Coordinates rounded to float before the leaf's origin is subtracted.
+  const double offset = 1e6;
+  Particles particles = random_particles(8, 1, 0.5, {offset, -offset, offset}, 11);
+  for (Particle& p : particles)
+    p.support_radius = 1;
+  Particles rounded = particles;
+  for (Particle& p : rounded)
+    for (int axis = 0; axis < 3; ++axis)
+      p.center[axis] = static_cast<double>(static_cast<float>(p.center[axis]));
+  const Grid grid = test::density_grid(rounded, 0.2);
+  EXPECT_GT(test::largest_leaf_error(grid, particles, 3), 1e-2);
+}
+
+TEST(Density, NegativeControlTheExpandedPolynomialGoesNegative) {
+  int negative = 0;
+  for (int n = 1; n < 1000; ++n) {
+    const float t = 1 - 1e-7F * static_cast<float>(n) / 100;
+    const float value = 1 - 22.0F / 9 * t + 17.0F / 9 * t * t - 4.0F / 9 * t * t * t;
+    negative += value < 0 ? 1 : 0;
+  }
+  EXPECT_GT(negative, 0);
+}
+
+TEST(Density, ListsWithParticlesOutOfReachGiveTheSameBits) {
+  const Particles particles = random_particles(70, 14, 5, {}, 6);
+  std::vector<LeafParticle> all;
+  std::vector<LeafParticle> near;
+  for (const Particle& p : particles) {
+    const LeafParticle local{static_cast<float>(p.center.x), static_cast<float>(p.center.y),
+                             static_cast<float>(p.center.z),
+                             static_cast<float>(1 / p.support_radius),
+                             static_cast<float>(p.weight)};
+    all.push_back(local);
+    double distance2 = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      distance2 += std::pow(std::fmax(std::fmax(-p.center[axis], p.center[axis] - 7), 0), 2);
+    if (distance2 < p.support_radius * p.support_radius * 1.001)
+      near.push_back(local);
+  }
+  ASSERT_LT(near.size() + 20, all.size());
+  std::vector<DensityKernel> kernels{add_density_baseline};
+  if (best_cpu_level() != CpuLevel::baseline)
+    kernels.push_back(add_density_avx2);
+  std::vector<float> expected(leaf_voxels);
+  add_density_baseline(near.data(), near.size(), expected.data());
+  for (const DensityKernel kernel : kernels)
+    for (const auto* list : {&near, &all}) {
+      std::vector<float> values(leaf_voxels);
+      kernel(list->data(), list->size(), values.data());
+      EXPECT_EQ(std::memcmp(values.data(), expected.data(), leaf_voxels * sizeof(float)), 0);
+    }
+}
+
+TEST(Density, PredictsBeforeTheWork) {
+  const Particles particles = random_particles(40, 20, 4, {}, 7);
+  DensityOptions options = options_for(0.4);
+  DensityReport before;
+  options.planned = [&](const DensityReport& plan) { before = plan; };
+  DensityReport after;
+  const Grid grid = metaball_density({}, particles, options, &after);
+  EXPECT_EQ(before.leaves, 0U);
+  EXPECT_EQ(before.predicted_bytes, after.predicted_bytes);
+  EXPECT_GE(before.predicted_voxels, 512.0 * static_cast<double>(grid.leaves().size()));
+  EXPECT_LE(before.predicted_voxels, 540.0 * static_cast<double>(grid.leaves().size()));
+  const auto bytes = static_cast<double>(grid.memory_bytes());
+  EXPECT_GE(before.predicted_bytes, 0.98 * bytes);
+  EXPECT_LE(before.predicted_bytes, 1.1 * bytes);
 }
