@@ -9,6 +9,8 @@
 #include <openvdb/tree/ValueAccessor.h>
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <utility>
 
 namespace gewebe {
@@ -172,26 +174,67 @@ bool Grid::active_box(Int3& min, Int3& max) const {
   return true;
 }
 
-std::uint64_t Grid::digest() const {
+namespace {
+
+/// Tiles go to the digest by the thousand: a call for each number would take longer than the hash.
+class TileBytes {
+public:
+  explicit TileBytes(Digest& digest) : digest_(digest) {}
+  void add(const TileView& tile) {
+    const auto dim = static_cast<std::uint64_t>(tile.dim);
+    const auto value = static_cast<double>(tile.value);
+    const std::uint64_t active = tile.active ? 1 : 0;
+    append(tile.origin.data(), sizeof tile.origin);
+    append(&dim, sizeof dim);
+    append(&value, sizeof value);
+    append(&active, sizeof active);
+    if (used_ + 64 > bytes_.size())
+      flush();
+  }
+  void flush() {
+    digest_.add_bytes(bytes_.data(), used_);
+    used_ = 0;
+  }
+
+private:
+  void append(const void* data, std::size_t size) {
+    std::memcpy(bytes_.data() + used_, data, size);
+    used_ += size;
+  }
+  Digest& digest_;
+  std::array<std::byte, 16384> bytes_{};
+  std::size_t used_ = 0;
+};
+
+std::uint64_t digest_of(const Grid& grid) {
+  const GridInfo& info = grid.info();
   Digest digest;
-  digest.add_bytes(info_.transform.m.data(), sizeof info_.transform.m);
-  digest.add(info_.isovalue);
-  digest.add(info_.band_isovalue.value_or(HUGE_VAL));
-  digest.add(std::uint64_t{info_.level_set});
-  digest.add(static_cast<double>(info_.background));
-  digest.add_bytes(info_.name.data(), info_.name.size());
-  for (const LeafView& leaf : leaves()) {
+  digest.add_bytes(info.transform.m.data(), sizeof info.transform.m);
+  digest.add(info.isovalue);
+  digest.add(info.band_isovalue.value_or(HUGE_VAL));
+  digest.add(std::uint64_t{info.level_set});
+  digest.add(static_cast<double>(info.background));
+  digest.add_bytes(info.name.data(), info.name.size());
+  for (const LeafView& leaf : grid.leaves()) {
     digest.add_bytes(leaf.origin.data(), sizeof leaf.origin);
     digest.add_bytes(leaf.active, leaf_voxels / 8);
     digest.add_bytes(leaf.values, leaf_voxels * sizeof(float));
   }
-  for (const TileView& tile : tiles()) {
-    digest.add_bytes(tile.origin.data(), sizeof tile.origin);
-    digest.add(static_cast<std::uint64_t>(tile.dim));
-    digest.add(static_cast<double>(tile.value));
-    digest.add(std::uint64_t{tile.active});
-  }
+  TileBytes tiles(digest);
+  for (const TileView& tile : grid.tiles())
+    tiles.add(tile);
+  tiles.flush();
   return digest.value();
+}
+
+} // namespace
+
+std::uint64_t Grid::digest() const {
+  const std::lock_guard lock(native_->digest_mutex);
+  auto& known = native_->digest;
+  if (!known || known->first != info_)
+    known.emplace(info_, digest_of(*this));
+  return known->second;
 }
 
 // ---- GridAccessor

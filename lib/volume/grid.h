@@ -67,6 +67,8 @@ struct GridInfo {
   std::optional<double> band_isovalue; ///< metadata gewebe_band_iso: exact only near this isovalue
   bool level_set = false;              ///< signed distance: inside is value < isovalue (0)
   std::string name = "density";
+
+  bool operator==(const GridInfo&) const = default;
 };
 
 /// Read-only view of a leaf; valid as long as its grid.
@@ -120,7 +122,8 @@ public:
   std::uint64_t memory_bytes() const;
   /// Index box of all active voxels, inclusive; false if there are none.
   bool active_box(Int3& min, Int3& max) const;
-  /// XXH3 over transform, isovalues, class, background, and every leaf and tile in order.
+  /// XXH3 over transform, isovalues, class, background, and every leaf and tile in order. Found at
+  /// the first call and kept.
   std::uint64_t digest() const;
 
   /// Opaque OpenVDB grid for formats/volume_file and volume/grid.

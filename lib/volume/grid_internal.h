@@ -9,6 +9,8 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -28,6 +30,8 @@ struct Grid::Native {
   std::shared_ptr<LeafStorage> storage;
   std::once_flag summary_once;
   ValueSummary summary;
+  std::mutex digest_mutex;
+  std::optional<std::pair<GridInfo, std::uint64_t>> digest; ///< the last one asked for
 };
 
 /// An empty tree whose leaves may borrow from `storage`, which lives as long as the tree.

@@ -2,17 +2,36 @@
 
 #include "base/parallel.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace gewebe {
 namespace {
 
-struct LeafSums {
+struct Sums {
   double sum = 0;
-  float min = HUGE_VALF, max = -HUGE_VALF;
   std::uint64_t inside = 0;
 };
+
+/// \tparam sign 1: inside is value > isovalue, -1: value < isovalue
+template <int sign>
+Sums leaf_sums(const float* values, double isovalue) {
+  constexpr std::size_t lanes = 8; // sums side by side: in a row each waits for the one before
+  std::array<double, lanes> sum{};
+  std::array<std::uint64_t, lanes> inside{};
+  for (std::size_t n = 0; n < leaf_voxels; n += lanes)
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const auto value = static_cast<double>(values[n + lane]);
+      sum[lane] += value;
+      inside[lane] += sign * value > sign * isovalue ? 1 : 0;
+    }
+  Sums all;
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    all.sum += sum[lane];
+    all.inside += inside[lane];
+  }
+  return all;
+}
 
 } // namespace
 
@@ -24,40 +43,30 @@ VolumeStats volume_stats(const Context& context, const Grid& grid) {
   VolumeStats stats;
   const std::vector<LeafView> leaves = grid.leaves();
   const std::vector<TileView> tiles = grid.tiles();
-  std::vector<LeafSums> sums(leaves.size());
+  std::vector<Sums> sums(leaves.size());
   Context quiet = context;
   quiet.progress = nullptr;
   parallel_blocks(quiet, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n)
-      for (int offset = 0; offset < leaf_voxels; ++offset) {
-        const float value = leaves[n].values[offset];
-        sums[n].sum += static_cast<double>(value);
-        sums[n].min = std::min(sums[n].min, value);
-        sums[n].max = std::max(sums[n].max, value);
-        sums[n].inside += is_inside(static_cast<double>(value)) ? 1 : 0;
-      }
+      sums[n] = info.level_set ? leaf_sums<-1>(leaves[n].values, info.isovalue)
+                               : leaf_sums<1>(leaves[n].values, info.isovalue);
   });
   double sum = 0;
-  double min = HUGE_VAL;
-  double max = -HUGE_VAL;
-  for (const LeafSums& leaf : sums) {
+  for (const Sums& leaf : sums) {
     sum += leaf.sum;
-    min = std::min(min, static_cast<double>(leaf.min));
-    max = std::max(max, static_cast<double>(leaf.max));
     stats.inside_voxels += leaf.inside;
   }
   for (const TileView& tile : tiles) {
     const auto dim = static_cast<std::uint64_t>(tile.dim);
     const auto value = static_cast<double>(tile.value);
     sum += value * static_cast<double>(dim * dim * dim);
-    min = std::min(min, value);
-    max = std::max(max, value);
     if (is_inside(value))
       stats.inside_voxels += dim * dim * dim;
   }
   const double voxel_volume = std::fabs(info.transform.determinant());
-  stats.min = min <= max ? min : static_cast<double>(info.background);
-  stats.max = min <= max ? max : static_cast<double>(info.background);
+  const ValueSummary& range = grid.summary(context);
+  stats.min = static_cast<double>(range.min);
+  stats.max = static_cast<double>(range.max);
   stats.leaves = leaves.size();
   stats.tiles = tiles.size();
   stats.active_voxels = grid.active_voxels();
