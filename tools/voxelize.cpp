@@ -44,7 +44,8 @@ void complete(Arguments& a) {
   if (a.antialias.empty())
     a.antialias = a.options.rule == VoxelRule::parity ? "exact" : "none";
   a.choice = antialias_from_text(a.antialias);
-  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none)
+  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none &&
+      a.choice.filter != Antialias::box)
     throw UsageError("--antialias " + a.antialias + " goes with --rule parity, not with --rule " +
                      a.rule);
   a.options.on_open = a.on_open == "error"  ? OpenMesh::refuse

@@ -1,5 +1,9 @@
 #include "volume/inside_scan_internal.h"
 
+#include "base/parallel.h"
+
+#include <type_traits>
+
 namespace gewebe {
 namespace {
 
@@ -24,6 +28,48 @@ void join(std::vector<Slab<Leaf>>& slabs, std::int32_t first_slab, InsideScan& s
     for (const Leaf& leaf : slabs[s].leaves)
       take(leaf);
     slabs[s] = {};
+  }
+}
+
+/// Voxel of sample f where there are n along an edge.
+std::int32_t voxel_of(std::int32_t f, std::int32_t n) {
+  return f >= 0 ? f / n : -((n - 1 - f) / n);
+}
+
+/// Adds the samples of a cube, cut to [begin, end) along i.
+void add_cube(const TileView& cube, std::int32_t n, std::int32_t begin, std::int32_t end,
+              LeafMap<CountLeaf>& map) {
+  const Int3 low{std::max(cube.origin[0], begin), cube.origin[1], cube.origin[2]};
+  const Int3 high{std::min(cube.origin[0] + cube.dim, end), cube.origin[1] + cube.dim,
+                  cube.origin[2] + cube.dim};
+  if (low[0] >= high[0])
+    return;
+  const auto overlap = [&](std::int32_t voxel, std::size_t axis) {
+    return static_cast<std::uint32_t>(std::min(high[axis], (voxel + 1) * n) -
+                                      std::max(low[axis], voxel * n));
+  };
+  for (std::int32_t i = voxel_of(low[0], n); i * n < high[0]; ++i)
+    for (std::int32_t j = voxel_of(low[1], n); j * n < high[1]; ++j)
+      for (std::int32_t k = voxel_of(low[2], n); k * n < high[2]; ++k)
+        map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(leaf_offset({i, j, k}))] +=
+            overlap(i, 0) * overlap(j, 1) * overlap(k, 2);
+}
+
+/// Adds the samples of a leaf of bits.
+void add_leaf(const Int3& origin, const std::array<std::uint64_t, 8>& bits, std::int32_t n,
+              LeafMap<CountLeaf>& map) {
+  for (std::int32_t column = 0; column < 64; ++column) {
+    const auto states = static_cast<unsigned>(
+        bits[static_cast<std::size_t>(column / 8)] >> (8 * (column % 8)) & 0xff);
+    if (states == 0)
+      continue;
+    const std::int32_t i = voxel_of(origin[0] + column / 8, n),
+                       j = voxel_of(origin[1] + column % 8, n);
+    for (std::int32_t c = 0; c < leaf_dim; ++c)
+      if ((states >> c & 1) != 0) {
+        const std::int32_t k = voxel_of(origin[2] + c, n);
+        ++map.at({j >> 3, k >> 3}).count[static_cast<std::size_t>(leaf_offset({i, j, k}))];
+      }
   }
 }
 
@@ -82,6 +128,51 @@ InsideScan join_slabs(std::vector<Slab<CountLeaf>>& slabs, std::int32_t first_sl
   scan.samples = samples;
   join(slabs, first_slab, scan, [&](const CountLeaf& leaf) { scan.counts.push_back(leaf.count); });
   return scan;
+}
+
+InsideScan count_samples(const Context& context, const InsideScan& fine, int samples) {
+  const std::int32_t rows = leaf_dim * samples; // of samples in a slab
+  std::int32_t low = INT32_MAX, high = INT32_MIN;
+  const auto include = [&](std::int32_t i, std::int32_t dim) {
+    low = std::min(low, voxel_of(i, rows));
+    high = std::max(high, voxel_of(i + dim - 1, rows) + 1);
+  };
+  for (const Int3& origin : fine.origins)
+    include(origin[0], leaf_dim);
+  for (const TileView& tile : fine.tiles)
+    include(tile.origin[0], tile.dim);
+  if (low >= high)
+    return {samples, {}, {}, {}, {}};
+  std::vector<Slab<CountLeaf>> slabs(static_cast<std::size_t>(high - low));
+  parallel_blocks(context, slabs.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t s = first; s < last; ++s) {
+      const std::int32_t begin = (low + static_cast<std::int32_t>(s)) * rows, end = begin + rows;
+      LeafMap<CountLeaf> map;
+      for (const TileView& tile : fine.tiles)
+        add_cube(tile, samples, begin, end, map);
+      for (std::size_t leaf = 0; leaf < fine.origins.size(); ++leaf)
+        if (fine.origins[leaf][0] >= begin && fine.origins[leaf][0] < end)
+          add_leaf(fine.origins[leaf], fine.bits[leaf], samples, map);
+      // What stands in the map already are sums, not flips: their differences along k are.
+      LeafMap<CountLeaf> flips;
+      for (std::size_t leaf = 0; leaf < map.keys.size(); ++leaf) {
+        const LeafKey key = map.keys[leaf];
+        for (std::size_t column = 0; column < 64; ++column) {
+          std::uint32_t before = 0;
+          for (std::size_t k = 0; k < 8; ++k) {
+            const std::uint32_t count = map.leaves[leaf].count[8 * column + k];
+            if (count != before)
+              flips.at(key).count[8 * column + k] += count - before;
+            before = count;
+          }
+          if (before != 0)
+            flips.at({key.j, key.k + 1}).count[8 * column] -= before;
+        }
+      }
+      (void)integrate_slab(flips, samples, slabs[s]);
+    }
+  });
+  return join_slabs(slabs, low, samples);
 }
 
 } // namespace gewebe

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 #include <unordered_map>
@@ -144,15 +145,26 @@ void agree(std::span<const Vec3> points, std::span<const Side> sides, OrientedSu
 void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
                   OrientedSurface& surface) {
   Groups groups(surface.triangles.size());
+  struct Sum {
+    Vec3 middle;
+    double corners = 0, area = 0, volume = 0;
+    bool open = false;
+    bool inward() const { // a ball's volume is area^1.5 / (6 sqrt(pi))
+      return volume < (open ? -0.01 * area * std::sqrt(area) / 10.634723105433096 : 0);
+    }
+  };
+  std::vector<Sum> sums(surface.triangles.size());
   for_each_edge(sides, [&](std::span<const Side> edge) {
     for (const Side& side : edge)
       groups.join(edge[0].triangle, side.triangle);
   });
-  struct Sum {
-    Vec3 middle;
-    double corners = 0, volume = 0;
-  };
-  std::vector<Sum> sums(surface.triangles.size());
+  for_each_edge(sides, [&](std::span<const Side> edge) {
+    int up = 0;
+    for (const Side& side : edge)
+      up += side.upward ? 1 : -1;
+    if (up != 0)
+      sums[groups.of(edge[0].triangle)].open = true;
+  });
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
     Sum& sum = sums[groups.of(t)];
     for (const std::uint32_t corner : surface.triangles[t])
@@ -163,15 +175,16 @@ void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
     Sum& sum = sums[groups.of(t)];
     const Vec3 middle = sum.middle / sum.corners;
     const auto& [a, b, c] = surface.triangles[t];
-    sum.volume += dot(points[a] - middle, cross(points[b] - middle, points[c] - middle));
+    sum.volume += dot(points[a] - middle, cross(points[b] - middle, points[c] - middle)) / 6;
+    sum.area += norm(cross(points[b] - points[a], points[c] - points[a])) / 2;
   }
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
     const Sum& sum = sums[groups.of(t)];
     if (groups.of(t) == t) {
       ++surface.parts;
-      surface.parts_turned += sum.volume < 0 ? 1 : 0;
+      surface.parts_turned += sum.inward() ? 1 : 0;
     }
-    if (sum.volume < 0)
+    if (sum.inward())
       std::swap(surface.triangles[t][1], surface.triangles[t][2]);
   }
 }
@@ -228,11 +241,14 @@ std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::array<std::uin
   return loops;
 }
 
-/// The cone of a loop in rings about as wide as the loop's edges are long, lest its triangles be
-/// long and thin.
+/// The cone of a loop; the pieces are in rings about as wide as the loop's edges are long.
 void add_cone(std::vector<Vec3>& points, const std::vector<std::uint32_t>& loop, const Vec3& tip,
-              std::vector<Triangle>& cones) {
+              ClosingCones& result) {
   const std::size_t size = loop.size();
+  const auto apex = static_cast<std::uint32_t>(points.size());
+  points.push_back(tip);
+  for (std::size_t n = 0; n < size; ++n)
+    result.cones.push_back({loop[n], loop[(n + 1) % size], apex});
   double around = 0, across = 0;
   for (std::size_t n = 0; n < size; ++n) {
     around += norm(points[loop[(n + 1) % size]] - points[loop[n]]);
@@ -250,15 +266,13 @@ void add_cone(std::vector<Vec3>& points, const std::vector<std::uint32_t>& loop,
     }
     for (std::size_t n = 0; n < size; ++n) {
       const std::size_t next = (n + 1) % size;
-      cones.push_back({outer[n], outer[next], inner[next]});
-      cones.push_back({outer[n], inner[next], inner[n]});
+      result.pieces.push_back({outer[n], outer[next], inner[next]});
+      result.pieces.push_back({outer[n], inner[next], inner[n]});
     }
     outer = std::move(inner);
   }
-  const auto apex = static_cast<std::uint32_t>(points.size());
-  points.push_back(tip);
   for (std::size_t n = 0; n < size; ++n)
-    cones.push_back({outer[n], outer[(n + 1) % size], apex});
+    result.pieces.push_back({outer[n], outer[(n + 1) % size], apex});
 }
 
 } // namespace
@@ -278,8 +292,7 @@ OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Tri
   return surface;
 }
 
-std::vector<Triangle> closing_cones(std::vector<Vec3>& points,
-                                    std::span<const Triangle> triangles) {
+ClosingCones closing_cones(std::vector<Vec3>& points, std::span<const Triangle> triangles) {
   std::vector<std::array<std::uint32_t, 2>> missing; // from, to: what would balance the edges
   const std::vector<Side> sides = sorted_sides(triangles, {});
   for_each_edge(sides, [&](std::span<const Side> edge) {
@@ -291,10 +304,11 @@ std::vector<Triangle> closing_cones(std::vector<Vec3>& points,
     for (; up < 0; ++up)
       missing.push_back({edge[0].low, edge[0].high});
   });
-  std::vector<Triangle> cones;
+  ClosingCones result;
   for (const std::vector<std::uint32_t>& loop : loops_of(std::move(missing))) {
     if (loop.size() == 3) {
-      cones.push_back({loop[0], loop[1], loop[2]});
+      result.cones.push_back({loop[0], loop[1], loop[2]});
+      result.pieces.push_back(result.cones.back());
       continue;
     }
     Vec3 sum;
@@ -306,9 +320,9 @@ std::vector<Triangle> closing_cones(std::vector<Vec3>& points,
     // Off the mean, lest the inner edges of a cone run through sample points.
     const Vec3 tip = sum / static_cast<double>(loop.size()) +
                      Vec3{0.013717, 0.007129, 0.011317} * box.longest_side();
-    add_cone(points, loop, tip, cones);
+    add_cone(points, loop, tip, result);
   }
-  return cones;
+  return result;
 }
 
 } // namespace gewebe

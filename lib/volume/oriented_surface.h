@@ -26,10 +26,15 @@ struct OrientedSurface {
 OrientedSurface orient_surface(std::span<const Vec3> points, std::span<const Triangle> triangles,
                                std::span<const std::int32_t> part);
 
-/// Triangles that close the surface as a chain, so that every edge is run through as often one way
-/// as the other: for each connected group of unbalanced edges a cone to a new point near the mean
-/// of its points, added to `points`. Empty if the surface is closed. \pre equal positions have
-/// equal indices in `triangles`
-std::vector<Triangle> closing_cones(std::vector<Vec3>& points, std::span<const Triangle> triangles);
+/// A chain that closes a surface, so that every edge is run through as often one way as the other.
+struct ClosingCones {
+  std::vector<Triangle> cones;  ///< one triangle for each missing edge, one for a loop of three
+  std::vector<Triangle> pieces; ///< the same up to rounding, cut so that no piece is long and thin
+};
+
+/// The unbalanced edges are taken apart into simple loops, and each longer than three edges gets a
+/// cone to a point near the mean of its points; new points are added to `points`. Empty if the
+/// surface is closed. \pre equal positions have equal indices in `triangles`
+ClosingCones closing_cones(std::vector<Vec3>& points, std::span<const Triangle> triangles);
 
 } // namespace gewebe

@@ -24,8 +24,14 @@ double angle_of(double x, double y);
 /// their ratio of distances.)
 class SolidAngleTree {
 public:
+  /// `pieces` make up the same surface as `triangles`, up to rounding; they are for the tree.
   /// \pre the points stay as they are as long as the tree
-  SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles);
+  SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles,
+                 std::span<const Triangle> pieces);
+
+  /// Sum over all triangles at sample p, moved by the infinitesimals of the scan; right up to
+  /// rounding. The sign of each angle is exact.
+  double exact_at(const Vec3& p) const;
 
   /// The tree as seen from a ball: a linear field for what is far from it, and the nodes that are
   /// not.
@@ -41,8 +47,8 @@ public:
   /// Value and error for all points of the ball for which the view was made.
   WindingSum range(const View& view, double radius) const;
 
-  /// At sample p, moved by the infinitesimals of the scan. Nodes whose expansion errs by at most
-  /// `tolerance` are not opened; 0 sums all triangles, and the error is that of rounding.
+  /// The same by pieces. Nodes whose expansion errs by at most `tolerance` are not opened.
+  /// \pre p is in the ball for which the view was made
   WindingSum at(const View& view, const Vec3& p, double tolerance) const;
 
   /// Farther from `box()` than this the magnitude is below 1/2.
@@ -61,7 +67,8 @@ private:
   void add(View& view, std::uint32_t node, double radius) const;
 
   std::span<const Vec3> points_;
-  std::vector<Triangle> triangles_;
+  std::span<const Triangle> exact_;
+  std::vector<Triangle> triangles_; ///< pieces
   std::vector<Node> nodes_;
 };
 

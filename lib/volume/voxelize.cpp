@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "volume/depth_buffers_internal.h"
 #include "volume/exact_predicates.h"
+#include "volume/inside_scan_internal.h"
 #include "volume/mesh_border.h"
 #include "volume/parity_scan_internal.h"
 #include "volume/voxelize_internal.h"
@@ -138,8 +139,6 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
   if (options.samples < 1 || options.samples > 64)
     throw Error("voxelize: " + std::to_string(options.samples) +
                 " samples along an edge, expected 1 to 64");
-  if (options.samples > 1 && options.rule != VoxelRule::parity)
-    throw Error("voxelize: more than one sample in a voxel, expected one with this rule");
   check_voxelize_input(mesh, transform);
   IndexMesh index = index_mesh(context, mesh, transform);
   require_memory(
@@ -172,14 +171,19 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
       samples.points = index.points;
       samples.triangles = closed;
     }
+  const auto counted = [&](InsideScan&& scan) {
+    return options.samples == 1 ? std::move(scan) : count_samples(context, scan, options.samples);
+  };
+  if (options.rule != VoxelRule::parity)
+    samples.samples = 1; // on the lattice of the samples
   if (options.rule == VoxelRule::winding) {
     // Cones that fill holes belong to no part, so with them edges alone connect.
     const std::span<const std::int32_t> part(mesh.part.data(),
                                              closed.empty() ? mesh.part.size() : 0);
-    return winding_scan(context, index.points, samples.triangles, part, r);
+    return counted(winding_scan(context, index.points, samples.triangles, part, r));
   }
   if (options.rule == VoxelRule::zbuffer)
-    return depth_buffer_scan(context, samples, r);
+    return counted(depth_buffer_scan(context, samples, r));
   InsideScan scan = parity_scan(context, samples, r, [&] {
     if (!looked)
       (void)look_at_border();

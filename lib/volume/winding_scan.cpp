@@ -78,13 +78,10 @@ std::vector<NearLeaf> leaves_near(const Context& context, const SolidAngleTree& 
 /// Is |whole - w(cones)| > 1/2 at p?
 bool winds(const SolidAngleTree& cones, const SolidAngleTree::View& view, const Vec3& p,
            std::int32_t whole) {
-  for (const double tolerance : {1e-4, 1e-5, 1e-6, 0.0}) {
-    const WindingSum sum = cones.at(tolerance == 1e-4 ? view : cones.whole(), p, tolerance);
-    const double distance = std::fabs(whole - sum.value) - 0.5;
-    if (std::fabs(distance) > sum.error || tolerance == 0)
-      return distance > 0;
-  }
-  return false;
+  if (const WindingSum sum = cones.at(view, p, 1e-4);
+      std::fabs(std::fabs(whole - sum.value) - 0.5) > sum.error)
+    return std::fabs(whole - sum.value) > 0.5;
+  return std::fabs(whole - cones.exact_at(p)) > 0.5;
 }
 
 struct Counters {
@@ -201,16 +198,16 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
   report.parts_turned = surface.parts_turned;
   report.triangles_turned = surface.triangles_turned;
   report.triangles_duplicate = surface.triangles_duplicate;
-  const std::vector<Triangle> caps = closing_cones(points, surface.triangles);
+  const ClosingCones caps = closing_cones(points, surface.triangles);
   for (Vec3& p : points)
     p = {predicate_coordinate(p.x), predicate_coordinate(p.y), predicate_coordinate(p.z)};
-  const SolidAngleTree cones(points, caps);
+  const SolidAngleTree cones(points, caps.cones, caps.pieces);
   const std::vector<NearLeaf> near = leaves_near(context, cones);
 
   // Those that a ray upward enters through, and those that it leaves through.
   std::array<std::vector<Triangle>, 2> facing;
   for (const std::span<const Triangle> list :
-       {std::span<const Triangle>(surface.triangles), std::span<const Triangle>(caps)})
+       {std::span<const Triangle>(surface.triangles), std::span<const Triangle>(caps.cones)})
     for (const Triangle& t : list) {
       const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
       const int normal_z = turn_sign(a.x, a.y, b.x, b.y, c.x, c.y, report.exact_tests);
