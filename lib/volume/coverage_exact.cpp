@@ -2,7 +2,9 @@
 // Based on: the divergence theorem over a polyhedron clipped to a box, after B. Mirtich, Fast and
 // Accurate Computation of Polyhedral Mass Properties, 1996; sums of signed areas along one axis are
 // how scan-line rasterizers anti-alias in the plane (L. Rosenberg's and D. Turner's of FreeType),
-// here one dimension up. Clipping: I. Sutherland, G. Hodgman, Reentrant Polygon Clipping, 1974.
+// here one dimension up: triangles are clipped to columns of voxels, along which the integral of
+// their height is known in closed form. Clipping: I. Sutherland, G. Hodgman, Reentrant Polygon
+// Clipping, 1974.
 
 #include "volume/coverage_internal.h"
 #include "volume/mesh_orient.h"
@@ -20,10 +22,10 @@ struct alignas(16) Corner {
   std::array<double, 4> at;
 };
 
-/// A convex polygon in space: a triangle cut by up to six planes has at most nine corners, and the
-/// walk keeps one plane more; a place to spare is written by `split`.
+/// A convex polygon in space: a triangle cut by up to four planes has at most seven corners, and
+/// the walk keeps one plane more; a place to spare is written by `split`.
 struct Polygon {
-  static constexpr std::size_t capacity = 12;
+  static constexpr std::size_t capacity = 10;
   std::size_t count = 0;
   std::array<Corner, capacity> corners;
 
@@ -122,35 +124,72 @@ public:
       return;
     for_each_cell<0>(whole, [&](std::int32_t i, Polygon& row) {
       const auto in_slab = static_cast<std::size_t>(std::clamp(i - begin, 0, leaf_dim - 1));
-      for_each_cell<1>(row, [&](std::int32_t j, Polygon& column) {
-        for_each_cell<2>(column, [&](std::int32_t k, Polygon& piece) {
-          add_piece(in_slab, j + base_[1], k + base_[2], k + 1, piece);
-        });
-      });
+      for_each_cell<1>(
+          row, [&](std::int32_t j, Polygon& column) { add_column(in_slab, j + base_[1], column); });
     });
   }
 
 private:
-  void add_piece(std::size_t i, std::int32_t j, std::int32_t k, double top, const Polygon& piece) {
-    const auto corner = [&](std::size_t n) -> const std::array<double, 4>& {
-      return piece.corners[n].at;
+  /// Adds a polygon that lies in one column of voxels.
+  void add_column(std::size_t i, std::int32_t j, const Polygon& polygon) {
+    const Polygon::Range range = polygon.range(2);
+    const std::int32_t bottom = floor_int(range.min);
+    const std::int32_t top = std::max(ceil_int(range.max) - 1, bottom);
+    const std::size_t column = 8 * i + static_cast<std::size_t>(j & 7);
+    const auto add = [&](std::int32_t k, double volume, double area) {
+      k += base_[2];
+      // Seen from below a face that looks down enters the solid.
+      leaves_.at({j >> 3, k >> 3}).add(column, static_cast<std::size_t>(k & 7), -volume, -area);
     };
-    double area = 0, moment = 0; // twice the area, six times the volume up to `top`
-    const double x0 = corner(0)[0], y0 = corner(0)[1], h0 = top - corner(0)[2];
-    double x1 = corner(1)[0] - x0, y1 = corner(1)[1] - y0, h1 = top - corner(1)[2];
-    for (std::size_t n = 2; n < piece.count; ++n) {
-      const double x2 = corner(n)[0] - x0, y2 = corner(n)[1] - y0, h2 = top - corner(n)[2];
-      const double twice = x1 * y2 - x2 * y1;
-      area += twice;
-      moment += twice * (h0 + h1 + h2);
+    // A fan of triangles: twice their areas seen from below, and of all of them six times the
+    // volume up to `top + 1`.
+    const auto corner = [&](std::size_t n) -> const std::array<double, 4>& {
+      return polygon.corners[n].at;
+    };
+    std::array<double, Polygon::capacity> twice;
+    double area = 0, volume = 0;
+    const double end = top + 1, x0 = corner(0)[0], y0 = corner(0)[1], h0 = end - corner(0)[2];
+    double x1 = corner(1)[0] - x0, y1 = corner(1)[1] - y0, h1 = end - corner(1)[2];
+    for (std::size_t n = 2; n < polygon.count; ++n) {
+      const double x2 = corner(n)[0] - x0, y2 = corner(n)[1] - y0, h2 = end - corner(n)[2];
+      twice[n] = x1 * y2 - x2 * y1;
+      area += twice[n];
+      volume += twice[n] * (h0 + h1 + h2);
       x1 = x2;
       y1 = y2;
       h1 = h2;
     }
-    // Seen from below a face that looks down enters the solid.
-    leaves_.at({j >> 3, k >> 3})
-        .add(8 * i + static_cast<std::size_t>(j & 7), static_cast<std::size_t>(k & 7),
-             moment * (-1.0 / 6), area * -0.5);
+    area *= 0.5;
+    volume *= 1.0 / 6;
+    double below = 0;  // volume up to the voxel's bottom
+    double before = 0; // of the voxel before
+    for (std::int32_t k = bottom; k < top; ++k) {
+      double sum = 0;
+      for (std::size_t n = 2; n < polygon.count; ++n)
+        sum += twice[n] * volume_below(k + 1, corner(0)[2], corner(n - 1)[2], corner(n)[2]);
+      sum *= 0.5;
+      const double of_voxel = sum - below;
+      add(k, of_voxel - before, of_voxel - before);
+      below = sum;
+      before = of_voxel;
+    }
+    add(top, volume - below - before, area - before);
+  }
+
+  /// The mean of max(h - z, 0) over a triangle whose corners have the heights z0, z1, z2: a cubic
+  /// below the middle one, the mean of h - z and a cubic above it.
+  static double volume_below(double h, double z0, double z1, double z2) {
+    const double low = std::min(std::min(z0, z1), z2), high = std::max(std::max(z0, z1), z2);
+    const double mean = ((h - z0) + (h - z1) + (h - z2)) / 3;
+    if (h >= high)
+      return mean;
+    if (h <= low)
+      return 0;
+    const double middle = std::max(std::min(z0, z1), std::min(std::max(z0, z1), z2));
+    const bool lower = h <= middle;
+    const double d = lower ? h - low : high - h;
+    const double cubic = d * d * d / (3 * (lower ? middle - low : high - middle) * (high - low));
+    return lower ? cubic : mean + cubic;
   }
 
   const SlabbedMesh& mesh_;

@@ -19,7 +19,7 @@ namespace gewebe {
 
 /// A leaf of differences along k. Entry 8 of a column goes to the leaf above.
 struct DifferenceLeaf {
-  std::array<double, 64 * 9> difference{};
+  std::array<double, std::size_t{64} * 9> difference{};
   std::array<std::uint64_t, 8> touched{}; ///< voxels with a patch, as bits of a leaf
 
   /// \pre column = 8 (i & 7) + (j & 7), k in [0, 8)
