@@ -3,12 +3,13 @@
 // raw and gzip) and MetaImage (.mha, .mhd; raw and zlib). What is read is which voxels have one of
 // the wanted labels, one bit a voxel, and where they lie in the world: mm, RAS.
 //
-// A reader of our own on zlib. Debian 12 has three libraries. nifticlib (1.8 MB) opens files by
-// name alone, so no pipe, and reports to standard error; teem (3.3 MB) reads NRRD only; both hold
-// the whole volume in its own type, eight times to sixty-four times the bits that are needed here,
-// allocated from what the header claims. ITK (126 MB, 38 packages) reads all three in the same way.
-// The headers are a page of code each; streamed through zlib (which libpng and HDF5 need anyway) a
-// volume takes one bit a voxel, and no byte is believed before it is checked.
+// A reader of our own on zlib. Debian 12 has three libraries. nifticlib 3 (1.8 MB) opens files by
+// name alone, so no pipe; it warns on standard error and reads a file that is cut off as zeros, and
+// for a header that claims 32000³ voxels asks for 1.6 GB, for its product overflows. teem (3.3 MB)
+// reads NRRD only. ITK (126 MB, 38 packages) reads all three. All hold the whole volume in its own
+// type, eight to sixty-four times the bits that are needed here. The headers are a page of code
+// each; streamed through zlib (which libpng and HDF5 need anyway) a volume takes one bit a voxel,
+// and no byte is believed before it is checked.
 //
 // Frames: NIfTI is RAS; its affine is chosen as by nibabel (sform where sform_code > 0, else qform
 // where qform_code > 0, else the voxel sizes about the middle with x from right to left, and a
