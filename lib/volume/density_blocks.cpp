@@ -42,7 +42,8 @@ bool meets(const IndexParticle& particle, const Int3& block, int shift) {
   const double center[3] = {particle.x, particle.y, particle.z};
   double sum = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double low = std::ldexp(block[axis], shift), high = low + std::ldexp(1.0, shift) - 1;
+    const auto low = static_cast<double>(std::int64_t{block[axis]} * (std::int64_t{1} << shift));
+    const double high = low + static_cast<double>((std::int64_t{1} << shift) - 1);
     const double d = std::max({low - center[axis], center[axis] - high, 0.0});
     sum += d * d;
   }
@@ -201,6 +202,7 @@ void BlockTree::load(std::span<const IndexParticle> particles, const Blocks& blo
   size_ = blocks.size;
   local_.clear();
   scratch_[0].clear();
+  local_.reserve(blocks.first[n + 1] - blocks.first[n]);
   for (std::uint64_t m = blocks.first[n]; m < blocks.first[n + 1]; ++m) {
     scratch_[0].push_back(static_cast<std::uint32_t>(local_.size()));
     local_.push_back(particles[blocks.particles[m]]);

@@ -42,7 +42,7 @@ std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c
     _mm256_store_ps(c.z2[n], z2);
     c.cubic[n] = p.weight * (4.0F / 9);
     c.square[n] = p.weight * (5.0F / 9);
-    for (int i = 0; i < 8; ++i)
+    for (std::size_t i = 0; i < 8; ++i)
       _mm256_store_ps(c.rest[n] + i * 8, _mm256_sub_ps(_mm256_broadcast_ss(rest_x + i), y2));
     // Of an axis' squares the largest is at an end: four corner rows tell whether all are reached.
     const float z2_least = smallest(z2);
@@ -50,7 +50,7 @@ std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c
     std::uint32_t reached = 0xffff;
     if (!(rest[0] > z2_least && rest[7] > z2_least && rest[56] > z2_least && rest[63] > z2_least)) {
       reached = 0;
-      for (int i = 0; i < 8; ++i) {
+      for (std::size_t i = 0; i < 8; ++i) {
         const int rows = _mm256_movemask_ps(
             _mm256_cmp_ps(_mm256_load_ps(rest + i * 8), _mm256_set1_ps(z2_least), _CMP_GT_OQ));
         reached |= ((rows & 15) != 0 ? 1U : 0U) << 2 * i | ((rows >> 4) != 0 ? 2U : 0U) << 2 * i;
@@ -71,48 +71,49 @@ __m256 add_row(__m256 sum, const float* rest, __m256 z2, __m256 cubic, __m256 sq
 
 /// Eight rows stay in registers while all particles pass. (Inlined, GCC 12 makes it a fifth
 /// slower.)
-__attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, int slice,
+__attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, std::size_t slice,
                                          float* rows) {
   __m256 sum[8];
-  for (int row = 0; row < 8; ++row)
+  for (std::size_t row = 0; row < 8; ++row)
     sum[row] = _mm256_loadu_ps(rows + row * 8);
   for (std::size_t n = 0; n < count; ++n) {
     const __m256 z2 = _mm256_load_ps(c.z2[n]);
     const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
     const __m256 square = _mm256_broadcast_ss(c.square + n);
     const float* const rest = c.rest[n] + slice * 8;
-    for (int row = 0; row < 8; ++row)
+    for (std::size_t row = 0; row < 8; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (int row = 0; row < 8; ++row)
+  for (std::size_t row = 0; row < 8; ++row)
     _mm256_storeu_ps(rows + row * 8, sum[row]);
 }
 
 /// Bit n: particle n reaches the half slice.
-std::uint32_t reaching(const Chunk& c, std::size_t count, int half) {
+std::uint32_t reaching(const Chunk& c, std::size_t count, std::size_t half) {
   const std::uint8_t* const bytes = half < 8 ? c.low : c.high;
   const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(bytes));
-  const int bits = _mm256_movemask_epi8(_mm256_sll_epi16(all, _mm_cvtsi32_si128(7 - (half & 7))));
+  const int bits = _mm256_movemask_epi8(
+      _mm256_sll_epi16(all, _mm_cvtsi32_si128(7 - static_cast<int>(half & 7))));
   return static_cast<std::uint32_t>(bits) &
          static_cast<std::uint32_t>(~(~std::uint64_t{0} << count));
 }
 
 /// Four rows, and only the particles that reach them.
-__attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t particles, int half,
-                                              float* rows) {
+__attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t particles,
+                                              std::size_t half, float* rows) {
   __m256 sum[4];
-  for (int row = 0; row < 4; ++row)
+  for (std::size_t row = 0; row < 4; ++row)
     sum[row] = _mm256_loadu_ps(rows + row * 8);
   for (; particles != 0; particles &= particles - 1) {
-    const int n = __builtin_ctz(particles);
+    const auto n = static_cast<std::size_t>(__builtin_ctz(particles));
     const __m256 z2 = _mm256_load_ps(c.z2[n]);
     const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
     const __m256 square = _mm256_broadcast_ss(c.square + n);
     const float* const rest = c.rest[n] + half * 4;
-    for (int row = 0; row < 4; ++row)
+    for (std::size_t row = 0; row < 4; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (int row = 0; row < 4; ++row)
+  for (std::size_t row = 0; row < 4; ++row)
     _mm256_storeu_ps(rows + row * 8, sum[row]);
 }
 
@@ -148,13 +149,13 @@ void add_density_avx2(const LeafParticle* particles, std::size_t count, float* v
   for (std::size_t begin = 0; begin < count; begin += chunk) {
     const std::size_t some = count - begin < chunk ? count - begin : chunk;
     const std::uint32_t common = prepare(particles + begin, some, c);
-    for (int slice = 0; slice < 8; ++slice) {
+    for (std::size_t slice = 0; slice < 8; ++slice) {
       float* const rows = values + slice * 64;
       if ((common >> 2 * slice & 3) == 3) {
         add_slice(c, some, slice, rows);
         continue;
       }
-      for (int half = 2 * slice; half < 2 * slice + 2; ++half)
+      for (std::size_t half = 2 * slice; half < 2 * slice + 2; ++half)
         if (const std::uint32_t some_reach = reaching(c, some, half); some_reach != 0)
           add_half_slice(c, some_reach, half, values + half * 32);
     }

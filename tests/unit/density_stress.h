@@ -45,8 +45,10 @@ inline StressResult stress_scale(double scale) {
 /// Radii from one voxel to a thousand in one scene.
 inline StressResult stress_mixed(double largest) {
   Particles particles;
-  for (double R = 1; R <= largest; R *= 3.7)
+  for (int n = 0; std::pow(3.7, n) <= largest; ++n) {
+    const double R = std::pow(3.7, n);
     particles.push_back({{0.3 * R, -0.1 * R, 0.2}, R, 1});
+  }
   return {"R from 1 to " + std::to_string(std::lround(largest)) + " voxels",
           largest_leaf_error(density_grid(particles, 1), particles, 101), 1e-6};
 }
