@@ -43,20 +43,15 @@ std::uint64_t not_0(const float* values) {
 }
 
 Range range_of(const LeafView& leaf) {
-  constexpr int lanes = 16; // fixed, so that the compiler can do them at once
-  std::array<Key, lanes> min{}, max{};
-  min.fill(std::numeric_limits<Key>::max());
-  max.fill(std::numeric_limits<Key>::min());
-  for (int n = 0; n < leaf_voxels; n += lanes)
-    for (int lane = 0; lane < lanes; ++lane) {
-      const Key key = key_of(leaf.values[n + lane]);
-      const auto l = static_cast<std::size_t>(lane);
-      min[l] = key < min[l] ? key : min[l];
-      max[l] = key > max[l] ? key : max[l];
-    }
+  Key min = std::numeric_limits<Key>::max(), max = std::numeric_limits<Key>::min();
+  for (int n = 0; n < leaf_voxels; ++n) {
+    const Key key = key_of(leaf.values[n]);
+    min = key < min ? key : min;
+    max = key > max ? key : max;
+  }
   Range range;
-  range.min = *std::min_element(min.begin(), min.end());
-  range.max = *std::max_element(max.begin(), max.end());
+  range.min = min;
+  range.max = max;
   range.varied = range.min != range.max;
   for (int word = 0; word < 8; ++word) {
     const std::uint64_t active = leaf.active[word];

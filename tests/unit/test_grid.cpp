@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 using namespace gewebe;
@@ -184,4 +185,74 @@ TEST(Grid, SharedLeafOutlivesItsLender) {
   const Grid grid = builder.finish(false);
   EXPECT_EQ(grid.leaves().at(0).values, place); // not copied
   EXPECT_EQ(GridAccessor(grid).value({3, 4, 5}), 0.75F);
+}
+
+/// Every figure against a plain loop over all voxels, for isovalues between and on single precision
+/// numbers and both classes of volume.
+TEST(VolumeStats, AgreesWithPlainSums) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> value(-1, 2);
+  for (const bool level_set : {false, true})
+    for (const double isovalue : {0.5, 0.1, -0.3, 1.0 / 3}) {
+      GridInfo info;
+      info.isovalue = isovalue;
+      info.level_set = level_set;
+      info.transform = uniform_transform(0.5);
+      GridBuilder builder(info);
+      const std::vector<Int3> origins{{0, 0, 0}, {8, 0, -8}, {64, 0, 0}};
+      double sum = 0;
+      float min = 0.3F, max = 0.3F;
+      std::uint64_t inside = 0;
+      const auto count = [&](float v, std::uint64_t times) {
+        sum += static_cast<double>(v) * static_cast<double>(times);
+        const auto wide = static_cast<double>(v);
+        inside += (level_set ? wide < isovalue : wide > isovalue) ? times : 0;
+        min = std::min(min, v);
+        max = std::max(max, v);
+      };
+      for (const LeafRef& leaf : builder.add_leaves({}, origins))
+        for (int n = 0; n < leaf_voxels; ++n) {
+          leaf.values[n] = n % 5 == 0 ? static_cast<float>(isovalue) : value(random);
+          count(leaf.values[n], 1);
+        }
+      builder.add_tile({{128, 0, 0}, 128, 0.3F, true});
+      count(0.3F, 128 * 128 * 128);
+      const VolumeStats stats = volume_stats({}, builder.finish(false));
+      EXPECT_EQ(stats.inside_voxels, inside);
+      EXPECT_NEAR(stats.volume, sum / 8, 1e-12 * std::fabs(sum));
+      EXPECT_EQ(stats.min, static_cast<double>(min));
+      EXPECT_EQ(stats.max, static_cast<double>(max));
+    }
+}
+
+TEST(Grid, SummaryTellsWhatValuesHaveInCommon) {
+  const auto summary = [](const std::function<void(const LeafRef&)>& change,
+                          const TileView& tile = {{8, 0, 0}, 8, 0.5F, true}) {
+    GridBuilder builder(GridInfo{});
+    const Int3 origin{0, 0, 0};
+    const LeafRef leaf = builder.add_leaves({}, {&origin, 1}).at(0);
+    for (int n = 0; n < leaf_voxels; ++n)
+      leaf.values[n] = static_cast<float>(n + 1) / 1024;
+    std::fill_n(leaf.active, 8, ~std::uint64_t{0});
+    change(leaf);
+    builder.add_tile(tile);
+    return builder.finish(false).summary({});
+  };
+  const ValueSummary plain = summary([](const LeafRef&) {});
+  EXPECT_TRUE(plain.finite && plain.active_where_not_0 && plain.varied_leaves);
+  EXPECT_EQ(plain.min, 1.0F / 1024);
+  EXPECT_EQ(plain.max, 0.5F);
+  EXPECT_EQ(summary([](const LeafRef& l) { l.values[77] = -3; }).min, -3);
+  EXPECT_EQ(summary([](const LeafRef& l) { l.values[77] = 3; }).max, 3);
+  EXPECT_TRUE(std::signbit(summary([](const LeafRef& l) { l.values[77] = -0.0F; }).min));
+  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = NAN; }).finite);
+  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = -NAN; }).finite);
+  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = -HUGE_VALF; }).finite);
+  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, NAN, true}).finite);
+  EXPECT_FALSE(summary([](const LeafRef& l) { l.values[77] = 0; }).active_where_not_0);
+  EXPECT_FALSE(summary([](const LeafRef& l) { l.active[3] = 1; }).active_where_not_0);
+  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, 0.5F, false}).active_where_not_0);
+  EXPECT_FALSE(summary([](const LeafRef&) {}, {{8, 0, 0}, 8, 0, true}).active_where_not_0);
+  EXPECT_FALSE(
+      summary([](const LeafRef& l) { std::fill_n(l.values, leaf_voxels, 0.25F); }).varied_leaves);
 }
