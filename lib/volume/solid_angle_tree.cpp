@@ -156,9 +156,6 @@ double SolidAngleTree::exact_at(const Vec3& p) const {
 }
 
 WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
-  constexpr std::size_t few = 64; // not worth a tree
-  if (exact_.size() <= few)
-    return {exact_at(p), 1e-12};
   WindingSum sum;
   std::uint32_t stack[128];
   int depth = 0;
@@ -189,6 +186,11 @@ WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
     }
   }
   return sum;
+}
+
+WindingSum SolidAngleTree::quick_at(const Vec3& p) const {
+  constexpr std::size_t few = 4096; // no tree beats as many angles
+  return exact_.size() <= few ? WindingSum{exact_at(p), 1e-12} : at(p, 1e-4);
 }
 
 bool SolidAngleTree::is_far(const Vec3& p, double radius) const {
@@ -223,7 +225,7 @@ WindingSum SolidAngleTree::within(const Vec3& p, double radius) const {
   }
   if (!is_far(p, radius))
     return {0, HUGE_VAL};
-  WindingSum sum = at(p, 1e-4);
+  WindingSum sum = quick_at(p);
   sum.error += 1.000001 * radius * slope / (4 * pi);
   return sum;
 }

@@ -36,6 +36,9 @@ public:
   /// The same by pieces. Nodes whose expansion errs by at most `tolerance` are not opened.
   WindingSum at(const Vec3& p, double tolerance) const;
 
+  /// The cheaper of the two.
+  WindingSum quick_at(const Vec3& p) const;
+
   /// Value at p, with an error that holds for all points within `radius` of it: infinite if the
   /// surface or its border may be as near.
   WindingSum within(const Vec3& p, double radius) const;

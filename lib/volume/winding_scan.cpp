@@ -64,7 +64,7 @@ std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cone
 
 /// Is |whole - w(cones)| > 1/2 at p?
 bool winds(const SolidAngleTree& cones, const Vec3& p, std::int32_t whole) {
-  if (const WindingSum sum = cones.at(p, 1e-4);
+  if (const WindingSum sum = cones.quick_at(p);
       std::fabs(std::fabs(whole - sum.value) - 0.5) > sum.error)
     return std::fabs(whole - sum.value) > 0.5;
   return std::fabs(whole - cones.exact_at(p)) > 0.5;
