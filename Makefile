@@ -120,7 +120,7 @@ $(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(SHARED) $(ARCHIVE)
 $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE)
 	$(LINK) $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
 
-$(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(ARCHIVE)
+$(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS)
 
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(ARCHIVE)

@@ -6,6 +6,8 @@
 #include "volume/exact_predicates.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <map>
 
 namespace gewebe {
 namespace {
@@ -68,6 +70,15 @@ SolidAngleTree::SolidAngleTree(std::span<const Vec3> points, std::span<const Tri
     : points_(points), exact_(triangles), triangles_(pieces.begin(), pieces.end()) {
   if (triangles_.empty())
     return;
+  std::map<std::array<std::uint32_t, 2>, int> surplus;
+  for (const Triangle& t : triangles)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t from = t[c], to = t[(c + 1) % 3];
+      surplus[{std::min(from, to), std::max(from, to)}] += from < to ? 1 : -1;
+    }
+  for (const auto& [edge, times] : surplus)
+    for (int n = 0; n < std::abs(times); ++n)
+      border_.push_back({points[edge[0]], points[edge[1]]});
   nodes_.emplace_back();
   nodes_[0].end = static_cast<std::uint32_t>(triangles_.size());
   build(0);
@@ -144,12 +155,14 @@ double SolidAngleTree::exact_at(const Vec3& p) const {
   return sum / (2 * pi);
 }
 
-WindingSum SolidAngleTree::at(const View& view, const Vec3& p, double tolerance) const {
-  WindingSum sum{view.value + dot(view.gradient, p - view.center), view.error};
-  std::vector<std::uint32_t> stack = view.near;
-  while (!stack.empty()) {
-    const Node& node = nodes_[stack.back()];
-    stack.pop_back();
+WindingSum SolidAngleTree::at(const Vec3& p, double tolerance) const {
+  WindingSum sum;
+  std::uint32_t stack[128];
+  int depth = 0;
+  if (!nodes_.empty())
+    stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
     const Vec3 q = node.center - p;
     const double d = norm(q), gap = d - node.radius;
     if (gap > 0 && tolerance > 0) {
@@ -162,8 +175,8 @@ WindingSum SolidAngleTree::at(const View& view, const Vec3& p, double tolerance)
       }
     }
     if (node.children != 0) {
-      stack.push_back(node.children + 1);
-      stack.push_back(node.children);
+      stack[depth++] = node.children + 1;
+      stack[depth++] = node.children;
       continue;
     }
     for (std::uint32_t t = node.begin; t < node.end; ++t) {
@@ -175,67 +188,45 @@ WindingSum SolidAngleTree::at(const View& view, const Vec3& p, double tolerance)
   return sum;
 }
 
-SolidAngleTree::View SolidAngleTree::whole() const {
-  View view;
+WindingSum SolidAngleTree::quick_at(const Vec3& p) const {
+  constexpr std::size_t few = 4096; // no tree beats as many angles
+  return exact_.size() <= few ? WindingSum{exact_at(p), 1e-12} : at(p, 1e-4);
+}
+
+bool SolidAngleTree::is_far(const Vec3& p, double radius) const {
+  std::uint32_t stack[128];
+  int depth = 0;
   if (!nodes_.empty())
-    view.near.push_back(0);
-  return view;
+    stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    if (norm(node.center - p) > node.radius + radius)
+      continue;
+    if (node.children == 0)
+      return false;
+    stack[depth++] = node.children + 1;
+    stack[depth++] = node.children;
+  }
+  return true;
 }
 
-void SolidAngleTree::add(View& view, std::uint32_t n, double radius) const {
-  const Node& node = nodes_[n];
-  const Vec3 q = node.center - view.center;
-  const double d = norm(q), reach = node.radius + radius, gap = d - reach;
-  if (gap > 0) {
-    const double error = 3 * node.area * reach * reach / (4 * pi * gap * gap * gap * gap);
-    if (error < 2e-5) {
-      view.value += expansion(node, q, d);
-      view.error += error;
-      view.gradient += (3 * dot(node.normal, q) / (d * d) * q - node.normal) / (4 * pi * d * d * d);
-      return;
-    }
-  }
-  if (node.children == 0 || node.radius < radius) { // to open it would not help much
-    view.near.push_back(n);
-    return;
-  }
-  add(view, node.children, radius);
-  add(view, node.children + 1, radius);
-}
+// Off the surface the solid angle's gradient is the integral of (x - p) x dx / |x - p|³ along the
+// border (Biot and Savart), so an edge at distance d adds at most its length / d².
 
-SolidAngleTree::View SolidAngleTree::narrowed(const View& view, const Vec3& center,
-                                              double radius) const {
-  View narrow;
-  narrow.center = center;
-  narrow.value = view.value + dot(view.gradient, center - view.center);
-  narrow.error = view.error;
-  narrow.gradient = view.gradient;
-  for (const std::uint32_t node : view.near)
-    add(narrow, node, radius);
-  return narrow;
-}
-
-WindingSum SolidAngleTree::range(const View& view, double radius) const {
-  WindingSum sum{view.value, view.error};
-  Vec3 gradient = view.gradient;
-  for (const std::uint32_t n : view.near) {
-    const Node& node = nodes_[n];
-    const Vec3 q = node.center - view.center;
-    const double d = norm(q), reach = node.radius + radius, gap = d - reach;
-    double crude = 0.5 * (node.end - node.begin); // half of all directions each
-    if (gap > 0) {
-      crude = std::min(crude, node.area / (4 * pi * gap * gap));
-      const double error = 3 * node.area * reach * reach / (4 * pi * gap * gap * gap * gap);
-      if (error < crude) {
-        sum.value += expansion(node, q, d);
-        sum.error += error;
-        gradient += (3 * dot(node.normal, q) / (d * d) * q - node.normal) / (4 * pi * d * d * d);
-        continue;
-      }
-    }
-    sum.error += crude;
+WindingSum SolidAngleTree::within(const Vec3& p, double radius) const {
+  double slope = 0;
+  for (const auto& [a, b] : border_) {
+    const Vec3 edge = b - a, to = p - a;
+    const double length2 = dot(edge, edge), t = dot(to, edge);
+    const double gap = norm(to - std::clamp(t / length2, 0.0, 1.0) * edge) - radius;
+    if (!(gap > 0))
+      return {0, HUGE_VAL};
+    slope += std::sqrt(length2) / (gap * gap);
   }
-  sum.error += radius * norm(gradient);
+  if (!is_far(p, radius))
+    return {0, HUGE_VAL};
+  WindingSum sum = quick_at(p);
+  sum.error += 1.000001 * radius * slope / (4 * pi);
   return sum;
 }
 

@@ -25,7 +25,7 @@ double angle_of(double x, double y);
 class SolidAngleTree {
 public:
   /// `pieces` make up the same surface as `triangles`, up to rounding; they are for the tree.
-  /// \pre the points stay as they are as long as the tree
+  /// \pre the points stay as they are as long as the tree, and so do the triangles
   SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles,
                  std::span<const Triangle> pieces);
 
@@ -33,23 +33,15 @@ public:
   /// rounding. The sign of each angle is exact.
   double exact_at(const Vec3& p) const;
 
-  /// The tree as seen from a ball: a linear field for what is far from it, and the nodes that are
-  /// not.
-  struct View {
-    Vec3 center;
-    double value = 0, error = 0;
-    Vec3 gradient;
-    std::vector<std::uint32_t> near;
-  };
-  View whole() const;
-  /// What a ball within the view's own sees. Far nodes err by at most 2e-5 each.
-  View narrowed(const View& view, const Vec3& center, double radius) const;
-  /// Value and error for all points of the ball for which the view was made.
-  WindingSum range(const View& view, double radius) const;
-
   /// The same by pieces. Nodes whose expansion errs by at most `tolerance` are not opened.
-  /// \pre p is in the ball for which the view was made
-  WindingSum at(const View& view, const Vec3& p, double tolerance) const;
+  WindingSum at(const Vec3& p, double tolerance) const;
+
+  /// The cheaper of the two.
+  WindingSum quick_at(const Vec3& p) const;
+
+  /// Value at p, with an error that holds for all points within `radius` of it: infinite if the
+  /// surface or its border may be as near.
+  WindingSum within(const Vec3& p, double radius) const;
 
   /// Farther from `box()` than this the magnitude is below 1/2.
   double reach() const;
@@ -64,12 +56,13 @@ private:
     std::uint32_t children = 0;       ///< the first of two; 0: a leaf
   };
   void build(std::uint32_t node);
-  void add(View& view, std::uint32_t node, double radius) const;
+  bool is_far(const Vec3& p, double radius) const;
 
   std::span<const Vec3> points_;
   std::span<const Triangle> exact_;
   std::vector<Triangle> triangles_; ///< pieces
   std::vector<Node> nodes_;
+  std::vector<std::array<Vec3, 2>> border_; ///< edges that the triangles leave unbalanced
 };
 
 } // namespace gewebe

@@ -14,15 +14,9 @@ namespace {
 
 constexpr double diagonal = 1.7320508075688774;
 
-/// A leaf in which the cones' winding number may reach 1/2, in units of leaves.
-struct NearLeaf {
-  Int3 place;
-  SolidAngleTree::View view;
-};
-
-/// All of them, ascending.
-std::vector<NearLeaf> leaves_near(const Context& context, const SolidAngleTree& cones) {
-  std::vector<NearLeaf> near;
+/// Leaves in which the cones' winding number may reach 1/2, ascending, in units of leaves.
+std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cones) {
+  std::vector<Int3> near;
   Box3 box = cones.box();
   if (box.empty())
     return near;
@@ -38,27 +32,22 @@ std::vector<NearLeaf> leaves_near(const Context& context, const SolidAngleTree& 
   struct Cube {
     Int3 low;
     std::int32_t side;
-    SolidAngleTree::View view; // of the cube that it is a part of
   };
-  std::vector<Cube> cubes{{low, side, cones.whole()}};
-  std::size_t listed = 0;
+  std::vector<Cube> cubes{{low, side}};
   while (!cubes.empty()) {
-    const Cube cube = std::move(cubes.back());
+    const Cube cube = cubes.back();
     cubes.pop_back();
     // Half a cube from the middle of the first to that of the last voxel.
     const double half = (leaf_dim * static_cast<double>(cube.side) - 1) / 2;
     const Vec3 middle = Vec3{1.0 * cube.low[0], 1.0 * cube.low[1], 1.0 * cube.low[2]} * leaf_dim +
                         Vec3{half, half, half};
-    SolidAngleTree::View view = cones.narrowed(cube.view, middle, half * diagonal);
-    const WindingSum sum = cones.range(view, half * diagonal);
+    const WindingSum sum = cones.within(middle, half * diagonal);
     if (std::fabs(sum.value) + sum.error < 0.5)
       continue;
     if (cube.side == 1) {
-      listed += view.near.size();
-      near.push_back({cube.low, std::move(view)});
-      if (near.size() % 4096 == 0)
-        require_memory(context,
-                       4096.0 * static_cast<double>(near.size()) + 4 * static_cast<double>(listed),
+      near.push_back(cube.low);
+      if (near.size() % 65536 == 0)
+        require_memory(context, 4096.0 * static_cast<double>(near.size()),
                        "the leaves near the holes of the mesh");
       continue;
     }
@@ -67,18 +56,15 @@ std::vector<NearLeaf> leaves_near(const Context& context, const SolidAngleTree& 
       cubes.push_back(
           {{cube.low[0] + ((c & 4) != 0 ? next : 0), cube.low[1] + ((c & 2) != 0 ? next : 0),
             cube.low[2] + ((c & 1) != 0 ? next : 0)},
-           next,
-           view});
+           next});
   }
-  std::sort(near.begin(), near.end(),
-            [](const NearLeaf& a, const NearLeaf& b) { return a.place < b.place; });
+  std::sort(near.begin(), near.end());
   return near;
 }
 
 /// Is |whole - w(cones)| > 1/2 at p?
-bool winds(const SolidAngleTree& cones, const SolidAngleTree::View& view, const Vec3& p,
-           std::int32_t whole) {
-  if (const WindingSum sum = cones.at(view, p, 1e-4);
+bool winds(const SolidAngleTree& cones, const Vec3& p, std::int32_t whole) {
+  if (const WindingSum sum = cones.quick_at(p);
       std::fabs(std::fabs(whole - sum.value) - 0.5) > sum.error)
     return std::fabs(whole - sum.value) > 0.5;
   return std::fabs(whole - cones.exact_at(p)) > 0.5;
@@ -98,9 +84,8 @@ BitLeaf bits_of(const CountLeaf& leaf) {
 
 /// Decides the samples of a cube of a leaf, together where the cones' winding number varies little
 /// enough in it, else in eight parts down to single samples.
-void decide(const SolidAngleTree& cones, const SolidAngleTree::View& outer, const CountLeaf& leaf,
-            const Int3& origin, const Int3& low, std::int32_t side, BitLeaf& bits,
-            std::uint64_t& summed) {
+void decide(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& origin, const Int3& low,
+            std::int32_t side, BitLeaf& bits, std::uint64_t& summed) {
   const double half = (side - 1) / 2.0;
   const Vec3 middle{origin[0] + low[0] + half, origin[1] + low[1] + half,
                     origin[2] + low[2] + half};
@@ -113,12 +98,11 @@ void decide(const SolidAngleTree& cones, const SolidAngleTree::View& outer, cons
     bits.word[at / 64] |= std::uint64_t{inside} << (at % 64);
   };
   if (side == 1) {
-    set(place(0), winds(cones, outer, middle, whole(place(0))));
+    set(place(0), winds(cones, middle, whole(place(0))));
     ++summed;
     return;
   }
-  const SolidAngleTree::View view = cones.narrowed(outer, middle, half * diagonal);
-  const WindingSum sum = cones.range(view, half * diagonal);
+  const WindingSum sum = cones.within(middle, half * diagonal);
   bool clear = true;
   for (std::int32_t n = 0; clear && n < side * side * side; ++n)
     clear = std::fabs(std::fabs(whole(place(n)) - sum.value) - 0.5) > sum.error;
@@ -129,18 +113,17 @@ void decide(const SolidAngleTree& cones, const SolidAngleTree::View& outer, cons
   }
   const std::int32_t next = side / 2;
   for (int c = 0; c < 8; ++c)
-    decide(cones, view, leaf, origin,
+    decide(cones, leaf, origin,
            {low[0] + ((c & 4) != 0 ? next : 0), low[1] + ((c & 2) != 0 ? next : 0),
             low[2] + ((c & 1) != 0 ? next : 0)},
            next, bits, summed);
 }
 
 /// Sums the flips of a slab up along k. `near` are its leaves near the cones.
-Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i,
-                        std::span<const NearLeaf> near, const SolidAngleTree& cones,
-                        Counters& counters) {
-  for (const NearLeaf& leaf : near)
-    (void)map.at({leaf.place[1], leaf.place[2]});
+Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<const Int3> near,
+                        const SolidAngleTree& cones, Counters& counters) {
+  for (const Int3& leaf : near)
+    (void)map.at({leaf[1], leaf[2]});
   std::vector<std::uint32_t> order(map.keys.size());
   for (std::size_t n = 0; n < order.size(); ++n)
     order[n] = static_cast<std::uint32_t>(n);
@@ -173,13 +156,10 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i,
     }
     CountLeaf& leaf = map.leaves[order[n]];
     leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
-    const auto of_leaf =
-        std::lower_bound(near.begin(), near.end(), Int3{slab_i, key.j, key.k},
-                         [](const NearLeaf& a, const Int3& place) { return a.place < place; });
-    if (of_leaf != near.end() && of_leaf->place == Int3{slab_i, key.j, key.k}) {
+    if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k})) {
       BitLeaf bits;
-      decide(cones, of_leaf->view, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim},
-             {0, 0, 0}, leaf_dim, bits, counters.summed);
+      decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
+             leaf_dim, bits, counters.summed);
       put(bits, key, key.k + 1);
     } else {
       put(bits_of(leaf), key, key.k + 1);
@@ -202,7 +182,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
   for (Vec3& p : points)
     p = {predicate_coordinate(p.x), predicate_coordinate(p.y), predicate_coordinate(p.z)};
   const SolidAngleTree cones(points, caps.cones, caps.pieces);
-  const std::vector<NearLeaf> near = leaves_near(context, cones);
+  const std::vector<Int3> near = leaves_near(context, cones);
 
   // Those that a ray upward enters through, and those that it leaves through.
   std::array<std::vector<Triangle>, 2> facing;
@@ -232,7 +212,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
               chunks[way].range.end * chunks[way].slabs_each);
   }
   if (!near.empty())
-    include(near.front().place[0], near.back().place[0] + 1);
+    include(near.front()[0], near.back()[0] + 1);
   if (slabs_range.begin >= slabs_range.end)
     return {};
 
@@ -264,7 +244,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
         const auto of_slab = [&](std::int32_t i) {
           return std::lower_bound(
               near.begin(), near.end(), i,
-              [](const NearLeaf& leaf, std::int32_t slab) { return leaf.place[0] < slab; });
+              [](const Int3& leaf, std::int32_t slab) { return leaf[0] < slab; });
         };
         slabs[n * static_cast<std::size_t>(each) + static_cast<std::size_t>(s)] =
             integrate(maps[static_cast<std::size_t>(s)], slab_i,

