@@ -95,6 +95,7 @@ deps:
 kernel = $(if $(filter release,$(config)),-O3)
 $(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
 $(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
+$(BUILD)/obj/lib/volume/coverage_exact.o: FILE_FLAGS := $(kernel)
 # CGAL's interval arithmetic changes the rounding mode.
 $(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math
 

@@ -272,7 +272,7 @@ private:
 void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t>& part,
                 std::uint32_t parts, std::vector<Triangle>& triangles) {
   std::vector<double> volume(parts, 0);
-  std::vector<std::size_t> first(parts + 1, 0);
+  std::vector<std::size_t> first(std::size_t{parts} + 1, 0);
   std::vector<Vec3> origin(parts);
   for (std::size_t n = 0; n < triangles.size(); ++n) {
     const Triangle& t = triangles[n];
@@ -292,11 +292,17 @@ void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t
       members[next[part[n]]++] = n;
     const Columns columns(points, triangles);
     for (std::uint32_t c = 0; c < parts; ++c) {
-      int votes = 0; // a point may lie on another part, so more than one is asked
-      constexpr std::size_t asked = 5;
+      // Points a little inside the part, since its surface may be that of a part beside it; of
+      // several, since parts may cut each other.
+      int votes = 0;
+      constexpr std::size_t asked = 9;
       for (std::size_t v = 0; v < asked; ++v) {
         const Triangle& t = triangles[members[first[c] + v * (first[c + 1] - first[c]) / asked]];
-        const Vec3 p = points[t[0]] * 0.375 + points[t[1]] * 0.3125 + points[t[2]] * 0.3125;
+        const Vec3 &p0 = points[t[0]], &p1 = points[t[1]], &p2 = points[t[2]];
+        const Vec3 normal = cross(p1 - p0, p2 - p0); // its length is that of an area
+        const double size = std::sqrt(norm(normal));
+        const double inward = size > 0 ? (volume[c] < 0 ? 1e-4 : -1e-4) / size : 0;
+        const Vec3 p = p0 * 0.375 + p1 * 0.3125 + p2 * 0.3125 + normal * inward;
         votes += columns.odd_below(p, part, c) ? 1 : -1;
       }
       flip[c] = (volume[c] < 0) != (votes > 0);

@@ -270,6 +270,32 @@ TEST(Coverage, TouchingSolidsAddUp) {
         ASSERT_NEAR(x.value({i, j, k}), y.value({i, j, k}), 1.2e-7f) << i << ' ' << j << ' ' << k;
 }
 
+TEST(Coverage, SolidsSetIntoEachOtherAddUp) {
+  // A body with a dent that another body fills: most of the second's surface is the first's too.
+  TriangleMesh mesh;
+  const Vec3 a{-5.3, -5.2, -5.1}, b{5.3, 5.2, 5.1}, c{-2.7, -2.6, -0.4}, d{2.7, 2.6, 5.1};
+  mesh = box_mesh(a, b);
+  TriangleMesh plug = box_mesh(c, d);
+  // Body: the box less the plug, as the box's surface without the top, the dent, and a ring on top.
+  mesh.triangles.erase(mesh.triangles.begin() + 2, mesh.triangles.begin() + 4);
+  const auto base = static_cast<std::uint32_t>(mesh.points.size());
+  mesh.points.insert(mesh.points.end(), plug.points.begin(), plug.points.end());
+  for (std::size_t n = 0; n < plug.triangles.size(); ++n)
+    if (n != 2 && n != 3) // all but its top, inward
+      mesh.triangles.push_back(
+          {plug.triangles[n][0] + base, plug.triangles[n][2] + base, plug.triangles[n][1] + base});
+  const std::array<std::uint32_t, 4> ring{4, 5, 7, 6};
+  for (std::size_t n = 0; n < 4; ++n) {
+    const std::uint32_t p = ring[n], q = ring[(n + 1) % 4];
+    mesh.triangles.push_back({p, q, q + base});
+    mesh.triangles.push_back({p, q + base, p + base});
+  }
+  append(mesh, plug);
+  CoverageReport report;
+  const Grid grid = exact(mesh, unit_lattice, &report);
+  EXPECT_LT(box_error(grid, a, b), 1.2e-7);
+}
+
 TEST(Coverage, SameBytesForAnyThreadsAndProcessor) {
   const TriangleMesh mesh = sphere_mesh(4, 60, {0.3, 0.1, 0.2});
   const auto digests = [&](const Context& context) {
