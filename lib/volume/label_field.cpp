@@ -159,7 +159,7 @@ Int3 next_stride(const std::array<double, 3>& spacing) {
   return any ? stride : Int3{2, 2, 2};
 }
 
-/// How many more levels help: until the spacings are alike, then two.
+/// How many more levels help: until the spacings are alike, then one.
 std::vector<Int3> strides_of(const LabelField& finest) {
   std::vector<Int3> strides;
   std::array<double, 3> spacing = finest.spacing;
