@@ -284,6 +284,8 @@ Grid label_density(const Context& context, const LabelMask& mask,
   LabelDensityReport local;
   LabelDensityReport& r = report != nullptr ? *report : local;
   r = {};
+  Context quiet = context; // all but the solution is quick
+  quiet.progress = nullptr;
   const Vec3 size = mask.transform.voxel_size();
   const double smallest = std::fmin(size.x, std::fmin(size.y, size.z));
   Sampling sampling;
@@ -303,7 +305,7 @@ Grid label_density(const Context& context, const LabelMask& mask,
     sampling.ratio[a] = sampling.voxel / field.spacing[a];
     field.reach[a] = std::max(4, floor_int(1.5 * sampling.ratio[a]) + 2);
   }
-  find_band(context, field);
+  find_band(quiet, field);
   r.band_voxels = field.band.size() * leaf_voxels;
   r.leaves_skipped = field.directory.size() - field.band.size();
   double finer = 1; // leaves of the grid for each block
@@ -313,14 +315,14 @@ Grid label_density(const Context& context, const LabelMask& mask,
                  label_field_bytes(field) +
                      static_cast<double>(field.band.size()) * finer * (leaf_voxels * 4.0 + 200),
                  "the density of the labels");
-  const Plan plan = plan_grid(context, field, sampling);
+  const Plan plan = plan_grid(quiet, field, sampling);
   solve_label_field(context, field, r);
 
   GridBuilder builder(info);
   for (const TileView& tile : plan.tiles)
     builder.add_tile(tile);
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, plan.leaves);
-  parallel_blocks(context, leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
+  const std::vector<LeafRef> leaves = builder.add_leaves(quiet, plan.leaves);
+  parallel_blocks(quiet, leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
     LeafSampler sampler(field, sampling);
     for (std::size_t n = begin; n < end; ++n) {
       sampler.sample(leaves[n].origin, leaves[n].values);

