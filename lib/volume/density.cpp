@@ -147,7 +147,7 @@ Grid metaball_density(const Context& context, const Particles& particles,
   if (!options.band)
     require_memory(context, least_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
 
-  const Blocks blocks = sort_into_blocks(context, local, clip);
+  const Blocks blocks = sort_into_blocks(context, local, clip, options.band ? 1 : 0);
   const std::vector<LeafLists> plans = plan_blocks(context, local, blocks, clip, options.band);
   double planned = 0;
   for (const LeafLists& plan : plans) {

@@ -33,7 +33,8 @@ DensityKernels density_kernels(CpuLevel level);
 std::vector<IndexParticle> to_index_space(const Context& context, const Particles& particles,
                                           const GridTransform& transform, const IndexBox& clip);
 
-/// Cubes of `size` voxels (a power of two, at least 16) with the particles that may reach them.
+/// Cubes of `size` voxels (a power of two, at least 16) with the particles that may reach them,
+/// enlarged on all sides by some margin.
 struct Blocks {
   std::int32_t size = 0;
   std::vector<Int3> origins;
@@ -41,7 +42,7 @@ struct Blocks {
   std::vector<std::uint32_t> particles; ///< ascending in each block
 };
 Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> particles,
-                        const IndexBox& clip);
+                        const IndexBox& clip, double margin);
 
 /// What is proven of a cube of voxels.
 enum class Side : std::uint8_t { unknown, background, opposite };
@@ -67,7 +68,7 @@ struct LeafLists {
 class BlockTree {
 public:
   /// Where `isovalue` is set, cubes that are proven to lie on one side of it, together with all
-  /// voxels that share a face with them, are left out of the lists.
+  /// voxels that share a face with them, are left out of the lists. The blocks need a margin of 1.
   BlockTree(const Context& context, const IndexBox& clip, std::optional<double> isovalue);
 
   /// Takes up block n.
