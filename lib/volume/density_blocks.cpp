@@ -354,8 +354,8 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
   if (bounding)
     kernels_.bound(local_.data(), list.data(), list.size(), children, masks.data(), bounds);
   else
-    kernels_.reach(local_.data(), list.data(), list.size(), children, bounding_ ? 1 : 0,
-                   masks.data());
+    kernels_.reach(local_.data(), list.data(), list.size(), children,
+                   bounding_ && half > leaf_dim ? 1 : 0, masks.data());
   if (bounding && half == leaf_dim)
     children_.spent += list.size() * 150;
 
@@ -394,6 +394,20 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
   }
 }
 
+BlockTrees::Lent BlockTrees::lend() {
+  const std::lock_guard lock(mutex_);
+  if (idle_.empty())
+    return {*this, std::make_unique<BlockTree>(context_, clip_, isovalue_)};
+  std::unique_ptr<BlockTree> tree = std::move(idle_.back());
+  idle_.pop_back();
+  return {*this, std::move(tree)};
+}
+
+BlockTrees::Lent::~Lent() {
+  const std::lock_guard lock(owner.mutex_);
+  owner.idle_.push_back(std::move(tree));
+}
+
 // ---- all blocks
 
 std::vector<LeafLists> plan_blocks(const Context& context, std::span<const IndexParticle> particles,
@@ -403,8 +417,10 @@ std::vector<LeafLists> plan_blocks(const Context& context, std::span<const Index
   std::atomic<std::uint64_t> bytes = 0, leaves = 0;
   Context quiet = context;
   quiet.progress = nullptr;
+  BlockTrees trees(context, clip, isovalue);
   parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockTree tree(context, clip, isovalue);
+    const BlockTrees::Lent lent = trees.lend();
+    BlockTree& tree = *lent.tree;
     for (std::size_t n = begin; n < end; ++n) {
       tree.load(particles, blocks, n);
       tree.list_leaves(plans[n], bytes < list_budget);

@@ -10,6 +10,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -123,6 +125,26 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
 
 /// Bit n of word w: is value 64 w + n above `bound`, or with `unequal`, is it another one?
 std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal = false);
+
+/// Trees for the threads of a loop, so that their scratch memory is made once.
+class BlockTrees {
+public:
+  BlockTrees(const Context& context, const IndexBox& clip, std::optional<double> isovalue)
+      : context_(context), clip_(clip), isovalue_(isovalue) {}
+  struct Lent { // goes back when it ends
+    BlockTrees& owner;
+    std::unique_ptr<BlockTree> tree;
+    ~Lent();
+  };
+  Lent lend();
+
+private:
+  const Context& context_;
+  IndexBox clip_;
+  std::optional<double> isovalue_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<BlockTree>> idle_;
+};
 
 /// Sets the active mask of a leaf: where the value isn't 0. False if that is nowhere.
 bool activate(const LeafRef& leaf);
