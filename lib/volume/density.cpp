@@ -96,8 +96,10 @@ Grid plain_grid(const Context& context, std::span<const IndexParticle> particles
   const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
   const DensityKernels kernels = density_kernels(context.cpu);
   std::vector<std::uint64_t> pairs(plans.size()), filled(plans.size());
+  BlockTrees trees(context, clip, {});
   parallel_blocks(context, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockTree tree(context, clip, {});
+    const BlockTrees::Lent lent = trees.lend();
+    BlockTree& tree = *lent.tree;
     std::vector<LeafParticle> scratch;
     for (std::size_t n = begin; n < end; ++n) {
       tree.load(particles, blocks, n);
@@ -147,7 +149,7 @@ Grid metaball_density(const Context& context, const Particles& particles,
   if (!options.band)
     require_memory(context, least_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
 
-  const Blocks blocks = sort_into_blocks(context, local, clip);
+  const Blocks blocks = sort_into_blocks(context, local, clip, options.band ? 1 : 0);
   const std::vector<LeafLists> plans = plan_blocks(context, local, blocks, clip, options.band);
   double planned = 0;
   for (const LeafLists& plan : plans) {

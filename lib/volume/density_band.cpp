@@ -148,6 +148,7 @@ Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
   std::vector<Sides> sides(first.back());
   std::vector<std::uint64_t> pairs(plans.size());
 
+  BlockTrees trees(context, clip, {});
   // Evaluates the leaves of some blocks; `wanted` says which, all where it is empty.
   std::vector<float> values;
   std::vector<Int3> origins;
@@ -159,7 +160,8 @@ Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
       slot.push_back(slot.back() + (wanted.empty() ? plans[n].leaves.size() : wanted[n].size()));
     values.resize(std::max(values.size(), slot.back() * leaf_voxels));
     parallel_blocks(quiet, end - begin, 1, [&](std::size_t low, std::size_t high) {
-      BlockTree tree(context, clip, {});
+      const BlockTrees::Lent lent = trees.lend();
+      BlockTree& tree = *lent.tree;
       std::vector<LeafParticle> scratch;
       for (std::size_t b = low; b < high; ++b) {
         const std::size_t n = begin + b;

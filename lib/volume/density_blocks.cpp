@@ -20,15 +20,17 @@ struct BlockRange {
   Int3 first, last;
 };
 
-/// Blocks of 2^shift voxels that the box around the support meets inside `clip`; false if none.
-bool block_range(const IndexParticle& particle, const IndexBox& clip, int shift,
+/// Blocks of 2^shift voxels that the box around the support, enlarged by `margin` voxels, meets
+/// inside `clip`; false if none.
+bool block_range(const IndexParticle& particle, const IndexBox& clip, int shift, double margin,
                  BlockRange& range) {
   const double center[3] = {particle.x, particle.y, particle.z};
+  const double reach = particle.radius + margin;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double low =
-        std::max(std::ceil(center[axis] - particle.radius), static_cast<double>(clip.min[axis]));
+        std::max(std::ceil(center[axis] - reach), static_cast<double>(clip.min[axis]));
     const double high =
-        std::min(std::floor(center[axis] + particle.radius), static_cast<double>(clip.max[axis]));
+        std::min(std::floor(center[axis] + reach), static_cast<double>(clip.max[axis]));
     if (!(low <= high))
       return false;
     range.first[axis] = static_cast<std::int32_t>(low) >> shift;
@@ -38,7 +40,7 @@ bool block_range(const IndexParticle& particle, const IndexBox& clip, int shift,
 }
 
 /// Does the ball meet the block? Never no where it does.
-bool meets(const IndexParticle& particle, const Int3& block, int shift) {
+bool meets(const IndexParticle& particle, const Int3& block, int shift, double margin) {
   const double center[3] = {particle.x, particle.y, particle.z};
   double sum = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -47,28 +49,31 @@ bool meets(const IndexParticle& particle, const Int3& block, int shift) {
     const double d = std::max({low - center[axis], center[axis] - high, 0.0});
     sum += d * d;
   }
-  return sum <= particle.radius * particle.radius * (1 + 1e-6);
+  const double reach = particle.radius + margin;
+  return sum <= reach * reach * (1 + 1e-6);
 }
 
 template <class Visit>
-void for_blocks(const IndexParticle& particle, const IndexBox& clip, int shift, Visit&& visit) {
+void for_blocks(const IndexParticle& particle, const IndexBox& clip, int shift, double margin,
+                Visit&& visit) {
   BlockRange range{};
-  if (!block_range(particle, clip, shift, range))
+  if (!block_range(particle, clip, shift, margin, range))
     return;
   Int3 block{};
   for (block[0] = range.first[0]; block[0] <= range.last[0]; ++block[0])
     for (block[1] = range.first[1]; block[1] <= range.last[1]; ++block[1])
       for (block[2] = range.first[2]; block[2] <= range.last[2]; ++block[2])
-        if (range.first == range.last || meets(particle, block, shift))
+        if (range.first == range.last || meets(particle, block, shift, margin))
           visit(block);
 }
 
 /// Number of blocks in the boxes around the particles.
-double count_pairs(std::span<const IndexParticle> particles, const IndexBox& clip, int shift) {
+double count_pairs(std::span<const IndexParticle> particles, const IndexBox& clip, int shift,
+                   double margin) {
   double pairs = 0;
   for (const IndexParticle& particle : particles) {
     BlockRange range{};
-    if (!block_range(particle, clip, shift, range))
+    if (!block_range(particle, clip, shift, margin, range))
       continue;
     double product = 1;
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -115,14 +120,14 @@ std::vector<IndexParticle> to_index_space(const Context& context, const Particle
                               static_cast<float>(1 / std::max(radius, 1e-18)),
                               static_cast<float>(particle.weight)};
     BlockRange range{};
-    if (block_range(local, clip, 3, range))
+    if (block_range(local, clip, 3, 0, range))
       result.push_back(local);
   }
   return result;
 }
 
 Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> particles,
-                        const IndexBox& clip) {
+                        const IndexBox& clip, double margin) {
   Blocks blocks;
   if (particles.empty())
     return blocks;
@@ -130,7 +135,7 @@ Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> p
   int shift = 5;
   const double most_pairs = 3.2e7 + 4 * static_cast<double>(particles.size());
   while (count_blocks(clip, shift) > most_blocks ||
-         (shift < 30 && count_pairs(particles, clip, shift) > most_pairs))
+         (shift < 30 && count_pairs(particles, clip, shift, margin) > most_pairs))
     ++shift;
   blocks.size = std::int32_t{1} << shift;
 
@@ -156,7 +161,8 @@ Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> p
   parallel_blocks(quiet, particles.size(), grain, [&](std::size_t begin, std::size_t end) {
     std::uint64_t* const counts = place.data() + begin / grain * cells;
     for (std::size_t n = begin; n < end; ++n)
-      for_blocks(particles[n], clip, shift, [&](const Int3& block) { ++counts[cell(block)]; });
+      for_blocks(particles[n], clip, shift, margin,
+                 [&](const Int3& block) { ++counts[cell(block)]; });
   });
   std::uint64_t total = 0;
   Int3 block{};
@@ -183,7 +189,7 @@ Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> p
   parallel_blocks(quiet, particles.size(), grain, [&](std::size_t begin, std::size_t end) {
     std::uint64_t* const next = place.data() + begin / grain * cells;
     for (std::size_t n = begin; n < end; ++n)
-      for_blocks(particles[n], clip, shift, [&](const Int3& b) {
+      for_blocks(particles[n], clip, shift, margin, [&](const Int3& b) {
         blocks.particles[next[cell(b)]++] = static_cast<std::uint32_t>(n);
       });
   });
@@ -348,7 +354,8 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
   if (bounding)
     kernels_.bound(local_.data(), list.data(), list.size(), children, masks.data(), bounds);
   else
-    kernels_.reach(local_.data(), list.data(), list.size(), children, masks.data());
+    kernels_.reach(local_.data(), list.data(), list.size(), children,
+                   bounding_ && half > leaf_dim ? 1 : 0, masks.data());
   if (bounding && half == leaf_dim)
     children_.spent += list.size() * 150;
 
@@ -387,6 +394,20 @@ void BlockTree::descend(const Int3& origin, std::int32_t size, std::span<const s
   }
 }
 
+BlockTrees::Lent BlockTrees::lend() {
+  const std::lock_guard lock(mutex_);
+  if (idle_.empty())
+    return {*this, std::make_unique<BlockTree>(context_, clip_, isovalue_)};
+  std::unique_ptr<BlockTree> tree = std::move(idle_.back());
+  idle_.pop_back();
+  return {*this, std::move(tree)};
+}
+
+BlockTrees::Lent::~Lent() {
+  const std::lock_guard lock(owner.mutex_);
+  owner.idle_.push_back(std::move(tree));
+}
+
 // ---- all blocks
 
 std::vector<LeafLists> plan_blocks(const Context& context, std::span<const IndexParticle> particles,
@@ -396,8 +417,10 @@ std::vector<LeafLists> plan_blocks(const Context& context, std::span<const Index
   std::atomic<std::uint64_t> bytes = 0, leaves = 0;
   Context quiet = context;
   quiet.progress = nullptr;
+  BlockTrees trees(context, clip, isovalue);
   parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    BlockTree tree(context, clip, isovalue);
+    const BlockTrees::Lent lent = trees.lend();
+    BlockTree& tree = *lent.tree;
     for (std::size_t n = begin; n < end; ++n) {
       tree.load(particles, blocks, n);
       tree.list_leaves(plans[n], bytes < list_budget);

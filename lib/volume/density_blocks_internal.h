@@ -10,6 +10,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -33,7 +35,8 @@ DensityKernels density_kernels(CpuLevel level);
 std::vector<IndexParticle> to_index_space(const Context& context, const Particles& particles,
                                           const GridTransform& transform, const IndexBox& clip);
 
-/// Cubes of `size` voxels (a power of two, at least 16) with the particles that may reach them.
+/// Cubes of `size` voxels (a power of two, at least 16) with the particles that may reach them,
+/// enlarged on all sides by some margin.
 struct Blocks {
   std::int32_t size = 0;
   std::vector<Int3> origins;
@@ -41,7 +44,7 @@ struct Blocks {
   std::vector<std::uint32_t> particles; ///< ascending in each block
 };
 Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> particles,
-                        const IndexBox& clip);
+                        const IndexBox& clip, double margin);
 
 /// What is proven of a cube of voxels.
 enum class Side : std::uint8_t { unknown, background, opposite };
@@ -67,7 +70,7 @@ struct LeafLists {
 class BlockTree {
 public:
   /// Where `isovalue` is set, cubes that are proven to lie on one side of it, together with all
-  /// voxels that share a face with them, are left out of the lists.
+  /// voxels that share a face with them, are left out of the lists. The blocks need a margin of 1.
   BlockTree(const Context& context, const IndexBox& clip, std::optional<double> isovalue);
 
   /// Takes up block n.
@@ -122,6 +125,26 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
 
 /// Bit n of word w: is value 64 w + n above `bound`, or with `unequal`, is it another one?
 std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal = false);
+
+/// Trees for the threads of a loop, so that their scratch memory is made once.
+class BlockTrees {
+public:
+  BlockTrees(const Context& context, const IndexBox& clip, std::optional<double> isovalue)
+      : context_(context), clip_(clip), isovalue_(isovalue) {}
+  struct Lent { // goes back when it ends
+    BlockTrees& owner;
+    std::unique_ptr<BlockTree> tree;
+    ~Lent();
+  };
+  Lent lend();
+
+private:
+  const Context& context_;
+  IndexBox clip_;
+  std::optional<double> isovalue_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<BlockTree>> idle_;
+};
 
 /// Sets the active mask of a leaf: where the value isn't 0. False if that is nowhere.
 bool activate(const LeafRef& leaf);

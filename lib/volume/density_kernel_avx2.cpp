@@ -163,9 +163,10 @@ void add_density_avx2(const LeafParticle* particles, std::size_t count, float* v
 }
 
 void reach_children_avx2(const IndexParticle* particles, const std::uint32_t* list,
-                         std::size_t count, const Children& children, std::uint8_t* masks) {
+                         std::size_t count, const Children& children, float margin,
+                         std::uint8_t* masks) {
   const Centers centers(children);
-  const __m256 half = _mm256_set1_ps(centers.half), limit = _mm256_set1_ps(reach_limit);
+  const __m256 half = _mm256_set1_ps(centers.half + margin), limit = _mm256_set1_ps(reach_limit);
   for (std::size_t n = 0; n < count; ++n) {
     const IndexParticle& p = particles[list[n]];
     const __m256 inverse = _mm256_set1_ps(p.inverse_radius);

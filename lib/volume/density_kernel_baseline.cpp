@@ -98,8 +98,9 @@ void add_density_baseline(const LeafParticle* particles, std::size_t count, floa
 }
 
 void reach_children_baseline(const IndexParticle* particles, const std::uint32_t* list,
-                             std::size_t count, const Children& children, std::uint8_t* masks) {
-  const float half = (children.size - 1) / 2 + children.size * box_slack;
+                             std::size_t count, const Children& children, float margin,
+                             std::uint8_t* masks) {
+  const float half = (children.size - 1) / 2 + children.size * box_slack + margin;
   for (std::size_t n = 0; n < count; ++n) {
     const IndexParticle& p = particles[list[n]];
     unsigned mask = 0;
@@ -120,7 +121,7 @@ void reach_children_baseline(const IndexParticle* particles, const std::uint32_t
 void bound_children_baseline(const IndexParticle* particles, const std::uint32_t* list,
                              std::size_t count, const Children& children, std::uint8_t* masks,
                              ChildBounds& bounds) {
-  reach_children_baseline(particles, list, count, children, masks);
+  reach_children_baseline(particles, list, count, children, 1, masks);
   Sums sums;
   for (std::size_t n = 0; n < count; ++n)
     for (int child = 0; child < 8; ++child)

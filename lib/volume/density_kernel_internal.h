@@ -44,23 +44,28 @@ struct ChildBounds {
   float upper[8];
 };
 
-/// Bit c of masks[n] tells whether particle list[n] may reach child c, never too few.
+/// Bit c of masks[n] tells whether particle list[n] may reach child c, enlarged on all sides by
+/// `margin` voxels; never too few.
 using ReachKernel = void (*)(const IndexParticle* particles, const std::uint32_t* list,
-                             std::size_t count, const Children& children, std::uint8_t* masks);
+                             std::size_t count, const Children& children, float margin,
+                             std::uint8_t* masks);
 
-/// The same with bounds. Two are made and the tighter one taken: the sum over the particles of each
-/// one's least and largest density (monotone in the distance), and value and gradient at the
-/// child's centre with the second derivatives bounded by 44/9 |w|/R² (their largest magnitude, at
-/// the particle's centre). They hold for the sums in single precision that the density kernel
-/// makes: its rounding and that of the bounds themselves are added. NaN where a sum overflows.
+/// The same with bounds, enlarged as these are. Two are made and the tighter one taken: the sum
+/// over the particles of each one's least and largest density (monotone in the distance), and value
+/// and gradient at the child's centre with the second derivatives bounded by 44/9 |w|/R² (their
+/// largest magnitude, at the particle's centre). They hold for the sums in single precision that
+/// the density kernel makes: its rounding and that of the bounds themselves are added. NaN where a
+/// sum overflows.
 using BoundKernel = void (*)(const IndexParticle* particles, const std::uint32_t* list,
                              std::size_t count, const Children& children, std::uint8_t* masks,
                              ChildBounds& bounds);
 
 void reach_children_baseline(const IndexParticle* particles, const std::uint32_t* list,
-                             std::size_t count, const Children& children, std::uint8_t* masks);
+                             std::size_t count, const Children& children, float margin,
+                             std::uint8_t* masks);
 void reach_children_avx2(const IndexParticle* particles, const std::uint32_t* list,
-                         std::size_t count, const Children& children, std::uint8_t* masks);
+                         std::size_t count, const Children& children, float margin,
+                         std::uint8_t* masks);
 void bound_children_baseline(const IndexParticle* particles, const std::uint32_t* list,
                              std::size_t count, const Children& children, std::uint8_t* masks,
                              ChildBounds& bounds);

@@ -125,6 +125,17 @@ TEST(DensityBand, HoldsExactlyTheCrossingLeavesOfRandomScenes) {
   EXPECT_GT(skipped, 5000U);
 }
 
+TEST(DensityBand, CubesSeeTheParticlesBeyondTheirFaces) {
+  // Lone balls of a few voxels: a particle that reaches no voxel of a cube but one beside its face.
+  for (unsigned scene = 0; scene < 3; ++scene) {
+    const Particles particles = random_particles(1500, 80, 2.5 + scene, {}, 40 + scene, false);
+    const Grid plain = metaball_density({}, particles, options_for(1));
+    const Grid band = metaball_density({}, particles, options_for(1, 0.5));
+    EXPECT_EQ(complaint(plain, band, 0.5), "") << scene;
+    EXPECT_TRUE(same_mesh(marching_cubes({}, band).mesh, marching_cubes({}, plain).mesh));
+  }
+}
+
 TEST(DensityBand, NegativeControlBoundsForAnotherIsovalueMissCrossings) {
   const Particles particles = random_particles(12, 8, 6, {}, 3);
   const Grid plain = metaball_density({}, particles, options_for(0.35));
