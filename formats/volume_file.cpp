@@ -410,7 +410,7 @@ Grid volume_from_bytes(std::string bytes, const std::string& name, const Context
   initialize_openvdb();
   check_vdb_head(bytes, name);
   try {
-    return parse_volume(bytes, name, context);
+    return at(name, [&] { return parse_volume(bytes, name, context); });
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
