@@ -89,8 +89,14 @@ __attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, std:
     for (std::size_t row = 0; row < 8; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (std::size_t row = 0; row < 8; ++row)
-    _mm256_storeu_ps(rows + row * 8, sum[row]);
+  _mm256_storeu_ps(rows + 0, sum[0]);
+  _mm256_storeu_ps(rows + 8, sum[1]);
+  _mm256_storeu_ps(rows + 16, sum[2]);
+  _mm256_storeu_ps(rows + 24, sum[3]);
+  _mm256_storeu_ps(rows + 32, sum[4]);
+  _mm256_storeu_ps(rows + 40, sum[5]);
+  _mm256_storeu_ps(rows + 48, sum[6]);
+  _mm256_storeu_ps(rows + 56, sum[7]);
 }
 
 /// Bit n: particle n reaches the half slice.
@@ -117,8 +123,10 @@ __attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t part
     for (std::size_t row = 0; row < 4; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (std::size_t row = 0; row < 4; ++row)
-    _mm256_storeu_ps(rows + row * 8, sum[row]);
+  _mm256_storeu_ps(rows + 0, sum[0]);
+  _mm256_storeu_ps(rows + 8, sum[1]);
+  _mm256_storeu_ps(rows + 16, sum[2]);
+  _mm256_storeu_ps(rows + 24, sum[3]);
 }
 
 __m256 magnitude(__m256 v) {
