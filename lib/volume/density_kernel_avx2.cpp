@@ -73,9 +73,14 @@ __m256 add_row(__m256 sum, const float* rest, __m256 z2, __m256 cubic, __m256 sq
 /// slower.)
 __attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, std::size_t slice,
                                          float* rows) {
-  __m256 sum[8];
-  for (std::size_t row = 0; row < 8; ++row)
-    sum[row] = _mm256_loadu_ps(rows + row * 8);
+  __m256 sum[8] = {_mm256_loadu_ps(rows + 0),
+                   _mm256_loadu_ps(rows + 8),
+                   _mm256_loadu_ps(rows + 16),
+                   _mm256_loadu_ps(rows + 24),
+                   _mm256_loadu_ps(rows + 32),
+                   _mm256_loadu_ps(rows + 40),
+                   _mm256_loadu_ps(rows + 48),
+                   _mm256_loadu_ps(rows + 56)}; // a loop becomes memcpy, which stalls
   for (std::size_t n = 0; n < count; ++n) {
     const __m256 z2 = _mm256_load_ps(c.z2[n]);
     const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
@@ -84,8 +89,14 @@ __attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, std:
     for (std::size_t row = 0; row < 8; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (std::size_t row = 0; row < 8; ++row)
-    _mm256_storeu_ps(rows + row * 8, sum[row]);
+  _mm256_storeu_ps(rows + 0, sum[0]);
+  _mm256_storeu_ps(rows + 8, sum[1]);
+  _mm256_storeu_ps(rows + 16, sum[2]);
+  _mm256_storeu_ps(rows + 24, sum[3]);
+  _mm256_storeu_ps(rows + 32, sum[4]);
+  _mm256_storeu_ps(rows + 40, sum[5]);
+  _mm256_storeu_ps(rows + 48, sum[6]);
+  _mm256_storeu_ps(rows + 56, sum[7]);
 }
 
 /// Bit n: particle n reaches the half slice.
@@ -101,9 +112,8 @@ std::uint32_t reaching(const Chunk& c, std::size_t count, std::size_t half) {
 /// Four rows, and only the particles that reach them.
 __attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t particles,
                                               std::size_t half, float* rows) {
-  __m256 sum[4];
-  for (std::size_t row = 0; row < 4; ++row)
-    sum[row] = _mm256_loadu_ps(rows + row * 8);
+  __m256 sum[4] = {_mm256_loadu_ps(rows + 0), _mm256_loadu_ps(rows + 8), _mm256_loadu_ps(rows + 16),
+                   _mm256_loadu_ps(rows + 24)}; // a loop becomes memcpy, which stalls
   for (; particles != 0; particles &= particles - 1) {
     const auto n = static_cast<std::size_t>(__builtin_ctz(particles));
     const __m256 z2 = _mm256_load_ps(c.z2[n]);
@@ -113,8 +123,10 @@ __attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t part
     for (std::size_t row = 0; row < 4; ++row)
       sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
   }
-  for (std::size_t row = 0; row < 4; ++row)
-    _mm256_storeu_ps(rows + row * 8, sum[row]);
+  _mm256_storeu_ps(rows + 0, sum[0]);
+  _mm256_storeu_ps(rows + 8, sum[1]);
+  _mm256_storeu_ps(rows + 16, sum[2]);
+  _mm256_storeu_ps(rows + 24, sum[3]);
 }
 
 __m256 magnitude(__m256 v) {

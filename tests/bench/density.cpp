@@ -15,6 +15,7 @@
 #include <immintrin.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -123,7 +124,7 @@ void bench_kernel() {
         useful += x * x + y * y + z * z < R * R ? 8 : 0;
       }
     std::vector<double> times, peaks, fractions;
-    std::vector<float> values(leaf_voxels);
+    alignas(64) std::array<float, leaf_voxels> values{};
     for (int run = 0; run < 21; ++run) {
       const double peak = milliseconds(run_peak);
       const double time = milliseconds([&] {
