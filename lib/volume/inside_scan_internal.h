@@ -219,8 +219,8 @@ std::vector<TileView> tiles_of_runs(const std::vector<std::span<const FullRun>>&
 InsideScan join_slabs(std::vector<Slab<BitLeaf>>& slabs, std::int32_t first_slab);
 InsideScan join_slabs(std::vector<Slab<CountLeaf>>& slabs, std::int32_t first_slab, int samples);
 
-/// Counts for each voxel the samples inside, samples³ of them in a voxel, of a scan of bits on their
-/// own lattice.
+/// Counts for each voxel the samples inside, samples³ of them in a voxel, of a scan of bits on
+/// their own lattice.
 InsideScan count_samples(const Context& context, const InsideScan& fine, int samples);
 
 } // namespace gewebe

@@ -59,7 +59,7 @@ void for_each_crossing(const SampleMesh& mesh, const Chunks& chunks, std::int32_
   };
   std::unique_ptr<CrossingBuffer> buffer;
   if (mesh.cpu != CpuLevel::baseline)
-    buffer.reset(new CrossingBuffer); // left as it is: the kernel says how much of it holds
+    buffer = std::make_unique<CrossingBuffer>();
   for (const Block& block : chunks.blocks) {
     const std::int32_t c = chunk - block.first;
     if (c < 0 || c + 1 >= static_cast<std::int32_t>(block.begin.size()))

@@ -223,8 +223,9 @@ void bench_vtk(const Scene& scene) {
   std::fwrite(scene.mesh.triangles.data(), sizeof(Triangle), scene.mesh.triangles.size(), file);
   std::fclose(file);
   char command[512];
-  std::snprintf(command, sizeof command, "python3 tests/bench/voxelize_vtk.py '%s' %.17g %d 2>&1",
-                path.c_str(), scene.voxel(), runs);
+  std::snprintf(command, sizeof command,
+                "python3 tests/bench/voxelize_vtk.py '%s' %.17g %d 2>/dev/null", path.c_str(),
+                scene.voxel(), runs);
   FILE* peer = popen(command, "r");
   std::vector<double> times(runs);
   double voxels = 0;
