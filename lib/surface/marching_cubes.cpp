@@ -1,8 +1,8 @@
 #include "surface/marching_cubes.h"
 
 #include "base/error.h"
-#include "base/parallel.h"
 #include "base/index_map.h"
+#include "base/parallel.h"
 #include "surface/marching_cubes_table.h"
 
 #include <algorithm>

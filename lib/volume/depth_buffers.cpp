@@ -32,7 +32,7 @@ struct DepthTiles {
 
   explicit DepthTiles(const DepthPair& pair)
       : columns((pair.v.end - pair.v.begin) / leaf_dim),
-        tiles(pair.near.size() / std::size_t{leaf_dim * leaf_dim}) {
+        tiles(pair.near.size() / (std::size_t{leaf_dim} * leaf_dim)) {
     for (std::int32_t u = pair.u.begin; u < pair.u.end; ++u)
       for (std::int32_t v = pair.v.begin; v < pair.v.end; ++v) {
         Tile& tile = tiles[static_cast<std::size_t>((u - pair.u.begin) / leaf_dim * columns +

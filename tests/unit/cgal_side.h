@@ -55,8 +55,7 @@ public:
       const int n = leaf_offset(v);
       return (scan_.bits[at->second][static_cast<std::size_t>(n / 64)] >> (n % 64) & 1) != 0;
     }
-    return tile_.contains(origin) ||
-           large_tile_.contains({v[0] & ~127, v[1] & ~127, v[2] & ~127});
+    return tile_.contains(origin) || large_tile_.contains({v[0] & ~127, v[1] & ~127, v[2] & ~127});
   }
 
 private:

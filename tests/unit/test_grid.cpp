@@ -216,7 +216,7 @@ TEST(VolumeStats, AgreesWithPlainSums) {
           count(leaf.values[n], 1);
         }
       builder.add_tile({{128, 0, 0}, 128, 0.3F, true});
-      count(0.3F, 128 * 128 * 128);
+      count(0.3F, std::uint64_t{128} * 128 * 128);
       const VolumeStats stats = volume_stats({}, builder.finish(false));
       EXPECT_EQ(stats.inside_voxels, inside);
       EXPECT_NEAR(stats.volume, sum / 8, 1e-12 * std::fabs(sum));
