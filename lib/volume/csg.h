@@ -55,7 +55,9 @@ struct CsgReport {
 ///
 /// A band volume (exact only near one isovalue v) can be united and intersected, and with v = ½
 /// used in the other set operations, together with volumes that have no band or the same; the
-/// result is a band volume again.
+/// result is a band volume again. Every voxel is then on the side of v where it would be without
+/// the band; on a lattice edge that both surfaces cross or touch, the crossing may lie elsewhere,
+/// since a constant beside the band stands for the value there.
 ///
 /// \throw Error, with the operand's name as place or both names in the text: fewer than two
 /// operands, a level set, a background other than 0, voxels that aren't cubic, different isovalues,
