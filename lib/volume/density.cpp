@@ -149,8 +149,14 @@ Grid metaball_density(const Context& context, const Particles& particles,
   if (!options.band)
     require_memory(context, least_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
 
-  const Blocks blocks = sort_into_blocks(context, local, clip, options.band ? 1 : 0);
-  const std::vector<LeafLists> plans = plan_blocks(context, local, blocks, clip, options.band);
+  // Bounds over leaves of particles below two leaves spare less than they cost. They need the voxel
+  // beside each face too.
+  const bool bounding = options.band && std::ranges::any_of(local, [](const IndexParticle& p) {
+                          return p.radius > 2 * leaf_dim;
+                        });
+  const Blocks blocks = sort_into_blocks(context, local, clip, bounding ? 1 : 0);
+  const std::vector<LeafLists> plans =
+      plan_blocks(context, local, blocks, clip, bounding ? options.band : std::nullopt);
   double planned = 0;
   for (const LeafLists& plan : plans) {
     planned += static_cast<double>(plan.leaves.size());

@@ -130,21 +130,118 @@ void add_tiles(GridBuilder& builder, const ConstantCube& cube, float value) {
                           value != 0});
 }
 
-} // namespace
+/// What becomes of an evaluated leaf.
+enum class Fate : std::uint8_t {
+  mixed,      ///< has voxels on both sides
+  crossed,    ///< on one side, but an edge to a neighbour's voxel crosses: stored too
+  opposite,   ///< a tile of the opposite side's constant
+  background, ///< nothing
+};
 
-Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
-               const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
-               const GridInfo& info, DensityReport& report) {
-  const double isovalue = *info.band_isovalue;
+/// Leaf m of block n has the number first[n] + m.
+std::vector<std::size_t> leaf_numbers(const std::vector<LeafLists>& plans) {
+  std::vector<std::size_t> first{0};
+  for (const LeafLists& plan : plans)
+    first.push_back(first.back() + plan.leaves.size());
+  return first;
+}
+
+/// A leaf on one side is needed where a neighbour's facing layer isn't wholly on this side.
+std::vector<Fate> find_fates(const Context& quiet, const std::vector<LeafLists>& plans,
+                             std::span<const std::size_t> first, std::span<const Sides> sides) {
+  IndexMap numbers(first.back());
+  for (std::size_t n = 0; n < plans.size(); ++n)
+    for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
+      numbers.insert(plans[n].leaves[m], static_cast<std::uint32_t>(first[n] + m));
+  const OppositeRegion region(plans);
+  std::vector<Fate> fates(first.back(), Fate::mixed);
+  parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      for (std::size_t m = 0; m < plans[n].leaves.size(); ++m) {
+        const Sides& own = sides[first[n] + m];
+        if (own.mixed)
+          continue;
+        const bool opposite = own.opposite != 0;
+        bool crossed = false;
+        for (unsigned face = 0; face < 6 && !crossed; ++face) {
+          const Int3 origin = neighbour(plans[n].leaves[m], face);
+          const std::uint32_t number = numbers.find(origin);
+          if (number != IndexMap::none) {
+            const Sides& other = sides[number];
+            crossed = ((opposite ? other.background : other.opposite) >> (face ^ 1U) & 1) != 0;
+          } else { // proven, or out of reach
+            crossed = opposite && !region.contains(origin);
+          }
+        }
+        fates[first[n] + m] = crossed    ? Fate::crossed
+                              : opposite ? Fate::opposite
+                                         : Fate::background;
+      }
+  });
+  return fates;
+}
+
+/// Where bounds spare little, most leaves are stored anyway: all are evaluated in their place, and
+/// those that no edge crosses are taken out again.
+void evaluate_in_place(const Context& context, GridBuilder& builder,
+                       std::span<const IndexParticle> particles, const Blocks& blocks,
+                       const std::vector<LeafLists>& plans, const IndexBox& clip, double isovalue,
+                       DensityReport& report) {
+  const float bound = float_bound(isovalue);
+  const DensityKernels kernels = density_kernels(context.cpu);
+  const std::vector<std::size_t> first = leaf_numbers(plans);
+  std::vector<Int3> origins;
+  origins.reserve(first.back());
+  for (const LeafLists& plan : plans)
+    origins.insert(origins.end(), plan.leaves.begin(), plan.leaves.end());
+  const std::vector<LeafRef> refs = builder.add_leaves(context, origins);
+  std::vector<Sides> sides(first.back());
+  std::vector<std::uint64_t> pairs(plans.size());
+  BlockTrees trees(context, clip, {});
+  parallel_blocks(context, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
+    const BlockTrees::Lent lent = trees.lend();
+    BlockTree& tree = *lent.tree;
+    std::vector<LeafParticle> scratch;
+    for (std::size_t n = begin; n < end; ++n) {
+      tree.load(particles, blocks, n);
+      visit_plan(tree, plans[n], [&](std::size_t leaf, std::span<const std::uint32_t> list) {
+        const LeafRef& ref = refs[first[n] + leaf];
+        evaluate_leaf(kernels, clip, tree.particles(), list, ref.origin, scratch, ref.values);
+        sides[first[n] + leaf] = sides_of(ref.values, bound, isovalue < 0);
+        (void)activate(ref);
+        pairs[n] += list.size();
+      });
+    }
+  });
+  Context quiet = context;
+  quiet.progress = nullptr;
+  const std::vector<Fate> fates = find_fates(quiet, plans, first, sides);
+  const float value = opposite_value(isovalue);
+  for (std::size_t n = 0; n < fates.size(); ++n) {
+    if (fates[n] == Fate::opposite)
+      builder.replace_leaf({origins[n], leaf_dim, value, true});
+    else if (fates[n] == Fate::background)
+      builder.replace_leaf({origins[n], leaf_dim, 0, false});
+    else
+      ++report.leaves;
+  }
+  report.leaves_evaluated += fates.size();
+  for (const std::uint64_t count : pairs)
+    report.leaf_particle_pairs += count;
+}
+
+/// Where bounds spare most, values wait outside the grid until it is known that they are needed;
+/// leaves on one side that are needed for a neighbour are evaluated again.
+void evaluate_in_batches(const Context& context, GridBuilder& builder,
+                         std::span<const IndexParticle> particles, const Blocks& blocks,
+                         const std::vector<LeafLists>& plans, const IndexBox& clip, double isovalue,
+                         DensityReport& report) {
   const float bound = float_bound(isovalue);
   const DensityKernels kernels = density_kernels(context.cpu);
   Context quiet = context;
   quiet.progress = nullptr;
-  GridBuilder builder(info);
 
-  std::vector<std::size_t> first{0}; // leaf m of block n has the number first[n] + m
-  for (const LeafLists& plan : plans)
-    first.push_back(first.back() + plan.leaves.size());
+  const std::vector<std::size_t> first = leaf_numbers(plans);
   std::vector<Sides> sides(first.back());
   std::vector<std::uint64_t> pairs(plans.size());
 
@@ -218,53 +315,43 @@ Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
         context.progress(static_cast<double>(end) / static_cast<double>(plans.size()));
     }
   };
-  if (!plans.empty())
-    in_batches({});
+  in_batches({});
 
-  // A leaf on one side is needed where a neighbour's facing layer isn't wholly on this side.
-  IndexMap numbers(first.back());
+  const std::vector<Fate> fates = find_fates(quiet, plans, first, sides);
+  std::vector<std::vector<std::uint32_t>> needed(plans.size());
   for (std::size_t n = 0; n < plans.size(); ++n)
     for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
-      numbers.insert(plans[n].leaves[m], static_cast<std::uint32_t>(first[n] + m));
-  const OppositeRegion region(plans);
-  std::vector<std::vector<std::uint32_t>> needed(plans.size());
-  std::vector<std::vector<std::uint32_t>> constant(plans.size());
-  parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      for (std::size_t m = 0; m < plans[n].leaves.size(); ++m) {
-        const Sides& own = sides[first[n] + m];
-        if (own.mixed)
-          continue;
-        const bool opposite = own.opposite != 0;
-        bool crossed = false;
-        for (unsigned face = 0; face < 6 && !crossed; ++face) {
-          const Int3 origin = neighbour(plans[n].leaves[m], face);
-          const std::uint32_t number = numbers.find(origin);
-          if (number != IndexMap::none) {
-            const Sides& other = sides[number];
-            crossed = ((opposite ? other.background : other.opposite) >> (face ^ 1U) & 1) != 0;
-          } else { // proven, or out of reach
-            crossed = opposite && !region.contains(origin);
-          }
-        }
-        if (crossed)
-          needed[n].push_back(static_cast<std::uint32_t>(m));
-        else if (opposite)
-          constant[n].push_back(static_cast<std::uint32_t>(m));
-      }
-  });
-  if (!plans.empty())
-    in_batches(needed);
+      if (fates[first[n] + m] == Fate::crossed)
+        needed[n].push_back(static_cast<std::uint32_t>(m));
+  in_batches(needed);
 
   const float value = opposite_value(isovalue);
-  for (std::size_t n = 0; n < plans.size(); ++n) {
-    for (const ConstantCube& cube : plans[n].opposite)
-      add_tiles(builder, cube, value);
-    for (const std::uint32_t leaf : constant[n])
-      builder.add_tile({plans[n].leaves[leaf], leaf_dim, value, true});
-  }
+  for (std::size_t n = 0; n < plans.size(); ++n)
+    for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
+      if (fates[first[n] + m] == Fate::opposite)
+        builder.add_tile({plans[n].leaves[m], leaf_dim, value, true});
   for (const std::uint64_t count : pairs)
     report.leaf_particle_pairs += count;
+}
+
+} // namespace
+
+Grid band_grid(const Context& context, std::span<const IndexParticle> particles,
+               const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
+               const GridInfo& info, DensityReport& report) {
+  const double isovalue = *info.band_isovalue;
+  GridBuilder builder(info);
+  std::uint64_t planned = 0, skipped = 0;
+  for (const LeafLists& plan : plans) {
+    planned += plan.leaves.size();
+    skipped += plan.skipped;
+  }
+  if (!plans.empty()) // both give the same grid
+    (planned > skipped ? evaluate_in_place : evaluate_in_batches)(
+        context, builder, particles, blocks, plans, clip, isovalue, report);
+  for (const LeafLists& plan : plans)
+    for (const ConstantCube& cube : plan.opposite)
+      add_tiles(builder, cube, opposite_value(isovalue));
   return builder.finish();
 }
 

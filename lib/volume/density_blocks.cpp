@@ -206,12 +206,12 @@ void BlockTree::load(std::span<const IndexParticle> particles, const Blocks& blo
                      std::size_t n) {
   origin_ = blocks.origins[n];
   size_ = blocks.size;
-  local_.clear();
-  scratch_[0].clear();
-  local_.reserve(blocks.first[n + 1] - blocks.first[n]);
-  for (std::uint64_t m = blocks.first[n]; m < blocks.first[n + 1]; ++m) {
-    scratch_[0].push_back(static_cast<std::uint32_t>(local_.size()));
-    local_.push_back(particles[blocks.particles[m]]);
+  const std::size_t count = blocks.first[n + 1] - blocks.first[n];
+  local_.resize(count);
+  scratch_[0].resize(count);
+  for (std::size_t m = 0; m < count; ++m) {
+    local_[m] = particles[blocks.particles[blocks.first[n] + m]];
+    scratch_[0][m] = static_cast<std::uint32_t>(m);
   }
 }
 

@@ -315,6 +315,15 @@ void GridBuilder::add_tile(const TileView& tile) {
   state_->tree->addTile(level, to_coord(tile.origin), tile.value, tile.active);
 }
 
+void GridBuilder::replace_leaf(const TileView& tile) {
+  const Coord origin = to_coord(tile.origin);
+  Leaf* const leaf = state_->accessor.probeLeaf(origin);
+  if (leaf == nullptr)
+    throw Error("no leaf to replace");
+  give_back(*leaf);
+  state_->accessor.addTile(1, origin, tile.value, tile.active);
+}
+
 void GridBuilder::share_leaf(const Grid& from, const LeafView& leaf) {
   const Leaf* const original = from.native()->tree->probeConstLeaf(to_coord(leaf.origin));
   if (original == nullptr)

@@ -175,6 +175,8 @@ public:
   std::vector<LeafRef> add_leaves(const Context& context, std::span<const Int3> origins);
   /// \pre dim is 8, 128 or 4096, origin a multiple of it, no leaf inside
   void add_tile(const TileView& tile);
+  /// A tile in the place of a leaf. \pre dim is 8, add_leaves made the leaf
+  void replace_leaf(const TileView& tile);
   /// A leaf with the values of another grid's, which stay where they are: this grid keeps the other
   /// one's memory alive. \pre no leaf exists there yet
   void share_leaf(const Grid& from, const LeafView& leaf);
