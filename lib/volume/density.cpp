@@ -87,35 +87,17 @@ Grid plain_grid(const Context& context, std::span<const IndexParticle> particles
                 const Blocks& blocks, const std::vector<LeafLists>& plans, const IndexBox& clip,
                 const GridInfo& info, DensityReport& report) {
   GridBuilder builder(info);
-  std::vector<Int3> origins;
-  std::vector<std::size_t> first{0};
-  for (const LeafLists& plan : plans) {
-    origins.insert(origins.end(), plan.leaves.begin(), plan.leaves.end());
-    first.push_back(origins.size());
-  }
-  const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
-  const DensityKernels kernels = density_kernels(context.cpu);
-  std::vector<std::uint64_t> pairs(plans.size()), filled(plans.size());
-  BlockTrees trees(context, clip, {});
-  parallel_blocks(context, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    const BlockTrees::Lent lent = trees.lend();
-    BlockTree& tree = *lent.tree;
-    std::vector<LeafParticle> scratch;
-    for (std::size_t n = begin; n < end; ++n) {
-      tree.load(particles, blocks, n);
-      visit_plan(tree, plans[n], [&](std::size_t leaf, std::span<const std::uint32_t> list) {
-        const LeafRef& ref = leaves[first[n] + leaf];
-        evaluate_leaf(kernels, clip, tree.particles(), list, ref.origin, scratch, ref.values);
-        pairs[n] += list.size();
-        filled[n] += activate(ref) ? 1U : 0U;
-      });
-    }
-  });
-  for (std::size_t n = 0; n < plans.size(); ++n) {
-    report.leaf_particle_pairs += pairs[n];
-    report.leaves += filled[n];
-  }
-  report.leaves_evaluated = origins.size();
+  std::size_t leaves = 0;
+  for (const LeafLists& plan : plans)
+    leaves += plan.leaves.size();
+  std::vector<std::uint8_t> filled(leaves);
+  const EvaluatedLeaves evaluated = evaluate_plans(
+      context, builder, particles, blocks, plans, clip,
+      [&](std::size_t leaf, const LeafRef& ref) { filled[leaf] = activate(ref) ? 1 : 0; });
+  for (const std::uint8_t one : filled)
+    report.leaves += one;
+  report.leaf_particle_pairs += evaluated.pairs;
+  report.leaves_evaluated = leaves;
   return builder.finish();
 }
 

@@ -188,46 +188,27 @@ void evaluate_in_place(const Context& context, GridBuilder& builder,
                        const std::vector<LeafLists>& plans, const IndexBox& clip, double isovalue,
                        DensityReport& report) {
   const float bound = float_bound(isovalue);
-  const DensityKernels kernels = density_kernels(context.cpu);
   const std::vector<std::size_t> first = leaf_numbers(plans);
-  std::vector<Int3> origins;
-  origins.reserve(first.back());
-  for (const LeafLists& plan : plans)
-    origins.insert(origins.end(), plan.leaves.begin(), plan.leaves.end());
-  const std::vector<LeafRef> refs = builder.add_leaves(context, origins);
   std::vector<Sides> sides(first.back());
-  std::vector<std::uint64_t> pairs(plans.size());
-  BlockTrees trees(context, clip, {});
-  parallel_blocks(context, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    const BlockTrees::Lent lent = trees.lend();
-    BlockTree& tree = *lent.tree;
-    std::vector<LeafParticle> scratch;
-    for (std::size_t n = begin; n < end; ++n) {
-      tree.load(particles, blocks, n);
-      visit_plan(tree, plans[n], [&](std::size_t leaf, std::span<const std::uint32_t> list) {
-        const LeafRef& ref = refs[first[n] + leaf];
-        evaluate_leaf(kernels, clip, tree.particles(), list, ref.origin, scratch, ref.values);
-        sides[first[n] + leaf] = sides_of(ref.values, bound, isovalue < 0);
+  const EvaluatedLeaves evaluated = evaluate_plans(
+      context, builder, particles, blocks, plans, clip, [&](std::size_t leaf, const LeafRef& ref) {
+        sides[leaf] = sides_of(ref.values, bound, isovalue < 0);
         (void)activate(ref);
-        pairs[n] += list.size();
       });
-    }
-  });
   Context quiet = context;
   quiet.progress = nullptr;
   const std::vector<Fate> fates = find_fates(quiet, plans, first, sides);
   const float value = opposite_value(isovalue);
   for (std::size_t n = 0; n < fates.size(); ++n) {
     if (fates[n] == Fate::opposite)
-      builder.replace_leaf({origins[n], leaf_dim, value, true});
+      builder.replace_leaf({evaluated.leaves[n].origin, leaf_dim, value, true});
     else if (fates[n] == Fate::background)
-      builder.replace_leaf({origins[n], leaf_dim, 0, false});
+      builder.replace_leaf({evaluated.leaves[n].origin, leaf_dim, 0, false});
     else
       ++report.leaves;
   }
   report.leaves_evaluated += fates.size();
-  for (const std::uint64_t count : pairs)
-    report.leaf_particle_pairs += count;
+  report.leaf_particle_pairs += evaluated.pairs;
 }
 
 /// Where bounds spare most, values wait outside the grid until it is known that they are needed;

@@ -446,6 +446,39 @@ void visit_plan(BlockTree& tree, const LeafLists& plan, const BlockTree::Visit& 
     visit(n, pairs.subspan(plan.first[n], plan.first[n + 1] - plan.first[n]));
 }
 
+EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
+                               std::span<const IndexParticle> particles, const Blocks& blocks,
+                               const std::vector<LeafLists>& plans, const IndexBox& clip,
+                               const std::function<void(std::size_t, const LeafRef&)>& done) {
+  std::vector<Int3> origins;
+  std::vector<std::size_t> first{0};
+  for (const LeafLists& plan : plans) {
+    origins.insert(origins.end(), plan.leaves.begin(), plan.leaves.end());
+    first.push_back(origins.size());
+  }
+  EvaluatedLeaves result{builder.add_leaves(context, origins), 0};
+  const DensityKernels kernels = density_kernels(context.cpu);
+  std::vector<std::uint64_t> pairs(plans.size());
+  BlockTrees trees(context, clip, {});
+  parallel_blocks(context, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
+    const BlockTrees::Lent lent = trees.lend();
+    BlockTree& tree = *lent.tree;
+    std::vector<LeafParticle> scratch;
+    for (std::size_t n = begin; n < end; ++n) {
+      tree.load(particles, blocks, n);
+      visit_plan(tree, plans[n], [&](std::size_t leaf, std::span<const std::uint32_t> list) {
+        const LeafRef& ref = result.leaves[first[n] + leaf];
+        evaluate_leaf(kernels, clip, tree.particles(), list, ref.origin, scratch, ref.values);
+        pairs[n] += list.size();
+        done(first[n] + leaf, ref);
+      });
+    }
+  });
+  for (const std::uint64_t count : pairs)
+    result.pairs += count;
+  return result;
+}
+
 bool contains(const IndexBox& box, const Int3& origin) {
   for (std::size_t axis = 0; axis < 3; ++axis)
     if (origin[axis] < box.min[axis] || origin[axis] + leaf_dim - 1 > box.max[axis])

@@ -123,6 +123,18 @@ void evaluate_leaf(const DensityKernels& kernels, const IndexBox& clip,
                    std::span<const IndexParticle> particles, std::span<const std::uint32_t> list,
                    const Int3& origin, std::vector<LeafParticle>& scratch, float* values);
 
+struct EvaluatedLeaves {
+  std::vector<LeafRef> leaves; ///< of all plans, one after the other
+  std::uint64_t pairs = 0;     ///< of leaves and particles
+};
+
+/// Adds all leaves of the plans to the grid and evaluates them there. Then, from the same thread,
+/// `done` is told the leaf's number.
+EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
+                               std::span<const IndexParticle> particles, const Blocks& blocks,
+                               const std::vector<LeafLists>& plans, const IndexBox& clip,
+                               const std::function<void(std::size_t, const LeafRef&)>& done);
+
 /// Bit n of word w: is value 64 w + n above `bound`, or with `unequal`, is it another one?
 std::array<std::uint64_t, 8> compare_leaf(const float* values, float bound, bool unequal = false);
 

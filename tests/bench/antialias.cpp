@@ -11,6 +11,7 @@
 #include "formats/image_file.h"
 #include "formats/mesh_file.h"
 #include "surface/marching_cubes.h"
+#include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/coverage.h"
 #include "volume/distance_band_internal.h"
@@ -30,6 +31,7 @@
 #include <string>
 
 using namespace gewebe;
+using namespace gewebe::timing;
 
 namespace {
 
@@ -40,10 +42,6 @@ const Context one_thread = [] {
   context.threads = 1;
   return context;
 }();
-
-struct Times {
-  double median, fastest, slowest; // ms
-};
 
 struct Filter {
   std::string name;
@@ -64,10 +62,8 @@ std::vector<Times> measure(std::vector<Filter>& filters) {
       times[n].push_back(now() - start);
     }
   std::vector<Times> result;
-  for (auto& t : times) {
-    std::ranges::sort(t);
-    result.push_back({t[t.size() / 2], t.front(), t.back()});
-  }
+  for (auto& t : times)
+    result.push_back(times_of(std::move(t)));
   return result;
 }
 

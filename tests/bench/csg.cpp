@@ -6,6 +6,7 @@
 // median, fastest and slowest time in ms, voxels that differ from gewebe's.
 
 #include "volume/csg.h"
+#include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/grid_internal.h"
 #include "volume/lattice.h"
@@ -20,15 +21,12 @@
 #include <functional>
 
 using namespace gewebe;
+using namespace gewebe::timing;
 using gewebe::test::sphere_mesh;
 
 namespace {
 
 constexpr int runs = 5;
-
-struct Times {
-  double median, fastest, slowest; // ms
-};
 
 /// Times `work(prepare())`; preparing doesn't count, nor does the end of what work returns.
 template <class Prepare, class Work>
@@ -42,8 +40,7 @@ Times measure(const Prepare& prepare, const Work& work) {
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
             .count());
   }
-  std::ranges::sort(times);
-  return {times[times.size() / 2], times.front(), times.back()};
+  return times_of(std::move(times));
 }
 
 void report(const char* operation, const char* program, std::size_t large, std::size_t small,

@@ -10,6 +10,7 @@
 #include "volume/density.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
+#include "tests/bench/timing.h"
 #include "volume/density_kernel_internal.h"
 
 #include <immintrin.h>
@@ -25,38 +26,17 @@
 #include <unistd.h>
 
 using namespace gewebe;
+using namespace gewebe::timing;
 
 namespace {
 
 constexpr int runs = 5;
-
-struct Times {
-  double median, fastest, slowest; // ms
-};
-
-Times times_of(std::vector<double> times) {
-  std::ranges::sort(times);
-  return {times[times.size() / 2], times.front(), times.back()};
-}
-
-double milliseconds(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-      .count();
-}
 
 void report(const char* stage, const char* program, double voxel, double size, int threads,
             const Times& times, double figure, const char* measure) {
   std::printf("%s,%s,%g,%.0f,%d,%.3f,%.3f,%.3f,%.3g,%s\n", stage, program, voxel, size, threads,
               times.median, times.fastest, times.slowest, figure, measure);
   std::fflush(stdout);
-}
-
-Context with_threads(int threads) {
-  Context context;
-  context.threads = threads;
-  return context;
 }
 
 // ---- the kernel

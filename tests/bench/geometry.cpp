@@ -4,6 +4,7 @@
 
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
+#include "tests/bench/timing.h"
 #include "volume/density.h"
 #include "volume/grid_internal.h"
 
@@ -16,37 +17,15 @@
 #include <functional>
 
 using namespace gewebe;
+using namespace gewebe::timing;
 
 namespace {
-
-struct Times {
-  double median, fastest, slowest; // ms
-};
-
-Times measure(const std::function<void()>& work) {
-  std::vector<double> times;
-  for (int run = 0; run < 7; ++run) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    times.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-            .count());
-  }
-  std::ranges::sort(times);
-  return {times[times.size() / 2], times.front(), times.back()};
-}
 
 void report(const char* stage, const char* program, double voxel, std::size_t size, int threads,
             const Times& times, double error, const char* measure) {
   std::printf("%s,%s,%g,%zu,%d,%.3f,%.3f,%.3f,%.3g,%s\n", stage, program, voxel, size, threads,
               times.median, times.fastest, times.slowest, error, measure);
   std::fflush(stdout);
-}
-
-Context with_threads(int threads) {
-  Context context;
-  context.threads = threads;
-  return context;
 }
 
 Grid ball(double voxel, double support) {

@@ -8,6 +8,7 @@
 
 #include "volume/voxelize.h"
 #include "formats/mesh_file.h"
+#include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/lattice.h"
 #include "volume/volume_stats.h"
@@ -29,31 +30,11 @@
 #include <functional>
 
 using namespace gewebe;
+using namespace gewebe::timing;
 
 namespace {
 
 constexpr int runs = 5;
-
-struct Times {
-  double median, fastest, slowest; // ms
-};
-
-Times times_of(std::vector<double> times) {
-  std::ranges::sort(times);
-  return {times[times.size() / 2], times.front(), times.back()};
-}
-
-Times measure(const std::function<void()>& work) {
-  std::vector<double> times;
-  for (int run = 0; run < runs; ++run) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    times.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-            .count());
-  }
-  return times_of(times);
-}
 
 /// What `work` adds at most to the process, MiB: asked of a child, which ends before it frees
 /// anything.

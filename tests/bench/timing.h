@@ -1,0 +1,44 @@
+#pragma once
+// Medians of times, for the benchmarks.
+
+#include "base/context.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace gewebe::timing {
+
+struct Times {
+  double median, fastest, slowest; // ms
+};
+
+/// \pre at least one time
+inline Times times_of(std::vector<double> times) {
+  std::ranges::sort(times);
+  return {times[times.size() / 2], times.front(), times.back()};
+}
+
+inline double milliseconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+inline Times measure(const std::function<void()>& work, int runs = 5) {
+  std::vector<double> times;
+  for (int run = 0; run < runs; ++run)
+    times.push_back(milliseconds(work));
+  return times_of(std::move(times));
+}
+
+inline Context with_threads(int threads) {
+  Context context;
+  context.threads = threads;
+  return context;
+}
+
+} // namespace gewebe::timing
