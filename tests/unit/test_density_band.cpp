@@ -92,7 +92,8 @@ std::string complaint(const Grid& plain, const Grid& band, double isovalue) {
 
 bool same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
   return a.points.size() == b.points.size() && a.triangles == b.triangles &&
-         std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(Vec3)) == 0;
+         (a.points.empty() ||
+          std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(Vec3)) == 0);
 }
 
 } // namespace
