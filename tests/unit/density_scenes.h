@@ -2,6 +2,7 @@
 // Particle scenes and their density in long double, for the tests of the density.
 
 #include "base/particles.h"
+#include "tests/unit/larger.h"
 #include "volume/grid.h"
 
 #include <cmath>
@@ -53,8 +54,7 @@ inline double largest_leaf_error(const Grid& grid, const Particles& particles, i
       const long double exact = exact_density(particles, transform.to_world(index));
       const auto here =
           static_cast<double>(std::fabs(static_cast<long double>(leaf.values[n]) - exact));
-      if (!(here <= error))
-        error = here;
+      error = larger(error, here);
     }
   }
   return error;

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_check.h"
+#include "tests/unit/larger.h"
 #include "volume/label_density.h"
 
 #include <gtest/gtest.h>
@@ -92,7 +93,7 @@ Deviation deviation_of(const TriangleMesh& mesh,
     const double x = distance(p);
     d.mean += x;
     d.rms += x * x;
-    d.largest = std::fmax(d.largest, std::fabs(x));
+    d.largest = test::larger(d.largest, std::fabs(x));
   }
   d.mean /= static_cast<double>(mesh.points.size());
   d.rms = std::sqrt(d.rms / static_cast<double>(mesh.points.size()));

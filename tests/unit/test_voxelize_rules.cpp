@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "mesh_fixtures.h"
+#include "tests/unit/larger.h"
 #include "volume/exact_predicates.h"
 #include "volume/lattice.h"
 #include "volume/oriented_surface.h"
@@ -193,7 +194,7 @@ TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
     EXPECT_NEAR(tree.at(p, 0).value, exact, 1e-12);
     const WindingSum rough = tree.at(p, 1e-3);
     EXPECT_LE(std::fabs(rough.value - exact), rough.error + 1e-13);
-    largest = std::fmax(largest, std::fabs(rough.value - exact));
+    largest = test::larger(largest, std::fabs(rough.value - exact));
     const WindingSum range = tree.within(p, 2);
     bounded += range.error < 1;
     for (int m = 0; m < 20; ++m) {
