@@ -146,8 +146,38 @@ std::vector<std::size_t> leaf_numbers(const std::vector<LeafLists>& plans) {
   return first;
 }
 
+/// The numbers of one block's leaves by position: most neighbours are found here.
+class BlockNumbers {
+public:
+  BlockNumbers(std::int32_t block_size, std::size_t first, const LeafLists& plan)
+      : mask_(-block_size), edge_(block_size / leaf_dim) {
+    if (plan.leaves.empty() || edge_ > 16)
+      return; // a hash costs less than so large a table
+    numbers_.assign(static_cast<std::size_t>(edge_) * edge_ * edge_, IndexMap::none);
+    origin_ = block_of(plan.leaves.front());
+    for (std::size_t m = 0; m < plan.leaves.size(); ++m)
+      numbers_[slot(plan.leaves[m])] = static_cast<std::uint32_t>(first + m);
+  }
+  bool covers(const Int3& leaf) const { return !numbers_.empty() && block_of(leaf) == origin_; }
+  std::uint32_t find(const Int3& leaf) const { return numbers_[slot(leaf)]; }
+
+private:
+  Int3 block_of(const Int3& leaf) const {
+    return {leaf[0] & mask_, leaf[1] & mask_, leaf[2] & mask_};
+  }
+  std::size_t slot(const Int3& leaf) const {
+    const std::int32_t i = (leaf[0] & ~mask_) / leaf_dim, j = (leaf[1] & ~mask_) / leaf_dim,
+                       k = (leaf[2] & ~mask_) / leaf_dim;
+    return static_cast<std::size_t>((i * edge_ + j) * edge_ + k);
+  }
+  std::int32_t mask_, edge_;
+  Int3 origin_{};
+  std::vector<std::uint32_t> numbers_;
+};
+
 /// A leaf on one side is needed where a neighbour's facing layer isn't wholly on this side.
-std::vector<Fate> find_fates(const Context& quiet, const std::vector<LeafLists>& plans,
+std::vector<Fate> find_fates(const Context& quiet, std::int32_t block_size,
+                             const std::vector<LeafLists>& plans,
                              std::span<const std::size_t> first, std::span<const Sides> sides) {
   IndexMap numbers(first.back());
   for (std::size_t n = 0; n < plans.size(); ++n)
@@ -156,7 +186,8 @@ std::vector<Fate> find_fates(const Context& quiet, const std::vector<LeafLists>&
   const OppositeRegion region(plans);
   std::vector<Fate> fates(first.back(), Fate::mixed);
   parallel_blocks(quiet, plans.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
+    for (std::size_t n = begin; n < end; ++n) {
+      const BlockNumbers near(block_size, first[n], plans[n]);
       for (std::size_t m = 0; m < plans[n].leaves.size(); ++m) {
         const Sides& own = sides[first[n] + m];
         if (own.mixed)
@@ -165,7 +196,8 @@ std::vector<Fate> find_fates(const Context& quiet, const std::vector<LeafLists>&
         bool crossed = false;
         for (unsigned face = 0; face < 6 && !crossed; ++face) {
           const Int3 origin = neighbour(plans[n].leaves[m], face);
-          const std::uint32_t number = numbers.find(origin);
+          const std::uint32_t number =
+              near.covers(origin) ? near.find(origin) : numbers.find(origin);
           if (number != IndexMap::none) {
             const Sides& other = sides[number];
             crossed = ((opposite ? other.background : other.opposite) >> (face ^ 1U) & 1) != 0;
@@ -177,6 +209,7 @@ std::vector<Fate> find_fates(const Context& quiet, const std::vector<LeafLists>&
                               : opposite ? Fate::opposite
                                          : Fate::background;
       }
+    }
   });
   return fates;
 }
@@ -197,7 +230,7 @@ void evaluate_in_place(const Context& context, GridBuilder& builder,
       });
   Context quiet = context;
   quiet.progress = nullptr;
-  const std::vector<Fate> fates = find_fates(quiet, plans, first, sides);
+  const std::vector<Fate> fates = find_fates(quiet, blocks.size, plans, first, sides);
   const float value = opposite_value(isovalue);
   for (std::size_t n = 0; n < fates.size(); ++n) {
     if (fates[n] == Fate::opposite)
@@ -298,7 +331,7 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
   };
   in_batches({});
 
-  const std::vector<Fate> fates = find_fates(quiet, plans, first, sides);
+  const std::vector<Fate> fates = find_fates(quiet, blocks.size, plans, first, sides);
   std::vector<std::vector<std::uint32_t>> needed(plans.size());
   for (std::size_t n = 0; n < plans.size(); ++n)
     for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
