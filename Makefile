@@ -91,8 +91,9 @@ endif
 deps:
 	@scripts/deps $(SETS)
 
-# Kernels for one instruction set each, chosen at run time; -O3 is for their loops.
-kernel = $(if $(filter release,$(config)),-O3)
+# Kernels for one instruction set each, chosen at run time; -O3 is for their loops, and nobody reads errno or the flags of
+# floating-point exceptions, which would keep square roots and choices out of them.
+kernel = $(if $(filter release,$(config)),-O3) -fno-math-errno -fno-trapping-math
 $(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
 $(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
 $(BUILD)/obj/lib/volume/coverage_exact.o: FILE_FLAGS := $(kernel)

@@ -153,7 +153,7 @@ public:
       : mask_(-block_size), edge_(block_size / leaf_dim) {
     if (plan.leaves.empty() || edge_ > 16)
       return; // a hash costs less than so large a table
-    numbers_.assign(static_cast<std::size_t>(edge_) * edge_ * edge_, IndexMap::none);
+    numbers_.assign(static_cast<std::size_t>(edge_ * edge_ * edge_), IndexMap::none);
     origin_ = block_of(plan.leaves.front());
     for (std::size_t m = 0; m < plan.leaves.size(); ++m)
       numbers_[slot(plan.leaves[m])] = static_cast<std::uint32_t>(first + m);

@@ -41,33 +41,44 @@ double half_solid_angle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
   return sign_from(a, b, c, p) * angle_of(denominator, numerator);
 }
 
+/// Distance of p from the segment a b.
+double segment_distance(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 edge = b - a, to = p - a;
+  const double length2 = dot(edge, edge);
+  const double t = length2 > 0 ? std::clamp(dot(to, edge) / length2, 0.0, 1.0) : 0;
+  return norm(to - t * edge);
+}
+
+/// Distance of p from the triangle: from its plane where p lies over it, else from its edges.
+double triangle_distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 normal = cross(b - a, c - a);
+  const auto left_of = [&](const Vec3& from, const Vec3& to) {
+    return dot(cross(to - from, p - from), normal) > 0;
+  };
+  const double area = norm(normal);
+  if (area > 0 && left_of(a, b) && left_of(b, c) && left_of(c, a))
+    return std::fabs(dot(normal, p - a)) / area;
+  return std::min(
+      {segment_distance(p, a, b), segment_distance(p, b, c), segment_distance(p, c, a)});
+}
+
 } // namespace
 
 double angle_of(double x, double y) {
-  const double ax = std::fabs(x);
-  const bool steep = y > ax;
-  const double high = steep ? y : ax, low = steep ? ax : y;
-  if (high == 0)
-    return 0;
-  const double ratio = low / high; // its angle is in [0, pi/4]
-  // Turned back by 0, pi/8 or pi/4 it is within pi/16 of 0.
-  constexpr double tan_pi_16 = 0.19891236737965800, tan_3_pi_16 = 0.66817863791929892,
-                   tan_pi_8 = 0.41421356237309505;
-  const double turn = ratio < tan_pi_16 ? 0 : ratio < tan_3_pi_16 ? tan_pi_8 : 1;
-  const double turn_angle = ratio < tan_pi_16 ? 0 : ratio < tan_3_pi_16 ? pi / 8 : pi / 4;
-  const double t = (ratio - turn) / (1 + ratio * turn), s = t * t;
-  double series = 0; // atan t = t - t³/3 + …; s < 0.04, so 12 terms reach 1e-17
-  for (int n = 12; n-- > 0;)
-    series = 1.0 / (2 * n + 1) - s * series;
-  double angle = turn_angle + t * series;
-  if (steep)
-    angle = pi / 2 - angle;
-  return x < 0 ? pi - angle : angle;
+  return angle(x, y);
 }
 
 SolidAngleTree::SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles,
-                               std::span<const Triangle> pieces)
-    : points_(points), exact_(triangles), triangles_(pieces.begin(), pieces.end()) {
+                               std::span<const Triangle> pieces, CpuLevel cpu)
+    : points_(points), exact_(triangles), triangles_(pieces.begin(), pieces.end()),
+      kernel_(cpu == CpuLevel::baseline ? solid_angles_baseline : solid_angles_avx2) {
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (t % solid_angle_lanes == 0)
+      blocks_.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c)
+      for (int a = 0; a < 3; ++a)
+        blocks_.back().corner[c][a][t % solid_angle_lanes] = points[triangles[t][c]][a];
+  }
   if (triangles_.empty())
     return;
   std::map<std::array<std::uint32_t, 2>, int> surplus;
@@ -149,9 +160,19 @@ double expansion(const Node& node, const Vec3& q, double d) {
 }
 
 double SolidAngleTree::exact_at(const Vec3& p) const {
+  const double point[3] = {p.x, p.y, p.z};
   double sum = 0;
-  for (const auto& [a, b, c] : exact_)
-    sum += half_solid_angle(points_[a], points_[b], points_[c], p);
+  for (std::size_t first = 0, block = 0; first < exact_.size();
+       first += solid_angle_lanes, ++block) {
+    double half[solid_angle_lanes];
+    const std::uint32_t certain = kernel_(blocks_[block], point, half);
+    const std::size_t count = std::min(solid_angle_lanes, exact_.size() - first);
+    for (std::size_t n = 0; n < count; ++n) {
+      const auto& [a, b, c] = exact_[first + n];
+      sum += (certain >> n & 1) != 0 ? half[n]
+                                     : half_solid_angle(points_[a], points_[b], points_[c], p);
+    }
+  }
   return sum / (2 * pi);
 }
 
@@ -202,8 +223,16 @@ bool SolidAngleTree::is_far(const Vec3& p, double radius) const {
     const Node& node = nodes_[stack[--depth]];
     if (norm(node.center - p) > node.radius + radius)
       continue;
-    if (node.children == 0)
-      return false;
+    if (node.children == 0) {
+      for (std::uint32_t t = node.begin; t < node.end; ++t) {
+        const auto& [a, b, c] = triangles_[t];
+        // The slack is more than the rounding.
+        if (!(triangle_distance(p, points_[a], points_[b], points_[c]) * (1 - 0x1p-20) >
+              radius + node.radius * 0x1p-20))
+          return false;
+      }
+      continue;
+    }
     stack[depth++] = node.children + 1;
     stack[depth++] = node.children;
   }
@@ -216,12 +245,10 @@ bool SolidAngleTree::is_far(const Vec3& p, double radius) const {
 WindingSum SolidAngleTree::within(const Vec3& p, double radius) const {
   double slope = 0;
   for (const auto& [a, b] : border_) {
-    const Vec3 edge = b - a, to = p - a;
-    const double length2 = dot(edge, edge), t = dot(to, edge);
-    const double gap = norm(to - std::clamp(t / length2, 0.0, 1.0) * edge) - radius;
+    const double gap = segment_distance(p, a, b) - radius;
     if (!(gap > 0))
       return {0, HUGE_VAL};
-    slope += std::sqrt(length2) / (gap * gap);
+    slope += norm(b - a) / (gap * gap);
   }
   if (!is_far(p, radius))
     return {0, HUGE_VAL};

@@ -2,7 +2,9 @@
 // The winding number of a few triangles, by a tree whose far nodes are taken as dipoles. Internal
 // to the winding rule.
 
+#include "base/cpu.h"
 #include "base/mesh.h"
+#include "volume/solid_angle_kernel_internal.h"
 
 #include <array>
 #include <cstdint>
@@ -27,7 +29,7 @@ public:
   /// `pieces` make up the same surface as `triangles`, up to rounding; they are for the tree.
   /// \pre the points stay as they are as long as the tree, and so do the triangles
   SolidAngleTree(std::span<const Vec3> points, std::span<const Triangle> triangles,
-                 std::span<const Triangle> pieces);
+                 std::span<const Triangle> pieces, CpuLevel cpu);
 
   /// Sum over all triangles at sample p, moved by the infinitesimals of the scan; right up to
   /// rounding. The sign of each angle is exact.
@@ -62,6 +64,8 @@ private:
   std::span<const Triangle> exact_;
   std::vector<Triangle> triangles_; ///< pieces
   std::vector<Node> nodes_;
+  SolidAngleKernel kernel_;
+  std::vector<SolidAngleTriangles> blocks_; ///< the triangles, by eight
   std::vector<std::array<Vec3, 2>> border_; ///< edges that the triangles leave unbalanced
 };
 

@@ -181,7 +181,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
   const ClosingCones caps = closing_cones(points, surface.triangles);
   for (Vec3& p : points)
     p = {predicate_coordinate(p.x), predicate_coordinate(p.y), predicate_coordinate(p.z)};
-  const SolidAngleTree cones(points, caps.cones, caps.pieces);
+  const SolidAngleTree cones(points, caps.cones, caps.pieces, context.cpu);
   const std::vector<Int3> near = leaves_near(context, cones);
 
   // Those that a ray upward enters through, and those that it leaves through.

@@ -182,7 +182,7 @@ TEST(VoxelizeWinding, SameForAnyThreadsAndProcessor) {
 TEST(SolidAngleTree, TreeAndSumAgreeWithinTheirErrors) {
   const TriangleMesh mesh =
       without(sphere_mesh(3, 5, {0.1, 0.2, 0.3}), [](const Vec3& p) { return p.z > 1; });
-  const SolidAngleTree tree(mesh.points, mesh.triangles, mesh.triangles);
+  const SolidAngleTree tree(mesh.points, mesh.triangles, mesh.triangles, best_cpu_level());
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-30, 30), small(-1, 1);
   double largest = 0;
