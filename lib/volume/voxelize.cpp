@@ -206,7 +206,7 @@ Grid grid_from_scan(const Context& context, const InsideScan& scan,
   const std::vector<LeafRef> leaves = builder.add_leaves(context, scan.origins);
   static constexpr std::array<std::array<float, 8>, 256> floats = floats_of_bits();
   const double full = scan.samples * scan.samples * scan.samples;
-  parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
+  parallel_blocks(context, leaves.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n)
       for (std::size_t w = 0; w < 8; ++w) {
         float* values = leaves[n].values + 64 * w;
