@@ -35,7 +35,7 @@ ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(C
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
 LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash
 CHECK_LIBS := -lgmp -lmpfr
-BENCH_LIBS := -lembree3
+BENCH_LIBS := -lembree3 -lblas
 LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
 
 # --- What there is ----------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE)
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS)
 
-$(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(ARCHIVE)
+$(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS) $(BENCH_LIBS)
 
 # libFuzzer brings its own main; elsewhere replay.cpp runs the files of the corpus.

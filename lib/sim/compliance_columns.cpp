@@ -13,7 +13,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t block_nodes = 8; // solved by one job
+constexpr std::size_t block_nodes = Factor::most_units / 3; // solved by one job
 
 /// The blocks that are computed at the same time, while those before them are handed over.
 std::size_t wave_blocks(std::size_t nodes, const Context& context) {
@@ -21,45 +21,61 @@ std::size_t wave_blocks(std::size_t nodes, const Context& context) {
   return std::min<std::size_t>(blocks, 2 * static_cast<std::size_t>(thread_count(context)));
 }
 
-/// The columns of a few nodes, and their largest backward error.
+/// The columns of a few nodes, and the backward error of their sum.
 struct Block {
-  std::vector<double> columns; ///< [node][axis][3 n]
-  std::vector<double> f, u;    ///< kept from block to block
+  std::vector<double> columns;      ///< [node][axis][3 n]
+  std::vector<double> x, sum, load; ///< kept from block to block
   double residual = 0;
 };
+
+/// What column c of a block counts in the sum that is checked: no two alike.
+double weight(std::size_t c) {
+  return 1 + static_cast<double>(c) / 32;
+}
 
 class Columns {
 public:
   Columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
           std::span<const std::uint32_t> nodes)
-      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes) {}
+      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes), place_(matrix.order()) {
+    const std::span<const std::int64_t> permutation = factor.view().permutation;
+    for (std::size_t k = 0; k < place_.size(); ++k)
+      place_[static_cast<std::size_t>(permutation[k])] = static_cast<std::int64_t>(k);
+  }
 
   std::size_t blocks() const { return (nodes_.size() + block_nodes - 1) / block_nodes; }
 
   void solve(std::size_t block, Block& out) const {
     const auto nodes = nodes_of(block);
     const std::size_t n = matrix_.order(), axes = matrix_.row_of_axis.size();
-    // Only free axes have an equation.
-    std::vector<std::size_t> asked;
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-      for (std::size_t a = 0; a < 3; ++a)
-        if (row_of(nodes[k], a) >= 0)
-          asked.push_back(3 * k + a);
-    std::vector<double>&f = out.f, &u = out.u;
-    f.assign(n * asked.size(), 0.0);
-    u.resize(f.size());
-    for (std::size_t c = 0; c < asked.size(); ++c)
-      f[c * n + static_cast<std::size_t>(row_of(nodes[asked[c] / 3], asked[c] % 3))] = 1;
-    factor_.solve(f, u, asked.size());
-    out.columns.assign(nodes.size() * 3 * axes, 0.0);
-    out.residual = 0;
-    for (std::size_t c = 0; c < asked.size(); ++c) {
-      const std::span<const double> x(u.data() + c * n, n);
-      for (std::size_t r = 0; r < n; ++r)
-        out.columns[asked[c] * axes + static_cast<std::size_t>(matrix_.axis_of_row[r])] = x[r];
-      if (c == 0 || asked[c] / 3 != asked[c - 1] / 3)
-        keep_worst(out.residual, backward_error(matrix_, norm_, x, {f.data() + c * n, n}));
+    out.columns.resize(block_nodes * 3 * axes); // 0 on fixed axes, which nothing writes
+    std::vector<std::size_t> asked;             // only free axes have an equation
+    std::vector<std::int64_t> places;
+    for (std::size_t column = 0; column < 3 * nodes.size(); ++column) {
+      const std::int64_t row = row_of(nodes[column / 3], column % 3);
+      if (row < 0) {
+        std::fill_n(out.columns.begin() + static_cast<std::ptrdiff_t>(column * axes), axes, 0.0);
+        continue;
+      }
+      asked.push_back(column);
+      places.push_back(place_[static_cast<std::size_t>(row)]);
     }
+    const std::size_t width = factor_.solve_units(places, out.x);
+    out.sum.assign(n, 0.0);
+    out.load.assign(n, 0.0);
+    for (std::size_t c = 0; c < asked.size(); ++c)
+      out.load[static_cast<std::size_t>(row_of(nodes[asked[c] / 3], asked[c] % 3))] = weight(c);
+    for (std::size_t r = 0; r < n; ++r) { // one pass over x, whose order is that of elimination
+      const double* const x = out.x.data() + static_cast<std::size_t>(place_[r]) * width;
+      double* const to = out.columns.data() + static_cast<std::size_t>(matrix_.axis_of_row[r]);
+      double sum = 0;
+      for (std::size_t c = 0; c < asked.size(); ++c) {
+        to[asked[c] * axes] = x[c];
+        sum += weight(c) * x[c];
+      }
+      out.sum[r] = sum;
+    }
+    out.residual = backward_error(matrix_, norm_, out.sum, out.load);
   }
 
   void hand_over(std::size_t block, const Block& from, ColumnSink& sink, double& residual) const {
@@ -87,17 +103,17 @@ private:
   const Factor& factor_;
   double norm_;
   std::span<const std::uint32_t> nodes_;
+  std::vector<std::int64_t> place_; ///< of a row in the order of elimination
 };
 
 } // namespace
 
 double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
                                 const Context& context) {
-  // A block has right-hand sides, solutions, a panel of them and the columns; those of the wave
-  // before wait to be handed over.
-  const double block = 8.0 * 3 * static_cast<double>(block_nodes) *
-                       (static_cast<double>(matrix.order()) * 3 +
-                        static_cast<double>(matrix.row_of_axis.size()) * 2);
+  // A block has a panel and the columns; those of the wave before wait to be handed over.
+  const double block =
+      8.0 * 3 * static_cast<double>(block_nodes) * 2 *
+      (static_cast<double>(matrix.order()) + static_cast<double>(matrix.row_of_axis.size()));
   return block * static_cast<double>(wave_blocks(nodes, context));
 }
 

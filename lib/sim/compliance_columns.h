@@ -16,7 +16,8 @@ namespace gewebe {
 /// of `nodes` while later ones are being computed. The same bytes for any number of threads. Memory
 /// is bounded by the number of threads, not by that of nodes.
 ///
-/// `norm` is ‖K‖₁. Returns the largest backward error of a column of each node.
+/// `norm` is ‖K‖₁. Of each block of columns a sum with different weights is put back into K u = f.
+/// Returns the largest backward error of these.
 /// \pre nodes < n, ascending; the factor is of this matrix
 /// \throw Error if that exceeds max_backward_error, if memory exceeds the context's, what the sink
 /// throws; Cancelled

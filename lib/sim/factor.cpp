@@ -255,27 +255,53 @@ FactorData Factor::data() const {
       copy(v.super), copy(v.pi),        copy(v.px),     copy(v.s),           copy(v.x)};
 }
 
-void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {
+void Factor::solve_panel(std::vector<double>& x, std::size_t width) const {
   const FactorView v = view();
-  const std::size_t n = order();
   const SupernodalArrays l{v.super.size() - 1, v.super.data(), v.pi.data(),
                            v.px.data(),        v.s.data(),     v.x.data()};
-  const bool wide = state_->cpu != CpuLevel::baseline;
+  std::vector<double> work(static_cast<std::size_t>(v.max_row_size) * panel_width);
+  (state_->cpu == CpuLevel::baseline ? solve_supernodal_baseline
+                                     : solve_supernodal_avx2)(l, x.data(), width, work.data());
+}
+
+namespace {
+
+std::size_t panel_for(std::size_t vectors) {
+  return vectors == 1 ? 1 : (vectors + panel_width - 1) / panel_width * panel_width;
+}
+
+} // namespace
+
+void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {
+  const std::span<const std::int64_t> permutation = view().permutation;
+  const std::size_t n = order();
+  std::vector<double> x;
   for (std::size_t first = 0; first < columns;) {
-    const std::size_t count = std::min(panel_width, columns - first);
-    const std::size_t width = count == 1 ? 1 : panel_width;
-    std::vector<double> x(n * width), work(static_cast<std::size_t>(v.max_row_size) * width);
-    for (std::size_t j = 0; j < count; ++j)
-      for (std::size_t k = 0; k < n; ++k) // + 0.0 leaves no -0, whose sign zeros skipped would lose
-        x[k * width + j] = f[(first + j) * n + static_cast<std::size_t>(v.permutation[k])] + 0.0;
-    const SupernodalSolve run = count == 1 ? (wide ? solve_single_avx2 : solve_single_baseline)
-                                           : (wide ? solve_panel_avx2 : solve_panel_baseline);
-    run(l, x.data(), work.data());
-    for (std::size_t j = 0; j < count; ++j)
-      for (std::size_t k = 0; k < n; ++k)
-        u[(first + j) * n + static_cast<std::size_t>(v.permutation[k])] = x[k * width + j];
+    const std::size_t count = std::min(most_units, columns - first), width = panel_for(count);
+    x.assign(n * width, 0.0);
+    for (std::size_t k = 0; k < n; ++k) {
+      const double* const from = f.data() + first * n + static_cast<std::size_t>(permutation[k]);
+      for (std::size_t j = 0; j < count; ++j)
+        x[k * width + j] = from[j * n] + 0.0; // leaves no -0, whose sign zeros skipped would lose
+    }
+    solve_panel(x, width);
+    for (std::size_t k = 0; k < n; ++k) {
+      double* const to = u.data() + first * n + static_cast<std::size_t>(permutation[k]);
+      for (std::size_t j = 0; j < count; ++j)
+        to[j * n] = x[k * width + j];
+    }
     first += count;
   }
+}
+
+std::size_t Factor::solve_units(std::span<const std::int64_t> places,
+                                std::vector<double>& x) const {
+  const std::size_t width = panel_for(std::max<std::size_t>(places.size(), 1));
+  x.assign(order() * width, 0.0);
+  for (std::size_t c = 0; c < places.size(); ++c)
+    x[static_cast<std::size_t>(places[c]) * width + c] = 1;
+  solve_panel(x, width);
+  return width;
 }
 
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,

@@ -2,12 +2,12 @@
 
 namespace gewebe {
 
-void solve_single_baseline(const SupernodalArrays& l, double* x, double* work) {
-  solve<Single>(l, x, work);
-}
-
-void solve_panel_baseline(const SupernodalArrays& l, double* x, double* work) {
-  solve<Wide>(l, x, work);
+void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
+                               double* work) {
+  if (vectors == 1)
+    solve<Single>(l, x, 1, work);
+  else
+    solve<Wide>(l, x, vectors, work);
 }
 
 } // namespace gewebe

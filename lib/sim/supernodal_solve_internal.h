@@ -21,13 +21,14 @@ struct SupernodalArrays {
 
 inline constexpr std::size_t panel_width = 8;
 
-/// x = L⁻ᵀ L⁻¹ x in place, for one vector or for panel_width of them side by side, x[row][vector].
-/// `work` holds at least as many rows as the longest supernode has below its own columns.
-using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, double* work);
+/// x = L⁻ᵀ L⁻¹ x in place, for `vectors` of them side by side, x[row][vector]: one, or a multiple
+/// of panel_width. `work` holds panel_width numbers for each row that the longest supernode has
+/// below its own columns.
+using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, std::size_t vectors,
+                                 double* work);
 
-void solve_single_baseline(const SupernodalArrays& l, double* x, double* work);
-void solve_panel_baseline(const SupernodalArrays& l, double* x, double* work);
-void solve_single_avx2(const SupernodalArrays& l, double* x, double* work);
-void solve_panel_avx2(const SupernodalArrays& l, double* x, double* work);
+void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
+                               double* work);
+void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vectors, double* work);
 
 } // namespace gewebe

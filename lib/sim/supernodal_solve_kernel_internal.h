@@ -70,13 +70,14 @@ inline Supernode supernode(const SupernodalArrays& a, std::size_t k) {
   return {columns, rows - columns, rows, first, a.s + a.pi[k] + columns, a.x + a.px[k]};
 }
 
-/// N rows from `r` on lose what columns [0, count) contribute; `x` are the supernode's own.
+/// N rows from `r` on lose what columns [0, count) contribute; `x` are the supernode's own,
+/// `stride` numbers from one row to the next.
 template <class Of, std::size_t N>
 void lose_columns(const Supernode& n, std::size_t r, std::size_t count, const double* x,
-                  Row<Of> (&sum)[N]) {
+                  std::size_t stride, Row<Of> (&sum)[N]) {
   for (std::size_t c = 0; c < count; ++c) {
     Row<Of> xc;
-    xc.load(x + c * Of::width);
+    xc.load(x + c * stride);
     const double* const l = n.l + c * n.rows + r;
     for (std::size_t i = 0; i < N; ++i)
       sum[i].subtract(l[i], xc);
@@ -85,60 +86,63 @@ void lose_columns(const Supernode& n, std::size_t r, std::size_t count, const do
 
 /// N own columns from `c` on, once all before them are solved.
 template <class Of, std::size_t N>
-void forward_own(const Supernode& n, std::size_t c, double* x) {
+void forward_own(const Supernode& n, std::size_t c, double* x, std::size_t stride) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].load(x + (c + i) * Of::width);
-  lose_columns<Of, N>(n, c, c, x, sum);
+    sum[i].load(x + (c + i) * stride);
+  lose_columns<Of, N>(n, c, c, x, stride, sum);
   for (std::size_t i = 0; i < N; ++i) {
     for (std::size_t j = 0; j < i; ++j)
       sum[i].subtract(n.at(c + i, c + j), sum[j]);
     sum[i].divide(n.at(c + i, c + i));
-    sum[i].store(x + (c + i) * Of::width);
+    sum[i].store(x + (c + i) * stride);
   }
 }
 
 template <class Of, std::size_t N>
-void forward_below(const Supernode& n, std::size_t r, const double* own, double* x) {
+void forward_below(const Supernode& n, std::size_t r, const double* own, double* x,
+                   std::size_t stride) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].load(x + static_cast<std::size_t>(n.row[r + i]) * Of::width);
-  lose_columns<Of, N>(n, n.columns + r, n.columns, own, sum);
+    sum[i].load(x + static_cast<std::size_t>(n.row[r + i]) * stride);
+  lose_columns<Of, N>(n, n.columns + r, n.columns, own, stride, sum);
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * Of::width);
+    sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * stride);
 }
 
 template <class Of>
-bool all_zero(const double* x, std::size_t count) {
-  for (std::size_t i = 0; i < count * Of::width; ++i)
-    if (x[i] != 0)
-      return false;
+bool all_zero(const double* x, std::size_t count, std::size_t stride) {
+  for (std::size_t r = 0; r < count; ++r)
+    for (std::size_t i = 0; i < Of::width; ++i)
+      if (x[r * stride + i] != 0)
+        return false;
   return true;
 }
 
 template <class Of>
-void forward(const Supernode& n, double* x) {
-  double* const own = x + n.first * Of::width;
-  if (all_zero<Of>(own, n.columns)) // and so stays everything that only hears from it
+void forward(const Supernode& n, double* x, std::size_t stride) {
+  double* const own = x + n.first * stride;
+  if (all_zero<Of>(own, n.columns, stride)) // and so stays everything that only hears from it
     return;
   std::size_t c = 0;
   for (; c + Of::rows <= n.columns; c += Of::rows)
-    forward_own<Of, Of::rows>(n, c, own);
+    forward_own<Of, Of::rows>(n, c, own, stride);
   for (; c < n.columns; ++c)
-    forward_own<Of, 1>(n, c, own);
+    forward_own<Of, 1>(n, c, own, stride);
   std::size_t r = 0;
   for (; r + Of::rows <= n.below; r += Of::rows)
-    forward_below<Of, Of::rows>(n, r, own, x);
+    forward_below<Of, Of::rows>(n, r, own, x, stride);
   for (; r < n.below; ++r)
-    forward_below<Of, 1>(n, r, own, x);
+    forward_below<Of, 1>(n, r, own, x, stride);
 }
 
 /// N own columns from `c` on, once all behind them are solved; `below` are the rows below.
 template <class Of, std::size_t N>
-void backward_own(const Supernode& n, std::size_t c, const double* below, double* x) {
+void backward_own(const Supernode& n, std::size_t c, const double* below, double* x,
+                  std::size_t stride) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].load(x + (c + i) * Of::width);
+    sum[i].load(x + (c + i) * stride);
   const double* const l = n.l + c * n.rows;
   for (std::size_t r = 0; r < n.below; ++r) {
     Row<Of> xr;
@@ -148,7 +152,7 @@ void backward_own(const Supernode& n, std::size_t c, const double* below, double
   }
   for (std::size_t r = n.columns; r-- > c + N;) {
     Row<Of> xr;
-    xr.load(x + r * Of::width);
+    xr.load(x + r * stride);
     for (std::size_t i = 0; i < N; ++i)
       sum[i].subtract(l[i * n.rows + r], xr);
   }
@@ -156,31 +160,38 @@ void backward_own(const Supernode& n, std::size_t c, const double* below, double
     for (std::size_t j = N; j-- > i + 1;)
       sum[i].subtract(n.at(c + j, c + i), sum[j]);
     sum[i].divide(n.at(c + i, c + i));
-    sum[i].store(x + (c + i) * Of::width);
+    sum[i].store(x + (c + i) * stride);
   }
 }
 
 template <class Of>
-void backward(const Supernode& n, double* x, double* work) {
+void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
   for (std::size_t r = 0; r < n.below; ++r) {
     Row<Of> xr;
-    xr.load(x + static_cast<std::size_t>(n.row[r]) * Of::width);
+    xr.load(x + static_cast<std::size_t>(n.row[r]) * stride);
     xr.store(work + r * Of::width);
   }
-  double* const own = x + n.first * Of::width;
+  double* const own = x + n.first * stride;
   std::size_t c = n.columns;
   for (; c >= Of::rows; c -= Of::rows)
-    backward_own<Of, Of::rows>(n, c - Of::rows, work, own);
+    backward_own<Of, Of::rows>(n, c - Of::rows, work, own, stride);
   for (; c > 0; --c)
-    backward_own<Of, 1>(n, c - 1, work, own);
+    backward_own<Of, 1>(n, c - 1, work, own, stride);
 }
 
+/// `stride` vectors side by side, Of::width of them at a time: a supernode is read once for all.
 template <class Of>
-void solve(const SupernodalArrays& l, double* x, double* work) {
-  for (std::size_t k = 0; k < l.supernodes; ++k)
-    forward<Of>(supernode(l, k), x);
-  for (std::size_t k = l.supernodes; k-- > 0;)
-    backward<Of>(supernode(l, k), x, work);
+void solve(const SupernodalArrays& l, double* x, std::size_t stride, double* work) {
+  for (std::size_t k = 0; k < l.supernodes; ++k) {
+    const Supernode n = supernode(l, k);
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      forward<Of>(n, x + v, stride);
+  }
+  for (std::size_t k = l.supernodes; k-- > 0;) {
+    const Supernode n = supernode(l, k);
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      backward<Of>(n, x + v, stride, work);
+  }
 }
 
 } // namespace

@@ -297,6 +297,26 @@ TEST(ComplianceColumns, AreTheSameForAnyNumberOfThreadsAndNeighbours) {
   EXPECT_NEAR(sinks[0].kept[4][z9], sinks[0].kept[9][2 * row + x4], 1e-18);
 }
 
+TEST(ComplianceColumns, AreWhatSolvingForUnitForcesGives) {
+  const Model model = model_of(ball(2));
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  KeptColumns sink;
+  const auto nodes = every(model.nodes.size(), 1); // the last block isn't full
+  (void)compliance_columns(k, factor, stiffness_norm(k), nodes, {}, sink);
+  std::size_t different = 0;
+  std::vector<double> f(3 * model.nodes.size()), u(f.size());
+  for (const std::uint32_t node : nodes)
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::fill(f.begin(), f.end(), 0.0);
+      f[3 * std::size_t{node} + a] = 1;
+      solve_axes(k, factor, f, u);
+      different +=
+          std::memcmp(u.data(), sink.kept[node].data() + a * u.size(), 8 * u.size()) != 0 ? 1 : 0;
+    }
+  EXPECT_EQ(different, 0u);
+}
+
 TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {
   struct Full final : ColumnSink {
     void write(std::size_t k, std::span<const double>) override {
