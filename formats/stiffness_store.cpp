@@ -152,6 +152,16 @@ StiffnessFacts StiffnessStore::facts(const Model& model) const {
                           " nodes, hash " + digest_text(hash) + ")");
 }
 
+StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
+  const hdf5::Group object = state_->file.root().group(facts.group);
+  StiffnessSizes sizes;
+  sizes.matrix = object.group("K").dataset("x", hdf5::Number::float64).rows();
+  sizes.factor = object.group("L").dataset("x", hdf5::Number::float64).rows();
+  if (object.has("columns"))
+    sizes.touched = object.group("columns").dataset("nodes", hdf5::Number::uint32).rows();
+  return sizes;
+}
+
 StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
   const hdf5::Group group = state_->file.root().group(facts.group).group("K");
   StiffnessMatrix matrix;

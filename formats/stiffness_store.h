@@ -27,6 +27,13 @@ struct StiffnessFacts {
   bool single = false;     ///< columns are float32
 };
 
+/// How much of an object stands in the store; nothing of it has to be read for that.
+struct StiffnessSizes {
+  std::uint64_t matrix = 0;  ///< numbers in the lower triangle of K
+  std::uint64_t factor = 0;  ///< numbers in L
+  std::uint64_t touched = 0; ///< nodes with columns
+};
+
 /// XXH3-64 of what K and gravity depend on: rest positions, masses and constraints of the nodes,
 /// stiffness and rest length of the springs. Neither names nor damping count.
 std::uint64_t stiffness_hash(const Model& model);
@@ -49,6 +56,7 @@ public:
   StiffnessFacts facts(const std::string& group) const;
   /// The object that belongs to this model, by hash. \throw Error "is of another model …"
   StiffnessFacts facts(const Model& model) const;
+  StiffnessSizes sizes(const StiffnessFacts& facts) const;
   /// The matrix itself. \throw Error if it is damaged
   StiffnessMatrix matrix(const StiffnessFacts& facts) const;
   /// Its order is facts.order. \throw Error if it is damaged

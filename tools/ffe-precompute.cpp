@@ -7,6 +7,7 @@
 #include "sim/compliance_columns.h"
 #include "sim/condition.h"
 #include "tools/cli.h"
+#include "tools/store_info.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -16,10 +17,15 @@ namespace {
 
 struct Arguments {
   std::string model = "-", columns = "none", precision = "float64";
+  bool info = false, verify = false;
   std::optional<Selector> touched;
 };
 
 void complete(Arguments& a) {
+  if (a.info && a.columns != "none")
+    throw UsageError("--columns does not go with --info");
+  if (a.info && a.model == "-")
+    throw UsageError("expected the name of a store with --info");
   if (a.columns == "none")
     return;
   try {
@@ -104,10 +110,11 @@ void work(cli::Run& run, const Arguments& a) {
     });
   });
   const double residual = std::max(w.check.residual, columns);
-  run.timed("write", [&] {
-    writer->close(residual);
-    output.commit();
-  });
+  run.timed("write", [&] { writer->close(residual); });
+  if (a.verify) // what the disk holds, before it takes its name
+    run.timed("verify",
+              [&] { verify_store(run, StiffnessStore(output.temporary()), run.output()); });
+  output.commit();
   if (run.stats_wanted())
     report(run, model, w, nodes.size(), residual, *writer);
 }
@@ -122,7 +129,10 @@ int main(int argc, char** argv) {
   p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none");
   p.option("--precision", a.precision, "TYPE", "of the columns: float64, float32")
       .one_of({"float64", "float32"});
+  p.flag("--verify", a.verify, "read the store back and recompute some columns another way");
+  p.flag("--info", a.info, "say what is in a store, which stands in the place of MODEL");
   p.operand("MODEL", a.model, "the model");
   p.check([&] { complete(a); });
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
+  return p.run(argc, argv,
+               [&](cli::Run& run) { a.info ? print_store(run, a.model, a.verify) : work(run, a); });
 }

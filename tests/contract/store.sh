@@ -96,6 +96,28 @@ test_a_full_disk_leaves_nothing() {
   rm cube.ela
 }
 
+# Every byte that a reader needs is under a checksum: flipped, --info --verify finds it or says what it said before.
+test_a_flipped_bit_is_found() {
+  held_cube
+  ffe-precompute --columns all cube.ela -o whole.h5
+  ffe-precompute --info --verify whole.h5 | tail -n +3 >whole.txt
+  local size at byte found=0
+  size=$(stat -c %s whole.h5)
+  for ((at = 11; at < size; at += size / 60)); do
+    cp whole.h5 store.h5
+    byte=$(od -An -tu1 -j "$at" -N 1 whole.h5)
+    printf '%b' "\\x$(printf %02x $((byte ^ 16)))" | dd of=store.h5 bs=1 seek="$at" conv=notrunc 2>/dev/null
+    if ffe-precompute --info --verify store.h5 >store.txt 2>message; then
+      tail -n +3 store.txt | cmp - whole.txt || fail "byte $at is wrong and nobody noticed"
+    else
+      grep -q '^ffe-precompute: store.h5: ' message || fail "byte $at: $(cat message)"
+      found=$((found + 1))
+    fi
+  done
+  ((found > 40)) || fail "only $found of 60 flipped bits were found"
+  rm whole.h5 whole.txt store.h5 store.txt message cube.ela
+}
+
 test_damaged_and_foreign_stores_are_refused() {
   command -v ffe-run >/dev/null || skip 'no ffe-run'
   held_cube

@@ -1,0 +1,96 @@
+#include "tools/store_info.h"
+
+#include "base/digest.h"
+#include "sim/verify.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t recomputed_nodes = 3;
+
+std::string number(const char* format, double value) {
+  char text[64];
+  (void)std::snprintf(text, sizeof text, format,
+                      value); // NOLINT(clang-diagnostic-format-nonliteral)
+  return text;
+}
+
+Verification verify_object(const StiffnessStore& store, const StiffnessFacts& facts,
+                           const Context& context) {
+  const StiffnessMatrix matrix = store.matrix(facts);
+  const Factor factor = store.factor(facts);
+  const std::unique_ptr<ColumnSource> columns = store.columns(facts);
+  return verify_compliance(matrix, factor, columns.get(), facts.condition, facts.single,
+                           recomputed_nodes, context);
+}
+
+std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
+  const double column_bytes =
+      static_cast<double>(sizes.touched * 9 * facts.nodes) * (facts.single ? 4 : 8);
+  std::string text = "object " + facts.object + "\n";
+  const auto line = [&](const char* key, const std::string& value) {
+    text += std::string("  ") + key + " " + value + "\n";
+  };
+  line("hash", digest_text(facts.hash));
+  line("nodes", std::to_string(facts.nodes));
+  line("free_axes", std::to_string(facts.order));
+  line("matrix_nonzeros", std::to_string(2 * sizes.matrix - facts.order));
+  line("factor_nonzeros", std::to_string(sizes.factor));
+  line("factor_mb", number("%.1f", static_cast<double>(sizes.factor) * 8e-6));
+  line("touched_nodes", std::to_string(sizes.touched));
+  line("columns_mb", number("%.1f", column_bytes * 1e-6));
+  line("precision", facts.single ? "float32" : "float64");
+  line("norm", number("%.6g", facts.norm));
+  line("condition", number("%.3g", facts.condition));
+  line("residual", number("%.2g", facts.residual));
+  return text;
+}
+
+std::string describe(const Verification& v) {
+  return "  verified_columns " + std::to_string(v.columns_read) + "\n  recomputed_columns " +
+         std::to_string(v.recomputed) + "\n  difference " + number("%.2g", v.difference) +
+         "\n  asymmetry " + number("%.2g", v.asymmetry) + "\n  tolerance " +
+         number("%.2g", v.tolerance) + "\n";
+}
+
+void count(cli::Run& run, const Verification& v) {
+  run.stats().set("verified_columns", std::uint64_t{v.columns_read});
+  run.stats().set("recomputed_columns", std::uint64_t{v.recomputed});
+  run.stats().set("difference", v.difference);
+  run.stats().set("asymmetry", v.asymmetry);
+  run.stats().set("tolerance", v.tolerance);
+}
+
+} // namespace
+
+void print_store(cli::Run& run, const std::string& path, bool verify) {
+  Output output(run.output(), run.output_options(false));
+  const StiffnessStore store(path);
+  std::string text =
+      "store " + path + "\nbytes " + std::to_string(std::filesystem::file_size(path)) + "\n";
+  for (const std::string& group : store.objects()) {
+    const StiffnessFacts facts = store.facts(group);
+    text += describe(facts, store.sizes(facts));
+    if (!verify)
+      continue;
+    const Verification v = run.timed("verify", [&] {
+      return at(path, [&] { return verify_object(store, facts, run.context()); });
+    });
+    text += describe(v);
+    count(run, v);
+  }
+  output.write(text);
+  output.commit();
+}
+
+void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name) {
+  for (const std::string& group : store.objects())
+    count(run, at(name, [&] { return verify_object(store, store.facts(group), run.context()); }));
+}
+
+} // namespace gewebe
