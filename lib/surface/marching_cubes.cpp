@@ -161,7 +161,10 @@ void write_points(const Octants& octants, const Block& block, double isovalue, I
       crossing.fraction = (isovalue - a) / (b - a);
       if (!std::isfinite(b - a)) // of floats that are finite it is
         throw_not_finite(crossing);
-      surface.mesh.points[point] = transform.to_world(index_position(crossing));
+      Vec3 p{static_cast<double>(crossing.corner[0]), static_cast<double>(crossing.corner[1]),
+             static_cast<double>(crossing.corner[2])}; // index_position, axis known
+      (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += crossing.fraction;
+      surface.mesh.points[point] = transform.to_world(p);
       numbers[place(i, j, k, axis)] = point++;
     }
   }
