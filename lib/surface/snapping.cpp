@@ -1,278 +1,20 @@
 #include "surface/snapping.h"
 
 #include "base/error.h"
-#include "base/index_map.h"
+#include "base/huge_pages.h"
+#include "base/parallel.h"
+#include "surface/snap_clusters_internal.h"
+#include "surface/snap_collapse_internal.h"
 
 #include <algorithm>
-#include <array>
-#include <numeric>
-#include <span>
+#include <cmath>
+#include <memory>
 #include <vector>
 
 // Based on: report FZKA 7190, Forschungszentrum Karlsruhe, 2006, section 3.1.4.
-// Dey, Edelsbrunner, Guha and Nekhayev, Topology Preserving Edge Contraction, 1999.
 
 namespace gewebe {
 namespace {
-
-constexpr std::uint32_t none = UINT32_MAX;
-
-/// Lists of numbers, one after the other: list n is items[first[n]] … items[first[n + 1]].
-struct Lists {
-  std::vector<std::uint32_t> first, items;
-  std::span<const std::uint32_t> operator[](std::size_t n) const {
-    return {items.data() + first[n], items.data() + first[n + 1]};
-  }
-};
-
-Lists faces_of_points(const std::vector<Triangle>& triangles, std::size_t points) {
-  Lists lists{std::vector<std::uint32_t>(points + 2), {}};
-  for (const Triangle& t : triangles)
-    for (const std::uint32_t p : t)
-      ++lists.first[p + 2];
-  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
-  lists.items.resize(3 * triangles.size());
-  for (std::size_t f = 0; f < triangles.size(); ++f)
-    for (const std::uint32_t p : triangles[f])
-      lists.items[lists.first[p + 1]++] = static_cast<std::uint32_t>(f);
-  return lists;
-}
-
-/// A closed mesh in which edges can be collapsed. A point that was collapsed into another hands
-/// over its list of faces.
-class CollapsingMesh {
-public:
-  explicit CollapsingMesh(const TriangleMesh& mesh)
-      : faces_(mesh.triangles), star_(faces_of_points(faces_, mesh.points.size())),
-        next_(mesh.points.size(), none), last_(mesh.points.size()), mark_(mesh.points.size(), 0),
-        alive_(mesh.points.size(), 1) {
-    std::iota(last_.begin(), last_.end(), 0U);
-  }
-
-  bool alive(std::uint32_t p) const { return alive_[p] != 0; }
-  const std::vector<Triangle>& faces() const { return faces_; } ///< [0] is none where it is gone
-
-  /// The points that were merged into p, p first.
-  std::uint32_t next_member(std::uint32_t p) const { return next_[p]; }
-
-  /// Calls visit(q) for each neighbour of p until it answers false. Returns whether it never did.
-  template <class Visit>
-  bool for_neighbours(std::uint32_t p, Visit&& visit) const {
-    for (std::uint32_t member = p; member != none; member = next_[member])
-      for (const std::uint32_t f : star_[member]) {
-        const Triangle& t = faces_[f];
-        if (t[0] == none)
-          continue;
-        const std::uint32_t following = t[0] == p ? t[1] : t[1] == p ? t[2] : t[0];
-        if (!visit(following))
-          return false;
-      }
-    return true;
-  }
-
-  /// Link condition for the edge p q of a closed 2-manifold.
-  bool can_collapse(std::uint32_t p, std::uint32_t q) {
-    ++tick_;
-    std::size_t valence_p = 0, valence_q = 0, common = 0;
-    for_neighbours(p, [&](std::uint32_t n) {
-      mark_[n] = tick_;
-      ++valence_p;
-      return true;
-    });
-    for_neighbours(q, [&](std::uint32_t n) {
-      common += mark_[n] == tick_ ? 1 : 0;
-      ++valence_q;
-      return common <= 2;
-    });
-    return common == 2 && !(valence_p == 3 && valence_q == 3);
-  }
-
-  /// Moves q into p and drops the two faces between them. \pre can_collapse(p, q)
-  void collapse(std::uint32_t p, std::uint32_t q) {
-    for (std::uint32_t member = q; member != none; member = next_[member])
-      for (const std::uint32_t f : star_[member]) {
-        Triangle& t = faces_[f];
-        if (t[0] == none)
-          continue;
-        if (t[0] == p || t[1] == p || t[2] == p)
-          t[0] = none;
-        else
-          (t[0] == q ? t[0] : t[1] == q ? t[1] : t[2]) = p;
-      }
-    next_[last_[p]] = q;
-    last_[p] = last_[q];
-    alive_[q] = 0;
-  }
-
-private:
-  std::vector<Triangle> faces_;
-  Lists star_;                             // faces of each point before any collapse
-  std::vector<std::uint32_t> next_, last_; // chain of merged points, kept at its first
-  std::vector<std::uint32_t> mark_;
-  std::vector<std::uint8_t> alive_;
-  std::uint32_t tick_ = 0;
-};
-
-struct Clusters {
-  std::vector<std::uint32_t> of_point; // or none
-  std::vector<Int3> corner;
-  std::vector<std::uint8_t> is_fin; // of each point
-};
-
-Clusters make_clusters(const std::vector<EdgeCrossing>& crossings, double epsilon) {
-  Clusters clusters;
-  clusters.of_point.assign(crossings.size(), none);
-  clusters.is_fin.assign(crossings.size(), 0);
-  const auto snaps_low = [&](const EdgeCrossing& c) { return c.fraction <= epsilon; };
-  const auto snaps_high = [&](const EdgeCrossing& c) { return 1 - c.fraction <= epsilon; };
-  const auto count = std::ranges::count_if(
-      crossings, [&](const EdgeCrossing& c) { return snaps_low(c) || snaps_high(c); });
-  IndexMap numbers(static_cast<std::size_t>(count));
-  for (std::size_t p = 0; p < crossings.size(); ++p) {
-    Int3 corner = crossings[p].corner;
-    if (!snaps_low(crossings[p])) {
-      if (!snaps_high(crossings[p]))
-        continue;
-      ++corner[static_cast<std::size_t>(crossings[p].axis)];
-    }
-    const std::uint32_t number =
-        numbers.insert(corner, static_cast<std::uint32_t>(clusters.corner.size()));
-    if (number == clusters.corner.size())
-      clusters.corner.push_back(corner);
-    clusters.of_point[p] = number;
-  }
-  return clusters;
-}
-
-double squared_distance(const EdgeCrossing& crossing, const Int3& corner) {
-  Vec3 d;
-  for (int a = 0; a < 3; ++a)
-    d[a] = static_cast<double>(crossing.corner[static_cast<std::size_t>(a)]) -
-           corner[static_cast<std::size_t>(a)];
-  d[crossing.axis] += crossing.fraction;
-  return dot(d, d);
-}
-
-/// The cluster that a point between at most two clusters joins, or none.
-std::uint32_t fin_cluster(const CollapsingMesh& mesh, const Clusters& clusters,
-                          const EdgeCrossing& crossing, std::uint32_t p) {
-  std::uint32_t a = none, b = none;
-  const bool fin = mesh.for_neighbours(p, [&](std::uint32_t n) {
-    const std::uint32_t cluster = clusters.of_point[n];
-    if (cluster == none)
-      return false;
-    if (a == none || cluster == a)
-      a = cluster;
-    else if (b == none || cluster == b)
-      b = cluster;
-    else
-      return false;
-    return true;
-  });
-  if (!fin || a == none)
-    return none;
-  if (b == none)
-    return a;
-  if (a > b)
-    std::swap(a, b);
-  const double to_a = squared_distance(crossing, clusters.corner[a]),
-               to_b = squared_distance(crossing, clusters.corner[b]);
-  return to_b < to_a ? b : a;
-}
-
-std::uint64_t apply_fin_rule(const CollapsingMesh& mesh, const std::vector<EdgeCrossing>& crossings,
-                             Clusters& clusters) {
-  std::uint64_t fins = 0;
-  std::vector<std::uint32_t> again; // neighbours of a fin may have become fins
-  const auto examine = [&](std::uint32_t p) {
-    if (clusters.of_point[p] != none)
-      return;
-    const std::uint32_t cluster = fin_cluster(mesh, clusters, crossings[p], p);
-    if (cluster == none)
-      return;
-    clusters.of_point[p] = cluster;
-    clusters.is_fin[p] = 1;
-    ++fins;
-    mesh.for_neighbours(p, [&](std::uint32_t n) {
-      if (clusters.of_point[n] == none)
-        again.push_back(n);
-      return true;
-    });
-  };
-  for (std::uint32_t p = 0; p < crossings.size(); ++p)
-    examine(p);
-  for (std::size_t n = 0; n < again.size(); ++n)
-    examine(again[n]);
-  return fins;
-}
-
-/// Collapses what can be collapsed among `members`; returns the edges between them that remain.
-std::uint64_t collapse_cluster(CollapsingMesh& mesh, const std::vector<std::uint32_t>& cluster_of,
-                               std::span<const std::uint32_t> members) {
-  const std::uint32_t cluster = cluster_of[members.front()];
-  std::uint64_t refused = 0;
-  for (bool changed = members.size() > 1; changed;) {
-    changed = false;
-    refused = 0;
-    for (const std::uint32_t p : members) {
-      for (bool again = mesh.alive(p); again;) {
-        again = false;
-        std::uint32_t partner = none;
-        std::uint64_t kept = 0;
-        mesh.for_neighbours(p, [&](std::uint32_t q) {
-          if (cluster_of[q] != cluster)
-            return true;
-          ++kept;
-          if (!mesh.can_collapse(p, q))
-            return true;
-          partner = q;
-          return false;
-        });
-        if (partner != none) {
-          mesh.collapse(p, partner);
-          changed = again = true;
-        } else {
-          refused += kept;
-        }
-      }
-    }
-  }
-  return refused / 2; // seen from both ends
-}
-
-Lists members_of_clusters(const Clusters& clusters) {
-  Lists lists{std::vector<std::uint32_t>(clusters.corner.size() + 2), {}};
-  for (const std::uint32_t cluster : clusters.of_point)
-    if (cluster != none)
-      ++lists.first[cluster + 2];
-  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
-  lists.items.resize(lists.first.back());
-  for (std::uint32_t p = 0; p < clusters.of_point.size(); ++p)
-    if (clusters.of_point[p] != none)
-      lists.items[lists.first[clusters.of_point[p] + 1]++] = p;
-  return lists;
-}
-
-/// Index position of the points merged at p.
-Vec3 merged_position(const IsoSurface& surface, const CollapsingMesh& mesh,
-                     const Clusters& clusters, std::uint32_t p, SnapOptions::Place place) {
-  const Vec3 own = index_position(surface.crossings[p]);
-  if (clusters.of_point[p] == none)
-    return own;
-  bool only_fins = true;
-  Vec3 sum;
-  double count = 0;
-  for (std::uint32_t member = p; member != none; member = mesh.next_member(member)) {
-    only_fins = only_fins && clusters.is_fin[member] != 0;
-    sum += index_position(surface.crossings[member]) - own;
-    ++count;
-  }
-  if (place == SnapOptions::Place::mean || only_fins)
-    return own + sum / count;
-  const Int3& corner = clusters.corner[clusters.of_point[p]];
-  return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),
-          static_cast<double>(corner[2])};
-}
 
 bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = b - a, v = c - a, w = c - b;
@@ -280,48 +22,215 @@ bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   return !(norm(cross(u, v)) > 1e-12 * longest);
 }
 
+/// A quick test. \pre enough is the square of what the area may be at least, for sides of 1
+bool has_much_area(const Vec3& a, const Vec3& b, const Vec3& c, double enough) {
+  const Vec3 u = b - a, v = c - a, w = c - b, normal = cross(u, v);
+  const double longest = std::max({dot(u, u), dot(v, v), dot(w, w)});
+  return dot(normal, normal) > enough * longest * longest;
+}
+
+/// What has_no_area asks in index space, asked in the world: an affine map changes the ratio of an
+/// area to a square by no more than its condition, which is below the product of the norms of the
+/// matrix and its inverse; infinite where that tells nothing.
+double enough_area(const GridTransform& transform) {
+  const auto& m = transform.m;
+  const Vec3 rows[3]{{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
+  const Vec3 minors[3]{cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])};
+  double norm2 = 0, minors2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    norm2 += dot(rows[a], rows[a]);
+    minors2 += dot(minors[a], minors[a]);
+  }
+  const double determinant = transform.determinant(),
+               condition2 = norm2 * minors2 / (determinant * determinant);
+  const double ratio = 1e-9 * condition2;
+  return ratio < 1e-3 ? ratio * ratio : HUGE_VAL;
+}
+
+/// The mesh that is left when points have been merged.
+class SnappedMesh {
+public:
+  SnappedMesh(const Context& context, const IsoSurface& surface, SnapClusters& clusters,
+              const SnapMerges& merges, SnapOptions::Place place)
+      : context_(context), surface_(surface), clusters_(clusters), merges_(merges), place_(place) {
+    context_.progress = nullptr;
+  }
+
+  void make(SnapResult& result) {
+    place_clusters();
+    write_points(result.mesh.points, result.mesh.triangles);
+    write_triangles(result.mesh.points, result.mesh.triangles);
+    for (const std::uint64_t count : zero_area_)
+      result.report.zero_area += count;
+  }
+
+private:
+  static constexpr std::size_t points_at_once = 16384;
+
+  /// Index position of the points that were merged at p, whose slot this is.
+  Vec3 merged_position(std::uint32_t p, std::uint32_t slot) const;
+  Vec3 position(std::uint32_t p) const;
+  void place_clusters();
+  void write_points(std::vector<Vec3>& points, std::vector<Triangle>& triangles);
+  void write_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles);
+
+  Context context_;
+  const IsoSurface& surface_;
+  SnapClusters& clusters_;
+  const SnapMerges& merges_;
+  SnapOptions::Place place_;
+  std::vector<Vec3> of_slot_;            // index positions of points that are left
+  std::unique_ptr<std::uint32_t[]> new_; // number of each point, of what it was merged into
+  std::vector<std::uint64_t> zero_area_; // faces of each part
+};
+
+Vec3 SnappedMesh::merged_position(std::uint32_t p, std::uint32_t slot) const {
+  const std::vector<EdgeCrossing>& crossings = surface_.crossings;
+  const Vec3 own = index_position(crossings[p]);
+  bool only_fins = true;
+  Vec3 sum;
+  double count = 0;
+  for (std::uint32_t at = slot; at != SnapMerges::none; at = merges_.next[at]) {
+    const std::uint32_t member = clusters_.members[at];
+    only_fins = only_fins && (clusters_.flags[member] & fin) != 0;
+    sum += index_position(crossings[member]) - own;
+    ++count;
+  }
+  if (place_ == SnapOptions::Place::mean || only_fins)
+    return own + sum / count;
+  const std::uint32_t first = clusters_.first_member[clusters_.cluster[slot]];
+  const Int3 corner = snap_corner(crossings[first], clusters_.flags[first]);
+  return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),
+          static_cast<double>(corner[2])};
+}
+
+void SnappedMesh::place_clusters() {
+  const std::size_t slots = clusters_.members.size();
+  of_slot_.resize(slots);
+  parallel_blocks(context_, slots, 8192, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t slot = begin; slot < end; ++slot) {
+      const std::uint32_t p = clusters_.members[slot];
+      std::uint8_t& flags = clusters_.flags[p];
+      if (merges_.target[slot] != p)
+        flags |= merged | looked_at;
+      else
+        of_slot_[slot] = merged_position(p, static_cast<std::uint32_t>(slot));
+      if (merges_.next[slot] != SnapMerges::none)
+        flags |= looked_at;
+    }
+  });
+}
+
+/// Index position of a point of the surface after snapping.
+Vec3 SnappedMesh::position(std::uint32_t p) const {
+  const unsigned flags = clusters_.flags[p];
+  if ((flags & merged) != 0)
+    p = merges_.target[clusters_.slot[p]];
+  if ((flags & clustered) != 0)
+    return of_slot_[clusters_.slot[p]];
+  if (place_ == SnapOptions::Place::corner && (flags & (snaps_low | snaps_high)) != 0) {
+    const Int3 corner = snap_corner(surface_.crossings[p], flags);
+    return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),
+            static_cast<double>(corner[2])};
+  }
+  return index_position(surface_.crossings[p]);
+}
+
+void SnappedMesh::write_points(std::vector<Vec3>& points, std::vector<Triangle>& triangles) {
+  const std::size_t count = surface_.crossings.size();
+  const std::uint8_t* const flags = clusters_.flags.get();
+  new_ = std::make_unique_for_overwrite<std::uint32_t[]>(count);
+  prefer_huge_pages(new_.get(), count * sizeof(std::uint32_t));
+  std::vector<std::size_t> first((count + points_at_once - 1) / points_at_once + 1);
+  parallel_blocks(context_, count, points_at_once, [&](std::size_t begin, std::size_t end) {
+    std::size_t left = 0;
+    for (std::size_t p = begin; p < end; ++p)
+      left += (flags[p] & merged) == 0 ? 1 : 0;
+    first[begin / points_at_once + 1] = left;
+  });
+  for (std::size_t n = 1; n < first.size(); ++n)
+    first[n] += first[n - 1];
+  std::size_t faces = surface_.mesh.triangles.size();
+  for (const std::uint32_t dropped : merges_.dropped)
+    faces -= dropped;
+  resize_all(context_, resizing(points, first.back()), resizing(triangles, faces));
+
+  // A point that stays where it was is copied.
+  const unsigned moves =
+      clustered | (place_ == SnapOptions::Place::corner ? snaps_low | snaps_high : 0U);
+  parallel_blocks(context_, count, points_at_once, [&](std::size_t begin, std::size_t end) {
+    std::size_t number = first[begin / points_at_once];
+    for (std::size_t p = begin; p < end; ++p) {
+      if ((flags[p] & merged) != 0)
+        continue;
+      new_[p] = static_cast<std::uint32_t>(number);
+      points[number++] = (flags[p] & moves) == 0
+                             ? surface_.mesh.points[p]
+                             : surface_.transform.to_world(position(static_cast<std::uint32_t>(p)));
+    }
+  });
+  parallel_blocks(context_, clusters_.members.size(), 8192,
+                  [&](std::size_t begin, std::size_t end) {
+                    for (std::size_t slot = begin; slot < end; ++slot) {
+                      const std::uint32_t p = clusters_.members[slot];
+                      if ((flags[p] & merged) != 0)
+                        new_[p] = new_[merges_.target[slot]];
+                    }
+                  });
+}
+
+void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
+                                  std::vector<Triangle>& triangles) {
+  const double enough = enough_area(surface_.transform);
+  constexpr std::size_t at_once = SnapMerges::faces_at_once;
+  const std::vector<Triangle>& old = surface_.mesh.triangles;
+  const std::uint8_t* const flags = clusters_.flags.get();
+  const std::size_t parts = (old.size() + at_once - 1) / at_once;
+  std::vector<std::size_t> first(parts);
+  for (std::size_t n = 1; n < parts; ++n)
+    first[n] = first[n - 1] + at_once - merges_.dropped[n - 1];
+  zero_area_.resize(parts);
+  // Faces between points that stayed in place at 0.001 or more from the ends of their edges have an
+  // area (see the test of the table): three edges of a cell that lie in no face of it in common.
+  const unsigned doubtful =
+      looked_at | (place_ == SnapOptions::Place::corner ? snaps_low | snaps_high : 0U);
+  parallel_blocks(context_, old.size(), at_once, [&](std::size_t begin, std::size_t end) {
+    Triangle* out = triangles.data() + first[begin / at_once];
+    std::uint64_t zero_area = 0;
+    for (std::size_t f = begin; f < end; ++f) {
+      const Triangle& t = old[f];
+      const std::uint32_t a = new_[t[0]], b = new_[t[1]], c = new_[t[2]];
+      const unsigned all = static_cast<unsigned>(flags[t[0]] | flags[t[1]] | flags[t[2]]);
+      if ((all & doubtful) != 0) {
+        if (a == b || b == c || c == a)
+          continue;
+        if (!has_much_area(points[a], points[b], points[c], enough))
+          zero_area += has_no_area(position(t[0]), position(t[1]), position(t[2])) ? 1 : 0;
+      }
+      *out++ = {a, b, c};
+    }
+    zero_area_[begin / at_once] = zero_area;
+  });
+}
+
 } // namespace
 
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options) {
   if (!(options.epsilon >= 0 && options.epsilon <= 0.5))
     throw Error("epsilon must lie within 0 ... 0.5");
-  const std::vector<EdgeCrossing>& crossings = surface.crossings;
-  const double points = static_cast<double>(crossings.size()),
+  const double points = static_cast<double>(surface.crossings.size()),
                triangles = static_cast<double>(surface.mesh.triangles.size());
   require_memory(context, points * (100 + 2 * sizeof(Vec3)) + triangles * 40, "snapping");
 
   SnapResult result;
   SnapReport& report = result.report;
-  CollapsingMesh mesh(surface.mesh);
-  Clusters clusters = make_clusters(crossings, options.epsilon);
-  report.corners = clusters.corner.size();
-  if (!clusters.corner.empty())
-    report.fins = apply_fin_rule(mesh, crossings, clusters);
-  const Lists members = members_of_clusters(clusters);
-  for (std::size_t n = 0; n < clusters.corner.size(); ++n) {
-    if (n % 65536 == 0 && context.cancelled && context.cancelled())
-      throw Cancelled();
-    report.refused += collapse_cluster(mesh, clusters.of_point, members[n]);
-  }
-
-  std::vector<std::uint32_t> number(crossings.size(), none);
-  std::vector<Vec3> index_points;
-  for (std::uint32_t p = 0; p < crossings.size(); ++p) {
-    if (!mesh.alive(p))
-      continue;
-    number[p] = static_cast<std::uint32_t>(index_points.size());
-    index_points.push_back(merged_position(surface, mesh, clusters, p, options.place));
-    result.mesh.points.push_back(surface.transform.to_world(index_points.back()));
-  }
-  for (const Triangle& t : mesh.faces()) {
-    if (t[0] == none)
-      continue;
-    const Triangle face{number[t[0]], number[t[1]], number[t[2]]};
-    report.zero_area +=
-        has_no_area(index_points[face[0]], index_points[face[1]], index_points[face[2]]) ? 1 : 0;
-    result.mesh.triangles.push_back(face);
-  }
-  report.points_before = crossings.size();
+  SnapClusters clusters = find_snap_clusters(context, surface, options.epsilon);
+  const SnapMerges merges = merge_snap_clusters(context, surface.mesh.triangles, clusters);
+  SnappedMesh(context, surface, clusters, merges, options.place).make(result);
+  report.corners = clusters.corners;
+  report.fins = clusters.fins;
+  report.refused = merges.refused;
+  report.points_before = surface.crossings.size();
   report.points_after = result.mesh.points.size();
   report.triangles_before = surface.mesh.triangles.size();
   report.triangles_after = result.mesh.triangles.size();

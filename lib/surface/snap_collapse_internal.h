@@ -1,0 +1,48 @@
+#pragma once
+// Merges the points of each cluster as far as the mesh stays a mesh; for surface/snapping.cpp.
+
+#include "surface/snap_clusters_internal.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+struct SnapMerges {
+  static constexpr std::uint32_t none = UINT32_MAX;
+  static constexpr std::size_t faces_at_once = 16384;
+
+  std::vector<std::uint32_t> target;  ///< of each slot: the point that its point was merged into
+  std::vector<std::uint32_t> next;    ///< of each slot: the next one merged there, or none
+  std::vector<std::uint32_t> dropped; ///< of each faces_at_once faces: those that vanish
+  std::uint64_t refused = 0;
+  std::uint64_t careful = 0; ///< clusters that had to be taken in order
+};
+
+/// Step 3 of `snap`: a face vanishes if two of its corners have the same target.
+///
+/// The result is that of taking one cluster after the other, ordered by first_member. Most clusters
+/// need no order. Let p q be an edge in cluster A, N(p) and N(q) the neighbours in the mesh that
+/// only A's collapses so far have changed, and let the label of a point be its cluster, or itself
+/// where it has none. Suppose that
+///
+///    (1) p and q have exactly two common neighbours x and y,
+///    (2) no label of N(p) \ {q, x, y} is one of N(q) \ {p, x, y},
+///    (3) N(p) or N(q) has four labels at least.
+///
+/// Then the link condition holds for p q whatever the other clusters did before. For they only
+/// merge points of equal label, and never two of A, so that N(p) then consists of the images of
+/// N(p) now. Images are equal only where labels are, so by (2) no image of N(p) \ {q, x, y} is one
+/// of N(q) \ {p, x, y}, unless it is that of x or y; and x and y stay apart, since the collapses
+/// made keep the mesh a 2-manifold without double faces, where an edge has two different points
+/// opposite. So exactly two common neighbours are left, and by (3) p q is no edge of a tetrahedron.
+/// Faces with two points of A vanish by A alone, so the edges inside A are met in the same order
+/// too. A cluster all of whose collapses, made in the mesh as it was at first, satisfy (1) to (3)
+/// thus ends the same in any order, and such clusters are taken in parallel. The others follow one
+/// by one in their order, each in the mesh as the clusters before it leave it.
+///
+/// \param always_careful takes all in order (for tests)
+SnapMerges merge_snap_clusters(const Context& context, const std::vector<Triangle>& triangles,
+                               const SnapClusters& clusters, bool always_careful = false);
+
+} // namespace gewebe
