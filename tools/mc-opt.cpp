@@ -1,12 +1,15 @@
 // mc-opt: volume -> triangle mesh of its isosurface.
 
-#include "base/digest.h"
 #include "formats/mesh_file.h"
 #include "formats/volume_file.h"
+#include "surface/gradient_normals.h"
 #include "surface/marching_cubes.h"
-#include "surface/mesh_check.h"
+#include "surface/regularize.h"
 #include "surface/snapping.h"
 #include "tools/cli.h"
+#include "tools/surface_choice.h"
+#include "tools/surface_report.h"
+#include "volume/crop.h"
 #include "volume/resample.h"
 
 using namespace gewebe;
@@ -14,51 +17,46 @@ using namespace gewebe;
 namespace {
 
 struct Arguments {
-  std::string volume = "-", place = "mean";
+  std::string volume = "-", place = "mean", components;
   std::optional<double> isovalue, voxel;
+  std::vector<double> box; // x0 y0 z0 x1 y1 z1
   double epsilon = SnapOptions{}.epsilon;
+  std::int64_t rounds = 0;
+  bool normals = false, self_intersections = false;
 };
 
-double reduction(std::uint64_t before, std::uint64_t after) {
-  return before == 0 ? 0 : 1 - static_cast<double>(after) / static_cast<double>(before);
-}
-
-void report_work(cli::Stats& stats, const Grid& grid, const IsoSurface& surface,
-                 const SnapReport& snapped) {
-  stats.set("voxels", grid.active_voxels());
-  stats.set("leaves", surface.leaves);
-  stats.set("leaves_visited", surface.leaves_visited);
-  stats.set("leaves_skipped", surface.leaves - surface.leaves_visited);
-  stats.set("active_cells", surface.active_cells);
-  stats.set("points_unsnapped", snapped.points_before);
-  stats.set("points", snapped.points_after);
-  stats.set("point_reduction", reduction(snapped.points_before, snapped.points_after));
-  stats.set("triangles_unsnapped", snapped.triangles_before);
-  stats.set("triangles", snapped.triangles_after);
-  stats.set("triangle_reduction", reduction(snapped.triangles_before, snapped.triangles_after));
-  stats.set("fins", snapped.fins);
-  stats.set("refused_collapses", snapped.refused);
-}
-
-void report_mesh(cli::Stats& stats, const TriangleMesh& mesh) {
-  const MeshReport report = examine_mesh(mesh);
-  stats.set("closed", report.closed());
-  stats.set("manifold", report.manifold());
-  stats.set("oriented", report.oriented());
-  stats.set("outward", report.outward());
-  stats.set("euler", report.euler);
-  stats.set("components", report.components);
-  stats.set("volume", report.volume);
-  stats.set("area", report.area);
-  stats.set("zero_area_faces", report.zero_area_faces);
-  stats.set("smallest_angle", report.smallest_angle);
-  stats.set("edge_min", report.edge_min);
-  stats.set("edge_mean", report.edge_mean);
-  stats.set("edge_max", report.edge_max);
-  Digest digest;
-  digest.add(mesh.points);
-  digest.add(mesh.triangles);
-  stats.set("digest", digest.hex());
+/// What the options ask for beyond the snapped mesh.
+void refine(cli::Run& run, const Arguments& arguments, const Grid& grid, double isovalue,
+            TriangleMesh& mesh) {
+  const Context& context = run.context();
+  cli::Stats& stats = run.stats();
+  if (!arguments.components.empty()) {
+    const ComponentReport report = keep_components(mesh, component_choice(arguments.components));
+    run.say(std::to_string(report.dropped) + " components dropped, " + std::to_string(report.kept) +
+            " kept");
+    if (report.kept == 0 && report.dropped > 0)
+      run.warn("no component is as large as --components asks");
+    stats.set("components_dropped", report.dropped);
+    stats.set("points_dropped", report.dropped_points);
+    stats.set("triangles_dropped", report.dropped_triangles);
+    stats.set("volume_dropped", report.dropped_volume);
+    stats.set("largest_dropped", report.largest_dropped);
+    stats.set("points", mesh.points.size());
+    stats.set("triangles", mesh.triangles.size());
+  }
+  if (arguments.rounds > 0) {
+    const RegularizeReport report = run.timed("regularize", [&] {
+      return regularize(context, grid, isovalue, mesh, {static_cast<int>(arguments.rounds)});
+    });
+    stats.set("edges_flipped", report.flips);
+    stats.set("moves", report.moves);
+    stats.set("moves_refused", report.refused_moves);
+    stats.set("points_kept", report.kept_points);
+  }
+  if (arguments.normals)
+    stats.set("normals_of_faces", run.timed("normals", [&] {
+      return gradient_normals(context, grid, mesh).from_faces;
+    }));
 }
 
 void work(cli::Run& run, const Arguments& arguments) {
@@ -67,10 +65,14 @@ void work(cli::Run& run, const Arguments& arguments) {
   Input input(arguments.volume);
   const Context& context = run.context();
   Grid grid = run.timed("read", [&] { return read_volume(input, context); });
+  const double isovalue = arguments.isovalue.value_or(default_isovalue(grid.info()));
   const IsoSurface surface = at(input.name(), [&] {
     if (arguments.voxel)
       grid = run.timed(
           "resample", [&] { return resample(context, grid, uniform_transform(*arguments.voxel)); });
+    if (!arguments.box.empty())
+      grid =
+          run.timed("crop", [&] { return crop(context, grid, box_of(arguments.box), isovalue); });
     return run.timed("marching_cubes",
                      [&] { return marching_cubes(context, grid, arguments.isovalue); });
   });
@@ -78,17 +80,17 @@ void work(cli::Run& run, const Arguments& arguments) {
   options.epsilon = arguments.epsilon;
   options.place =
       arguments.place == "corner" ? SnapOptions::Place::corner : SnapOptions::Place::mean;
-  const SnapResult snapped = run.timed("snap", [&] { return snap(context, surface, options); });
-  run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
-  output.commit();
-  if (snapped.mesh.triangles.empty())
-    run.warn("the surface is empty: no value lies across the isovalue from another");
-
+  SnapResult snapped = run.timed("snap", [&] { return snap(context, surface, options); });
+  cli::report_meshing(run.stats(), grid, surface, snapped.report);
   run.say(std::to_string(snapped.report.points_before) + " points, " +
           std::to_string(snapped.report.points_after) + " after snapping");
-  report_work(run.stats(), grid, surface, snapped.report);
+  if (snapped.mesh.triangles.empty())
+    run.warn("the surface is empty: no value lies across the isovalue from another");
+  refine(run, arguments, grid, isovalue, snapped.mesh);
+  run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
+  output.commit();
   if (run.stats_wanted())
-    run.timed("examine", [&] { report_mesh(run.stats(), snapped.mesh); });
+    run.timed("examine", [&] { report_surface(run, snapped.mesh, arguments.self_intersections); });
 }
 
 } // namespace
@@ -110,7 +112,24 @@ int main(int argc, char** argv) {
       .one_of({"mean", "corner"});
   program.option("--resample", arguments.voxel, "S", "first bring the volume to voxels of S mm")
       .positive();
+  program
+      .option("--bbox", arguments.box, "X0,Y0,Z0,X1,Y1,Z1",
+              "only what lies in this box of the world, closed by its faces")
+      .count(6);
+  program.option("--components", arguments.components, "WHICH",
+                 "keep only the largest components: largest, a number N, or min-volume:V mm3");
+  program
+      .option("--regularize", arguments.rounds, "N",
+              "improve the triangles by N rounds of flips and sliding along the surface")
+      .range(0, 1000);
+  program.flag("--normals", arguments.normals, "write normals, from the gradient of the volume");
+  program.flag("--self-intersections", arguments.self_intersections,
+               "let --stats count the pairs of faces that cut each other");
   program.output_kinds(writable_mesh_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");
+  program.check([&] {
+    component_choice(arguments.components);
+    box_of(arguments.box);
+  });
   return program.run(argc, argv, [&](cli::Run& run) { work(run, arguments); });
 }

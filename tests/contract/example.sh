@@ -83,3 +83,21 @@ test_antialias_draws_every_filter() {
     [[ $file == Makefile ]] || fail "clean left $file"
   done
 }
+
+# Figure 3-3 of the report, a part of it: what snapping saves grows like epsilon.
+test_reduction_is_linear() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/reduction/{Makefile,*.awk,*.gnuplot} .
+  make DIMS=32 SEEDS=8 all check >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  awk -F, 'NR > 1 { ++n; if (!($3 > 0.85 && $3 < 0.95)) bad = 1 } END { exit bad || n != 2 }' fit.csv ||
+    fail 'the slope is not about 0.9' "$(<fit.csv)"
+  # A bend is seen.
+  sed -i 's/^32,0.3,[^,]*/32,0.3,0.5/' reduction.csv
+  ! make DIMS=32 SEEDS=8 check >log 2>&1 || fail 'a bent line passes'
+  make -s clean
+  for file in *; do
+    [[ $file == log || -e $GEWEBE_ROOT/examples/reduction/$file ]] || fail "clean left $file"
+  done
+}

@@ -89,6 +89,58 @@ TEST(Resample, PrefilterKeepsTheMeanOfNoise) {
   EXPECT_LT(std::sqrt(square / count - mean * mean), 0.06); // 0.289 without prefilter
 }
 
+/// Sum of the values times the voxel's volume.
+double mass(const Grid& grid) {
+  double sum = 0;
+  for (const LeafView& leaf : grid.leaves())
+    for (int n = 0; n < leaf_voxels; ++n)
+      sum += static_cast<double>(leaf.values[n]);
+  for (const TileView& tile : grid.tiles())
+    sum += static_cast<double>(tile.value) * tile.dim * tile.dim * tile.dim;
+  return sum * std::abs(grid.info().transform.determinant());
+}
+
+TEST(Resample, AThinSheetKeepsItsMassWhereverItLies) {
+  // One voxel thick, brought to three and more: point sampling loses it or makes it three thick.
+  for (const double size : {2.0, 3.0, 3.7, 5.0}) {
+    double least = HUGE_VAL, most = 0, least_points = HUGE_VAL, most_points = 0;
+    for (int offset = 0; offset < 8; ++offset) {
+      const Grid sheet =
+          sample({}, {-20, -20, offset}, {20, 20, offset}, [](int, int, int) { return 1.0; });
+      const double kept = mass(resample({}, sheet, uniform_transform(size))) / mass(sheet);
+      least = std::min(least, kept);
+      most = std::max(most, kept);
+      // The negative control: the values at the new centres alone.
+      GridAccessor values(sheet);
+      double points = 0;
+      for (int k = -9; k < 9; ++k)
+        points += static_cast<double>(values.value({0, 0, static_cast<int>(k * size)})) * size;
+      least_points = std::min(least_points, points);
+      most_points = std::max(most_points, points);
+    }
+    // Exact at whole ratios; else the weights of a centre, divided by their sum, err a little.
+    const double tolerance = size == std::floor(size) ? 1e-6 : 0.03;
+    EXPECT_GT(least, 1 - tolerance) << size;
+    EXPECT_LT(most, 1 + tolerance) << size;
+    EXPECT_TRUE(least_points == 0 && most_points >= size) << size;
+  }
+}
+
+TEST(Resample, AWallIsMeshedWhereverItLies) {
+  // 2.4 voxels of 1 brought to voxels of 2: its value stays above 0.5 somewhere at any offset.
+  for (int offset = 0; offset < 12; ++offset) {
+    const double low = 3 + offset / 6.0, high = low + 2.4;
+    const Grid wall = sample({}, {-12, -12, 0}, {12, 12, 16}, [&](int, int, int k) {
+      return std::clamp(std::min(k + 0.5, high) - std::max(k - 0.5, low), 0.0, 1.0);
+    });
+    const MeshReport report =
+        examine_mesh(marching_cubes({}, resample({}, wall, uniform_transform(2))).mesh);
+    EXPECT_TRUE(is_sound(report) && report.outward());
+    EXPECT_EQ(report.components, 1U) << offset;
+    EXPECT_EQ(report.euler, 2) << offset;
+  }
+}
+
 TEST(Resample, SphereKeepsItsVolume) {
   const double radius = 12.2, exact = 4.0 / 3 * std::numbers::pi * radius * radius * radius;
   const Grid grid = sample({}, {-16, -16, -16}, {16, 16, 16}, [&](int i, int j, int k) {

@@ -1,0 +1,104 @@
+#include "surface/regularize.h"
+
+#include "base/error.h"
+#include "surface/mesh_quality.h"
+#include "surface/self_intersections.h"
+#include "tests/unit/surface_scenes.h"
+#include "volume/field.h"
+
+#include <gtest/gtest.h>
+
+namespace gewebe {
+namespace {
+
+using namespace scenes;
+
+/// Largest distance, to first order, of the points from the trilinear isosurface, in voxels.
+double worst_offset(const Grid& grid, const TriangleMesh& mesh, double isovalue) {
+  Field field(grid);
+  double worst = 0;
+  for (const Vec3& p : mesh.points) {
+    const Vec3 index = grid.info().transform.to_index(p);
+    const double offset = std::abs(field.value(index) - isovalue) / norm(field.gradient(index));
+    worst = !(offset <= worst) ? offset : worst;
+  }
+  return worst;
+}
+
+TEST(Regularize, MetaballsGetGoodAnglesOnTheSurface) {
+  for (std::uint32_t seed = 0; seed < 6; ++seed)
+    for (const double epsilon : {0.0, 0.15, 0.5}) {
+      const Grid grid = metaballs(32, seed);
+      TriangleMesh mesh = snap({}, marching_cubes({}, grid), {epsilon}).mesh;
+      const MeshReport before = examine_mesh(mesh);
+      const RegularizeReport report = regularize({}, grid, 0.5, mesh, {10});
+      const MeshReport after = examine_mesh(mesh);
+      EXPECT_TRUE(keeps_topology(before, after)) << seed << ", epsilon " << epsilon;
+      EXPECT_EQ(after.points, before.points);
+      EXPECT_GT(report.flips, 0U);
+      EXPECT_GT(report.moves, 0U);
+      EXPECT_GE(after.smallest_angle, before.smallest_angle);
+      EXPECT_GT(after.smallest_angle, 15) << seed << ", epsilon " << epsilon;
+      EXPECT_GT(mesh_quality(mesh).angle_1_percent, 30);
+      EXPECT_NEAR(after.volume / before.volume, 1, 0.01);
+      EXPECT_LT(worst_offset(grid, mesh, 0.5), 0.02);
+      EXPECT_EQ(self_intersections({}, mesh).pairs, 0U);
+    }
+}
+
+TEST(Regularize, NoiseKeepsItsTopology) {
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    const Grid grid = noise(12, seed, seed % 2 == 0 ? 0 : 4);
+    TriangleMesh mesh = snap({}, marching_cubes({}, grid), {0.15}).mesh;
+    const MeshReport before = examine_mesh(mesh);
+    const SelfIntersections cuts = self_intersections({}, mesh);
+    regularize({}, grid, 0.5, mesh, {5});
+    EXPECT_TRUE(keeps_topology(before, examine_mesh(mesh))) << seed;
+    EXPECT_LE(self_intersections({}, mesh).pairs, cuts.pairs) << seed;
+  }
+}
+
+TEST(Regularize, TurnedAndMirroredTransforms) {
+  GridInfo info;
+  info.transform.m = {-0.36, -0.48, 0, 10, -0.48, 0.36, 0, 20, 0, 0, 0.6, 30};
+  const Grid grid = sample(info, {-16, -16, -16}, {16, 16, 16}, [&](int i, int j, int k) {
+    return std::clamp(0.5 + (12.2 - std::sqrt(i * i + j * j + k * k)) / 6, 0.0, 1.0);
+  });
+  TriangleMesh mesh = snap({}, marching_cubes({}, grid), {}).mesh;
+  const MeshReport before = examine_mesh(mesh);
+  EXPECT_TRUE(before.outward());
+  regularize({}, grid, 0.5, mesh, {10});
+  const MeshReport after = examine_mesh(mesh);
+  EXPECT_TRUE(keeps_topology(before, after) && after.outward());
+  EXPECT_GT(after.smallest_angle, 25);
+}
+
+TEST(Regularize, NoRoundsNoChange) {
+  const Grid grid = metaballs(24, 1);
+  TriangleMesh mesh = snap({}, marching_cubes({}, grid), {}).mesh;
+  const TriangleMesh before = mesh;
+  EXPECT_EQ(regularize({}, grid, 0.5, mesh, {0}).moves, 0U);
+  EXPECT_EQ(mesh.points, before.points);
+  EXPECT_EQ(mesh.triangles, before.triangles);
+  EXPECT_THROW(regularize({}, grid, 0.5, mesh, {-1}), Error);
+  TriangleMesh open = before;
+  open.triangles.pop_back();
+  EXPECT_THROW(regularize({}, grid, 0.5, open, {1}), Error);
+  TriangleMesh empty;
+  EXPECT_EQ(regularize({}, grid, 0.5, empty, {3}).flips, 0U);
+}
+
+TEST(Regularize, SameForAnyThreadCount) {
+  const Grid grid = metaballs(40, 5);
+  TriangleMesh a = snap({}, marching_cubes({}, grid), {}).mesh, b = a;
+  Context one, three;
+  one.threads = 1;
+  three.threads = 3;
+  regularize(one, grid, 0.5, a, {4});
+  regularize(three, grid, 0.5, b, {4});
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_EQ(a.triangles, b.triangles);
+}
+
+} // namespace
+} // namespace gewebe
