@@ -95,22 +95,19 @@ double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor
 }
 
 struct StiffnessStoreWriter::State {
+  const Output& output;
   hdf5::File file;
-  hdf5::Group object;
-  std::optional<hdf5::Group> columns;
+  Digest digest, matrix_digest;
+  // The object under way:
+  std::optional<hdf5::Group> object, columns;
   std::optional<hdf5::Dataset> values;
-  std::uint64_t nodes; ///< of the model
-  bool single;
+  std::uint64_t nodes = 0; ///< of the model
+  bool single = false;
   std::vector<std::uint32_t> crc; ///< of the columns so far
   std::vector<float> bounds, row;
-  Digest digest;
-  std::uint64_t matrix_digest = 0;
 
-  State(const Output& output, const StiffnessFacts& facts)
-      : file(hdf5::File::create(output.temporary(), output.name())),
-        object(file.root().create_group(
-            hdf5::link_name(facts.group.empty() ? facts.object : facts.group))),
-        nodes(facts.nodes), single(facts.single) {}
+  explicit State(const Output& to)
+      : output(to), file(hdf5::File::create(to.temporary(), to.name())) {}
 
   template <class T>
   void write(std::size_t k, std::span<const T> stored) {
@@ -128,31 +125,40 @@ struct StiffnessStoreWriter::State {
   }
 };
 
-StiffnessStoreWriter::StiffnessStoreWriter(Output& output, const StiffnessFacts& facts,
-                                           const StiffnessMatrix& matrix, const Factor& factor,
-                                           std::span<const std::uint32_t> nodes) {
-  require_disk(output, stiffness_store_bytes(matrix, factor, nodes.size(), facts.single));
-  state_ = std::make_unique<State>(output, facts);
-  State& s = *state_;
-  hdf5::Group& root = s.file.root();
+StiffnessStoreWriter::StiffnessStoreWriter(Output& output)
+    : state_(std::make_unique<State>(output)) {
+  hdf5::Group& root = state_->file.root();
   root.set("format", store::format);
   root.set("version", store::version);
-  s.object.set("name", facts.object);
-  s.object.set("hash", facts.hash);
-  s.object.set("nodes", facts.nodes);
-  s.object.set("order", facts.order);
-  s.object.set("method", "direct");
-  s.object.set("norm", facts.norm);
-  s.object.set("condition", facts.condition);
-  s.object.set("precision", facts.single ? "float32" : "float64");
+}
+
+void StiffnessStoreWriter::begin(const StiffnessFacts& facts, const StiffnessMatrix& matrix,
+                                 const Factor& factor, std::span<const std::uint32_t> nodes) {
+  State& s = *state_;
+  require_disk(s.output, stiffness_store_bytes(matrix, factor, nodes.size(), facts.single));
+  const std::string group = hdf5::link_name(facts.group.empty() ? facts.object : facts.group);
+  if (s.file.root().has(group))
+    throw Error(s.file.path(),
+                "two objects are named '" + group + "', expected different names (exp2ela --name)");
+  s.object = s.file.root().create_group(group);
+  s.nodes = facts.nodes;
+  s.single = facts.single;
+  s.object->set("name", facts.object);
+  s.object->set("hash", facts.hash);
+  s.object->set("nodes", facts.nodes);
+  s.object->set("order", facts.order);
+  s.object->set("method", "direct");
+  s.object->set("norm", facts.norm);
+  s.object->set("condition", facts.condition);
+  s.object->set("precision", facts.single ? "float32" : "float64");
   add_matrix(s.digest, matrix);
-  s.matrix_digest = s.digest.value();
-  write_matrix(s.object, matrix);
+  add_matrix(s.matrix_digest, matrix);
+  write_matrix(*s.object, matrix);
   add_factor(s.digest, factor.view());
-  write_factor(s.object, factor.view());
+  write_factor(*s.object, factor.view());
   if (nodes.empty())
     return;
-  s.columns = s.object.create_group("columns");
+  s.columns = s.object->create_group("columns");
   write_checked(*s.columns, "nodes", nodes);
   s.values =
       s.columns->create_dataset("values", s.single ? hdf5::Number::float32 : hdf5::Number::float64,
@@ -175,16 +181,24 @@ void StiffnessStoreWriter::write(std::size_t k, std::span<const double> columns)
   s.write(k, std::span<const float>(s.row));
 }
 
-void StiffnessStoreWriter::close(double residual) {
+void StiffnessStoreWriter::end(double residual) {
   State& s = *state_;
-  s.object.set("residual", residual);
+  s.object->set("residual", residual);
   if (s.columns) {
     write_checked<std::uint32_t>(*s.columns, "crc32c", s.crc);
     write_checked<float>(*s.columns, "bound", s.bounds,
                          {s.crc.size(), 3, store::bound_blocks(s.nodes)});
     s.columns->set("bound_nodes", static_cast<std::int64_t>(store::bound_nodes));
   }
-  s.file.close();
+  s.values.reset();
+  s.columns.reset();
+  s.object.reset();
+  s.crc.clear();
+  s.bounds.clear();
+}
+
+void StiffnessStoreWriter::close() {
+  state_->file.close();
 }
 
 std::uint64_t StiffnessStoreWriter::digest() const {
@@ -192,7 +206,7 @@ std::uint64_t StiffnessStoreWriter::digest() const {
 }
 
 std::uint64_t StiffnessStoreWriter::matrix_digest() const {
-  return state_->matrix_digest;
+  return state_->matrix_digest.value();
 }
 
 } // namespace gewebe

@@ -1,6 +1,5 @@
 // ffe-precompute: model -> stiffness store.
 
-#include "base/digest.h"
 #include "formats/ela.h"
 #include "formats/stiffness_store_writer.h"
 #include "model/selector.h"
@@ -10,13 +9,13 @@
 #include "tools/store_info.h"
 
 #include <algorithm>
-#include <filesystem>
 
 using namespace gewebe;
 namespace {
 
 struct Arguments {
-  std::string model = "-", columns = "none", precision = "float64";
+  std::vector<std::string> models; ///< the store, for --info
+  std::string columns = "none", precision = "float64";
   bool info = false, verify = false;
   std::optional<Selector> touched;
 };
@@ -24,17 +23,20 @@ struct Arguments {
 void complete(Arguments& a) {
   if (a.info && a.columns != "none")
     throw UsageError("--columns does not go with --info");
-  if (a.info && a.model == "-")
-    throw UsageError("expected the name of a store with --info");
-  if (a.columns == "none")
-    return;
-  try {
-    a.touched = parse_selector(a.columns);
-  } catch (const Error& error) {
-    throw UsageError(std::string("--columns: ") + error.what());
+  if (a.info && (a.models.size() != 1 || a.models[0] == "-"))
+    throw UsageError("expected the name of one store with --info");
+  if (a.models.empty())
+    a.models.emplace_back("-");
+  std::vector<std::string> inputs = a.models;
+  if (a.columns != "none") {
+    try {
+      a.touched = parse_selector(a.columns);
+    } catch (const Error& error) {
+      throw UsageError(std::string("--columns: ") + error.what());
+    }
+    const std::vector<std::string> lists = node_list_names(*a.touched);
+    inputs.insert(inputs.end(), lists.begin(), lists.end());
   }
-  std::vector<std::string> inputs = node_list_names(*a.touched);
-  inputs.push_back(a.model);
   cli::check_one_pipe(inputs);
 }
 
@@ -59,24 +61,6 @@ Work prepare(cli::Run& run, const Model& model) {
   return w;
 }
 
-void report(cli::Run& run, const Model& model, const Work& w, std::size_t columns, double residual,
-            const StiffnessStoreWriter& writer) {
-  const auto set = [&](const char* key, std::size_t value) {
-    run.stats().set(key, std::uint64_t{value});
-  };
-  set("nodes", model.nodes.size());
-  set("free_axes", w.matrix.order());
-  set("matrix_nonzeros", 2 * w.matrix.row.size() - w.matrix.order());
-  set("factor_nonzeros", w.factor->entries());
-  run.stats().set("norm", w.check.norm);
-  run.stats().set("condition", w.check.condition);
-  run.stats().set("residual", residual);
-  set("columns", 3 * columns);
-  set("bytes", std::filesystem::file_size(run.output()));
-  run.stats().set("matrix_digest", digest_text(writer.matrix_digest()));
-  run.stats().set("digest", digest_text(writer.digest()));
-}
-
 StiffnessFacts facts_of(const Model& model, const Work& w, const Arguments& a) {
   StiffnessFacts facts;
   facts.object = model.name;
@@ -89,50 +73,65 @@ StiffnessFacts facts_of(const Model& model, const Work& w, const Arguments& a) {
   return facts;
 }
 
+void add_object(cli::Run& run, const Arguments& a, const std::string& name,
+                StiffnessStoreWriter& writer, StoreTotals& totals) {
+  Input input(name);
+  const Model model = run.timed("read", [&] { return read_ela(input, run.context()); });
+  at(input.name(), [&] {
+    const auto nodes = touched_nodes(model, a);
+    const Work w = prepare(run, model);
+    run.timed("write", [&] { writer.begin(facts_of(model, w, a), w.matrix, *w.factor, nodes); });
+    const double columns = run.timed("columns", [&] {
+      return compliance_columns(w.matrix, *w.factor, w.check.norm, nodes, run.context(), writer);
+    });
+    const double residual = std::max(w.check.residual, columns);
+    run.timed("write", [&] { writer.end(residual); });
+    totals = {totals.objects + 1,
+              totals.nodes + model.nodes.size(),
+              totals.order + w.matrix.order(),
+              totals.matrix + 2 * w.matrix.row.size() - w.matrix.order(),
+              totals.factor + w.factor->entries(),
+              totals.columns + 3 * nodes.size(),
+              std::max(totals.norm, w.check.norm),
+              std::max(totals.condition, w.check.condition),
+              std::max(totals.residual, residual)};
+  });
+}
+
 void work(cli::Run& run, const Arguments& a) {
   if (run.output() == "-")
     throw UsageError("expected -o FILE, since a store cannot go to standard output");
   Output::Options options = run.output_options(true);
   options.sync = true;
   Output output(run.output(), options);
-  (void)output.temporary(); // what is no file is refused before the work
-  Input input(a.model);
-  const Model model = run.timed("read", [&] { return read_ela(input, run.context()); });
-  const auto nodes = at(input.name(), [&] { return touched_nodes(model, a); });
-  const Work w = at(input.name(), [&] { return prepare(run, model); });
-
-  std::optional<StiffnessStoreWriter> writer;
-  run.timed("write",
-            [&] { writer.emplace(output, facts_of(model, w, a), w.matrix, *w.factor, nodes); });
-  const double columns = run.timed("columns", [&] {
-    return at(input.name(), [&] {
-      return compliance_columns(w.matrix, *w.factor, w.check.norm, nodes, run.context(), *writer);
-    });
-  });
-  const double residual = std::max(w.check.residual, columns);
-  run.timed("write", [&] { writer->close(residual); });
+  StiffnessStoreWriter writer(output); // what is no file is refused before the work
+  StoreTotals totals;
+  for (const std::string& name : a.models)
+    add_object(run, a, name, writer, totals);
+  writer.close();
   if (a.verify) // what the disk holds, before it takes its name
     run.timed("verify",
               [&] { verify_store(run, StiffnessStore(output.temporary()), run.output()); });
   output.commit();
   if (run.stats_wanted())
-    report(run, model, w, nodes.size(), residual, *writer);
+    report_store(run, totals, writer);
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
   cli::Program p("ffe-precompute",
-                 "Factorises the stiffness of a model and stores it, with columns "
-                 "of its inverse on request.");
+                 "Factorises the stiffness of models and stores it, with columns of its "
+                 "inverse on request.");
   Arguments a;
   p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none");
   p.option("--precision", a.precision, "TYPE", "of the columns: float64, float32")
       .one_of({"float64", "float32"});
   p.flag("--verify", a.verify, "read the store back and recompute some columns another way");
   p.flag("--info", a.info, "say what is in a store, which stands in the place of MODEL");
-  p.operand("MODEL", a.model, "the model");
+  p.operands("MODEL", a.models, "the models, one object each; standard input if there are none", 0);
   p.check([&] { complete(a); });
-  return p.run(argc, argv,
-               [&](cli::Run& run) { a.info ? print_store(run, a.model, a.verify) : work(run, a); });
+  return p.run(argc, argv, [&](cli::Run& run) {
+    a.info ? print_store(run, a.models[0], a.verify) : work(run, a);
+  });
 }

@@ -58,7 +58,16 @@ std::string describe(const Verification& v) {
          number("%.2g", v.tolerance) + "\n";
 }
 
-void count(cli::Run& run, const Verification& v) {
+/// Sums and worst figures over objects.
+void add(Verification& total, const Verification& v) {
+  total.columns_read += v.columns_read;
+  total.recomputed += v.recomputed;
+  total.difference = std::max(total.difference, v.difference);
+  total.asymmetry = std::max(total.asymmetry, v.asymmetry);
+  total.tolerance = std::max(total.tolerance, v.tolerance);
+}
+
+void report(cli::Run& run, const Verification& v) {
   run.stats().set("verified_columns", std::uint64_t{v.columns_read});
   run.stats().set("recomputed_columns", std::uint64_t{v.recomputed});
   run.stats().set("difference", v.difference);
@@ -73,6 +82,7 @@ void print_store(cli::Run& run, const std::string& path, bool verify) {
   const StiffnessStore store(path);
   std::string text =
       "store " + path + "\nbytes " + std::to_string(std::filesystem::file_size(path)) + "\n";
+  Verification total;
   for (const std::string& group : store.objects()) {
     const StiffnessFacts facts = store.facts(group);
     text += describe(facts, store.sizes(facts));
@@ -82,15 +92,35 @@ void print_store(cli::Run& run, const std::string& path, bool verify) {
       return at(path, [&] { return verify_object(store, facts, run.context()); });
     });
     text += describe(v);
-    count(run, v);
+    add(total, v);
   }
+  if (verify)
+    report(run, total);
   output.write(text);
   output.commit();
 }
 
 void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name) {
+  Verification total;
   for (const std::string& group : store.objects())
-    count(run, at(name, [&] { return verify_object(store, store.facts(group), run.context()); }));
+    add(total, at(name, [&] { return verify_object(store, store.facts(group), run.context()); }));
+  report(run, total);
+}
+
+void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer) {
+  cli::Stats& stats = run.stats();
+  stats.set("objects", totals.objects);
+  stats.set("nodes", totals.nodes);
+  stats.set("free_axes", totals.order);
+  stats.set("matrix_nonzeros", totals.matrix);
+  stats.set("factor_nonzeros", totals.factor);
+  stats.set("norm", totals.norm);
+  stats.set("condition", totals.condition);
+  stats.set("residual", totals.residual);
+  stats.set("columns", totals.columns);
+  stats.set("bytes", std::uint64_t{std::filesystem::file_size(run.output())});
+  stats.set("matrix_digest", digest_text(writer.matrix_digest()));
+  stats.set("digest", digest_text(writer.digest()));
 }
 
 } // namespace gewebe

@@ -1,9 +1,11 @@
 #pragma once
-// ffe-precompute --info and --verify.
+// ffe-precompute --info, --verify and --stats.
 
 #include "formats/stiffness_store.h"
+#include "formats/stiffness_store_writer.h"
 #include "tools/cli.h"
 
+#include <cstdint>
 #include <string>
 
 namespace gewebe {
@@ -16,5 +18,14 @@ void print_store(cli::Run& run, const std::string& path, bool verify);
 /// Reads every object of a store back and recomputes the columns of some nodes, which --stats
 /// tells. \throw Error, place = `name`
 void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name);
+
+/// Sums over the objects of a store that was made, and the worst of each.
+struct StoreTotals {
+  std::uint64_t objects = 0, nodes = 0, order = 0, matrix = 0, factor = 0, columns = 0;
+  double norm = 0, condition = 0, residual = 0;
+};
+
+/// What --stats says of a store that stands under its name.
+void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer);
 
 } // namespace gewebe

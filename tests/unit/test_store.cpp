@@ -50,11 +50,13 @@ std::uint64_t write_store(const std::string& path, const Model& model,
   facts.condition = check.condition;
   facts.single = single;
   Output output(path, {});
-  StiffnessStoreWriter writer(output, facts, k, factor, nodes);
+  StiffnessStoreWriter writer(output);
+  writer.begin(facts, k, factor, nodes);
   Context context;
   context.threads = threads;
   const double residual = compliance_columns(k, factor, check.norm, nodes, context, writer);
-  writer.close(std::max(residual, check.residual));
+  writer.end(std::max(residual, check.residual));
+  writer.close();
   output.commit();
   return writer.digest();
 }
@@ -345,8 +347,10 @@ TEST(Store, ArraysOfOtherSizesAreRefused) {
     spoil(facts);
     const Factor factor(k, {});
     Output output(file.path(), {});
-    StiffnessStoreWriter writer(output, facts, k, factor, {});
-    writer.close(0);
+    StiffnessStoreWriter writer(output);
+    writer.begin(facts, k, factor, {});
+    writer.end(0);
+    writer.close();
     output.commit();
     return refusal(file.path());
   };
