@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <memory>
 #include <numeric>
 #include <span>
@@ -87,78 +88,167 @@ struct Scene {
   SnapMerges& merges;
 };
 
-/// What two faces' points have in common: the label of merge_snap_clusters.
-std::uint64_t label_of(const SnapClusters& clusters, std::uint32_t p) {
-  if ((clusters.flags[p] & clustered) == 0)
-    return p;
-  return std::uint64_t{1} << 32 | clusters.cluster[clusters.slot[p]];
-}
-
-enum class Pair { merges, stays, unclear };
-
-/// The test of merge_snap_clusters for a cluster of two points alone, the most frequent one. What
-/// it can't tell with few comparisons is unclear. Sets the two faces that vanish.
-Pair examine_pair(const Scene& scene, std::uint32_t first_slot,
-                  std::array<std::uint32_t, 2>& vanish) {
-  constexpr std::size_t most = 12;
-  const std::uint32_t p = scene.clusters.members[first_slot],
-                      q = scene.clusters.members[first_slot + 1];
-  std::uint32_t x = none, y = none; // opposite to the edge
-  const auto following = [&](std::uint32_t f, std::uint32_t point) {
-    const Triangle& t = scene.triangles[f];
-    return t[0] == point   ? std::array{t[1], t[2]}
-           : t[1] == point ? std::array{t[2], t[0]}
-                           : std::array{t[0], t[1]};
-  };
-  std::array<std::uint32_t, most> of_p{};
-  std::size_t count = 0;
-  for (const std::uint32_t f : scene.stars[first_slot]) {
-    const auto [a, b] = following(f, p);
-    if (a == q) {
-      x = b;
-      vanish[0] = f;
-    } else if (b == q) {
-      y = a;
-      vanish[1] = f;
-    }
-    if (count == most)
-      return Pair::unclear;
-    of_p[count++] = a;
-  }
-  if (x == none && y == none)
-    return Pair::stays;
-  if (x == none || y == none)
-    return Pair::unclear;
-  // Labels of p's neighbours but q, x and y; of p's neighbours, q itself is one.
-  std::array<std::uint64_t, most> labels{};
-  std::size_t others = 0, single = 1;
-  for (std::size_t n = 0; n < count; ++n) {
-    if (of_p[n] == q)
-      continue;
-    const std::uint64_t label = label_of(scene.clusters, of_p[n]);
-    single += label <= UINT32_MAX ? 1 : 0;
-    if (of_p[n] != x && of_p[n] != y)
-      labels[others++] = label;
-  }
-  if (single + (single < count ? 1 : 0) < 4) // a bound of the number of labels
-    return Pair::unclear;
-  for (const std::uint32_t f : scene.stars[first_slot + 1]) {
-    const std::uint32_t a = following(f, q)[0];
-    if (a == p || a == x || a == y)
-      continue;
-    const std::uint64_t label = label_of(scene.clusters, a);
-    bool met = false;
-    for (std::size_t n = 0; n < others; ++n)
-      met = met || labels[n] == label;
-    if (met) // another cluster on both sides, or a third common neighbour
-      return Pair::unclear;
-  }
-  return Pair::merges;
-}
-
 void drop_face(SnapMerges& merges, std::uint32_t f) {
   std::atomic_ref(merges.dropped[f / SnapMerges::faces_at_once])
       .fetch_add(1, std::memory_order_relaxed);
+}
+
+/// Clusters of two or three points, nearly all that there are, with few comparisons.
+class SmallCollapse {
+public:
+  static constexpr std::size_t most_members = 3;
+  /// Takes cluster n, if the conditions of merge_snap_clusters can be told to hold; else it changes
+  /// nothing and answers false.
+  bool take(Scene& scene, std::uint32_t n);
+
+private:
+  /// Neighbours and their labels.
+  struct Ring {
+    static constexpr std::size_t most = 26;
+    std::array<std::uint32_t, most> points;
+    std::array<std::uint64_t, most> labels;
+    std::size_t count = 0;
+    bool has(std::uint32_t point) const {
+      bool found = false;
+      for (std::size_t n = 0; n < count; ++n)
+        found = found || points[n] == point;
+      return found;
+    }
+    void add(std::uint32_t point, std::uint64_t label) {
+      points[count] = point;
+      labels[count++] = label;
+    }
+  };
+  static constexpr int outside = -1;
+
+  /// Bit m: it is member m. Without a branch, since none could be predicted.
+  unsigned member_bit(std::uint32_t point) const {
+    return (point == points_[0] ? 1U : 0U) | (point == points_[1] ? 2U : 0U) |
+           (point == points_[2] ? 4U : 0U);
+  }
+  bool find_ring(const Scene& scene, std::uint32_t slot, std::size_t m);
+  static bool always_collapses(const Ring& p, const Ring& q);
+  void store(Scene& scene, std::uint32_t first_slot, std::size_t p, std::size_t s, int t) const;
+
+  std::span<const std::uint32_t> members_;
+  std::array<std::uint32_t, most_members> points_{}; // the same, then none
+  std::array<Ring, most_members> rings_;
+};
+
+bool SmallCollapse::find_ring(const Scene& scene, std::uint32_t slot, std::size_t m) {
+  Ring& ring = rings_.at(m);
+  ring.count = 0;
+  const std::span<const std::uint32_t> star = scene.stars[slot];
+  if (star.size() > Ring::most / 2)
+    return false;
+  for (const std::uint32_t f : star) {
+    const Triangle& t = scene.triangles[f];
+    const std::uint32_t point = t[0] == members_[m] ? t[1] : t[1] == members_[m] ? t[2] : t[0];
+    std::uint64_t label = point;
+    if ((scene.clusters.flags[point] & clustered) != 0 && member_bit(point) == 0)
+      label = std::uint64_t{1} << 32 | scene.clusters.cluster[scene.clusters.slot[point]];
+    ring.add(point, label);
+  }
+  return true;
+}
+
+/// Do (1) to (3) hold for an edge between points with these neighbours?
+bool SmallCollapse::always_collapses(const Ring& p, const Ring& q) {
+  std::array<std::uint64_t, Ring::most> others; // labels of p's own neighbours
+  std::size_t count = 0, common = 0, single = 0;
+  for (std::size_t n = 0; n < p.count; ++n) {
+    single += p.labels[n] <= UINT32_MAX ? 1 : 0;
+    const bool both = q.has(p.points[n]);
+    others[count] = p.labels[n];
+    common += both ? 1 : 0;
+    count += both ? 0 : 1;
+  }
+  // Points that are no cluster's have a label each.
+  if (common != 2 || single + (single < p.count ? 1 : 0) < 4)
+    return false;
+  bool met = false;
+  for (std::size_t n = 0; n < q.count; ++n) {
+    bool here = false;
+    for (std::size_t m = 0; m < count; ++m)
+      here = here || others[m] == q.labels[n];
+    met = met || (here && !p.has(q.points[n]));
+  }
+  return !met;
+}
+
+bool SmallCollapse::take(Scene& scene, std::uint32_t n) {
+  members_ = scene.clusters.members_of(n);
+  const std::uint32_t first_slot = scene.clusters.begin[n];
+  points_ = {members_[0], members_[1], members_.size() > 2 ? members_[2] : none};
+  for (std::size_t m = 0; m < members_.size(); ++m)
+    if (!find_ring(scene, first_slot + static_cast<std::uint32_t>(m), m))
+      return false;
+  // The first member with a neighbour in the cluster, and the first such neighbour.
+  std::size_t p = 0;
+  int found = outside;
+  for (; p + 1 < members_.size(); ++p) {
+    const Ring& ring = rings_.at(p);
+    for (std::size_t at = 0; at < ring.count && found == outside; ++at)
+      if (const unsigned bit = member_bit(ring.points[at]); bit != 0)
+        found = std::countr_zero(bit);
+    if (found != outside)
+      break;
+  }
+  if (found == outside)
+    return true;
+  const auto s = static_cast<std::size_t>(found);
+  if (!always_collapses(rings_.at(p), rings_.at(s)))
+    return false;
+  int third = outside;
+  if (members_.size() == 3 && p == 0) {
+    const std::size_t t = 3 - s;
+    Ring merged;
+    for (const std::size_t m : {p, s})
+      for (std::size_t at = 0; at < rings_.at(m).count; ++at) {
+        const std::uint32_t point = rings_.at(m).points[at];
+        if (point != members_[p] && point != members_[s] && !merged.has(point))
+          merged.add(point, rings_.at(m).labels[at]);
+      }
+    if (merged.has(members_[t])) {
+      Ring last;
+      const Ring& ring = rings_.at(t);
+      for (std::size_t at = 0; at < ring.count; ++at)
+        if (ring.points[at] != members_[s] && ring.points[at] != members_[p])
+          last.add(ring.points[at], ring.labels[at]);
+      last.add(members_[p], members_[p]);
+      if (!always_collapses(merged, last))
+        return false;
+      third = static_cast<int>(t);
+    }
+  }
+  store(scene, first_slot, p, s, third);
+  return true;
+}
+
+/// Merges s, and t where there is one, into p.
+void SmallCollapse::store(Scene& scene, std::uint32_t first_slot, std::size_t p, std::size_t s,
+                          int t) const {
+  SnapMerges& merges = scene.merges;
+  const auto slot = [&](std::size_t m) { return first_slot + static_cast<std::uint32_t>(m); };
+  merges.target[slot(s)] = members_[p];
+  merges.next[slot(p)] = slot(s);
+  if (t != outside) {
+    merges.target[slot(static_cast<std::size_t>(t))] = members_[p];
+    merges.next[slot(s)] = slot(static_cast<std::size_t>(t));
+  }
+  // Faces with two of them vanish; each is counted at its first one.
+  const unsigned all = 1U << p | 1U << s | (t != outside ? 1U << t : 0U);
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    if ((all >> m & 1) == 0)
+      continue;
+    for (const std::uint32_t f : scene.stars[slot(m)]) {
+      const Triangle& corners = scene.triangles[f];
+      const unsigned here =
+          all & (member_bit(corners[0]) | member_bit(corners[1]) | member_bit(corners[2]));
+      if ((here & (here - 1)) != 0 && (here & (0 - here)) == 1U << m)
+        drop_face(merges, f);
+    }
+  }
 }
 
 /// One cluster and the faces around it. Its members are numbered from 0 on.
@@ -223,19 +313,6 @@ private:
 
 bool Collapse::take(Scene& scene, std::uint32_t n, bool careful) {
   members_ = scene.clusters.members_of(n);
-  if (members_.size() == 2 && !careful) {
-    const std::uint32_t slot = scene.clusters.begin[n];
-    std::array<std::uint32_t, 2> vanish{};
-    const Pair pair = examine_pair(scene, slot, vanish);
-    if (pair == Pair::merges) {
-      scene.merges.target[slot + 1] = members_[0];
-      scene.merges.next[slot] = slot + 1;
-      for (const std::uint32_t f : vanish)
-        drop_face(scene.merges, f);
-    }
-    if (pair != Pair::unclear)
-      return true;
-  }
   gather(scene, n, careful);
   refused_ = 0;
   if (!collapse_all(careful))
@@ -407,9 +484,14 @@ SnapMerges merge_snap_clusters(const Context& context, const std::vector<Triangl
               std::vector<std::uint8_t>(clusters.count()), merges};
   if (!always_careful)
     parallel_blocks(context, clusters.count(), 1024, [&](std::size_t begin, std::size_t end) {
+      SmallCollapse small;
       Collapse collapse;
-      for (std::size_t n = begin; n < end; ++n)
-        scene.done[n] = collapse.in_parallel(scene, static_cast<std::uint32_t>(n)) ? 1 : 0;
+      for (auto n = static_cast<std::uint32_t>(begin); n < end; ++n)
+        scene.done[n] = (clusters.members_of(n).size() <= SmallCollapse::most_members &&
+                         small.take(scene, n)) ||
+                                collapse.in_parallel(scene, n)
+                            ? 1
+                            : 0;
     });
   std::vector<std::uint32_t> rest;
   for (std::size_t n = 0; n < clusters.count(); ++n)

@@ -7,6 +7,7 @@
 #include "surface/snap_collapse_internal.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -196,18 +197,28 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
       looked_at | (place_ == SnapOptions::Place::corner ? snaps_low | snaps_high : 0U);
   parallel_blocks(context_, old.size(), at_once, [&](std::size_t begin, std::size_t end) {
     Triangle* out = triangles.data() + first[begin / at_once];
+    Triangle* const out_end = out + (end - begin - merges_.dropped[begin / at_once]);
+    // Which faces vanish or may have no area can't be predicted: they are picked without a branch.
+    std::array<std::uint32_t, 1025> picked;
     std::uint64_t zero_area = 0;
-    for (std::size_t f = begin; f < end; ++f) {
-      const Triangle& t = old[f];
-      const std::uint32_t a = new_[t[0]], b = new_[t[1]], c = new_[t[2]];
-      const unsigned all = static_cast<unsigned>(flags[t[0]] | flags[t[1]] | flags[t[2]]);
-      if ((all & doubtful) != 0) {
-        if (a == b || b == c || c == a)
-          continue;
-        if (!has_much_area(points[a], points[b], points[c], enough))
+    for (std::size_t f = begin; f < end;) {
+      std::size_t count = 0;
+      for (const std::size_t stop = std::min(end, f + picked.size() - 1); f < stop; ++f) {
+        const Triangle& t = old[f];
+        const Triangle face{new_[t[0]], new_[t[1]], new_[t[2]]};
+        const bool stays = face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
+        const unsigned all = static_cast<unsigned>(flags[t[0]] | flags[t[1]] | flags[t[2]]);
+        picked[count] = static_cast<std::uint32_t>(f);
+        count += stays && (all & doubtful) != 0 ? 1 : 0;
+        if (out != out_end) // only faces that vanish follow
+          *out = face;
+        out += stays ? 1 : 0;
+      }
+      for (std::size_t n = 0; n < count; ++n) {
+        const Triangle& t = old[picked[n]];
+        if (!has_much_area(points[new_[t[0]]], points[new_[t[1]]], points[new_[t[2]]], enough))
           zero_area += has_no_area(position(t[0]), position(t[1]), position(t[2])) ? 1 : 0;
       }
-      *out++ = {a, b, c};
     }
     zero_area_[begin / at_once] = zero_area;
   });

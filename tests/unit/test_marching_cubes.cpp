@@ -41,7 +41,10 @@ TEST(MarchingCubes, SphereConvergesWithOrderTwo) {
     EXPECT_TRUE(report.outward());
     EXPECT_EQ(report.euler, 2);
     EXPECT_EQ(report.components, 1U);
-    EXPECT_EQ(surface.crossings.size(), surface.mesh.points.size());
+    ASSERT_EQ(surface.crossings.size(), surface.mesh.points.size());
+    for (std::size_t p = 0; p < surface.crossings.size(); ++p)
+      EXPECT_EQ(surface.mesh.points[p],
+                surface.transform.to_world(index_position(surface.crossings[p])));
     const double volume_error = std::abs(report.volume - volume) / volume,
                  area_error = std::abs(report.area - area) / area;
     EXPECT_LT(volume_error, 0.65 / (n * n));

@@ -181,5 +181,33 @@ TEST(MarchingCubesTable, FacesOutward) {
   }
 }
 
+TEST(MarchingCubesTable, FacesAwayFromCornersHaveAnArea) {
+  // With crossings at 0.001 or more from the ends of their edges. The normal a×b + b×c + c×a of a
+  // face is linear in each of its three fractions, so a component of one sign at the eight ends of
+  // their ranges is nowhere smaller than at these.
+  constexpr double margin = 1e-3;
+  for (const CellCase& cell : marching_cubes_table())
+    for (std::size_t t = 0; t < cell.count; ++t) {
+      double best = 0; // over directions
+      for (int direction = 1; direction < 27; ++direction) {
+        const int j = direction / 3 % 3, k = direction / 9;
+        const Vec3 d{direction % 3 - 1.0, j - 1.0, k - 1.0};
+        double smallest = HUGE_VAL;
+        for (unsigned ends = 0; ends < 8; ++ends) {
+          std::array<Vec3, 3> p;
+          for (std::size_t n = 0; n < 3; ++n) {
+            const CellEdge& edge = cell_edges[cell.triangles[t][n]];
+            p[n] = {1.0 * (edge.corner & 1), 1.0 * (edge.corner >> 1 & 1),
+                    1.0 * (edge.corner >> 2)};
+            p[n][edge.axis] += (ends >> n & 1) != 0 ? 1 - margin : margin;
+          }
+          smallest = std::min(smallest, dot(d, cross(p[1] - p[0], p[2] - p[0])));
+        }
+        best = std::max(best, smallest / norm(d));
+      }
+      EXPECT_GT(best, 1e-7); // the longest side's square is 3 at most; no area means 1e-12 of it
+    }
+}
+
 } // namespace
 } // namespace gewebe
