@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -20,6 +21,8 @@ namespace {
 
 using Index = std::uint32_t;
 
+/// A point that would move by less than this, relative to its edges, stays.
+constexpr double still = 1e-3;
 constexpr double cos_30 = 0.86602540378443864676, cos_45 = 0.70710678118654752440;
 
 /// Cosine of the smallest angle; 1 where the face has no area.
@@ -217,40 +220,39 @@ private:
   double isovalue_, voxel_ = 0;
 };
 
-/// One point's wish: there, or half the way there; not, if not finite.
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr Vec3 nowhere{nan, nan, nan};
+
+/// Where one point would go; not finite if nowhere.
 struct Wish {
-  std::array<Vec3, 2> target;
+  Vec3 target = nowhere;
   bool off_surface = false;
 };
 
 Wish wish(const FlippingMesh& mesh, const TriangleMesh& shape, IsoField& field, Index p) {
   const Vec3& here = shape.points[p];
   Vec3 normal, mean;
-  double weight = 0;
+  double weight = 0, count = 0;
   mesh.for_outgoing(p, [&](Index h) {
     const Triangle& t = shape.triangles[h / 3];
     const Vec3 area = area_vector(shape.points[t[0]], shape.points[t[1]], shape.points[t[2]]);
     const double size = norm(area);
     normal += area;
     weight += size;
+    ++count;
     mean += (shape.points[t[0]] + shape.points[t[1]] + shape.points[t[2]] - here * 3) * (size / 3);
   });
-  constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  Wish result{{Vec3{none, none, none}, Vec3{none, none, none}}};
   const double length = norm(normal);
   if (!(weight > 0) || !(length > 0))
-    return result;
+    return {};
   normal = normal / length;
   Vec3 move = mean * (0.5 / weight);
   move -= normal * dot(move, normal);
-  for (Vec3& target : result.target) {
-    if (const std::optional<Vec3> place = field.project(here + move))
-      target = *place;
-    else
-      result.off_surface = true;
-    move *= 0.5;
-  }
-  return result;
+  if (dot(move, move) < still * still * weight / count)
+    return {};
+  if (const std::optional<Vec3> place = field.project(here + move))
+    return {*place, false};
+  return {nowhere, true};
 }
 
 /// May p move there? Faces must not turn, nor angles become smaller than they are.
@@ -271,43 +273,58 @@ bool may_move(const FlippingMesh& mesh, const TriangleMesh& shape, Index p, cons
   return !turned && after <= std::fmax(before, cos_30);
 }
 
-/// All rounds, without those points.
-RegularizeReport improve(const Context& context, const Grid& grid, double isovalue,
-                         TriangleMesh& mesh, int rounds, const std::vector<std::uint8_t>& kept) {
-  RegularizeReport report;
-  FlippingMesh flipping(mesh, kept);
-  std::vector<Wish> wishes(mesh.points.size());
-  Context quiet = context; // one loop of many
-  quiet.progress = {};
-  for (int round = 0; round < rounds; ++round) {
-    if (context.progress)
-      context.progress(static_cast<double>(round) / rounds);
-    report.flips += flipping.flip_pass();
-    parallel_blocks(quiet, wishes.size(), 1024, [&](std::size_t begin, std::size_t end) {
-      IsoField field(grid, isovalue);
+/// The rounds of one attempt, in which some points are kept.
+class Attempt {
+public:
+  Attempt(const Context& context, const Grid& grid, double isovalue, TriangleMesh& mesh,
+          const std::vector<std::uint8_t>& kept)
+      : context_(context), grid_(grid), isovalue_(isovalue), mesh_(mesh), kept_(kept),
+        flipping_(mesh, kept), field_(grid, isovalue), wishes_(mesh.points.size()) {
+    context_.progress = {}; // one loop of many
+  }
+
+  void flip() { report.flips += flipping_.flip_pass(); }
+
+  void round() {
+    flip();
+    parallel_blocks(context_, wishes_.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      IsoField field(grid_, isovalue_);
       for (std::size_t p = begin; p < end; ++p)
-        if (kept[p] == 0)
-          wishes[p] = wish(flipping, mesh, field, static_cast<Index>(p));
+        if (kept_[p] == 0)
+          wishes_[p] = wish(flipping_, mesh_, field, static_cast<Index>(p));
     });
     // In turn, so that each move is judged by its neighbours' new places.
-    for (Index p = 0; p < wishes.size(); ++p) {
-      if (kept[p] != 0)
-        continue;
-      const auto& target = wishes[p].target;
-      report.off_surface += wishes[p].off_surface ? 1 : 0;
-      const auto good = std::ranges::find_if(
-          target, [&](const Vec3& place) { return may_move(flipping, mesh, p, place); });
-      if (good != target.end()) {
-        mesh.points[p] = *good;
-        ++report.moves;
-      } else if (is_finite(target[0])) {
-        ++report.refused_moves;
-      }
+    for (Index p = 0; p < wishes_.size(); ++p) {
+      report.off_surface += wishes_[p].off_surface ? 1 : 0;
+      if (is_finite(wishes_[p].target))
+        move(p, wishes_[p].target);
     }
   }
-  report.flips += flipping.flip_pass();
-  return report;
-}
+
+  RegularizeReport report;
+
+private:
+  void move(Index p, Vec3 target) {
+    if (!may_move(flipping_, mesh_, p, target)) {
+      target = field_.project((mesh_.points[p] + target) * 0.5).value_or(nowhere);
+      if (!may_move(flipping_, mesh_, p, target)) {
+        ++report.refused_moves;
+        return;
+      }
+    }
+    mesh_.points[p] = target;
+    ++report.moves;
+  }
+
+  Context context_;
+  const Grid& grid_;
+  double isovalue_;
+  TriangleMesh& mesh_;
+  const std::vector<std::uint8_t>& kept_;
+  FlippingMesh flipping_;
+  IsoField field_;
+  std::vector<Wish> wishes_;
+};
 
 /// Marks the points of these faces and what lies within `rings` edges of them; returns how many are
 /// new.
@@ -347,21 +364,32 @@ RegularizeReport regularize(const Context& context, const Grid& grid, double iso
   if (options.rounds == 0 || mesh.triangles.empty())
     return report;
   std::vector<std::uint8_t> kept(mesh.points.size(), 0);
+  std::uint64_t kept_points = 0;
+  Context quiet = context;
+  quiet.progress = {};
   for (int rings = 1;; rings *= 2) { // ends, since each time more points are kept
     TriangleMesh better;
     better.points = mesh.points;
     better.triangles = mesh.triangles;
-    const std::uint64_t kept_points = report.kept_points;
-    report = improve(context, grid, isovalue, better, options.rounds, kept);
-    report.kept_points = kept_points;
-    const SelfIntersections cuts = self_intersections(context, better);
-    const std::uint64_t fresh = keep_around(better, cuts.faces, rings, kept);
+    Attempt attempt(context, grid, isovalue, better, kept);
+    std::uint64_t fresh = 0;
+    for (int round = 1; round <= options.rounds && fresh == 0; ++round) {
+      if (context.progress)
+        context.progress(static_cast<double>(round - 1) / options.rounds);
+      attempt.round();
+      if (round == options.rounds)
+        attempt.flip();
+      // Most cuts come early: looked for after 1, 2, 4 … rounds, so that little is done in vain.
+      if (std::has_single_bit(static_cast<unsigned>(round)) || round == options.rounds)
+        fresh = keep_around(better, self_intersections(quiet, better).faces, rings, kept);
+    }
+    kept_points += fresh;
     if (fresh == 0) {
       mesh.points = std::move(better.points);
       mesh.triangles = std::move(better.triangles);
-      return report;
+      attempt.report.kept_points = kept_points;
+      return attempt.report;
     }
-    report.kept_points += fresh;
   }
 }
 

@@ -101,3 +101,23 @@ test_reduction_is_linear() {
     [[ $file == log || -e $GEWEBE_ROOT/examples/reduction/$file ]] || fail "clean left $file"
   done
 }
+
+# Triangles before and after snapping: fewer, but the same outline.
+test_wireframe_draws_fewer_triangles() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  mkdir wireframe myoma
+  cp "$GEWEBE_ROOT"/examples/myoma/*.particles myoma
+  cp "$GEWEBE_ROOT"/examples/wireframe/{Makefile,*.awk,*.gnuplot} wireframe
+  cd wireframe || fail 'no folder'
+  make VOXELS=5 5-plain.faces 5-half.faces 5-regularized.faces >../log 2>&1 || fail 'the example fails:' "$(tail -3 ../log)"
+  faces() { grep -c '^$' "5-$1.faces"; }
+  (($(faces half) * 10 < $(faces plain) * 7)) || fail "$(faces half) of $(faces plain) faces after snapping"
+  width() { awk 'NF { if ($1 < low) low = $1; if ($1 > high) high = $1 } END { print high - low }' "5-$1.faces"; }
+  awk "BEGIN { r = $(width half) / $(width plain); exit !(r > 0.98 && r < 1.02) }" || fail 'another outline'
+  make -s VOXELS=5 clean
+  for file in *; do
+    [[ -e $GEWEBE_ROOT/examples/wireframe/$file ]] || fail "clean left $file"
+  done
+}
