@@ -50,7 +50,10 @@ struct SnapResult {
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
 /// \pre `surface` as marching_cubes made it: closed and 2-manifold
-/// \throw Error if epsilon is not within 0 … 0.5, or context.max_memory would not do
+/// Most clusters are taken in parallel; any number of threads gives the same bytes.
+///
+/// \throw Error if epsilon is not within 0 … 0.5, if the points are not in the order that
+/// marching_cubes gives them, or if context.max_memory would not do
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options);
 
 } // namespace gewebe
