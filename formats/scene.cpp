@@ -107,6 +107,16 @@ public:
     return text;
   }
 
+  /// The number behind `word`, which may be absent: 0.
+  double time_after(std::string_view word) {
+    if (!take(word))
+      return 0;
+    const double time = number("time");
+    if (!(time > 0))
+      fail("a time that is not positive");
+    return time;
+  }
+
   Selector nodes() { return parse_selector(word("NODES")); }
 
   void end() const {
@@ -141,6 +151,8 @@ What parse_object(Words& in) {
     const std::string word = in.word("");
     if (word.starts_with("store=") && word.size() > 6 && c.store.empty())
       c.store = word.substr(6);
+    else if (word == "integration=implicit" && !c.implicit)
+      c.implicit = true;
     else if ((word == "method=ffe" || word == "method=ela") && !method)
       method = word == "method=ffe" ? Method::ffe : Method::ela;
     else
@@ -148,6 +160,8 @@ What parse_object(Words& in) {
   }
   if (method == Method::ela && !c.store.empty())
     throw Error("method=ela has no use for a store, expected one of them");
+  if (c.implicit && (method == Method::ffe || !c.store.empty()))
+    throw Error("integration=implicit is for method=ela, expected one of them");
   c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
   return c;
 }
@@ -158,6 +172,28 @@ What parse_force(Words& in) {
   c.nodes = in.nodes();
   c.force = in.vector("number");
   c.total = in.take("total");
+  c.period = in.time_after("period");
+  return c;
+}
+
+What parse_pressure(Words& in) {
+  PressureCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.pressure = in.number("number");
+  c.period = in.time_after("period");
+  return c;
+}
+
+What parse_attach(Words& in) {
+  AttachCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.other = in.name();
+  c.others = in.nodes();
+  c.stiffness = in.number("stiffness");
+  if (!(c.stiffness > 0))
+    in.fail("a stiffness that is not positive");
   return c;
 }
 
@@ -166,6 +202,7 @@ What parse_displace(Words& in) {
   c.object = in.name();
   c.nodes = in.nodes();
   c.displacement = in.vector("number");
+  c.over = in.time_after("over");
   return c;
 }
 
@@ -222,11 +259,14 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 9>& verbs() {
-  static const std::array<Verb, 9> all{{
-      {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela]", false, parse_object},
-      {"force", "force NAME NODES fx fy fz [total]", true, parse_force},
-      {"displace", "displace NAME NODES dx dy dz", true, parse_displace},
+const std::array<Verb, 11>& verbs() {
+  static const std::array<Verb, 11> all{{
+      {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
+       false, parse_object},
+      {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
+      {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},
+      {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
+      {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
       {"release", "release NAME NODES", true, parse_release},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"timestep", "timestep dt", true, parse_timestep},
@@ -269,11 +309,14 @@ std::optional<Command> parse_scene_line(std::string_view line) {
   Command command;
   if (words[0] == "at") {
     words.erase(words.begin());
-    Words in(words, "at T COMMAND...");
+    Words in(words, "at [every] T COMMAND...");
+    command.every = in.take("every");
     command.at = in.number("time");
+    if (command.every && !(*command.at > 0))
+      in.fail("a period that is not positive");
     if (in.done())
       in.fail("no command");
-    words.erase(words.begin());
+    words.erase(words.begin(), words.begin() + (command.every ? 2 : 1));
   }
   command.what = parse_command(std::move(words), command.at.has_value());
   return command;

@@ -109,7 +109,9 @@ struct SceneRun::State {
   }
 
   void change(const Command& command, const Change& made) {
-    if (command.at)
+    if (command.every)
+      simulation.schedule_every(*command.at, made);
+    else if (command.at)
       simulation.schedule(*command.at, made);
     else
       simulation.apply(made);
@@ -124,7 +126,8 @@ struct SceneRun::State {
     if (!c.store.empty())
       parts = options.files.store(c.store, model);
     counts.nodes += model.nodes.size();
-    simulation.add_object(c.name, std::move(model), c.method, std::move(parts));
+    simulation.add_object(c.name, std::move(model), c.method, std::move(parts),
+                          c.implicit ? Integration::implicit : Integration::semi_implicit);
     if (options.result != nullptr)
       deliver([&] {
         options.result->add_object(c.name, simulation.model(simulation.object_count() - 1));
@@ -135,14 +138,25 @@ struct SceneRun::State {
     if (const auto* const object = std::get_if<ObjectCommand>(&command.what)) {
       add(*object);
     } else if (const auto* const force = std::get_if<ForceCommand>(&command.what)) {
-      SetForce set{simulation.find(force->object), {}, force->force};
+      SetForce set{simulation.find(force->object), {}, force->force, force->period};
       set.nodes = nodes(set.object, force->nodes);
       if (force->total)
         set.force = set.force / static_cast<double>(set.nodes.size());
       change(command, set);
     } else if (const auto* const displace = std::get_if<DisplaceCommand>(&command.what)) {
-      SetDisplacement set{simulation.find(displace->object), {}, displace->displacement};
+      SetDisplacement set{
+          simulation.find(displace->object), {}, displace->displacement, displace->over};
       set.nodes = nodes(set.object, displace->nodes);
+      change(command, set);
+    } else if (const auto* const pressure = std::get_if<PressureCommand>(&command.what)) {
+      SetPressure set{
+          simulation.find(pressure->object), {}, {pressure->pressure, pressure->period}};
+      set.nodes = nodes(set.object, pressure->nodes);
+      change(command, set);
+    } else if (const auto* const tie = std::get_if<AttachCommand>(&command.what)) {
+      Attach set{simulation.find(tie->object), {}, simulation.find(tie->other), {}, tie->stiffness};
+      set.nodes = nodes(set.object, tie->nodes);
+      set.others = nodes(set.other, tie->others);
       change(command, set);
     } else if (const auto* const release = std::get_if<ReleaseCommand>(&command.what)) {
       Release set{simulation.find(release->object), {}};

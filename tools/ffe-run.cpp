@@ -4,6 +4,7 @@
 #include "formats/scene_run.h"
 #include "tools/cli.h"
 
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -34,6 +35,16 @@ void report(cli::Run& run, const SceneRun& scene) {
   stats.set("time", scene.simulation().time());
   stats.set("integration_steps", steps.integration);
   stats.set("skipped_at_rest", steps.resting);
+  const std::uint64_t advances = steps.resting + steps.moving;
+  stats.set("sleeping_share",
+            advances == 0 ? 0.0
+                          : static_cast<double>(steps.resting) / static_cast<double>(advances));
+  const SimulationState state = scene.simulation().state();
+  stats.set("kinetic_energy", state.kinetic_energy);
+  stats.set("elastic_energy", state.elastic_energy);
+  stats.set("largest_strain", state.strain);
+  if (std::isfinite(state.safe_step))
+    stats.set("safe_step", state.safe_step);
   stats.set("updates", still.updates);
   stats.set("skipped_unchanged", still.unchanged);
   stats.set("factors", still.factors);

@@ -120,28 +120,65 @@ double total_mass(const Model& model) {
   return sum;
 }
 
-double safe_step(const Model& model) {
-  std::vector<double> stiffness(model.nodes.size()), damping(model.nodes.size());
+namespace {
+
+/// Σ w k and Σ w c + d of a node, as in safe_steps().
+struct Pull {
+  double stiffness = 0, braking = 0;
+};
+
+std::vector<Pull> node_pulls(const Model& model) {
+  std::vector<Pull> pulls(model.nodes.size());
+  const auto add = [&](std::uint32_t i, std::uint32_t other, const Spring& s) {
+    const double weight = model.nodes[other].fixed == fixed_all ? 1 : 2;
+    pulls[i].stiffness += weight * s.stiffness;
+    pulls[i].braking += weight * s.damping;
+  };
   for (const Spring& s : model.springs) {
-    stiffness[s.i] += 2 * s.stiffness;
-    stiffness[s.j] += 2 * s.stiffness;
-    damping[s.i] += 2 * s.damping;
-    damping[s.j] += 2 * s.damping;
+    add(s.i, s.j, s);
+    add(s.j, s.i, s);
   }
-  double omega2 = 0, gamma = 0;
-  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
-    const Node& n = model.nodes[i];
-    const double brake = damping[i] + n.drag;
-    if (n.fixed == fixed_all || (stiffness[i] == 0 && brake == 0))
-      continue;
-    omega2 = std::max(omega2, stiffness[i] / n.mass);
-    if (brake > 0)
-      gamma = std::max(gamma, brake / n.mass);
-  }
-  if (omega2 == 0 && gamma == 0)
+  for (std::size_t i = 0; i < pulls.size(); ++i)
+    pulls[i].braking += model.nodes[i].drag;
+  return pulls;
+}
+
+double node_step(const Node& node, const Pull& pull) {
+  if (node.fixed == fixed_all || (pull.stiffness == 0 && pull.braking == 0))
     return HUGE_VAL;
+  const double omega2 = pull.stiffness / node.mass, gamma = pull.braking / node.mass;
   // The same as (√(γ² + 4ω²) - γ)/ω², without its cancellation and its 0/0 at ω = 0.
-  return 4 / (std::sqrt(gamma * gamma + 4 * omega2) + gamma);
+  return node.mass > 0 ? 4 / (std::sqrt(gamma * gamma + 4 * omega2) + gamma) : 0;
+}
+
+} // namespace
+
+std::vector<double> safe_steps(const Model& model) {
+  const std::vector<Pull> pulls = node_pulls(model);
+  std::vector<double> steps(pulls.size());
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    steps[i] = node_step(model.nodes[i], pulls[i]);
+  return steps;
+}
+
+double safe_step(const Model& model) {
+  const std::vector<double> steps = safe_steps(model);
+  return steps.empty() ? HUGE_VAL : *std::min_element(steps.begin(), steps.end());
+}
+
+std::size_t scale_masses(Model& model, double step) {
+  const std::vector<Pull> pulls = node_pulls(model);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < pulls.size(); ++i) {
+    Node& node = model.nodes[i];
+    if (node_step(node, pulls[i]) >= step)
+      continue;
+    node.mass = (step * step * pulls[i].stiffness + 2 * step * pulls[i].braking) / 4;
+    while (!(node_step(node, pulls[i]) >= step)) // rounding
+      node.mass = std::nextafter(node.mass, HUGE_VAL);
+    ++count;
+  }
+  return count;
 }
 
 std::string model_digest(const Model& model) {

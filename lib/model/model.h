@@ -117,10 +117,22 @@ Components components(const Model& model);
 /// Sum of the masses of the surface nodes, g.
 double total_mass(const Model& model);
 
-/// Largest stable step in s of semi-implicit Euler with explicit damping, for the model at rest:
-/// (√(γ² + 4ω²) - γ)/ω² with ω² = max Σ 2k/m and γ = max (Σ 2c + d)/m over the nodes that may move.
-/// Infinite where nothing pulls or brakes, 0 where a movable node with springs has no mass.
+/// For each node the largest step h in s of semi-implicit Euler with explicit damping for which
+///
+///   h² Σ w k + 2 h (Σ w c + d) <= 4 m,   that is   h = (√(γ² + 4ω²) - γ)/ω²
+///
+/// with ω² = Σ w k/m and γ = (Σ w c + d)/m; w is 2, and 1 for springs to nodes that are fixed along
+/// all axes. A step is stable for the model at rest where 4 M - 2 h C - h² K is positive definite,
+/// which by Gershgorin's theorem holds below the least of these. Infinite for nodes that can't move
+/// or that nothing pulls or brakes, 0 where a movable node with springs has no mass.
+std::vector<double> safe_steps(const Model& model);
+
+/// The least of safe_steps().
 double safe_step(const Model& model);
+
+/// Raises the masses of the nodes whose safe step is below `step` so that it is `step`; drag and
+/// damping stay. \return how many   \pre step > 0
+std::size_t scale_masses(Model& model, double step);
 
 /// XXH3-64 of the whole model in file order, 16 hexadecimal digits.
 std::string model_digest(const Model& model);

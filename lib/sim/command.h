@@ -20,17 +20,33 @@ constexpr const char* method_name(Method method) {
 struct ObjectCommand {
   std::string name, model, store; ///< files as the scene names them; no store: ""
   Method method = Method::ela;
+  bool implicit = false;
 };
 struct ForceCommand {
   std::string object;
   Selector nodes;
   Vec3 force;
   bool total = false; ///< divided among the nodes
+  double period = 0;  ///< of its pulse, s; 0: none
+};
+struct PressureCommand {
+  std::string object;
+  Selector nodes;
+  double pressure = 0; ///< Pa, along the normals
+  double period = 0;
+};
+struct AttachCommand {
+  std::string object;
+  Selector nodes;
+  std::string other;
+  Selector others;
+  double stiffness = 0; ///< > 0
 };
 struct DisplaceCommand {
   std::string object;
   Selector nodes;
   Vec3 displacement;
+  double over = 0; ///< s that the way takes
 };
 struct ReleaseCommand {
   std::string object;
@@ -54,8 +70,10 @@ struct RunCommand {
 
 struct Command {
   std::optional<double> at; ///< when; absent: now. Never for object, step and run.
-  std::variant<ObjectCommand, ForceCommand, DisplaceCommand, ReleaseCommand, GravityCommand,
-               TimestepCommand, EmitCommand, StepCommand, RunCommand>
+  bool every = false;       ///< at every multiple of it
+  std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
+               ReleaseCommand, GravityCommand, TimestepCommand, EmitCommand, StepCommand,
+               RunCommand>
       what;
 };
 

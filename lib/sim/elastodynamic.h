@@ -1,18 +1,25 @@
 #pragma once
-// The elastodynamic method: masses and springs in time by semi-implicit Euler (report 3.1.3).
+// The elastodynamic method: masses and springs in time (report 3.1.3).
 //
-//   v += h/m (F(u, v) + f + m g),   u += h v
+// Semi-implicit Euler, with all F of the old state:
 //
-// with all F of the old state. Axes that the model holds stay, a displaced node stands at its
-// displacement with velocity 0. The same bytes for any number of threads.
+//   v' = v + h/m (F(u, v) + f + m g),   u' = u + h v'
+//
+// or, for models too stiff for that, backward Euler with F of the new state (sim/implicit_euler.h).
+// Axes that the model holds stay, a displaced node stands at its displacement with velocity 0, or
+// is on its way there. The same bytes for any number of threads.
 
 #include "base/context.h"
+#include "base/error.h"
 #include "model/model.h"
+#include "sim/implicit_euler.h"
 #include "sim/load.h"
 #include "sim/spring_force.h"
+#include "sim/spring_layout.h"
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -22,46 +29,93 @@ namespace gewebe {
 /// model at rest alone.
 inline constexpr double safe_step_fraction = 0.9;
 
+enum class Integration { semi_implicit, implicit };
+
+/// The state of an object can't be continued.
+class MotionError : public Error {
+public:
+  MotionError(std::uint32_t node, double time, const std::string& what)
+      : Error(what), node_(node), time_(time) {}
+  std::uint32_t node() const noexcept { return node_; }
+  double time() const noexcept { return time_; }
+
+private:
+  std::uint32_t node_;
+  double time_;
+};
+
 class Elastodynamic {
 public:
   /// At rest. Keeps a reference to the model.
   /// \pre check_model(model) passes   \throw Error if a node can move but has no mass
-  explicit Elastodynamic(const Model& model);
+  explicit Elastodynamic(const Model& model, Integration integration = Integration::semi_implicit);
 
   /// What acts from now on. Displaced nodes stand where they must at once. An unchanged load wakes
   /// nobody. \pre nodes exist, no displacement along an axis that the model holds
-  void set_load(const Load& load);
+  void set_load(const Load& load, double time = 0);
 
-  /// Integrates over `duration` in equal steps of at most `largest_step`. An object that rests (see
-  /// resting()) takes none. \return steps taken \pre duration >= 0, largest_step > 0
-  /// \throw Error if there would be over 1e9 steps or the state is no longer finite ("… after …
-  /// s"); Cancelled
-  std::uint64_t advance(double duration, double largest_step, const Context& context);
+  /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object
+  /// that rests (see resting()) takes none. \return steps taken
+  /// \pre duration >= 0, largest_step > 0, start >= 0
+  /// \throw Error if there would be over 1e9 steps; MotionError that names the node and the time
+  /// where the state is no longer finite, or an implicit step has no solution; Cancelled
+  std::uint64_t advance(double duration, double largest_step, const Context& context,
+                        double start = 0);
 
   /// Whether the object was found at rest: no speed, and acceleration (times the square of the
-  /// step) under 1e-14 of its size; so it stays until its load changes.
+  /// step) under 1e-15 of its size; so it stays until its load changes.
   bool resting() const noexcept { return resting_; }
 
-  std::span<const NodeMotion> motion() const noexcept { return motion_; }
+  /// By node of the model. \pre not from two threads at once
+  std::span<const NodeMotion> motion() const;
   /// Gives the nodes another state; it wakes. \pre as many as nodes; 0 where the model holds them
-  void set_motion(std::vector<NodeMotion> motion);
+  void set_motion(std::span<const NodeMotion> motion);
 
   /// What holds the displaced nodes: the force on the object, per node in ascending order; 0 along
   /// axes that the model holds.
   std::vector<NodeVector> contact_forces() const;
 
 private:
+  /// A row whose force changes with time or shape.
+  struct Driven {
+    std::uint32_t node = 0;
+    Vec3 steady, pulsing;
+    double period = 0;
+    NodePressure pressure;
+    std::vector<Triangle> around; ///< if there is a pressure
+  };
+  struct Traveller {
+    std::uint32_t node = 0;
+    Travel way;
+  };
+  struct Drive { ///< of a block
+    std::vector<Driven> driven;
+    std::vector<Traveller> travellers;
+  };
+
   void apply_load();
-  bool found_at_rest(double h) const;
-  bool step(double h, const Context& context); ///< whether the state is still finite
+  bool found_at_rest(double h, double time) const;
+  template <class At>
+  Vec3 outer_force(const Driven& driven, double time, const At& position) const;
+  void run_steps(std::uint64_t steps, double h, double start, const Context& context);
+  void run_implicit(std::uint64_t steps, double h, double start, const Context& context);
+  bool step_block(std::size_t block, const NodeRow* now, NodeRow* next, double h, double time,
+                  CpuLevel cpu);
+  Vec3 outer_force(std::uint32_t node, double time) const;
+  [[noreturn]] void fail(double time, const char* what) const;
 
   const Model& model_;
   SpringNetwork network_;
+  SpringLayout layout_;
   Load load_;
-  std::vector<Vec3> inverse_mass_; ///< 0 along axes that can't move
-  std::vector<Vec3> constant_;     ///< f + m g of each node
-  std::vector<NodeMotion> motion_, next_;
-  double size_ = 0; ///< longest side of the box at rest
+  double time_ = 0; ///< of the state
+  std::vector<NodeTraits> traits_;
+  std::vector<NodeRow> rows_, next_;
+  std::vector<Drive> drives_; ///< by block; empty where nothing changes
+  std::unique_ptr<ImplicitEuler> implicit_;
+  mutable std::vector<NodeMotion> motion_;
+  mutable bool motion_shown_ = false; ///< motion_ is that of rows_
+  double size_ = 0;                   ///< longest side of the box at rest
   bool resting_ = false;
 };
 

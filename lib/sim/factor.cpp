@@ -179,6 +179,17 @@ struct Factor::State {
   ~State() { (void)cholmod_l_free_factor(&owned, common.get()); }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
+
+  /// The numbers of `owned`. \pre it is this thread's turn
+  void factorise(cholmod_sparse& a, const Context& context) {
+    check_cancelled(context);
+    (void)cholmod_l_factorize(&a, owned, common.get());
+    common.check("the factorisation of the stiffness matrix");
+    check_cancelled(context);
+    if (owned->minor < a.nrow)
+      throw NotPositiveDefinite(
+          static_cast<std::size_t>(static_cast<const std::int64_t*>(owned->Perm)[owned->minor]));
+  }
 };
 
 Factor::~Factor() = default;
@@ -196,13 +207,13 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
   if (state_->owned == nullptr || state_->owned->is_super == 0)
     throw Error("the analysis of the stiffness matrix made no supernodes");
   require_memory(context, factor_bytes(*state_->owned), "the factor of the stiffness matrix");
-  check_cancelled(context);
-  (void)cholmod_l_factorize(&a, state_->owned, common.get());
-  common.check("the factorisation of the stiffness matrix");
-  check_cancelled(context);
-  if (state_->owned->minor < matrix.order())
-    throw NotPositiveDefinite(static_cast<std::size_t>(
-        static_cast<const std::int64_t*>(state_->owned->Perm)[state_->owned->minor]));
+  state_->factorise(a, context);
+}
+
+void Factor::renew(const StiffnessMatrix& matrix, const Context& context) {
+  cholmod_sparse a = sparse_view(matrix);
+  const auto turn = blas_turn();
+  state_->factorise(a, context);
 }
 
 Factor::Factor(FactorData data, CpuLevel cpu) : state_(std::make_unique<State>(cpu)) {

@@ -55,6 +55,9 @@ public:
   /// \throw NotPositiveDefinite by its pivots alone; Error if memory exceeds the context's;
   /// Cancelled
   Factor(const StiffnessMatrix& matrix, const Context& context);
+  /// The factor of another matrix of the same pattern: what depends on the pattern alone is kept.
+  /// \pre made by the constructor above   \throw as it
+  void renew(const StiffnessMatrix& matrix, const Context& context);
   /// \throw Error if the arrays contradict each other (every index is checked: they come from
   /// files)
   explicit Factor(FactorData data, CpuLevel cpu = best_cpu_level());

@@ -9,6 +9,7 @@
 #include "sim/elastostatic.h"
 #include "sim/load.h"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -25,14 +26,30 @@ namespace gewebe {
 struct SetForce {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
-  Vec3 force; ///< on each; 0 takes it away
+  Vec3 force;        ///< on each; 0 takes it away
+  double period = 0; ///< s; 0: it does not pulse
+};
+struct SetPressure {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  NodePressure pressure; ///< 0 takes it away
 };
 struct SetDisplacement {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
   Vec3 displacement;
+  double over = 0; ///< s that the way there takes an elastodynamic object's nodes
 };
-struct Release { ///< of force and displacement
+/// Ties each of the first object's nodes to the nearest of the second's by a spring, at rest as
+/// they stand.
+struct Attach {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  std::size_t other = 0;
+  std::vector<std::uint32_t> others;
+  double stiffness = 0; ///< g/s², of each spring
+};
+struct Release { ///< of force, pressure and displacement
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
 };
@@ -45,7 +62,8 @@ struct SetTimestep {
 struct Emit {
   bool forces = false; ///< else shapes
 };
-using Change = std::variant<SetForce, SetDisplacement, Release, SetGravity, SetTimestep, Emit>;
+using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetGravity,
+                            SetTimestep, Emit>;
 
 struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
@@ -56,7 +74,15 @@ struct SimulationCounts {
   std::uint64_t steps = 0;         ///< of the scene
   std::uint64_t integration = 0;   ///< integration steps of elastodynamic objects
   std::uint64_t resting = 0;       ///< advances that an object at rest did not need
+  std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
+};
+
+/// Of the last step.
+struct SimulationState {
+  double kinetic_energy = 0, elastic_energy = 0; ///< of elastodynamic objects, 1e-9 J
+  double strain = 0;                             ///< largest of any spring
+  double safe_step = HUGE_VAL;                   ///< least of the elastodynamic objects
 };
 
 class Simulation {
@@ -69,7 +95,8 @@ public:
   /// An object at rest, under the present gravity. \param parts for ffe: what is stored of it
   /// \pre check_model(model) passes   \throw Error if there is one of that name, or it can't be
   /// simulated by this method; Cancelled
-  void add_object(const std::string& name, Model model, Method method, StiffnessParts parts = {});
+  void add_object(const std::string& name, Model model, Method method, StiffnessParts parts = {},
+                  Integration integration = Integration::semi_implicit);
 
   std::size_t object_count() const noexcept { return objects_.size(); }
   const std::string& name(std::size_t object) const;
@@ -79,12 +106,17 @@ public:
   std::size_t find(const std::string& name) const;
 
   /// Takes effect now. \pre objects and nodes exist, numbers are finite
-  /// \throw Error if a node should move along an axis that the model holds
+  /// \throw Error if a node should move along an axis that the model holds, or objects can't be
+  /// attached
   void apply(const Change& change);
   /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier.
   /// \throw Error as apply, and if the time is past
   void schedule(double time, const Change& change);
-  std::size_t pending() const noexcept { return events_.size(); }
+  /// Takes effect at every multiple of `period` behind now. \throw Error as apply
+  /// \pre period > 0
+  void schedule_every(double period, const Change& change);
+  /// Events that wait, repeated ones not counted.
+  std::size_t pending() const noexcept;
 
   double time() const noexcept { return time_; }
   /// The integration step asked for by SetTimestep.
@@ -102,21 +134,40 @@ public:
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
   SimulationCounts counts() const;
+  SimulationState state() const;
 
 private:
   struct Object;
+  struct Body;
+  struct Tie {
+    std::size_t object = 0, other = 0;
+    std::uint32_t node = 0, other_node = 0;
+    double stiffness = 0, rest = 0;
+  };
+  struct Event {
+    Change change;
+    double origin = 0, period = 0; ///< of a repeated one
+    double round = 0;
+  };
   void check(const Change& change) const;
+  void attach(const Attach& tie);
+  void displace(Object& object, const SetDisplacement& set);
+  [[noreturn]] void raise(const Body& body) const;
+  std::unique_ptr<Body> make_body(std::vector<std::size_t> parts);
+  void move_bodies(double to);
   void advance(double to);
   template <class Work>
   void at_object(const Object& object, Work&& work); ///< names object and time in an Error
   void show(Object& object);
   void warn_of_range(Object& object);
-  double integration_step(Object& object);
+  double integration_step(Body& body);
 
   Context context_;
   SimulationOptions options_;
   std::vector<std::unique_ptr<Object>> objects_;
-  std::multimap<double, Change> events_;
+  std::vector<std::unique_ptr<Body>> bodies_;
+  std::vector<Tie> ties_;
+  std::multimap<double, Event> events_;
   Vec3 gravity_;
   std::optional<double> timestep_;
   double time_ = 0;

@@ -1,5 +1,9 @@
 #include "sim/spring_force.h"
 
+#include "sim/spring_kernel.h"
+
+#include <cmath>
+
 namespace gewebe {
 
 SpringNetwork spring_network(const Model& model) {
@@ -37,13 +41,13 @@ Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> moti
     // Differences, products and sums of them: seen from the other end all signs are opposite.
     const Vec3 along =
         (network.position[half.other] - position) + (other.displacement - own.displacement);
-    const double length = norm(along);
-    if (length == 0)
+    const double square = dot(along, along);
+    if (!(square > least_square))
       continue;
-    const Vec3 direction = along * (1 / length);
-    const double pull = half.stiffness * (length - half.rest) +
-                        half.damping * dot(other.velocity - own.velocity, direction);
-    force += pull * direction;
+    const double length = std::sqrt(square);
+    const double pull = half.stiffness * (length - half.rest) * length +
+                        half.damping * dot(other.velocity - own.velocity, along);
+    force += pull * (1 / square) * along;
   }
   return force - network.drag[i] * own.velocity;
 }

@@ -3,7 +3,7 @@
 //
 // With e = l - rest and n from i to j a spring pulls node i by [k e + c (v_j - v_i)·n] n and node j
 // by exactly the opposite, bit for bit; drag brakes a node by -d v. A spring whose ends are at one
-// place has no direction and pulls nobody.
+// place (within 1e-150 mm) has no direction and pulls nobody.
 
 #include "base/vec3.h"
 #include "model/model.h"

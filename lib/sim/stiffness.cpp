@@ -13,8 +13,7 @@ namespace gewebe {
 
 namespace {
 
-/// The symmetric block of a spring, entries xx xy xz yy yz zz.
-using Block = std::array<double, 6>;
+using Block = SymmetricBlock;
 
 constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
 
@@ -71,21 +70,29 @@ void number_axes(const Model& model, std::span<const std::uint8_t> fixed, Stiffn
 
 } // namespace
 
-StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed) {
+namespace {
+
+/// \param left_out says of a spring that it makes no entry
+template <class LeftOut>
+StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
+                         std::span<const double> added, std::span<const std::uint8_t> fixed,
+                         LeftOut&& left_out) {
   StiffnessMatrix matrix;
   number_axes(model, fixed, matrix);
   if (matrix.order() == 0)
     throw Error("every node is fixed along every axis, expected a node that can move");
 
-  std::vector<Block> blocks(model.springs.size()), diagonal(model.nodes.size());
+  std::vector<Block> diagonal(model.nodes.size());
   for (std::size_t e = 0; e < model.springs.size(); ++e) {
     const Spring& s = model.springs[e];
-    blocks[e] = block_of(model, s);
     for (std::size_t k = 0; k < 6; ++k) {
       diagonal[s.i][k] += blocks[e][k];
       diagonal[s.j][k] += blocks[e][k];
     }
   }
+  for (std::size_t i = 0; i < added.size(); ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      diagonal[i][entry[a][a]] += added[i];
 
   const Rows rows = rows_of(model);
   matrix.column_start.reserve(matrix.order() + 1);
@@ -107,7 +114,7 @@ StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_
           add(row, diagonal[i][entry[a][b]]);
       for (std::size_t r = rows.start[i]; r < rows.start[i + 1]; ++r) {
         const std::size_t e = rows.spring[r];
-        if (model.springs[e].stiffness == 0)
+        if (left_out(model.springs[e]))
           continue;
         for (std::size_t b = 0; b < 3; ++b)
           if (const std::int64_t row = matrix.row_of_axis[3 * std::size_t{model.springs[e].j} + b];
@@ -119,6 +126,22 @@ StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_
   if (!finite)
     throw Error("the stiffness of a node is too large to be a number");
   return matrix;
+}
+
+} // namespace
+
+StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed) {
+  std::vector<Block> blocks(model.springs.size());
+  for (std::size_t e = 0; e < blocks.size(); ++e)
+    blocks[e] = block_of(model, model.springs[e]);
+  return assemble(model, blocks, {}, fixed, [](const Spring& s) { return s.stiffness == 0; });
+}
+
+StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock> blocks,
+                              std::span<const double> diagonal,
+                              std::span<const std::uint8_t> fixed) {
+  return assemble(model, blocks, diagonal, fixed,
+                  [](const Spring& s) { return s.stiffness == 0 && s.damping == 0; });
 }
 
 void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f) {

@@ -9,6 +9,7 @@
 #include "base/context.h"
 #include "model/model.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -32,6 +33,17 @@ struct StiffnessMatrix {
 /// displacements are prescribed. The same bytes on every machine. \pre check_model(model) passes
 /// \throw Error if no axis is free, or a sum isn't finite
 StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed = {});
+
+/// A symmetric 3 × 3 matrix, entries xx xy xz yy yz zz.
+using SymmetricBlock = std::array<double, 6>;
+
+/// The sum over the springs of blocks[e] at (i,i) and (j,j) and its negative at (i,j) and (j,i),
+/// plus diagonal[i] (where there is one) on the axes of node i. Springs without stiffness and
+/// damping make no entry, so that models of one structure have matrices of one pattern. \pre a
+/// block for each spring   \throw Error as stiffness_matrix
+StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock> blocks,
+                              std::span<const double> diagonal,
+                              std::span<const std::uint8_t> fixed = {});
 
 /// f = K u over all 3 n axes, the fixed ones too, whose f are what the supports must hold against:
 /// reactions. \pre u.size() == f.size() == 3 n

@@ -67,13 +67,23 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(later.value().at, 0.5);
   EXPECT_TRUE(std::holds_alternative<ReleaseCommand>(later.value().what));
   EXPECT_FALSE(parse_scene_line("step").value().at);
+  EXPECT_TRUE(parse_scene_line("at every 0.5 release a 3").value().every);
+  EXPECT_FALSE(later.value().every);
+  EXPECT_EQ(parsed<ForceCommand>("force a 1 1 2 3 total period 0.8").period, 0.8);
+  EXPECT_EQ(parsed<PressureCommand>("pressure a all -20").pressure, -20);
+  EXPECT_EQ(parsed<PressureCommand>("pressure a all -20 period 2").period, 2);
+  EXPECT_EQ(parsed<DisplaceCommand>("displace a 1 0 0 1 over 0.25").over, 0.25);
+  EXPECT_EQ(parsed<AttachCommand>("attach a 1 b z<3 500").stiffness, 500);
+  EXPECT_EQ(parsed<AttachCommand>("attach a 1 b z<3 500").other, "b");
+  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela integration=implicit").implicit);
 }
 
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
-  const std::string known =
-      "expected one of object, force, displace, release, gravity, timestep, emit, step, run, at";
-  for (const char* word : {"pressure", "instrument", "attach", "grasp", "method", "two-step", "cut",
-                           "steps", "STEP", "\"\""})
+  const std::string known = "expected one of object, force, pressure, displace, attach, release, "
+                            "gravity, timestep, emit, "
+                            "step, run, at";
+  for (const char* word :
+       {"instrument", "grasp", "method", "two-step", "cut", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{
       {"object", "no NAME, expected object NAME"},
@@ -124,9 +134,15 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"run 1 every", "no time"},
       {"run 1 every 0", "DT is not positive"},
       {"run inf every 1", "'inf' is not finite"},
-      {"at", "expected at T COMMAND"},
-      {"at every 1 step", "'every' is no time"},
-      {"at 1", "no command, expected at T"},
+      {"at", "expected at [every] T COMMAND"},
+      {"at every 1 step", "'step' is no command behind at T"},
+      {"at every 0 emit shapes", "a period that is not positive"},
+      {"force a 1 0 0 1 period 0", "a time that is not positive"},
+      {"pressure a 1", "expected pressure NAME NODES p [period T]"},
+      {"displace a 1 0 0 1 over -1", "a time that is not positive"},
+      {"attach a 1 b 2 0", "a stiffness that is not positive"},
+      {"object a b method=ffe integration=implicit", "is for method=ela"},
+      {"at 1", "no command, expected at [every] T"},
       {"at 1 step", "'step' is no command behind at T, expected one of force"},
       {"at 1 at 2 step", "'at' is no command behind at T"},
       {"at 1 object a b", "'object' is no command behind at T"},

@@ -168,5 +168,121 @@ TEST(Simulation, RefusesDisplacementAlongFixedAxesAndThePast) {
   EXPECT_EQ(s.pending(), 0U);
 }
 
+/// Two organs, the second beside the first.
+void add_two(Simulation& s, Method method = Method::ela) {
+  s.add_object("a", organ(), method);
+  Model b = organ();
+  for (Node& n : b.nodes)
+    n.position.x += 41;
+  s.add_object("b", std::move(b), Method::ela);
+}
+
+TEST(Simulation, AttachedObjectsPullEachOtherAndTheOthersSleep) {
+  const auto run = [](int count, bool attached) {
+    Simulation s(threads(count), {});
+    add_two(s);
+    s.add_object("c", organ(), Method::ela);
+    const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
+    if (attached)
+      s.apply(Attach{0, {nodes[5], nodes[9]}, 1, free_nodes(s.model(1)), 5000});
+    s.step(0.01); // the springs are at rest
+    EXPECT_EQ(s.counts().integration, 0U);
+    s.apply(SetDisplacement{0, {nodes[5]}, {-1, 0, 0}});
+    s.step(0.05);
+    std::vector<double> result;
+    for (const std::size_t object : {0U, 1U, 2U})
+      result.insert(result.end(), s.displacement(object).begin(), s.displacement(object).end());
+    return result;
+  };
+  const std::vector<double> tied = run(1, true), loose = run(1, false);
+  const std::size_t n = tied.size() / 3;
+  double moved = 0;
+  for (std::size_t i = n; i < 2 * n; ++i) {
+    moved = std::max(moved, std::abs(tied[i]));
+    EXPECT_EQ(loose[i], 0);
+  }
+  EXPECT_GT(moved, 1e-4);
+  for (std::size_t i = 2 * n; i < tied.size(); ++i)
+    EXPECT_EQ(tied[i], 0);
+  EXPECT_EQ(run(2, true), tied);
+}
+
+TEST(Simulation, AttachKeepsTheMotionAndMomentumOfTheObjects) {
+  Simulation s(threads(1), {});
+  add_two(s);
+  const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
+  s.apply(SetForce{0, {nodes[3]}, {200, 0, 0}});
+  s.step(0.02);
+  const Vec3 before = moved(s, 0, nodes[3]);
+  EXPECT_NE(before, Vec3{});
+  s.apply(Attach{0, {nodes[3]}, 1, {free_nodes(s.model(1))[0]}, 1});
+  s.step(1e-9);
+  EXPECT_LT(norm(moved(s, 0, nodes[3]) - before), 1e-4);
+  s.apply(Attach{0, {nodes[4]}, 1, {free_nodes(s.model(1))[1]}, 1}); // once more
+  EXPECT_NO_THROW(s.step(0.01));
+}
+
+TEST(Simulation, RefusesToAttachWhatHasNoMotion) {
+  Simulation s(threads(1), {});
+  add_two(s, Method::ffe);
+  EXPECT_THROW(s.apply(Attach{0, {1}, 1, {1}, 1}), Error);
+  EXPECT_THROW(s.apply(Attach{1, {1}, 1, {2}, 1}), Error);
+  s.add_object("c", organ(), Method::ela, {}, Integration::implicit);
+  EXPECT_THROW(s.apply(Attach{1, {1}, 2, {2}, 1}), Error);
+}
+
+TEST(Simulation, SeveralObjectsMoveAsEachAlone) {
+  const auto run = [](int count, bool both) {
+    Simulation s(threads(count), {});
+    s.add_object("a", organ(), Method::ela);
+    if (both)
+      s.add_object("b", organ(), Method::ela, {}, Integration::implicit);
+    for (std::size_t object = 0; object < s.object_count(); ++object)
+      s.apply(SetForce{object, {free_nodes(s.model(0))[3]}, {100, 0, 0}});
+    s.step(0.05);
+    return std::vector<double>(s.displacement(0).begin(), s.displacement(0).end());
+  };
+  EXPECT_EQ(run(1, true), run(1, false));
+  EXPECT_EQ(run(2, true), run(1, false));
+}
+
+TEST(Simulation, RepeatedEventsComeAtEveryMultiple) {
+  Simulation s(threads(1), {});
+  s.add_object("a", organ(), Method::ela);
+  const std::uint32_t node = free_nodes(s.model(0))[3];
+  s.schedule_every(0.01, SetForce{0, {node}, {100, 0, 0}});
+  s.schedule_every(0.015, Release{0, {node}});
+  EXPECT_EQ(s.pending(), 0U); // they never end
+  s.step(0.0099);
+  EXPECT_EQ(s.counts().integration, 0U);
+  s.step_to(0.012);
+  EXPECT_GT(s.counts().integration, 0U);
+  const Vec3 pulled = moved(s, 0, node);
+  EXPECT_GT(pulled.x, 0);
+}
+
+TEST(Simulation, ElastostaticObjectsFollowPulsesAndTravel) {
+  Simulation s(threads(1), {});
+  s.add_object("a", organ(), Method::ffe);
+  const std::uint32_t node = free_nodes(s.model(0))[3];
+  s.apply(SetForce{0, {node}, {100, 0, 0}, 1});
+  s.step_to(0.5);
+  const Vec3 whole = moved(s, 0, node);
+  s.step_to(1);
+  EXPECT_LT(norm(moved(s, 0, node)), 1e-12 * norm(whole));
+  s.step_to(1.5);
+  EXPECT_EQ(moved(s, 0, node), whole);
+  s.apply(Release{0, {node}});
+  s.apply(SetDisplacement{0, {node}, {0, 1, 0}, 2});
+  s.step_to(2.5);
+  EXPECT_EQ(moved(s, 0, node), (Vec3{0, 0.5, 0}));
+  s.step_to(4);
+  EXPECT_EQ(moved(s, 0, node), (Vec3{0, 1, 0}));
+  s.apply(Release{0, {node}});
+  s.apply(SetPressure{0, free_nodes(s.model(0)), {100, 0}});
+  s.step(1);
+  EXPECT_NE(moved(s, 0, node), Vec3{});
+}
+
 } // namespace
 } // namespace gewebe

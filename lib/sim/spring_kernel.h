@@ -1,0 +1,57 @@
+#pragma once
+// The inner loop of elastodynamics: forces of a block's springs, then one step of its nodes.
+// Compiled once per CPU level; every level gives the same bits, for there is no fused
+// multiplication and each sum has one fixed order.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace gewebe {
+
+/// A node's displacement from rest (mm) and velocity (mm/s) in one cache line; the fourth numbers
+/// are 0.
+struct alignas(64) NodeRow {
+  double u[4], v[4];
+};
+
+/// What acts on a node beside springs, and how it answers; the fourth numbers are 0.
+struct alignas(32) NodeTraits {
+  double constant[4];     ///< f + m g
+  double inverse_mass[4]; ///< 0 along axes that can't move
+  double drag[4];         ///< the same along all three axes
+};
+
+/// Four springs side by side. A spring of a shorter group's end joins a node to itself and pulls
+/// nobody.
+struct alignas(32) SpringGroup {
+  double x[4], y[4], z[4]; ///< from i to j at rest
+  double stiffness[4], damping[4], rest[4];
+  std::uint32_t i[4], j[4]; ///< rows, in bytes from the first one
+};
+
+/// Consecutive rows [first, first + count) and their springs. Both ends of a spring `within` are
+/// rows of the block; of a spring `across` only i is, and only i is pulled.
+struct SpringBlock {
+  std::size_t first = 0, count = 0;
+  const SpringGroup* within = nullptr;
+  std::size_t within_count = 0;
+  const SpringGroup* across = nullptr;
+  std::size_t across_count = 0;
+};
+
+inline constexpr std::size_t largest_block = 256;
+
+/// Of a length in mm², below which a spring has no direction.
+inline constexpr double least_square = 1e-300;
+
+/// v' = v + h (constant - drag v + F) / m, u' = u + h v' for the rows of the block; F sums the
+/// springs within, then those across, each in order. \return whether u' and v' are finite
+using BlockStep = bool (*)(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
+                           NodeRow* next, double h);
+
+bool block_step_baseline(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
+                         NodeRow* next, double h);
+bool block_step_avx2(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
+                     NodeRow* next, double h);
+
+} // namespace gewebe

@@ -1,0 +1,10 @@
+#include "sim/spring_kernel_body_internal.h"
+
+namespace gewebe {
+
+bool block_step_avx2(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
+                     NodeRow* next, double h) {
+  return step(block, traits, now, next, h);
+}
+
+} // namespace gewebe

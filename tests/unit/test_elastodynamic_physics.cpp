@@ -1,0 +1,448 @@
+// What the motion must agree with: analytic solutions, conservation, the static solution, other
+// CPUs.
+
+#include "larger.h"
+#include "sim/elastodynamic.h"
+#include "sim/factor.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <random>
+
+namespace gewebe {
+namespace {
+
+using test::organ, test::two_masses;
+
+Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
+
+std::vector<NodeMotion> kicked(const Model& model, double displacement, double speed) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::vector<NodeMotion> motion(model.nodes.size());
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      const double x = displacement * u(random), v = speed * u(random);
+      if (!is_fixed(model, i, a)) {
+        motion[i].displacement[a] = x;
+        motion[i].velocity[a] = v;
+      }
+    }
+  return motion;
+}
+
+TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
+  const Model model = build_model(test::ball(4, 20), {}, Context{}).model; // several blocks
+  const SpringLayout layout = spring_layout(model);
+  EXPECT_GT(layout.blocks.size(), 2U);
+  const std::vector<NodeMotion> motion = kicked(model, 1, 30);
+  std::vector<NodeRow> now(model.nodes.size()), next(now.size()), again(now.size());
+  std::vector<NodeTraits> traits(layout.movable);
+  for (std::size_t row = 0; row < now.size(); ++row) {
+    now[row] = {};
+    for (int a = 0; a < 3; ++a) {
+      now[row].u[a] = motion[layout.node_of_row[row]].displacement[a];
+      now[row].v[a] = motion[layout.node_of_row[row]].velocity[a];
+    }
+  }
+  for (std::size_t row = 0; row < traits.size(); ++row) {
+    traits[row] = {};
+    for (int a = 0; a < 3; ++a) {
+      traits[row].inverse_mass[a] = 1;
+      traits[row].drag[a] = model.nodes[layout.node_of_row[row]].drag;
+    }
+  }
+  for (const SpringBlock& block : layout.blocks) {
+    EXPECT_TRUE(block_step_baseline(block, traits.data(), now.data(), next.data(), 1));
+    if (best_cpu_level() != CpuLevel::baseline) {
+      EXPECT_TRUE(block_step_avx2(block, traits.data(), now.data(), again.data(), 1));
+    }
+  }
+  if (best_cpu_level() != CpuLevel::baseline) {
+    EXPECT_EQ(0, std::memcmp(next.data(), again.data(), layout.movable * sizeof(NodeRow)));
+  }
+  const SpringNetwork network = spring_network(model);
+  double error = 0, scale = 0;
+  for (std::size_t row = 0; row < layout.movable; ++row) {
+    const Vec3 force = spring_force(network, motion, layout.node_of_row[row]);
+    const Vec3 gained{next[row].v[0] - now[row].v[0], next[row].v[1] - now[row].v[1],
+                      next[row].v[2] - now[row].v[2]};
+    error = test::larger(error, norm(gained - force));
+    scale = test::larger(scale, norm(force));
+  }
+  EXPECT_GT(scale, 1);
+  EXPECT_LT(error, 1e-12 * scale);
+  // It tells what is not finite, wherever.
+  for (const std::size_t row : {std::size_t{0}, layout.movable - 1}) {
+    std::vector<NodeRow> odd = now;
+    odd[row].v[2] = std::nan("");
+    bool finite = true;
+    for (const SpringBlock& block : layout.blocks)
+      finite = block_step_baseline(block, traits.data(), odd.data(), next.data(), 1) && finite;
+    EXPECT_FALSE(finite);
+  }
+}
+
+TEST(SpringLayout, HoldsEverySpringOnceOrOnceForEitherEnd) {
+  const Model model = organ(4);
+  const SpringLayout layout = spring_layout(model);
+  std::size_t rows = 0, halves = 0;
+  for (const SpringBlock& block : layout.blocks) {
+    EXPECT_EQ(block.first, rows);
+    rows += block.count;
+    for (const bool within : {true, false})
+      for (std::size_t g = 0; g < (within ? block.within_count : block.across_count); ++g)
+        for (std::size_t lane = 0; lane < 4; ++lane) {
+          const SpringGroup& group = within ? block.within[g] : block.across[g];
+          if (group.i[lane] != group.j[lane])
+            halves += within ? 2 : 1;
+        }
+  }
+  EXPECT_EQ(rows, layout.movable);
+  std::size_t expected = 0;
+  for (const Spring& s : model.springs)
+    expected += (model.nodes[s.i].fixed != fixed_all ? 1U : 0U) +
+                (model.nodes[s.j].fixed != fixed_all ? 1U : 0U);
+  EXPECT_EQ(halves, expected);
+}
+
+TEST(ElastodynamicPhysics, EnergyOfAnUndampedNetStaysInABoundOverAMillionSteps) {
+  BuildOptions options;
+  options.drag_rate = 0;
+  options.material.materials[0].damping_ratio = 0;
+  const Model model = build_model(test::octahedron(), options, Context{}).model;
+  Elastodynamic object(model);
+  object.set_motion(kicked(model, 0.02, 0));
+  const auto energy = [&] {
+    return kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+  };
+  const double first = energy(), h = 0.2 * safe_step(model);
+  EXPECT_GT(first, 0);
+  double worst = 0;
+  for (int k = 0; k < 100; ++k) {
+    EXPECT_EQ(object.advance(10000 * h, h, one_thread()), 10000U);
+    worst = test::larger(worst, std::abs(energy() - first) / first);
+  }
+  EXPECT_LT(worst, 0.2); // of order h
+}
+
+/// The largest difference of the two over the largest displacement.
+double difference(std::span<const NodeMotion> motion, std::span<const double> u) {
+  double error = 0, size = 0;
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const Vec3 still{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+    error = test::larger(error, norm(motion[i].displacement - still));
+    size = test::larger(size, norm(still));
+  }
+  return error / size;
+}
+
+TEST(ElastodynamicPhysics, ASmallForceEndsAtTheStaticSolution) {
+  const Model model = organ(2);
+  const StiffnessMatrix matrix = stiffness_matrix(model);
+  const Factor factor(matrix, Context{});
+  std::vector<double> f(3 * model.nodes.size()), u(f.size());
+  const std::uint32_t node = test::free_nodes(model)[7];
+  Load load;
+  load.force[node] = {0.05, 0.1, -0.05};
+  for (std::size_t a = 0; a < 3; ++a)
+    f[3 * node + a] = load.force[node][static_cast<int>(a)];
+  solve_axes(matrix, factor, f, u);
+  // Half the difference of pulls to either side: what bends the answer is even in the force.
+  const auto pulled = [&](Integration way, double by) {
+    const double h = way == Integration::implicit ? 0.05 : 0.9 * safe_step(model);
+    std::vector<NodeMotion> half(model.nodes.size());
+    for (const double side : {1.0, -1.0}) {
+      Load pull;
+      pull.force[node] = side * by * load.force[node];
+      Elastodynamic object(model, way);
+      object.set_load(pull);
+      for (int k = 0; k < 400 && !object.resting(); ++k)
+        (void)object.advance(0.25, h, one_thread());
+      for (std::size_t i = 0; i < half.size(); ++i)
+        half[i].displacement += side / (2 * by) * object.motion()[i].displacement;
+    }
+    return half;
+  };
+  EXPECT_LT(difference(pulled(Integration::semi_implicit, 1), u), 1e-6);
+  EXPECT_LT(difference(pulled(Integration::implicit, 1), u), 1e-6);
+  EXPECT_GT(difference(pulled(Integration::implicit, 2000), u), 1e-6); // not a small one
+}
+
+/// A strip of equilateral triangles of edge 1, `columns` wide and `rows` high, along y.
+TriangleMesh strip(int columns, int rows) {
+  TriangleMesh mesh;
+  for (int r = 0; r <= rows; ++r)
+    for (int c = 0; c <= columns; ++c)
+      mesh.points.push_back({c + (r % 2 == 0 ? 0 : 0.5), r * std::sqrt(3.0) / 2, 0});
+  const auto at = [&](int r, int c) { return static_cast<std::uint32_t>(r * (columns + 1) + c); };
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      if (r % 2 == 0) {
+        mesh.triangles.push_back({at(r, c), at(r, c + 1), at(r + 1, c)});
+        mesh.triangles.push_back({at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)});
+      } else {
+        mesh.triangles.push_back({at(r, c), at(r + 1, c + 1), at(r + 1, c)});
+        mesh.triangles.push_back({at(r, c), at(r, c + 1), at(r + 1, c + 1)});
+      }
+  return mesh;
+}
+
+TEST(ElastodynamicPhysics, APlateOfVanGeldersSpringsStretchesAsThePlateDoes) {
+  const int columns = 24, rows = 48;
+  BuildOptions options;
+  options.centrals = 0;
+  const TriangleMesh mesh = strip(columns, rows);
+  Model model = build_model(mesh, options, Context{}).model;
+  for (Node& n : model.nodes)
+    n.fixed = n.position.y == 0 ? fixed_y | fixed_z : fixed_z;
+  model.nodes[columns / 2].fixed = fixed_all;
+  const Material& m = model.materials[0];
+  const double height = rows * std::sqrt(3.0) / 2, width = columns, strain = 1e-3;
+  const double force = m.young * m.thickness * width * strain; // of the plate under this strain
+  const StiffnessMatrix matrix = stiffness_matrix(model);
+  const Factor factor(matrix, Context{});
+  std::vector<double> f(3 * model.nodes.size()), u(f.size());
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].position.y > height - 1e-9)
+      f[3 * i + 1] = force / (columns + 1);
+  solve_axes(matrix, factor, f, u);
+  const auto middle = [&](int row) {
+    return u[3 * static_cast<std::size_t>(row * (columns + 1) + columns / 2) + 1];
+  };
+  const double measured = (middle(3 * rows / 4) - middle(rows / 4)) / (height / 2);
+  EXPECT_NEAR(measured / strain, 1, 0.05);
+}
+
+/// Where mass 1 of a damped pair is at time 1 by backward Euler steps of 1/n, against the analytic
+/// motion.
+double implicit_error(int n) {
+  const double mass = 2, stiffness = 50, damping = 1, drag = 0.4, v = 0.3;
+  const Model model = two_masses(mass, stiffness, damping, drag);
+  Elastodynamic object(model, Integration::implicit);
+  std::vector<NodeMotion> motion(2);
+  motion[0].velocity.x = -v;
+  motion[1].velocity.x = v;
+  object.set_motion(motion);
+  (void)object.advance(1, 1.0 / n, one_thread());
+  const double decay = (2 * damping + drag) / mass / 2;
+  const double omega = std::sqrt(2 * stiffness / mass - decay * decay);
+  return std::abs(object.motion()[1].displacement.x -
+                  v / omega * std::exp(-decay) * std::sin(omega));
+}
+
+TEST(ImplicitEuler, FollowsTheAnalyticDampedMotionWithOrderOne) {
+  EXPECT_LT(implicit_error(4000), 2e-4);
+  for (const int n : {500, 1000, 2000})
+    EXPECT_NEAR(implicit_error(n) / implicit_error(2 * n), 2, 0.1) << n;
+}
+
+TEST(ImplicitEuler, SolvesItsEquationAndNeverGainsEnergyHoweverLongTheStep) {
+  const Model model = organ(2);
+  for (const double factor : {1.0, 30.0, 1000.0}) {
+    Elastodynamic object(model, Integration::implicit);
+    object.set_motion(kicked(model, 0.3, 5));
+    double energy = kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+    const double h = factor * safe_step(model), first = energy;
+    for (int k = 0; k < 20; ++k) {
+      EXPECT_EQ(object.advance(h, h, one_thread()), 1U);
+      const double now =
+          kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+      EXPECT_LE(now, energy * (1 + 1e-9) + 1e-20 * first) << factor << " " << k;
+      energy = now;
+    }
+  }
+  // The semi-implicit one does explode there: the steps are beyond its bound.
+  Elastodynamic object(model);
+  object.set_motion(kicked(model, 0.3, 5));
+  const double h = 30 * safe_step(model);
+  EXPECT_THROW((void)object.advance(2000 * h, h, one_thread()), MotionError);
+}
+
+TEST(ImplicitEuler, KeepsMomentumAndAgreesWithManySmallSteps) {
+  Model model = organ(1);
+  for (Node& n : model.nodes) {
+    n.fixed = fixed_none;
+    n.drag = 0;
+  }
+  const std::vector<NodeMotion> start = kicked(model, 0.2, 3);
+  Elastodynamic object(model, Integration::implicit), fine(model);
+  object.set_motion(start);
+  fine.set_motion(start);
+  const Vec3 before = momentum(model, start);
+  const double t = 20 * safe_step(model);
+  (void)object.advance(t, t / 8000, one_thread());
+  (void)fine.advance(t, t / 64000, one_thread());
+  EXPECT_LT(norm(momentum(model, object.motion()) - before), 1e-6 * norm(before));
+  double error = 0, size = 0;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    error =
+        test::larger(error, norm(object.motion()[i].displacement - fine.motion()[i].displacement));
+    size = test::larger(size, norm(fine.motion()[i].displacement));
+  }
+  EXPECT_LT(error, 0.01 * size);
+}
+
+TEST(ElastodynamicLoad, APulseIsZeroAtWholePeriodsAndWholeBetween) {
+  EXPECT_EQ(pulse(0, 0.8), 0);
+  EXPECT_EQ(pulse(0.5, 1), 1);
+  EXPECT_NEAR(pulse(0.8 * 7, 0.8), 0, 1e-12);
+  EXPECT_EQ(pulse(3, 0), 1);
+  for (double t = 0; t < 3; t += 0.01)
+    EXPECT_NEAR(pulse(t, 1), (1 - std::cos(2 * M_PI * t)) / 2, 0.011);
+}
+
+TEST(ElastodynamicLoad, APulsingForceDrivesAMassAsItShould) {
+  // A free mass under f pulse(t): its speed is the integral, f T / 2 a period.
+  Model model = two_masses(2, 0);
+  Elastodynamic object(model);
+  Load load;
+  load.force[1] = {0, 6, 0};
+  load.force_period[1] = 0.5;
+  object.set_load(load);
+  (void)object.advance(1.5, 1e-4, one_thread());
+  EXPECT_NEAR(object.motion()[1].velocity.y, 6.0 / 2 * 1.5 / 2, 1e-6);
+  EXPECT_EQ(object.motion()[0].velocity.y, 0);
+  EXPECT_FALSE(object.resting());
+}
+
+TEST(ElastodynamicLoad, ATravellingNodeArrivesAndPullsTheOthers) {
+  for (const Integration way : {Integration::semi_implicit, Integration::implicit}) {
+    const Model model = two_masses(1, 10, 0.5);
+    Elastodynamic object(model, way);
+    Load load;
+    load.displacement[0] = {-0.5, 0, 0};
+    load.travel[0] = {{}, {-0.5, 0, 0}, 0.25, 1.25};
+    object.set_load(load);
+    (void)object.advance(0.25, 1e-3, one_thread());
+    EXPECT_EQ(object.motion()[0].displacement, Vec3{});
+    (void)object.advance(0.5, 1e-3, one_thread(), 0.25);
+    EXPECT_NEAR(object.motion()[0].displacement.x, -0.25, 1e-12);
+    EXPECT_NEAR(object.motion()[0].velocity.x, -0.75, 1e-2);
+    EXPECT_LT(object.motion()[1].displacement.x, -1e-3);
+    (void)object.advance(0.5, 1e-3, one_thread(), 0.75);
+    EXPECT_EQ(object.motion()[0].displacement.x, -0.5);
+    EXPECT_EQ(object.motion()[0].velocity, Vec3{});
+  }
+}
+
+TEST(ElastodynamicLoad, PressureOnAClosedSurfaceMovesNothingAsAWholeAndFollowsTheShape) {
+  Model model = organ(2);
+  for (Node& n : model.nodes) {
+    n.fixed = fixed_none;
+    n.drag = 0;
+  }
+  Elastodynamic object(model);
+  Load load;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    load.pressure[i] = {50, 0};
+  object.set_load(load);
+  (void)object.advance(200 * safe_step(model), 0.9 * safe_step(model), one_thread());
+  const Vec3 moved = momentum(model, object.motion());
+  double scale = 0, outward = 0;
+  Vec3 middle;
+  for (std::size_t i = 0; i < surface_count(model); ++i)
+    middle += model.nodes[i].position / static_cast<double>(surface_count(model));
+  for (std::size_t i = 0; i < surface_count(model); ++i) {
+    scale += model.nodes[i].mass * norm(object.motion()[i].velocity);
+    outward += dot(object.motion()[i].displacement, model.nodes[i].position - middle);
+  }
+  EXPECT_GT(scale, 0);
+  EXPECT_LT(norm(moved), 1e-9 * scale);
+  EXPECT_GT(outward, 0); // it swells
+  // At rest the forces are those of load_at().
+  const Load still = load_at(load, model, 0);
+  Vec3 sum;
+  for (const auto& [node, force] : still.force)
+    sum += force;
+  EXPECT_LT(norm(sum), 1e-9 * norm(still.force.at(0)));
+}
+
+TEST(ElastodynamicLoad, TheFirstNodeThatIsNotFiniteIsNamedWithItsTime) {
+  const Model model = organ(1);
+  const std::uint32_t node = test::free_nodes(model)[3];
+  for (const Integration way : {Integration::semi_implicit, Integration::implicit}) {
+    Elastodynamic object(model, way);
+    Load load;
+    load.force[node] = {1e308, 1e308, 0};
+    object.set_load(load);
+    try {
+      (void)object.advance(1, 0.001, one_thread(), 2);
+      ADD_FAILURE() << "no error";
+    } catch (const MotionError& error) {
+      EXPECT_GT(error.time(), 2);
+      EXPECT_LE(error.time(), 2.1);
+      if (way == Integration::semi_implicit) {
+        EXPECT_EQ(error.node(), node);
+      }
+    }
+  }
+}
+
+/// Nets of random shape, stiffness, mass and damping, all in a box.
+Model random_model(std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto spread = [&](double decades) { return std::pow(10, decades * (u(random) - 0.5)); };
+  constexpr std::array<double, 4> ratios{0, 0.1, 1, 3};
+  const double ratio = ratios[seed % 4];
+  Model m = two_masses();
+  m.nodes.clear();
+  m.springs.clear();
+  const double flat = seed % 3 == 0 ? 1e-4 : 1; // slivers
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    Node n;
+    n.position = {u(random), u(random), flat * u(random)};
+    n.mass = spread(seed % 2 == 0 ? 6 : 1);
+    n.drag = 0.1 * n.mass * (seed % 5 == 0 ? 1 : 0);
+    n.fixed = i < 3 ? fixed_all : i < 6 ? fixed_x : fixed_none;
+    m.nodes.push_back(n);
+  }
+  for (std::uint32_t i = 0; i < 30; ++i)
+    for (std::uint32_t j = i + 1; j < 30; ++j)
+      if (u(random) < 0.2) {
+        Spring s{i, j, SpringKind::edge, spread(seed % 2 == 1 ? 9 : 3), 0, 0};
+        const double a = m.nodes[i].mass, b = m.nodes[j].mass;
+        s.damping = 2 * ratio * std::sqrt(s.stiffness * a * (b / (a + b)));
+        s.rest = norm(m.nodes[j].position - m.nodes[i].position);
+        m.springs.push_back(s);
+      }
+  return m;
+}
+
+TEST(ElastodynamicStability, BelowTheBoundEnergyStaysBoundedAndFarAboveItIsReported) {
+  int exploded = 0;
+  for (std::uint32_t seed = 0; seed < 16; ++seed) {
+    const Model model = random_model(seed);
+    const std::vector<NodeMotion> start = kicked(model, 1e-7, 0);
+    for (const double part : {0.99, 4.0}) {
+      Elastodynamic object(model);
+      object.set_motion(start);
+      const double energy = elastic_energy(model, object.motion()), h = part * safe_step(model);
+      try {
+        (void)object.advance(3000 * h, h, one_thread());
+      } catch (const MotionError&) {
+        EXPECT_GT(part, 1) << seed;
+        ++exploded;
+        continue;
+      }
+      const double now =
+          kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
+      if (part < 1) {
+        EXPECT_LE(now, 200 * energy) << seed; // near the bound the conserved quantity is not E
+      } else if (!(now <= 200 * energy)) {
+        ++exploded;
+      }
+    }
+  }
+  EXPECT_GT(exploded, 8);
+}
+
+} // namespace
+} // namespace gewebe
