@@ -1,12 +1,12 @@
 #include "model/model.h"
 
 #include "base/digest.h"
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "model/check.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string_view>
 
 namespace gewebe {
@@ -79,25 +79,17 @@ std::size_t spring_count(const Model& model, SpringKind kind) {
 }
 
 Components components(const Model& model) {
-  // Union-find whose roots are the smallest nodes of their trees.
-  std::vector<std::uint32_t> parent(model.nodes.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i)
-      i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(model.nodes.size());
   for (const Spring& s : model.springs) {
     if (s.kind != SpringKind::edge)
       break;
-    const std::uint32_t a = root(s.i), b = root(s.j);
-    parent[std::max(a, b)] = std::min(a, b);
+    sets.join(s.i, s.j);
   }
   Components result;
   result.of_node.resize(model.nodes.size());
   const std::size_t surface = surface_count(model);
   for (std::uint32_t i = 0; i < surface; ++i) {
-    const std::uint32_t r = root(i);
+    const std::uint32_t r = sets.find(i);
     result.of_node[i] = r == i ? result.count++ : result.of_node[r];
   }
   std::vector<bool> named(model.nodes.size());

@@ -1,5 +1,6 @@
 #include "sim/condition.h"
 
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 
 #include <Eigen/Eigenvalues>
@@ -8,7 +9,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 // Based on: Hager, Condition Estimates, 1984; Higham, FORTRAN Codes for Estimating the One-Norm of
@@ -110,17 +110,9 @@ struct Parts {
 
 Parts parts_of(const StiffnessMatrix& matrix) {
   const std::size_t n = matrix.order();
-  std::vector<std::uint32_t> parent(n);
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i)
-      i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(n);
   const auto join = [&](std::size_t a, std::size_t b) {
-    const std::uint32_t x = root(static_cast<std::uint32_t>(a));
-    const std::uint32_t y = root(static_cast<std::uint32_t>(b));
-    parent[std::max(x, y)] = std::min(x, y);
+    sets.join(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
   };
   for (std::size_t c = 0; c < n; ++c) {
     // The axes of a node belong together even where K has no entry between them.
@@ -132,7 +124,7 @@ Parts parts_of(const StiffnessMatrix& matrix) {
   Parts parts;
   parts.of_row.resize(n);
   for (std::uint32_t r = 0; r < n; ++r) {
-    const std::uint32_t top = root(r);
+    const std::uint32_t top = sets.find(r);
     if (top == r) {
       parts.of_row[r] = static_cast<std::uint32_t>(parts.rows.size());
       parts.rows.emplace_back();

@@ -1,9 +1,10 @@
 #include "surface/components.h"
 
+#include "base/disjoint_sets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <vector>
 
 namespace gewebe {
@@ -11,21 +12,15 @@ namespace {
 
 /// The component of each point, by the number of its first point.
 std::vector<std::uint32_t> first_points(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> parent(mesh.points.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t p) {
-    while (parent[p] != p)
-      p = parent[p] = parent[parent[p]];
-    return p;
-  };
-  for (const Triangle& t : mesh.triangles)
-    for (std::size_t n = 1; n < 3; ++n) {
-      const std::uint32_t a = root(t[0]), b = root(t[n]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  for (std::uint32_t p = 0; p < parent.size(); ++p)
-    parent[p] = root(p);
-  return parent;
+  DisjointSets sets(mesh.points.size());
+  for (const Triangle& t : mesh.triangles) {
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
+  }
+  std::vector<std::uint32_t> first(mesh.points.size());
+  for (std::uint32_t p = 0; p < first.size(); ++p)
+    first[p] = sets.find(p);
+  return first;
 }
 
 template <class Item, class Keep>

@@ -1,5 +1,7 @@
 #include "volume/mesh_border.h"
 
+#include "base/disjoint_sets.h"
+
 #include <algorithm>
 #include <numeric>
 #include <tuple>
@@ -120,22 +122,16 @@ std::uint32_t edge_groups(const std::vector<Edge>& edges, std::vector<std::uint3
     return static_cast<std::uint32_t>(std::lower_bound(ends.begin(), ends.end(), point) -
                                       ends.begin());
   };
-  std::vector<std::uint32_t> parent(ends.size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&](std::uint32_t n) {
-    while (parent[n] != n)
-      n = parent[n] = parent[parent[n]];
-    return n;
-  };
+  DisjointSets sets(ends.size());
   for (const Edge& e : edges)
-    parent[root(local(e[0]))] = root(local(e[1]));
+    sets.join(local(e[0]), local(e[1]));
 
   constexpr std::uint32_t none = UINT32_MAX;
   std::vector<std::uint32_t> number(ends.size(), none);
   std::uint32_t groups = 0;
   group.resize(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e) {
-    std::uint32_t& n = number[root(local(edges[e][0]))];
+    std::uint32_t& n = number[sets.find(local(edges[e][0]))];
     if (n == none)
       n = groups++;
     group[e] = n;

@@ -10,6 +10,7 @@
 #include "volume/density.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
+#include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "volume/density_kernel_internal.h"
 
@@ -286,22 +287,11 @@ void bench_splashsurf() {
              voxel, static_cast<double>(vertices), threads, ours, 1, "times of ours");
       fastest = band ? std::min(fastest, ours.median) : ours.median;
     }
-    char command[512];
-    (void)std::snprintf(command, sizeof command,
-                        "python3 tests/bench/density_splashsurf.py '%s' 0.5 %.17g %zu %d %d 2>&1",
-                        path.c_str(), voxel, vertices, threads, runs);
-    FILE* const peer = popen(command, "r");
-    std::vector<double> numbers; // the times, then the vertices
-    char text[1024] = "";
-    if (peer != nullptr && std::fgets(text, sizeof text, peer) != nullptr)
-      for (char *at = text, *end = text; numbers.size() <= runs; at = end) {
-        const double number = std::strtod(at, &end);
-        if (end == at)
-          break;
-        numbers.push_back(number);
-      }
-    if (peer != nullptr)
-      pclose(peer);
+    char call[512];
+    (void)std::snprintf(call, sizeof call,
+                        "tests/bench/density_splashsurf.py '%s' 0.5 %.17g %zu %d %d", path.c_str(),
+                        voxel, vertices, threads, runs);
+    std::vector<double> numbers = numbers_of_script(call); // the times, then the vertices
     if (numbers.size() == runs + 1) {
       const double found = numbers.back();
       numbers.pop_back();

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
+#include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "volume/density.h"
 #include "volume/grid_internal.h"
@@ -90,23 +91,10 @@ void bench_vtk(const std::string& stage, const Grid& grid, double isovalue, cons
       (std::filesystem::temp_directory_path() / ("surface-" + std::to_string(getpid()))).string();
   write_dense(grid, low, n, path);
   for (const int threads : {1, 2}) {
-    char command[512];
-    (void)std::snprintf(command, sizeof command,
-                        "%s tests/bench/surface_vtk.py '%s' %d %.17g %d %d 2>/dev/null",
-                        std::getenv("PYTHON") != nullptr ? std::getenv("PYTHON") : "python3",
+    char call[512];
+    (void)std::snprintf(call, sizeof call, "tests/bench/surface_vtk.py '%s' %d %.17g %d %d",
                         path.c_str(), n, isovalue, threads, runs);
-    FILE* const peer = popen(command, "r");
-    std::vector<double> numbers; // the times, then the points
-    char text[1024] = "";
-    if (peer != nullptr && std::fgets(text, sizeof text, peer) != nullptr)
-      for (char *at = text, *end = text; numbers.size() <= runs; at = end) {
-        const double number = std::strtod(at, &end);
-        if (end == at)
-          break;
-        numbers.push_back(number);
-      }
-    if (peer != nullptr)
-      pclose(peer);
+    std::vector<double> numbers = numbers_of_script(call); // the times, then the points
     if (numbers.size() != runs + 1) {
       (void)std::fputs("surface: FlyingEdges3D skipped, python3 has no vtk\n", stderr);
       break;

@@ -21,6 +21,7 @@
 #include "surface/regularize.h"
 #include "surface/self_intersections.h"
 #include "surface/snapping.h"
+#include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
@@ -298,15 +299,9 @@ void bench_python(const Scene& scene, const Dense& values, const char* peer, con
     file.write(reinterpret_cast<const char*>(values.values.data()),
                static_cast<std::streamsize>(values.values.size() * sizeof(float)));
   }
-  const char* python = std::getenv("PYTHON");
-  const std::string command = std::string(python != nullptr ? python : "python3") +
-                              " tests/bench/surface_quality_peers.py " + peer + " '" +
-                              path.string() + "' " + std::to_string(runs);
-  FILE* output = popen(command.c_str(), "r");
-  std::vector<double> times;
-  for (double time = 0; std::fscanf(output, "%lf", &time) == 1;)
-    times.push_back(time);
-  pclose(output);
+  const std::vector<double> times =
+      numbers_of_script("tests/bench/surface_quality_peers.py " + std::string(peer) + " '" +
+                        path.string() + "' " + std::to_string(runs));
   if (times.size() == static_cast<std::size_t>(runs)) {
     std::ifstream file(path, std::ios::binary);
     std::uint64_t counts[2] = {};

@@ -8,6 +8,7 @@
 
 #include "volume/voxelize.h"
 #include "formats/mesh_file.h"
+#include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/lattice.h"
@@ -203,22 +204,16 @@ void bench_vtk(const Scene& scene) {
   std::fwrite(scene.mesh.points.data(), sizeof(Vec3), scene.mesh.points.size(), file);
   std::fwrite(scene.mesh.triangles.data(), sizeof(Triangle), scene.mesh.triangles.size(), file);
   std::fclose(file);
-  char command[512];
-  std::snprintf(command, sizeof command,
-                "python3 tests/bench/voxelize_vtk.py '%s' %.17g %d 2>/dev/null", path.c_str(),
+  char call[512];
+  std::snprintf(call, sizeof call, "tests/bench/voxelize_vtk.py '%s' %.17g %d", path.c_str(),
                 scene.voxel(), runs);
-  FILE* peer = popen(command, "r");
-  std::vector<double> times(runs);
-  double voxels = 0;
-  int read = 0;
-  for (double& time : times)
-    read += std::fscanf(peer, "%lf", &time);
-  read += std::fscanf(peer, "%lf", &voxels);
-  pclose(peer);
+  std::vector<double> numbers = numbers_of_script(call); // the times, then the voxels
   std::filesystem::remove(path);
-  if (read == runs + 1)
-    report(scene, "VTK stencil", 1, times_of(times), voxels > 0 ? scene.error(voxels) : NAN, 0);
-  else
+  if (numbers.size() == static_cast<std::size_t>(runs) + 1) {
+    const double voxels = numbers.back();
+    numbers.pop_back();
+    report(scene, "VTK stencil", 1, times_of(numbers), voxels > 0 ? scene.error(voxels) : NAN, 0);
+  } else
     std::fprintf(stderr, "voxelize %d, VTK stencil: skipped, python3 has no VTK\n", scene.dim);
 }
 

@@ -1,0 +1,34 @@
+#pragma once
+// Union-find: which items are connected by the pairs joined so far.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace gewebe {
+
+/// Sets of the numbers 0 … count - 1, each named by its smallest member, so that names depend on
+/// the pairs alone and not on their order.
+class DisjointSets {
+public:
+  explicit DisjointSets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0U);
+  }
+  /// The smallest member of n's set. \pre n < count
+  std::uint32_t find(std::uint32_t n) {
+    while (parent_[n] != n)
+      n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t x = find(a), y = find(b);
+    parent_[std::max(x, y)] = std::min(x, y);
+  }
+
+private:
+  std::vector<std::uint32_t> parent_;
+};
+
+} // namespace gewebe
