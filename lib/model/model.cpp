@@ -6,6 +6,7 @@
 #include "model/check.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <string_view>
 
@@ -156,6 +157,21 @@ std::vector<double> safe_steps(const Model& model) {
 double safe_step(const Model& model) {
   const std::vector<double> steps = safe_steps(model);
   return steps.empty() ? HUGE_VAL : *std::min_element(steps.begin(), steps.end());
+}
+
+void require_safe_step(const Model& model, double step) {
+  const std::vector<double> steps = safe_steps(model);
+  const auto least = std::min_element(steps.begin(), steps.end());
+  if (least == steps.end() || *least >= step)
+    return;
+  const auto text = [](double value) {
+    std::array<char, 32> digits{};
+    return std::string(digits.data(),
+                       std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+  };
+  throw Error("a step of " + text(step) + " s is beyond the safe step " + text(*least) +
+              " s of node " + std::to_string(least - steps.begin()) +
+              ", expected a shorter one or scaled masses");
 }
 
 std::size_t scale_masses(Model& model, double step) {

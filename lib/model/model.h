@@ -130,6 +130,9 @@ std::vector<double> safe_steps(const Model& model);
 /// The least of safe_steps().
 double safe_step(const Model& model);
 
+/// \throw Error naming the node whose safe step is the least, if it is below `step`
+void require_safe_step(const Model& model, double step);
+
 /// Raises the masses of the nodes whose safe step is below `step` so that it is `step`; drag and
 /// damping stay. \return how many   \pre step > 0
 std::size_t scale_masses(Model& model, double step);

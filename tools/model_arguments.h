@@ -1,0 +1,32 @@
+#pragma once
+// The options of exp2ela: how a model is built.
+
+#include "model/build.h"
+#include "model/material.h"
+#include "model/primitive.h"
+#include "model/selector.h"
+#include "tools/cli.h"
+
+#include <optional>
+#include <string>
+
+namespace gewebe {
+
+struct ModelArguments {
+  std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
+              axes = "xyz", primitive, size;
+  MaterialOverrides values;
+  BuildOptions build;
+  std::optional<Selector> fixed;
+  std::optional<Primitive> matrix;
+  std::optional<double> dt;
+  bool scale_mass = false;
+};
+
+/// The options of a program, to be told into `a`.
+void declare(cli::Program& p, ModelArguments& a);
+
+/// Checks them against each other and reads their texts. \throw UsageError
+void complete(ModelArguments& a);
+
+} // namespace gewebe
