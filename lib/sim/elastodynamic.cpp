@@ -242,7 +242,7 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
 }
 
 void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const Context& context) {
-  const std::uint64_t pulls = layout_.pulls();
+  const std::uint64_t pulls = layout_.pulls(), worth = pulls / pulls_of_a_step;
   int threads = static_cast<int>(std::min<std::size_t>(
       static_cast<std::size_t>(std::min(thread_count(context), thread_count(Context{}))),
       layout_.blocks.size()));
@@ -250,7 +250,7 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
       std::max(1, static_cast<int>(std::min(
                       {static_cast<double>(threads),
                        static_cast<double>(pulls) * static_cast<double>(steps) / pulls_of_a_thread,
-                       static_cast<double>(pulls / pulls_of_a_step)})));
+                       static_cast<double>(worth)})));
   // Written during one step and read behind its end, while the next may be on: hence two.
   std::array<std::atomic<bool>, 2> odd{}, cancelled{};
   std::uint64_t done = 0;
@@ -313,7 +313,7 @@ void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
   std::vector<Vec3> outer(n);
   for (std::uint32_t i = 0; i < n; ++i)
     for (std::size_t a = 0; a < 3; ++a)
-      held[3 * i + a] =
+      held[3 * std::size_t{i} + a] =
           is_fixed(model_, i, static_cast<int>(a)) || load_.displacement.contains(i) ? 1 : 0;
   for (std::uint64_t s = 0; s < steps; ++s) {
     const double time = start + static_cast<double>(s + 1) * h;
