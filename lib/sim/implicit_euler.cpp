@@ -9,7 +9,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr int most_iterations = 60, most_parts = 10;
+constexpr int most_iterations = 200, most_parts = 10, most_renewals = 2;
 constexpr double tolerance = 1e-10, size_tolerance = 1e-16;
 constexpr double noise = 1e-12; // of the size: a change below it that does not shrink is rounding
 constexpr double slow = 0.2;    // contraction above which the factor is made anew
@@ -117,7 +117,7 @@ bool ImplicitEuler::solve_step(std::span<NodeMotion> motion, std::span<const Vec
       moved[3 * i + a] = is_held(i, a) ? 0 : h * before[i].velocity[static_cast<int>(a)];
   set(moved);
   double square = measure(), last_change = HUGE_VAL;
-  bool fresh = false;
+  int renewed = 0;
   for (int k = 0; k < most_iterations; ++k) {
     solve_axes(matrix_, *factor_, residual, change);
     ++solves_;
@@ -145,9 +145,10 @@ bool ImplicitEuler::solve_step(std::span<NodeMotion> motion, std::span<const Vec
       return true;
     if (largest_change <= noise * size_ && largest_change >= last_change / 2)
       return true;
-    if (!fresh && !(largest_change <= slow * last_change) && k > 0) {
+    // A matrix of this very state may not help further: what the max leaves out limits the rate.
+    if (renewed < most_renewals && k > 0 && !(largest_change <= slow * last_change)) {
       make_factor(motion, h, context);
-      fresh = k > 20; // from then on it stays
+      ++renewed;
     }
     last_change = largest_change;
   }

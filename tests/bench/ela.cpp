@@ -1,0 +1,189 @@
+// Elastodynamics: time of a stretch of motion against error, and the speed of the springs against a
+// plain loop over an edge list and against what root and division alone allow.
+
+#include "model/build.h"
+#include "model/primitive.h"
+#include "sim/elastodynamic.h"
+#include "timing.h"
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+namespace {
+
+using namespace gewebe;
+using timing::Times;
+
+void print(const std::string& stage, const char* program, std::size_t springs, double steps,
+           int threads, const Times& t, double error) {
+  std::printf("%s,%s,%zu,%.0f,%d,%.3f,%.3f,%.3f,%.3g,largest error over largest displacement\n",
+              stage.c_str(), program, springs, steps, threads, t.median, t.fastest, t.slowest,
+              error);
+  std::fprintf(stderr, "%s, %s, %d threads: %.0f steps/s, %.1f M springs/s\n", stage.c_str(),
+               program, threads, steps / t.median * 1e3,
+               static_cast<double>(springs) * steps / t.median / 1e3);
+}
+
+Load push(const Model& model) {
+  Load load{.gravity = {0, 0, -9810}};
+  load.force[static_cast<std::uint32_t>(surface_count(model) / 2)] = {500, 0, 0};
+  return load;
+}
+
+/// What one would write first.
+class PlainLoop {
+public:
+  explicit PlainLoop(const Model& model) : model_(model) {
+    for (const Node& n : model.nodes)
+      points_.push_back({n.position, {}, {}, n.mass, n.drag, n.fixed == fixed_all});
+    load_ = push(model);
+  }
+
+  void step(double h) {
+    for (Point& p : points_)
+      p.force = p.mass * load_.gravity - p.drag * p.v;
+    for (const auto& [node, force] : load_.force)
+      points_[node].force += force;
+    for (const Spring& s : model_.springs) {
+      Point &i = points_[s.i], &j = points_[s.j];
+      const Vec3 d = j.x - i.x;
+      const double l = norm(d);
+      const Vec3 n = d / l;
+      const Vec3 f = (s.stiffness * (l - s.rest) + s.damping * dot(j.v - i.v, n)) * n;
+      i.force += f;
+      j.force -= f;
+    }
+    for (Point& p : points_)
+      if (!p.fixed) {
+        p.v += h / p.mass * p.force;
+        p.x += h * p.v;
+      }
+  }
+
+  Vec3 displacement(std::size_t i) const { return points_[i].x - model_.nodes[i].position; }
+
+private:
+  struct Point {
+    Vec3 x, v, force;
+    double mass, drag;
+    bool fixed;
+  };
+  const Model& model_;
+  Load load_;
+  std::vector<Point> points_;
+};
+
+std::vector<Vec3> moved(const Elastodynamic& object) {
+  std::vector<Vec3> u;
+  for (const NodeMotion& m : object.motion())
+    u.push_back(m.displacement);
+  return u;
+}
+
+double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double error = 0, size = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double e = norm(a[i] - b[i]);
+    error = error >= e || std::isnan(error) ? error : e;
+    size = std::max(size, norm(b[i]));
+  }
+  return error / size;
+}
+
+std::vector<Vec3> run(const Model& model, double duration, double h, const Context& context) {
+  Elastodynamic object(model);
+  object.set_load(push(model));
+  (void)object.advance(duration, h, context);
+  return moved(object);
+}
+
+/// Root and division of every spring, and nothing else.
+double limit(std::size_t springs, double steps) {
+  std::vector<double> square(1024, 2), inverse(1024);
+  double sum = 0;
+  const auto rounds = static_cast<std::size_t>(static_cast<double>(springs) * steps / 1024);
+  const double time = timing::milliseconds([&] {
+    for (std::size_t r = 0; r < rounds; ++r) {
+      for (std::size_t k = 0; k < square.size(); k += 4) {
+        using Four = double __attribute__((vector_size(32)));
+        Four x{square[k], square[k + 1], square[k + 2], square[k + 3]};
+        const Four root{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+        const Four one = 1 / x;
+        for (std::size_t l = 0; l < 4; ++l)
+          inverse[k + l] = one[l] * root[l];
+      }
+      sum += inverse[r % inverse.size()];
+    }
+  });
+  return sum > 0 ? time : 0;
+}
+
+void speed(const Model& model, double steps) {
+  const std::string stage = "speed " + std::to_string(model.nodes.size()) + " nodes";
+  const double h = 0.9 * safe_step(model);
+  std::vector<Vec3> plain_u;
+  const Times plain = timing::measure([&] {
+    PlainLoop loop(model);
+    for (double s = 0; s < steps; ++s)
+      loop.step(h);
+    plain_u.clear();
+    for (std::size_t i = 0; i < model.nodes.size(); ++i)
+      plain_u.push_back(loop.displacement(i));
+  });
+  const double allowed = limit(model.springs.size(), steps);
+  print(stage, "root and division alone", model.springs.size(), steps, 1,
+        {allowed, allowed, allowed}, 0);
+  for (const int threads : {1, 2}) {
+    Elastodynamic object(model);
+    std::vector<Vec3> u;
+    std::vector<double> times;
+    for (int k = 0; k < 5; ++k) {
+      object.set_motion(std::vector<NodeMotion>(model.nodes.size()));
+      object.set_load(push(model));
+      times.push_back(timing::milliseconds(
+          [&] { (void)object.advance(steps * h, h, timing::with_threads(threads)); }));
+      u = moved(object);
+    }
+    print(stage, "gewebe", model.springs.size(), steps, threads, timing::times_of(times),
+          difference(u, plain_u));
+  }
+  print(stage, "plain loop", model.springs.size(), steps, 1, plain, 0);
+}
+
+void work_precision(const Model& model) {
+  const double safe = safe_step(model), duration = 400 * safe;
+  const Context one = timing::with_threads(1);
+  const std::vector<Vec3> exact = run(model, duration, safe / 64, one);
+  const std::string stage = "motion " + std::to_string(model.nodes.size()) + " nodes";
+  for (const double part : {0.9, 0.45, 0.225, 0.1125}) {
+    std::vector<Vec3> u;
+    const Times t = timing::measure([&] { u = run(model, duration, part * safe, one); }, 3);
+    print(stage, "semi-implicit", model.springs.size(), 400 / part, 1, t, difference(u, exact));
+  }
+}
+
+void sleeping(const Model& model) {
+  Elastodynamic object(model);
+  const double h = 0.9 * safe_step(model);
+  constexpr int calls = 100000;
+  const double time = timing::milliseconds([&] {
+    for (int k = 0; k < calls; ++k)
+      (void)object.advance(0.01, h, Context{});
+  });
+  std::fprintf(stderr, "asleep: %.4f us a step\n", time * 1e3 / calls);
+}
+
+} // namespace
+
+int main() {
+  std::puts("stage,program,springs,steps,threads,median_ms,fastest_ms,slowest_ms,error,measure");
+  const auto sphere = [](const char* text) {
+    return build_model(primitive_mesh(parse_primitive(text, "60")), {}, Context{}).model;
+  };
+  const Model organ = sphere("sphere:100x100");
+  speed(organ, 300);
+  speed(sphere("sphere:316x316"), 20);
+  sleeping(organ);
+  work_precision(sphere("sphere:40x40"));
+}
