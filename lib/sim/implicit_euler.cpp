@@ -122,7 +122,8 @@ bool ImplicitEuler::solve_step(std::span<NodeMotion> motion, std::span<const Vec
     solve_axes(matrix_, *factor_, residual, change);
     ++solves_;
     double scale = 1, largest_change = 0, largest = 0, next_square = HUGE_VAL;
-    for (int halvings = 0; halvings < 12; ++halvings, scale /= 2) {
+    for (int halvings = 0; halvings < 12; ++halvings) {
+      scale = std::ldexp(1.0, -halvings);
       for (std::size_t x = 0; x < trial.size(); ++x)
         trial[x] = moved[x] + scale * change[x];
       set(trial);

@@ -14,7 +14,7 @@ using FourBits = long long __attribute__((vector_size(32)));
 inline const Four& four(const double* at) {
   return *reinterpret_cast<const Four*>(at);
 }
-inline Four& four(double* at) {
+inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
   return *reinterpret_cast<Four*>(at);
 }
 
@@ -66,7 +66,7 @@ inline double* at(NodeRow* base, std::uint64_t offset) {
 
 /// Groups that go through each stage together. A group alone is a chain of a hundred cycles, most
 /// of them in the root and the division; side by side they wait for nothing but the divider.
-constexpr std::size_t batch = 16;
+inline constexpr std::size_t batch = 16;
 
 struct Batch {
   Three along[batch];
@@ -143,14 +143,14 @@ inline bool step(const SpringBlock& block, const NodeTraits* traits, const NodeR
     four(next[n].v) = four(traits[n].constant) - four(traits[n].drag) * four(now[n].v);
   add_pulls<true>(block.within, block.within_count, now, next);
   add_pulls<false>(block.across, block.across_count, now, next);
-  const Four step{h, h, h, h};
+  const Four step{h, h, h, h}, zero{};
   Four odd{}; // not 0 where a number is not finite
   for (std::size_t n = block.first; n < end; ++n) {
     const Four v = four(now[n].v) + step * (four(next[n].v) * four(traits[n].inverse_mass));
     const Four u = four(now[n].u) + step * v;
     four(next[n].v) = v;
     four(next[n].u) = u;
-    odd += (u - u) + (v - v);
+    odd += zero * u + zero * v;
   }
   return odd[0] == 0 && odd[1] == 0 && odd[2] == 0;
 }

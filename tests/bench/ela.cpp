@@ -125,7 +125,7 @@ void speed(const Model& model, double steps) {
   std::vector<Vec3> plain_u;
   const Times plain = timing::measure([&] {
     PlainLoop loop(model);
-    for (double s = 0; s < steps; ++s)
+    for (int s = 0; s < static_cast<int>(steps); ++s)
       loop.step(h);
     plain_u.clear();
     for (std::size_t i = 0; i < model.nodes.size(); ++i)

@@ -18,9 +18,18 @@ inline std::vector<double> numbers_of_script(const std::string& call) {
   FILE* const peer = popen(command.c_str(), "r");
   if (peer == nullptr)
     return numbers;
-  for (double number = 0; std::fscanf(peer, "%lf", &number) == 1;)
-    numbers.push_back(number);
+  std::string text;
+  char part[4096];
+  while (std::fgets(part, sizeof part, peer) != nullptr)
+    text += part;
   pclose(peer);
+  const char* at = text.c_str();
+  for (char* end = nullptr;; at = end) {
+    const double number = std::strtod(at, &end);
+    if (end == at)
+      break;
+    numbers.push_back(number);
+  }
   return numbers;
 }
 

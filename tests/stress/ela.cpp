@@ -53,8 +53,8 @@ int run(std::uint32_t nets, double steps) {
 } // namespace
 
 int main(int argc, char** argv) {
-  const double nets = argc > 1 ? std::atof(argv[1]) : 50;
-  const double steps = argc > 2 ? std::atof(argv[2]) : 1e5;
+  const double nets = argc > 1 ? std::strtod(argv[1], nullptr) : 50;
+  const double steps = argc > 2 ? std::strtod(argv[2], nullptr) : 1e5;
   if (!(nets >= 1 && nets <= 1e6 && steps >= 1 && steps <= 1e8)) {
     std::fputs("usage: stress_ela [NETS [STEPS]]\n", stderr);
     return 2;
