@@ -26,6 +26,16 @@ public:
     const std::uint32_t x = find(a), y = find(b);
     parent_[std::max(x, y)] = std::min(x, y);
   }
+  /// The set of each, numbered by smallest member; returns how many there are.
+  std::uint32_t number(std::vector<std::uint32_t>& set) {
+    set.resize(parent_.size());
+    std::uint32_t sets = 0;
+    for (std::uint32_t n = 0; n < set.size(); ++n) {
+      const std::uint32_t smallest = find(n);
+      set[n] = smallest == n ? sets++ : set[smallest];
+    }
+    return sets;
+  }
 
 private:
   std::vector<std::uint32_t> parent_;

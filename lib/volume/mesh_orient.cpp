@@ -3,12 +3,12 @@
 // crossings of a ray follows F. S. Nooruddin, G. Turk, Simplification and Repair of Polygonal
 // Models Using Volumetric Techniques, 2003.
 
+#include "base/disjoint_sets.h"
 #include "volume/mesh_border.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -130,40 +130,9 @@ std::vector<char> agreeing_flips(const Edges& edges, std::size_t triangles) {
   return flip;
 }
 
-/// Sets of triangles, each known by its smallest.
-class Sets {
-public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t root(std::uint32_t n) {
-    while (parent_[n] != n)
-      n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-  /// The set of each, numbered by smallest; returns how many there are.
-  std::uint32_t number(std::vector<std::uint32_t>& set) {
-    set.resize(parent_.size());
-    std::uint32_t sets = 0;
-    for (std::uint32_t n = 0; n < set.size(); ++n) {
-      const std::uint32_t r = root(n);
-      set[n] = r == n ? sets++ : set[r];
-    }
-    return sets;
-  }
-
-private:
-  std::vector<std::uint32_t> parent_;
-};
-
 /// Pairs the sides of each edge that run in opposite directions, in one pass, and unites their
 /// triangles. False if a side stays alone or more than eight wait at a point.
-bool pair_sides(std::size_t points, const std::vector<Triangle>& triangles, Sets& sets) {
+bool pair_sides(std::size_t points, const std::vector<Triangle>& triangles, DisjointSets& sets) {
   constexpr std::size_t places = 8;
   struct Waiting {
     std::uint32_t count = 0;
@@ -184,7 +153,7 @@ bool pair_sides(std::size_t points, const std::vector<Triangle>& triangles, Sets
              (at.sides[w].high != side.high || at.sides[w].backward() == side.backward()))
         ++w;
       if (w < at.count) {
-        sets.unite(at.sides[w].index(), n);
+        sets.join(at.sides[w].index(), n);
         at.sides[w] = at.sides[--at.count];
         --alone;
       } else {
@@ -319,10 +288,10 @@ void turn_parts(const std::vector<Vec3>& points, const std::vector<std::uint32_t
 
 bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
                    OrientReport* report) {
-  Sets sets(triangles.size());
+  DisjointSets sets(triangles.size());
   std::vector<Triangle> turned = triangles;
   if (!pair_sides(points.size(), triangles, sets)) {
-    sets = Sets(triangles.size());
+    sets = DisjointSets(triangles.size());
     std::vector<Triangle> welded = triangles;
     const std::vector<std::uint32_t> representative = first_at_position(points);
     for (Triangle& t : welded)
@@ -342,7 +311,7 @@ bool orient_closed(const std::vector<Vec3>& points, std::vector<Triangle>& trian
     }
     edges.for_each([&](std::span<const Side> edge) {
       for (const Side& side : edge)
-        sets.unite(edge[0].index(), side.index());
+        sets.join(edge[0].index(), side.index());
     });
   }
   std::vector<std::uint32_t> part;

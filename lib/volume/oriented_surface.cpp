@@ -1,11 +1,11 @@
 #include "volume/oriented_surface.h"
 
+#include "base/disjoint_sets.h"
 #include "volume/mesh_border.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <unordered_map>
 
@@ -48,25 +48,6 @@ void for_each_edge(std::span<const Side> sides, Visit&& visit) {
     visit(sides.subspan(begin, end - begin));
   }
 }
-
-class Groups {
-public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t of(std::uint32_t n) {
-    while (parent_[n] != n)
-      n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t x = of(a), y = of(b);
-    parent_[std::max(x, y)] = std::min(x, y);
-  }
-
-private:
-  std::vector<std::uint32_t> parent_;
-};
 
 /// Takes degenerate and repeated triangles out; `part` follows.
 void drop_repeated(OrientedSurface& surface, std::vector<std::int32_t>& part) {
@@ -144,7 +125,7 @@ void agree(std::span<const Vec3> points, std::span<const Side> sides, OrientedSu
 /// Turns the parts of negative volume.
 void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
                   OrientedSurface& surface) {
-  Groups groups(surface.triangles.size());
+  DisjointSets groups(surface.triangles.size());
   struct Sum {
     Vec3 middle;
     double corners = 0, area = 0, volume = 0;
@@ -163,24 +144,24 @@ void turn_outward(std::span<const Vec3> points, std::span<const Side> sides,
     for (const Side& side : edge)
       up += side.upward ? 1 : -1;
     if (up != 0)
-      sums[groups.of(edge[0].triangle)].open = true;
+      sums[groups.find(edge[0].triangle)].open = true;
   });
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    Sum& sum = sums[groups.of(t)];
+    Sum& sum = sums[groups.find(t)];
     for (const std::uint32_t corner : surface.triangles[t])
       sum.middle += points[corner];
     sum.corners += 3;
   }
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    Sum& sum = sums[groups.of(t)];
+    Sum& sum = sums[groups.find(t)];
     const Vec3 middle = sum.middle / sum.corners;
     const auto& [a, b, c] = surface.triangles[t];
     sum.volume += dot(points[a] - middle, cross(points[b] - middle, points[c] - middle)) / 6;
     sum.area += norm(cross(points[b] - points[a], points[c] - points[a])) / 2;
   }
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    const Sum& sum = sums[groups.of(t)];
-    if (groups.of(t) == t) {
+    const Sum& sum = sums[groups.find(t)];
+    if (groups.find(t) == t) {
       ++surface.parts;
       surface.parts_turned += sum.inward() ? 1 : 0;
     }
