@@ -233,8 +233,10 @@ void SmallCollapse::store(Scene& scene, std::uint32_t first_slot, std::size_t p,
   merges.target[slot(s)] = members_[p];
   merges.next[slot(p)] = slot(s);
   if (t != outside) {
-    merges.target[slot(static_cast<std::size_t>(t))] = members_[p];
-    merges.next[slot(s)] = slot(static_cast<std::size_t>(t));
+    const auto third = static_cast<std::size_t>(t);
+    merges.target[slot(third)] = members_[p];
+    merges.next[slot(p)] = slot(std::min(s, third));
+    merges.next[slot(std::min(s, third))] = slot(std::max(s, third));
   }
   // Faces with two of them vanish; each is counted at its first one.
   const unsigned all = 1U << p | 1U << s | (t != outside ? 1U << t : 0U);
@@ -280,7 +282,7 @@ private:
   void find_neighbours(int p, std::vector<Neighbour>& neighbours) const;
   Answer can_collapse(int p, int q, bool careful);
   void collapse(int p, int q);
-  void store(Scene& scene, std::uint32_t n) const;
+  void store(Scene& scene, std::uint32_t n);
 
   int target(int member) const {
     return member == outside ? outside : target_[static_cast<std::size_t>(member)];
@@ -453,14 +455,19 @@ void Collapse::collapse(int p, int q) {
   last_[static_cast<std::size_t>(p)] = last_[static_cast<std::size_t>(q)];
 }
 
-void Collapse::store(Scene& scene, std::uint32_t n) const {
+void Collapse::store(Scene& scene, std::uint32_t n) {
   const std::uint32_t first_slot = scene.clusters.begin[n];
   SnapMerges& merges = scene.merges;
+  std::iota(last_.begin(), last_.end(), 0); // what was merged where is linked by its number
   for (std::size_t m = 0; m < members_.size(); ++m) {
-    merges.target[first_slot + m] = members_[static_cast<std::size_t>(target_[m])];
-    merges.next[first_slot + m] =
-        next_[m] == outside ? none : first_slot + static_cast<std::uint32_t>(next_[m]);
     const auto member = static_cast<int>(m);
+    const auto target = static_cast<std::size_t>(target_[m]);
+    merges.target[first_slot + m] = members_[target];
+    if (target_[m] != member) {
+      merges.next[first_slot + static_cast<std::uint32_t>(last_[target])] =
+          first_slot + static_cast<std::uint32_t>(m);
+      last_[target] = member;
+    }
     for (const Face& face : star(member)) {
       const bool is_first = (face.member_a == outside || face.member_a > member) &&
                             (face.member_b == outside || face.member_b > member);

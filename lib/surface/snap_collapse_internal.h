@@ -13,7 +13,7 @@ struct SnapMerges {
   static constexpr std::size_t faces_at_once = 16384;
 
   std::vector<std::uint32_t> target;  ///< of each slot: the point that its point was merged into
-  std::vector<std::uint32_t> next;    ///< of each slot: the next one merged there, or none
+  std::vector<std::uint32_t> next;    ///< of each slot: the next merged there, ascending, or none
   std::vector<std::uint32_t> dropped; ///< of each faces_at_once faces: those that vanish
   std::uint64_t refused = 0;
   std::uint64_t careful = 0; ///< clusters that had to be taken in order

@@ -90,15 +90,17 @@ Vec3 SnappedMesh::merged_position(std::uint32_t p, std::uint32_t slot) const {
   const Vec3 own = index_position(crossings[p]);
   bool only_fins = true;
   Vec3 sum;
-  double count = 0;
+  double weights = 0;
   for (std::uint32_t at = slot; at != SnapMerges::none; at = merges_.next[at]) {
     const std::uint32_t member = clusters_.members[at];
     only_fins = only_fins && (clusters_.flags[member] & fin) != 0;
-    sum += index_position(crossings[member]) - own;
-    ++count;
+    const double fraction = crossings[member].fraction,
+                 weight = 1 - 1.5 * std::min(fraction, 1 - fraction);
+    sum += (index_position(crossings[member]) - own) * weight;
+    weights += weight;
   }
   if (place_ == SnapOptions::Place::mean || only_fins)
-    return own + sum / count;
+    return own + sum / weights;
   const std::uint32_t first = clusters_.first_member[clusters_.cluster[slot]];
   const Int3 corner = snap_corner(crossings[first], clusters_.flags[first]);
   return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),

@@ -78,7 +78,7 @@ TEST(SnappingBounds, AnglesOfMetaballs) {
     EXPECT_LT(mesh_quality(surface.mesh).angle_1_percent, 3) << seed; // and without
   }
   RecordProperty("angle_1_percent", std::to_string(one_percent));
-  EXPECT_GT(one_percent, 29.5);
+  EXPECT_GT(one_percent, 31);
 }
 
 /// The organ of shared data as a volume of exact fractions, or nothing.
@@ -102,7 +102,7 @@ void check_organ(const Grid& grid) {
   EXPECT_EQ(snapped.report.zero_area, 0U);
   EXPECT_EQ(self_intersections({}, snapped.mesh).pairs, 0U);
   const MeshQuality quality = mesh_quality(snapped.mesh);
-  EXPECT_GT(quality.angle_1_percent, 29.5);
+  EXPECT_GT(quality.angle_1_percent, 30);
   EXPECT_LT(quality.share_below_10, 1e-3);
   // The negative control: corners leave flat faces that lie on each other.
   EXPECT_GT(
