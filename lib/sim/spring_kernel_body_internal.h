@@ -64,13 +64,14 @@ inline double* at(NodeRow* base, std::uint64_t offset) {
   return reinterpret_cast<double*>(reinterpret_cast<char*>(base) + offset);
 }
 
-/// Groups that go through each stage together. A group alone is a chain of a hundred cycles, most
-/// of them in the root and the division; side by side they wait for nothing but the divider.
-inline constexpr std::size_t batch = 16;
+/// A group alone is a chain of a hundred cycles, a fifth of them in the divider. Groups overlap best
+/// when each stage of one stands beside the other stages of those before it.
+inline constexpr std::size_t apart = 4;
+inline constexpr std::size_t underway = 2 * apart; ///< a power of two
 
-struct Batch {
-  Three along[batch];
-  Four square[batch], speed[batch]; ///< length², speed · along
+struct Underway {
+  Three along[underway];
+  Four square[underway], speed[underway]; ///< length², speed · along, then the pull over the length
 };
 
 inline void measure(const SpringGroup& g, const NodeRow* now, Three& d, Four& square, Four& rate) {
@@ -121,18 +122,16 @@ inline void add(const SpringGroup& g, const Three& along, const Four& pull, Node
 }
 
 template <bool both_ends>
-inline void add_pulls(const SpringGroup* groups, std::size_t count, const NodeRow* now,
-                      NodeRow* sum) {
-  Batch b;
-  for (std::size_t first = 0; first < count; first += batch) {
-    const std::size_t size = count - first < batch ? count - first : batch;
-    const SpringGroup* const g = groups + first;
-    for (std::size_t n = 0; n < size; ++n)
-      measure(g[n], now, b.along[n], b.square[n], b.speed[n]);
-    for (std::size_t n = 0; n < size; ++n)
-      pull_of(g[n], b.square[n], b.speed[n]);
-    for (std::size_t n = 0; n < size; ++n)
-      add<both_ends>(g[n], b.along[n], b.speed[n], sum);
+inline void add_pulls(const SpringGroup* g, std::size_t count, const NodeRow* now, NodeRow* sum) {
+  Underway w;
+  const auto slot = [](std::size_t n) { return n % underway; };
+  for (std::size_t n = 0; n < count + 2 * apart; ++n) {
+    if (n >= 2 * apart)
+      add<both_ends>(g[n - 2 * apart], w.along[slot(n)], w.speed[slot(n)], sum);
+    if (n < count)
+      measure(g[n], now, w.along[slot(n)], w.square[slot(n)], w.speed[slot(n)]);
+    if (n >= apart && n - apart < count)
+      pull_of(g[n - apart], w.square[slot(n - apart)], w.speed[slot(n - apart)]);
   }
 }
 
