@@ -88,10 +88,9 @@ void Elastodynamic::apply_load() {
   for (std::size_t row = 0; row < layout_.movable; ++row) {
     const std::uint32_t i = layout_.node_of_row[row];
     const Node& node = model_.nodes[i];
-    for (int a = 0; a < 3; ++a) {
+    for (int a = 0; a < 3; ++a)
       traits_[row].inverse_mass[a] = is_fixed(model_, i, a) ? 0 : 1 / node.mass;
-      traits_[row].drag[a] = node.drag;
-    }
+    traits_[row].drag = node.drag;
     put(node.mass * load_.gravity, traits_[row].constant);
   }
   const auto drive_of = [&](std::size_t row) -> Drive& {
@@ -294,7 +293,8 @@ bool Elastodynamic::step_block(std::size_t block, const NodeRow* now, NodeRow* n
                       }),
           traits_[layout_.row_of_node[driven.node]].constant);
   const BlockStep kernel = cpu == CpuLevel::baseline ? block_step_baseline : block_step_avx2;
-  const bool finite = kernel(layout_.blocks[block], traits_.data(), now, next, h);
+  const bool finite =
+      kernel(layout_.blocks[block], layout_.rest.data(), traits_.data(), now, next, h);
   if (drive != nullptr)
     for (const Traveller& t : drive->travellers) {
       const std::size_t row = layout_.row_of_node[t.node];

@@ -14,19 +14,23 @@ struct alignas(64) NodeRow {
   double u[4], v[4];
 };
 
-/// What acts on a node beside springs, and how it answers; the fourth numbers are 0.
-struct alignas(32) NodeTraits {
-  double constant[4];     ///< f + m g
-  double inverse_mass[4]; ///< 0 along axes that can't move
-  double drag[4];         ///< the same along all three axes
+/// Where a node rests (mm); the fourth number is 0.
+struct alignas(32) NodeRest {
+  double p[4];
+};
+
+/// What acts on a node beside springs, and how it answers.
+struct alignas(64) NodeTraits {
+  double constant[3]; ///< f + m g
+  double drag;
+  double inverse_mass[4]; ///< 0 along axes that can't move; the fourth number is 0
 };
 
 /// Four springs side by side. A spring of a shorter group's end joins a node to itself and pulls
 /// nobody.
-struct alignas(32) SpringGroup {
-  double x[4], y[4], z[4]; ///< from i to j at rest
+struct alignas(64) SpringGroup {
   double stiffness[4], damping[4], rest[4];
-  std::uint32_t i[4], j[4]; ///< rows, in bytes from the first one
+  std::uint32_t i[4], j[4]; ///< rows, by their NodeRest in bytes from the first one
 };
 
 /// Consecutive rows [first, first + count) and their springs. Both ends of a spring `within` are
@@ -46,12 +50,12 @@ inline constexpr double least_square = 1e-300;
 
 /// v' = v + h (constant - drag v + F) / m, u' = u + h v' for the rows of the block; F sums the
 /// springs within, then those across, each in order. \return whether u' and v' are finite
-using BlockStep = bool (*)(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
-                           NodeRow* next, double h);
+using BlockStep = bool (*)(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
+                           const NodeRow* now, NodeRow* next, double h);
 
-bool block_step_baseline(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
-                         NodeRow* next, double h);
-bool block_step_avx2(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
-                     NodeRow* next, double h);
+bool block_step_baseline(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
+                         const NodeRow* now, NodeRow* next, double h);
+bool block_step_avx2(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
+                     const NodeRow* now, NodeRow* next, double h);
 
 } // namespace gewebe

@@ -2,9 +2,9 @@
 
 namespace gewebe {
 
-bool block_step_avx2(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
-                     NodeRow* next, double h) {
-  return step(block, traits, now, next, h);
+bool block_step_avx2(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
+                     const NodeRow* now, NodeRow* next, double h) {
+  return step(block, rest, traits, now, next, h);
 }
 
 } // namespace gewebe

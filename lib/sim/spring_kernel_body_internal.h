@@ -57,15 +57,27 @@ inline void rows(const Three& from, Four& a, Four& b, Four& c, Four& d) {
   d = __builtin_shufflevector(xy2, z2, 2, 3, 6, 7);
 }
 
-inline const double* at(const NodeRow* base, std::uint64_t offset) {
+/// `offset` is that of the row's NodeRest.
+inline const double* at(const NodeRest* base, std::uint64_t offset) {
   return reinterpret_cast<const double*>(reinterpret_cast<const char*>(base) + offset);
 }
+inline const double* at(const NodeRow* base, std::uint64_t offset) {
+  static_assert(sizeof(NodeRow) == 2 * sizeof(NodeRest));
+  return reinterpret_cast<const double*>(reinterpret_cast<const char*>(base) + 2 * offset);
+}
 inline double* at(NodeRow* base, std::uint64_t offset) {
-  return reinterpret_cast<double*>(reinterpret_cast<char*>(base) + offset);
+  return reinterpret_cast<double*>(reinterpret_cast<char*>(base) + 2 * offset);
 }
 
-/// A group alone is a chain of a hundred cycles, a fifth of them in the divider. Groups overlap best
-/// when each stage of one stands beside the other stages of those before it.
+/// From one row to another: at rest and what displacements add; and the velocity.
+inline void between(const NodeRest* rest, const NodeRow* now, std::uint64_t i, std::uint64_t j,
+                    Four& along, Four& speed) {
+  along = (four(at(rest, j)) - four(at(rest, i))) + (four(at(now, j)) - four(at(now, i)));
+  speed = four(at(now, j) + 4) - four(at(now, i) + 4);
+}
+
+/// A group alone is a chain of a hundred cycles, a fifth of them in the divider. Groups overlap
+/// best when each stage of one stands beside the other stages of those before it.
 inline constexpr std::size_t apart = 4;
 inline constexpr std::size_t underway = 2 * apart; ///< a power of two
 
@@ -74,22 +86,19 @@ struct Underway {
   Four square[underway], speed[underway]; ///< length², speed · along, then the pull over the length
 };
 
-inline void measure(const SpringGroup& g, const NodeRow* now, Three& d, Four& square, Four& rate) {
-  const std::uint64_t i0 = g.i[0], i1 = g.i[1], i2 = g.i[2], i3 = g.i[3];
-  const std::uint64_t j0 = g.j[0], j1 = g.j[1], j2 = g.j[2], j3 = g.j[3];
-  Three along, speed;
-  columns(four(at(now, j0)) - four(at(now, i0)), four(at(now, j1)) - four(at(now, i1)),
-          four(at(now, j2)) - four(at(now, i2)), four(at(now, j3)) - four(at(now, i3)), along);
-  columns(four(at(now, j0) + 4) - four(at(now, i0) + 4),
-          four(at(now, j1) + 4) - four(at(now, i1) + 4),
-          four(at(now, j2) + 4) - four(at(now, i2) + 4),
-          four(at(now, j3) + 4) - four(at(now, i3) + 4), speed);
-  along.x = four(g.x) + along.x;
-  along.y = four(g.y) + along.y;
-  along.z = four(g.z) + along.z;
-  square = along.x * along.x + along.y * along.y + along.z * along.z;
-  rate = speed.x * along.x + speed.y * along.y + speed.z * along.z;
-  d = along;
+inline void measure(const SpringGroup& g, const NodeRest* rest, const NodeRow* now, Three& along,
+                    Four& square, Four& rate) {
+  Four along0, along1, along2, along3, speed0, speed1, speed2, speed3;
+  between(rest, now, g.i[0], g.j[0], along0, speed0);
+  between(rest, now, g.i[1], g.j[1], along1, speed1);
+  between(rest, now, g.i[2], g.j[2], along2, speed2);
+  between(rest, now, g.i[3], g.j[3], along3, speed3);
+  Three d, speed;
+  columns(along0, along1, along2, along3, d);
+  columns(speed0, speed1, speed2, speed3, speed);
+  square = d.x * d.x + d.y * d.y + d.z * d.z;
+  rate = speed.x * d.x + speed.y * d.y + speed.z * d.z;
+  along = d;
 }
 
 /// The pull over the length, of spring_force().
@@ -122,26 +131,31 @@ inline void add(const SpringGroup& g, const Three& along, const Four& pull, Node
 }
 
 template <bool both_ends>
-inline void add_pulls(const SpringGroup* g, std::size_t count, const NodeRow* now, NodeRow* sum) {
+inline void add_pulls(const SpringGroup* g, std::size_t count, const NodeRest* rest,
+                      const NodeRow* now, NodeRow* sum) {
   Underway w;
   const auto slot = [](std::size_t n) { return n % underway; };
   for (std::size_t n = 0; n < count + 2 * apart; ++n) {
     if (n >= 2 * apart)
       add<both_ends>(g[n - 2 * apart], w.along[slot(n)], w.speed[slot(n)], sum);
     if (n < count)
-      measure(g[n], now, w.along[slot(n)], w.square[slot(n)], w.speed[slot(n)]);
+      measure(g[n], rest, now, w.along[slot(n)], w.square[slot(n)], w.speed[slot(n)]);
     if (n >= apart && n - apart < count)
       pull_of(g[n - apart], w.square[slot(n - apart)], w.speed[slot(n - apart)]);
   }
 }
 
-inline bool step(const SpringBlock& block, const NodeTraits* traits, const NodeRow* now,
-                 NodeRow* next, double h) {
+inline bool step(const SpringBlock& block, const NodeRest* rest, const NodeTraits* traits,
+                 const NodeRow* now, NodeRow* next, double h) {
   const std::size_t end = block.first + block.count;
-  for (std::size_t n = block.first; n < end; ++n)
-    four(next[n].v) = four(traits[n].constant) - four(traits[n].drag) * four(now[n].v);
-  add_pulls<true>(block.within, block.within_count, now, next);
-  add_pulls<false>(block.across, block.across_count, now, next);
+  for (std::size_t n = block.first; n < end; ++n) {
+    const double d = traits[n].drag;
+    const Four drag{d, d, d, d};
+    four(next[n].v) =
+        four(traits[n].constant) - drag * four(now[n].v); // the fourth is multiplied by 0
+  }
+  add_pulls<true>(block.within, block.within_count, rest, now, next);
+  add_pulls<false>(block.across, block.across_count, rest, now, next);
   const Four step{h, h, h, h}, zero{};
   Four odd{}; // not 0 where a number is not finite
   for (std::size_t n = block.first; n < end; ++n) {

@@ -40,7 +40,7 @@ void bisect(const Model& model, std::span<std::uint32_t> nodes, std::size_t firs
 }
 
 std::uint32_t bytes(std::uint32_t row) {
-  return row * static_cast<std::uint32_t>(sizeof(NodeRow));
+  return row * static_cast<std::uint32_t>(sizeof(NodeRest));
 }
 
 struct Half {
@@ -50,9 +50,8 @@ struct Half {
 
 /// Groups of springs in rounds in which no node comes twice: a sum that waits for the one before
 /// costs the time of a whole group.
-void append_groups(std::vector<Half> springs, const Model& model,
-                   const std::vector<std::uint32_t>& node_of_row, std::uint32_t idle,
-                   bool both_ends, std::vector<SpringGroup>& groups) {
+void append_groups(std::vector<Half> springs, std::uint32_t idle, bool both_ends,
+                   std::vector<SpringGroup>& groups) {
   std::sort(springs.begin(), springs.end(),
             [](const Half& a, const Half& b) { return std::pair(a.i, a.j) < std::pair(b.i, b.j); });
   std::size_t lane = lanes;
@@ -64,11 +63,6 @@ void append_groups(std::vector<Half> springs, const Model& model,
       lane = 0;
     }
     SpringGroup& group = groups.back();
-    const Vec3 along =
-        model.nodes[node_of_row[half.j]].position - model.nodes[node_of_row[half.i]].position;
-    group.x[lane] = along.x;
-    group.y[lane] = along.y;
-    group.z[lane] = along.z;
     group.stiffness[lane] = half.spring->stiffness;
     group.damping[lane] = half.spring->damping;
     group.rest[lane] = half.spring->rest;
@@ -114,6 +108,11 @@ SpringLayout spring_layout(const Model& model) {
   layout.row_of_node.resize(n);
   for (std::uint32_t row = 0; row < n; ++row)
     layout.row_of_node[layout.node_of_row[row]] = row;
+  layout.rest.reserve(n);
+  for (const std::uint32_t node : layout.node_of_row) {
+    const Vec3& p = model.nodes[node].position;
+    layout.rest.push_back({{p.x, p.y, p.z, 0}});
+  }
   std::vector<std::uint32_t> block_of_row(layout.movable);
   for (std::uint32_t b = 0; b < ranges.size(); ++b)
     for (std::size_t row = ranges[b].first; row < ranges[b].first + ranges[b].second; ++row)
@@ -136,9 +135,9 @@ SpringLayout spring_layout(const Model& model) {
   for (std::size_t b = 0; b < ranges.size(); ++b) {
     const auto idle = static_cast<std::uint32_t>(ranges[b].first);
     const std::size_t first = layout.groups.size();
-    append_groups(std::move(within[b]), model, layout.node_of_row, idle, true, layout.groups);
+    append_groups(std::move(within[b]), idle, true, layout.groups);
     const std::size_t middle = layout.groups.size();
-    append_groups(std::move(across[b]), model, layout.node_of_row, idle, false, layout.groups);
+    append_groups(std::move(across[b]), idle, false, layout.groups);
     starts.push_back({first, middle, layout.groups.size()});
   }
   for (std::size_t b = 0; b < ranges.size(); ++b)

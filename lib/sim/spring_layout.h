@@ -16,7 +16,8 @@ namespace gewebe {
 struct SpringLayout {
   std::vector<std::uint32_t> node_of_row; ///< movable nodes, block by block, then the others
   std::vector<std::uint32_t> row_of_node;
-  std::size_t movable = 0; ///< rows that can move along an axis or more
+  std::vector<NodeRest> rest; ///< by row
+  std::size_t movable = 0;    ///< rows that can move along an axis or more
   std::vector<SpringGroup> groups;
   std::vector<SpringBlock> blocks; ///< point into groups: the layout is not copied
 

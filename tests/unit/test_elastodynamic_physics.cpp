@@ -38,15 +38,15 @@ TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
   }
   for (std::size_t row = 0; row < traits.size(); ++row) {
     traits[row] = {};
-    for (int a = 0; a < 3; ++a) {
-      traits[row].inverse_mass[a] = 1;
-      traits[row].drag[a] = model.nodes[layout.node_of_row[row]].drag;
-    }
+    std::fill_n(traits[row].inverse_mass, 3, 1.0);
+    traits[row].drag = model.nodes[layout.node_of_row[row]].drag;
   }
   for (const SpringBlock& block : layout.blocks) {
-    EXPECT_TRUE(block_step_baseline(block, traits.data(), now.data(), next.data(), 1));
+    EXPECT_TRUE(
+        block_step_baseline(block, layout.rest.data(), traits.data(), now.data(), next.data(), 1));
     if (best_cpu_level() != CpuLevel::baseline) {
-      EXPECT_TRUE(block_step_avx2(block, traits.data(), now.data(), again.data(), 1));
+      EXPECT_TRUE(
+          block_step_avx2(block, layout.rest.data(), traits.data(), now.data(), again.data(), 1));
     }
   }
   if (best_cpu_level() != CpuLevel::baseline) {
@@ -69,7 +69,9 @@ TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
     odd[row].v[2] = std::nan("");
     bool finite = true;
     for (const SpringBlock& block : layout.blocks)
-      finite = block_step_baseline(block, traits.data(), odd.data(), next.data(), 1) && finite;
+      finite = block_step_baseline(block, layout.rest.data(), traits.data(), odd.data(),
+                                   next.data(), 1) &&
+               finite;
     EXPECT_FALSE(finite);
   }
 }
