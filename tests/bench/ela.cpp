@@ -1,13 +1,19 @@
-// Elastodynamics: time of a stretch of motion against error, and the speed of the springs against a
-// plain loop over an edge list and against what root and division alone allow.
+// Elastodynamics: time of a stretch of motion against error, beside Taichi in single and double
+// precision where $PYTHON (python3) has it, and the speed of the springs against a plain loop over
+// an edge list and against what root and division alone allow.
 
 #include "model/build.h"
 #include "model/primitive.h"
+#include "peer.h"
 #include "sim/elastodynamic.h"
 #include "timing.h"
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <unistd.h>
 #include <vector>
 
 namespace {
@@ -119,6 +125,46 @@ double limit(std::size_t springs, double steps) {
   return sum > 0 ? time : 0;
 }
 
+/// The same net in Taichi; false where there is none.
+bool taichi(const Model& model, double h, int steps, int threads, const char* precision,
+            Times& times, std::vector<Vec3>& u) {
+  constexpr int runs = 3;
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("ela-" + std::to_string(getpid()))).string();
+  const Load load = push(model);
+  std::vector<double> numbers;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    const Node& n = model.nodes[i];
+    const auto force = load.force.find(i);
+    const Vec3 outer = n.mass * load.gravity + (force != load.force.end() ? force->second : Vec3{});
+    numbers.insert(numbers.end(), {n.position.x, n.position.y, n.position.z, n.mass, n.drag,
+                                   outer.x, outer.y, outer.z, n.fixed == fixed_all ? 0.0 : 1.0});
+  }
+  for (const Spring& s : model.springs)
+    numbers.insert(numbers.end(), {1.0 * s.i, 1.0 * s.j, s.stiffness, s.damping, s.rest});
+  {
+    const std::uint64_t counts[2] = {model.nodes.size(), model.springs.size()};
+    std::ofstream file(path, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(counts), sizeof counts);
+    file.write(reinterpret_cast<const char*>(numbers.data()),
+               static_cast<std::streamsize>(numbers.size() * sizeof(double)));
+  }
+  char call[512];
+  (void)std::snprintf(call, sizeof call, "tests/bench/ela_taichi.py '%s' %.17g %d %d %d %s",
+                      path.c_str(), h, steps, threads, runs, precision);
+  const std::vector<double> found = timing::numbers_of_script(call);
+  const bool made = found.size() == static_cast<std::size_t>(runs);
+  if (made) {
+    times = timing::times_of(found);
+    u.resize(model.nodes.size());
+    std::ifstream file(path, std::ios::binary);
+    file.read(reinterpret_cast<char*>(u.data()),
+              static_cast<std::streamsize>(u.size() * sizeof(Vec3)));
+  }
+  std::filesystem::remove(path);
+  return made;
+}
+
 void speed(const Model& model, double steps) {
   const std::string stage = "speed " + std::to_string(model.nodes.size()) + " nodes";
   const double h = 0.9 * safe_step(model);
@@ -149,6 +195,12 @@ void speed(const Model& model, double steps) {
           difference(u, plain_u));
   }
   print(stage, "plain loop", model.springs.size(), steps, 1, plain, 0);
+  for (const int threads : {1, 2}) {
+    Times t{};
+    std::vector<Vec3> u;
+    if (taichi(model, h, static_cast<int>(steps), threads, "f64", t, u))
+      print(stage, "Taichi f64", model.springs.size(), steps, threads, t, difference(u, plain_u));
+  }
 }
 
 void work_precision(const Model& model) {
@@ -161,6 +213,18 @@ void work_precision(const Model& model) {
     const Times t = timing::measure([&] { u = run(model, duration, part * safe, one); }, 3);
     print(stage, "semi-implicit", model.springs.size(), 400 / part, 1, t, difference(u, exact));
   }
+  for (const char* precision : {"f64", "f32"})
+    for (const double part : {0.9, 0.45, 0.225, 0.1125}) {
+      const double steps = std::ceil(400 / part * (1 - 1e-12));
+      Times t{};
+      std::vector<Vec3> u;
+      if (!taichi(model, duration / steps, static_cast<int>(steps), 1, precision, t, u)) {
+        (void)std::fputs("ela: Taichi skipped, python3 has none\n", stderr);
+        return;
+      }
+      print(stage, (std::string("Taichi ") + precision).c_str(), model.springs.size(), steps, 1, t,
+            difference(u, exact));
+    }
 }
 
 void sleeping(const Model& model) {
