@@ -61,6 +61,8 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
   p.option("--weld", a.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
+  p.option("--repair", a.repair, "LIST",
+           "weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all");
 }
 
 void complete(ModelArguments& a) {
@@ -72,8 +74,9 @@ void complete(ModelArguments& a) {
          "--fix-axes without --fix, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
+  a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });
   if (!a.primitive.empty()) {
-    refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto",
+    refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto" || !a.repair.empty(),
            "--primitive makes the mesh, expected no other and no option that reads one");
     a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
   }

@@ -5,6 +5,7 @@
 #include "model/material.h"
 #include "model/primitive.h"
 #include "model/selector.h"
+#include "surface/repair.h"
 #include "tools/cli.h"
 
 #include <optional>
@@ -14,9 +15,10 @@ namespace gewebe {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
-              axes = "xyz", primitive, size;
+              axes = "xyz", primitive, size, repair;
   MaterialOverrides values;
   BuildOptions build;
+  RepairOptions repairs;
   std::optional<Selector> fixed;
   std::optional<Primitive> matrix;
   std::optional<double> dt;
