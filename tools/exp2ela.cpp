@@ -81,7 +81,9 @@ void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
   require_safe_step(model, *a.dt);
 }
 
-void work(cli::Run& run, const ModelArguments& a) {
+void work(cli::Run& run, ModelArguments& a) {
+  if (!a.materials.empty())
+    choose_materials(a);
   const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
   Output output(run.output(), run.output_options(is_binary(to)));
   Model model = source(run, a);
@@ -119,5 +121,6 @@ int main(int argc, char** argv) {
   p.input_kinds(and_ela(readable_mesh_kinds()));
   p.operand("MESH", a.mesh, "the mesh, or a model");
   p.check([&] { complete(a); });
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
+  return p.run(argc, argv,
+               [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });
 }
