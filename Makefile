@@ -33,8 +33,8 @@ INCLUDES := -Ilib -I. $(addprefix -isystem /usr/include/,eigen3 suitesparse hdf5
 DEFINES := -DGEWEBE_VERSION='"$(VERSION)"'
 ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
-LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash
-CHECK_LIBS := -lgmp -lmpfr
+LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash -lgmp
+CHECK_LIBS := -lmpfr
 BENCH_LIBS := -lembree3 -lblas
 LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
 

@@ -24,8 +24,23 @@ void refuse(bool wrong, const char* what) {
     throw UsageError(what);
 }
 
-Model from_mesh(cli::Run& run, const std::string& name, const TriangleMesh& mesh,
+void repair(cli::Run& run, const std::string& name, TriangleMesh& mesh, const ModelArguments& a) {
+  const RepairReport report = run.timed("repair", [&] {
+    return at(name, [&] { return repair_mesh(mesh, a.repairs, run.context()); });
+  });
+  for (const RepairReport::Line& line : report.lines()) {
+    run.stats().set(line.key, line.count);
+    if (line.count == 0)
+      continue;
+    const std::string text = name + ": " + std::to_string(line.count) + " " + line.text;
+    line.trouble ? run.warn(text) : run.say(text);
+  }
+}
+
+Model from_mesh(cli::Run& run, const std::string& name, TriangleMesh mesh,
                 const ModelArguments& a) {
+  if (!a.repair.empty())
+    repair(run, name, mesh, a);
   BuiltModel built = run.timed(
       "build", [&] { return at(name, [&] { return build_model(mesh, a.build, run.context()); }); });
   for (const BuildReport::Line& line : built.report.lines()) {
@@ -48,7 +63,8 @@ Model source(cli::Run& run, const ModelArguments& a) {
   Input input(a.mesh);
   const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
   // Nothing that was asked for may be ignored.
-  refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || a.build != BuildOptions{}),
+  refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
+                               a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
   if (from == Kind::ela)
     return run.timed("read", [&] { return read_ela(input, run.context()); });
@@ -65,7 +81,9 @@ void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
   require_safe_step(model, *a.dt);
 }
 
-void work(cli::Run& run, const ModelArguments& a) {
+void work(cli::Run& run, ModelArguments& a) {
+  if (!a.materials.empty())
+    choose_materials(a);
   const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
   Output output(run.output(), run.output_options(is_binary(to)));
   Model model = source(run, a);
@@ -103,5 +121,6 @@ int main(int argc, char** argv) {
   p.input_kinds(and_ela(readable_mesh_kinds()));
   p.operand("MESH", a.mesh, "the mesh, or a model");
   p.check([&] { complete(a); });
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
+  return p.run(argc, argv,
+               [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });
 }

@@ -2,6 +2,7 @@
 
 #include "formats/mesh_file.h"
 #include "model/check.h"
+#include "model/material_table.h"
 
 #include <vector>
 
@@ -24,6 +25,14 @@ void refuse(bool wrong, const char* what) {
     throw UsageError(what);
 }
 
+/// The text of a table that parses.
+std::string checked_table(const std::string& file) {
+  Input input(file, false);
+  std::string text = input.read_all();
+  (void)parse_material_table(text, input.name());
+  return text;
+}
+
 } // namespace
 
 void declare(cli::Program& p, ModelArguments& a) {
@@ -39,8 +48,9 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.flag("--bend", b.bend, "add bending springs across edges");
   p.option("--bend-stiffness", b.bend_factor, "F", "their stiffness over that of the edge")
       .range(0, 1e9);
-  p.option("--material", a.material, "NAME",
-           "generic, liver, gallbladder, uterus; PART=NAME for a part");
+  p.option("--material", a.material, "NAME", "of --list-materials; PART=NAME for a part");
+  p.option("--materials", a.materials, "FILE", "a table of materials, beside the presets");
+  p.flag("--list-materials", a.list_materials, "write the table of materials instead of a model");
   p.option("--density", a.values.density, "D", "g/mm3, instead of the material's").positive();
   p.option("--young", a.values.young, "E", "Young's modulus in Pa, instead of the material's")
       .positive();
@@ -61,6 +71,8 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
   p.option("--weld", a.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
+  p.option("--repair", a.repair, "LIST",
+           "weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all");
 }
 
 void complete(ModelArguments& a) {
@@ -72,21 +84,44 @@ void complete(ModelArguments& a) {
          "--fix-axes without --fix, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
+  a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });
   if (!a.primitive.empty()) {
-    refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto",
+    refuse(a.mesh != "-" || !a.unit.empty() || a.weld != "auto" || !a.repair.empty(),
            "--primitive makes the mesh, expected no other and no option that reads one");
     a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
   }
   parsed("--name", [&] { check_name(a.name); });
-  a.build.material = parsed("--material", [&] { return parse_material_choice(a.material); });
-  override_materials(a.build.material.materials, a.values);
-  if (a.fix == "none")
-    return;
-  a.fixed = parsed("--fix", [&] { return parse_selector(a.fix); });
-  std::vector<std::string> inputs = node_list_names(*a.fixed);
-  if (!a.matrix)
+  refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none"),
+         "--list-materials makes no model, expected no mesh and no nodes");
+  if (a.materials.empty())
+    choose_materials(a); // what is wrong is known before anything is read
+  std::vector<std::string> inputs;
+  if (!a.materials.empty())
+    inputs.push_back(a.materials);
+  if (!a.matrix && !a.list_materials)
     inputs.push_back(a.mesh);
+  if (a.fix != "none") {
+    a.fixed = parsed("--fix", [&] { return parse_selector(a.fix); });
+    for (const std::string& name : node_list_names(*a.fixed))
+      inputs.push_back(name);
+  }
   cli::check_one_pipe(inputs);
+}
+
+void choose_materials(ModelArguments& a) {
+  std::string table(preset_table());
+  if (!a.materials.empty())
+    table = merged_tables(table, checked_table(a.materials));
+  const std::vector<Material> known = parse_material_table(table, a.materials);
+  a.build.material = parsed("--material", [&] { return parse_material_choice(a.material, known); });
+  override_materials(a.build.material.materials, a.values);
+}
+
+void list_materials(cli::Run& run, const ModelArguments& a) {
+  Output output(run.output(), run.output_options(false));
+  output.write(a.materials.empty() ? std::string(preset_table())
+                                   : merged_tables(preset_table(), checked_table(a.materials)));
+  output.commit();
 }
 
 } // namespace gewebe

@@ -5,6 +5,7 @@
 #include "model/material.h"
 #include "model/primitive.h"
 #include "model/selector.h"
+#include "surface/repair.h"
 #include "tools/cli.h"
 
 #include <optional>
@@ -14,13 +15,14 @@ namespace gewebe {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
-              axes = "xyz", primitive, size;
+              axes = "xyz", primitive, size, repair, materials;
   MaterialOverrides values;
   BuildOptions build;
+  RepairOptions repairs;
   std::optional<Selector> fixed;
   std::optional<Primitive> matrix;
   std::optional<double> dt;
-  bool scale_mass = false;
+  bool scale_mass = false, list_materials = false;
 };
 
 /// The options of a program, to be told into `a`.
@@ -28,5 +30,12 @@ void declare(cli::Program& p, ModelArguments& a);
 
 /// Checks them against each other and reads their texts. \throw UsageError
 void complete(ModelArguments& a);
+
+/// Chooses among the presets and the materials of --materials. \throw UsageError if there is none
+/// of a name; Error if the table is bad
+void choose_materials(ModelArguments& a);
+
+/// Writes the table of the materials there are.
+void list_materials(cli::Run& run, const ModelArguments& a);
 
 } // namespace gewebe

@@ -15,7 +15,7 @@
 namespace gewebe {
 
 struct BuildOptions {
-  MaterialChoice material{{material_preset("generic")}, {}};
+  MaterialChoice material{{material_presets()[0]}, {}};
   std::optional<double> stiffness; ///< of every edge spring, g/s²; else from Young's modulus
   std::optional<double> mass;      ///< of every surface node, g; else density × thickness × area
   double drag_rate = 1;            ///< drag of a node per mass, 1/s

@@ -1,35 +1,21 @@
 #include "model/material.h"
 
 #include "base/error.h"
+#include "model/material_table.h"
 
 #include <algorithm>
 #include <charconv>
 
 namespace gewebe {
 
-// Where the numbers come from. They set the order of magnitude; tissue varies by factors between
-// people and, being non-linear, with its stretch.
-//   density      soft tissue and liver about 1.06 g/cm3: ICRU Report 46, 1992
-//   liver        5.5 kPa, healthy, transient elastography: Roulot et al., J Hepatol 48, 2008;
-//                10 mm is no wall: it is the shell as heavy as the organ, for 1.5 kg on 0.15 m2
-//   gallbladder  some hundred kPa in tension: Karimi et al., J Med Eng Technol 41, 2017;
-//                a healthy wall is at most 3 mm thick in ultrasound
-//   uterus       30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006;
-//                the myometrium is one to two centimetres thick
-// The damping ratio is a choice: motion dies within a few swings.
 const std::vector<Material>& material_presets() {
-  static const std::vector<Material> presets{
-      {"generic", 1e-3, 1e4, 5, 0.2},
-      {"liver", 1.06e-3, 5500, 10, 0.2},
-      {"gallbladder", 1.06e-3, 2.5e5, 3, 0.2},
-      {"uterus", 1.06e-3, 3e4, 15, 0.2},
-  };
+  static const std::vector<Material> presets = parse_material_table(preset_table(), "presets");
   return presets;
 }
 
-Material material_preset(std::string_view name) {
+Material material_named(std::string_view name, const std::vector<Material>& table) {
   std::string known;
-  for (const Material& m : material_presets()) {
+  for (const Material& m : table) {
     if (m.name == name)
       return m;
     known += (known.empty() ? "" : ", ") + m.name;
@@ -46,10 +32,10 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
   }
 }
 
-MaterialChoice parse_material_choice(std::string_view text) {
+MaterialChoice parse_material_choice(std::string_view text, const std::vector<Material>& table) {
   constexpr std::int32_t most_parts = 4096;
   MaterialChoice choice;
-  choice.materials.push_back(material_preset("generic"));
+  choice.materials.push_back(material_named("generic", table));
   std::vector<bool> named;
   for (bool first = true;; first = false) {
     const std::size_t comma = std::min(text.find(','), text.size());
@@ -58,7 +44,7 @@ MaterialChoice parse_material_choice(std::string_view text) {
     if (sign == std::string_view::npos) {
       if (!first)
         throw Error("surplus material '" + std::string(word) + "', expected PART=NAME");
-      choice.materials[0] = material_preset(word);
+      choice.materials[0] = material_named(word, table);
     } else {
       std::int32_t part = -1;
       const auto [rest, status] = std::from_chars(word.data(), word.data() + sign, part);
@@ -73,7 +59,7 @@ MaterialChoice parse_material_choice(std::string_view text) {
       if (named[p])
         throw Error("part " + std::to_string(part) + " has two materials, expected one");
       named[p] = true;
-      const Material material = material_preset(word.substr(sign + 1));
+      const Material material = material_named(word.substr(sign + 1), table);
       auto found = std::find(choice.materials.begin(), choice.materials.end(), material);
       if (found == choice.materials.end())
         found = choice.materials.insert(found, material);

@@ -14,8 +14,8 @@ namespace gewebe {
 /// The presets: generic, liver, gallbladder, uterus.
 const std::vector<Material>& material_presets();
 
-/// \throw Error naming the presets, if there is none of that name
-Material material_preset(std::string_view name);
+/// The one of that name. \throw Error naming those there are
+Material material_named(std::string_view name, const std::vector<Material>& table);
 
 /// The materials of a mesh in parts.
 struct MaterialChoice {
@@ -32,7 +32,9 @@ struct MaterialOverrides {
 void override_materials(std::vector<Material>& materials, const MaterialOverrides& values);
 
 /// Understands "NAME" and, after it or alone, "PART=NAME", separated by commas:
-/// "liver,2=gallbladder". Parts that are not named get NAME, or generic. \throw Error
-MaterialChoice parse_material_choice(std::string_view text);
+/// "liver,2=gallbladder". Parts that are not named get NAME, or the table's first, generic among
+/// the presets. \pre the table is not empty   \throw Error
+MaterialChoice parse_material_choice(std::string_view text,
+                                     const std::vector<Material>& table = material_presets());
 
 } // namespace gewebe

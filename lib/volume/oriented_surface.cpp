@@ -76,6 +76,7 @@ void drop_repeated(OrientedSurface& surface, std::vector<std::int32_t>& part) {
   surface.triangles.resize(keep.size());
   if (!part.empty())
     part.resize(keep.size());
+  surface.source = std::move(keep);
 }
 
 /// Makes the triangles of each patch agree with most of its area.

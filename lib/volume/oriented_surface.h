@@ -12,6 +12,7 @@ namespace gewebe {
 
 struct OrientedSurface {
   std::vector<Triangle> triangles;    ///< corners are the first points at their positions
+  std::vector<std::uint32_t> source;  ///< of each, the triangle that was given; ascending
   std::uint64_t parts = 0;            ///< connected by edges, within the parts of the input
   std::uint64_t parts_turned = 0;     ///< turned as a whole, since their signed volume was negative
   std::uint64_t triangles_turned = 0; ///< that run against most of their patch

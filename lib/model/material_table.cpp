@@ -1,0 +1,137 @@
+#include "model/material_table.h"
+
+#include "base/error.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::string_view presets =
+    R"(# Materials: name, density in g/mm3, Young's modulus in Pa, thickness in mm, damping ratio.
+#
+# They set the order of magnitude; tissue varies by factors between people and, being non-linear,
+# with its stretch. The damping ratio is a choice: motion dies within a few swings.
+#
+# Soft, and as heavy as water.
+generic      0.001    10000   5  0.2
+# Density: ICRU Report 46, 1992. Young's modulus: healthy, by transient elastography, Roulot et al.,
+# J Hepatol 48, 2008. 10 mm is no wall but the shell that is as heavy as the organ, for 1.5 kg on
+# 0.15 m2.
+liver        0.00106   5500  10  0.2
+# Some hundred kPa in tension: Karimi et al., J Med Eng Technol 41, 2017. A healthy wall is at most
+# 3 mm thick in ultrasound. Density as of the liver.
+gallbladder  0.00106 250000   3  0.2
+# 30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006. The myometrium
+# is one to two centimetres thick. Density as of the liver.
+uterus       0.00106  30000  15  0.2
+)";
+
+constexpr const char* form = ", expected name density young thickness damping_ratio";
+
+/// Calls visit(number, line with its end, words) for each line that is not blank or a comment
+/// alone.
+template <class Visit>
+void for_each_line(std::string_view text, Visit&& visit) {
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end);
+    std::string_view rest = line.substr(0, line.find('#'));
+    std::vector<std::string_view> words;
+    constexpr const char* blanks = " \t\r\n\f\v";
+    for (;;) {
+      rest.remove_prefix(std::min(rest.find_first_not_of(blanks), rest.size()));
+      if (rest.empty())
+        break;
+      words.push_back(rest.substr(0, rest.find_first_of(blanks)));
+      rest.remove_prefix(words.back().size());
+    }
+    visit(number, line, words);
+  }
+}
+
+std::string quoted(std::string_view word) {
+  return "'" + std::string(word.substr(0, 40)) + (word.size() > 40 ? "…'" : "'");
+}
+
+bool bad_in_name(char c) {
+  return c == '"' || c == ',' || c == '=' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+}
+
+Material material_of(const std::vector<std::string_view>& words) {
+  if (words.size() != 5)
+    throw Error(std::to_string(words.size()) + (words.size() == 1 ? " word" : " words") + form);
+  Material m;
+  m.name = words[0];
+  if (std::any_of(m.name.begin(), m.name.end(), bad_in_name))
+    throw Error(quoted(words[0]) +
+                R"( is no name, expected one without ", comma, = and control characters)");
+  struct Field {
+    const char* name;
+    double* value;
+    bool zero;
+  };
+  const std::array<Field, 4> fields{{{"density", &m.density, false},
+                                     {"Young's modulus", &m.young, false},
+                                     {"thickness", &m.thickness, false},
+                                     {"damping ratio", &m.damping_ratio, true}}};
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const auto& [name, value, zero] = fields[k];
+    const std::string_view word = words[k + 1];
+    const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), *value);
+    if (status != std::errc{} || rest != word.data() + word.size() || !std::isfinite(*value) ||
+        !(zero ? *value >= 0 : *value > 0))
+      throw Error(quoted(word) + " is no " + name + ", expected a finite number " +
+                  (zero ? "of 0 or more" : "above 0"));
+  }
+  return m;
+}
+
+} // namespace
+
+std::string_view preset_table() {
+  return presets;
+}
+
+std::vector<Material> parse_material_table(std::string_view text, const std::string& name) {
+  std::vector<Material> materials;
+  for_each_line(
+      text, [&](std::size_t number, std::string_view, const std::vector<std::string_view>& words) {
+        if (words.empty())
+          return;
+        at(name + ":" + std::to_string(number), [&] {
+          const Material m = material_of(words);
+          for (const Material& other : materials)
+            if (other.name == m.name)
+              throw Error("a second material " + quoted(m.name) + ", expected another name");
+          materials.push_back(m);
+        });
+      });
+  if (materials.empty())
+    throw Error(name, std::string("no material") + form);
+  return materials;
+}
+
+std::string merged_tables(std::string_view table, std::string_view more) {
+  std::vector<std::string_view> replaced;
+  for_each_line(more, [&](std::size_t, std::string_view, const auto& words) {
+    if (!words.empty())
+      replaced.push_back(words[0]);
+  });
+  std::string text;
+  for_each_line(table, [&](std::size_t, std::string_view line, const auto& words) {
+    if (words.empty() || std::find(replaced.begin(), replaced.end(), words[0]) == replaced.end())
+      text += line;
+  });
+  if (!text.empty() && text.back() != '\n')
+    text += '\n';
+  return text += more;
+}
+
+} // namespace gewebe

@@ -1,0 +1,217 @@
+// Bodies: what is tied together and moves as one.
+
+#include "base/parallel.h"
+#include "sim/simulation_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace gewebe {
+
+using simulation::number_text;
+
+namespace {
+
+constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a tenth of a picture
+
+} // namespace
+
+std::unique_ptr<Simulation::Body> Simulation::make_body(std::vector<std::size_t> parts) {
+  auto body = std::make_unique<Body>();
+  std::vector<std::size_t> offset;
+  const Model* model = &objects_[parts[0]]->model;
+  if (parts.size() > 1) {
+    Model& joined = body->joined.emplace();
+    for (const std::size_t part : parts) {
+      const Model& from = objects_[part]->model;
+      const auto base = static_cast<std::uint32_t>(joined.nodes.size());
+      offset.push_back(base);
+      joined.nodes.insert(joined.nodes.end(), from.nodes.begin(), from.nodes.end());
+      for (Spring s : from.springs) {
+        s.i += base;
+        s.j += base;
+        joined.springs.push_back(s);
+      }
+      for (Triangle t : from.triangles) {
+        for (std::uint32_t& corner : t)
+          corner += base;
+        joined.triangles.push_back(t);
+      }
+    }
+    model = &joined;
+  } else {
+    offset.push_back(0);
+  }
+  std::vector<NodeMotion> motion;
+  for (const std::size_t part : parts) {
+    const Object& object = *objects_[part];
+    if (object.body == nullptr) {
+      motion.resize(motion.size() + object.model.nodes.size());
+      continue;
+    }
+    const auto from =
+        object.body->moving->motion().subspan(object.offset, object.model.nodes.size());
+    motion.insert(motion.end(), from.begin(), from.end());
+  }
+  for (const Tie& tie : ties_) {
+    const auto a = std::find(parts.begin(), parts.end(), tie.object);
+    const auto b = std::find(parts.begin(), parts.end(), tie.other);
+    if (a == parts.end() || b == parts.end())
+      continue;
+    const auto index = [&](auto part, std::uint32_t node) {
+      return static_cast<std::uint32_t>(offset[static_cast<std::size_t>(part - parts.begin())]) +
+             node;
+    };
+    Spring s{
+        index(a, tie.node), index(b, tie.other_node), SpringKind::edge, tie.stiffness, 0, tie.rest};
+    const Node &m = body->joined->nodes[s.i], &n = body->joined->nodes[s.j];
+    const auto ratio = [&](const Object& o, const Node& node) {
+      return o.model.materials[static_cast<std::size_t>(node.material)].damping_ratio;
+    };
+    const double mass = m.fixed == fixed_all   ? n.mass
+                        : n.fixed == fixed_all ? m.mass
+                                               : m.mass * (n.mass / (m.mass + n.mass));
+    s.damping = (ratio(*objects_[tie.object], m) + ratio(*objects_[tie.other], n)) *
+                std::sqrt(s.stiffness * mass);
+    if (s.i > s.j)
+      std::swap(s.i, s.j);
+    body->joined->springs.push_back(s);
+  }
+  body->moving.emplace(*model, objects_[parts[0]]->integration);
+  body->moving->set_motion(motion);
+  body->safe = safe_step(*model);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    objects_[parts[k]]->body = body.get();
+    objects_[parts[k]]->offset = offset[k];
+  }
+  body->parts = std::move(parts);
+  return body;
+}
+
+void Simulation::attach(const Attach& tie) {
+  Object &a = *objects_[tie.object], &b = *objects_[tie.other];
+  const auto place = [](const Object& o, std::uint32_t node) {
+    return o.model.nodes[node].position + o.body->moving->motion()[o.offset + node].displacement;
+  };
+  for (const std::uint32_t node : tie.nodes) {
+    const Vec3 here = place(a, node);
+    std::uint32_t nearest = tie.others[0];
+    double least = HUGE_VAL;
+    for (const std::uint32_t other : tie.others) {
+      const Vec3 d = place(b, other) - here;
+      if (dot(d, d) < least) {
+        least = dot(d, d);
+        nearest = other;
+      }
+    }
+    ties_.push_back({tie.object, tie.other, node, nearest, tie.stiffness, std::sqrt(least)});
+  }
+  std::vector<std::size_t> parts = a.body->parts;
+  if (a.body != b.body)
+    parts.insert(parts.end(), b.body->parts.begin(), b.body->parts.end());
+  std::sort(parts.begin(), parts.end());
+  const Body *const first = a.body, *const second = b.body;
+  std::unique_ptr<Body> body = make_body(std::move(parts));
+  std::erase_if(bodies_,
+                [&](const auto& old) { return old.get() == first || old.get() == second; });
+  bodies_.push_back(std::move(body));
+}
+
+double Simulation::integration_step(Body& body) {
+  if (objects_[body.parts[0]]->integration == Integration::implicit)
+    return timestep_.value_or(implicit_step);
+  const double usual = safe_step_fraction * body.safe;
+  if (!timestep_)
+    return usual;
+  if (*timestep_ <= body.safe)
+    return *timestep_;
+  if (!body.warned_step && options_.warn)
+    options_.warn("object " + objects_[body.parts[0]]->name + ": the timestep " +
+                  number_text(*timestep_) + " s is beyond the safe " + number_text(body.safe) +
+                  " s, it takes smaller ones");
+  body.warned_step = true;
+  return usual;
+}
+
+void Simulation::move_bodies(double to) {
+  const double duration = to - time_;
+  for (const auto& body : bodies_) {
+    if (!body->changed)
+      continue;
+    Load load; // of all parts
+    for (const std::size_t part : body->parts) {
+      const Object& object = *objects_[part];
+      const auto add = [&](const auto& from, auto& all) {
+        for (const auto& [node, value] : from)
+          all[static_cast<std::uint32_t>(object.offset) + node] = value;
+      };
+      add(object.load.force, load.force);
+      add(object.load.displacement, load.displacement);
+      add(object.load.force_period, load.force_period);
+      add(object.load.pressure, load.pressure);
+      add(object.load.travel, load.travel);
+      load.gravity = object.load.gravity;
+    }
+    body->moving->set_load(load, time_);
+    body->changed = false;
+  }
+  if (!(duration > 0))
+    return;
+  std::vector<Body*> awake;
+  std::vector<double> step;
+  for (const auto& body : bodies_) {
+    body->taken = 0;
+    if (body->moving->resting())
+      continue;
+    awake.push_back(body.get());
+    step.push_back(integration_step(*body));
+  }
+  // One body has all threads, several have one each.
+  Context context = context_;
+  if (awake.size() > 1)
+    context.threads = 1;
+  parallel_blocks(context_, awake.size(), 1, [&](std::size_t k, std::size_t) {
+    try {
+      awake[k]->taken = awake[k]->moving->advance(duration, step[k], context, time_);
+    } catch (...) {
+      awake[k]->failure = std::current_exception();
+    }
+  });
+  for (Body* const body : awake)
+    if (body->failure)
+      raise(*body);
+  for (const auto& body : bodies_)
+    for (const std::size_t part : body->parts) {
+      counts_.integration += body->taken;
+      counts_.resting += body->taken == 0 ? 1 : 0;
+      counts_.moving += body->taken == 0 ? 0 : 1;
+      objects_[part]->shown = objects_[part]->shown && body->taken == 0;
+    }
+}
+
+/// What ended a body's motion, with its object's name.
+void Simulation::raise(const Body& body) const {
+  const auto owner = [&](std::uint32_t node) {
+    std::size_t found = body.parts[0];
+    for (const std::size_t part : body.parts)
+      if (objects_[part]->offset <= node)
+        found = part;
+    return found;
+  };
+  try {
+    std::rethrow_exception(body.failure);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const MotionError& error) {
+    const Object& object = *objects_[owner(error.node())];
+    throw Error("object " + object.name + " at " + number_text(error.time()) + " s: node " +
+                std::to_string(error.node() - object.offset) + " " + error.what());
+  } catch (const Error& error) {
+    throw Error("object " + objects_[body.parts[0]]->name + " at " + number_text(time_) +
+                " s: " + error.what());
+  }
+}
+
+} // namespace gewebe

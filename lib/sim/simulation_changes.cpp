@@ -1,0 +1,132 @@
+// Changes: what acts on objects, now or later.
+
+#include "sim/simulation_internal.h"
+
+#include <algorithm>
+#include <variant>
+
+namespace gewebe {
+
+using simulation::number_text;
+
+void Simulation::check(const Change& change) const {
+  if (const auto* const tie = std::get_if<Attach>(&change)) {
+    const Object &a = *objects_.at(tie->object), &b = *objects_.at(tie->other);
+    for (const Object* const o : {&a, &b})
+      if (o->method != Method::ela)
+        throw Error("object " + o->name +
+                    " is elastostatic (ffe) and has no motion to tie, expected ela objects");
+    if (&a == &b)
+      throw Error("object " + a.name + " can't be attached to itself, expected two objects");
+    if (a.integration != b.integration)
+      throw Error("one of " + a.name + " and " + b.name +
+                  " is implicit and the other is not, expected both alike");
+    return;
+  }
+  const auto* const set = std::get_if<SetDisplacement>(&change);
+  if (set == nullptr)
+    return;
+  const Model& model = objects_.at(set->object)->model;
+  for (const std::uint32_t node : set->nodes)
+    for (int a = 0; a < 3; ++a)
+      if (is_fixed(model, node, a) && set->displacement[a] != 0)
+        throw Error("node " + std::to_string(node) + " is fixed along " + "xyz"[a] +
+                    ", expected a displacement of 0 there");
+}
+
+void Simulation::apply(const Change& change) {
+  check(change);
+  Object* touched = nullptr;
+  if (const auto* const force = std::get_if<SetForce>(&change)) {
+    touched = objects_.at(force->object).get();
+    for (const std::uint32_t node : force->nodes) {
+      touched->load.force_period.erase(node);
+      if (force->force == Vec3{}) {
+        touched->load.force.erase(node);
+        continue;
+      }
+      touched->load.force[node] = force->force;
+      if (force->period > 0)
+        touched->load.force_period[node] = force->period;
+    }
+  } else if (const auto* const press = std::get_if<SetPressure>(&change)) {
+    touched = objects_.at(press->object).get();
+    for (const std::uint32_t node : press->nodes)
+      if (press->pressure.pressure == 0)
+        touched->load.pressure.erase(node);
+      else
+        touched->load.pressure[node] = press->pressure;
+  } else if (const auto* const set = std::get_if<SetDisplacement>(&change)) {
+    touched = objects_.at(set->object).get();
+    displace(*touched, *set);
+  } else if (const auto* const tie = std::get_if<Attach>(&change)) {
+    attach(*tie);
+  } else if (const auto* const release = std::get_if<Release>(&change)) {
+    touched = objects_.at(release->object).get();
+    for (const std::uint32_t node : release->nodes) {
+      touched->load.force.erase(node);
+      touched->load.force_period.erase(node);
+      touched->load.pressure.erase(node);
+      touched->load.displacement.erase(node);
+      touched->load.travel.erase(node);
+    }
+  } else if (const auto* const pull = std::get_if<SetGravity>(&change)) {
+    gravity_ = pull->gravity;
+    for (const auto& object : objects_) {
+      object->load.gravity = gravity_;
+      object->shown = false;
+      if (object->body != nullptr)
+        object->body->changed = true;
+    }
+  } else if (const auto* const wish = std::get_if<SetTimestep>(&change)) {
+    timestep_ = wish->dt;
+  } else if (std::get<Emit>(change).forces) {
+    emit_forces_ = true;
+  } else {
+    emit_shapes_ = true;
+  }
+  if (touched == nullptr)
+    return;
+  touched->shown = false;
+  if (touched->body != nullptr)
+    touched->body->changed = true;
+}
+
+void Simulation::displace(Object& object, const SetDisplacement& set) {
+  for (const std::uint32_t node : set.nodes) {
+    Vec3 from;
+    if (object.body != nullptr)
+      from = object.body->moving->motion()[object.offset + node].displacement;
+    else if (const auto old = object.load.displacement.find(node);
+             old != object.load.displacement.end())
+      from = old->second;
+    object.load.displacement[node] = set.displacement;
+    object.load.travel.erase(node);
+    if (set.over > 0)
+      object.load.travel[node] = {from, set.displacement, time_, time_ + set.over};
+  }
+}
+
+void Simulation::schedule(double time, const Change& change) {
+  if (!(time >= time_))
+    throw Error("the time " + number_text(time) + " s is past, expected " + number_text(time_) +
+                " s or later");
+  if (time == time_) {
+    apply(change);
+    return;
+  }
+  check(change);
+  events_.emplace(time, Event{change});
+}
+
+void Simulation::schedule_every(double period, const Change& change) {
+  check(change);
+  events_.emplace(time_ + period, Event{change, time_, period, 1});
+}
+
+std::size_t Simulation::pending() const noexcept {
+  return static_cast<std::size_t>(std::count_if(
+      events_.begin(), events_.end(), [](const auto& e) { return e.second.period == 0; }));
+}
+
+} // namespace gewebe

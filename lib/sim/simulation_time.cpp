@@ -1,0 +1,121 @@
+// Time: steps through events, and what is shown at their end.
+
+#include "sim/simulation_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+using simulation::number_text;
+
+namespace {
+
+constexpr double strain_limit = 0.1, turn_limit = 0.2;
+constexpr double same_time = 1e-9; // of a step's length
+
+std::string percent(double part) {
+  return number_text(std::round(1000 * part) / 10) + " %";
+}
+
+} // namespace
+
+void Simulation::step(double dt) {
+  // Neumaier's sum: ten steps of 0.1 s end at 1 s.
+  const double sum = sum_ + dt;
+  const double lost = lost_ + (sum_ >= dt ? (sum_ - sum) + dt : (dt - sum) + sum_);
+  advance(std::max(sum + lost, time_));
+  sum_ = sum;
+  lost_ = lost;
+}
+
+void Simulation::step_to(double time) {
+  if (!(time >= time_))
+    throw Error("the time " + number_text(time) + " s is past, expected " + number_text(time_) +
+                " s or later");
+  advance(time);
+  sum_ = time;
+  lost_ = 0;
+}
+
+template <class Work>
+void Simulation::at_object(const Object& object, Work&& work) {
+  try {
+    work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("object " + object.name + " at " + number_text(time_) +
+                " s: " + (error.place().empty() ? "" : error.place() + ": ") + error.what());
+  }
+}
+
+void Simulation::advance(double to) {
+  const double slack = same_time * (to - time_);
+  const auto move_to = [&](double time) {
+    move_bodies(time);
+    time_ = std::max(time_, time);
+  };
+  while (!events_.empty() && events_.begin()->first <= to + slack) {
+    move_to(std::min(events_.begin()->first, to));
+    Event event = std::move(events_.begin()->second);
+    events_.erase(events_.begin());
+    apply(event.change);
+    if (event.period > 0) {
+      ++event.round;
+      const double next = event.origin + event.round * event.period;
+      if (!(next > time_))
+        throw Error("the period " + number_text(event.period) +
+                    " s is lost in the rounding of the time, expected a longer one");
+      events_.emplace(next, std::move(event));
+    }
+  }
+  move_to(to);
+  for (const auto& object : objects_)
+    if (!object->shown || (object->still && object->load.changes_until() > object->shown_time))
+      at_object(*object, [&] { show(*object); });
+  ++counts_.steps;
+}
+
+void Simulation::show(Object& object) {
+  if (object.still) {
+    object.still->update(load_at(object.load, object.model, time_));
+    const std::span<const double> u = object.still->displacement();
+    object.displacement.assign(u.begin(), u.end());
+    object.forces = object.still->contact_forces();
+    if (!object.warned_range)
+      warn_of_range(object);
+  } else {
+    const std::span<const NodeMotion> motion =
+        object.body->moving->motion().subspan(object.offset, object.model.nodes.size());
+    for (std::size_t i = 0; i < motion.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        object.displacement[3 * i + static_cast<std::size_t>(a)] = motion[i].displacement[a];
+    object.forces.clear();
+    for (const NodeVector& f : object.body->moving->contact_forces())
+      if (f.node >= object.offset && f.node - object.offset < object.model.nodes.size())
+        object.forces.push_back({f.node - static_cast<std::uint32_t>(object.offset), f.value});
+  }
+  object.shown_time = time_;
+  object.shown = true;
+}
+
+void Simulation::warn_of_range(Object& object) {
+  const LinearRange range = linear_range(object.model, object.displacement);
+  const bool strained = !(range.strain <= strain_limit), turned = !(range.turn <= turn_limit);
+  if (!strained && !turned)
+    return;
+  object.warned_range = true;
+  if (!options_.warn)
+    return;
+  const Spring& spring = object.model.springs[strained ? range.strain_spring : range.turn_spring];
+  options_.warn("object " + object.name + " at " + number_text(time_) +
+                " s: beyond the linear range, the edge " + std::to_string(spring.i) + "-" +
+                std::to_string(spring.j) +
+                (strained ? " is strained by " + percent(range.strain)
+                          : " is turned by " + percent(range.turn)) +
+                ", the shape is not to be trusted there");
+}
+
+} // namespace gewebe

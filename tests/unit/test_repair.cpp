@@ -1,0 +1,277 @@
+#include "surface/repair.h"
+
+#include "base/error.h"
+#include "mesh_fixtures.h"
+#include "surface/mesh_check.h"
+#include "surface/weld.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+const TriangleMesh& ball() {
+  static const TriangleMesh mesh = test::sphere_mesh(3, 10, {3, -2, 1});
+  return mesh;
+}
+
+TriangleMesh with_hole() {
+  TriangleMesh mesh = ball(); // without the faces at two neighbours
+  const std::uint32_t a = mesh.triangles[5][0], b = mesh.triangles[5][1];
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    return std::any_of(t.begin(), t.end(), [&](std::uint32_t c) { return c == a || c == b; });
+  });
+  weld(mesh, {Weld::none, false, true});
+  return mesh;
+}
+
+TriangleMesh with_flipped_face() {
+  TriangleMesh mesh = ball();
+  std::swap(mesh.triangles[7][1], mesh.triangles[7][2]);
+  return mesh;
+}
+
+TriangleMesh with_duplicate() {
+  TriangleMesh mesh = ball();
+  const auto [a, b, c] = mesh.triangles[9];
+  mesh.triangles.insert(mesh.triangles.begin() + 40, Triangle{b, c, a});
+  return mesh;
+}
+
+/// A face whose corners are on one line: a point on an edge that only the one side has.
+TriangleMesh with_flat_face(double away) {
+  TriangleMesh mesh = ball();
+  const auto [a, b, c] = mesh.triangles[11];
+  const auto m = static_cast<std::uint32_t>(mesh.points.size());
+  mesh.points.push_back(mesh.points[a] * (1 - away) + mesh.points[b] * away);
+  mesh.triangles[11] = {a, m, c};
+  mesh.triangles.push_back({m, b, c});
+  mesh.triangles.push_back({a, b, m});
+  return mesh;
+}
+
+/// A point that stands twice, a rounding apart.
+TriangleMesh with_crack() {
+  TriangleMesh mesh = ball();
+  const std::uint32_t from = mesh.triangles[3][0];
+  mesh.points.push_back(mesh.points[from] + Vec3{1e-6, -1e-6, 1e-6});
+  mesh.triangles[3][0] = static_cast<std::uint32_t>(mesh.points.size() - 1);
+  return mesh;
+}
+
+std::uint64_t total(const RepairReport& report) {
+  std::uint64_t sum = 0;
+  for (const RepairReport::Line& line : report.lines())
+    sum += line.count;
+  return sum;
+}
+
+void expect_sound(const TriangleMesh& mesh, const std::string& what) {
+  const MeshReport report = examine_mesh(mesh);
+  EXPECT_TRUE(report.closed() && report.manifold() && report.oriented() && report.outward())
+      << what;
+  EXPECT_EQ(report.euler, 2) << what;
+  EXPECT_EQ(report.zero_area_faces, 0U) << what;
+  EXPECT_EQ(report.unused_points, 0U) << what;
+}
+
+struct Fault {
+  const char* word;
+  TriangleMesh mesh;
+  std::uint64_t RepairReport::*count;
+  std::uint64_t faults = 1;
+};
+std::vector<Fault> faults() {
+  return {{"weld", with_crack(), &RepairReport::welded_points},
+          {"duplicates", with_duplicate(), &RepairReport::duplicate_faces},
+          {"orientation", with_flipped_face(), &RepairReport::turned_faces},
+          {"degenerate", with_flat_face(0.4), &RepairReport::degenerate_faces},
+          {"degenerate", with_flat_face(5e-5), &RepairReport::degenerate_faces, 2},
+          {"holes", with_hole(), &RepairReport::holes}};
+}
+
+TEST(Repair, EachWordMendsItsOwnFaultAndLeavesTheOthersAlone) {
+  expect_sound(ball(), "the ball");
+  for (const Fault& fault : faults())
+    for (const char* const word : {"weld", "duplicates", "orientation", "degenerate", "holes"}) {
+      const std::string what = std::string(word) + " of " + fault.word;
+      TriangleMesh mesh = fault.mesh;
+      const RepairReport report = repair_mesh(mesh, parse_repair(word), Context{});
+      if (std::string(word) == fault.word) {
+        EXPECT_EQ(report.*fault.count, fault.faults) << what;
+        expect_sound(mesh, what);
+      } else if (std::string(word) == "holes" && std::string(fault.word) == "weld") {
+        EXPECT_EQ(report.holes + report.holes_left, 1U) << "a crack is a hole";
+      } else {
+        EXPECT_EQ(total(report), 0U) << what;
+        EXPECT_EQ(mesh.points, fault.mesh.points) << what;
+        EXPECT_EQ(mesh.triangles, fault.mesh.triangles) << what;
+      }
+    }
+}
+
+TEST(Repair, AllMendsAllAtOnceAndASecondTimeNothing) {
+  TriangleMesh mesh;
+  for (const Fault& fault : faults()) {
+    TriangleMesh moved = fault.mesh;
+    const double x = 0.05 * static_cast<double>(mesh.points.size());
+    for (Vec3& p : moved.points)
+      p.x += x;
+    test::append(mesh, moved);
+  }
+  const RepairReport report = repair_mesh(mesh, parse_repair("all,weld:1e-4"), Context{});
+  EXPECT_EQ(report.welded_points, 1U + 1U); // the crack, and the short edge
+  EXPECT_EQ(report.duplicate_faces, 1U);
+  EXPECT_EQ(report.turned_faces, 1U);
+  EXPECT_EQ(report.degenerate_faces, 1U);
+  EXPECT_EQ(report.holes, 1U);
+  const MeshReport after = examine_mesh(mesh);
+  EXPECT_TRUE(after.closed() && after.manifold() && after.outward());
+  EXPECT_EQ(after.components, faults().size());
+  const TriangleMesh before = mesh;
+  EXPECT_EQ(total(repair_mesh(mesh, parse_repair("all"), Context{})), 0U);
+  EXPECT_EQ(mesh.points, before.points);
+  EXPECT_EQ(mesh.triangles, before.triangles);
+}
+
+TEST(Repair, AFilledHoleIsLikeItsSurroundings) {
+  TriangleMesh mesh = with_hole();
+  mesh.part.assign(mesh.triangles.size(), 3);
+  mesh.material.assign(mesh.triangles.size(), 2);
+  mesh.texcoords.assign(mesh.triangles.size(), {0.25F, 0.5F, 0.25F, 0.5F, 0.25F, 0.5F});
+  const std::size_t faces = mesh.triangles.size();
+  const RepairReport report = repair_mesh(mesh, parse_repair("holes"), Context{});
+  EXPECT_EQ(report.hole_faces, mesh.triangles.size() - faces);
+  EXPECT_EQ(mesh.part, std::vector<std::int32_t>(mesh.triangles.size(), 3));
+  EXPECT_EQ(mesh.material, std::vector<std::int32_t>(mesh.triangles.size(), 2));
+  for (const auto& st : mesh.texcoords)
+    EXPECT_EQ(st, (std::array<float, 6>{0.25F, 0.5F, 0.25F, 0.5F, 0.25F, 0.5F}));
+  EXPECT_NEAR(signed_volume(mesh), signed_volume(ball()), 0.02 * signed_volume(ball()));
+}
+
+TEST(Repair, HolesAreFilledUpToTheirSize) {
+  TriangleMesh mesh = with_hole(); // of eight edges
+  RepairReport report = repair_mesh(mesh, parse_repair("holes:7"), Context{});
+  EXPECT_EQ(report.holes, 0U);
+  EXPECT_EQ(report.holes_left, 1U);
+  EXPECT_EQ(mesh.triangles, with_hole().triangles);
+  report = repair_mesh(mesh, parse_repair("holes:8"), Context{});
+  EXPECT_EQ(report.holes, 1U);
+  TriangleMesh alone;
+  alone.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  alone.triangles = {{0, 1, 2}};
+  EXPECT_EQ(repair_mesh(alone, parse_repair("all"), Context{}).holes_left, 1U);
+  EXPECT_EQ(alone.triangles.size(), 1U);
+}
+
+TEST(Repair, SheetsThatMeetInAnEdgeStayJoinedAndAreNoHoles) {
+  // Three fans round one edge, and a flat face in the first.
+  TriangleMesh mesh;
+  mesh.points = {{0, 0, 0}, {0, 0, 4}, {5, 0, 2}, {-3, 4, 2}, {-3, -4, 2}, {2.5, 0, 1}};
+  mesh.triangles = {{0, 5, 1}, {5, 2, 1}, {0, 2, 5}, {0, 1, 3}, {1, 0, 4}};
+  const RepairReport report = repair_mesh(mesh, parse_repair("degenerate,holes"), Context{});
+  EXPECT_EQ(report.degenerate_faces, 1U);
+  EXPECT_EQ(report.holes, 0U);
+  EXPECT_GT(report.holes_left, 0U);
+  const MeshReport after = examine_mesh(mesh);
+  EXPECT_EQ(after.nonmanifold_edges, 1U);
+  EXPECT_EQ(after.components, 1U);
+}
+
+TEST(Repair, WeldKeepsClosedPartsApartAndJoinsPatches) {
+  TriangleMesh two = ball();
+  test::append(two, ball());
+  two.part.assign(two.triangles.size(), 0);
+  std::fill(two.part.begin() + static_cast<std::ptrdiff_t>(ball().triangles.size()), two.part.end(),
+            1);
+  for (std::size_t p = ball().points.size(); p < two.points.size(); ++p)
+    two.points[p].x += 1e-7;
+  TriangleMesh mesh = two;
+  EXPECT_EQ(repair_mesh(mesh, parse_repair("weld"), Context{}).welded_points, 0U);
+  EXPECT_EQ(examine_mesh(mesh).components, 2U);
+
+  // One ball in two patches with points of their own, a rounding apart.
+  TriangleMesh patches = ball();
+  patches.part.resize(patches.triangles.size());
+  std::vector<std::uint32_t> copy(patches.points.size(), UINT32_MAX);
+  for (std::size_t t = 0; t < patches.triangles.size(); ++t) {
+    const Vec3 middle = patches.points[patches.triangles[t][0]];
+    if (middle.z < 1)
+      continue;
+    patches.part[t] = 1;
+    for (std::uint32_t& corner : patches.triangles[t]) {
+      if (copy[corner] == UINT32_MAX) {
+        copy[corner] = static_cast<std::uint32_t>(patches.points.size());
+        patches.points.push_back(patches.points[corner] + Vec3{0, 0, 1e-7});
+      }
+      corner = copy[corner];
+    }
+  }
+  EXPECT_GT(examine_mesh(patches).boundary_edges, 0U);
+  EXPECT_GT(repair_mesh(patches, parse_repair("weld"), Context{}).welded_points, 0U);
+  const MeshReport joined = examine_mesh(patches);
+  EXPECT_TRUE(joined.closed() && joined.manifold());
+  EXPECT_EQ(joined.components, 1U);
+}
+
+TEST(Repair, OrientationTurnsWholePartsOutwardAndCavitiesInward) {
+  TriangleMesh mesh = ball();
+  TriangleMesh inner = test::sphere_mesh(2, 5, {3, -2, 1});
+  test::append(mesh, inner); // a cavity, but facing outward
+  const auto faces = static_cast<std::ptrdiff_t>(ball().triangles.size());
+  TriangleMesh one = mesh;
+  EXPECT_EQ(repair_mesh(one, parse_repair("orientation"), Context{}).turned_faces,
+            inner.triangles.size());
+  EXPECT_TRUE(examine_mesh(one).outward());
+  // As parts both are solids.
+  mesh.part.assign(mesh.triangles.size(), 0);
+  std::fill(mesh.part.begin() + faces, mesh.part.end(), 1);
+  EXPECT_EQ(repair_mesh(mesh, parse_repair("orientation"), Context{}).turned_faces, 0U);
+  for (Triangle& t : mesh.triangles)
+    std::swap(t[0], t[1]);
+  EXPECT_EQ(repair_mesh(mesh, parse_repair("orientation"), Context{}).turned_faces,
+            mesh.triangles.size());
+}
+
+TEST(Repair, UnderstandsWordsAndRefusesOthers) {
+  EXPECT_EQ(parse_repair(""), RepairOptions{});
+  EXPECT_EQ(parse_repair("all"), parse_repair("weld,duplicates,orientation,degenerate,holes"));
+  EXPECT_EQ(parse_repair("all,weld:0.5").weld, 0.5);
+  EXPECT_EQ(parse_repair("weld:0.5,all").weld, 0.5);
+  EXPECT_EQ(parse_repair("holes:12,all").holes, 12U);
+  EXPECT_EQ(parse_repair("all,holes:12").holes, 12U);
+  for (const char* const text :
+       {"wled", "all,", ",all", "weld:", "weld:0", "weld:-1", "weld:nan", "weld:inf", "weld:1x",
+        "holes:2.5", "holes:0", "all:3", "duplicates:1", "holes:1e300"})
+    EXPECT_THROW((void)parse_repair(text), Error) << text;
+  TriangleMesh mesh = ball();
+  EXPECT_THROW((void)repair_mesh(mesh, parse_repair("weld:1e-300"), Context{}), Error);
+}
+
+TEST(Repair, OfDirtyOrgans) {
+  for (const char* const name : {"hubmap_M_liver_dirty.obj", "hubmap_female_reproductive.obj"}) {
+    TriangleMesh mesh = test::load_test_mesh(name);
+    if (mesh.triangles.empty())
+      GTEST_SKIP() << "no " << name;
+    const MeshReport before = examine_mesh(mesh);
+    RepairReport report = repair_mesh(mesh, parse_repair("all"), Context{});
+    const MeshReport after = examine_mesh(mesh);
+    EXPECT_GE(report.duplicate_faces, before.duplicate_faces) << name;
+    EXPECT_GT(report.holes, 0U) << name;
+    EXPECT_EQ(after.duplicate_faces, 0U) << name;
+    EXPECT_LT(after.boundary_edges, before.boundary_edges) << name;
+    EXPECT_LE(after.misoriented_edges, before.misoriented_edges) << name;
+    EXPECT_EQ(after.unused_points, 0U) << name;
+    report = repair_mesh(mesh, parse_repair("duplicates,orientation"), Context{});
+    EXPECT_EQ(report.duplicate_faces, 0U) << name;
+  }
+}
+
+} // namespace
+} // namespace gewebe
