@@ -65,6 +65,7 @@ StiffnessFacts facts_of(const Model& model, const Work& w, const Arguments& a) {
   StiffnessFacts facts;
   facts.object = model.name;
   facts.hash = stiffness_hash(model);
+  facts.rest = rest_hash(model);
   facts.nodes = model.nodes.size();
   facts.order = w.matrix.order();
   facts.norm = w.check.norm;
@@ -80,12 +81,13 @@ void add_object(cli::Run& run, const Arguments& a, const std::string& name,
   at(input.name(), [&] {
     const auto nodes = touched_nodes(model, a);
     const Work w = prepare(run, model);
-    run.timed("write", [&] { writer.begin(facts_of(model, w, a), w.matrix, *w.factor, nodes); });
-    const double columns = run.timed("columns", [&] {
-      return compliance_columns(w.matrix, *w.factor, w.check.norm, nodes, run.context(), writer);
+    const auto missing = run.timed(
+        "write", [&] { return writer.begin(facts_of(model, w, a), w.matrix, *w.factor, nodes); });
+    report_kept(run, writer);
+    run.timed("columns", [&] {
+      compliance_columns(w.matrix, *w.factor, w.check.norm, missing, run.context(), writer);
     });
-    const double residual = std::max(w.check.residual, columns);
-    run.timed("write", [&] { writer.end(residual); });
+    const double residual = run.timed("write", [&] { return writer.end(w.check.residual); });
     totals = {totals.objects + 1,
               totals.nodes + model.nodes.size(),
               totals.order + w.matrix.order(),
@@ -103,6 +105,7 @@ void work(cli::Run& run, const Arguments& a) {
     throw UsageError("expected -o FILE, since a store cannot go to standard output");
   Output::Options options = run.output_options(true);
   options.sync = true;
+  options.part = a.touched.has_value();
   Output output(run.output(), options);
   StiffnessStoreWriter writer(output); // what is no file is refused before the work
   StoreTotals totals;
@@ -113,6 +116,7 @@ void work(cli::Run& run, const Arguments& a) {
     run.timed("verify",
               [&] { verify_store(run, StiffnessStore(output.temporary()), run.output()); });
   output.commit();
+  writer.remove_journal();
   if (run.stats_wanted())
     report_store(run, totals, writer);
 }

@@ -107,6 +107,15 @@ void verify_store(cli::Run& run, const StiffnessStore& store, const std::string&
   report(run, total);
 }
 
+void report_kept(cli::Run& run, const StiffnessStoreWriter& writer) {
+  const std::string part = run.output() + ".part";
+  for (const std::uint32_t node : writer.damaged())
+    run.warn(part + ": the columns of node " + std::to_string(node) +
+             " are damaged: their checksum does not hold; they are computed again");
+  if (writer.kept() > 0)
+    run.say(part + ": the columns of " + std::to_string(writer.kept()) + " nodes are taken up");
+}
+
 void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer) {
   cli::Stats& stats = run.stats();
   stats.set("objects", totals.objects);
@@ -118,6 +127,7 @@ void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStore
   stats.set("condition", totals.condition);
   stats.set("residual", totals.residual);
   stats.set("columns", totals.columns);
+  stats.set("kept_columns", 3 * writer.kept());
   stats.set("bytes", std::uint64_t{std::filesystem::file_size(run.output())});
   stats.set("matrix_digest", digest_text(writer.matrix_digest()));
   stats.set("digest", digest_text(writer.digest()));

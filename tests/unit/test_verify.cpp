@@ -18,7 +18,7 @@ class Kept final : public ColumnSink, public ColumnSource {
 public:
   Kept(std::size_t count, std::vector<std::uint32_t> nodes)
       : count_(count), nodes_(std::move(nodes)) {}
-  void write(std::size_t, std::span<const double> columns) override {
+  void write(std::size_t, std::span<const double> columns, double) override {
     kept.emplace_back(columns.begin(), columns.end());
   }
   std::size_t node_count() const override { return count_; }
