@@ -53,7 +53,7 @@ StiffnessMethod read_method(const hdf5::Group& group) {
     return method;
   require(group, method.name == "relax" || method.name == "relax-fixed", "its method");
   method.force = group.number<double>("force");
-  require(group, std::isfinite(method.force) && method.force > 0, "its force");
+  require(group, std::isfinite(method.force) && method.force >= 0, "its force");
   if (method.name == "relax-fixed") {
     method.steps = group.number<std::uint64_t>("steps");
   } else {
@@ -138,6 +138,10 @@ std::uint64_t rest_hash(const Model& model) {
   return digest.value();
 }
 
+std::string second_stage_group(const std::string& group) {
+  return group + "/" + store::second_stage;
+}
+
 struct StiffnessStore::State {
   hdf5::File file;
 
@@ -160,6 +164,7 @@ StiffnessStore::StiffnessStore(std::span<const std::uint8_t> bytes, const std::s
     : state_(std::make_shared<State>(hdf5::File::open_image(bytes, name))) {}
 StiffnessStore::~StiffnessStore() = default;
 StiffnessStore::StiffnessStore(StiffnessStore&&) noexcept = default;
+StiffnessStore& StiffnessStore::operator=(StiffnessStore&&) noexcept = default;
 
 const std::string& StiffnessStore::path() const {
   return state_->file.path();
@@ -191,7 +196,7 @@ StiffnessFacts StiffnessStore::facts(const Model& model) const {
 std::optional<StiffnessFacts> StiffnessStore::second_stage(const StiffnessFacts& facts) const {
   if (!group_of(state_->file.root(), facts.group).has(store::second_stage))
     return std::nullopt;
-  return this->facts(facts.group + "/" + store::second_stage);
+  return this->facts(second_stage_group(facts.group));
 }
 
 StoreShard StiffnessStore::shard() const {

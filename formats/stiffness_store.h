@@ -18,7 +18,7 @@ namespace gewebe {
 /// How columns were computed.
 struct StiffnessMethod {
   std::string name = "direct"; ///< or "relax", "relax-fixed"
-  double force = 0;            ///< of a relaxation, 1e-6 N
+  double force = 0;            ///< of a relaxation, 1e-6 N; 0: each pull its own
   double threshold = 0;        ///< of "relax", of speeds
   std::uint64_t steps = 0;     ///< of "relax-fixed"
 
@@ -59,6 +59,9 @@ std::uint64_t stiffness_hash(const Model& model);
 /// XXH3-64 of rest positions and constraints of the nodes: what the two stages of an object share.
 std::uint64_t rest_hash(const Model& model);
 
+/// Where a store keeps the second stage of an object: OBJECT/stage2.
+std::string second_stage_group(const std::string& group);
+
 /// Opens and checks a store for reading; factors and columns are read when asked for, and their
 /// checksums compared. Not to be used from several threads at once, nor beside another HDF5 file.
 class StiffnessStore {
@@ -69,6 +72,7 @@ public:
   StiffnessStore(std::span<const std::uint8_t> bytes, const std::string& name);
   ~StiffnessStore();
   StiffnessStore(StiffnessStore&&) noexcept;
+  StiffnessStore& operator=(StiffnessStore&&) noexcept;
 
   const std::string& path() const;
   /// Groups, in order of the alphabet.

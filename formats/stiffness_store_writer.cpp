@@ -222,6 +222,7 @@ struct StiffnessStoreWriter::State {
   std::optional<hdf5::Group> object, columns;
   bool single = false;
   std::uint64_t row_bytes = 0;
+  std::size_t together = 1;         ///< nodes whose columns were checked together
   std::vector<std::size_t> missing; ///< index of each node that is still to come
   ColumnSums sums;
   std::vector<float> row;
@@ -266,8 +267,8 @@ struct StiffnessStoreWriter::State {
   /// Sets `missing`. Columns that were checked together are kept together.
   void take_up(std::span<const std::uint32_t> nodes,
                std::span<const std::optional<ColumnRecord>> finished) {
-    for (std::size_t first = 0; first < nodes.size(); first += compliance_block) {
-      const std::size_t end = std::min(first + compliance_block, nodes.size());
+    for (std::size_t first = 0; first < nodes.size(); first += together) {
+      const std::size_t end = std::min(first + together, nodes.size());
       bool whole = true;
       for (std::size_t k = first; k < end; ++k) {
         if (!finished[k]) {
@@ -329,6 +330,7 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
   write_matrix(*s.object, matrix);
   add_factor(s.digest, factor.view());
   write_factor(*s.object, factor.view());
+  s.together = facts.method.name == "direct" ? compliance_block : 1;
   s.missing.clear();
   s.damaged.clear();
   s.sums.resize(nodes.size(), facts.nodes);

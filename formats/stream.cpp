@@ -428,8 +428,8 @@ const std::string& Output::temporary() const {
   return state_->temporary;
 }
 
-void Output::keep_part() {
-  state_->kept = true;
+void Output::keep_part(bool keep) {
+  state_->kept = keep;
   forget_temporary(state_->slot);
   state_->slot = -1;
 }

@@ -73,7 +73,7 @@ public:
   const std::string& temporary() const;
   /// With Options::part: whatever ends the program now, the temporary file stays; and whether it is
   /// one that stays.
-  void keep_part();
+  void keep_part(bool keep = true);
   bool part() const;
   /// Flushes, checks, closes, renames. \throw Error
   void commit();
