@@ -299,6 +299,13 @@ void Dataset::require_shape(const Shape& shape) const {
     fail("has shape " + shape_text(shape_) + ", expected " + shape_text(shape));
 }
 
+std::uint64_t Dataset::offset() const {
+  const haddr_t offset = H5Dget_offset(handle_.id());
+  if (offset == HADDR_UNDEF)
+    fail("has no place in the file");
+  return offset;
+}
+
 void Dataset::grow(std::size_t values) {
   if (row_size_ == 0 || values % row_size_ != 0)
     fail(std::to_string(values) + " numbers, expected rows of " + std::to_string(row_size_));

@@ -143,6 +143,8 @@ public:
   /// Numbers in a row.
   std::uint64_t row_size() const noexcept { return row_size_; }
 
+  /// Where its bytes stand in the file, contiguous as create_dataset makes it.
+  std::uint64_t offset() const;
   /// \pre values.size() is a multiple of row_size(), type() is that of T
   /// \throw Error too if the rows are not there
   template <class T>

@@ -38,12 +38,38 @@ void require(const hdf5::Object& where, bool good, const char* what) {
     where.fail(std::string("is damaged: ") + what);
 }
 
+/// An object's group, or "OBJECT/stage2".
+hdf5::Group group_of(const hdf5::Group& root, const std::string& name) {
+  const std::size_t slash = name.find('/');
+  if (slash == std::string::npos)
+    return root.group(name);
+  return root.group(name.substr(0, slash)).group(name.substr(slash + 1));
+}
+
+StiffnessMethod read_method(const hdf5::Group& group) {
+  StiffnessMethod method;
+  method.name = group.text("method");
+  if (method.name == "direct")
+    return method;
+  require(group, method.name == "relax" || method.name == "relax-fixed", "its method");
+  method.force = group.number<double>("force");
+  require(group, std::isfinite(method.force) && method.force >= 0, "its force");
+  if (method.name == "relax-fixed") {
+    method.steps = group.number<std::uint64_t>("steps");
+  } else {
+    method.threshold = group.number<double>("velocity_threshold");
+    require(group, std::isfinite(method.threshold) && method.threshold > 0, "its threshold");
+  }
+  return method;
+}
+
 StiffnessFacts read_facts(const hdf5::Group& root, const std::string& name) {
-  const hdf5::Group group = root.group(name);
+  const hdf5::Group group = group_of(root, name);
   StiffnessFacts facts;
   facts.object = group.text("name");
   facts.group = name;
   facts.hash = group.number<std::uint64_t>("hash");
+  facts.rest = group.number<std::uint64_t>("rest_hash");
   facts.nodes = group.number<std::uint64_t>("nodes");
   facts.order = group.number<std::uint64_t>("order");
   facts.norm = group.number<double>("norm");
@@ -57,6 +83,7 @@ StiffnessFacts read_facts(const hdf5::Group& root, const std::string& name) {
   const std::string precision = group.text("precision");
   facts.single = precision == "float32";
   require(group, facts.single || precision == "float64", "its precision");
+  facts.method = read_method(group);
   return facts;
 }
 
@@ -102,6 +129,19 @@ std::uint64_t stiffness_hash(const Model& model) {
   return digest.value();
 }
 
+std::uint64_t rest_hash(const Model& model) {
+  Digest digest;
+  for (const Node& n : model.nodes) {
+    const double values[]{n.position.x, n.position.y, n.position.z, static_cast<double>(n.fixed)};
+    digest.add_bytes(values, sizeof values);
+  }
+  return digest.value();
+}
+
+std::string second_stage_group(const std::string& group) {
+  return group + "/" + store::second_stage;
+}
+
 struct StiffnessStore::State {
   hdf5::File file;
 
@@ -124,6 +164,7 @@ StiffnessStore::StiffnessStore(std::span<const std::uint8_t> bytes, const std::s
     : state_(std::make_shared<State>(hdf5::File::open_image(bytes, name))) {}
 StiffnessStore::~StiffnessStore() = default;
 StiffnessStore::StiffnessStore(StiffnessStore&&) noexcept = default;
+StiffnessStore& StiffnessStore::operator=(StiffnessStore&&) noexcept = default;
 
 const std::string& StiffnessStore::path() const {
   return state_->file.path();
@@ -152,8 +193,23 @@ StiffnessFacts StiffnessStore::facts(const Model& model) const {
                           " nodes, hash " + digest_text(hash) + ")");
 }
 
+std::optional<StiffnessFacts> StiffnessStore::second_stage(const StiffnessFacts& facts) const {
+  if (!group_of(state_->file.root(), facts.group).has(store::second_stage))
+    return std::nullopt;
+  return this->facts(second_stage_group(facts.group));
+}
+
+StoreShard StiffnessStore::shard() const {
+  const hdf5::Group& root = state_->file.root();
+  if (!root.has_attribute("shard"))
+    return {};
+  const StoreShard shard{root.number<std::uint64_t>("shard"), root.number<std::uint64_t>("shards")};
+  require(root, shard.index >= 1 && shard.index <= shard.count, "its shard");
+  return shard;
+}
+
 StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
-  const hdf5::Group object = state_->file.root().group(facts.group);
+  const hdf5::Group object = group_of(state_->file.root(), facts.group);
   StiffnessSizes sizes;
   sizes.matrix = object.group("K").dataset("x", hdf5::Number::float64).rows();
   sizes.factor = object.group("L").dataset("x", hdf5::Number::float64).rows();
@@ -163,7 +219,7 @@ StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
 }
 
 StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
-  const hdf5::Group group = state_->file.root().group(facts.group).group("K");
+  const hdf5::Group group = group_of(state_->file.root(), facts.group).group("K");
   StiffnessMatrix matrix;
   matrix.axis_of_row = read_checked<std::int64_t>(group, "axis", facts.order);
   matrix.column_start = read_checked<std::int64_t>(group, "p", facts.order + 1);
@@ -182,7 +238,7 @@ StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
 }
 
 Factor StiffnessStore::factor(const StiffnessFacts& facts) const {
-  const hdf5::Group group = state_->file.root().group(facts.group).group("L");
+  const hdf5::Group group = group_of(state_->file.root(), facts.group).group("L");
   FactorData data;
   data.order = static_cast<std::int64_t>(facts.order);
   data.max_column_size = group.number<std::int64_t>("maxcsize");
@@ -244,7 +300,7 @@ private:
 } // namespace
 
 std::unique_ptr<ColumnSource> StiffnessStore::columns(const StiffnessFacts& facts) const {
-  const hdf5::Group object = state_->file.root().group(facts.group);
+  const hdf5::Group object = group_of(state_->file.root(), facts.group);
   if (!object.has("columns"))
     return nullptr;
   return std::make_unique<StoredColumns>(state_, object.group("columns"), facts);

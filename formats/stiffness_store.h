@@ -8,23 +8,41 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace gewebe {
 
+/// How columns were computed.
+struct StiffnessMethod {
+  std::string name = "direct"; ///< or "relax", "relax-fixed"
+  double force = 0;            ///< of a relaxation, 1e-6 N; 0: each pull its own
+  double threshold = 0;        ///< of "relax", of speeds
+  std::uint64_t steps = 0;     ///< of "relax-fixed"
+
+  bool operator==(const StiffnessMethod&) const = default;
+};
+
 /// What one says of an object's stiffness, beside the arrays.
 struct StiffnessFacts {
   std::string object;      ///< the model's name
   std::string group;       ///< what the store calls it
   std::uint64_t hash = 0;  ///< stiffness_hash of the model
+  std::uint64_t rest = 0;  ///< rest_hash of it
   std::uint64_t nodes = 0; ///< n, central nodes too
   std::uint64_t order = 0; ///< of K
   double norm = 0;         ///< ‖K‖₁
   double condition = 0;    ///< estimate of cond₁(K)
   double residual = 0;     ///< largest backward error seen of the checks made
   bool single = false;     ///< columns are float32
+  StiffnessMethod method{};
+};
+
+/// Which part of the whole a store holds: number `index` of `count`, from 1.
+struct StoreShard {
+  std::uint64_t index = 1, count = 1;
 };
 
 /// How much of an object stands in the store; nothing of it has to be read for that.
@@ -38,6 +56,12 @@ struct StiffnessSizes {
 /// stiffness and rest length of the springs. Neither names nor damping count.
 std::uint64_t stiffness_hash(const Model& model);
 
+/// XXH3-64 of rest positions and constraints of the nodes: what the two stages of an object share.
+std::uint64_t rest_hash(const Model& model);
+
+/// Where a store keeps the second stage of an object: OBJECT/stage2.
+std::string second_stage_group(const std::string& group);
+
 /// Opens and checks a store for reading; factors and columns are read when asked for, and their
 /// checksums compared. Not to be used from several threads at once, nor beside another HDF5 file.
 class StiffnessStore {
@@ -48,6 +72,7 @@ public:
   StiffnessStore(std::span<const std::uint8_t> bytes, const std::string& name);
   ~StiffnessStore();
   StiffnessStore(StiffnessStore&&) noexcept;
+  StiffnessStore& operator=(StiffnessStore&&) noexcept;
 
   const std::string& path() const;
   /// Groups, in order of the alphabet.
@@ -56,6 +81,9 @@ public:
   StiffnessFacts facts(const std::string& group) const;
   /// The object that belongs to this model, by hash. \throw Error "is of another model …"
   StiffnessFacts facts(const Model& model) const;
+  /// The second matrix of an object, stored with it, for the two-step method; or nothing.
+  std::optional<StiffnessFacts> second_stage(const StiffnessFacts& facts) const;
+  StoreShard shard() const;
   StiffnessSizes sizes(const StiffnessFacts& facts) const;
   /// The matrix itself. \throw Error if it is damaged
   StiffnessMatrix matrix(const StiffnessFacts& facts) const;

@@ -14,6 +14,7 @@
 #include <istream>
 #include <ostream>
 #include <streambuf>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <vector>
@@ -249,7 +250,7 @@ struct Output::State final : std::streambuf {
   ~State() override {
     if (fd > 1)
       (void)::close(fd);
-    if (!temporary.empty()) {
+    if (!temporary.empty() && !kept) {
       (void)::unlink(temporary.c_str());
       forget_temporary(slot);
     }
@@ -267,24 +268,42 @@ struct Output::State final : std::streambuf {
       throw UsageError(name + " is a terminal, expected a file or a pipe");
   }
 
+  /// False where another program has it, or had it and gave it its name just now.
+  bool lock_part(const std::string& path) const {
+    struct stat opened {
+    }, named{};
+    return ::flock(fd, LOCK_EX | LOCK_NB) == 0 && ::fstat(fd, &opened) == 0 &&
+           ::stat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino &&
+           opened.st_dev == named.st_dev;
+  }
+
   void create_temporary() {
     const std::size_t slash = target.find_last_of('/');
     const std::string folder = slash == std::string::npos ? "" : target.substr(0, slash + 1);
     const std::string base = slash == std::string::npos ? target : target.substr(slash + 1);
-    std::string path = folder + "." + base.substr(0, 200) + ".XXXXXX";
+    std::string path =
+        options.part ? target + ".part" : folder + "." + base.substr(0, 200) + ".XXXXXX";
     // Blocked until the slot is filled, so that no signal can leave the file behind.
     sigset_t all{};
     sigset_t old{};
     (void)::sigfillset(&all);
     (void)::pthread_sigmask(SIG_SETMASK, &all, &old);
-    fd = ::mkostemp(path.data(), O_CLOEXEC);
-    const int error = errno;
+    fd = options.part ? ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)
+                      : ::mkostemp(path.data(), O_CLOEXEC);
+    int error = errno;
+    if (fd >= 0 && options.part && !lock_part(path)) {
+      error = EBUSY; // of another program, so it must not be removed
+      (void)::close(fd);
+      fd = -1;
+    }
     if (fd >= 0) {
       temporary = path;
       slot = remember_temporary(path);
     }
     (void)::pthread_sigmask(SIG_SETMASK, &old, nullptr);
     errno = error;
+    if (fd < 0 && errno == EBUSY)
+      throw Error(name, "is being made by another program: " + path + " is locked");
     if (fd < 0)
       fail("cannot create a file in its folder");
     if (::fchmod(fd, mode) != 0)
@@ -343,7 +362,7 @@ struct Output::State final : std::streambuf {
   Options options;
   int fd = -1, slot = -1;
   mode_t mode = 0;
-  bool existed = false;
+  bool existed = false, kept = false;
   std::vector<char> buffer = std::vector<char>(buffer_bytes);
   std::unique_ptr<std::ostream> stream;
 };
@@ -409,6 +428,16 @@ const std::string& Output::temporary() const {
   return state_->temporary;
 }
 
+void Output::keep_part(bool keep) {
+  state_->kept = keep;
+  forget_temporary(state_->slot);
+  state_->slot = -1;
+}
+
+bool Output::part() const {
+  return state_->options.part && !state_->temporary.empty();
+}
+
 void Output::commit() {
   State& state = *state_;
   state.flush_buffer();
@@ -427,8 +456,10 @@ void Output::commit() {
   state.fd = -1;
   if (::close(fd) != 0)
     state.fail("cannot write");
-  if (state.options.keep_unchanged && state.existed && same_bytes(state.temporary, state.target))
+  if (state.options.keep_unchanged && state.existed && same_bytes(state.temporary, state.target)) {
+    state.kept = false;
     return; // the destructor removes the temporary file
+  }
   if (::rename(state.temporary.c_str(), state.target.c_str()) != 0)
     state.fail("cannot rename");
   forget_temporary(state.slot);

@@ -52,6 +52,7 @@ public:
     bool keep_unchanged =
         false;          ///< leave the file and its time stamp alone if the bytes would be equal
     bool sync = false;  ///< fsync before the rename
+    bool part = false;  ///< the temporary file is FILE.part, may be kept, and is taken up again
     bool binary = true; ///< refuse a terminal
   };
   /// \throw Error (place = name) if the folder is not writable or the path is a directory;
@@ -70,6 +71,10 @@ public:
   /// close the library's file before `commit`, and `write` nothing yourself.
   /// \throw Error if this is standard output or no regular file
   const std::string& temporary() const;
+  /// With Options::part: whatever ends the program now, the temporary file stays; and whether it is
+  /// one that stays.
+  void keep_part(bool keep = true);
+  bool part() const;
   /// Flushes, checks, closes, renames. \throw Error
   void commit();
 

@@ -25,14 +25,29 @@ Verification verify_object(const StiffnessStore& store, const StiffnessFacts& fa
   const StiffnessMatrix matrix = store.matrix(facts);
   const Factor factor = store.factor(facts);
   const std::unique_ptr<ColumnSource> columns = store.columns(facts);
-  return verify_compliance(matrix, factor, columns.get(), facts.condition, facts.single,
-                           recomputed_nodes, context);
+  // A relaxation that came to rest.
+  const double method_error = facts.method.name == "direct" ? 0 : 1e-6;
+  return verify_compliance(matrix, factor, columns.get(),
+                           {facts.condition, facts.single, method_error, recomputed_nodes},
+                           context);
+}
+
+/// Of all objects, each followed by its second stage.
+std::vector<StiffnessFacts> all_facts(const StiffnessStore& store) {
+  std::vector<StiffnessFacts> all;
+  for (const std::string& group : store.objects()) {
+    all.push_back(store.facts(group));
+    if (const auto second = store.second_stage(all.back()))
+      all.push_back(*second);
+  }
+  return all;
 }
 
 std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
   const double column_bytes =
       static_cast<double>(sizes.touched * 9 * facts.nodes) * (facts.single ? 4 : 8);
-  std::string text = "object " + facts.object + "\n";
+  const bool second = facts.group.find('/') != std::string::npos;
+  std::string text = "object " + facts.object + (second ? " stage 2" : "") + "\n";
   const auto line = [&](const char* key, const std::string& value) {
     text += std::string("  ") + key + " " + value + "\n";
   };
@@ -44,6 +59,13 @@ std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
   line("factor_mb", number("%.1f", static_cast<double>(sizes.factor) * 8e-6));
   line("touched_nodes", std::to_string(sizes.touched));
   line("columns_mb", number("%.1f", column_bytes * 1e-6));
+  line("method", facts.method.name);
+  if (facts.method.force > 0)
+    line("force", number("%.6g", facts.method.force));
+  if (facts.method.name == "relax")
+    line("velocity_threshold", number("%.6g", facts.method.threshold));
+  if (facts.method.name == "relax-fixed")
+    line("steps", std::to_string(facts.method.steps));
   line("precision", facts.single ? "float32" : "float64");
   line("norm", number("%.6g", facts.norm));
   line("condition", number("%.3g", facts.condition));
@@ -82,9 +104,10 @@ void print_store(cli::Run& run, const std::string& path, bool verify) {
   const StiffnessStore store(path);
   std::string text =
       "store " + path + "\nbytes " + std::to_string(std::filesystem::file_size(path)) + "\n";
+  if (const StoreShard shard = store.shard(); shard.count > 1)
+    text += "shard " + std::to_string(shard.index) + " of " + std::to_string(shard.count) + "\n";
   Verification total;
-  for (const std::string& group : store.objects()) {
-    const StiffnessFacts facts = store.facts(group);
+  for (const StiffnessFacts& facts : all_facts(store)) {
     text += describe(facts, store.sizes(facts));
     if (!verify)
       continue;
@@ -102,9 +125,18 @@ void print_store(cli::Run& run, const std::string& path, bool verify) {
 
 void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name) {
   Verification total;
-  for (const std::string& group : store.objects())
-    add(total, at(name, [&] { return verify_object(store, store.facts(group), run.context()); }));
+  for (const StiffnessFacts& facts : all_facts(store))
+    add(total, at(name, [&] { return verify_object(store, facts, run.context()); }));
   report(run, total);
+}
+
+void report_kept(cli::Run& run, const StiffnessStoreWriter& writer) {
+  const std::string part = run.output() + ".part";
+  for (const std::uint32_t node : writer.damaged())
+    run.warn(part + ": the columns of node " + std::to_string(node) +
+             " are damaged: their checksum does not hold; they are computed again");
+  if (writer.kept() > 0)
+    run.say(part + ": the columns of " + std::to_string(writer.kept()) + " nodes are taken up");
 }
 
 void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer) {
@@ -118,6 +150,7 @@ void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStore
   stats.set("condition", totals.condition);
   stats.set("residual", totals.residual);
   stats.set("columns", totals.columns);
+  stats.set("kept_columns", 3 * writer.kept());
   stats.set("bytes", std::uint64_t{std::filesystem::file_size(run.output())});
   stats.set("matrix_digest", digest_text(writer.matrix_digest()));
   stats.set("digest", digest_text(writer.digest()));

@@ -19,6 +19,9 @@ void print_store(cli::Run& run, const std::string& path, bool verify);
 /// tells. \throw Error, place = `name`
 void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name);
 
+/// Says of the object just begun what of an earlier run is kept, and warns of what was damaged.
+void report_kept(cli::Run& run, const StiffnessStoreWriter& writer);
+
 /// Sums over the objects of a store that was made, and the worst of each.
 struct StoreTotals {
   std::uint64_t objects = 0, nodes = 0, order = 0, matrix = 0, factor = 0, columns = 0;

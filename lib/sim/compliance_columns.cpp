@@ -13,7 +13,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t block_nodes = Factor::most_units / 3; // solved by one job
+constexpr std::size_t block_nodes = compliance_block;
 
 /// The blocks that are computed at the same time, while those before them are handed over.
 std::size_t wave_blocks(std::size_t nodes, const Context& context) {
@@ -80,9 +80,9 @@ public:
 
   void hand_over(std::size_t block, const Block& from, ColumnSink& sink, double& residual) const {
     const std::size_t each = 3 * matrix_.row_of_axis.size();
+    keep_worst(residual, from.residual); // nothing wrong is handed over
     for (std::size_t k = 0; k < nodes_of(block).size(); ++k)
-      sink.write(block * block_nodes + k, {from.columns.data() + k * each, each});
-    keep_worst(residual, from.residual);
+      sink.write(block * block_nodes + k, {from.columns.data() + k * each, each}, from.residual);
   }
 
 private:

@@ -12,6 +12,9 @@
 
 namespace gewebe {
 
+/// So many nodes, one behind the other from the first one on, are solved and checked together.
+inline constexpr std::size_t compliance_block = Factor::most_units / 3;
+
 /// Solves for the columns of `nodes` in blocks, in parallel, and hands them to `sink` in the order
 /// of `nodes` while later ones are being computed. The same bytes for any number of threads. Memory
 /// is bounded by the number of threads, not by that of nodes.

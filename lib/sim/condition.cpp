@@ -45,6 +45,13 @@ std::size_t index_of_largest(const std::vector<double>& x) {
   return at;
 }
 
+std::string short_number(double value) {
+  std::array<char, 32> text{};
+  const auto result =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 2);
+  return {text.data(), result.ptr};
+}
+
 /// A fixed sequence without pattern in [-1, 1).
 class Noise {
 public:
@@ -87,6 +94,13 @@ double inverse_norm(const Factor& factor) {
     x[i] = (i % 2 == 0 ? 1 : -1) * (1 + static_cast<double>(i) / static_cast<double>(n));
   factor.solve(x, y);
   return std::max(estimate, 2 * sum_abs(y) / (3 * static_cast<double>(n)));
+}
+
+void require_precision(double condition, bool single) {
+  const double most = 0x1p24;
+  if (single && !(condition <= most))
+    throw Error("the condition " + short_number(condition) + " is beyond " + short_number(most) +
+                ", what float32 can tell, expected --precision float64");
 }
 
 double backward_error(const StiffnessMatrix& matrix, double norm, std::span<const double> x,
@@ -327,13 +341,6 @@ std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatr
 }
 
 namespace {
-
-std::string short_number(double value) {
-  std::array<char, 32> text{};
-  const auto result =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 2);
-  return {text.data(), result.ptr};
-}
 
 std::string count_text(int count, const char* what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");

@@ -23,6 +23,10 @@ inline constexpr double max_backward_error = 1e-14;
 /// Higham 1988, algorithm 2.4).
 double inverse_norm(const Factor& factor);
 
+/// \throw Error if columns of a matrix of this condition mean nothing in that precision: beyond
+/// 1/2^-24 for float32. float64 needs no more than max_condition.
+void require_precision(double condition, bool single);
+
 /// ‖K x - f‖ / (‖K‖ ‖x‖ + ‖f‖) in maximum norms, `norm` = ‖K‖. 0 where all is 0; NaN if anything
 /// is.
 double backward_error(const StiffnessMatrix& matrix, double norm, std::span<const double> x,

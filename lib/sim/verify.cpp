@@ -170,19 +170,21 @@ std::size_t conjugate_gradients(const StiffnessMatrix& matrix, std::span<const d
 }
 
 Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& factor,
-                               const ColumnSource* columns, double condition, bool single,
-                               std::size_t samples, const Context& context) {
+                               const ColumnSource* columns, const VerifyOptions& options,
+                               const Context& context) {
   Verification result;
   const double rounding = std::numeric_limits<double>::epsilon();
-  result.tolerance = 10 * condition * rounding +
-                     (single ? 2 * static_cast<double>(std::numeric_limits<float>::epsilon()) : 0);
+  result.tolerance =
+      10 * options.condition * rounding + options.method_error +
+      (options.single ? 2 * static_cast<double>(std::numeric_limits<float>::epsilon()) : 0);
   Recomputed again(matrix, context);
   if (columns != nullptr) {
-    verify_stored(*columns, spread(columns->nodes().size(), samples), again, result, context);
+    verify_stored(*columns, spread(columns->nodes().size(), options.samples), again, result,
+                  context);
     return result;
   }
   const std::size_t axes = matrix.row_of_axis.size();
-  for (const std::size_t node : spread(axes / 3, samples)) {
+  for (const std::size_t node : spread(axes / 3, options.samples)) {
     std::vector<double> made(3 * axes), f(axes);
     for (std::size_t a = 0; a < 3; ++a) {
       std::ranges::fill(f, 0.0);

@@ -27,13 +27,21 @@ struct Verification {
   double tolerance = 0;         ///< what both may be
 };
 
-/// Reads every column that there is, and solves again for one of each of `samples` nodes spread
+struct VerifyOptions {
+  double condition = 0;    ///< of K
+  bool single = false;     ///< columns are stored as float32
+  double method_error = 0; ///< what the columns' method may err by, relative
+  std::size_t samples = 3; ///< nodes whose columns are solved for again
+};
+
+/// Reads every column that there is, and solves again for one of each of some nodes spread
 /// over the stored ones (over all nodes, by the factor, where none are stored). They may differ by
-/// what the condition explains: 10 ε cond, ε that of the stored precision. \throw Error naming the
+/// what the condition explains: 10 ε cond, ε that of the stored precision, and by the error of the
+/// method. \throw Error naming the
 /// node whose columns differ by more, aren't symmetric, or aren't finite; what the source and
 /// conjugate_gradients throw
 Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& factor,
-                               const ColumnSource* columns, double condition, bool single,
-                               std::size_t samples, const Context& context);
+                               const ColumnSource* columns, const VerifyOptions& options,
+                               const Context& context);
 
 } // namespace gewebe

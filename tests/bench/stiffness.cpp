@@ -52,7 +52,7 @@ double product_rate() {
 /// Columns that go nowhere, but for the last of which the first number is kept.
 class Nowhere final : public ColumnSink {
 public:
-  void write(std::size_t, std::span<const double> columns) override { sum += columns[0]; }
+  void write(std::size_t, std::span<const double> columns, double) override { sum += columns[0]; }
   double sum = 0;
 };
 

@@ -137,3 +137,50 @@ test_damaged_and_foreign_stores_are_refused() {
   expect_failure 1 ffe-run ffe-run scene
   rm whole.h5 scene cube.ela
 }
+
+# examples/store/displace.py: u = C f, and ffe-run by its factor, within 10 eps cond of each other.
+test_the_python_example_agrees_with_ffe_run() {
+  local python condition
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  exp2ela --primitive sphere:24x12 --name ball -o ball.ela
+  ffe-precompute --columns 40,41,100 ball.ela -o columns.h5
+  ffe-precompute ball.ela -o factor.h5
+  "$python" "$GEWEBE_ROOT/examples/store/displace.py" columns.h5 ball 40 1e-3 0 2e-3 100 0 -1e-3 0 >u.txt
+  printf '%s\n' 'object ball ball.ela store=factor.h5' 'force ball 40 1e-3 0 2e-3' 'force ball 100 0 -1e-3 0' 'emit shapes' step >scene
+  ffe-run scene | awk '/^shapes /{ n = $3; next } n-- > 0' >shape.txt
+  [[ $(wc -l <u.txt) == $(wc -l <shape.txt) ]] || fail 'another number of nodes'
+  condition=$(ffe-precompute --info factor.h5 | sed -n 's/^ *condition //p')
+  # Shapes are rest plus displacement: their rounding counts, too.
+  awk '/^nodes /{ n = $2; next } n-- > 0 { print $1, $2, $3 }' ball.ela | paste -d' ' - u.txt shape.txt >all.txt
+  compare() { # FACTOR on u
+    awk -v condition="$condition" -v factor="$1" '
+      function abs(x) { return x < 0 ? -x : x }
+      { for (a = 1; a <= 3; ++a) {
+          d = abs($a + factor * $(a + 3) - $(a + 6)); if (d > worst) worst = d
+          if (abs($(a + 3)) > most) most = abs($(a + 3))
+          if (abs($a) > size) size = abs($a)
+        } }
+      END { exit !(most > 0 && worst <= 10 * 2.2e-16 * condition * most + 4e-16 * size) }' all.txt
+  }
+  compare 1 || fail 'Python says something else'
+  ! compare 1.000001 || fail 'the check sees nothing'
+}
+
+# What the man page says of datasets and attributes is what h5dump shows.
+test_h5dump_shows_what_the_page_says() {
+  command -v h5dump >/dev/null || skip 'no h5dump'
+  held_cube
+  ffe-precompute --columns all cube.ela -o cube.h5
+  ffe-precompute --stage 2 --columns none cube.ela -o cube.h5
+  local word page=$GEWEBE_ROOT/man/stiffness_store.5
+  h5dump -H -A 0 cube.h5 >header.txt
+  for word in $(h5dump -H cube.h5 | sed -nE 's/.*(GROUP|DATASET|ATTRIBUTE) "([^"]*)".*/\2/p' | sort -u); do
+    [[ $word == / || $word == cube ]] && continue
+    grep -qw -e "$word" "$page" || fail "the page says nothing of '$word'"
+  done
+  for word in Perm ColCount super pi px s x p i axis nodes values crc32c bound; do
+    grep -q "DATASET \"$word\"" header.txt || fail "there is no dataset $word"
+  done
+  [[ $(grep -c 'H5T_IEEE_F64LE' header.txt) -gt 3 ]] || fail 'no float64'
+  ! grep -qE 'H5T_(IEEE|STD)_[A-Z0-9]*BE' header.txt || fail 'not little-endian'
+}

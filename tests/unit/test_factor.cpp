@@ -21,7 +21,7 @@ namespace {
 /// Keeps columns in memory.
 class KeptColumns final : public ColumnSink {
 public:
-  void write(std::size_t k, std::span<const double> columns) override {
+  void write(std::size_t k, std::span<const double> columns, double) override {
     EXPECT_EQ(k, kept.size());
     kept.emplace_back(columns.begin(), columns.end());
   }
@@ -319,7 +319,7 @@ TEST(ComplianceColumns, AreWhatSolvingForUnitForcesGives) {
 
 TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {
   struct Full final : ColumnSink {
-    void write(std::size_t k, std::span<const double>) override {
+    void write(std::size_t k, std::span<const double>, double) override {
       if (k == 20)
         throw Error("full");
     }

@@ -18,7 +18,7 @@ class Kept final : public ColumnSink, public ColumnSource {
 public:
   Kept(std::size_t count, std::vector<std::uint32_t> nodes)
       : count_(count), nodes_(std::move(nodes)) {}
-  void write(std::size_t, std::span<const double> columns) override {
+  void write(std::size_t, std::span<const double> columns, double) override {
     kept.emplace_back(columns.begin(), columns.end());
   }
   std::size_t node_count() const override { return count_; }
@@ -41,7 +41,8 @@ struct Solved {
   Kept columns{model.nodes.size(), {0, 5, 17, 40, 41}};
   Solved() { (void)compliance_columns(matrix, factor, check.norm, columns.nodes(), {}, columns); }
   Verification verify(const ColumnSource* source, bool single = false) const {
-    return verify_compliance(matrix, factor, source, check.condition, single, 3, {});
+    return verify_compliance(matrix, factor, source,
+                             {.condition = check.condition, .single = single}, {});
   }
 };
 
@@ -81,8 +82,9 @@ TEST(Verify, AnotherFactorIsFound) {
     spring.stiffness *= 1 + 1e-7;
   StiffnessCheck check;
   const Factor factor = checked_factor(other, stiffness_matrix(other), {}, check);
-  EXPECT_THROW((void)verify_compliance(s.matrix, factor, nullptr, s.check.condition, false, 3, {}),
-               Error);
+  EXPECT_THROW(
+      (void)verify_compliance(s.matrix, factor, nullptr, {.condition = s.check.condition}, {}),
+      Error);
 }
 
 TEST(Verify, ConjugateGradientsRefuseAnIndefiniteMatrix) {

@@ -1,0 +1,66 @@
+#pragma once
+// What of a store's columns is finished, beside the store while it is being made: FILE.part.log.
+//
+// Lines of text, each ended by the CRC-32C of what stands before it, so that a line that a kill cut
+// short counts as none:
+//
+//   part 1
+//   object INDEX HASH WORK NAME          the model's hash, and a digest of all that columns depend
+//   on columns INDEX K CRC RESIDUAL         of the object's k-th node; the last one holds
+//
+// A line is written after the bytes it speaks of. It proves nothing by itself: whoever takes
+// columns up compares their checksum.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+struct ColumnRecord {
+  std::uint32_t crc = 0;
+  double residual = 0; ///< of the check of its block
+};
+
+class ColumnJournal {
+public:
+  /// What columns belong to.
+  struct Object {
+    std::uint64_t hash = 0, work = 0;
+    std::string name;
+  };
+
+  /// Of the file `part`, whose journal is `part`.log. Takes up the lines that are there if the file
+  /// holds anything; else forgets them. Makes no file yet. `part_bytes` is the size of `part`.
+  /// \throw Error, place = path of the journal, if it is of a newer version or damaged
+  ColumnJournal(const std::string& part, std::uint64_t part_bytes);
+  ~ColumnJournal();
+  ColumnJournal(const ColumnJournal&) = delete;
+  ColumnJournal& operator=(const ColumnJournal&) = delete;
+
+  /// Begins the next object and returns what is finished of its `count` nodes.
+  /// \throw Error, place = `part`, if what stands there is of another model or other work
+  std::vector<std::optional<ColumnRecord>> begin(const Object& object, std::size_t count);
+  void add(std::size_t k, const ColumnRecord& record);
+  /// Removes the file.
+  void remove();
+
+private:
+  struct Known {
+    Object object;
+    std::vector<std::pair<std::size_t, ColumnRecord>> columns;
+  };
+  void read();
+  void read_line(const std::string& line);
+  void write(const std::string& text);
+
+  std::string part_, path_;
+  int fd_ = -1;
+  std::vector<Known> known_;       ///< from before
+  std::vector<std::string> ahead_; ///< lines that wait for the first column
+  std::size_t object_ = 0;         ///< the next one
+};
+
+} // namespace gewebe
