@@ -84,10 +84,9 @@ public:
         step_(safe_step_fraction * safe_step(model_)), traits_(layout_.movable) {
     for (std::size_t row = 0; row < layout_.movable; ++row) {
       const std::uint32_t i = layout_.node_of_row[row];
-      for (int a = 0; a < 3; ++a) {
+      for (int a = 0; a < 3; ++a)
         traits_[row].inverse_mass[a] = is_fixed(model_, i, a) ? 0 : 1 / model_.nodes[i].mass;
-        traits_[row].drag[a] = model_.nodes[i].drag;
-      }
+      traits_[row].drag = model_.nodes[i].drag;
     }
     for (const Spring& s : model_.springs)
       shortest_ = std::min(shortest_,
@@ -147,8 +146,9 @@ private:
     for (std::uint64_t s = 1; s <= most; ++s) {
       bool finite = true;
       for (const SpringBlock& block : layout_.blocks)
-        finite =
-            kernel(block, work.traits.data(), work.now.data(), work.next.data(), step_) && finite;
+        finite = kernel(block, layout_.rest.data(), work.traits.data(), work.now.data(),
+                        work.next.data(), step_) &&
+                 finite;
       std::swap(work.now, work.next);
       ++work.steps;
       if (!finite)
