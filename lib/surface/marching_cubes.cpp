@@ -121,7 +121,7 @@ using PointNumbers = std::array<std::uint32_t, edge_places>;
 /// Computes the block's fractions and, with a mesh, its points and notes their numbers.
 template <bool with_mesh>
 void write_points(const Octants& octants, const SurfaceBlock& block, double isovalue,
-                  const GridTransform& to_world, double* fractions, Vec3* points,
+                  const GridTransform& to_world, SurfaceBlocks& lattice, Vec3* points,
                   PointNumbers& numbers) {
   constexpr std::array<unsigned, 3> stride{64, 8, 1};
   const std::array<double, 12> transform = to_world.m;
@@ -144,7 +144,8 @@ void write_points(const Octants& octants, const SurfaceBlock& block, double isov
                         block.origin[2] + static_cast<int>(k)};
       if (!std::isfinite(b - a)) // of floats that are finite it is
         throw_not_finite(corner);
-      fractions[point] = fraction;
+      lattice.fractions[point] = fraction;
+      lattice.edges[point] = BlockEdge::at(i, axis, bit);
       if (with_mesh) {
         Vec3 p{static_cast<double>(corner[0]), static_cast<double>(corner[1]),
                static_cast<double>(corner[2])}; // index_position, axis known
@@ -270,30 +271,29 @@ IsoSurface make_surface(const Context& context, const Grid& grid,
   lattice->triangles = triangles;
 
   require_memory(context,
-                 static_cast<double>(points) * (sizeof(double) + (with_mesh ? sizeof(Vec3) : 0)) +
+                 static_cast<double>(points) * (sizeof(double) + sizeof(BlockEdge) + (with_mesh ? sizeof(Vec3) : 0)) +
                      static_cast<double>(with_mesh ? triangles : 0) * sizeof(Triangle),
                  "the mesh of the isosurface");
   if (with_mesh)
     resize_all(quiet, resizing(surface.mesh.points, points), resizing(lattice->fractions, points),
-               resizing(surface.mesh.triangles, triangles));
+               resizing(lattice->edges, points), resizing(surface.mesh.triangles, triangles));
   else
-    resize_all(quiet, resizing(lattice->fractions, points));
+    resize_all(quiet, resizing(lattice->fractions, points), resizing(lattice->edges, points));
   const CellPlans plans = make_plans(surface.transform.determinant() < 0);
   parallel_blocks(context, parts.size(), 1, [&](std::size_t n, std::size_t) {
     const SurfaceBlocks::Part& part = parts[n];
     const auto point_numbers = std::make_unique_for_overwrite<PointNumbers>();
-    double* const fractions = lattice->fractions.data();
     Vec3* const mesh_points = surface.mesh.points.data();
     link_neighbours(candidates, numbers, blocks, part.first, part.first + part.blocks.size());
     for (std::size_t b = 0; b < part.blocks.size(); ++b) {
       const SurfaceBlock& block = part.blocks[b];
       const Octants octants = octants_of(field, part.contents[b]);
       if (!with_mesh) {
-        write_points<false>(octants, block, isovalue, surface.transform, fractions, mesh_points,
+        write_points<false>(octants, block, isovalue, surface.transform, *lattice, mesh_points,
                             *point_numbers);
         continue;
       }
-      write_points<true>(octants, block, isovalue, surface.transform, fractions, mesh_points,
+      write_points<true>(octants, block, isovalue, surface.transform, *lattice, mesh_points,
                          *point_numbers);
       for_far_edges(*lattice, block,
                     [&](const SurfaceBlock& far, std::uint32_t, unsigned w, unsigned bit,

@@ -84,7 +84,7 @@ std::array<EdgeCell, 4> cells_around(const LatticeEdge& edge) {
     cells.at(n).cell = edge.start;
     cells.at(n).cell.at(b) -= static_cast<int>(n & 1);
     cells.at(n).cell.at(d) -= static_cast<int>(n >> 1);
-    cells.at(n).edge = 4 * edge.axis + n;
+    cells.at(n).edge = std::size_t{4} * edge.axis + n;
   }
   return cells;
 }

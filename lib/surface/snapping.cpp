@@ -70,15 +70,18 @@ public:
 
 private:
   static constexpr std::size_t blocks_at_once = 64;
-  static constexpr std::uint64_t doubtful = std::uint64_t{1} << 32;
 
   /// The point on an edge, by its block.
   struct PointRef {
     std::uint32_t block = 0;
     std::uint8_t word = 0, bit = 0;
   };
-  /// Of the places of a block's edges: the point's new number, and `doubtful` where a face of it
-  /// may have no area.
+  /// A face with hardly an area: the block of its cell, and which of its faces that was.
+  struct SmallFace {
+    std::uint32_t block = 0, face = 0;
+  };
+  /// Of the places of a block's edges: the point's new number, and bit 32 where a face of it may
+  /// have no area.
   using PlaceNumbers = std::array<std::uint64_t, edge_places>;
 
   void count(TriangleMesh& mesh);
@@ -87,7 +90,8 @@ private:
   void write_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles);
   std::uint64_t count_without_area();
   PointRef point_at(std::size_t n, unsigned place) const;
-  Vec3 position(const PointRef& point) const;
+  std::array<PointRef, 3> corners_of(const SmallFace& face) const;
+  Vec3 position(const PointRef& ref) const;
 
   std::uint64_t is_doubtful(const SnapBlock& block, std::size_t w) const {
     return block.merged[w] | block.looked_at[w] | (at_corners_ ? block.low[w] | block.high[w] : 0);
@@ -101,7 +105,7 @@ private:
   bool at_corners_;
   CellPlans plans_;
   std::vector<std::uint32_t> first_point_, first_triangle_; // of each block, after snapping
-  std::vector<std::vector<std::array<PointRef, 3>>> small_; // faces with hardly an area
+  std::vector<std::vector<SmallFace>> small_;
 };
 
 void SnappedMesh::count(TriangleMesh& mesh) {
@@ -128,31 +132,32 @@ void SnappedMesh::count(TriangleMesh& mesh) {
 /// Numbers the points that are left, too: what merges_.target says of those.
 void SnappedMesh::write_points(std::vector<Vec3>& points) {
   const std::array<double, 12> transform = transform_.m;
-  parallel_blocks(
-      context_, surface_.blocks.size(), blocks_at_once, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t n = begin; n < end; ++n) {
-          const SurfaceBlock& block = *surface_.blocks[n];
-          const SnapBlock& snaps = lattice_.snaps(n);
-          std::uint32_t point = block.first_point, number = first_point_[n];
-          for (unsigned w = 0; w < 24; ++w) {
-            const unsigned axis = w % 3;
-            for (std::uint64_t bits = block.crossed[w]; bits != 0; bits &= bits - 1, ++point) {
-              const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-              if ((snaps.merged[w] >> bit & 1) != 0)
-                continue;
-              Vec3 p{static_cast<double>(block.origin[0] + static_cast<int>(w / 3)),
-                     static_cast<double>(block.origin[1] + static_cast<int>(bit >> 3)),
-                     static_cast<double>(block.origin[2] + static_cast<int>(bit & 7))};
-              double along = surface_.fractions[point];
-              if (at_corners_ && ((snaps.low[w] | snaps.high[w]) >> bit & 1) != 0)
-                along = (snaps.high[w] >> bit & 1) != 0 ? 1 : 0;
-              (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += along;
-              points[number] = world_position(transform, p);
-              merges_.target[point] = number++;
-            }
-          }
-        }
-      });
+  const auto write_block = [&](std::size_t n) {
+    const SurfaceBlock& block = *surface_.blocks[n];
+    const SnapBlock& snaps = lattice_.snaps(n);
+    std::uint32_t number = first_point_[n];
+    for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+      const BlockEdge edge = surface_.edges[p];
+      const unsigned w = edge.word(), bit = edge.bit(), axis = edge.axis();
+      if ((snaps.merged[w] >> bit & 1) != 0)
+        continue;
+      double along = surface_.fractions[p];
+      if (at_corners_ && ((snaps.low[w] | snaps.high[w]) >> bit & 1) != 0)
+        along = (snaps.high[w] >> bit & 1) != 0 ? 1 : 0;
+      const Vec3 place{static_cast<double>(block.origin[0] + static_cast<int>(edge.i())),
+                       static_cast<double>(block.origin[1] + static_cast<int>(edge.j())),
+                       static_cast<double>(block.origin[2] + static_cast<int>(edge.k()))};
+      points[number] = world_position(transform, {place.x + (axis == 0 ? along : 0),
+                                                  place.y + (axis == 1 ? along : 0),
+                                                  place.z + (axis == 2 ? along : 0)});
+      merges_.target[p] = number++;
+    }
+  };
+  parallel_blocks(context_, surface_.blocks.size(), blocks_at_once,
+                  [&](std::size_t begin, std::size_t end) {
+                    for (std::size_t n = begin; n < end; ++n)
+                      write_block(n);
+                  });
   parallel_blocks(context_, merges_.places.size(), 1, [&](std::size_t n, std::size_t) {
     for (const SnapMerges::Place& place : merges_.places[n])
       points[merges_.target[place.point]] = world_position(transform, place.position);
@@ -163,28 +168,66 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
   const std::uint32_t* const target = merges_.target.get();
   const SurfaceBlock& block = *surface_.blocks[n];
   const SnapBlock& snaps = lattice_.snaps(n);
-  std::uint32_t number = first_point_[n];
-  for (unsigned w = 0; w < 24; ++w) {
-    const unsigned first = edge_place(w / 3, 0, 0, w % 3);
-    const std::uint64_t merged = snaps.merged[w], looked_at = is_doubtful(snaps, w);
-    for (std::uint64_t bits = block.crossed[w] & ~merged; bits != 0; bits &= bits - 1) {
-      const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-      numbers[first + 9 * (bit >> 3) + (bit & 7)] = number++ | (looked_at >> bit & 1) << 32;
-    }
-    for (std::uint64_t bits = merged; bits != 0; bits &= bits - 1) {
-      const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-      numbers[first + 9 * (bit >> 3) + (bit & 7)] = target[target[block.point(w, bit)]] | doubtful;
-    }
+  const EdgeWords merged = snaps.merged;
+  EdgeWords looked_at;
+  for (std::size_t w = 0; w < looked_at.size(); ++w)
+    looked_at[w] = is_doubtful(snaps, w);
+  for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+    const BlockEdge edge = surface_.edges[p];
+    const unsigned w = edge.word(), bit = edge.bit();
+    const std::uint32_t last = (merged[w] >> bit & 1) != 0 ? target[p] : p;
+    numbers[edge.place()] = target[last] | (looked_at[w] >> bit & 1) << 32;
   }
   for_far_edges(surface_, block,
-                [&](const SurfaceBlock& far, std::uint32_t far_number, unsigned w, unsigned bit,
+                [&](const SurfaceBlock& far, std::uint32_t number, unsigned w, unsigned bit,
                     unsigned place) {
-                  const SnapBlock& far_snaps = lattice_.snaps(far_number);
-                  std::uint32_t p = target[far.point(w, bit)];
-                  if ((far_snaps.merged[w] >> bit & 1) != 0)
-                    p = target[p];
-                  numbers[place] = p | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
+                  const SnapBlock& far_snaps = lattice_.snaps(number);
+                  const std::uint32_t p = far.point(w, bit),
+                                      last =
+                                          (far_snaps.merged[w] >> bit & 1) != 0 ? target[p] : p;
+                  numbers[place] = target[last] | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
                 });
+}
+
+/// What a block's faces become before they go to the mesh.
+struct BlockFaces {
+  static constexpr std::size_t most = std::size_t{max_cell_triangles} * leaf_voxels;
+  std::array<Triangle, most + 1> made;
+  std::array<std::uint16_t, most + 1> picked, picked_from; ///< of `made`; of the block's faces
+  std::size_t made_count = 0, picked_count = 0;
+};
+
+/// Those that stay, and of these the ones that may have no area. Which faces do so can't be
+/// predicted, so there is no branch.
+void make_faces(const SurfaceBlock& block, const std::uint64_t* numbers, const CellPlans& plans,
+                BlockFaces& faces) {
+  const std::uint8_t* cell = block.cases;
+  std::size_t made = 0, picked = 0;
+  std::uint16_t face = 0;
+  for (unsigned i = 0; i < leaf_dim; ++i)
+    for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
+      const auto bit = static_cast<unsigned>(std::countr_zero(active));
+      const std::uint64_t* const at = numbers + edge_place(i, bit >> 3, bit & 7);
+      const CellPlan& plan = plans[*cell++];
+      const std::uint16_t* corner = plan.corner.data();
+      for (unsigned t = 0; t < plan.triangles; ++t, corner += 3) {
+        const std::uint64_t a = at[corner[0]], b = at[corner[1]], c = at[corner[2]];
+        const Triangle next{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b),
+                            static_cast<std::uint32_t>(c)};
+        const auto differ = [](std::uint32_t p, std::uint32_t q) {
+          return static_cast<std::uint64_t>(p ^ q) + UINT32_MAX; // from bit 32 on: 1 or 0
+        };
+        const std::uint64_t stays =
+            (differ(next[0], next[1]) & differ(next[1], next[2]) & differ(next[2], next[0])) >> 32;
+        faces.made[made] = next;
+        faces.picked[picked] = static_cast<std::uint16_t>(made);
+        faces.picked_from[picked] = face++;
+        made += stays;
+        picked += stays & (a | b | c) >> 32;
+      }
+    }
+  faces.made_count = made;
+  faces.picked_count = picked;
 }
 
 void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
@@ -196,47 +239,16 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
   // area (see the test of the table): three edges of a cell that lie in no face of it in common.
   parallel_blocks(context_, blocks, blocks_at_once, [&](std::size_t begin, std::size_t end) {
     const auto numbers = std::make_unique_for_overwrite<PlaceNumbers>();
-    struct Picked {
-      std::uint32_t face;
-      const std::uint16_t* corner;
-      unsigned own;
-    };
-    // Which faces vanish or may have no area can't be predicted: they are picked without a branch.
-    std::vector<Picked> picked(std::size_t{max_cell_triangles} * leaf_voxels + 1);
+    const auto faces = std::make_unique_for_overwrite<BlockFaces>();
     for (std::size_t n = begin; n < end; ++n) {
-      const SurfaceBlock& block = *surface_.blocks[n];
       note_points(n, *numbers);
-      const std::uint8_t* cell = block.cases;
-      std::uint32_t face = first_triangle_[n];
-      const std::uint32_t face_end = first_triangle_[n + 1];
-      std::size_t count = 0;
-      for (unsigned i = 0; i < leaf_dim; ++i)
-        for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
-          const auto bit = static_cast<unsigned>(std::countr_zero(active));
-          const unsigned own = edge_place(i, bit >> 3, bit & 7);
-          const std::uint64_t* const at = numbers->data() + own;
-          const CellPlan& plan = plans_[*cell++];
-          const std::uint16_t* corner = plan.corner.data();
-          for (unsigned t = 0; t < plan.triangles; ++t, corner += 3) {
-            const std::uint64_t a = at[corner[0]], b = at[corner[1]], c = at[corner[2]];
-            const Triangle made{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b),
-                                static_cast<std::uint32_t>(c)};
-            const bool stays = made[0] != made[1] && made[1] != made[2] && made[2] != made[0];
-            picked[count] = {face, corner, own};
-            count += stays && ((a | b | c) & doubtful) != 0 ? 1 : 0;
-            if (face != face_end) // only faces that vanish follow
-              triangles[face] = made;
-            face += stays ? 1 : 0;
-          }
-        }
-      for (std::size_t p = 0; p < count; ++p) {
-        const Triangle& t = triangles[picked[p].face];
-        if (has_much_area(points[t[0]], points[t[1]], points[t[2]], enough))
-          continue;
-        std::array<PointRef, 3> refs;
-        for (unsigned a = 0; a < 3; ++a)
-          refs[a] = point_at(n, picked[p].own + picked[p].corner[a]);
-        small_[begin / blocks_at_once].push_back(refs);
+      make_faces(*surface_.blocks[n], numbers->data(), plans_, *faces);
+      std::copy_n(faces->made.data(), faces->made_count, triangles.data() + first_triangle_[n]);
+      for (std::size_t p = 0; p < faces->picked_count; ++p) {
+        const Triangle& t = faces->made[faces->picked[p]];
+        if (!has_much_area(points[t[0]], points[t[1]], points[t[2]], enough))
+          small_[begin / blocks_at_once].push_back(
+              {static_cast<std::uint32_t>(n), faces->picked_from[p]});
       }
     }
   });
@@ -248,6 +260,26 @@ SnappedMesh::PointRef SnappedMesh::point_at(std::size_t n, unsigned place) const
       lattice_.spot(n, {static_cast<int>(place / 81 % 9), static_cast<int>(place / 9 % 9),
                         static_cast<int>(place % 9)});
   return {at.block, static_cast<std::uint8_t>(at.word(axis)), static_cast<std::uint8_t>(at.bit)};
+}
+
+std::array<SnappedMesh::PointRef, 3> SnappedMesh::corners_of(const SmallFace& face) const {
+  const SurfaceBlock& block = *surface_.blocks[face.block];
+  const std::uint8_t* cell = block.cases;
+  std::uint32_t after = 0;
+  for (unsigned i = 0; i < leaf_dim; ++i)
+    for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1, ++cell) {
+      const CellPlan& plan = plans_[*cell];
+      after += plan.triangles;
+      if (face.face >= after)
+        continue;
+      const auto bit = static_cast<unsigned>(std::countr_zero(active));
+      const unsigned own = edge_place(i, bit >> 3, bit & 7);
+      const std::size_t first = std::size_t{3} * (face.face + plan.triangles - after);
+      return {point_at(face.block, own + plan.corner.at(first)),
+              point_at(face.block, own + plan.corner.at(first + 1)),
+              point_at(face.block, own + plan.corner.at(first + 2))};
+    }
+  return {};
 }
 
 /// Index position of a point after snapping, itself if nothing was merged here.
@@ -277,10 +309,11 @@ std::uint64_t SnappedMesh::count_without_area() {
   std::ranges::sort(merged, by_number);
   std::vector<std::uint64_t> counts(small_.size());
   parallel_blocks(context_, small_.size(), 1, [&](std::size_t part, std::size_t) {
-    for (const std::array<PointRef, 3>& face : small_[part]) {
+    for (const SmallFace& face : small_[part]) {
+      const std::array<PointRef, 3> refs = corners_of(face);
       std::array<Vec3, 3> p;
       for (std::size_t a = 0; a < 3; ++a) {
-        const PointRef& ref = face.at(a);
+        const PointRef& ref = refs.at(a);
         std::uint32_t number = merges_.target[surface_.blocks[ref.block]->point(ref.word, ref.bit)];
         if ((lattice_.snaps(ref.block).merged.at(ref.word) >> ref.bit & 1) != 0)
           number = merges_.target[number];
