@@ -45,14 +45,18 @@ void drop_faces(SnapMerges& merges, std::uint32_t block, unsigned count) {
 struct Member {
   std::uint32_t point = 0;
   LatticeEdge edge; // relative to the cluster's block
+  LatticeSpot at;   // of its start
   bool is_fin = false;
 };
 
+/// The same as index_position, where it can be inlined.
 Vec3 position_of(const SnapLattice& lattice, const Int3& origin, const Member& member) {
-  return index_position({{origin[0] + member.edge.start[0], origin[1] + member.edge.start[1],
-                          origin[2] + member.edge.start[2]},
-                         static_cast<std::int32_t>(member.edge.axis),
-                         lattice.fraction(member.point)});
+  const double along = lattice.fraction(member.point);
+  const auto part = [&](unsigned axis) {
+    return static_cast<double>(origin[axis] + member.edge.start[axis]) +
+           (member.edge.axis == axis ? along : 0);
+  };
+  return {part(0), part(1), part(2)};
 }
 
 /// Notes that all but the first of some members were merged into it, in this order.
@@ -68,13 +72,12 @@ void store_group(const Scene& scene, std::size_t n, const Int3& corner,
     only_fins = only_fins && member.is_fin;
     sum += position_of(lattice, origin, member) - own;
     ++count;
-    const LatticeSpot at = lattice.spot(n, member.edge.start);
-    SnapBlock& block = scene.lattice.snaps(at.block);
-    const std::size_t w = at.word(member.edge.axis);
+    SnapBlock& block = scene.lattice.snaps(member.at.block);
+    const std::size_t w = member.at.word(member.edge.axis);
     if (&member == &group[0]) {
-      mark(block.looked_at[w], at.bit);
+      mark(block.looked_at[w], member.at.bit);
     } else {
-      mark(block.merged[w], at.bit);
+      mark(block.merged[w], member.at.bit);
       scene.merges.target[member.point] = group[0].point;
     }
   }
@@ -123,8 +126,8 @@ bool BitCollapse::take(unsigned slice, unsigned bit, std::vector<SnapMerges::Pla
       Member& member = group[m];
       member.edge = {corner, direction / 2};
       member.edge.start[direction / 2] -= static_cast<int>(direction & 1);
-      member.point =
-          scene_.lattice.point_on(scene_.lattice.spot(block_, member.edge.start), direction / 2);
+      member.at = scene_.lattice.spot(block_, member.edge.start);
+      member.point = scene_.lattice.point_on(member.at, direction / 2);
     }
     store_group(scene_, block_, corner, {group.data(), found_.groups[g].count}, places);
   }
@@ -226,10 +229,13 @@ void Collapse::gather(const Scene& scene, const Cluster& cluster, bool careful) 
   const std::size_t n = cluster.block;
   members_.clear();
   lattice.for_members(n, cluster.corner, [&](const LatticeEdge& edge) {
-    members_.push_back({lattice.point_on(lattice.spot(n, edge.start), edge.axis), edge, false});
+    const LatticeSpot at = lattice.spot(n, edge.start);
+    members_.push_back({lattice.point_on(at, edge.axis), edge, at, false});
   });
-  for (const SnapFin& f : lattice.fins_at(lattice.absolute(n, cluster.corner)))
-    members_.push_back({f.point, {lattice.from_origin(n, f.start), f.axis}, true});
+  for (const SnapFin& f : lattice.fins_at(lattice.absolute(n, cluster.corner))) {
+    const LatticeEdge edge{lattice.from_origin(n, f.start), f.axis};
+    members_.push_back({f.point, edge, lattice.spot(n, edge.start), true});
+  }
   std::ranges::sort(members_, {}, &Member::point);
   struct Corner {
     std::uint32_t point;
@@ -409,16 +415,15 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
         Part& part = parts[begin / blocks_at_once];
         std::vector<SnapMerges::Place>& places = merges.places[begin / blocks_at_once];
         for (std::size_t n = begin; n < end; ++n) {
-          std::array<std::uint64_t, leaf_dim> several{};
-          unsigned slices = 0;
-          for (unsigned i = 0; i < leaf_dim; ++i) {
-            const SnapLattice::Corners corners = lattice.corners(n, i);
-            several[i] = corners.several;
-            part.corners += count_bits(corners.some);
-            part.clusters += count_bits(corners.several);
-            slices |= corners.several != 0 ? 1U << i : 0U;
-          }
-          if (slices == 0)
+          SnapLattice::Corners corners = lattice.corners(n);
+      CornerWords& several = corners.several;
+      unsigned slices = 0;
+      for (unsigned i = 0; i < leaf_dim; ++i) {
+        part.corners += count_bits(corners.some[i]);
+        part.clusters += count_bits(several[i]);
+        slices |= several[i] != 0 ? 1U << i : 0U;
+      }
+      if (slices == 0)
             continue;
           if (!always_careful)
             bits.enter(n, slices);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <emmintrin.h>
 #include <tuple>
 #include <utility>
 
@@ -13,62 +14,55 @@
 namespace gewebe {
 namespace {
 
-constexpr std::uint64_t first_row = 0xff, last_row = first_row << 56;
+constexpr std::uint64_t last_row = std::uint64_t{0xff} << 56;
 constexpr std::uint64_t first_column = 0x0101010101010101U, last_column = first_column << 7;
 constexpr std::size_t blocks_at_once = 64;
 
-void classify_block(const SurfaceBlock& block, const double* fraction, double epsilon,
-                    SnapBlock& snaps) {
-  snaps.merged = {};
-  for (std::size_t w = 0; w < 24; ++w) {
-    std::uint64_t low = 0, high = 0, extreme = 0;
-    for (std::uint64_t bits = block.crossed[w]; bits != 0; bits &= bits - 1, ++fraction) {
-      const std::uint64_t bit = bits & (0 - bits);
-      const double f = *fraction;
-      const bool is_low = f <= epsilon, is_high = !is_low && 1 - f <= epsilon;
-      // Two of these near a corner can make a face without area; see `snap`.
-      const bool is_extreme = !(f >= 1e-3 && f <= 1 - 1e-3);
-      low |= is_low ? bit : 0;
-      high |= is_high ? bit : 0;
-      extreme |= is_extreme ? bit : 0;
-    }
-    snaps.low[w] = low;
-    snaps.high[w] = high;
-    snaps.looked_at[w] = extreme;
+/// Bit n: distance(fraction n) <= limit. \pre count <= 64
+template <class Distance>
+std::uint64_t near_ones(const double* fractions, std::size_t count, double limit,
+                        Distance&& distance) {
+  std::uint64_t bits = 0;
+  const __m128d limits = _mm_set1_pd(limit);
+  std::size_t n = 0;
+  for (; n + 2 <= count; n += 2) {
+    const __m128d near = _mm_cmple_pd(distance(_mm_loadu_pd(fractions + n)), limits);
+    bits |= static_cast<std::uint64_t>(_mm_movemask_pd(near)) << n;
+  }
+  if (n < count) {
+    const __m128d near = _mm_cmple_sd(distance(_mm_load_sd(fractions + n)), limits);
+    bits |= static_cast<std::uint64_t>(_mm_movemask_pd(near) & 1) << n;
+  }
+  return bits;
+}
+
+void set(EdgeWords& words, std::uint64_t points, const BlockEdge* edges) {
+  for (; points != 0; points &= points - 1) {
+    const BlockEdge edge = edges[std::countr_zero(points)];
+    words[edge.word()] |= std::uint64_t{1} << edge.bit();
   }
 }
 
-/// Points that snap nowhere while, as far as this block tells, on each of the four faces of the
-/// lattice around their edge another edge's point snaps. The surface joins a point to one on each
-/// of these faces, so no other point can have neighbours that all snap.
-EdgeWords fin_candidates(const SurfaceBlock& block, const SnapBlock& snaps) {
-  // At corner (i, j, k): the face that two axes span from there.
-  const auto next_row = [](std::uint64_t word) { return word >> 8 | last_row; };
-  const auto next_column = [](std::uint64_t word) {
-    return (word >> 1 & ~last_column) | last_column;
-  };
-  const auto last_row_of = [](std::uint64_t word) { return word << 8 | first_row; };
-  const auto last_column_of = [](std::uint64_t word) {
-    return (word << 1 & ~first_column) | first_column;
-  };
-  EdgeWords found;
-  std::uint64_t xy_before = ~0ULL, xz_before = ~0ULL;
-  for (std::size_t i = 0; i < leaf_dim; ++i) {
-    const auto word = [&](std::size_t slice, std::size_t axis) {
-      return slice < leaf_dim ? snaps.low[3 * slice + axis] | snaps.high[3 * slice + axis] : ~0ULL;
-    };
-    const std::uint64_t x = word(i, 0), y = word(i, 1), z = word(i, 2);
-    const std::uint64_t xy = x | next_row(x) | y | word(i + 1, 1),
-                        xz = x | next_column(x) | z | word(i + 1, 2),
-                        yz = y | next_column(y) | z | next_row(z);
-    const auto* const crossed = &block.crossed[3 * i];
-    found[3 * i] = crossed[0] & ~x & xy & last_row_of(xy) & xz & last_column_of(xz);
-    found[3 * i + 1] = crossed[1] & ~y & xy & xy_before & yz & last_column_of(yz);
-    found[3 * i + 2] = crossed[2] & ~z & xz & xz_before & yz & last_row_of(yz);
-    xy_before = xy;
-    xz_before = xz;
+void classify_block(const SurfaceBlock& block, const SurfaceBlocks& surface, double epsilon,
+                    SnapBlock& snaps) {
+  snaps = {};
+  const auto to_start = [](__m128d f) { return f; };
+  const auto to_end = [](__m128d f) { return _mm_sub_pd(_mm_set1_pd(1), f); };
+  // Two points nearer to a corner than that can make a face without area; see `snap`.
+  constexpr double extreme = 1e-3;
+  for (std::uint32_t p = block.first_point; p < block.first_point + block.points; p += 64) {
+    const std::size_t count = std::min<std::size_t>(64, block.first_point + block.points - p);
+    const double* const fractions = surface.fractions.data() + p;
+    const BlockEdge* const edges = surface.edges.data() + p;
+    const std::uint64_t low = near_ones(fractions, count, epsilon, to_start),
+                        high = near_ones(fractions, count, epsilon, to_end) & ~low;
+    set(snaps.low, low, edges);
+    set(snaps.high, high, edges);
+    set(snaps.looked_at,
+        near_ones(fractions, count, extreme, to_start) |
+            near_ones(fractions, count, extreme, to_end),
+        edges);
   }
-  return found;
 }
 
 /// A cell at an edge, by its place relative to some block, and which of its edges that is.
@@ -109,41 +103,36 @@ void SnapLattice::classify(const Context& context, double epsilon) {
   const std::size_t real = surface_.blocks.size();
   snaps_ = std::make_unique_for_overwrite<SnapBlock[]>(real);
   prefer_huge_pages(snaps_.get(), real * sizeof(SnapBlock));
+  std::vector<std::vector<Missing>> missing((real + blocks_at_once - 1) / blocks_at_once);
   parallel_blocks(context, real, blocks_at_once, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const SurfaceBlock& block = *surface_.blocks[n];
-      classify_block(block, surface_.fractions.data() + block.first_point, epsilon, snaps_[n]);
+      classify_block(block, surface_, epsilon, snaps_[n]);
+      const auto add = [&](std::size_t place, unsigned axis, std::uint64_t draws) {
+        if (draws != 0 && block.neighbours.at(place) == SurfaceBlock::none)
+          missing[begin / blocks_at_once].push_back(
+              {shifted(block.origin, 1U << axis, leaf_dim), static_cast<std::uint32_t>(n), axis});
+      };
+      const EdgeWords& high = snaps_[n].high;
+      std::uint64_t y = 0, z = 0;
+      for (std::size_t i = 0; i < leaf_dim; ++i) {
+        y |= high[3 * i + 1];
+        z |= high[3 * i + 2];
+      }
+      add(SurfaceBlock::neighbour_place(1, 0, 0), 0, high[21]);
+      add(SurfaceBlock::neighbour_place(0, 1, 0), 1, y & last_row);
+      add(SurfaceBlock::neighbour_place(0, 0, 1), 2, z & last_column);
     }
   });
-  add_further_blocks();
+  std::vector<Missing> all;
+  for (const std::vector<Missing>& part : missing)
+    all.insert(all.end(), part.begin(), part.end());
+  add_further_blocks(std::move(all));
 }
 
 /// Blocks that no surface crosses, but with a corner that draws points of blocks before them.
-void SnapLattice::add_further_blocks() {
-  struct Missing {
-    Int3 origin{};
-    std::uint32_t found_by = 0;
-    unsigned axis = 0;
-  };
-  std::vector<Missing> missing;
+void SnapLattice::add_further_blocks(std::vector<Missing> missing) {
   const std::size_t real = surface_.blocks.size();
-  for (std::size_t n = 0; n < real; ++n) {
-    const SurfaceBlock& block = *surface_.blocks[n];
-    const auto add = [&](std::size_t place, unsigned axis, std::uint64_t draws) {
-      if (draws != 0 && block.neighbours.at(place) == SurfaceBlock::none)
-        missing.push_back(
-            {shifted(block.origin, 1U << axis, leaf_dim), static_cast<std::uint32_t>(n), axis});
-    };
-    const EdgeWords& high = snaps_[n].high;
-    std::uint64_t y = 0, z = 0;
-    for (std::size_t i = 0; i < leaf_dim; ++i) {
-      y |= high[3 * i + 1];
-      z |= high[3 * i + 2];
-    }
-    add(SurfaceBlock::neighbour_place(1, 0, 0), 0, high[21]);
-    add(SurfaceBlock::neighbour_place(0, 1, 0), 1, y & last_row);
-    add(SurfaceBlock::neighbour_place(0, 0, 1), 2, z & last_column);
-  }
   std::ranges::sort(missing, [](const Missing& a, const Missing& b) {
     return std::tie(a.origin, a.found_by) < std::tie(b.origin, b.found_by);
   });
@@ -178,38 +167,29 @@ void SnapLattice::add_further_blocks() {
     further_numbers_.insert(further_[n].origin, static_cast<std::uint32_t>(real + n));
 }
 
-std::uint64_t SnapLattice::from_below(std::size_t n, std::size_t i, unsigned axis) const {
-  const auto& around = block(n).neighbours;
-  const auto high = [&](std::uint32_t number, std::size_t slice) {
-    return number == SurfaceBlock::none ? 0 : snaps(number).high[3 * slice + axis];
-  };
-  const auto here = static_cast<std::uint32_t>(n);
-  if (axis == 0)
-    return i > 0 ? high(here, i - 1) : high(around[SurfaceBlock::neighbour_place(-1, 0, 0)], 7);
-  if (axis == 1)
-    return high(here, i) << 8 | high(around[SurfaceBlock::neighbour_place(0, -1, 0)], i) >> 56;
-  return (high(here, i) & ~last_column) << 1 |
-         (high(around[SurfaceBlock::neighbour_place(0, 0, -1)], i) >> 7 & first_column);
-}
-
-SnapLattice::Corners SnapLattice::corners(std::size_t n, std::size_t i) const {
+SnapLattice::Corners SnapLattice::corners(std::size_t n) const {
+  const SurfaceBlock& own = block(n);
+  const SnapBlock &here = snaps(n), &x_before = neighbour(own, -1, 0, 0),
+                  &y_before = neighbour(own, 0, -1, 0), &z_before = neighbour(own, 0, 0, -1);
   Corners result;
-  for (unsigned axis = 0; axis < 3; ++axis)
-    for (const std::uint64_t word : {snaps(n).low[3 * i + axis], from_below(n, i, axis)}) {
-      result.several |= result.some & word;
-      result.some |= word;
+  for (std::size_t i = 0; i < leaf_dim; ++i) {
+    const std::size_t w = 3 * i;
+    const std::array<std::uint64_t, 6> words{
+        here.low[w],
+        here.low[w + 1],
+        here.low[w + 2],
+        i > 0 ? here.high[w - 3] : x_before.high[21],
+        here.high[w + 1] << 8 | y_before.high[w + 1] >> 56,
+        (here.high[w + 2] & ~last_column) << 1 | (z_before.high[w + 2] >> 7 & first_column)};
+    std::uint64_t some = 0, several = 0;
+    for (const std::uint64_t word : words) {
+      several |= some & word;
+      some |= word;
     }
-  if (!fin_draws_.empty())
-    result.several |= fin_draws_[n][i];
+    result.some[i] = some;
+    result.several[i] = several | (fin_draws_.empty() ? 0 : fin_draws_[n][i]);
+  }
   return result;
-}
-
-LatticeSpot SnapLattice::spot(std::size_t n, const Int3& corner) const {
-  const int x = corner[0] >> 3, y = corner[1] >> 3, z = corner[2] >> 3;
-  const std::size_t place = SurfaceBlock::neighbour_place(x, y, z);
-  return {place == 13 ? static_cast<std::uint32_t>(n) : block(n).neighbours.at(place),
-          static_cast<unsigned>(corner[0] & 7),
-          static_cast<unsigned>(8 * (corner[1] & 7) + (corner[2] & 7))};
 }
 
 bool SnapLattice::snap_corner(std::size_t n, const LatticeEdge& edge, Int3& corner) const {
@@ -274,6 +254,65 @@ void SnapLattice::append_star(std::size_t n, const LatticeEdge& edge,
 }
 
 // ---- the fin rule
+
+/// Points that snap nowhere while on each of the four faces of the lattice around their edge the
+/// point of another edge snaps, or might. The surface joins a point to one on each of these faces,
+/// so no other point can have neighbours that all snap.
+EdgeWords SnapLattice::fin_candidates(std::size_t n) const {
+  const SurfaceBlock& block = *surface_.blocks[n];
+  const SnapBlock &here = snaps_[n], &x_after = neighbour(block, 1, 0, 0),
+                  &y_after = neighbour(block, 0, 1, 0), &z_after = neighbour(block, 0, 0, 1),
+                  &x_before = neighbour(block, -1, 0, 0), &y_before = neighbour(block, 0, -1, 0),
+                  &z_before = neighbour(block, 0, 0, -1);
+  const auto word = [](const SnapBlock& snaps, std::size_t i, std::size_t axis) {
+    return snaps.low[3 * i + axis] | snaps.high[3 * i + axis];
+  };
+  const auto next_row = [](std::uint64_t bits, std::uint64_t after) {
+    return bits >> 8 | after << 56;
+  };
+  const auto next_column = [](std::uint64_t bits, std::uint64_t after) {
+    return (bits >> 1 & ~last_column) | (after & first_column) << 7;
+  };
+  const auto row_before = [](std::uint64_t bits, std::uint64_t before) {
+    return bits << 8 | before >> 56;
+  };
+  const auto column_before = [](std::uint64_t bits, std::uint64_t before) {
+    return (bits << 1 & ~first_column) | (before >> 7 & first_column);
+  };
+  // What edges of `axis` of the next slice do; further blocks than six might do anything.
+  const auto next_slice = [&](const SnapBlock& snaps, std::size_t i, std::size_t axis) {
+    return i < 7 ? word(snaps, i + 1, axis) : &snaps == &here ? word(x_after, 0, axis) : ~0ULL;
+  };
+  // At corner (i, j, k): the faces that two axes span from there, and those from the slice before.
+  std::uint64_t xy_below = word(x_before, 7, 0) | next_row(word(x_before, 7, 0), ~0ULL) |
+             word(x_before, 7, 1) | word(here, 0, 1),
+                xz_below = word(x_before, 7, 0) | next_column(word(x_before, 7, 0), ~0ULL) |
+             word(x_before, 7, 2) | word(here, 0, 2);
+  EdgeWords found;
+  for (std::size_t i = 0; i < leaf_dim; ++i) {
+    const std::uint64_t x = word(here, i, 0), y = word(here, i, 1), z = word(here, i, 2);
+    const std::uint64_t xy = x | next_row(x, word(y_after, i, 0)) | y | next_slice(here, i, 1),
+                        xz = x | next_column(x, word(z_after, i, 0)) | z | next_slice(here, i, 2),
+                        yz = y | next_column(y, word(z_after, i, 1)) | z |
+                             next_row(z, word(y_after, i, 2));
+    // The last row of the block before and the last column: with the row and column that follow.
+    const std::uint64_t row_xy = word(y_before, i, 0) | x << 56 | word(y_before, i, 1) |
+                                 next_slice(y_before, i, 1),
+                        row_yz = word(y_before, i, 1) | next_column(word(y_before, i, 1), ~0ULL) |
+                                 word(y_before, i, 2) | z << 56,
+                        column_xz = word(z_before, i, 0) | x << 7 | word(z_before, i, 2) |
+                                    next_slice(z_before, i, 2),
+                        column_yz = word(z_before, i, 1) | y << 7 | word(z_before, i, 2) |
+                                    next_row(word(z_before, i, 2), ~0ULL);
+    const auto* const crossed = &block.crossed[3 * i];
+    found[3 * i] = crossed[0] & ~x & xy & row_before(xy, row_xy) & xz & column_before(xz, column_xz);
+    found[3 * i + 1] = crossed[1] & ~y & xy & xy_below & yz & column_before(yz, column_yz);
+    found[3 * i + 2] = crossed[2] & ~z & xz & xz_below & yz & row_before(yz, row_yz);
+    xy_below = xy;
+    xz_below = xz;
+  }
+  return found;
+}
 
 namespace {
 
@@ -350,7 +389,7 @@ void SnapLattice::apply_fin_rule(const Context& context) {
   std::vector<std::vector<SnapFin>> found((real + blocks_at_once - 1) / blocks_at_once);
   parallel_blocks(context, real, blocks_at_once, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      const EdgeWords candidates = fin_candidates(*surface_.blocks[n], snaps_[n]);
+      const EdgeWords candidates = fin_candidates(n);
       for (unsigned w = 0; w < 24; ++w)
         for (std::uint64_t bits = candidates[w]; bits != 0; bits &= bits - 1) {
           const int bit = std::countr_zero(bits);

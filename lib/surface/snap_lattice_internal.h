@@ -65,11 +65,11 @@ public:
   SnapBlock& snaps(std::size_t n) { return snaps_[n]; } ///< \pre a block of the surface
   bool mirrored() const { return mirrored_; }
 
-  /// The corners of slice i of block n that draw a point, and those that draw several.
+  /// The corners of block n that draw a point, and those that draw several.
   struct Corners {
-    std::uint64_t some = 0, several = 0;
+    CornerWords some{}, several{};
   };
-  Corners corners(std::size_t n, std::size_t i) const;
+  Corners corners(std::size_t n) const;
 
   const std::vector<SnapFin>& fins() const { return fins_; } ///< by corner, then by point
   std::span<const SnapFin> fins_at(const Int3& corner) const;
@@ -85,7 +85,13 @@ public:
   }
 
   // The rest is for the few points where bits don't do; places are relative to block n.
-  LatticeSpot spot(std::size_t n, const Int3& corner) const;
+  LatticeSpot spot(std::size_t n, const Int3& corner) const {
+    const std::size_t place =
+        SurfaceBlock::neighbour_place(corner[0] >> 3, corner[1] >> 3, corner[2] >> 3);
+    return {place == 13 ? static_cast<std::uint32_t>(n) : block(n).neighbours.at(place),
+            static_cast<unsigned>(corner[0] & 7),
+            static_cast<unsigned>(8 * (corner[1] & 7) + (corner[2] & 7))};
+  }
   std::uint32_t point_on(const LatticeSpot& spot, unsigned axis) const {
     return block(spot.block).point(spot.word(axis), spot.bit);
   }
@@ -104,10 +110,20 @@ public:
 
 private:
   void classify(const Context& context, double epsilon);
-  void add_further_blocks();
+  /// Found from a block of the surface along an axis.
+  struct Missing {
+    Int3 origin{};
+    std::uint32_t found_by = 0;
+    unsigned axis = 0;
+  };
+  void add_further_blocks(std::vector<Missing> missing);
   void apply_fin_rule(const Context& context);
   bool find_fin(std::size_t n, const LatticeEdge& edge, SnapFin& fin) const;
-  std::uint64_t from_below(std::size_t n, std::size_t i, unsigned axis) const;
+  const SnapBlock& neighbour(const SurfaceBlock& block, int x, int y, int z) const {
+    const std::uint32_t number = block.neighbours[SurfaceBlock::neighbour_place(x, y, z)];
+    return number == SurfaceBlock::none ? nothing : snaps_[number];
+  }
+  EdgeWords fin_candidates(std::size_t n) const;
 
   const SurfaceBlocks& surface_;
   bool mirrored_;

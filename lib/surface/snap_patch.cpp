@@ -188,6 +188,25 @@ std::uint16_t row(std::uint64_t before, std::uint64_t here, std::uint64_t after,
                                     (after >> shift & 1) << 9);
 }
 
+/// Bits round corner (i, j, k) of the block.
+inline PatchCorners window(const std::uint16_t* set, unsigned i, unsigned j, unsigned k) {
+  std::uint64_t bits = 0;
+  for (unsigned x = 0; x < 3; ++x) {
+    std::uint64_t rows;
+    std::memcpy(&rows, set + SnapPatches::padded * (i + x) + j, sizeof rows);
+    bits |= (rows >> k & 0x0000000700070007U) << (3 * x);
+  }
+  return static_cast<PatchCorners>((bits & 0x1ff) | (bits >> 7 & 0x3fe00) |
+                                   (bits >> 14 & 0x7fc0000));
+}
+
+/// The same of three sets, one for each axis.
+template <class Rows>
+PatchEdges edges_window(const Rows* sets, unsigned i, unsigned j, unsigned k) {
+  return {window(sets[0].data(), i, j, k) | std::uint64_t{window(sets[1].data(), i, j, k)} << 27,
+          window(sets[2].data(), i, j, k)};
+}
+
 /// One cluster while it is merged. Its members are numbered by their order.
 struct Cluster {
   const Tables& table;
@@ -317,29 +336,13 @@ void SnapPatches::enter(std::size_t n, unsigned slices) {
   }
 }
 
-PatchCorners SnapPatches::window(unsigned set, unsigned i, unsigned j, unsigned k) const {
-  std::uint64_t bits = 0;
-  for (unsigned x = 0; x < 3; ++x) {
-    std::uint64_t rows;
-    std::memcpy(&rows, rows_[set].data() + padded * (i + x) + j, sizeof rows);
-    bits |= (rows >> k & 0x0000000700070007U) << (3 * x);
-  }
-  return static_cast<PatchCorners>((bits & 0x1ff) | (bits >> 7 & 0x3fe00) |
-                                   (bits >> 14 & 0x7fc0000));
-}
-
-PatchEdges SnapPatches::edges_window(unsigned set, unsigned i, unsigned j, unsigned k) const {
-  return {window(set, i, j, k) | std::uint64_t{window(set + 1, i, j, k)} << 27,
-          window(set + 2, i, j, k)};
-}
-
 bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
   const Tables& table = tables();
   const unsigned j = bit >> 3, k = bit & 7;
   Cluster c{table, lattice_.mirrored(),
             (slice == 0 ? 1U : 0U) | (j == 0 ? 2U : 0U) | (k == 0 ? 4U : 0U)};
-  const PatchCorners sides = window(inside, slice, j, k);
-  Snapping snaps{edges_window(low, slice, j, k), edges_window(high, slice, j, k), {}};
+  const PatchCorners sides = window(rows_[inside].data(), slice, j, k);
+  Snapping snaps{edges_window(&rows_[low], slice, j, k), edges_window(&rows_[high], slice, j, k), {}};
   for (unsigned side = 0; side < 8; ++side) {
     const PatchCorners cell = sides >> cell_place(side);
     c.cases[side] = table.flat[cell & 31] | static_cast<unsigned>(table.flat[cell >> 9 & 31]) << 2;
@@ -358,7 +361,7 @@ bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
     snaps.own = snaps.own | table.edge[d];
   }
   if (has_fins_) {
-    const PatchEdges fins = edges_window(fin, slice, j, k);
+    const PatchEdges fins = edges_window(&rows_[fin], slice, j, k);
     for (std::size_t m = 0; m < c.count; ++m)
       if (any(c.near[m] & fins))
         return false;

@@ -46,14 +46,12 @@ public:
   /// merge_snap_clusters; else answers false. \pre it draws no fin
   bool take(unsigned slice, unsigned bit, PatchMerges& result);
 
+  static constexpr std::size_t padded = 10;
+
 private:
   // Padded bits of the block and of what lies round it: bit k + 1 of row j + 1 of slice i + 1.
   enum Set { inside, low, high = low + 3, fin = high + 3, sets = fin + 3 };
-  static constexpr std::size_t padded = 10;
   using Rows = std::array<std::uint16_t, padded * padded + 4>; // a window is read by 4 rows
-
-  PatchCorners window(unsigned set, unsigned i, unsigned j, unsigned k) const;
-  PatchEdges edges_window(unsigned set, unsigned i, unsigned j, unsigned k) const;
 
   const SnapLattice& lattice_;
   std::array<Rows, sets> rows_{};

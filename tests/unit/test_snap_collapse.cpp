@@ -154,18 +154,19 @@ TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
       if (snaps(crossings[p], epsilon))
         corners[corner_of(crossings[p], epsilon)].push_back(p);
     std::size_t some = 0;
-    for (std::size_t n = 0; n < lattice.count(); ++n)
+    for (std::size_t n = 0; n < lattice.count(); ++n) {
+      const SnapLattice::Corners drawn = lattice.corners(n);
       for (int bit = 0; bit < leaf_voxels; ++bit) {
         const Int3 corner{bit >> 6, bit >> 3 & 7, bit & 7};
         const auto found = corners.find(lattice.absolute(n, corner));
         const auto slice = static_cast<std::size_t>(corner[0]);
-        const SnapLattice::Corners drawn = lattice.corners(n, slice);
-        ASSERT_EQ((drawn.some >> (bit & 63) & 1) != 0, found != corners.end());
+        ASSERT_EQ((drawn.some.at(slice) >> (bit & 63) & 1) != 0, found != corners.end());
         if (found == corners.end())
           continue;
         ++some;
         const bool draws_fin = !lattice.fins_at(found->first).empty();
-        EXPECT_EQ((drawn.several >> (bit & 63) & 1) != 0, found->second.size() > 1 || draws_fin);
+        EXPECT_EQ((drawn.several.at(slice) >> (bit & 63) & 1) != 0,
+                  found->second.size() > 1 || draws_fin);
         std::vector<std::uint32_t> members;
         lattice.for_members(n, corner, [&](const LatticeEdge& edge) {
           members.push_back(lattice.point_on(lattice.spot(n, edge.start), edge.axis));
@@ -174,6 +175,7 @@ TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
         EXPECT_EQ(members, found->second);
         EXPECT_EQ(lattice.first_member(n, corner), found->second.front());
       }
+    }
     EXPECT_EQ(some, corners.size());
   }
 }
