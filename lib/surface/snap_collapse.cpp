@@ -50,7 +50,7 @@ struct Member {
 };
 
 /// The same as index_position, where it can be inlined.
-Vec3 position_of(const SnapLattice& lattice, const Int3& origin, const Member& member) {
+inline Vec3 position_of(const SnapLattice& lattice, const Int3& origin, const Member& member) {
   const double along = lattice.fraction(member.point);
   const auto part = [&](unsigned axis) {
     return static_cast<double>(origin[axis] + member.edge.start[axis]) +
@@ -416,14 +416,14 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
         std::vector<SnapMerges::Place>& places = merges.places[begin / blocks_at_once];
         for (std::size_t n = begin; n < end; ++n) {
           SnapLattice::Corners corners = lattice.corners(n);
-      CornerWords& several = corners.several;
-      unsigned slices = 0;
-      for (unsigned i = 0; i < leaf_dim; ++i) {
-        part.corners += count_bits(corners.some[i]);
-        part.clusters += count_bits(several[i]);
-        slices |= several[i] != 0 ? 1U << i : 0U;
-      }
-      if (slices == 0)
+          CornerWords& several = corners.several;
+          unsigned slices = 0;
+          for (unsigned i = 0; i < leaf_dim; ++i) {
+            part.corners += count_bits(corners.some[i]);
+            part.clusters += count_bits(several[i]);
+            slices |= several[i] != 0 ? 1U << i : 0U;
+          }
+          if (slices == 0)
             continue;
           if (!always_careful)
             bits.enter(n, slices);

@@ -174,13 +174,13 @@ SnapLattice::Corners SnapLattice::corners(std::size_t n) const {
   Corners result;
   for (std::size_t i = 0; i < leaf_dim; ++i) {
     const std::size_t w = 3 * i;
-    const std::array<std::uint64_t, 6> words{
-        here.low[w],
-        here.low[w + 1],
-        here.low[w + 2],
-        i > 0 ? here.high[w - 3] : x_before.high[21],
-        here.high[w + 1] << 8 | y_before.high[w + 1] >> 56,
-        (here.high[w + 2] & ~last_column) << 1 | (z_before.high[w + 2] >> 7 & first_column)};
+    const std::array<std::uint64_t, 6> words{here.low[w],
+                                             here.low[w + 1],
+                                             here.low[w + 2],
+                                             i > 0 ? here.high[w - 3] : x_before.high[21],
+                                             here.high[w + 1] << 8 | y_before.high[w + 1] >> 56,
+                                             (here.high[w + 2] & ~last_column) << 1 |
+                                                 (z_before.high[w + 2] >> 7 & first_column)};
     std::uint64_t some = 0, several = 0;
     for (const std::uint64_t word : words) {
       several |= some & word;
@@ -285,9 +285,9 @@ EdgeWords SnapLattice::fin_candidates(std::size_t n) const {
   };
   // At corner (i, j, k): the faces that two axes span from there, and those from the slice before.
   std::uint64_t xy_below = word(x_before, 7, 0) | next_row(word(x_before, 7, 0), ~0ULL) |
-             word(x_before, 7, 1) | word(here, 0, 1),
+                           word(x_before, 7, 1) | word(here, 0, 1),
                 xz_below = word(x_before, 7, 0) | next_column(word(x_before, 7, 0), ~0ULL) |
-             word(x_before, 7, 2) | word(here, 0, 2);
+                           word(x_before, 7, 2) | word(here, 0, 2);
   EdgeWords found;
   for (std::size_t i = 0; i < leaf_dim; ++i) {
     const std::uint64_t x = word(here, i, 0), y = word(here, i, 1), z = word(here, i, 2);
@@ -305,7 +305,8 @@ EdgeWords SnapLattice::fin_candidates(std::size_t n) const {
                         column_yz = word(z_before, i, 1) | y << 7 | word(z_before, i, 2) |
                                     next_row(word(z_before, i, 2), ~0ULL);
     const auto* const crossed = &block.crossed[3 * i];
-    found[3 * i] = crossed[0] & ~x & xy & row_before(xy, row_xy) & xz & column_before(xz, column_xz);
+    found[3 * i] =
+        crossed[0] & ~x & xy & row_before(xy, row_xy) & xz & column_before(xz, column_xz);
     found[3 * i + 1] = crossed[1] & ~y & xy & xy_below & yz & column_before(yz, column_yz);
     found[3 * i + 2] = crossed[2] & ~z & xz & xz_below & yz & row_before(yz, row_yz);
     xy_below = xy;

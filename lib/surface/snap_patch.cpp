@@ -202,7 +202,7 @@ inline PatchCorners window(const std::uint16_t* set, unsigned i, unsigned j, uns
 
 /// The same of three sets, one for each axis.
 template <class Rows>
-PatchEdges edges_window(const Rows* sets, unsigned i, unsigned j, unsigned k) {
+inline PatchEdges edges_window(const Rows* sets, unsigned i, unsigned j, unsigned k) {
   return {window(sets[0].data(), i, j, k) | std::uint64_t{window(sets[1].data(), i, j, k)} << 27,
           window(sets[2].data(), i, j, k)};
 }
@@ -342,7 +342,8 @@ bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
   Cluster c{table, lattice_.mirrored(),
             (slice == 0 ? 1U : 0U) | (j == 0 ? 2U : 0U) | (k == 0 ? 4U : 0U)};
   const PatchCorners sides = window(rows_[inside].data(), slice, j, k);
-  Snapping snaps{edges_window(&rows_[low], slice, j, k), edges_window(&rows_[high], slice, j, k), {}};
+  Snapping snaps{
+      edges_window(&rows_[low], slice, j, k), edges_window(&rows_[high], slice, j, k), {}};
   for (unsigned side = 0; side < 8; ++side) {
     const PatchCorners cell = sides >> cell_place(side);
     c.cases[side] = table.flat[cell & 31] | static_cast<unsigned>(table.flat[cell >> 9 & 31]) << 2;

@@ -27,8 +27,8 @@ bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 /// A quick test. \pre enough is the square of what the area may be at least, for sides of 1
 bool has_much_area(const Vec3& a, const Vec3& b, const Vec3& c, double enough) {
-  const Vec3 u = b - a, v = c - a, w = c - b, normal = cross(u, v);
-  const double longest = std::max({dot(u, u), dot(v, v), dot(w, w)});
+  const Vec3 u = b - a, v = c - a, normal = cross(u, v);
+  const double longest = 2 * (dot(u, u) + dot(v, v)); // of three squares: (v - u)² isn't more
   return dot(normal, normal) > enough * longest * longest;
 }
 
@@ -178,15 +178,14 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
     const std::uint32_t last = (merged[w] >> bit & 1) != 0 ? target[p] : p;
     numbers[edge.place()] = target[last] | (looked_at[w] >> bit & 1) << 32;
   }
-  for_far_edges(surface_, block,
-                [&](const SurfaceBlock& far, std::uint32_t number, unsigned w, unsigned bit,
-                    unsigned place) {
-                  const SnapBlock& far_snaps = lattice_.snaps(number);
-                  const std::uint32_t p = far.point(w, bit),
-                                      last =
-                                          (far_snaps.merged[w] >> bit & 1) != 0 ? target[p] : p;
-                  numbers[place] = target[last] | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
-                });
+  for_far_edges(
+      surface_, block,
+      [&](const SurfaceBlock& far, std::uint32_t number, unsigned w, unsigned bit, unsigned place) {
+        const SnapBlock& far_snaps = lattice_.snaps(number);
+        const std::uint32_t p = far.point(w, bit),
+                            last = (far_snaps.merged[w] >> bit & 1) != 0 ? target[p] : p;
+        numbers[place] = target[last] | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
+      });
 }
 
 /// What a block's faces become before they go to the mesh.

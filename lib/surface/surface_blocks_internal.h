@@ -117,12 +117,20 @@ void for_far_edges(const SurfaceBlocks& surface, const SurfaceBlock& block, Visi
     for (unsigned axis = 0; axis < 3; ++axis) {
       if ((octant >> axis & 1) != 0)
         continue; // this edge leads away
-      for (unsigned i = 0; i < (far_i != 0 ? 1U : 8U); ++i)
-        for (std::uint64_t bits = far.crossed[3 * i + axis] & mask; bits != 0; bits &= bits - 1) {
-          const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-          visit(far, number, 3 * i + axis, bit,
-                edge_place(i + 8 * far_i, (bit >> 3) + 8 * far_j, (bit & 7) + 8 * far_k, axis));
-        }
+      // A row or a column of each slice makes one word, since short loops are badly predicted.
+      std::uint64_t all = 0;
+      if (far_i != 0)
+        all = far.crossed[axis] & mask;
+      else
+        for (unsigned i = 0; i < 8; ++i)
+          all |= (far.crossed[3 * i + axis] & mask) << (far_k != 0 ? i : 8 * i);
+      for (; all != 0; all &= all - 1) {
+        const auto n = static_cast<unsigned>(std::countr_zero(all));
+        const unsigned i = far_i != 0 ? 0 : far_k != 0 ? n & 7 : n >> 3,
+                       bit = far_i != 0 ? n : far_k != 0 ? n & 56 : n & 7;
+        visit(far, number, 3 * i + axis, bit,
+              edge_place(i + 8 * far_i, (bit >> 3) + 8 * far_j, (bit & 7) + 8 * far_k, axis));
+      }
     }
   }
 }
