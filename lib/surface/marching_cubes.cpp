@@ -271,7 +271,8 @@ IsoSurface make_surface(const Context& context, const Grid& grid,
   lattice->triangles = triangles;
 
   require_memory(context,
-                 static_cast<double>(points) * (sizeof(double) + sizeof(BlockEdge) + (with_mesh ? sizeof(Vec3) : 0)) +
+                 static_cast<double>(points) *
+                         (sizeof(double) + sizeof(BlockEdge) + (with_mesh ? sizeof(Vec3) : 0)) +
                      static_cast<double>(with_mesh ? triangles : 0) * sizeof(Triangle),
                  "the mesh of the isosurface");
   if (with_mesh)
