@@ -126,8 +126,12 @@ void for_far_edges(const SurfaceBlocks& surface, const SurfaceBlock& block, Visi
           all |= (far.crossed[3 * i + axis] & mask) << (far_k != 0 ? i : 8 * i);
       for (; all != 0; all &= all - 1) {
         const auto n = static_cast<unsigned>(std::countr_zero(all));
-        const unsigned i = far_i != 0 ? 0 : far_k != 0 ? n & 7 : n >> 3,
-                       bit = far_i != 0 ? n : far_k != 0 ? n & 56 : n & 7;
+        const unsigned i = far_i != 0   ? 0
+                           : far_k != 0 ? n & 7
+                                        : n >> 3,
+                       bit = far_i != 0   ? n
+                             : far_k != 0 ? n & 56
+                                          : n & 7;
         visit(far, number, 3 * i + axis, bit,
               edge_place(i + 8 * far_i, (bit >> 3) + 8 * far_j, (bit & 7) + 8 * far_k, axis));
       }
