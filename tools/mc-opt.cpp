@@ -74,7 +74,7 @@ void work(cli::Run& run, const Arguments& arguments) {
       grid =
           run.timed("crop", [&] { return crop(context, grid, box_of(arguments.box), isovalue); });
     return run.timed("marching_cubes",
-                     [&] { return marching_cubes(context, grid, arguments.isovalue); });
+                     [&] { return marching_cubes_to_snap(context, grid, arguments.isovalue); });
   });
   SnapOptions options;
   options.epsilon = arguments.epsilon;

@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "surface/inside_field_internal.h"
 #include "surface/marching_cubes_table.h"
+#include "surface/surface_blocks_internal.h"
 
 #include <algorithm>
 #include <array>
@@ -69,28 +70,7 @@ unsigned cell_case(const CornerBits& bits, std::size_t i, unsigned n) {
   return result;
 }
 
-/// What is kept of a block with a crossed cell.
-struct Block {
-  Int3 origin{};
-  std::uint32_t first_point = 0, points = 0;
-  std::uint32_t first_triangle = 0, triangles = 0;
-  std::uint32_t cells = 0;
-  const std::uint8_t* cases = nullptr;     // of each crossed cell in turn
-  std::array<std::uint32_t, 8> contents{}; // of the octants
-  std::array<std::uint16_t, 24> before{};  // crossed edges of this block in earlier words
-  std::array<std::uint64_t, 24> crossed{}; // word 3 i + axis, bit 8 j + k
-  std::array<std::uint64_t, 8> active{};   // crossed cells: word i, bit 8 j + k
-
-  std::uint32_t first_of_word(std::size_t w) const { return first_point + before[w]; }
-};
-
-/// The crossed blocks among some candidates.
-struct Blocks {
-  std::vector<Block> blocks;
-  std::vector<std::uint8_t> cases;
-};
-
-void examine_block(const InsideField& field, const Int3& origin, Blocks& result) {
+void examine_block(const InsideField& field, const Int3& origin, SurfaceBlocks::Part& result) {
   const std::array<std::uint32_t, 8> contents = field.octants(origin);
   const CornerBits bits = corner_bits(octants_of(field, contents));
   std::array<std::uint64_t, 8> active{};
@@ -99,10 +79,16 @@ void examine_block(const InsideField& field, const Int3& origin, Blocks& result)
     any |= active[i] = active_cells(bits, i);
   if (any == 0)
     return;
-  Block& block = result.blocks.emplace_back();
+  result.contents.push_back(contents);
+  SurfaceBlock& block = result.blocks.emplace_back();
   block.origin = origin;
-  block.contents = contents;
   block.active = active;
+  for (unsigned n = 0; n < 8; ++n) {
+    block.inside[n] = bits.word[n][0];
+    const std::uint64_t slice = bits.word[(n & 1) != 0 ? leaf_dim : 0][n >> 1];
+    const unsigned bit = ((n & 2) != 0 ? 56U : 0U) + ((n & 4) != 0 ? 7U : 0U);
+    block.outer = static_cast<std::uint8_t>(block.outer | (slice >> bit & 1) << n);
+  }
   const auto& table = marching_cubes_table();
   for (std::size_t i = 0; i < leaf_dim; ++i) {
     const std::uint64_t here = bits.word[i][0];
@@ -113,6 +99,7 @@ void examine_block(const InsideField& field, const Int3& origin, Blocks& result)
       block.crossed[3 * i + axis] = crossed[axis];
       block.points += count_bits(crossed[axis]);
     }
+    block.cells_before[i] = static_cast<std::uint16_t>(block.cells);
     for (std::uint64_t cells = active[i]; cells != 0; cells &= cells - 1) {
       const unsigned cell = cell_case(bits, i, static_cast<unsigned>(std::countr_zero(cells)));
       result.cases.push_back(static_cast<std::uint8_t>(cell));
@@ -122,30 +109,22 @@ void examine_block(const InsideField& field, const Int3& origin, Blocks& result)
   }
 }
 
-[[noreturn]] void throw_not_finite(const EdgeCrossing& crossing) {
-  const Int3& c = crossing.corner;
+[[noreturn]] void throw_not_finite(const Int3& c) {
   throw Error("the volume has a value beside the surface that is not finite, at voxel (" +
               std::to_string(c[0]) + ", " + std::to_string(c[1]) + ", " + std::to_string(c[2]) +
               ") or its neighbour");
 }
 
-/// Numbers of the points on the edges of a block's cells: [place(i, j, k, axis)].
-using PointNumbers = std::array<std::uint32_t, std::size_t{3} * 9 * 9 * 9>;
-constexpr unsigned place(unsigned i, unsigned j, unsigned k, unsigned axis = 0) {
-  return ((axis * 9 + i) * 9 + j) * 9 + k;
-}
+/// Numbers of the points on the edges of a block's cells, by edge_place.
+using PointNumbers = std::array<std::uint32_t, edge_places>;
 
-/// GridTransform::to_world, the same sums, where it can be inlined.
-Vec3 world_position(const std::array<double, 12>& m, const Vec3& p) {
-  return {m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-          m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
-}
-
-/// Computes the block's points and notes their numbers.
-void write_points(const Octants& octants, const Block& block, double isovalue, IsoSurface& surface,
+/// Computes the block's fractions and, with a mesh, its points and notes their numbers.
+template <bool with_mesh>
+void write_points(const Octants& octants, const SurfaceBlock& block, double isovalue,
+                  const GridTransform& to_world, SurfaceBlocks& lattice, Vec3* points,
                   PointNumbers& numbers) {
   constexpr std::array<unsigned, 3> stride{64, 8, 1};
-  const std::array<double, 12> transform = surface.transform.m;
+  const std::array<double, 12> transform = to_world.m;
   std::uint32_t point = block.first_point;
   const auto value = [](const Content& content, unsigned n) {
     return static_cast<double>(content.values != nullptr ? content.values[n] : content.constant);
@@ -159,80 +138,34 @@ void write_points(const Octants& octants, const Block& block, double isovalue, I
       const double a = value(*octants[0], n);
       const double b = along < 7 ? value(*octants[0], n + stride[axis])
                                  : value(*octants[1U << axis], n - 7 * stride[axis]);
-      EdgeCrossing& crossing = surface.crossings[point];
-      crossing.corner = {block.origin[0] + static_cast<int>(i),
-                         block.origin[1] + static_cast<int>(j),
-                         block.origin[2] + static_cast<int>(k)};
-      crossing.axis = static_cast<std::int32_t>(axis);
-      crossing.fraction = (isovalue - a) / (b - a);
+      const double fraction = (isovalue - a) / (b - a);
+      const Int3 corner{block.origin[0] + static_cast<int>(i),
+                        block.origin[1] + static_cast<int>(j),
+                        block.origin[2] + static_cast<int>(k)};
       if (!std::isfinite(b - a)) // of floats that are finite it is
-        throw_not_finite(crossing);
-      Vec3 p{static_cast<double>(crossing.corner[0]), static_cast<double>(crossing.corner[1]),
-             static_cast<double>(crossing.corner[2])}; // index_position, axis known
-      (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += crossing.fraction;
-      surface.mesh.points[point] = world_position(transform, p);
-      numbers[place(i, j, k, axis)] = point++;
+        throw_not_finite(corner);
+      lattice.fractions[point] = fraction;
+      lattice.edges[point] = BlockEdge::at(i, axis, bit);
+      if (with_mesh) {
+        Vec3 p{static_cast<double>(corner[0]), static_cast<double>(corner[1]),
+               static_cast<double>(corner[2])}; // index_position, axis known
+        (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += fraction;
+        points[point] = world_position(transform, p);
+        numbers[edge_place(i, j, k, axis)] = point;
+      }
+      ++point;
     }
   }
 }
 
-/// Notes the numbers of the points on the edges that cells of a block share with its neighbours on
-/// the far sides. \pre near[n] has a crossed edge wherever a cell of this block asks for one
-void note_far_points(const std::array<const Block*, 8>& near, PointNumbers& numbers) {
-  constexpr std::uint64_t first_row = 0xff, first_column = 0x0101010101010101U;
-  for (unsigned octant = 1; octant < 7; ++octant) {
-    if (near[octant] == nullptr)
-      continue;
-    const Block& block = *near[octant];
-    const unsigned far_i = octant & 1, far_j = octant >> 1 & 1, far_k = octant >> 2;
-    const std::uint64_t mask =
-        (far_j != 0 ? first_row : ~0ULL) & (far_k != 0 ? first_column : ~0ULL);
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      if ((octant >> axis & 1) != 0)
-        continue; // this edge leads away
-      for (unsigned i = 0; i < (far_i != 0 ? 1U : 8U); ++i) {
-        const unsigned w = 3 * i + axis;
-        const std::uint64_t crossed = block.crossed[w];
-        for (std::uint64_t bits = crossed & mask; bits != 0; bits &= bits - 1) {
-          const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-          numbers[place(i + 8 * far_i, (bit >> 3) + 8 * far_j, (bit & 7) + 8 * far_k, axis)] =
-              block.first_of_word(w) + count_bits(crossed & ((std::uint64_t{1} << bit) - 1));
-        }
-      }
-    }
-  }
-}
-
-/// The table of cases for PointNumbers.
-struct CellPlan {
-  std::uint8_t triangles = 0;
-  std::array<std::uint16_t, std::size_t{3} * max_cell_triangles> corner{};
-};
-using CellPlans = std::array<CellPlan, 256>;
-
-CellPlans make_plans(bool mirrored) {
-  CellPlans plans{};
-  for (std::size_t c = 0; c < plans.size(); ++c) {
-    const CellCase& cell = marching_cubes_table()[c];
-    plans[c].triangles = cell.count;
-    for (std::size_t t = 0; t < cell.count; ++t)
-      for (std::size_t n = 0; n < 3; ++n) {
-        const CellEdge& edge = cell_edges[cell.triangles[t][mirrored && n > 0 ? 3 - n : n]];
-        plans[c].corner[3 * t + n] = static_cast<std::uint16_t>(
-            place(edge.corner & 1, edge.corner >> 1 & 1, edge.corner >> 2, edge.axis));
-      }
-  }
-  return plans;
-}
-
-void write_triangles(const Block& block, const PointNumbers& numbers, const CellPlans& plans,
+void write_triangles(const SurfaceBlock& block, const PointNumbers& numbers, const CellPlans& plans,
                      std::vector<Triangle>& triangles) {
   const std::uint8_t* cell = block.cases;
   Triangle* out = triangles.data() + block.first_triangle;
   for (unsigned i = 0; i < leaf_dim; ++i)
     for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(active));
-      const std::uint32_t* const own = numbers.data() + place(i, bit >> 3, bit & 7);
+      const std::uint32_t* const own = numbers.data() + edge_place(i, bit >> 3, bit & 7);
       const CellPlan& plan = plans[*cell++];
       const std::uint16_t* corner = plan.corner.data();
       for (unsigned t = 0; t < plan.triangles; ++t, corner += 3)
@@ -257,21 +190,27 @@ void check_input(const GridInfo& info, double isovalue) {
                 " (made with --band), expected that one, not " + number_text(isovalue));
 }
 
-} // namespace
-
-double default_isovalue(const GridInfo& info) {
-  return info.level_set ? 0 : info.isovalue;
+/// Notes which blocks lie round each of those of some parts, and the other way round. Each pair is
+/// looked up once, from the block that comes first.
+void link_neighbours(const InsideField::Candidates& candidates,
+                     const std::vector<std::uint32_t>& numbers, std::vector<SurfaceBlock*>& blocks,
+                     std::size_t begin, std::size_t end) {
+  for (std::size_t n = begin; n < end; ++n)
+    for (std::size_t place = 14; place < 27; ++place) {
+      Int3 origin = blocks[n]->origin;
+      origin[0] += leaf_dim * (static_cast<int>(place / 9) - 1);
+      origin[1] += leaf_dim * (static_cast<int>(place / 3 % 3) - 1);
+      origin[2] += leaf_dim * (static_cast<int>(place % 3) - 1);
+      const std::uint32_t candidate = candidates.find(origin);
+      if (candidate == IndexMap::none || numbers[candidate] == SurfaceBlock::none)
+        continue;
+      blocks[n]->neighbours[place] = numbers[candidate];
+      blocks[numbers[candidate]]->neighbours[26 - place] = static_cast<std::uint32_t>(n);
+    }
 }
 
-Vec3 index_position(const EdgeCrossing& crossing) {
-  Vec3 p{static_cast<double>(crossing.corner[0]), static_cast<double>(crossing.corner[1]),
-         static_cast<double>(crossing.corner[2])};
-  p[crossing.axis] += crossing.fraction;
-  return p;
-}
-
-IsoSurface marching_cubes(const Context& context, const Grid& grid,
-                          std::optional<double> wanted_isovalue) {
+IsoSurface make_surface(const Context& context, const Grid& grid,
+                        std::optional<double> wanted_isovalue, bool with_mesh) {
   const double isovalue = wanted_isovalue.value_or(default_isovalue(grid.info()));
   check_input(grid.info(), isovalue);
   const InsideField field(context, grid, isovalue);
@@ -280,29 +219,39 @@ IsoSurface marching_cubes(const Context& context, const Grid& grid,
 
   const InsideField::Candidates candidates = field.candidates(context);
   const std::size_t count = candidates.blocks.size();
-  require_memory(context, static_cast<double>(count) * (sizeof(Block) + leaf_voxels / 8.0),
+  require_memory(context, static_cast<double>(count) * (sizeof(SurfaceBlock) + leaf_voxels / 8.0),
                  "the crossed blocks");
   constexpr std::size_t at_once = 64;
-  std::vector<Blocks> parts((count + at_once - 1) / at_once);
-  std::vector<const Block*> crossed(count); // or nullptr: no crossed cell there
+  const auto lattice = std::make_shared<SurfaceBlocks>();
+  std::vector<SurfaceBlocks::Part>& parts = lattice->parts;
+  parts.resize((count + at_once - 1) / at_once);
+  std::vector<std::uint32_t> numbers(count, SurfaceBlock::none); // none: no crossed cell there
   parallel_blocks(quiet, count, at_once, [&](std::size_t begin, std::size_t end) {
-    Blocks& part = parts[begin / at_once];
+    SurfaceBlocks::Part& part = parts[begin / at_once];
     part.blocks.reserve(end - begin);
     for (std::size_t n = begin; n < end; ++n) {
       const std::size_t before = part.blocks.size();
       examine_block(field, candidates.blocks[n], part);
       if (part.blocks.size() > before)
-        crossed[n] = &part.blocks.back();
+        numbers[n] = 0;
     }
   });
 
   IsoSurface surface;
   surface.transform = grid.info().transform;
   surface.leaves = field.leaves();
+  std::uint32_t next = 0;
+  for (std::uint32_t& number : numbers)
+    if (number != SurfaceBlock::none)
+      number = next++;
+  std::vector<SurfaceBlock*> blocks;
+  blocks.reserve(next);
   std::uint64_t points = 0, triangles = 0;
-  for (Blocks& part : parts) {
+  for (SurfaceBlocks::Part& part : parts) {
     const std::uint8_t* cases = part.cases.data();
-    for (Block& block : part.blocks) {
+    part.first = static_cast<std::uint32_t>(blocks.size());
+    for (std::size_t n = 0; n < part.blocks.size(); ++n) {
+      SurfaceBlock& block = part.blocks[n];
       block.first_point = static_cast<std::uint32_t>(points);
       block.first_triangle = static_cast<std::uint32_t>(triangles);
       block.cases = cases;
@@ -310,35 +259,67 @@ IsoSurface marching_cubes(const Context& context, const Grid& grid,
       points += block.points;
       triangles += block.triangles;
       surface.active_cells += block.cells;
-      surface.leaves_visited += field.is_leaf(block.contents[0]) ? 1 : 0;
+      surface.leaves_visited += field.is_leaf(part.contents[n][0]) ? 1 : 0;
+      blocks.push_back(&block);
       if (points >= UINT32_MAX || triangles >= UINT32_MAX)
         throw Error("the surface has more than 2^32 - 2 points or triangles, expected fewer");
     }
-    surface.blocks += part.blocks.size();
   }
+  surface.blocks = blocks.size();
+  lattice->blocks.assign(blocks.begin(), blocks.end());
+  lattice->points = points;
+  lattice->triangles = triangles;
 
   require_memory(context,
-                 static_cast<double>(points) * (sizeof(Vec3) + sizeof(EdgeCrossing)) +
-                     static_cast<double>(triangles) * sizeof(Triangle),
+                 static_cast<double>(points) *
+                         (sizeof(double) + sizeof(BlockEdge) + (with_mesh ? sizeof(Vec3) : 0)) +
+                     static_cast<double>(with_mesh ? triangles : 0) * sizeof(Triangle),
                  "the mesh of the isosurface");
-  resize_all(quiet, resizing(surface.mesh.points, points), resizing(surface.crossings, points),
-             resizing(surface.mesh.triangles, triangles));
+  if (with_mesh)
+    resize_all(quiet, resizing(surface.mesh.points, points), resizing(lattice->fractions, points),
+               resizing(lattice->edges, points), resizing(surface.mesh.triangles, triangles));
+  else
+    resize_all(quiet, resizing(lattice->fractions, points), resizing(lattice->edges, points));
   const CellPlans plans = make_plans(surface.transform.determinant() < 0);
-  parallel_blocks(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    const auto numbers = std::make_unique_for_overwrite<PointNumbers>();
-    for (std::size_t n = begin; n < end; ++n)
-      for (const Block& block : parts[n].blocks) {
-        std::array<const Block*, 8> near{};
-        for (unsigned octant = 1; octant < 7; ++octant) {
-          const std::uint32_t number = candidates.find(shifted(block.origin, octant, leaf_dim));
-          near[octant] = number == IndexMap::none ? nullptr : crossed[number];
-        }
-        write_points(octants_of(field, block.contents), block, isovalue, surface, *numbers);
-        note_far_points(near, *numbers);
-        write_triangles(block, *numbers, plans, surface.mesh.triangles);
+  parallel_blocks(context, parts.size(), 1, [&](std::size_t n, std::size_t) {
+    const SurfaceBlocks::Part& part = parts[n];
+    const auto point_numbers = std::make_unique_for_overwrite<PointNumbers>();
+    Vec3* const mesh_points = surface.mesh.points.data();
+    link_neighbours(candidates, numbers, blocks, part.first, part.first + part.blocks.size());
+    for (std::size_t b = 0; b < part.blocks.size(); ++b) {
+      const SurfaceBlock& block = part.blocks[b];
+      const Octants octants = octants_of(field, part.contents[b]);
+      if (!with_mesh) {
+        write_points<false>(octants, block, isovalue, surface.transform, *lattice, mesh_points,
+                            *point_numbers);
+        continue;
       }
+      write_points<true>(octants, block, isovalue, surface.transform, *lattice, mesh_points,
+                         *point_numbers);
+      for_far_edges(*lattice, block,
+                    [&](const SurfaceBlock& far, std::uint32_t, unsigned w, unsigned bit,
+                        unsigned place) { (*point_numbers)[place] = far.point(w, bit); });
+      write_triangles(block, *point_numbers, plans, surface.mesh.triangles);
+    }
   });
+  surface.lattice = lattice;
   return surface;
+}
+
+} // namespace
+
+double default_isovalue(const GridInfo& info) {
+  return info.level_set ? 0 : info.isovalue;
+}
+
+IsoSurface marching_cubes(const Context& context, const Grid& grid,
+                          std::optional<double> isovalue) {
+  return make_surface(context, grid, isovalue, true);
+}
+
+IsoSurface marching_cubes_to_snap(const Context& context, const Grid& grid,
+                                  std::optional<double> isovalue) {
+  return make_surface(context, grid, isovalue, false);
 }
 
 } // namespace gewebe

@@ -6,6 +6,7 @@
 #include "volume/grid.h"
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -21,17 +22,22 @@ struct EdgeCrossing {
 /// The place of a crossing in index space.
 Vec3 index_position(const EdgeCrossing& crossing);
 
-/// The mesh, and for each of its points the lattice edge that it lies on.
+struct SurfaceBlocks;
+
+/// The mesh, and where the surface crosses the lattice.
 struct IsoSurface {
   TriangleMesh mesh;
-  std::vector<EdgeCrossing> crossings; ///< one per point
   GridTransform transform;
-  std::uint64_t leaves = 0; ///< of the grid
+  std::shared_ptr<const SurfaceBlocks> lattice; ///< what `snap` works on, whatever became of `mesh`
+  std::uint64_t leaves = 0;                     ///< of the grid
   std::uint64_t leaves_visited =
       0;                    ///< of these, with a crossed cell among the cells of their voxels
   std::uint64_t blocks = 0; ///< blocks of 8³ cells with a crossed cell, in leaves or between tiles
   std::uint64_t active_cells = 0; ///< cells that the surface crosses
 };
+
+/// The lattice edges that the points of the mesh lie on, one per point in their order.
+std::vector<EdgeCrossing> edge_crossings(const IsoSurface& surface);
 
 /// The isovalue that `grid` asks for: info().isovalue, 0 for a level set.
 double default_isovalue(const GridInfo& info);
@@ -58,5 +64,9 @@ double default_isovalue(const GridInfo& info);
 /// do
 IsoSurface marching_cubes(const Context& context, const Grid& grid,
                           std::optional<double> isovalue = {});
+
+/// The same surface for `snap` alone: its mesh, which `snap` doesn't need, is left empty.
+IsoSurface marching_cubes_to_snap(const Context& context, const Grid& grid,
+                                  std::optional<double> isovalue = {});
 
 } // namespace gewebe

@@ -1,272 +1,168 @@
 #include "surface/snap_collapse_internal.h"
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
+#include "surface/snap_patch_internal.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
-#include <memory>
 #include <numeric>
 #include <span>
-#include <utility>
 
 // Based on: Dey, Edelsbrunner, Guha and Nekhayev, Topology Preserving Edge Contraction, 1999.
 
 namespace gewebe {
 namespace {
 
-constexpr std::uint32_t none = SnapMerges::none;
+constexpr std::size_t blocks_at_once = 64;
 
-/// Faces of each slot's point, ascending.
-struct Stars {
-  std::vector<std::uint32_t> first;
-  std::unique_ptr<std::uint32_t[]> faces;
-  std::span<const std::uint32_t> operator[](std::size_t slot) const {
-    return {faces.get() + first[slot], faces.get() + first[slot + 1]};
-  }
+/// A cluster by its corner.
+struct Cluster {
+  std::uint32_t block = 0, first_member = 0;
+  Int3 corner{}; // relative to the block
 };
-
-Stars make_stars(const Context& context, const std::vector<Triangle>& triangles,
-                 const SnapClusters& clusters) {
-  const std::size_t slots = clusters.members.size();
-  // Each range of faces counts on its own, so that faces stay in order.
-  const auto ranges = static_cast<std::size_t>(std::clamp(thread_count(context), 1, 16));
-  const std::size_t grain = triangles.size() / ranges + 1;
-  std::vector<std::vector<std::uint16_t>> counts(ranges);
-  // Which corners are in a cluster can't be predicted, so they are picked without a branch.
-  const auto for_slots = [&](std::size_t begin, std::size_t end, auto&& visit) {
-    constexpr std::size_t at_once = 2048;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> picked(3 * at_once + 1);
-    for (; begin < end; begin += at_once) {
-      std::size_t count = 0;
-      for (std::size_t f = begin; f < std::min(end, begin + at_once); ++f)
-        for (const std::uint32_t p : triangles[f]) {
-          picked[count] = {p, static_cast<std::uint32_t>(f)};
-          count += clusters.flags[p] / clustered % 2;
-        }
-      for (std::size_t n = 0; n < count; ++n)
-        visit(clusters.slot[picked[n].first], picked[n].second);
-    }
-  };
-  parallel_blocks(context, triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint16_t>& own = counts[begin / grain];
-    own.resize(slots);
-    for_slots(begin, end, [&](std::uint32_t slot, std::uint32_t) { ++own[slot]; });
-  });
-  Stars stars;
-  stars.first.resize(slots + 1);
-  std::uint64_t total = 0;
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    stars.first[slot] = static_cast<std::uint32_t>(total);
-    std::uint16_t before = 0;
-    for (std::vector<std::uint16_t>& own : counts)
-      if (!own.empty())
-        before = static_cast<std::uint16_t>(before + std::exchange(own[slot], before));
-    total += before;
-  }
-  if (total > UINT32_MAX)
-    throw Error("the surface has too many points to snap at once, expected a smaller epsilon");
-  stars.first[slots] = static_cast<std::uint32_t>(total);
-  stars.faces = std::make_unique_for_overwrite<std::uint32_t[]>(total);
-  parallel_blocks(context, triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint16_t>& own = counts[begin / grain];
-    for_slots(begin, end, [&](std::uint32_t slot, std::uint32_t f) {
-      stars.faces[stars.first[slot] + own[slot]++] = f;
-    });
-  });
-  return stars;
-}
 
 /// What all clusters share.
 struct Scene {
-  const std::vector<Triangle>& triangles;
-  const SnapClusters& clusters;
-  Stars stars;
-  std::vector<std::uint8_t> done; // of each cluster: it went without order
+  SnapLattice& lattice;
+  SnapOptions::Place place;
   SnapMerges& merges;
+  IndexMap in_order; // absolute corners of clusters that are taken in order
 };
 
-void drop_face(SnapMerges& merges, std::uint32_t f) {
-  std::atomic_ref(merges.dropped[f / SnapMerges::faces_at_once])
-      .fetch_add(1, std::memory_order_relaxed);
+void mark(std::uint64_t& word, unsigned bit) {
+  std::atomic_ref(word).fetch_or(std::uint64_t{1} << bit, std::memory_order_relaxed);
 }
 
-/// Clusters of two or three points, nearly all that there are, with few comparisons.
-class SmallCollapse {
+void drop_faces(SnapMerges& merges, std::uint32_t block, unsigned count) {
+  std::atomic_ref(merges.dropped[block]).fetch_add(count, std::memory_order_relaxed);
+}
+
+/// A point of a cluster.
+struct Member {
+  std::uint32_t point = 0;
+  LatticeEdge edge; // relative to the cluster's block
+  LatticeSpot at;   // of its start
+  bool is_fin = false;
+};
+
+/// The same as index_position, where it can be inlined.
+inline Vec3 position_of(const SnapLattice& lattice, const Int3& origin, const Member& member) {
+  const double along = lattice.fraction(member.point);
+  const auto part = [&](unsigned axis) {
+    return static_cast<double>(origin[axis] + member.edge.start[axis]) +
+           (member.edge.axis == axis ? along : 0);
+  };
+  return {part(0), part(1), part(2)};
+}
+
+/// Notes that all but the first of some members were merged into it; they are summed in the order
+/// of their points.
+void store_group(const Scene& scene, std::size_t n, const Int3& corner, std::span<Member> group,
+                 std::vector<SnapMerges::Place>& places) {
+  std::sort(group.begin() + 1, group.end(),
+            [](const Member& a, const Member& b) { return a.point < b.point; });
+  const SnapLattice& lattice = scene.lattice;
+  const Int3& origin = lattice.block(n).origin;
+  const Vec3 own = position_of(lattice, origin, group[0]);
+  bool only_fins = true;
+  Vec3 sum;
+  double weights = 0;
+  for (const Member& member : group) {
+    only_fins = only_fins && member.is_fin;
+    const double along = lattice.fraction(member.point),
+                 weight = 1 - 1.5 * std::min(along, 1 - along);
+    sum += (position_of(lattice, origin, member) - own) * weight;
+    weights += weight;
+    SnapBlock& block = scene.lattice.snaps(member.at.block);
+    const std::size_t w = member.at.word(member.edge.axis);
+    if (&member == &group[0]) {
+      mark(block.looked_at[w], member.at.bit);
+    } else {
+      mark(block.merged[w], member.at.bit);
+      scene.merges.target[member.point] = group[0].point;
+    }
+  }
+  Vec3 position = own + sum / weights;
+  if (scene.place == SnapOptions::Place::corner && !only_fins)
+    position = {static_cast<double>(origin[0] + corner[0]),
+                static_cast<double>(origin[1] + corner[1]),
+                static_cast<double>(origin[2] + corner[2])};
+  places.push_back({group[0].point, position});
+}
+
+/// The clusters of a block that bits can tell of.
+class BitCollapse {
 public:
-  static constexpr std::size_t most_members = 3;
-  /// Takes cluster n, if the conditions of merge_snap_clusters can be told to hold; else it changes
-  /// nothing and answers false.
-  bool take(Scene& scene, std::uint32_t n);
+  explicit BitCollapse(const Scene& scene) : scene_(scene), patches_(scene.lattice) {}
+  void enter(std::size_t n, unsigned slices) {
+    block_ = n;
+    patches_.enter(n, slices);
+    dropped_ = {};
+  }
+  bool take(unsigned slice, unsigned bit, std::vector<SnapMerges::Place>& places);
+  void leave() {
+    for (unsigned back = 0; back < 8; ++back)
+      if (dropped_[back] != 0)
+        drop_faces(scene_.merges,
+                   scene_.lattice.spot(block_, shifted({0, 0, 0}, back, -leaf_dim)).block,
+                   dropped_[back]);
+  }
 
 private:
-  /// Neighbours and their labels.
-  struct Ring {
-    static constexpr std::size_t most = 26;
-    std::array<std::uint32_t, most> points;
-    std::array<std::uint64_t, most> labels;
-    std::size_t count = 0;
-    bool has(std::uint32_t point) const {
-      bool found = false;
-      for (std::size_t n = 0; n < count; ++n)
-        found = found || points[n] == point;
-      return found;
-    }
-    void add(std::uint32_t point, std::uint64_t label) {
-      points[count] = point;
-      labels[count++] = label;
-    }
-  };
-  static constexpr int outside = -1;
-
-  /// Bit m: it is member m. Without a branch, since none could be predicted.
-  unsigned member_bit(std::uint32_t point) const {
-    return (point == points_[0] ? 1U : 0U) | (point == points_[1] ? 2U : 0U) |
-           (point == points_[2] ? 4U : 0U);
-  }
-  bool find_ring(const Scene& scene, std::uint32_t slot, std::size_t m);
-  static bool always_collapses(const Ring& p, const Ring& q);
-  void store(Scene& scene, std::uint32_t first_slot, std::size_t p, std::size_t s, int t) const;
-
-  std::span<const std::uint32_t> members_;
-  std::array<std::uint32_t, most_members> points_{}; // the same, then none
-  std::array<Ring, most_members> rings_;
+  const Scene& scene_;
+  SnapPatches patches_;
+  PatchMerges found_;
+  std::size_t block_ = 0;
+  std::array<std::uint32_t, 8> dropped_{}; // faces of the block and of those before it
 };
 
-bool SmallCollapse::find_ring(const Scene& scene, std::uint32_t slot, std::size_t m) {
-  Ring& ring = rings_.at(m);
-  ring.count = 0;
-  const std::span<const std::uint32_t> star = scene.stars[slot];
-  if (star.size() > Ring::most / 2)
+bool BitCollapse::take(unsigned slice, unsigned bit, std::vector<SnapMerges::Place>& places) {
+  if (!patches_.take(slice, bit, found_))
     return false;
-  for (const std::uint32_t f : star) {
-    const Triangle& t = scene.triangles[f];
-    const std::uint32_t point = t[0] == members_[m] ? t[1] : t[1] == members_[m] ? t[2] : t[0];
-    std::uint64_t label = point;
-    if ((scene.clusters.flags[point] & clustered) != 0 && member_bit(point) == 0)
-      label = std::uint64_t{1} << 32 | scene.clusters.cluster[scene.clusters.slot[point]];
-    ring.add(point, label);
-  }
-  return true;
-}
-
-/// Do (1) to (3) hold for an edge between points with these neighbours?
-bool SmallCollapse::always_collapses(const Ring& p, const Ring& q) {
-  std::array<std::uint64_t, Ring::most> others; // labels of p's own neighbours
-  std::size_t count = 0, common = 0, single = 0;
-  for (std::size_t n = 0; n < p.count; ++n) {
-    single += p.labels[n] <= UINT32_MAX ? 1 : 0;
-    const bool both = q.has(p.points[n]);
-    others[count] = p.labels[n];
-    common += both ? 1 : 0;
-    count += both ? 0 : 1;
-  }
-  // Points that are no cluster's have a label each.
-  if (common != 2 || single + (single < p.count ? 1 : 0) < 4)
-    return false;
-  bool met = false;
-  for (std::size_t n = 0; n < q.count; ++n) {
-    bool here = false;
-    for (std::size_t m = 0; m < count; ++m)
-      here = here || others[m] == q.labels[n];
-    met = met || (here && !p.has(q.points[n]));
-  }
-  return !met;
-}
-
-bool SmallCollapse::take(Scene& scene, std::uint32_t n) {
-  members_ = scene.clusters.members_of(n);
-  const std::uint32_t first_slot = scene.clusters.begin[n];
-  points_ = {members_[0], members_[1], members_.size() > 2 ? members_[2] : none};
-  for (std::size_t m = 0; m < members_.size(); ++m)
-    if (!find_ring(scene, first_slot + static_cast<std::uint32_t>(m), m))
-      return false;
-  // The first member with a neighbour in the cluster, and the first such neighbour.
-  std::size_t p = 0;
-  int found = outside;
-  for (; p + 1 < members_.size(); ++p) {
-    const Ring& ring = rings_.at(p);
-    for (std::size_t at = 0; at < ring.count && found == outside; ++at)
-      if (const unsigned bit = member_bit(ring.points[at]); bit != 0)
-        found = std::countr_zero(bit);
-    if (found != outside)
-      break;
-  }
-  if (found == outside)
-    return true;
-  const auto s = static_cast<std::size_t>(found);
-  if (!always_collapses(rings_.at(p), rings_.at(s)))
-    return false;
-  int third = outside;
-  if (members_.size() == 3 && p == 0) {
-    const std::size_t t = 3 - s;
-    Ring merged;
-    for (const std::size_t m : {p, s})
-      for (std::size_t at = 0; at < rings_.at(m).count; ++at) {
-        const std::uint32_t point = rings_.at(m).points[at];
-        if (point != members_[p] && point != members_[s] && !merged.has(point))
-          merged.add(point, rings_.at(m).labels[at]);
-      }
-    if (merged.has(members_[t])) {
-      Ring last;
-      const Ring& ring = rings_.at(t);
-      for (std::size_t at = 0; at < ring.count; ++at)
-        if (ring.points[at] != members_[s] && ring.points[at] != members_[p])
-          last.add(ring.points[at], ring.labels[at]);
-      last.add(members_[p], members_[p]);
-      if (!always_collapses(merged, last))
-        return false;
-      third = static_cast<int>(t);
+  const Int3 corner{static_cast<int>(slice), static_cast<int>(bit >> 3), static_cast<int>(bit & 7)};
+  std::array<Member, 6> group;
+  for (std::size_t g = 0; g < found_.count; ++g) {
+    for (std::size_t m = 0; m < found_.groups[g].count; ++m) {
+      const unsigned direction = found_.groups[g].members[m];
+      Member& member = group[m];
+      member.edge = {corner, direction / 2};
+      member.edge.start[direction / 2] -= static_cast<int>(direction & 1);
+      member.at = scene_.lattice.spot(block_, member.edge.start);
+      member.point = scene_.lattice.point_on(member.at, direction / 2);
     }
+    store_group(scene_, block_, corner, {group.data(), found_.groups[g].count}, places);
   }
-  store(scene, first_slot, p, s, third);
+  const unsigned begins =
+      (slice == 0 ? 1U : 0U) | (bit >> 3 == 0 ? 2U : 0U) | ((bit & 7) == 0 ? 4U : 0U);
+  for (unsigned side = 0; side < 8; ++side)
+    dropped_[~side & begins] += found_.vanished[side];
   return true;
-}
-
-/// Merges s, and t where there is one, into p.
-void SmallCollapse::store(Scene& scene, std::uint32_t first_slot, std::size_t p, std::size_t s,
-                          int t) const {
-  SnapMerges& merges = scene.merges;
-  const auto slot = [&](std::size_t m) { return first_slot + static_cast<std::uint32_t>(m); };
-  merges.target[slot(s)] = members_[p];
-  merges.next[slot(p)] = slot(s);
-  if (t != outside) {
-    const auto third = static_cast<std::size_t>(t);
-    merges.target[slot(third)] = members_[p];
-    merges.next[slot(p)] = slot(std::min(s, third));
-    merges.next[slot(std::min(s, third))] = slot(std::max(s, third));
-  }
-  // Faces with two of them vanish; each is counted at its first one.
-  const unsigned all = 1U << p | 1U << s | (t != outside ? 1U << t : 0U);
-  for (std::size_t m = 0; m < members_.size(); ++m) {
-    if ((all >> m & 1) == 0)
-      continue;
-    for (const std::uint32_t f : scene.stars[slot(m)]) {
-      const Triangle& corners = scene.triangles[f];
-      const unsigned here =
-          all & (member_bit(corners[0]) | member_bit(corners[1]) | member_bit(corners[2]));
-      if ((here & (here - 1)) != 0 && (here & (0 - here)) == 1U << m)
-        drop_face(merges, f);
-    }
-  }
 }
 
 /// One cluster and the faces around it. Its members are numbered from 0 on.
 class Collapse {
 public:
-  /// Takes cluster n. Where it `needs_no_order`, another cluster may be taken at the same time;
-  /// answers whether it was so, else nothing has changed.
-  bool in_parallel(Scene& scene, std::uint32_t n) { return take(scene, n, false); }
-  /// \pre the clusters before it that aren't done have been taken, none after it
-  void in_order(Scene& scene, std::uint32_t n) { (void)take(scene, n, true); }
+  /// Takes a cluster. Where it needs no order, another one may be taken at the same time; answers
+  /// whether it was so, else nothing has changed.
+  bool in_parallel(const Scene& scene, const Cluster& cluster,
+                   std::vector<SnapMerges::Place>& places) {
+    return take(scene, cluster, false, places);
+  }
+  /// \pre of the clusters that are taken in order, those before it have been, none after it
+  void in_order(const Scene& scene, const Cluster& cluster,
+                std::vector<SnapMerges::Place>& places) {
+    (void)take(scene, cluster, true, places);
+  }
   std::uint64_t refused() const { return refused_; }
 
 private:
   static constexpr int outside = -1;
   struct Face { // of a member: the corners that follow it
-    std::uint32_t number, a, b;
+    std::uint32_t block, a, b;
     int member_a, member_b; // or outside
     std::uint64_t label_a;
   };
@@ -276,13 +172,14 @@ private:
   };
   enum class Answer { yes, no, depends };
 
-  bool take(Scene& scene, std::uint32_t n, bool careful);
-  void gather(const Scene& scene, std::uint32_t n, bool careful);
+  bool take(const Scene& scene, const Cluster& cluster, bool careful,
+            std::vector<SnapMerges::Place>& places);
+  void gather(const Scene& scene, const Cluster& cluster, bool careful);
   bool collapse_all(bool careful);
   void find_neighbours(int p, std::vector<Neighbour>& neighbours) const;
   Answer can_collapse(int p, int q, bool careful);
   void collapse(int p, int q);
-  void store(Scene& scene, std::uint32_t n);
+  void store(const Scene& scene, const Cluster& cluster, std::vector<SnapMerges::Place>& places);
 
   int target(int member) const {
     return member == outside ? outside : target_[static_cast<std::size_t>(member)];
@@ -304,7 +201,8 @@ private:
           return;
   }
 
-  std::span<const std::uint32_t> members_;
+  std::vector<Member> members_, group_;
+  std::vector<StarFace> star_;
   std::vector<Face> faces_;
   std::vector<std::size_t> begin_; // of each member's faces
   std::vector<int> target_, next_, last_;
@@ -313,47 +211,73 @@ private:
   std::uint64_t refused_ = 0;
 };
 
-bool Collapse::take(Scene& scene, std::uint32_t n, bool careful) {
-  members_ = scene.clusters.members_of(n);
-  gather(scene, n, careful);
+bool Collapse::take(const Scene& scene, const Cluster& cluster, bool careful,
+                    std::vector<SnapMerges::Place>& places) {
+  gather(scene, cluster, careful);
   refused_ = 0;
   if (!collapse_all(careful))
     return false;
-  store(scene, n);
+  store(scene, cluster, places);
   return true;
 }
 
-void Collapse::gather(const Scene& scene, std::uint32_t n, bool careful) {
-  const SnapClusters& clusters = scene.clusters;
-  const std::uint32_t first_slot = clusters.begin[n];
+/// What stands for a corner near block n; no number of a point does.
+std::uint64_t label_of(const Int3& corner) {
+  std::uint64_t label = 1;
+  for (const std::int32_t c : corner)
+    label = label << 8 | static_cast<std::uint8_t>(c);
+  return label << 32;
+}
+
+void Collapse::gather(const Scene& scene, const Cluster& cluster, bool careful) {
+  const SnapLattice& lattice = scene.lattice;
+  const std::size_t n = cluster.block;
+  members_.clear();
+  lattice.for_members(n, cluster.corner, [&](const LatticeEdge& edge) {
+    const LatticeSpot at = lattice.spot(n, edge.start);
+    members_.push_back({lattice.point_on(at, edge.axis), edge, at, false});
+  });
+  for (const SnapFin& f : lattice.fins_at(lattice.absolute(n, cluster.corner))) {
+    const LatticeEdge edge{lattice.from_origin(n, f.start), f.axis};
+    members_.push_back({f.point, edge, lattice.spot(n, edge.start), true});
+  }
+  std::ranges::sort(members_, {}, &Member::point);
   struct Corner {
     std::uint32_t point;
     int member;
     std::uint64_t label;
   };
-  const auto look_up = [&](std::uint32_t p) -> Corner {
-    if ((clusters.flags[p] & clustered) == 0)
+  const auto look_up = [&](const LatticeEdge& edge) -> Corner {
+    const LatticeSpot at = lattice.spot(n, edge.start);
+    const std::uint32_t p = lattice.point_on(at, edge.axis);
+    Int3 corner;
+    if (lattice.is_fin(n, edge))
+      corner = lattice.from_origin(n, lattice.fin_of(p).corner);
+    else if (!lattice.snap_corner(n, edge, corner))
       return {p, outside, p};
-    const std::uint32_t slot = clusters.slot[p], cluster = clusters.cluster[slot];
-    if (cluster == n)
-      return {p, static_cast<int>(slot - first_slot), p};
-    const std::uint64_t label = std::uint64_t{1} << 32 | cluster;
-    if (!careful || // a later cluster may be done already
-        (scene.done[cluster] != 0 && clusters.first_member[cluster] > clusters.first_member[n]))
+    if (corner == cluster.corner)
+      return {p,
+              static_cast<int>(std::ranges::lower_bound(members_, p, {}, &Member::point) -
+                               members_.begin()),
+              p};
+    const std::uint64_t label = label_of(corner);
+    if (!careful || (lattice.snaps(at.block).merged.at(at.word(edge.axis)) >> at.bit & 1) == 0 ||
+        // A later cluster may be done already.
+        (scene.in_order.find(lattice.absolute(n, corner)) == IndexMap::none &&
+         lattice.first_member(n, corner) > cluster.first_member))
       return {p, outside, label};
-    return {scene.merges.target[slot], outside, label};
+    return {scene.merges.target[p], outside, label};
   };
   faces_.clear();
   begin_.clear();
-  for (std::size_t m = 0; m < members_.size(); ++m) {
+  for (const Member& member : members_) {
     begin_.push_back(faces_.size());
-    for (const std::uint32_t f : scene.stars[first_slot + m]) {
-      const Triangle& t = scene.triangles[f];
-      const std::uint32_t p = members_[m];
-      const std::size_t at = t[0] == p ? 0 : t[1] == p ? 1 : 2;
-      const Corner a = look_up(t.at((at + 1) % 3)), b = look_up(t.at((at + 2) % 3));
+    star_.clear();
+    lattice.append_star(n, member.edge, star_);
+    for (const StarFace& face : star_) {
+      const Corner a = look_up(face.a), b = look_up(face.b);
       if (a.member != outside || b.member != outside || a.point != b.point)
-        faces_.push_back({f, a.point, b.point, a.member, b.member, a.label});
+        faces_.push_back({face.block, a.point, b.point, a.member, b.member, a.label});
     }
   }
   begin_.push_back(faces_.size());
@@ -413,7 +337,7 @@ void Collapse::find_neighbours(int p, std::vector<Neighbour>& neighbours) const 
     if (member == outside) {
       neighbours.push_back({face.a, face.label_a});
     } else {
-      const std::uint32_t point = members_[static_cast<std::size_t>(member)];
+      const std::uint32_t point = members_[static_cast<std::size_t>(member)].point;
       neighbours.push_back({point, point});
     }
     return true;
@@ -455,62 +379,94 @@ void Collapse::collapse(int p, int q) {
   last_[static_cast<std::size_t>(p)] = last_[static_cast<std::size_t>(q)];
 }
 
-void Collapse::store(Scene& scene, std::uint32_t n) {
-  const std::uint32_t first_slot = scene.clusters.begin[n];
-  SnapMerges& merges = scene.merges;
-  std::iota(last_.begin(), last_.end(), 0); // what was merged where is linked by its number
+void Collapse::store(const Scene& scene, const Cluster& cluster,
+                     std::vector<SnapMerges::Place>& places) {
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const auto member = static_cast<int>(m);
-    const auto target = static_cast<std::size_t>(target_[m]);
-    merges.target[first_slot + m] = members_[target];
-    if (target_[m] != member) {
-      merges.next[first_slot + static_cast<std::uint32_t>(last_[target])] =
-          first_slot + static_cast<std::uint32_t>(m);
-      last_[target] = member;
-    }
     for (const Face& face : star(member)) {
       const bool is_first = (face.member_a == outside || face.member_a > member) &&
                             (face.member_b == outside || face.member_b > member);
       if (is_first && is_gone(face, target_[m]))
-        drop_face(merges, face.number);
+        drop_faces(scene.merges, face.block, 1);
     }
+    if (target_[m] != member || next_[m] == outside)
+      continue;
+    group_.clear();
+    for (int at = member; at != outside; at = next_[static_cast<std::size_t>(at)])
+      group_.push_back(members_[static_cast<std::size_t>(at)]);
+    store_group(scene, cluster.block, cluster.corner, group_, places);
   }
 }
 
 } // namespace
 
-SnapMerges merge_snap_clusters(const Context& context, const std::vector<Triangle>& triangles,
-                               const SnapClusters& clusters, bool always_careful) {
+SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
+                               SnapOptions::Place place, bool always_careful) {
+  struct Part {
+    std::vector<Cluster> rest;
+    std::uint64_t clusters = 0, corners = 0;
+  };
   SnapMerges merges;
-  merges.target = clusters.members;
-  merges.next.assign(clusters.members.size(), none);
-  merges.dropped.resize(triangles.size() / SnapMerges::faces_at_once + 1);
-  Context quiet = context;
-  quiet.progress = nullptr;
-  Scene scene{triangles, clusters, make_stars(quiet, triangles, clusters),
-              std::vector<std::uint8_t>(clusters.count()), merges};
-  if (!always_careful)
-    parallel_blocks(context, clusters.count(), 1024, [&](std::size_t begin, std::size_t end) {
-      SmallCollapse small;
-      Collapse collapse;
-      for (auto n = static_cast<std::uint32_t>(begin); n < end; ++n)
-        scene.done[n] = (clusters.members_of(n).size() <= SmallCollapse::most_members &&
-                         small.take(scene, n)) ||
-                                collapse.in_parallel(scene, n)
-                            ? 1
-                            : 0;
-    });
-  std::vector<std::uint32_t> rest;
-  for (std::size_t n = 0; n < clusters.count(); ++n)
-    if (scene.done[n] == 0)
-      rest.push_back(static_cast<std::uint32_t>(n));
-  std::ranges::sort(rest, {}, [&](std::uint32_t n) { return clusters.first_member[n]; });
+  merges.target = std::make_unique_for_overwrite<std::uint32_t[]>(lattice.surface().points);
+  prefer_huge_pages(merges.target.get(), lattice.surface().points * sizeof(std::uint32_t));
+  merges.dropped.resize(lattice.surface().blocks.size());
+  std::vector<Part> parts((lattice.count() + blocks_at_once - 1) / blocks_at_once);
+  merges.places.resize(parts.size() + 1);
+  Scene scene{lattice, place, merges, IndexMap()};
+  parallel_blocks(
+      context, lattice.count(), blocks_at_once, [&](std::size_t begin, std::size_t end) {
+        BitCollapse bits(scene);
+        Collapse collapse;
+        Part& part = parts[begin / blocks_at_once];
+        std::vector<SnapMerges::Place>& places = merges.places[begin / blocks_at_once];
+        for (std::size_t n = begin; n < end; ++n) {
+          SnapLattice::Corners corners = lattice.corners(n);
+          CornerWords& several = corners.several;
+          unsigned slices = 0;
+          for (unsigned i = 0; i < leaf_dim; ++i) {
+            part.corners += count_bits(corners.some[i]);
+            part.clusters += count_bits(several[i]);
+            slices |= several[i] != 0 ? 1U << i : 0U;
+          }
+          if (slices == 0)
+            continue;
+          if (!always_careful)
+            bits.enter(n, slices);
+          for (unsigned i = 0; i < leaf_dim; ++i)
+            for (; several[i] != 0; several[i] &= several[i] - 1) {
+              const auto bit = static_cast<unsigned>(std::countr_zero(several[i]));
+              const LatticeSpot at{static_cast<std::uint32_t>(n), i, bit};
+              if (!always_careful && !lattice.draws_fin(n, at) && bits.take(i, bit, places))
+                continue;
+              Cluster cluster{
+                  at.block,
+                  0,
+                  {static_cast<int>(i), static_cast<int>(bit >> 3), static_cast<int>(bit & 7)}};
+              if (!always_careful && collapse.in_parallel(scene, cluster, places))
+                continue;
+              cluster.first_member = lattice.first_member(n, cluster.corner);
+              part.rest.push_back(cluster);
+            }
+          if (!always_careful)
+            bits.leave();
+        }
+      });
+  std::vector<Cluster> rest;
+  for (const Part& part : parts) {
+    merges.corners += part.corners;
+    merges.clusters += part.clusters;
+    rest.insert(rest.end(), part.rest.begin(), part.rest.end());
+  }
+  std::ranges::sort(rest, {}, &Cluster::first_member);
   merges.careful = rest.size();
+  scene.in_order = IndexMap(rest.size());
+  for (const Cluster& cluster : rest)
+    scene.in_order.insert(lattice.absolute(cluster.block, cluster.corner), 0);
   Collapse collapse;
   for (std::size_t n = 0; n < rest.size(); ++n) {
     if (n % 65536 == 0 && context.cancelled && context.cancelled())
       throw Cancelled();
-    collapse.in_order(scene, rest[n]);
+    collapse.in_order(scene, rest[n], merges.places.back());
     merges.refused += collapse.refused();
   }
   return merges;

@@ -1,20 +1,28 @@
 #pragma once
 // Merges the points of each cluster as far as the mesh stays a mesh; for surface/snapping.cpp.
 
-#include "surface/snap_clusters_internal.h"
+#include "surface/snap_lattice_internal.h"
+#include "surface/snapping.h"
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace gewebe {
 
+/// Steps of `snap` leave their marks in the lattice's SnapBlocks: `merged` where a point was merged
+/// into another, `looked_at` where it is what others were merged into.
 struct SnapMerges {
-  static constexpr std::uint32_t none = UINT32_MAX;
-  static constexpr std::size_t faces_at_once = 16384;
-
-  std::vector<std::uint32_t> target;  ///< of each slot: the point that its point was merged into
-  std::vector<std::uint32_t> next;    ///< of each slot: the next merged there, ascending, or none
-  std::vector<std::uint32_t> dropped; ///< of each faces_at_once faces: those that vanish
+  struct Place {
+    std::uint32_t point = 0;
+    Vec3 position; ///< in index space
+    bool operator==(const Place&) const = default;
+  };
+  std::unique_ptr<std::uint32_t[]> target; ///< of each point that was merged: into which
+  std::vector<std::vector<Place>> places;  ///< of points that others were merged into
+  std::vector<std::uint32_t> dropped;      ///< of each block: faces of its cells that vanish
+  std::uint64_t clusters = 0;              ///< of two points or more
+  std::uint64_t corners = 0;               ///< that drew a crossing
   std::uint64_t refused = 0;
   std::uint64_t careful = 0; ///< clusters that had to be taken in order
 };
@@ -41,8 +49,16 @@ struct SnapMerges {
 /// thus ends the same in any order, and such clusters are taken in parallel. The others follow one
 /// by one in their order, each in the mesh as the clusters before it leave it.
 ///
+/// Nearly all clusters have no fin, and none among their neighbours: these are told by bits (see
+/// snap_patch_internal.h). There the label of a point is the corner that it snaps to, or itself
+/// where it snaps nowhere or to the cluster's own corner. That says the same: two points snap to
+/// one corner if and only if they are in one cluster. (2) is asked of all corners at once; for (3)
+/// the neighbours that have themselves as label are counted, and the different corners of the
+/// others. The edges inside A are met in the order of faces, which a corner's place in its block
+/// decides.
+///
 /// \param always_careful takes all in order (for tests)
-SnapMerges merge_snap_clusters(const Context& context, const std::vector<Triangle>& triangles,
-                               const SnapClusters& clusters, bool always_careful = false);
+SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
+                               SnapOptions::Place place, bool always_careful = false);
 
 } // namespace gewebe

@@ -3,13 +3,15 @@
 #include "base/error.h"
 #include "base/huge_pages.h"
 #include "base/parallel.h"
-#include "surface/snap_clusters_internal.h"
 #include "surface/snap_collapse_internal.h"
+#include "surface/snap_lattice_internal.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 // Based on: report FZKA 7190, Forschungszentrum Karlsruhe, 2006, section 3.1.4.
@@ -25,8 +27,8 @@ bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 /// A quick test. \pre enough is the square of what the area may be at least, for sides of 1
 bool has_much_area(const Vec3& a, const Vec3& b, const Vec3& c, double enough) {
-  const Vec3 u = b - a, v = c - a, w = c - b, normal = cross(u, v);
-  const double longest = std::max({dot(u, u), dot(v, v), dot(w, w)});
+  const Vec3 u = b - a, v = c - a, normal = cross(u, v);
+  const double longest = 2 * (dot(u, u) + dot(v, v)); // of three squares: (v - u)² isn't more
   return dot(normal, normal) > enough * longest * longest;
 }
 
@@ -51,179 +53,276 @@ double enough_area(const GridTransform& transform) {
 /// The mesh that is left when points have been merged.
 class SnappedMesh {
 public:
-  SnappedMesh(const Context& context, const IsoSurface& surface, SnapClusters& clusters,
-              const SnapMerges& merges, SnapOptions::Place place)
-      : context_(context), surface_(surface), clusters_(clusters), merges_(merges), place_(place) {
+  SnappedMesh(const Context& context, const IsoSurface& surface, const SnapLattice& lattice,
+              SnapMerges& merges, SnapOptions::Place place)
+      : context_(context), surface_(lattice.surface()), transform_(surface.transform),
+        lattice_(lattice), merges_(merges), at_corners_(place == SnapOptions::Place::corner),
+        plans_(make_plans(lattice.mirrored())) {
     context_.progress = nullptr;
   }
 
   void make(SnapResult& result) {
-    place_clusters();
-    write_points(result.mesh.points, result.mesh.triangles);
+    count(result.mesh);
+    write_points(result.mesh.points);
     write_triangles(result.mesh.points, result.mesh.triangles);
-    for (const std::uint64_t count : zero_area_)
-      result.report.zero_area += count;
+    result.report.zero_area = count_without_area();
   }
 
 private:
-  static constexpr std::size_t points_at_once = 16384;
+  static constexpr std::size_t blocks_at_once = 64;
 
-  /// Index position of the points that were merged at p, whose slot this is.
-  Vec3 merged_position(std::uint32_t p, std::uint32_t slot) const;
-  Vec3 position(std::uint32_t p) const;
-  void place_clusters();
-  void write_points(std::vector<Vec3>& points, std::vector<Triangle>& triangles);
+  /// The point on an edge, by its block.
+  struct PointRef {
+    std::uint32_t block = 0;
+    std::uint8_t word = 0, bit = 0;
+  };
+  /// A face with hardly an area: the block of its cell, and which of its faces that was.
+  struct SmallFace {
+    std::uint32_t block = 0, face = 0;
+  };
+  /// Of the places of a block's edges: the point's new number, and bit 32 where a face of it may
+  /// have no area.
+  using PlaceNumbers = std::array<std::uint64_t, edge_places>;
+
+  void count(TriangleMesh& mesh);
+  void write_points(std::vector<Vec3>& points);
+  void note_points(std::size_t n, PlaceNumbers& numbers) const;
   void write_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles);
+  std::uint64_t count_without_area();
+  PointRef point_at(std::size_t n, unsigned place) const;
+  std::array<PointRef, 3> corners_of(const SmallFace& face) const;
+  Vec3 position(const PointRef& ref) const;
+
+  std::uint64_t is_doubtful(const SnapBlock& block, std::size_t w) const {
+    return block.merged[w] | block.looked_at[w] | (at_corners_ ? block.low[w] | block.high[w] : 0);
+  }
 
   Context context_;
-  const IsoSurface& surface_;
-  SnapClusters& clusters_;
-  const SnapMerges& merges_;
-  SnapOptions::Place place_;
-  std::vector<Vec3> of_slot_;            // index positions of points that are left
-  std::unique_ptr<std::uint32_t[]> new_; // number of each point, of what it was merged into
-  std::vector<std::uint64_t> zero_area_; // faces of each part
+  const SurfaceBlocks& surface_;
+  GridTransform transform_;
+  const SnapLattice& lattice_;
+  SnapMerges& merges_;
+  bool at_corners_;
+  CellPlans plans_;
+  std::vector<std::uint32_t> first_point_, first_triangle_; // of each block, after snapping
+  std::vector<std::vector<SmallFace>> small_;
 };
 
-Vec3 SnappedMesh::merged_position(std::uint32_t p, std::uint32_t slot) const {
-  const std::vector<EdgeCrossing>& crossings = surface_.crossings;
-  const Vec3 own = index_position(crossings[p]);
-  bool only_fins = true;
-  Vec3 sum;
-  double weights = 0;
-  for (std::uint32_t at = slot; at != SnapMerges::none; at = merges_.next[at]) {
-    const std::uint32_t member = clusters_.members[at];
-    only_fins = only_fins && (clusters_.flags[member] & fin) != 0;
-    const double fraction = crossings[member].fraction,
-                 weight = 1 - 1.5 * std::min(fraction, 1 - fraction);
-    sum += (index_position(crossings[member]) - own) * weight;
-    weights += weight;
-  }
-  if (place_ == SnapOptions::Place::mean || only_fins)
-    return own + sum / weights;
-  const std::uint32_t first = clusters_.first_member[clusters_.cluster[slot]];
-  const Int3 corner = snap_corner(crossings[first], clusters_.flags[first]);
-  return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),
-          static_cast<double>(corner[2])};
-}
-
-void SnappedMesh::place_clusters() {
-  const std::size_t slots = clusters_.members.size();
-  of_slot_.resize(slots);
-  parallel_blocks(context_, slots, 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t slot = begin; slot < end; ++slot) {
-      const std::uint32_t p = clusters_.members[slot];
-      std::uint8_t& flags = clusters_.flags[p];
-      if (merges_.target[slot] != p)
-        flags |= merged | looked_at;
-      else
-        of_slot_[slot] = merged_position(p, static_cast<std::uint32_t>(slot));
-      if (merges_.next[slot] != SnapMerges::none)
-        flags |= looked_at;
+void SnappedMesh::count(TriangleMesh& mesh) {
+  const std::size_t blocks = surface_.blocks.size();
+  first_point_.resize(blocks + 1);
+  first_triangle_.resize(blocks + 1);
+  parallel_blocks(context_, blocks, 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      std::uint32_t merged = 0;
+      for (const std::uint64_t word : lattice_.snaps(n).merged)
+        merged += word != 0 ? count_bits(word) : 0;
+      first_point_[n + 1] = surface_.blocks[n]->points - merged;
+      first_triangle_[n + 1] = surface_.blocks[n]->triangles - merges_.dropped[n];
     }
   });
-}
-
-/// Index position of a point of the surface after snapping.
-Vec3 SnappedMesh::position(std::uint32_t p) const {
-  const unsigned flags = clusters_.flags[p];
-  if ((flags & merged) != 0)
-    p = merges_.target[clusters_.slot[p]];
-  if ((flags & clustered) != 0)
-    return of_slot_[clusters_.slot[p]];
-  if (place_ == SnapOptions::Place::corner && (flags & (snaps_low | snaps_high)) != 0) {
-    const Int3 corner = snap_corner(surface_.crossings[p], flags);
-    return {static_cast<double>(corner[0]), static_cast<double>(corner[1]),
-            static_cast<double>(corner[2])};
+  for (std::size_t n = 0; n < blocks; ++n) {
+    first_point_[n + 1] += first_point_[n];
+    first_triangle_[n + 1] += first_triangle_[n];
   }
-  return index_position(surface_.crossings[p]);
+  resize_all(context_, resizing(mesh.points, first_point_.back()),
+             resizing(mesh.triangles, first_triangle_.back()));
 }
 
-void SnappedMesh::write_points(std::vector<Vec3>& points, std::vector<Triangle>& triangles) {
-  const std::size_t count = surface_.crossings.size();
-  const std::uint8_t* const flags = clusters_.flags.get();
-  new_ = std::make_unique_for_overwrite<std::uint32_t[]>(count);
-  prefer_huge_pages(new_.get(), count * sizeof(std::uint32_t));
-  std::vector<std::size_t> first((count + points_at_once - 1) / points_at_once + 1);
-  parallel_blocks(context_, count, points_at_once, [&](std::size_t begin, std::size_t end) {
-    std::size_t left = 0;
-    for (std::size_t p = begin; p < end; ++p)
-      left += (flags[p] & merged) == 0 ? 1 : 0;
-    first[begin / points_at_once + 1] = left;
-  });
-  for (std::size_t n = 1; n < first.size(); ++n)
-    first[n] += first[n - 1];
-  std::size_t faces = surface_.mesh.triangles.size();
-  for (const std::uint32_t dropped : merges_.dropped)
-    faces -= dropped;
-  resize_all(context_, resizing(points, first.back()), resizing(triangles, faces));
-
-  // A point that stays where it was is copied.
-  const unsigned moves =
-      clustered | (place_ == SnapOptions::Place::corner ? snaps_low | snaps_high : 0U);
-  parallel_blocks(context_, count, points_at_once, [&](std::size_t begin, std::size_t end) {
-    std::size_t number = first[begin / points_at_once];
-    for (std::size_t p = begin; p < end; ++p) {
-      if ((flags[p] & merged) != 0)
+/// Numbers the points that are left, too: what merges_.target says of those.
+void SnappedMesh::write_points(std::vector<Vec3>& points) {
+  const std::array<double, 12> transform = transform_.m;
+  const auto write_block = [&](std::size_t n) {
+    const SurfaceBlock& block = *surface_.blocks[n];
+    const SnapBlock& snaps = lattice_.snaps(n);
+    std::uint32_t number = first_point_[n];
+    for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+      const BlockEdge edge = surface_.edges[p];
+      const unsigned w = edge.word(), bit = edge.bit(), axis = edge.axis();
+      if ((snaps.merged[w] >> bit & 1) != 0)
         continue;
-      new_[p] = static_cast<std::uint32_t>(number);
-      points[number++] = (flags[p] & moves) == 0
-                             ? surface_.mesh.points[p]
-                             : surface_.transform.to_world(position(static_cast<std::uint32_t>(p)));
+      double along = surface_.fractions[p];
+      if (at_corners_ && ((snaps.low[w] | snaps.high[w]) >> bit & 1) != 0)
+        along = (snaps.high[w] >> bit & 1) != 0 ? 1 : 0;
+      const Vec3 place{static_cast<double>(block.origin[0] + static_cast<int>(edge.i())),
+                       static_cast<double>(block.origin[1] + static_cast<int>(edge.j())),
+                       static_cast<double>(block.origin[2] + static_cast<int>(edge.k()))};
+      points[number] = world_position(transform, {place.x + (axis == 0 ? along : 0),
+                                                  place.y + (axis == 1 ? along : 0),
+                                                  place.z + (axis == 2 ? along : 0)});
+      merges_.target[p] = number++;
     }
-  });
-  parallel_blocks(context_, clusters_.members.size(), 8192,
+  };
+  parallel_blocks(context_, surface_.blocks.size(), blocks_at_once,
                   [&](std::size_t begin, std::size_t end) {
-                    for (std::size_t slot = begin; slot < end; ++slot) {
-                      const std::uint32_t p = clusters_.members[slot];
-                      if ((flags[p] & merged) != 0)
-                        new_[p] = new_[merges_.target[slot]];
-                    }
+                    for (std::size_t n = begin; n < end; ++n)
+                      write_block(n);
                   });
+  parallel_blocks(context_, merges_.places.size(), 1, [&](std::size_t n, std::size_t) {
+    for (const SnapMerges::Place& place : merges_.places[n])
+      points[merges_.target[place.point]] = world_position(transform, place.position);
+  });
+}
+
+void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
+  const std::uint32_t* const target = merges_.target.get();
+  const SurfaceBlock& block = *surface_.blocks[n];
+  const SnapBlock& snaps = lattice_.snaps(n);
+  const EdgeWords merged = snaps.merged;
+  EdgeWords looked_at;
+  for (std::size_t w = 0; w < looked_at.size(); ++w)
+    looked_at[w] = is_doubtful(snaps, w);
+  for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+    const BlockEdge edge = surface_.edges[p];
+    const unsigned w = edge.word(), bit = edge.bit();
+    const std::uint32_t last = (merged[w] >> bit & 1) != 0 ? target[p] : p;
+    numbers[edge.place()] = target[last] | (looked_at[w] >> bit & 1) << 32;
+  }
+  for_far_edges(
+      surface_, block,
+      [&](const SurfaceBlock& far, std::uint32_t number, unsigned w, unsigned bit, unsigned place) {
+        const SnapBlock& far_snaps = lattice_.snaps(number);
+        const std::uint32_t p = far.point(w, bit),
+                            last = (far_snaps.merged[w] >> bit & 1) != 0 ? target[p] : p;
+        numbers[place] = target[last] | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
+      });
+}
+
+/// What a block's faces become before they go to the mesh.
+struct BlockFaces {
+  static constexpr std::size_t most = std::size_t{max_cell_triangles} * leaf_voxels;
+  std::array<Triangle, most + 1> made;
+  std::array<std::uint16_t, most + 1> picked, picked_from; ///< of `made`; of the block's faces
+  std::size_t made_count = 0, picked_count = 0;
+};
+
+/// Those that stay, and of these the ones that may have no area. Which faces do so can't be
+/// predicted, so there is no branch.
+void make_faces(const SurfaceBlock& block, const std::uint64_t* numbers, const CellPlans& plans,
+                BlockFaces& faces) {
+  const std::uint8_t* cell = block.cases;
+  std::size_t made = 0, picked = 0;
+  std::uint16_t face = 0;
+  for (unsigned i = 0; i < leaf_dim; ++i)
+    for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
+      const auto bit = static_cast<unsigned>(std::countr_zero(active));
+      const std::uint64_t* const at = numbers + edge_place(i, bit >> 3, bit & 7);
+      const CellPlan& plan = plans[*cell++];
+      const std::uint16_t* corner = plan.corner.data();
+      for (unsigned t = 0; t < plan.triangles; ++t, corner += 3) {
+        const std::uint64_t a = at[corner[0]], b = at[corner[1]], c = at[corner[2]];
+        const Triangle next{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b),
+                            static_cast<std::uint32_t>(c)};
+        const auto differ = [](std::uint32_t p, std::uint32_t q) {
+          return static_cast<std::uint64_t>(p ^ q) + UINT32_MAX; // from bit 32 on: 1 or 0
+        };
+        const std::uint64_t stays =
+            (differ(next[0], next[1]) & differ(next[1], next[2]) & differ(next[2], next[0])) >> 32;
+        faces.made[made] = next;
+        faces.picked[picked] = static_cast<std::uint16_t>(made);
+        faces.picked_from[picked] = face++;
+        made += stays;
+        picked += stays & (a | b | c) >> 32;
+      }
+    }
+  faces.made_count = made;
+  faces.picked_count = picked;
 }
 
 void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
                                   std::vector<Triangle>& triangles) {
-  const double enough = enough_area(surface_.transform);
-  constexpr std::size_t at_once = SnapMerges::faces_at_once;
-  const std::vector<Triangle>& old = surface_.mesh.triangles;
-  const std::uint8_t* const flags = clusters_.flags.get();
-  const std::size_t parts = (old.size() + at_once - 1) / at_once;
-  std::vector<std::size_t> first(parts);
-  for (std::size_t n = 1; n < parts; ++n)
-    first[n] = first[n - 1] + at_once - merges_.dropped[n - 1];
-  zero_area_.resize(parts);
+  const double enough = enough_area(transform_);
+  const std::size_t blocks = surface_.blocks.size();
+  small_.resize((blocks + blocks_at_once - 1) / blocks_at_once);
   // Faces between points that stayed in place at 0.001 or more from the ends of their edges have an
   // area (see the test of the table): three edges of a cell that lie in no face of it in common.
-  const unsigned doubtful =
-      looked_at | (place_ == SnapOptions::Place::corner ? snaps_low | snaps_high : 0U);
-  parallel_blocks(context_, old.size(), at_once, [&](std::size_t begin, std::size_t end) {
-    Triangle* out = triangles.data() + first[begin / at_once];
-    Triangle* const out_end = out + (end - begin - merges_.dropped[begin / at_once]);
-    // Which faces vanish or may have no area can't be predicted: they are picked without a branch.
-    std::array<std::uint32_t, 1025> picked;
-    std::uint64_t zero_area = 0;
-    for (std::size_t f = begin; f < end;) {
-      std::size_t count = 0;
-      for (const std::size_t stop = std::min(end, f + picked.size() - 1); f < stop; ++f) {
-        const Triangle& t = old[f];
-        const Triangle face{new_[t[0]], new_[t[1]], new_[t[2]]};
-        const bool stays = face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
-        const unsigned all = static_cast<unsigned>(flags[t[0]] | flags[t[1]] | flags[t[2]]);
-        picked[count] = static_cast<std::uint32_t>(f);
-        count += stays && (all & doubtful) != 0 ? 1 : 0;
-        if (out != out_end) // only faces that vanish follow
-          *out = face;
-        out += stays ? 1 : 0;
-      }
-      for (std::size_t n = 0; n < count; ++n) {
-        const Triangle& t = old[picked[n]];
-        if (!has_much_area(points[new_[t[0]]], points[new_[t[1]]], points[new_[t[2]]], enough))
-          zero_area += has_no_area(position(t[0]), position(t[1]), position(t[2])) ? 1 : 0;
+  parallel_blocks(context_, blocks, blocks_at_once, [&](std::size_t begin, std::size_t end) {
+    const auto numbers = std::make_unique_for_overwrite<PlaceNumbers>();
+    const auto faces = std::make_unique_for_overwrite<BlockFaces>();
+    for (std::size_t n = begin; n < end; ++n) {
+      note_points(n, *numbers);
+      make_faces(*surface_.blocks[n], numbers->data(), plans_, *faces);
+      std::copy_n(faces->made.data(), faces->made_count, triangles.data() + first_triangle_[n]);
+      for (std::size_t p = 0; p < faces->picked_count; ++p) {
+        const Triangle& t = faces->made[faces->picked[p]];
+        if (!has_much_area(points[t[0]], points[t[1]], points[t[2]], enough))
+          small_[begin / blocks_at_once].push_back(
+              {static_cast<std::uint32_t>(n), faces->picked_from[p]});
       }
     }
-    zero_area_[begin / at_once] = zero_area;
   });
+}
+
+SnappedMesh::PointRef SnappedMesh::point_at(std::size_t n, unsigned place) const {
+  const unsigned axis = place / 729;
+  const LatticeSpot at =
+      lattice_.spot(n, {static_cast<int>(place / 81 % 9), static_cast<int>(place / 9 % 9),
+                        static_cast<int>(place % 9)});
+  return {at.block, static_cast<std::uint8_t>(at.word(axis)), static_cast<std::uint8_t>(at.bit)};
+}
+
+std::array<SnappedMesh::PointRef, 3> SnappedMesh::corners_of(const SmallFace& face) const {
+  const SurfaceBlock& block = *surface_.blocks[face.block];
+  const std::uint8_t* cell = block.cases;
+  std::uint32_t after = 0;
+  for (unsigned i = 0; i < leaf_dim; ++i)
+    for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1, ++cell) {
+      const CellPlan& plan = plans_[*cell];
+      after += plan.triangles;
+      if (face.face >= after)
+        continue;
+      const auto bit = static_cast<unsigned>(std::countr_zero(active));
+      const unsigned own = edge_place(i, bit >> 3, bit & 7);
+      const std::size_t first = std::size_t{3} * (face.face + plan.triangles - after);
+      return {point_at(face.block, own + plan.corner.at(first)),
+              point_at(face.block, own + plan.corner.at(first + 1)),
+              point_at(face.block, own + plan.corner.at(first + 2))};
+    }
+  return {};
+}
+
+/// Index position of a point after snapping, itself if nothing was merged here.
+Vec3 SnappedMesh::position(const PointRef& ref) const {
+  const SurfaceBlock& block = *surface_.blocks[ref.block];
+  const SnapBlock& snaps = lattice_.snaps(ref.block);
+  EdgeCrossing crossing{{block.origin[0] + ref.word / 3, block.origin[1] + (ref.bit >> 3),
+                         block.origin[2] + (ref.bit & 7)},
+                        ref.word % 3,
+                        surface_.fractions[block.point(ref.word, ref.bit)]};
+  if (at_corners_ && ((snaps.low.at(ref.word) | snaps.high.at(ref.word)) >> ref.bit & 1) != 0)
+    crossing.fraction = (snaps.high.at(ref.word) >> ref.bit & 1) != 0 ? 1 : 0;
+  return index_position(crossing);
+}
+
+std::uint64_t SnappedMesh::count_without_area() {
+  bool none = true;
+  for (const auto& part : small_)
+    none = none && part.empty();
+  if (none)
+    return 0;
+  std::vector<std::pair<std::uint32_t, Vec3>> merged; // by their new number
+  for (const auto& part : merges_.places)
+    for (const SnapMerges::Place& place : part)
+      merged.emplace_back(merges_.target[place.point], place.position);
+  const auto by_number = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::ranges::sort(merged, by_number);
+  std::vector<std::uint64_t> counts(small_.size());
+  parallel_blocks(context_, small_.size(), 1, [&](std::size_t part, std::size_t) {
+    for (const SmallFace& face : small_[part]) {
+      const std::array<PointRef, 3> refs = corners_of(face);
+      std::array<Vec3, 3> p;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const PointRef& ref = refs.at(a);
+        std::uint32_t number = merges_.target[surface_.blocks[ref.block]->point(ref.word, ref.bit)];
+        if ((lattice_.snaps(ref.block).merged.at(ref.word) >> ref.bit & 1) != 0)
+          number = merges_.target[number];
+        const auto found = std::ranges::lower_bound(merged, std::pair(number, Vec3{}), by_number);
+        p.at(a) = found != merged.end() && found->first == number ? found->second : position(ref);
+      }
+      counts[part] += has_no_area(p[0], p[1], p[2]) ? 1 : 0;
+    }
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
 }
 
 } // namespace
@@ -231,21 +330,28 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options) {
   if (!(options.epsilon >= 0 && options.epsilon <= 0.5))
     throw Error("epsilon must lie within 0 ... 0.5");
-  const double points = static_cast<double>(surface.crossings.size()),
-               triangles = static_cast<double>(surface.mesh.triangles.size());
-  require_memory(context, points * (100 + 2 * sizeof(Vec3)) + triangles * 40, "snapping");
-
   SnapResult result;
+  if (surface.lattice == nullptr)
+    return result;
+  const SurfaceBlocks& blocks = *surface.lattice;
+  const double points = static_cast<double>(blocks.points),
+               triangles = static_cast<double>(blocks.triangles);
+  require_memory(context,
+                 static_cast<double>(blocks.blocks.size()) * sizeof(SnapBlock) +
+                     points * (2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3)) +
+                     triangles * sizeof(Triangle),
+                 "snapping");
+
+  SnapLattice lattice(context, blocks, options.epsilon, surface.transform.determinant() < 0);
+  SnapMerges merges = merge_snap_clusters(context, lattice, options.place);
+  SnappedMesh(context, surface, lattice, merges, options.place).make(result);
   SnapReport& report = result.report;
-  SnapClusters clusters = find_snap_clusters(context, surface, options.epsilon);
-  const SnapMerges merges = merge_snap_clusters(context, surface.mesh.triangles, clusters);
-  SnappedMesh(context, surface, clusters, merges, options.place).make(result);
-  report.corners = clusters.corners;
-  report.fins = clusters.fins;
+  report.corners = merges.corners;
+  report.fins = lattice.fins().size();
   report.refused = merges.refused;
-  report.points_before = surface.crossings.size();
+  report.points_before = blocks.points;
   report.points_after = result.mesh.points.size();
-  report.triangles_before = surface.mesh.triangles.size();
+  report.triangles_before = blocks.triangles;
   report.triangles_after = result.mesh.triangles.size();
   return result;
 }

@@ -51,11 +51,11 @@ struct SnapResult {
 /// points, Place::corner every point of a cluster (but no point of a fin on its own).
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
-/// \pre `surface` as marching_cubes made it: closed and 2-manifold
-/// Most clusters are taken in parallel; any number of threads gives the same bytes.
+/// What is snapped is surface.lattice as marching_cubes or marching_cubes_to_snap made it; the mesh
+/// of the surface isn't looked at. Most clusters are taken in parallel; any number of threads gives
+/// the same bytes.
 ///
-/// \throw Error if epsilon is not within 0 … 0.5, if the points are not in the order that
-/// marching_cubes gives them, or if context.max_memory would not do
+/// \throw Error if epsilon is not within 0 … 0.5, or if context.max_memory would not do
 SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options);
 
 } // namespace gewebe

@@ -277,7 +277,7 @@ void bench_splashsurf() {
         SnapResult snapped;
         times.push_back(milliseconds([&] {
           grid = metaball_density(with_threads(threads), particles, options);
-          surface = marching_cubes(with_threads(threads), grid);
+          surface = marching_cubes_to_snap(with_threads(threads), grid);
           snapped = snap(with_threads(threads), surface, {});
         }));
         vertices = snapped.mesh.points.size();

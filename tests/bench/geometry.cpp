@@ -53,7 +53,7 @@ void bench_surface(double voxel) {
            radial_error(surface.mesh.points, support / 2), "mean distance mm");
     SnapResult snapped;
     times = measure([&] {
-      surface = marching_cubes(context, grid);
+      surface = marching_cubes_to_snap(context, grid);
       snapped = snap(context, surface, {});
     });
     report("surface", "mc-opt 0.15", voxel, snapped.mesh.triangles.size(), threads, times,

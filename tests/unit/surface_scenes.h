@@ -97,10 +97,11 @@ inline Grid noise(int n, std::uint32_t seed, int levels = 0) {
 /// corner goes there, faces with equal corners vanish. Breaks meshes; a negative control.
 inline TriangleMesh snap_naively(const IsoSurface& surface, double epsilon) {
   std::map<Int3, std::uint32_t> corners;
-  std::vector<std::uint32_t> number(surface.crossings.size());
+  const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+  std::vector<std::uint32_t> number(crossings.size());
   TriangleMesh mesh;
   for (std::size_t p = 0; p < number.size(); ++p) {
-    const EdgeCrossing& c = surface.crossings[p];
+    const EdgeCrossing& c = crossings[p];
     Int3 corner = c.corner;
     if (1 - c.fraction <= epsilon)
       ++corner[static_cast<std::size_t>(c.axis)];

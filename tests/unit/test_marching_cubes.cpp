@@ -41,10 +41,10 @@ TEST(MarchingCubes, SphereConvergesWithOrderTwo) {
     EXPECT_TRUE(report.outward());
     EXPECT_EQ(report.euler, 2);
     EXPECT_EQ(report.components, 1U);
-    ASSERT_EQ(surface.crossings.size(), surface.mesh.points.size());
-    for (std::size_t p = 0; p < surface.crossings.size(); ++p)
-      EXPECT_EQ(surface.mesh.points[p],
-                surface.transform.to_world(index_position(surface.crossings[p])));
+    const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+    ASSERT_EQ(crossings.size(), surface.mesh.points.size());
+    for (std::size_t p = 0; p < crossings.size(); ++p)
+      EXPECT_EQ(surface.mesh.points[p], surface.transform.to_world(index_position(crossings[p])));
     const double volume_error = std::abs(report.volume - volume) / volume,
                  area_error = std::abs(report.area - area) / area;
     EXPECT_LT(volume_error, 0.65 / (n * n));
@@ -79,8 +79,10 @@ TEST(MarchingCubes, CrossingsLieOnCrossedEdges) {
   const Grid grid = metaballs(24, 3);
   const IsoSurface surface = marching_cubes({}, grid);
   GridAccessor values(grid);
-  for (std::size_t p = 0; p < surface.crossings.size(); ++p) {
-    const EdgeCrossing& c = surface.crossings[p];
+  const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+  ASSERT_EQ(crossings.size(), surface.mesh.points.size());
+  for (std::size_t p = 0; p < crossings.size(); ++p) {
+    const EdgeCrossing& c = crossings[p];
     Int3 end = c.corner;
     ++end[static_cast<std::size_t>(c.axis)];
     const double a = values.value(c.corner), b = values.value(end);
@@ -143,7 +145,7 @@ TEST(MarchingCubes, TileOfAnotherValueCountsInInterpolation) {
   const IsoSurface surface = marching_cubes({}, builder.finish());
   EXPECT_TRUE(is_sound(examine_mesh(surface.mesh)));
   std::size_t found = 0;
-  for (const EdgeCrossing& c : surface.crossings)
+  for (const EdgeCrossing& c : edge_crossings(surface))
     if (c.axis == 0 && c.corner[0] == 7) {
       EXPECT_DOUBLE_EQ(c.fraction, 0.5 / 0.75);
       ++found;

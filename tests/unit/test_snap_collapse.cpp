@@ -2,12 +2,17 @@
 
 #include "surface/snap_collapse_internal.h"
 
-#include "base/error.h"
 #include "tests/unit/surface_scenes.h"
 
 #include <gtest/gtest.h>
 
-#include <utility>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace gewebe {
 namespace {
@@ -20,22 +25,60 @@ Context with_threads(int threads) {
   return context;
 }
 
+using Place = SnapOptions::Place;
+
+/// All that merge_snap_clusters tells, in an order of its own.
+struct Outcome {
+  std::map<std::uint32_t, std::uint32_t> targets; // of points that were merged
+  std::map<std::uint32_t, std::array<double, 3>> places;
+  std::vector<std::uint32_t> dropped;
+  std::uint64_t clusters = 0, corners = 0, refused = 0, careful = 0, marked = 0;
+
+  bool ends_as(const Outcome& o) const {
+    return targets == o.targets && places == o.places && dropped == o.dropped &&
+           clusters == o.clusters && corners == o.corners && refused == o.refused &&
+           marked == o.marked;
+  }
+};
+
+SnapLattice lattice_of(const IsoSurface& surface, double epsilon) {
+  return SnapLattice({}, *surface.lattice, epsilon, surface.transform.determinant() < 0);
+}
+
+Outcome merge(const IsoSurface& surface, double epsilon, Place place, int threads,
+              bool always_careful) {
+  SnapLattice lattice = lattice_of(surface, epsilon);
+  const SnapMerges merges =
+      merge_snap_clusters(with_threads(threads), lattice, place, always_careful);
+  Outcome result{
+      {}, {}, merges.dropped, merges.clusters, merges.corners, merges.refused, merges.careful};
+  for (const auto& part : merges.places)
+    for (const SnapMerges::Place& p : part)
+      result.places[p.point] = {p.position.x, p.position.y, p.position.z};
+  for (std::size_t n = 0; n < surface.lattice->blocks.size(); ++n)
+    for (std::size_t w = 0; w < 24; ++w) {
+      result.marked += count_bits(lattice.snaps(n).looked_at[w]);
+      for (std::uint64_t bits = lattice.snaps(n).merged[w]; bits != 0; bits &= bits - 1) {
+        const std::uint32_t p =
+            lattice.block(n).point(w, static_cast<unsigned>(std::countr_zero(bits)));
+        result.targets[p] = merges.target[p];
+      }
+    }
+  return result;
+}
+
 struct Compared {
   std::size_t clusters = 0, careful = 0;
 };
 
 Compared compare(const Grid& grid, double epsilon, const std::string& name) {
-  const IsoSurface surface = marching_cubes({}, grid);
-  const SnapClusters clusters = find_snap_clusters({}, surface, epsilon);
-  const SnapMerges fast = merge_snap_clusters(with_threads(2), surface.mesh.triangles, clusters);
-  const SnapMerges slow =
-      merge_snap_clusters(with_threads(1), surface.mesh.triangles, clusters, true);
-  EXPECT_EQ(fast.target, slow.target) << name << ", epsilon " << epsilon;
-  EXPECT_EQ(fast.next, slow.next) << name << ", epsilon " << epsilon;
-  EXPECT_EQ(fast.dropped, slow.dropped) << name << ", epsilon " << epsilon;
-  EXPECT_EQ(fast.refused, slow.refused) << name << ", epsilon " << epsilon;
-  EXPECT_EQ(slow.careful, clusters.count());
-  return {clusters.count(), fast.careful};
+  const IsoSurface surface = marching_cubes_to_snap({}, grid);
+  const Place place = name.size() % 2 == 0 ? Place::mean : Place::corner;
+  const Outcome fast = merge(surface, epsilon, place, 2, false),
+                slow = merge(surface, epsilon, place, 1, true);
+  EXPECT_TRUE(fast.ends_as(slow)) << name << ", epsilon " << epsilon;
+  EXPECT_EQ(slow.careful, slow.clusters);
+  return {fast.clusters, fast.careful};
 }
 
 TEST(SnapCollapse, ParallelClustersEndAsInOrder) {
@@ -70,38 +113,124 @@ TEST(SnapCollapse, ThreadsGiveEqualBytes) {
   }
 }
 
-TEST(SnapCollapse, ClustersAreThoseOfAPlainSearch) {
+TEST(SnapCollapse, AnotherOutcomeIsSeen) {
+  // Negative control of the comparison: each thing told counts.
+  const IsoSurface surface = marching_cubes_to_snap({}, metaballs(24, 3));
+  const Outcome outcome = merge(surface, 0.3, Place::mean, 1, false);
+  ASSERT_FALSE(outcome.targets.empty());
+  EXPECT_TRUE(outcome.ends_as(merge(surface, 0.3, Place::mean, 1, true)));
+  EXPECT_FALSE(outcome.ends_as(merge(surface, 0.31, Place::mean, 1, false)));
+  EXPECT_FALSE(outcome.ends_as(merge(surface, 0.3, Place::corner, 1, false)));
+  Outcome other = outcome;
+  ++other.targets.begin()->second;
+  EXPECT_FALSE(outcome.ends_as(other));
+  other = outcome;
+  other.places.begin()->second[1] += 1e-15 * other.places.begin()->second[1];
+  EXPECT_FALSE(outcome.ends_as(other));
+  other = outcome;
+  ++other.dropped.front();
+  EXPECT_FALSE(outcome.ends_as(other));
+}
+
+Int3 corner_of(const EdgeCrossing& crossing, double epsilon) {
+  Int3 corner = crossing.corner;
+  if (!(crossing.fraction <= epsilon))
+    ++corner[static_cast<std::size_t>(crossing.axis)];
+  return corner;
+}
+
+bool snaps(const EdgeCrossing& crossing, double epsilon) {
+  return crossing.fraction <= epsilon || 1 - crossing.fraction <= epsilon;
+}
+
+TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
+  constexpr double epsilon = 0.3;
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    const IsoSurface surface = marching_cubes({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
-    const SnapClusters clusters = find_snap_clusters({}, surface, 0.3);
+    const IsoSurface surface = marching_cubes_to_snap({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
+    const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+    const SnapLattice lattice = lattice_of(surface, epsilon);
     std::map<Int3, std::vector<std::uint32_t>> corners;
-    for (std::uint32_t p = 0; p < surface.crossings.size(); ++p)
-      if ((clusters.flags[p] & (snaps_low | snaps_high)) != 0)
-        corners[snap_corner(surface.crossings[p], clusters.flags[p])].push_back(p);
-    EXPECT_EQ(clusters.corners, corners.size());
-    std::size_t found = 0, fins = 0;
-    for (std::size_t n = 0; n < clusters.count(); ++n) {
-      std::vector<std::uint32_t> members;
-      for (const std::uint32_t p : clusters.members_of(n))
-        if ((clusters.flags[p] & fin) == 0)
-          members.push_back(p);
-        else
-          ++fins;
-      const std::uint32_t first = clusters.first_member[n];
-      EXPECT_EQ(members, corners[snap_corner(surface.crossings[first], clusters.flags[first])]);
-      EXPECT_EQ(members.front(), first);
-      found += members.size() > 1 ? 1 : 0;
+    for (std::uint32_t p = 0; p < crossings.size(); ++p)
+      if (snaps(crossings[p], epsilon))
+        corners[corner_of(crossings[p], epsilon)].push_back(p);
+    std::size_t some = 0;
+    for (std::size_t n = 0; n < lattice.count(); ++n) {
+      const SnapLattice::Corners drawn = lattice.corners(n);
+      for (int bit = 0; bit < leaf_voxels; ++bit) {
+        const Int3 corner{bit >> 6, bit >> 3 & 7, bit & 7};
+        const auto found = corners.find(lattice.absolute(n, corner));
+        const auto slice = static_cast<std::size_t>(corner[0]);
+        ASSERT_EQ((drawn.some.at(slice) >> (bit & 63) & 1) != 0, found != corners.end());
+        if (found == corners.end())
+          continue;
+        ++some;
+        const bool draws_fin = !lattice.fins_at(found->first).empty();
+        EXPECT_EQ((drawn.several.at(slice) >> (bit & 63) & 1) != 0,
+                  found->second.size() > 1 || draws_fin);
+        std::vector<std::uint32_t> members;
+        lattice.for_members(n, corner, [&](const LatticeEdge& edge) {
+          members.push_back(lattice.point_on(lattice.spot(n, edge.start), edge.axis));
+        });
+        std::ranges::sort(members);
+        EXPECT_EQ(members, found->second);
+        EXPECT_EQ(lattice.first_member(n, corner), found->second.front());
+      }
     }
-    EXPECT_EQ(fins, clusters.fins);
-    EXPECT_EQ(found, static_cast<std::size_t>(std::ranges::count_if(
-                         corners, [](const auto& corner) { return corner.second.size() > 1; })));
+    EXPECT_EQ(some, corners.size());
   }
 }
 
-TEST(SnapCollapse, RefusesPointsInAnotherOrder) {
-  IsoSurface surface = marching_cubes({}, metaballs(24, 1));
-  std::swap(surface.crossings[10], surface.crossings[11]);
-  EXPECT_THROW(snap({}, surface, {}), Error);
+/// The points that snap nowhere, as opposed to all their neighbours, which snap to two corners at
+/// most, or to `most` of them.
+std::set<std::uint32_t> plain_fins(const IsoSurface& surface, double epsilon, std::size_t most) {
+  const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+  std::map<std::uint32_t, std::set<std::uint32_t>> neighbours;
+  for (const Triangle& t : surface.mesh.triangles)
+    for (const std::uint32_t p : t)
+      if (!snaps(crossings[p], epsilon))
+        neighbours[p].insert(t.begin(), t.end());
+  std::set<std::uint32_t> fins;
+  for (auto& [p, around] : neighbours) {
+    around.erase(p);
+    std::set<Int3> corners;
+    bool all = true;
+    for (const std::uint32_t q : around) {
+      all = all && snaps(crossings[q], epsilon);
+      corners.insert(corner_of(crossings[q], epsilon));
+    }
+    if (all && corners.size() <= most)
+      fins.insert(p);
+  }
+  return fins;
+}
+
+TEST(SnapLattice, FinsAreThoseOfAPlainSearch) {
+  std::size_t found = 0, with_three = 0;
+  for (std::uint32_t seed = 0; seed < 20; ++seed)
+    for (const double epsilon : {0.15, 0.3, 0.4}) {
+      const IsoSurface surface = marching_cubes({}, noise(14, seed, seed % 3 == 0 ? 4 : 0));
+      std::set<std::uint32_t> fins;
+      const SnapLattice lattice = lattice_of(surface, epsilon);
+      for (const SnapFin& f : lattice.fins())
+        fins.insert(f.point);
+      EXPECT_EQ(fins, plain_fins(surface, epsilon, 2));
+      found += fins.size();
+      with_three += plain_fins(surface, epsilon, 3).size();
+    }
+  EXPECT_GT(found, 100U);
+  EXPECT_GT(with_three, found); // negative control: another rule finds others
+}
+
+TEST(SnapCollapse, MeshIsNotLookedAt) {
+  const Grid grid = metaballs(24, 1);
+  const IsoSurface plain = marching_cubes({}, grid), bare = marching_cubes_to_snap({}, grid);
+  EXPECT_FALSE(plain.mesh.triangles.empty());
+  EXPECT_TRUE(bare.mesh.points.empty() && bare.mesh.triangles.empty());
+  const SnapResult a = snap({}, plain, {}), b = snap({}, bare, {});
+  EXPECT_EQ(a.mesh.points, b.mesh.points);
+  EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
+  EXPECT_EQ(a.report.triangles_before, plain.mesh.triangles.size());
+  EXPECT_EQ(b.report.triangles_before, plain.mesh.triangles.size());
 }
 
 } // namespace
