@@ -50,7 +50,8 @@ FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
 BENCH_SRC := $(wildcard tests/bench/*.cpp)
 HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*.h))
 MAN := $(wildcard man/*.[1-9])
-SCRIPTS := .ci/run tests/run tests/golden/run $(wildcard scripts/* tests/contract/*)
+STRESS_SCRIPTS := tests/stress/kill
+SCRIPTS := .ci/run tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -151,9 +152,10 @@ endif
 golden-update: $(TOOLS) | $(FIRST)
 	@tests/golden/run update --config '$(config)' $(if $(T),--test '$(T)')
 
-stress: $(STRESS) | $(FIRST)
+stress: $(STRESS) $(TOOLS) | $(FIRST)
 	@test -n '$(STRESS)' || { echo 'stress: tests/stress has no programs yet' >&2; exit 1; }
-	@for program in $(STRESS); do echo "$$program"; $$program || exit 1; done
+	@for program in $(STRESS) $(STRESS_SCRIPTS); do echo "$$program"; \
+	  PATH='$(abspath $(BUILD))':"$$PATH" $$program || exit 1; done
 
 # Each program writes CSV; gnuplot, where there is one, draws it.
 bench: $(BENCH) $(TOOLS) | $(FIRST)

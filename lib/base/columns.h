@@ -36,9 +36,9 @@ public:
   ColumnSink& operator=(const ColumnSink&) = delete;
   virtual ~ColumnSink() = default;
 
-  /// Takes the columns of the k-th node asked for; k ascends by one from call to call. `residual` is
-  /// the backward error of the check that they took part in.
-  /// \pre columns.size() == 9 n \throw Error if they can't be written
+  /// Takes the columns of the k-th node asked for; k ascends by one from call to call. `residual`
+  /// is the backward error of the check that they took part in. \pre columns.size() == 9 n \throw
+  /// Error if they can't be written
   virtual void write(std::size_t k, std::span<const double> columns, double residual) = 0;
 };
 
