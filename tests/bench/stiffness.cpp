@@ -1,7 +1,8 @@
 // Compliance: the factor of a model and columns of the inverse, one and two threads, against
 // CHOLMOD's own solve on blocks of identity columns and the rate of BLAS's matrix product in the
-// same run. A patient's colon (a ball where there is no shared data) with central springs, and
-// balls of growing size. Nothing is written to a disk.
+// same run; and against relaxation, whose error over time it gives for several thresholds and
+// numbers of steps, from a sample of one node. A patient's colon and liver (a ball where there is
+// no shared data) with central springs. Nothing is written to a disk.
 //
 // Writes CSV to standard output: stage, program, nodes, columns solved, threads, median, fastest
 // and slowest time in ms, a figure and its unit.
@@ -9,16 +10,22 @@
 #include "model/build.h"
 #include "sim/compliance_columns.h"
 #include "sim/condition.h"
+#include "sim/relaxation.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 
 #include <cholmod.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
 #include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 extern "C" void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*,
                        const double*, const int*, const double*, const int*, const double*, double*,
@@ -48,6 +55,15 @@ double product_rate() {
   report("matrix product", "BLAS", 0, n, 1, times, rate, "GFLOP/s");
   return rate;
 }
+
+/// Columns that stay in memory.
+class Kept final : public ColumnSink {
+public:
+  void write(std::size_t, std::span<const double> columns, double) override {
+    all.insert(all.end(), columns.begin(), columns.end());
+  }
+  std::vector<double> all;
+};
 
 /// Columns that go nowhere, but for the last of which the first number is kept.
 class Nowhere final : public ColumnSink {
@@ -143,6 +159,54 @@ void bench_columns(const Model& model, double rate) {
   }
 }
 
+/// Relaxed columns of one node, one thread: their largest error over the largest number of the
+/// direct ones, against the time of one column; and how much longer that is than a direct one.
+void bench_relaxation(const char* name, const Model& model, bool many) {
+  const StiffnessMatrix matrix = stiffness_matrix(model);
+  const Factor factor(matrix, with_threads(1));
+  const double norm = stiffness_norm(matrix);
+  const std::size_t n = model.nodes.size();
+  const std::uint32_t node[] = {static_cast<std::uint32_t>(n / 3)};
+  Kept exact;
+  (void)compliance_columns(matrix, factor, norm, node, with_threads(1), exact);
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < std::min<std::size_t>(n, 512); ++i)
+    nodes.push_back(i);
+  Nowhere nowhere;
+  const Times direct = measure(
+      [&] { (void)compliance_columns(matrix, factor, norm, nodes, with_threads(1), nowhere); }, 3);
+  const double column = direct.median / static_cast<double>(3 * nodes.size());
+  const auto relax = [&](const char* program, const RelaxOptions& options) {
+    Kept found;
+    const Times times = measure(
+        [&] {
+          found.all.clear();
+          (void)relaxed_columns(model, matrix, factor, norm, node, options, with_threads(1), found);
+        },
+        1);
+    double error = 0, largest = 0;
+    for (std::size_t i = 0; i < exact.all.size(); ++i) {
+      const double e = std::abs(found.all[i] - exact.all[i]);
+      error = error >= e || std::isnan(error) ? error : e;
+      largest = std::max(largest, std::abs(exact.all[i]));
+    }
+    report((std::string("relaxation of ") + name).c_str(), program, n, 3, 1, times, error / largest,
+           "largest error over largest displacement");
+    report((std::string("a column relaxed, ") + name).c_str(), program, n, 3, 1, times,
+           times.median / 3 / column, "times of a direct one (sample of one node)");
+  };
+  relax("threshold 5e-06 (the default)", {});
+  if (!many)
+    return;
+  for (const double threshold : {5e-3, 5e-4, 5e-5}) {
+    char program[32];
+    (void)std::snprintf(program, sizeof program, "threshold %g", threshold);
+    relax(program, {.threshold = threshold});
+  }
+  for (const std::uint64_t steps : std::initializer_list<std::uint64_t>{250, 1000, 4000, 16000})
+    relax((std::to_string(steps) + " steps").c_str(), {.steps = steps});
+}
+
 Model model_of(const TriangleMesh& mesh) {
   return build_model(mesh, {}, Context{}).model;
 }
@@ -158,5 +222,10 @@ int main() {
     organ = test::sphere_mesh(5, 100, {});
   }
   bench_columns(model_of(organ), rate);
+  bench_relaxation("colon", model_of(organ), false);
+  TriangleMesh liver = test::load_test_mesh("sofa_liver_smooth.obj");
+  if (liver.triangles.empty())
+    liver = test::sphere_mesh(4, 100, {});
+  bench_relaxation("liver", model_of(liver), true);
   return EXIT_SUCCESS;
 }

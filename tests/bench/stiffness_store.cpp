@@ -14,6 +14,7 @@
 #include "tests/bench/timing.h"
 #include "tests/unit/scratch.h"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -23,6 +24,8 @@
 #include <string>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <utility>
+#include <vector>
 
 using namespace gewebe;
 using namespace gewebe::timing;
@@ -126,17 +129,47 @@ double peak_memory() {
   return static_cast<double>(usage.ru_maxrss) * 1024e-6; // MB
 }
 
+/// The exponent of a power law through points (nodes, figure), by least squares of logarithms.
+double slope(const std::vector<std::pair<double, double>>& points) {
+  double x = 0, y = 0, xx = 0, xy = 0;
+  const auto count = static_cast<double>(points.size());
+  for (const auto& [nodes, figure] : points) {
+    x += std::log(nodes) / count;
+    y += std::log(figure) / count;
+  }
+  for (const auto& [nodes, figure] : points) {
+    xx += (std::log(nodes) - x) * (std::log(nodes) - x);
+    xy += (std::log(nodes) - x) * (std::log(figure) - y);
+  }
+  return xy / xx;
+}
+
+/// Of factor-only stores; the stage "scaling" is drawn over the number of nodes.
 void bench_scaling() {
+  struct Line {
+    const char *name, *unit;
+    std::vector<std::pair<double, double>> points;
+  };
+  std::array<Line, 3> lines{Line{"time", "ms", {}}, {"store", "MB", {}}, {"peak memory", "MB", {}}};
+  std::vector<Times> all;
   for (const std::size_t nodes :
        std::initializer_list<std::size_t>{1000, 3000, 10000, 30000, 100000}) {
     const Model model = ball(nodes);
+    const auto n = static_cast<double>(model.nodes.size());
     Made made;
-    const Times times =
-        measure([&] { made = make_store(model, 1, false, false, 1); }, nodes > 10000 ? 1 : 3);
-    report("scaling: time", "factor only", model.nodes.size(), 0, 1, times, times.median, "ms");
-    report("scaling: bytes", "factor only", model.nodes.size(), 0, 1, times,
-           static_cast<double>(made.bytes) * 1e-6, "MB");
-    report("scaling: memory", "factor only", model.nodes.size(), 0, 1, times, peak_memory(), "MB");
+    all.push_back(
+        measure([&] { made = make_store(model, 1, false, false, 1); }, nodes > 10000 ? 1 : 3));
+    lines[0].points.emplace_back(n, all.back().median);
+    lines[1].points.emplace_back(n, static_cast<double>(made.bytes) * 1e-6);
+    lines[2].points.emplace_back(n, peak_memory());
+  }
+  for (const Line& line : lines) {
+    char program[64];
+    (void)std::snprintf(program, sizeof program, "%s in %s; n^%.2f", line.name, line.unit,
+                        slope(line.points));
+    for (std::size_t k = 0; k < all.size(); ++k)
+      report("scaling", program, static_cast<std::size_t>(line.points[k].first), 0, 1, all[k],
+             line.points[k].second, "ms or MB");
   }
 }
 
