@@ -90,7 +90,8 @@ private:
 } // namespace
 
 int main(int argc, char** argv) {
-  const auto every = static_cast<std::uint32_t>(argc > 1 ? std::max(1, std::atoi(argv[1])) : 1);
+  const auto every =
+      static_cast<std::uint32_t>(argc > 1 ? std::max(1L, std::strtol(argv[1], nullptr, 10)) : 1);
   TriangleMesh organ = test::load_test_mesh("gca90_large_intestine_20k.stl");
   if (organ.triangles.empty()) {
     (void)std::fputs("compliance: no shared data, a ball instead\n", stderr);
