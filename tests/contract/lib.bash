@@ -102,3 +102,15 @@ cube() {
   printf '%s\n' '-1 -1 -1' '1 -1 -1' '1 1 -1' '-1 1 -1' '-1 -1 1' '1 -1 1' '1 1 1' '-1 1 1'
   printf '3 %s\n' '0 2 1' '0 3 2' '4 5 6' '4 6 7' '0 1 5' '0 5 4' '1 2 6' '1 6 5' '2 3 7' '2 7 6' '3 0 4' '3 4 7'
 }
+
+# A python3 that has h5py and numpy.
+python_with_h5py() {
+  local python
+  for python in python3 /usr/bin/python3; do
+    if "$python" -c 'import h5py, numpy' 2>/dev/null; then
+      echo "$python"
+      return
+    fi
+  done
+  return 1
+}

@@ -198,8 +198,9 @@ test_stored_stiffness_gives_the_same_shape() {
 }
 
 test_h5py_reads_results() {
+  local python
   need ffe-run exp2ela
-  python3 -c 'import h5py' 2>/dev/null || skip 'no h5py for python3'
+  python=$(python_with_h5py) || skip 'no h5py for python3'
   pull method=ffe
   ffe-run -q pull.scene -o run.h5
   cat >in.py <<'P'
@@ -214,7 +215,7 @@ with h5py.File('run.h5') as f:
     assert list(o['forces/node']) == [6] and list(o['forces/frame']) == [1] and o['forces/force'][0, 2] > 0
     assert o['triangles'][:].max() < o.attrs['surface_nodes'] == 8 < len(o['points'])
 P
-  python3 in.py
+  "$python" in.py
   rm in.py run.h5 run.xdmf pull.scene organ.ela
 }
 

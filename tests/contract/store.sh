@@ -8,18 +8,6 @@ held_cube() {
   rm cube.off
 }
 
-# A python3 that has h5py and numpy.
-python_with_h5py() {
-  local python
-  for python in python3 /usr/bin/python3; do
-    if "$python" -c 'import h5py, numpy' 2>/dev/null; then
-      echo "$python"
-      return
-    fi
-  done
-  return 1
-}
-
 test_h5py_reads_matrix_factor_and_columns() {
   local python
   python=$(python_with_h5py) || skip 'no h5py for python3'
