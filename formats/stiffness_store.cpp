@@ -274,14 +274,18 @@ public:
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
 
   void read(std::size_t k, std::span<double> out) const override {
-    if (values_.type() == hdf5::Number::float64) {
+    if (!single()) {
       values_.read_rows(k, out);
       return check(k, crc32c(std::span<const double>(out)));
     }
     std::vector<float> row(out.size());
-    values_.read_rows(k, std::span<float>(row));
-    check(k, crc32c(row));
+    read_single(k, row);
     std::copy(row.begin(), row.end(), out.begin());
+  }
+  bool single() const override { return values_.type() == hdf5::Number::float32; }
+  void read_single(std::size_t k, std::span<float> out) const override {
+    values_.read_rows(k, out);
+    check(k, crc32c(std::span<const float>(out)));
   }
 
 private:

@@ -27,7 +27,18 @@ public:
   /// Reads the columns of nodes()[k]. \pre out.size() == 9 n \throw Error if they can't be read or
   /// are damaged
   virtual void read(std::size_t k, std::span<double> out) const = 0;
+  /// Whether they are kept as float32, so that nothing is lost by read_single.
+  virtual bool single() const { return false; }
+  /// As read. \pre single()
+  virtual void read_single(std::size_t k, std::span<float> out) const;
 };
+
+inline void ColumnSource::read_single(std::size_t k, std::span<float> out) const {
+  std::vector<double> wide(out.size());
+  read(k, wide);
+  for (std::size_t r = 0; r < out.size(); ++r)
+    out[r] = static_cast<float>(wide[r]);
+}
 
 class ColumnSink {
 public:

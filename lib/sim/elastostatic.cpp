@@ -1,12 +1,9 @@
 #include "sim/elastostatic.h"
 
 #include "base/error.h"
-#include "base/parallel.h"
-#include "sim/condition.h"
+#include "sim/contact_block.h"
+#include "sim/shape_modes.h"
 #include "sim/stiffness.h"
-
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
@@ -14,17 +11,19 @@
 #include <optional>
 #include <utility>
 
-// Based on: M. Bro-Nielsen, Finite element modeling in surgery simulation, 1998; N. Hansen, FZKA
-// 7190, 2006, 3.3.2 and 3.3.3 (prescribed displacements turned into forces).
-
 namespace gewebe {
 
 namespace {
 
 constexpr double contact_tolerance = 1e-6;
-// Doubles of L per free axis, to compare costs while the factor is not loaded yet.
-constexpr std::size_t typical_fill = 110;
-constexpr std::size_t rows_at_once = 8192;
+// Displaced nodes whose factor of C_cc is kept where their columns are stored: its 1200 rows take
+// 12 MB, read twice an update. Columns that are not stored cost three solves each, a fresh factor
+// with axes held some dozens.
+constexpr std::size_t block_stored = 400, block_solved = 32;
+// Nodes from which on a rigid motion is worth to be found out.
+constexpr std::size_t worth_modes = 6;
+// Roundings of sums that follow their changes stay below 1000 times one.
+constexpr std::uint64_t most_increments = 1000;
 
 double largest_size(std::span<const double> values) {
   double m = 0;
@@ -37,216 +36,86 @@ std::size_t axis_of(std::uint32_t node, int axis) {
   return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
 }
 
-bool same_nodes(const std::map<std::uint32_t, Vec3>& a, const std::map<std::uint32_t, Vec3>& b) {
+template <class Map>
+bool same_nodes(const Map& a, const Map& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const auto& x, const auto& y) { return x.first == y.first; });
 }
 
-/// A factor with the rows of its matrix.
-struct Solver {
-  Factor factor;
-  std::vector<std::int64_t> row_of_axis;
+std::vector<std::uint32_t> nodes_of(const std::map<std::uint32_t, Vec3>& values) {
+  std::vector<std::uint32_t> nodes;
+  nodes.reserve(values.size());
+  for (const auto& entry : values)
+    nodes.push_back(entry.first);
+  return nodes;
+}
 
-  /// Solves for right-hand sides over all axes, one behind the other, in place.
-  void solve(std::span<double> over_axes, std::size_t columns) const {
-    const std::size_t axes = row_of_axis.size(), order = factor.order();
-    std::vector<double> f(order * columns), u(order * columns);
-    for (std::size_t c = 0; c < columns; ++c)
-      for (std::size_t a = 0; a < axes; ++a)
-        if (row_of_axis[a] >= 0)
-          f[c * order + static_cast<std::size_t>(row_of_axis[a])] = over_axes[c * axes + a];
-    factor.solve(f, u, columns);
-    for (std::size_t c = 0; c < columns; ++c)
-      for (std::size_t a = 0; a < axes; ++a)
-        over_axes[c * axes + a] =
-            row_of_axis[a] < 0 ? 0 : u[c * order + static_cast<std::size_t>(row_of_axis[a])];
-  }
-};
+std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) {
+  std::vector<NodeVector> list;
+  list.reserve(values.size());
+  for (const auto& [node, value] : values)
+    list.push_back({node, value});
+  return list;
+}
 
 } // namespace
 
 struct Elastostatic::State {
   const Model& model;
-  StiffnessParts parts;
   Context context;
   ElastostaticOptions options;
+  Compliance compliance;
   std::size_t axes = 0; // 3 n
   ElastostaticCounts counts;
+  std::optional<double> norm; // of K, for backward errors
 
-  std::optional<Solver> solver;
-  std::optional<double> norm;                           // of K, for backward errors
-  std::map<std::uint32_t, std::vector<double>> columns; // kept
-
-  // What was computed last, each with the part of the load that it belongs to.
+  // The last load, its contact forces, and its shape, where that was asked for.
   Load load;
-  std::vector<double> u;
   std::vector<NodeVector> forces;
+  std::vector<double> u;
+  bool shape_known = true;
 
+  // K⁻¹ M g; empty for 0.
   Vec3 weight_gravity;
-  std::vector<double> weight; // K⁻¹ M g; empty for 0
+  std::vector<double> weight;
 
+  // K⁻¹ (f + M g), of these.
   std::map<std::uint32_t, Vec3> outer_force;
   Vec3 outer_gravity;
-  std::vector<double> outer; // K⁻¹ (f + M g)
+  std::vector<double> outer;
+  std::uint64_t increments = 0;
 
-  std::map<std::uint32_t, Vec3> block_nodes;
-  std::vector<std::size_t> contact_axes;
-  Eigen::LLT<Eigen::MatrixXd> block; // of C_cc
+  // C_cc of these nodes, in order of arrival.
+  struct Contact {
+    std::uint32_t node = 0;
+    std::vector<std::size_t> axes;
+  };
+  std::vector<Contact> contacts;
+  ContactBlock block;
+  std::uint64_t block_changes = 0;
+  std::vector<double> question;      // what the contacts have to be moved by, beyond other loads
+  std::vector<double> contact_force; // by axis of the block
+  bool by_block = false;             // how the present load is met
+  ShapeModes modes;                  // of this set: question to shape
 
+  // K with these nodes held.
   std::map<std::uint32_t, Vec3> held_nodes;
-  std::optional<Solver> held; // of K_ff; none where nothing is free
+  std::optional<AxisSolver> held; // none where nothing is free
+  std::optional<ColumnCache> held_columns;
+  ShapeModes held_modes; // displacements to shape
+  std::map<std::uint32_t, Vec3> base_force;
+  Vec3 base_gravity;
+  std::vector<double> base; // the shape with all displacements 0, under these; empty: unknown
 
   State(const Model& m, StiffnessParts p, const Context& c, const ElastostaticOptions& o)
-      : model(m), parts(std::move(p)), context(c), options(o), axes(3 * m.nodes.size()) {
+      : model(m), context(c), options(o), compliance(m, std::move(p), c, o.tolerance > 0),
+        axes(3 * m.nodes.size()) {
     context.progress = nullptr;
     u.assign(axes, 0);
     outer.assign(axes, 0);
   }
 
-  /// K itself is checked for what it determines; with more axes held it can only get better.
-  Solver factorise() {
-    StiffnessMatrix matrix = stiffness_matrix(model);
-    ++counts.factors;
-    StiffnessCheck check;
-    Factor factor = checked_factor(model, matrix, context, check);
-    norm = stiffness_norm(matrix);
-    return {std::move(factor), std::move(matrix.row_of_axis)};
-  }
-  Solver factorise_held(std::span<const std::uint8_t> fixed) {
-    StiffnessMatrix matrix = stiffness_matrix(model, fixed);
-    ++counts.factors;
-    return {Factor(matrix, context), std::move(matrix.row_of_axis)};
-  }
-
-  const Solver& whole() {
-    if (solver)
-      return *solver;
-    if (!parts.factor) {
-      solver.emplace(factorise());
-      return *solver;
-    }
-    std::vector<std::int64_t> rows(axes, -1);
-    std::int64_t next = 0;
-    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a)
-        if (!is_fixed(model, i, a))
-          rows[axis_of(i, a)] = next++;
-    ++counts.factors;
-    Factor factor = parts.factor();
-    if (factor.order() != static_cast<std::size_t>(next))
-      throw Error("the factor has " + std::to_string(factor.order()) + " rows, expected " +
-                  std::to_string(next) + " as the model has free axes");
-    solver.emplace(Solver{std::move(factor), std::move(rows)});
-    return *solver;
-  }
-
-  void solve(const Solver& by, std::span<double> over_axes, std::size_t count = 1) {
-    by.solve(over_axes, count);
-    counts.solves += count;
-  }
-
-  // ---- columns
-
-  std::optional<std::size_t> stored(std::uint32_t node) const {
-    if (!parts.columns)
-      return std::nullopt;
-    const std::vector<std::uint32_t>& nodes = parts.columns->nodes();
-    const auto found = std::lower_bound(nodes.begin(), nodes.end(), node);
-    if (found == nodes.end() || *found != node)
-      return std::nullopt;
-    return static_cast<std::size_t>(found - nodes.begin());
-  }
-
-  template <class Nodes>
-  bool all_stored(const Nodes& nodes) const {
-    return std::all_of(nodes.begin(), nodes.end(), [&](const auto& entry) {
-      return columns.contains(entry.first) || stored(entry.first);
-    });
-  }
-
-  std::size_t nodes_in_memory() const {
-    const double bytes = std::min(static_cast<double>(context.max_memory) / 4, 1073741824.0);
-    return static_cast<std::size_t>(bytes / (72 * static_cast<double>(model.nodes.size())));
-  }
-
-  /// Columns of these nodes come to memory; others leave it where there is no room.
-  template <class Nodes>
-  void need_columns(const Nodes& nodes) {
-    std::vector<std::uint32_t> missing;
-    for (const auto& [node, value] : nodes)
-      if (!columns.contains(node))
-        missing.push_back(node);
-    if (columns.size() + missing.size() > nodes_in_memory())
-      std::erase_if(columns, [&](const auto& entry) { return !nodes.contains(entry.first); });
-    std::vector<std::uint32_t> unknown;
-    for (const std::uint32_t node : missing) {
-      if (const auto k = stored(node)) {
-        std::vector<double> c(3 * axes);
-        parts.columns->read(*k, c);
-        ++counts.columns_read;
-        columns.emplace(node, std::move(c));
-      } else {
-        unknown.push_back(node);
-      }
-    }
-    constexpr std::size_t at_once = 8;
-    for (std::size_t begin = 0; begin < unknown.size(); begin += at_once) {
-      const std::size_t count = std::min(at_once, unknown.size() - begin);
-      std::vector<double> block_columns(3 * axes * count);
-      for (std::size_t k = 0; k < count; ++k)
-        for (int a = 0; a < 3; ++a)
-          block_columns[(3 * k + static_cast<std::size_t>(a)) * axes +
-                        axis_of(unknown[begin + k], a)] = 1;
-      solve(whole(), block_columns, 3 * count);
-      for (std::size_t k = 0; k < count; ++k) {
-        const auto first = block_columns.begin() + static_cast<std::ptrdiff_t>(3 * axes * k);
-        columns.emplace(unknown[begin + k],
-                        std::vector<double>(first, first + static_cast<std::ptrdiff_t>(3 * axes)));
-      }
-    }
-  }
-
-  /// Nodes whose columns cost as much to add up as one solve, which reads L twice. Measured, 10,246
-  /// nodes: 0.09 ms a node while columns are in a cache, 0.26 ms beyond, 5 to 8 ms a solve.
-  std::size_t break_even() const {
-    const std::size_t entries = solver ? solver->factor.entries() : typical_fill * axes;
-    return std::max<std::size_t>(1, entries / (3 * axes));
-  }
-
-  /// Adds the displacement under these forces to `sum`, by columns or by a solve.
-  template <class Nodes>
-  void add_shape(const Nodes& forces_of, std::span<double> sum) {
-    if (forces_of.empty())
-      return;
-    const bool few = forces_of.size() <= std::min(break_even(), nodes_in_memory());
-    if (few && all_stored(forces_of)) {
-      need_columns(forces_of);
-      std::vector<std::pair<const double*, double>> terms;
-      for (const auto& [node, force] : forces_of)
-        for (int a = 0; a < 3; ++a)
-          if (force[a] != 0 && !is_fixed(model, node, a))
-            terms.emplace_back(columns.at(node).data() + static_cast<std::size_t>(a) * axes,
-                               force[a]);
-      Context some = context;
-      if (terms.size() * axes < 1000000)
-        some.threads = 1;
-      parallel_blocks(some, axes, rows_at_once, [&](std::size_t begin, std::size_t end) {
-        for (const auto& [column, factor] : terms)
-          for (std::size_t r = begin; r < end; ++r)
-            sum[r] += column[r] * factor;
-      });
-      return;
-    }
-    std::vector<double> f(axes, 0);
-    for (const auto& [node, force] : forces_of)
-      for (int a = 0; a < 3; ++a)
-        f[axis_of(node, a)] = force[a];
-    solve(whole(), f);
-    for (std::size_t r = 0; r < axes; ++r)
-      sum[r] += f[r];
-  }
-
-  // ---- the parts of an update
+  // ---- what acts beside displacements
 
   std::vector<double> weights(const Vec3& gravity) const {
     std::vector<double> f(axes, 0);
@@ -254,99 +123,6 @@ struct Elastostatic::State {
       for (int a = 0; a < 3; ++a)
         f[axis_of(i, a)] = model.nodes[i].mass * gravity[a];
     return f;
-  }
-
-  void renew_outer(const Load& now) {
-    if (now.gravity == outer_gravity && now.force == outer_force)
-      return;
-    if (now.gravity != weight_gravity) {
-      weight.clear();
-      if (now.gravity != Vec3{}) {
-        weight = weights(now.gravity);
-        solve(whole(), weight);
-      }
-      weight_gravity = now.gravity;
-    }
-    if (weight.empty())
-      outer.assign(axes, 0);
-    else
-      outer = weight;
-    add_shape(now.force, outer);
-    outer_gravity = now.gravity;
-    outer_force = now.force;
-  }
-
-  bool block_is_cheaper(const Load& now) const {
-    const std::size_t m = now.displacement.size();
-    if (options.block_limit != SIZE_MAX)
-      return m <= options.block_limit;
-    // Columns that are not stored cost three solves each, a fresh factor some dozens.
-    const std::size_t most = all_stored(now.displacement) ? 128 : 32;
-    return m <= std::min(most, nodes_in_memory());
-  }
-
-  void renew_block(const Load& now) {
-    if (!block_nodes.empty() && same_nodes(now.displacement, block_nodes))
-      return;
-    need_columns(now.displacement);
-    contact_axes.clear();
-    for (const auto& [node, d] : now.displacement)
-      for (int a = 0; a < 3; ++a)
-        if (!is_fixed(model, node, a))
-          contact_axes.push_back(axis_of(node, a));
-    const auto size = static_cast<Eigen::Index>(contact_axes.size());
-    Eigen::MatrixXd c(size, size);
-    for (Eigen::Index j = 0; j < size; ++j) {
-      const std::size_t axis = contact_axes[static_cast<std::size_t>(j)];
-      const double* const column =
-          columns.at(static_cast<std::uint32_t>(axis / 3)).data() + axis % 3 * axes;
-      for (Eigen::Index i = 0; i < size; ++i)
-        c(i, j) = column[contact_axes[static_cast<std::size_t>(i)]];
-    }
-    block.compute(c);
-    block_nodes = now.displacement;
-  }
-
-  /// How far the shape misses the prescribed displacements, over the largest one.
-  double missed(const Load& now) const {
-    double miss = 0, size = largest_size(u);
-    for (const auto& [node, d] : now.displacement)
-      for (int a = 0; a < 3; ++a) {
-        const double error = std::abs(u[axis_of(node, a)] - d[a]);
-        miss = std::isnan(error) ? error : std::max(miss, error);
-        size = std::max(size, std::abs(d[a]));
-      }
-    return size == 0 ? miss : miss / size;
-  }
-
-  /// Whether it came out right.
-  bool contact_by_block(const Load& now) {
-    renew_block(now);
-    if (block.info() != Eigen::Success)
-      return false;
-    Eigen::VectorXd rhs(static_cast<Eigen::Index>(contact_axes.size()));
-    for (std::size_t k = 0; k < contact_axes.size(); ++k) {
-      const std::size_t axis = contact_axes[k];
-      const Vec3& d = now.displacement.at(static_cast<std::uint32_t>(axis / 3));
-      rhs[static_cast<Eigen::Index>(k)] = d[static_cast<int>(axis % 3)] - outer[axis];
-    }
-    const Eigen::VectorXd f = block.solve(rhs);
-    std::map<std::uint32_t, Vec3> contact;
-    for (const auto& [node, d] : now.displacement)
-      contact.emplace(node, Vec3{});
-    for (std::size_t k = 0; k < contact_axes.size(); ++k)
-      contact[static_cast<std::uint32_t>(contact_axes[k] / 3)]
-             [static_cast<int>(contact_axes[k] % 3)] = f[static_cast<Eigen::Index>(k)];
-    u = outer;
-    add_shape(contact, u);
-    const double miss = missed(now);
-    if (!(miss <= contact_tolerance))
-      return false;
-    counts.contact_error = std::max(counts.contact_error, miss);
-    forces.clear();
-    for (const auto& [node, force] : contact)
-      forces.push_back({node, force});
-    return true;
   }
 
   std::vector<double> outer_load(const Load& now) const {
@@ -357,11 +133,261 @@ struct Elastostatic::State {
     return f;
   }
 
+  void renew_weight(const Vec3& gravity) {
+    if (gravity == weight_gravity)
+      return;
+    std::vector<double> fresh;
+    if (gravity != Vec3{}) {
+      fresh = weights(gravity);
+      compliance.solve(fresh);
+    }
+    weight = std::move(fresh);
+    weight_gravity = gravity;
+  }
+
+  bool outer_known(const Load& now) const {
+    return now.gravity == outer_gravity && now.force == outer_force;
+  }
+
+  /// Forces that differ from those of `outer`, by their difference.
+  std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const {
+    std::vector<NodeVector> changed;
+    auto a = outer_force.begin();
+    auto b = now.begin();
+    while (a != outer_force.end() || b != now.end()) {
+      if (b == now.end() || (a != outer_force.end() && a->first < b->first)) {
+        changed.push_back({a->first, -a->second});
+        ++a;
+      } else if (a == outer_force.end() || b->first < a->first) {
+        changed.push_back({b->first, b->second});
+        ++b;
+      } else {
+        if (!(a->second == b->second))
+          changed.push_back({b->first, b->second - a->second});
+        ++a;
+        ++b;
+      }
+    }
+    return changed;
+  }
+
+  void renew_outer(const Load& now) {
+    if (outer_known(now))
+      return;
+    renew_weight(now.gravity);
+    const std::vector<NodeVector> changed =
+        now.gravity == outer_gravity ? changed_forces(now.force) : std::vector<NodeVector>{};
+    std::vector<double> fresh;
+    if (now.gravity == outer_gravity && changed.size() < now.force.size() &&
+        increments < most_increments) {
+      fresh = std::move(outer);
+      outer_gravity = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; // unknown, should the sum fail
+      compliance.add(changed, 0, fresh);
+      ++increments;
+    } else {
+      fresh = weight;
+      fresh.resize(axes, 0);
+      compliance.add(as_vectors(now.force), 0, fresh);
+      increments = 0;
+    }
+    outer = std::move(fresh);
+    outer_gravity = now.gravity;
+    outer_force = now.force;
+  }
+
+  /// The displacements under all but the contacts, at the axes of `wanted`.
+  std::vector<double> outer_at(const Load& now, std::span<const std::size_t> wanted) {
+    std::vector<double> values;
+    values.reserve(wanted.size());
+    const std::vector<std::uint32_t> nodes = nodes_of(now.force);
+    if (!outer_known(now) && compliance.columns_pay(nodes)) {
+      renew_weight(now.gravity);
+      compliance.need(nodes);
+      for (const std::size_t axis : wanted) {
+        double sum = weight.empty() ? 0 : weight[axis];
+        for (const auto& [node, force] : now.force)
+          for (int a = 0; a < 3; ++a)
+            sum += compliance.entry(node, a, axis) * force[a];
+        values.push_back(sum);
+      }
+      return values;
+    }
+    renew_outer(now);
+    for (const std::size_t axis : wanted)
+      values.push_back(outer[axis]);
+    return values;
+  }
+
+  // ---- contacts by the block
+
+  bool block_is_cheaper(const Load& now) const {
+    const std::size_t m = now.displacement.size();
+    if (options.block_limit != SIZE_MAX)
+      return m <= options.block_limit;
+    const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+    const std::size_t most = compliance.stored(nodes) ? block_stored : block_solved;
+    return m <= std::min(most, compliance.capacity());
+  }
+
+  bool join(std::uint32_t node) {
+    Contact contact{node, {}};
+    std::vector<double> row;
+    for (int a = 0; a < 3; ++a) {
+      if (is_fixed(model, node, a))
+        continue;
+      contact.axes.push_back(axis_of(node, a));
+      row.clear();
+      for (const Contact& other : contacts)
+        for (const std::size_t axis : other.axes)
+          row.push_back(compliance.entry(node, a, axis));
+      for (const std::size_t axis : contact.axes)
+        row.push_back(compliance.entry(node, a, axis));
+      if (!block.append(row)) {
+        block.remove(block.size() + 1 - contact.axes.size(), contact.axes.size() - 1);
+        return false;
+      }
+    }
+    contacts.push_back(std::move(contact));
+    ++block_changes;
+    return true;
+  }
+
+  void leave_all() {
+    contacts.clear();
+    block.clear();
+    block_changes = 0;
+    modes.clear();
+  }
+
+  /// Whether C_cc of these nodes is positive definite.
+  bool renew_block(const std::map<std::uint32_t, Vec3>& nodes) {
+    std::size_t staying = 0;
+    for (const Contact& c : contacts)
+      staying += nodes.contains(c.node) ? 1 : 0;
+    if (staying == contacts.size() && staying == nodes.size())
+      return true;
+    modes.clear();
+    if (2 * staying < contacts.size() || block_changes > most_increments)
+      leave_all();
+    compliance.need(nodes_of(nodes));
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < contacts.size();) {
+      if (nodes.contains(contacts[k].node)) {
+        row += contacts[k++].axes.size();
+        continue;
+      }
+      block.remove(row, contacts[k].axes.size());
+      contacts.erase(contacts.begin() + static_cast<std::ptrdiff_t>(k));
+      ++block_changes;
+    }
+    for (const auto& entry : nodes) {
+      const bool there = std::any_of(contacts.begin(), contacts.end(),
+                                     [&](const Contact& c) { return c.node == entry.first; });
+      if (!there && !join(entry.first)) {
+        leave_all();
+        return false;
+      }
+    }
+    return true;
+  }
+
+  std::vector<std::size_t> contact_axes() const {
+    std::vector<std::size_t> all;
+    for (const Contact& c : contacts)
+      all.insert(all.end(), c.axes.begin(), c.axes.end());
+    return all;
+  }
+
+  std::vector<NodeVector> by_node(std::span<const double> force) const {
+    std::vector<NodeVector> list;
+    std::size_t row = 0;
+    for (const Contact& c : contacts) {
+      NodeVector& f = list.emplace_back(NodeVector{c.node, {}});
+      for (const std::size_t axis : c.axes)
+        f.value[static_cast<int>(axis % 3)] = force[row++];
+    }
+    std::sort(list.begin(), list.end(),
+              [](const NodeVector& a, const NodeVector& b) { return a.node < b.node; });
+    return list;
+  }
+
+  /// Whether it came out right.
+  bool contact_by_block(const Load& now) {
+    if (!renew_block(now.displacement))
+      return false;
+    const std::vector<std::size_t> where = contact_axes();
+    std::vector<double> wanted = outer_at(now, where);
+    double size = largest_size(wanted);
+    for (std::size_t k = 0; k < where.size(); ++k) {
+      const double d = now.displacement.at(
+          static_cast<std::uint32_t>(where[k] / 3))[static_cast<int>(where[k] % 3)];
+      size = std::max(size, std::abs(d));
+      wanted[k] = d - wanted[k];
+    }
+    std::vector<double> f = wanted, back(wanted.size()), correction(wanted.size());
+    block.solve(f);
+    double miss = 0;
+    for (int round = 0; round < 2; ++round) { // once more where updates of the factor left error
+      block.multiply(f, back);
+      for (std::size_t k = 0; k < back.size(); ++k)
+        correction[k] = wanted[k] - back[k];
+      miss = largest_size(correction);
+      if (round == 1 || miss <= 1e-13 * size)
+        break;
+      block.solve(correction);
+      for (std::size_t k = 0; k < f.size(); ++k)
+        f[k] += correction[k];
+    }
+    if (size > 0)
+      miss /= size;
+    if (!(miss <= contact_tolerance))
+      return false;
+    counts.contact_error = std::max(counts.contact_error, miss);
+    forces = by_node(f);
+    question = std::move(wanted);
+    contact_force = std::move(f);
+    by_block = true;
+    return true;
+  }
+
+  /// By what a rigid motion of the contacts did before, if this is one. \return whether it was
+  bool shape_by_modes(const Load& now) {
+    if (contacts.size() < worth_modes || (modes.size() == 0 && !modes.open()))
+      return false;
+    std::vector<double> coefficients, rest;
+    if (!modes.express(question, coefficients, rest)) {
+      if (!modes.open()) {
+        modes.give_up();
+        return false;
+      }
+      double square = 0;
+      for (const double r : rest)
+        square += r * r;
+      const double length = std::sqrt(square);
+      for (double& r : rest)
+        r /= length;
+      std::vector<double> f = rest, answer(axes, 0);
+      block.solve(f);
+      compliance.add(by_node(f), 0, answer);
+      modes.add(rest, std::move(answer));
+      coefficients.push_back(length);
+    }
+    renew_outer(now);
+    u = outer;
+    modes.answer(coefficients, u);
+    return true;
+  }
+
+  // ---- contacts by constraints
+
   void renew_held(const Load& now) {
     if (!held_nodes.empty() && same_nodes(now.displacement, held_nodes))
       return;
     held.reset();
     held_nodes.clear();
+    held_columns.reset();
+    base.clear();
+    held_modes.clear();
     std::vector<std::uint8_t> fixed(axes, 0);
     bool any_free = false;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
@@ -369,40 +395,179 @@ struct Elastostatic::State {
         fixed[axis_of(i, a)] = now.displacement.contains(i) ? 1 : 0;
         any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model, i, a));
       }
-    if (any_free)
-      held.emplace(factorise_held(fixed));
+    if (any_free) {
+      ++counts.factors;
+      held.emplace(factorise_axes(model, fixed, context));
+    }
     held_nodes = now.displacement;
+  }
+
+  void solve_held(std::span<double> over_axes, std::size_t columns = 1) {
+    if (!held) {
+      std::fill(over_axes.begin(), over_axes.end(), 0.0);
+      return;
+    }
+    held->solve(over_axes, columns);
+    counts.solves += columns;
+  }
+
+  /// u = shape under f (over all axes) and these displacements.
+  void held_shape(std::span<const double> f, std::span<const double> prescribed,
+                  std::vector<double>& shape) {
+    std::vector<double> product(axes, 0);
+    multiply_stiffness(model, prescribed, product);
+    shape.resize(axes);
+    for (std::size_t r = 0; r < axes; ++r)
+      shape[r] = (f.empty() ? 0 : f[r]) - product[r];
+    solve_held(shape);
+    for (std::size_t r = 0; r < axes; ++r)
+      shape[r] += prescribed[r]; // on held axes the solution is 0
   }
 
   void contact_by_constraints(const Load& now) {
     renew_held(now);
     const std::vector<double> f = outer_load(now);
-    std::vector<double> prescribed(axes, 0), product(axes, 0);
+    std::vector<double> wanted(3 * now.displacement.size()), prescribed(axes, 0);
+    std::size_t k = 0;
     for (const auto& [node, d] : now.displacement)
       for (int a = 0; a < 3; ++a)
-        prescribed[axis_of(node, a)] = d[a];
-    u.assign(axes, 0);
-    if (held) {
-      multiply_stiffness(model, prescribed, product);
-      for (std::size_t r = 0; r < axes; ++r)
-        u[r] = f[r] - product[r];
-      solve(*held, u);
+        wanted[k++] = d[a];
+    const auto spread = [&](std::span<const double> values, double factor) {
+      std::size_t at = 0;
+      for (const auto& entry : now.displacement)
+        for (int a = 0; a < 3; ++a)
+          prescribed[axis_of(entry.first, a)] = factor * values[at++];
+    };
+    std::vector<double> coefficients, rest;
+    const bool rigid = held_modes.express(wanted, coefficients, rest);
+    std::vector<double> shape;
+    if (rigid || held_modes.open()) {
+      if (base.empty() || base_gravity != now.gravity || base_force != now.force) {
+        held_shape(f, prescribed, base);
+        base_gravity = now.gravity;
+        base_force = now.force;
+      }
+      if (!rigid) {
+        const double length = [&] {
+          double square = 0;
+          for (const double r : rest)
+            square += r * r;
+          return std::sqrt(square);
+        }();
+        spread(rest, 1 / length);
+        std::vector<double> answer;
+        held_shape({}, prescribed, answer);
+        for (double& r : rest)
+          r /= length;
+        held_modes.add(rest, std::move(answer));
+        coefficients.push_back(length);
+      }
+      shape = base;
+      held_modes.answer(coefficients, shape);
+    } else {
+      held_modes.give_up();
+      spread(wanted, 1);
+      held_shape(f, prescribed, shape);
+    }
+    for (const auto& [node, d] : now.displacement)
+      for (int a = 0; a < 3; ++a)
+        shape[axis_of(node, a)] = d[a];
+    std::vector<double> product(axes, 0);
+    multiply_stiffness(model, shape, product);
+    forces.clear();
+    for (const auto& entry : now.displacement) {
+      Vec3 force;
+      for (int a = 0; a < 3; ++a)
+        if (!is_fixed(model, entry.first, a))
+          force[a] = product[axis_of(entry.first, a)] - f[axis_of(entry.first, a)];
+      forces.push_back({entry.first, force});
+    }
+    u = std::move(shape);
+    by_block = false;
+    shape_known = true;
+  }
+
+  // ---- the shape
+
+  /// Less than the largest size of an entry of the shape.
+  double least_size(const Load& now) {
+    double size = 0;
+    for (const auto& entry : now.displacement)
+      for (int a = 0; a < 3; ++a)
+        size = std::max(size, std::abs(entry.second[a]));
+    if (size > 0 || now.force.empty())
+      return size;
+    std::vector<std::size_t> where;
+    for (const auto& entry : now.force)
+      for (int a = 0; a < 3; ++a)
+        where.push_back(axis_of(entry.first, a));
+    const double most = largest_size(outer_at(now, where));
+    return std::isfinite(most) ? most : 0;
+  }
+
+  void make_shape(double tolerance) {
+    const Load& now = load;
+    if (now.displacement.empty()) {
+      // Where sums may leave something out, they are made for this load alone.
+      if (tolerance > 0 && !outer_known(now) && compliance.columns_pay(nodes_of(now.force))) {
+        renew_weight(now.gravity);
+        const double allowed = tolerance * least_size(now);
+        u = weight;
+        u.resize(axes, 0);
+        compliance.add(as_vectors(now.force), allowed, u);
+        return;
+      }
+      renew_outer(now);
+      u = outer;
+      return;
+    }
+    if (!shape_by_modes(now)) {
+      std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+      if (outer_known(now) || compliance.columns_pay(nodes)) {
+        renew_outer(now);
+        u = outer;
+        compliance.add(forces, tolerance * least_size(now), u);
+      } else {
+        u = outer_load(now);
+        for (const NodeVector& contact : forces)
+          for (int a = 0; a < 3; ++a)
+            u[axis_of(contact.node, a)] += contact.value[a];
+        compliance.solve(u);
+      }
     }
     for (const auto& [node, d] : now.displacement)
       for (int a = 0; a < 3; ++a)
         u[axis_of(node, a)] = d[a];
-    multiply_stiffness(model, u, product);
-    forces.clear();
-    for (const auto& [node, d] : now.displacement) {
-      Vec3 force;
-      for (int a = 0; a < 3; ++a)
-        if (!is_fixed(model, node, a))
-          force[a] = product[axis_of(node, a)] - f[axis_of(node, a)];
-      forces.push_back({node, force});
-    }
   }
 
-  void measure(const Load& now) {
+  void need_shape() {
+    if (shape_known)
+      return;
+    make_shape(options.tolerance);
+    ++counts.shapes;
+    double sum = 0;
+    for (const double value : u)
+      sum += std::abs(value);
+    if (!std::isfinite(sum))
+      throw Error("the shape is not finite, expected a smaller load");
+    if (options.measure_error)
+      measure();
+    shape_known = true;
+  }
+
+  void measure() {
+    const Load& now = load;
+    if (options.tolerance > 0) {
+      std::vector<double> taken = u;
+      make_shape(0);
+      double worst = 0;
+      for (std::size_t r = 0; r < axes; ++r)
+        worst = std::max(worst, std::abs(taken[r] - u[r]));
+      const double size = largest_size(u);
+      if (size > 0)
+        counts.shape_error = std::max(counts.shape_error, worst / size);
+      std::swap(taken, u);
+    }
     if (!norm)
       norm = stiffness_norm(stiffness_matrix(model));
     std::vector<double> f = outer_load(now), product(axes, 0);
@@ -428,39 +593,116 @@ struct Elastostatic::State {
       ++counts.unchanged;
       return;
     }
-    if (now.displacement.empty()) {
-      renew_outer(now);
-      u = outer;
-      forces.clear();
-    } else {
-      bool done = false;
-      if (block_is_cheaper(now)) {
-        renew_outer(now);
-        done = contact_by_block(now);
-      }
-      if (!done)
+    shape_known = false;
+    std::vector<NodeVector> before = std::move(forces);
+    forces.clear();
+    try {
+      if (!now.displacement.empty() && !(block_is_cheaper(now) && contact_by_block(now)))
         contact_by_constraints(now);
-      for (const auto& [node, d] : now.displacement)
-        for (int a = 0; a < 3; ++a)
-          u[axis_of(node, a)] = d[a];
+      double sum = 0;
+      for (const NodeVector& f : forces)
+        sum += std::abs(f.value.x) + std::abs(f.value.y) + std::abs(f.value.z);
+      if (!std::isfinite(sum))
+        throw Error("the contact forces are not finite, expected a smaller load");
+    } catch (...) {
+      forces = std::move(before);
+      throw;
     }
-    double sum = 0;
-    for (const double value : u)
-      sum += std::abs(value);
-    if (!std::isfinite(sum))
-      throw Error("the shape is not finite, expected a smaller load");
-    if (options.measure_error)
-      measure(now);
     load = now;
+    if (shape_known) {
+      ++counts.shapes;
+      if (options.measure_error)
+        measure();
+    }
+  }
+
+  // ---- for who finds forces by conditions
+
+  ContactSpace space(const Load& now, std::span<const std::uint32_t> nodes) {
+    update(now);
+    ContactSpace space;
+    space.nodes.assign(nodes.begin(), nodes.end());
+    std::vector<std::size_t> where;
+    for (const std::uint32_t node : nodes)
+      for (int a = 0; a < 3; ++a)
+        where.push_back(axis_of(node, a));
+    const std::size_t size = where.size();
+    space.compliance.resize(size * size);
+    const auto symmetric = [&](const auto& entry) {
+      for (std::size_t c = 0; c < size; ++c)
+        for (std::size_t r = c; r < size; ++r)
+          space.compliance[c * size + r] = space.compliance[r * size + c] = entry(c, r);
+    };
+    const auto node_at = [&](std::size_t row) { return nodes[row / 3]; };
+    const auto axis_at = [&](std::size_t row) { return static_cast<int>(row % 3); };
+    if (!now.displacement.empty() && !by_block) {
+      space_by_constraints(nodes);
+      symmetric([&](std::size_t c, std::size_t r) {
+        return held_columns->entry(node_at(c), axis_at(c), where[r]);
+      });
+      for (const std::size_t axis : where)
+        space.free.push_back(u[axis]);
+      return space;
+    }
+    std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
+    for (const Contact& c : contacts)
+      if (!now.displacement.empty())
+        all.push_back(c.node);
+    if (all.size() > compliance.capacity())
+      throw Error("the columns of " + std::to_string(all.size()) +
+                  " nodes in contact do not fit in memory, expected more of it or fewer contacts");
+    compliance.need(all);
+    symmetric([&](std::size_t c, std::size_t r) {
+      return compliance.entry(node_at(c), axis_at(c), where[r]);
+    });
+    space.free = outer_at(now, where);
+    if (now.displacement.empty())
+      return space;
+    // The displaced nodes give way to nothing: C - C_ch C_hh⁻¹ C_hc.
+    const std::vector<std::size_t> held_axes = contact_axes();
+    std::vector<double> across(held_axes.size() * size), answer;
+    for (std::size_t c = 0; c < size; ++c)
+      for (std::size_t k = 0; k < held_axes.size(); ++k)
+        across[c * held_axes.size() + k] = compliance.entry(node_at(c), axis_at(c), held_axes[k]);
+    const auto column = [&](std::size_t c) {
+      return std::span(across).subspan(c * held_axes.size(), held_axes.size());
+    };
+    for (std::size_t c = 0; c < size; ++c) {
+      answer.assign(column(c).begin(), column(c).end());
+      block.solve(answer);
+      for (std::size_t r = c; r < size; ++r) {
+        double sum = 0;
+        for (std::size_t k = 0; k < answer.size(); ++k)
+          sum += answer[k] * column(r)[k];
+        space.compliance[c * size + r] -= sum;
+        if (r > c)
+          space.compliance[r * size + c] = space.compliance[c * size + r];
+      }
+      for (std::size_t k = 0; k < held_axes.size(); ++k)
+        space.free[c] += column(c)[k] * contact_force[k];
+    }
+    return space;
+  }
+
+  void space_by_constraints(std::span<const std::uint32_t> nodes) {
+    if (!held_columns)
+      held_columns.emplace(
+          model.nodes.size(), nullptr,
+          [this](std::span<const std::uint32_t> some, std::span<double> columns) {
+            std::fill(columns.begin(), columns.end(), 0.0);
+            for (std::size_t k = 0; k < some.size(); ++k)
+              for (int a = 0; a < 3; ++a)
+                columns[(3 * k + static_cast<std::size_t>(a)) * axes + axis_of(some[k], a)] = 1;
+            solve_held(columns, 3 * some.size());
+          },
+          static_cast<double>(context.max_memory) / 4, false);
+    held_columns->need(nodes);
   }
 };
 
 Elastostatic::Elastostatic(const Model& model, StiffnessParts parts, const Context& context,
                            const ElastostaticOptions& options)
-    : state_(std::make_unique<State>(model, std::move(parts), context, options)) {
-  if (!state_->parts.factor)
-    (void)state_->whole();
-}
+    : state_(std::make_unique<State>(model, std::move(parts), context, options)) {}
 Elastostatic::~Elastostatic() = default;
 Elastostatic::Elastostatic(Elastostatic&&) noexcept = default;
 
@@ -468,7 +710,8 @@ void Elastostatic::update(const Load& load) {
   state_->update(load);
 }
 
-std::span<const double> Elastostatic::displacement() const noexcept {
+std::span<const double> Elastostatic::displacement() {
+  state_->need_shape();
   return state_->u;
 }
 
@@ -476,35 +719,18 @@ const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
   return state_->forces;
 }
 
-const ElastostaticCounts& Elastostatic::counts() const noexcept {
-  return state_->counts;
+ContactSpace Elastostatic::contact_space(const Load& load, std::span<const std::uint32_t> nodes) {
+  return state_->space(load, nodes);
 }
 
-LinearRange linear_range(const Model& model, std::span<const double> displacement) {
-  const auto moved = [&](std::uint32_t node) {
-    return Vec3{displacement[axis_of(node, 0)], displacement[axis_of(node, 1)],
-                displacement[axis_of(node, 2)]};
-  };
-  LinearRange range;
-  for (std::size_t s = 0; s < model.springs.size(); ++s) {
-    const Spring& spring = model.springs[s];
-    if (spring.kind != SpringKind::edge)
-      break; // edges come first
-    const Vec3 along = model.nodes[spring.j].position - model.nodes[spring.i].position;
-    const Vec3 by = moved(spring.j) - moved(spring.i);
-    const double length = norm(along);
-    const double strain = std::abs(norm(along + by) - length) / length;
-    const double turn = norm(by - along * (dot(by, along) / (length * length))) / length;
-    if (strain > range.strain) {
-      range.strain = strain;
-      range.strain_spring = s;
-    }
-    if (turn > range.turn) {
-      range.turn = turn;
-      range.turn_spring = s;
-    }
-  }
-  return range;
+ElastostaticCounts Elastostatic::counts() const noexcept {
+  ElastostaticCounts counts = state_->counts;
+  counts.solves += state_->compliance.solves();
+  counts.factors += state_->compliance.factors();
+  counts.columns_read = state_->compliance.cache().columns_read();
+  counts.terms = state_->compliance.cache().taken();
+  counts.skipped = state_->compliance.cache().skipped();
+  return counts;
 }
 
 } // namespace gewebe

@@ -2,46 +2,59 @@
 // The elastostatic method (fast finite elements; Bro-Nielsen 1998, report 3.3.2, 3.3.3): the shape
 // follows the load at once, u = C f with C = K⁻¹ of the model linearised at rest.
 //
-// Prescribed displacements d of m nodes, few: the block C_cc on their free axes gives the forces
-// f_c = C_cc⁻¹ (d - u_c of all other loads). Many: K with these axes held, K_ff u_f = f - K_fc d,
+// Prescribed displacements d of m nodes: the block C_cc on their free axes gives the forces
+// f_c = C_cc⁻¹ (d - u_c of all other loads); its factor follows the set as nodes join and leave.
+// Where columns are not at hand and nodes are many: K with these axes held, K_ff u_f = f - K_fc d,
 // f_c = K_cf u_f + K_cc d. Both are exact; which is cheaper decides. Displaced nodes then stand at
 // exactly d.
+//
+// Forces come first, the shape when it is asked for. What was asked before is not asked again: a
+// grasp that moves rigidly costs as much for a hundred nodes as for twelve.
 
-#include "base/columns.h"
 #include "base/context.h"
 #include "model/model.h"
-#include "sim/factor.h"
+#include "sim/compliance.h"
+#include "sim/linear_range.h"
 #include "sim/load.h"
 
+#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
 
 namespace gewebe {
 
-/// What was computed beforehand. The factor is asked for once, when first needed; without it K is
-/// factorised by the constructor. Columns may be absent or of some nodes.
-struct StiffnessParts {
-  std::function<Factor()> factor;
-  std::unique_ptr<ColumnSource> columns;
-};
-
 /// How an elastostatic object came to its shapes.
 struct ElastostaticCounts {
   std::uint64_t updates = 0, unchanged = 0; ///< asked for; answered without work
+  std::uint64_t shapes = 0;                 ///< computed
   std::uint64_t solves = 0;                 ///< right-hand sides solved with a factor
   std::uint64_t columns_read = 0;           ///< nodes whose columns were read
   std::uint64_t factors = 0;                ///< factorised or loaded
+  std::uint64_t terms = 0, skipped = 0;     ///< of columns and blocks of rows: added, left out
   double backward_error = 0; ///< largest ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖) seen, where it was asked for
   double contact_error = 0; ///< largest miss of a prescribed displacement, over the largest one
+  double shape_error = 0; ///< largest effect of the tolerance on an entry, over the largest entry,
+                          ///< where errors were asked for
 };
 
 struct ElastostaticOptions {
-  bool measure_error = false; ///< the backward error of every new shape
+  bool measure_error = false; ///< backward error, and effect of the tolerance, of every new shape
   /// Displaced nodes up to which the block C_cc is used; by default what is cheaper.
   std::size_t block_limit = SIZE_MAX;
+  /// How much of the largest displacement an entry of a shape may be wrong by, so that blocks of
+  /// rows need not be computed: the sum of what was left out of each row is bounded, not each part
+  /// alone. Forces and displaced nodes are exact.
+  double tolerance = 0;
+};
+
+/// What one must know to find forces at some nodes that have to meet conditions: u = free +
+/// compliance f.
+struct ContactSpace {
+  std::vector<std::uint32_t> nodes;
+  std::vector<double> compliance; ///< (3 m)², by columns; row 3 k + a is axis a of nodes[k]
+  std::vector<double> free;       ///< 3 m
 };
 
 class Elastostatic {
@@ -53,32 +66,29 @@ public:
   ~Elastostatic();
   Elastostatic(Elastostatic&&) noexcept;
 
-  /// The shape under `load`; nothing is done if it is the last one. Only what changed is computed
+  /// The forces under `load`; nothing is done if it is the last one. Only what changed is computed
   /// again. \pre nodes exist, no displacement along an axis that the model holds
-  /// \throw Error if columns can't be read, memory does not suffice, the shape is not finite, or
-  /// displacements are not met within 1e-6 of the largest
+  /// \throw Error if columns can't be read, memory does not suffice, forces are not finite, or
+  /// displacements are not met within 1e-6 of the largest; the load is the one before then
   void update(const Load& load);
 
-  /// 3 n numbers, mm; exactly the prescribed ones at displaced nodes.
-  std::span<const double> displacement() const noexcept;
+  /// The shape: 3 n numbers, mm; exactly the prescribed ones at displaced nodes. Computed by the
+  /// first call behind an update. \throw Error as update, or if the shape is not finite
+  std::span<const double> displacement();
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
-  const ElastostaticCounts& counts() const noexcept;
+  /// What contact at these nodes needs: under `load`, its prescribed displacements held, u at
+  /// `nodes` is free + compliance f for forces f there. \pre as update; nodes ascending, none of
+  /// them displaced by the load   \throw Error as update, and if memory does not hold their columns
+  ContactSpace contact_space(const Load& load, std::span<const std::uint32_t> nodes);
+
+  ElastostaticCounts counts() const noexcept;
 
 private:
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// How far a shape is from where linear elasticity holds: over all edge springs the largest change
-/// of length over length, and the largest turn (displacement of one end against the other, across
-/// the edge, over its length).
-struct LinearRange {
-  double strain = 0, turn = 0;
-  std::size_t strain_spring = 0, turn_spring = 0; ///< where: indices of springs
-};
-LinearRange linear_range(const Model& model, std::span<const double> displacement);
 
 } // namespace gewebe

@@ -36,7 +36,8 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   object->shown = object->load.empty();
   if (method == Method::ffe)
     object->still.emplace(object->model, std::move(parts), context_,
-                          ElastostaticOptions{.measure_error = options_.measure_error});
+                          ElastostaticOptions{.measure_error = options_.measure_error,
+                                              .tolerance = options_.tolerance});
   objects_.push_back(std::move(object));
   if (method == Method::ffe)
     return;
@@ -72,7 +73,8 @@ std::size_t Simulation::find(const std::string& name) const {
 }
 
 std::span<const double> Simulation::displacement(std::size_t object) const {
-  return objects_.at(object)->displacement;
+  shape(*objects_.at(object));
+  return objects_[object]->displacement;
 }
 
 const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) const {
@@ -85,9 +87,13 @@ SimulationCounts Simulation::counts() const {
   for (const auto& object : objects_) {
     if (!object->still)
       continue;
-    const ElastostaticCounts& c = object->still->counts();
+    const ElastostaticCounts c = object->still->counts();
     sum.updates += c.updates;
     sum.unchanged += c.unchanged;
+    sum.shapes += c.shapes;
+    sum.terms += c.terms;
+    sum.skipped += c.skipped;
+    sum.shape_error = std::max(sum.shape_error, c.shape_error);
     sum.solves += c.solves;
     sum.columns_read += c.columns_read;
     sum.factors += c.factors;
@@ -99,8 +105,9 @@ SimulationCounts Simulation::counts() const {
 
 SimulationState Simulation::state() const {
   SimulationState state;
-  for (const auto& object : objects_) {
-    state.strain = std::max(state.strain, linear_range(object->model, object->displacement).strain);
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const auto& object = objects_[i];
+    state.strain = std::max(state.strain, linear_range(object->model, displacement(i)).strain);
     if (object->body == nullptr)
       continue;
     const auto motion =

@@ -67,6 +67,7 @@ using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Rele
 
 struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
+  double tolerance = 0;                           ///< as well
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
 };
 
@@ -129,7 +130,8 @@ public:
   void step(double dt);
   void step_to(double time);
 
-  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes.
+  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes. The shape of an
+  /// elastostatic object is computed when it is first asked for. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
@@ -157,9 +159,11 @@ private:
   void move_bodies(double to);
   void advance(double to);
   template <class Work>
-  void at_object(const Object& object, Work&& work); ///< names object and time in an Error
+  void at_object(const Object& object, Work&& work) const; ///< names object and time in an Error
   void show(Object& object);
-  void warn_of_range(Object& object);
+  void shape(Object& object) const;
+  bool may_leave_range(Object& object, double most) const;
+  void warn_of_range(Object& object) const;
   double integration_step(Body& body);
 
   Context context_;

@@ -32,9 +32,13 @@ struct Simulation::Object {
 
   std::vector<double> displacement;
   std::vector<NodeVector> forces;
-  bool shown = true; // displacement and forces are those of the present state
+  bool shown = true;  // forces are those of the present state, and of ela the displacement
+  bool shaped = true; // of ffe the displacement too
   double shown_time = 0;
   bool warned_range = false;
+  double shortest_edge = 0; // mm; 0: not yet known
+  double looked_at = 0;     // largest displacement when the range was last looked at
+  int not_looked = 0;
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.

@@ -40,7 +40,7 @@ void Simulation::step_to(double time) {
 }
 
 template <class Work>
-void Simulation::at_object(const Object& object, Work&& work) {
+void Simulation::at_object(const Object& object, Work&& work) const {
   try {
     work();
   } catch (const Cancelled&) {
@@ -81,11 +81,14 @@ void Simulation::advance(double to) {
 void Simulation::show(Object& object) {
   if (object.still) {
     object.still->update(load_at(object.load, object.model, time_));
-    const std::span<const double> u = object.still->displacement();
-    object.displacement.assign(u.begin(), u.end());
     object.forces = object.still->contact_forces();
-    if (!object.warned_range)
-      warn_of_range(object);
+    object.shaped = false; // until somebody asks for it
+    // Who never asks is warned too, if the contacts alone may leave the range.
+    double most = 0;
+    for (const auto& [node, d] : object.load.displacement)
+      most = std::max({most, std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    if (!object.warned_range && may_leave_range(object, most))
+      shape(object);
   } else {
     const std::span<const NodeMotion> motion =
         object.body->moving->motion().subspan(object.offset, object.model.nodes.size());
@@ -101,7 +104,37 @@ void Simulation::show(Object& object) {
   object.shown = true;
 }
 
-void Simulation::warn_of_range(Object& object) {
+void Simulation::shape(Object& object) const {
+  if (object.shaped)
+    return;
+  at_object(object, [&] {
+    const std::span<const double> u = object.still->displacement();
+    object.displacement.assign(u.begin(), u.end());
+  });
+  object.shaped = true;
+  if (!object.warned_range)
+    warn_of_range(object);
+}
+
+/// Whether it is worth to look at all edges where the largest displacement is this (mm).
+bool Simulation::may_leave_range(Object& object, double most) const {
+  if (object.shortest_edge == 0)
+    object.shortest_edge = shortest_edge(object.model);
+  // Ends that move less than this against each other can do no harm; beyond, a look at all edges
+  // would cost as much as the shape, so not every time.
+  return !(2 * std::sqrt(3.0) * most <= strain_limit * object.shortest_edge) &&
+         (!(most <= 1.02 * object.looked_at) || ++object.not_looked >= 64);
+}
+
+void Simulation::warn_of_range(Object& object) const {
+  // The range can be left only where something moves far.
+  double most = 0;
+  for (const double u : object.displacement)
+    most = std::max(most, std::abs(u));
+  if (!may_leave_range(object, most))
+    return;
+  object.looked_at = most;
+  object.not_looked = 0;
   const LinearRange range = linear_range(object.model, object.displacement);
   const bool strained = !(range.strain <= strain_limit), turned = !(range.turn <= turn_limit);
   if (!strained && !turned)

@@ -90,8 +90,9 @@ TEST(Simulation, GravityIsOneSolution) {
   s.apply(SetGravity{{0, 0, -9810}});
   s.add_object("a", organ(), Method::ffe); // under the present gravity
   s.step(1);
-  EXPECT_EQ(s.counts().elastostatic.solves, 1U);
+  EXPECT_EQ(s.counts().elastostatic.solves, 0U); // nobody asked for the shape yet
   const Vec3 once = moved(s, 0, 0);
+  EXPECT_EQ(s.counts().elastostatic.solves, 1U);
   s.apply(SetGravity{{0, 0, -2 * 9810}});
   s.step(1);
   EXPECT_LT(norm(moved(s, 0, 0) - 2 * once), 1e-12 * norm(once));

@@ -1,0 +1,33 @@
+#pragma once
+// The inner loop of elastostatics: a sum of columns of the compliance matrix. Compiled once per CPU
+// level; every level gives the same bits, for there is no fused multiplication and each row is
+// summed in the order of the columns. Columns may be float32: they are widened, the sum is double.
+
+#include "base/cpu.h"
+
+#include <cstddef>
+
+namespace gewebe {
+
+/// sum[r] += Σ factor[k] column[k][r] for begin <= r < end.
+template <class Entry>
+using ColumnSum = void (*)(const Entry* const* column, const double* factor, std::size_t count,
+                           double* sum, std::size_t begin, std::size_t end);
+
+void column_sum_baseline(const double* const* column, const double* factor, std::size_t count,
+                         double* sum, std::size_t begin, std::size_t end);
+void column_sum_baseline(const float* const* column, const double* factor, std::size_t count,
+                         double* sum, std::size_t begin, std::size_t end);
+void column_sum_avx2(const double* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end);
+void column_sum_avx2(const float* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end);
+
+template <class Entry>
+ColumnSum<Entry> column_sum(CpuLevel level) {
+  if (level == CpuLevel::baseline)
+    return &column_sum_baseline;
+  return &column_sum_avx2;
+}
+
+} // namespace gewebe

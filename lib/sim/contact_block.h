@@ -1,0 +1,44 @@
+#pragma once
+// The Cholesky factor of the compliance among a set of contacts, C_cc = L Lᵀ, that follows the set:
+// a contact that joins appends its rows, one that leaves takes a rank-3 update of what stands
+// behind it (Golub & Van Loan, Matrix Computations, 6.5).
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class ContactBlock {
+public:
+  std::size_t size() const noexcept { return size_; }
+
+  /// Appends the row `row` of the matrix: its entries with the rows there are, then its diagonal.
+  /// \return false, and nothing changed, if the matrix would not be positive definite \pre
+  /// row.size() == size() + 1
+  bool append(std::span<const double> row);
+
+  /// Removes the rows and columns [first, first + count).
+  void remove(std::size_t first, std::size_t count);
+
+  void clear();
+
+  /// Entry of C_cc as it was appended. \pre i, j < size()
+  double entry(std::size_t i, std::size_t j) const {
+    return i < j ? matrix_[j * (j + 1) / 2 + i] : matrix_[i * (i + 1) / 2 + j];
+  }
+
+  /// x = C_cc⁻¹ x. \pre x.size() == size()
+  void solve(std::span<double> x) const;
+  /// y = C_cc x. \pre x.size() == y.size() == size()
+  void multiply(std::span<const double> x, std::span<double> y) const;
+
+private:
+  double* row(std::size_t i) { return values_.data() + i * (i + 1) / 2; }
+  const double* row(std::size_t i) const { return values_.data() + i * (i + 1) / 2; }
+  std::size_t size_ = 0;
+  std::vector<double> values_, matrix_; ///< L and C_cc by rows, their lower triangles alone
+};
+
+} // namespace gewebe
