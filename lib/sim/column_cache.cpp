@@ -12,13 +12,10 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t rows_at_once = 768;      // whose sums stay in the first cache
+// Rows whose sums stay in the first cache, and fewer where blocks of them may be left out.
+constexpr std::size_t rows_at_once = 3072, bounded_rows = 768;
 constexpr std::size_t worth_threads = 1000000; // products
 constexpr std::size_t solved_at_once = 8;
-
-std::size_t blocks_of(std::size_t rows) {
-  return (rows + rows_at_once - 1) / rows_at_once;
-}
 
 float rounded_up(double value) {
   const auto nearest = static_cast<float>(value);
@@ -28,13 +25,12 @@ float rounded_up(double value) {
 }
 
 template <class Entry>
-std::vector<float> bounds_of(const std::vector<Entry>& columns, std::size_t axes) {
+std::vector<float> bounds_of(const Entry* columns, std::size_t axes) {
   std::vector<float> bounds;
-  bounds.reserve(3 * blocks_of(axes));
   for (std::size_t axis = 0; axis < 3; ++axis)
-    for (std::size_t begin = 0; begin < axes; begin += rows_at_once) {
+    for (std::size_t begin = 0; begin < axes; begin += bounded_rows) {
       Entry most = 0;
-      const std::size_t end = std::min(axes, begin + rows_at_once);
+      const std::size_t end = std::min(axes, begin + bounded_rows);
       for (std::size_t r = begin; r < end; ++r)
         most = std::max(most, std::abs(columns[axis * axes + r]));
       bounds.push_back(rounded_up(static_cast<double>(most)));
@@ -54,7 +50,8 @@ struct ColumnCache::Term {
 
 ColumnCache::ColumnCache(std::size_t nodes, const ColumnSource* source, ColumnSolve solve,
                          double bytes, bool bounded)
-    : axes_(3 * nodes), source_(source), solve_(std::move(solve)), bounded_(bounded) {
+    : axes_(3 * nodes), source_(source), solve_(std::move(solve)), bounded_(bounded),
+      wide_(3 * axes_), narrow_(3 * axes_) {
   const bool single = source_ != nullptr && source_->single();
   const double each = (single ? 12.0 : 24.0) * static_cast<double>(axes_);
   capacity_ = std::max<std::size_t>(2, static_cast<std::size_t>(bytes / each));
@@ -74,15 +71,26 @@ void ColumnCache::make_room(std::size_t count) {
     old.emplace_back(columns.used, node);
   std::sort(old.begin(), old.end());
   for (std::size_t k = 0; kept_.size() + count > capacity_ && k < old.size(); ++k)
-    kept_.erase(old[k].second);
+    drop(old[k].second);
 }
 
-void ColumnCache::keep(std::uint32_t node, Columns columns) {
-  if (bounded_)
-    columns.bound =
-        columns.wide.empty() ? bounds_of(columns.narrow, axes_) : bounds_of(columns.wide, axes_);
+ColumnCache::Columns& ColumnCache::fresh(std::uint32_t node, bool single) {
+  Columns& columns = kept_[node];
+  if (single)
+    columns.narrow = narrow_.take();
+  else
+    columns.wide = wide_.take();
   columns.used = clock_;
-  kept_.insert_or_assign(node, std::move(columns));
+  return columns;
+}
+
+void ColumnCache::drop(std::uint32_t node) {
+  const auto found = kept_.find(node);
+  if (found->second.wide != nullptr)
+    wide_.give_back(found->second.wide);
+  if (found->second.narrow != nullptr)
+    narrow_.give_back(found->second.narrow);
+  kept_.erase(found);
 }
 
 void ColumnCache::need(std::span<const std::uint32_t> nodes) {
@@ -102,40 +110,50 @@ void ColumnCache::need(std::span<const std::uint32_t> nodes) {
     const std::vector<std::uint32_t>& all = source_->nodes();
     const auto k =
         static_cast<std::size_t>(std::lower_bound(all.begin(), all.end(), node) - all.begin());
-    Columns columns;
-    if (source_->single()) {
-      columns.narrow.resize(3 * axes_);
-      source_->read_single(k, columns.narrow);
-    } else {
-      columns.wide.resize(3 * axes_);
-      source_->read(k, columns.wide);
+    Columns& columns = fresh(node, source_->single());
+    try {
+      if (source_->single())
+        source_->read_single(k, {columns.narrow, 3 * axes_});
+      else
+        source_->read(k, {columns.wide, 3 * axes_});
+    } catch (...) {
+      drop(node);
+      throw;
     }
     ++read_;
-    keep(node, std::move(columns));
+    bound(columns);
   }
+  std::vector<double> solved;
   for (std::size_t begin = 0; begin < unknown.size(); begin += solved_at_once) {
     const auto some =
         std::span(unknown).subspan(begin, std::min(solved_at_once, unknown.size() - begin));
-    std::vector<double> solved(3 * axes_ * some.size());
+    solved.resize(3 * axes_ * some.size());
     solve_(some, solved);
     for (std::size_t k = 0; k < some.size(); ++k) {
-      const auto first = solved.begin() + static_cast<std::ptrdiff_t>(3 * axes_ * k);
-      Columns columns;
-      columns.wide.assign(first, first + static_cast<std::ptrdiff_t>(3 * axes_));
-      keep(some[k], std::move(columns));
+      Columns& columns = fresh(some[k], false);
+      std::copy_n(solved.begin() + static_cast<std::ptrdiff_t>(3 * axes_ * k), 3 * axes_,
+                  columns.wide);
+      bound(columns);
     }
   }
+}
+
+void ColumnCache::bound(Columns& columns) const {
+  if (bounded_)
+    columns.bound =
+        columns.wide == nullptr ? bounds_of(columns.narrow, axes_) : bounds_of(columns.wide, axes_);
 }
 
 double ColumnCache::entry(std::uint32_t node, int axis, std::size_t row) const {
   const Columns& columns = kept_.at(node);
   const std::size_t at = static_cast<std::size_t>(axis) * axes_ + row;
-  return columns.wide.empty() ? static_cast<double>(columns.narrow[at]) : columns.wide[at];
+  return columns.wide == nullptr ? static_cast<double>(columns.narrow[at]) : columns.wide[at];
 }
 
 double ColumnCache::add(std::span<const NodeVector> forces, double allowed, const Context& context,
                         std::span<double> sum) const {
-  const std::size_t blocks = blocks_of(axes_);
+  const std::size_t rows = bounded_ ? bounded_rows : rows_at_once;
+  const std::size_t blocks = (axes_ + rows - 1) / rows;
   std::vector<Term> terms;
   terms.reserve(3 * forces.size());
   for (const NodeVector& f : forces) {
@@ -146,10 +164,10 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
       const std::size_t axis = static_cast<std::size_t>(a);
       Term& term = terms.emplace_back();
       term.factor = f.value[a];
-      if (columns.wide.empty())
-        term.narrow = columns.narrow.data() + axis * axes_;
+      if (columns.wide == nullptr)
+        term.narrow = columns.narrow + axis * axes_;
       else
-        term.wide = columns.wide.data() + axis * axes_;
+        term.wide = columns.wide + axis * axes_;
       if (bounded_)
         term.bound = columns.bound.data() + axis * blocks;
     }
@@ -196,7 +214,7 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
         narrow.push_back(t.narrow);
     }
     used[block] = factor.size();
-    const std::size_t begin = block * rows_at_once, end = std::min(axes_, begin + rows_at_once);
+    const std::size_t begin = block * rows, end = std::min(axes_, begin + rows);
     if (!wide.empty())
       column_sum<double>(context.cpu)(wide.data(), factor.data(), wide.size(), sum.data(), begin,
                                       end);

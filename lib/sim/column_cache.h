@@ -4,6 +4,7 @@
 #include "base/columns.h"
 #include "base/context.h"
 #include "sim/load.h"
+#include "sim/slot_pool_internal.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -52,13 +53,15 @@ public:
 
 private:
   struct Columns { ///< of a node, [axis][3 n]; one of both
-    std::vector<double> wide;
-    std::vector<float> narrow;
+    double* wide = nullptr;
+    float* narrow = nullptr;
     std::vector<float> bound; ///< [axis][block], rounded up
     std::uint64_t used = 0;
   };
   struct Term;
-  void keep(std::uint32_t node, Columns columns);
+  Columns& fresh(std::uint32_t node, bool single);
+  void drop(std::uint32_t node);
+  void bound(Columns& columns) const;
   void make_room(std::size_t count);
 
   std::size_t axes_ = 0; ///< 3 n
@@ -66,6 +69,8 @@ private:
   ColumnSolve solve_;
   bool bounded_ = false;
   std::size_t capacity_ = 0;
+  SlotPool<double> wide_;
+  SlotPool<float> narrow_;
   std::unordered_map<std::uint32_t, Columns> kept_;
   std::uint64_t clock_ = 0, read_ = 0;
   mutable std::uint64_t taken_ = 0, skipped_ = 0;

@@ -3,43 +3,50 @@
 
 #include "sim/column_sum.h"
 
-#include <cstring>
-
 namespace gewebe {
 namespace {
 
 using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
 using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
 
-inline void four(const double* at, Four& to) {
-  std::memcpy(&to, at, sizeof to);
+inline const Four& four(const double* at) {
+  return *reinterpret_cast<const Four*>(at);
 }
-inline void four(const float* at, Four& to) {
-  FourSingle narrow;
-  std::memcpy(&narrow, at, sizeof narrow);
-  to = __builtin_convertvector(narrow, Four);
+inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
+  return *reinterpret_cast<Four*>(at);
+}
+
+inline void load(const double* at, Four& to) {
+  to = four(at);
+}
+inline void load(const float* at, Four& to) {
+  to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
 }
 
 template <int Width, class Entry>
 void add(const Entry* const* column, const double* factor, double* sum, std::size_t begin,
          std::size_t end) {
+  const Entry* from[Width];
+  double by[Width];
+  for (int k = 0; k < Width; ++k) {
+    from[k] = column[k];
+    by[k] = factor[k];
+  }
   std::size_t r = begin;
   for (; r + 8 <= end; r += 8) {
-    Four low, high, a, b;
-    four(sum + r, low);
-    four(sum + r + 4, high);
+    Four low = four(sum + r), high = four(sum + r + 4), a, b;
     for (int k = 0; k < Width; ++k) {
-      four(column[k] + r, a);
-      four(column[k] + r + 4, b);
-      low += a * factor[k];
-      high += b * factor[k];
+      load(from[k] + r, a);
+      load(from[k] + r + 4, b);
+      low += a * by[k];
+      high += b * by[k];
     }
-    std::memcpy(sum + r, &low, sizeof low);
-    std::memcpy(sum + r + 4, &high, sizeof high);
+    four(sum + r) = low;
+    four(sum + r + 4) = high;
   }
   for (; r < end; ++r)
     for (int k = 0; k < Width; ++k)
-      sum[r] += static_cast<double>(column[k][r]) * factor[k];
+      sum[r] += static_cast<double>(from[k][r]) * by[k];
 }
 
 /// Eight columns at a time over rows whose sums stay in the first cache: so many streams as the
