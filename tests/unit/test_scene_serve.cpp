@@ -173,13 +173,14 @@ TEST(SceneServe, ARecordOfAnyRunDoesTheSameAgain) {
       const std::string object = pick({"a", "b", "c", "a", "b", "d", "e", "f", "g"});
       const std::string node =
           object == "d" || object == "e" ? pick({"0", "1"}) : pick({"4", "6", "@list", "3", "7"});
-      const std::string number = pick({"0.1", "-0.3", "2", "0", "1e300"});
+      const std::string number = pick({"0.1", "-0.3", "0.2", "0", "0.5", "-1", "-0.2", "1e300"});
       lines.push_back(pick({"", "", "", "at 0.0" + std::to_string(random() % 90) + " "}) +
                       pick({"force " + object + " " + node + " " + number + " 0 " + number,
                             "displace " + object + " " + node + " 0 0 " + number,
                             "displace " + object + " " + node + " 0 0.2 0 over 0.03",
                             "release " + object + " " + node, "release " + object + " all",
-                            "method " + object + " " + pick({"ffe", "ela"}),
+                            "release a all", "release b all", "release c all", "release d all",
+                            "release e all", "method " + object + " " + pick({"ffe", "ela"}),
                             "attach a 4 " + object + " " + node + " 30", "nonsense", "emit shapes",
                             "gravity 0 0 " + pick({"-100", "0"})}));
       if (random() % 2 == 0)
