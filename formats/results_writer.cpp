@@ -1,24 +1,17 @@
 #include "formats/results_writer.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "formats/hdf5_internal.h"
-#include "formats/obj_stl.h"
-#include "formats/ply.h"
+#include "formats/results_mesh.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
 namespace gewebe {
 
 namespace {
-
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 // ---- HDF5 and XDMF
 
@@ -233,69 +226,6 @@ private:
   std::uint64_t frames_ = 0;
 };
 
-// ---- the last shape
-
-class LastShape final : public ResultWriter {
-public:
-  LastShape(Kind kind, const std::string& path, const Output::Options& options)
-      : kind_(kind), output_(path, options) {}
-
-  void add_object(const std::string& /*name*/, const Model& model) override {
-    models_.push_back(&model);
-    last_.emplace_back(3 * model.nodes.size());
-  }
-
-  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
-    for (std::size_t i = 0; i < objects.size(); ++i)
-      last_[i].assign(objects[i].displacement.begin(), objects[i].displacement.end());
-  }
-
-  void commit() override {
-    const TriangleMesh mesh = joined();
-    const auto sink = [&](std::string_view bytes) { output_.write(bytes); };
-    at(output_.name(), [&] {
-      check_mesh(mesh);
-      if (kind_ == Kind::ply)
-        write_ply(mesh, sink);
-      else
-        write_obj(mesh, sink);
-    });
-    output_.commit();
-  }
-
-private:
-  /// All surfaces in one mesh; each is a part where there are several.
-  TriangleMesh joined() const {
-    TriangleMesh all;
-    bool textured = false;
-    for (const Model* model : models_)
-      textured = textured || !model->texcoords.empty();
-    for (std::size_t k = 0; k < models_.size(); ++k) {
-      TriangleMesh mesh = surface_mesh(*models_[k]);
-      const auto shift = static_cast<std::uint32_t>(all.points.size());
-      if (all.points.size() + mesh.points.size() > UINT32_MAX)
-        throw Error("the objects have over 2^32 nodes, expected fewer");
-      for (std::size_t i = 0; i < mesh.points.size(); ++i)
-        all.points.push_back(mesh.points[i] +
-                             Vec3{last_[k][3 * i], last_[k][3 * i + 1], last_[k][3 * i + 2]});
-      for (const Triangle& t : mesh.triangles)
-        all.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-      mesh.texcoords.resize(textured ? mesh.triangles.size() : 0);
-      all.texcoords.insert(all.texcoords.end(), mesh.texcoords.begin(), mesh.texcoords.end());
-      if (models_.size() > 1)
-        all.part.insert(all.part.end(), mesh.triangles.size(), static_cast<std::int32_t>(k));
-      else
-        all.material = std::move(mesh.material);
-    }
-    return all;
-  }
-
-  Kind kind_;
-  Output output_;
-  std::vector<const Model*> models_;
-  std::vector<std::vector<double>> last_;
-};
-
 // ---- forces
 
 class ForceTable final : public ResultWriter {
@@ -303,6 +233,8 @@ public:
   ForceTable(const std::string& path, const Output::Options& options) : output_(path, options) {
     output_.write("time,object,node,fx,fy,fz\n");
   }
+
+  bool wants_models() const override { return false; }
 
   void add_object(const std::string& name, const Model& /*model*/) override {
     names_.push_back(name);
@@ -339,7 +271,7 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
   case Kind::csv:
     return std::make_unique<ForceTable>(path, options);
   default:
-    return std::make_unique<LastShape>(kind, path, options);
+    return open_mesh_result(kind, path, options);
   }
 }
 

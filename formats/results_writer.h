@@ -1,6 +1,6 @@
 #pragma once
-// What a run leaves: gewebe_results(5). HDF5 with an XDMF beside it, the last shape as a mesh, or
-// the contact forces as CSV.
+// What a run leaves: gewebe_results(5). HDF5 with an XDMF beside it, the last shape or every
+// shape as a mesh, or the contact forces as CSV.
 
 #include "formats/kind.h"
 #include "formats/stream.h"
@@ -27,18 +27,21 @@ public:
   ResultWriter& operator=(const ResultWriter&) = delete;
   virtual ~ResultWriter() = default;
 
+  /// Whether it writes shapes; else models may be empty, and displacements too.
+  virtual bool wants_models() const { return true; }
   /// An object that is in all frames to come; in those before it was at rest. Names differ and need
   /// no quoting. The model must live as long as the writer.
   virtual void add_object(const std::string& name, const Model& model) = 0;
   /// \pre as many objects as were added, in their order
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
-  /// Nothing appears without it. \throw Error
+  /// Nothing appears without it, but for the files of a series. \throw Error
   virtual void commit() = 0;
 };
 
 /// The kinds that there are: h5, ply, obj, csv.
 const std::vector<Kind>& result_kinds();
 
+/// A ply or obj whose path holds a pattern, %d or %04d, is a series: one file for each frame.
 /// \throw Error, UsageError as Output; h5 needs a file, and writes PATH with suffix .xdmf beside it
 std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
                                           const Output::Options& options);

@@ -26,34 +26,6 @@ std::string shown(std::string_view word) {
   return text + (word.size() > 40 ? "…'" : "'");
 }
 
-/// Words between blanks; quotes may stand around a word or a part of it and hold blanks and #.
-std::vector<std::string> split(std::string_view line) {
-  std::vector<std::string> words;
-  for (std::size_t at = 0; at < line.size();) {
-    if (is_blank(line[at])) {
-      ++at;
-      continue;
-    }
-    if (line[at] == '#')
-      break;
-    std::string& word = words.emplace_back();
-    while (at < line.size() && !is_blank(line[at]) && line[at] != '#') {
-      if (line[at] != '"') {
-        word += line[at++];
-        continue;
-      }
-      const std::size_t close = line.find('"', at + 1);
-      if (close == std::string_view::npos)
-        throw Error("a quote without an end, expected one more '\"'");
-      word += line.substr(at + 1, close - at - 1);
-      at = close + 1;
-    }
-    if (word.find('\0') != std::string::npos)
-      throw Error("a zero byte, expected text");
-  }
-  return words;
-}
-
 /// Takes the words of a line one by one; the complaints name what the command looks like.
 class Words {
 public:
@@ -158,10 +130,6 @@ What parse_object(Words& in) {
     else
       in.fail(shown(word) + " is no use here");
   }
-  if (method == Method::ela && !c.store.empty())
-    throw Error("method=ela has no use for a store, expected one of them");
-  if (c.implicit && (method == Method::ffe || !c.store.empty()))
-    throw Error("integration=implicit is for method=ela, expected one of them");
   c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
   return c;
 }
@@ -252,6 +220,20 @@ What parse_run(Words& in) {
   return c;
 }
 
+What parse_method(Words& in) {
+  MethodCommand c;
+  c.object = in.name();
+  const std::string& word = in.word("method");
+  if (word != "ffe" && word != "ela")
+    in.fail(shown(word) + " is no method");
+  c.method = word == "ffe" ? Method::ffe : Method::ela;
+  return c;
+}
+
+What parse_renew(Words& in) {
+  return RenewCommand{in.name()};
+}
+
 struct Verb {
   std::string_view name;
   const char* usage;
@@ -259,8 +241,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 11>& verbs() {
-  static const std::array<Verb, 11> all{{
+const std::array<Verb, 13>& verbs() {
+  static const std::array<Verb, 13> all{{
       {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
@@ -269,10 +251,12 @@ const std::array<Verb, 11>& verbs() {
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
       {"release", "release NAME NODES", true, parse_release},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
+      {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
       {"emit", "emit shapes|forces", true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
+      {"renew", "renew NAME", false, parse_renew},
   }};
   return all;
 }
@@ -302,8 +286,45 @@ What parse_command(std::vector<std::string> line, bool behind_at) {
 
 } // namespace
 
+std::vector<std::string> scene_words(std::string_view line) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < line.size();) {
+    if (is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    if (line[at] == '#')
+      break;
+    std::string& word = words.emplace_back();
+    while (at < line.size() && !is_blank(line[at]) && line[at] != '#') {
+      if (line[at] != '"') {
+        word += line[at++];
+        continue;
+      }
+      const std::size_t close = line.find('"', at + 1);
+      if (close == std::string_view::npos)
+        throw Error("a quote without an end, expected one more '\"'");
+      word += line.substr(at + 1, close - at - 1);
+      at = close + 1;
+    }
+    if (word.find('\0') != std::string::npos)
+      throw Error("a zero byte, expected text");
+  }
+  return words;
+}
+
+std::string scene_line(const std::vector<std::string>& words) {
+  std::string line;
+  for (const std::string& word : words) {
+    const bool quoted = word.empty() || std::any_of(word.begin(), word.end(),
+                                                    [](char c) { return is_blank(c) || c == '#'; });
+    line += (line.empty() ? "" : " ") + (quoted ? '"' + word + '"' : word);
+  }
+  return line;
+}
+
 std::optional<Command> parse_scene_line(std::string_view line) {
-  std::vector<std::string> words = split(line);
+  std::vector<std::string> words = scene_words(line);
   if (words.empty())
     return std::nullopt;
   Command command;

@@ -4,7 +4,9 @@
 #include "sim/command.h"
 
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace gewebe {
 
@@ -12,5 +14,10 @@ namespace gewebe {
 /// whether objects and files exist is for the run to find out.
 /// \throw Error without place, what is wrong and what was expected
 std::optional<Command> parse_scene_line(std::string_view line);
+
+/// The words of a line without their quotes and the comment, and a line that has these words.
+/// \throw Error without place
+std::vector<std::string> scene_words(std::string_view line);
+std::string scene_line(const std::vector<std::string>& words);
 
 } // namespace gewebe

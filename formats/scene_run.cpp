@@ -2,53 +2,38 @@
 
 #include "base/digest.h"
 #include "base/error.h"
-#include "formats/ela.h"
+#include "formats/event_log.h"
+#include "formats/frames_binary.h"
 #include "formats/scene.h"
-#include "formats/stiffness_store.h"
+#include "formats/scene_answer.h"
+#include "formats/scene_changes.h"
+#include "formats/scene_record.h"
+#include "formats/step_latency.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <exception>
 #include <istream>
+#include <map>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
 
 namespace gewebe {
 
 namespace {
 
-constexpr std::size_t longest_line = 1U << 20U;
+constexpr std::size_t longest_line = 1U << 24U;
 constexpr double most_samples = 1e9;
-
-void append(std::string& text, double value) {
-  std::array<char, 32> number{};
-  text.append(number.data(),
-              std::to_chars(number.data(), number.data() + number.size(), value).ptr);
-}
-
-void append(std::string& text, const Vec3& v, char end) {
-  append(text, v.x);
-  text += ' ';
-  append(text, v.y);
-  text += ' ';
-  append(text, v.z);
-  text += end;
-}
+constexpr double default_step = 1.0 / 60;
 
 /// A file that a line names may be wrong in a place of its own: both places count.
-template <class Work>
-auto at_line(const std::string& name, std::uint64_t line, Work&& work) {
-  try {
-    return work();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(name + ":" + std::to_string(line),
-                (error.place().empty() ? "" : error.place() + ": ") + error.what());
-  }
+std::string with_place(const Error& error) {
+  return (error.place().empty() ? "" : error.place() + ": ") + error.what();
 }
 
-/// A failure of what takes answers and results is no fault of the line.
+/// A failure of what takes answers, results and logs is no fault of the line.
 struct Undelivered {
   std::exception_ptr error;
 };
@@ -62,35 +47,24 @@ void deliver(Work&& work) {
   }
 }
 
-} // namespace
+/// A file of an object, read late, is the fault of the line that named it.
+struct WrongFile {
+  std::uint64_t line = 0;
+  std::string text;
+};
 
-SceneFiles scene_files(const std::string& scene, const Context& context) {
-  const std::size_t slash = scene.find_last_of('/');
-  const std::string folder =
-      scene == "-" || slash == std::string::npos ? "" : scene.substr(0, slash + 1);
-  const auto resolve = [folder](const std::string& name) {
-    if (name == "-")
-      return folder + "./-"; // a file, for the pipe may be the scene's
-    return name.starts_with('/') ? name : folder + name;
-  };
-  SceneFiles files;
-  files.model = [resolve, context](const std::string& name) {
-    Input input(resolve(name), false);
-    return read_ela(input, context);
-  };
-  files.store = [resolve](const std::string& name, const Model& model) {
-    const auto store = std::make_shared<StiffnessStore>(resolve(name));
-    const StiffnessFacts facts = store->facts(model);
-    StiffnessParts parts;
-    parts.columns = store->columns(facts);
-    parts.factor = [store, facts] { return store->factor(facts); };
-    return parts;
-  };
-  files.node_list = [resolve](const std::string& name) {
-    return Input(resolve(name), false).read_all();
-  };
-  return files;
+template <class Work>
+auto of_object(std::uint64_t line, Work&& work) {
+  try {
+    return work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw WrongFile{line, with_place(error)};
+  }
 }
+
+} // namespace
 
 struct SceneRun::State {
   std::string name;
@@ -99,75 +73,80 @@ struct SceneRun::State {
   SceneCounts counts;
   Digest digest;
   std::uint64_t line = 0, steps = 0;
+  std::size_t in_result = 0;                // objects that the result knows
+  std::map<std::string, std::string> lists; // node lists that the line named
+  std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
+  std::uint64_t first_error = 0;
+  std::string first_error_text;
 
   State(std::string n, const Context& context, SceneOptions o)
-      : name(std::move(n)), options(std::move(o)),
-        simulation(context, {.measure_error = options.measure, .warn = options.warn}) {}
+      : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
 
-  std::vector<std::uint32_t> nodes(std::size_t object, const Selector& selector) const {
-    return select_nodes(simulation.model(object), selector, options.files.node_list);
-  }
-
-  void change(const Command& command, const Change& made) {
-    if (command.every)
-      simulation.schedule_every(*command.at, made);
-    else if (command.at)
-      simulation.schedule(*command.at, made);
-    else
-      simulation.apply(made);
+  SimulationOptions simulation_options() {
+    SimulationOptions s;
+    s.measure_error = options.measure_error;
+    s.tolerance = options.tolerance;
+    s.guard = options.serve;
+    // Now, so that one that can't be made is the fault of its step.
+    s.shapes = options.measure_error ||
+               (options.result != nullptr && options.result->wants_models()) ||
+               (options.serve && options.measure);
+    s.rate = options.rate;
+    if (options.warn)
+      s.warn = [this](const std::string& text) {
+        if (options.events != nullptr)
+          options.events->message(simulation.time(), "warning", text);
+        options.warn(text);
+      };
+    if (options.events != nullptr)
+      s.applied = [this](const Change& change) { options.events->change(simulation, change); };
+    return s;
   }
 
   void add(const ObjectCommand& c) {
-    for (std::size_t i = 0; i < simulation.object_count(); ++i)
-      if (simulation.name(i) == c.name)
-        throw Error("there is an object '" + c.name + "' already, expected another name");
-    Model model = options.files.model(c.model);
-    StiffnessParts parts;
-    if (!c.store.empty())
-      parts = options.files.store(c.store, model);
-    counts.nodes += model.nodes.size();
-    simulation.add_object(c.name, std::move(model), c.method, std::move(parts),
-                          c.implicit ? Integration::implicit : Integration::semi_implicit);
-    if (options.result != nullptr)
-      deliver([&] {
-        options.result->add_object(c.name, simulation.model(simulation.object_count() - 1));
+    if (options.files.check) {
+      options.files.check(c.model);
+      if (!c.store.empty())
+        options.files.check(c.store);
+    }
+    ObjectSource source;
+    source.model = [this, file = c.model, at = line] {
+      return of_object(at, [&] {
+        Model model = options.files.model(file);
+        ++counts.models;
+        counts.nodes += model.nodes.size();
+        return model;
       });
+    };
+    source.stiffness = [this, file = c.store, at = line](const Model& model) {
+      StiffnessParts parts;
+      if (file.empty())
+        return parts;
+      parts = of_object(at, [&] { return options.files.store(file, model); });
+      ++counts.stores;
+      if (parts.factor)
+        parts.factor = [at, factor = parts.factor] { return of_object(at, factor); };
+      return parts;
+    };
+    simulation.add_object(c.name, std::move(source), c.method,
+                          c.implicit ? Integration::implicit : Integration::semi_implicit);
+    if (options.events != nullptr)
+      options.events->object(simulation.time(), c.name, c.model, c.method);
   }
 
   void execute(const Command& command) {
     if (const auto* const object = std::get_if<ObjectCommand>(&command.what)) {
       add(*object);
-    } else if (const auto* const force = std::get_if<ForceCommand>(&command.what)) {
-      SetForce set{simulation.find(force->object), {}, force->force, force->period};
-      set.nodes = nodes(set.object, force->nodes);
-      if (force->total)
-        set.force = set.force / static_cast<double>(set.nodes.size());
-      change(command, set);
-    } else if (const auto* const displace = std::get_if<DisplaceCommand>(&command.what)) {
-      SetDisplacement set{
-          simulation.find(displace->object), {}, displace->displacement, displace->over};
-      set.nodes = nodes(set.object, displace->nodes);
-      change(command, set);
-    } else if (const auto* const pressure = std::get_if<PressureCommand>(&command.what)) {
-      SetPressure set{
-          simulation.find(pressure->object), {}, {pressure->pressure, pressure->period}};
-      set.nodes = nodes(set.object, pressure->nodes);
-      change(command, set);
-    } else if (const auto* const tie = std::get_if<AttachCommand>(&command.what)) {
-      Attach set{simulation.find(tie->object), {}, simulation.find(tie->other), {}, tie->stiffness};
-      set.nodes = nodes(set.object, tie->nodes);
-      set.others = nodes(set.other, tie->others);
-      change(command, set);
-    } else if (const auto* const release = std::get_if<ReleaseCommand>(&command.what)) {
-      Release set{simulation.find(release->object), {}};
-      set.nodes = nodes(set.object, release->nodes);
-      change(command, set);
-    } else if (const auto* const gravity = std::get_if<GravityCommand>(&command.what)) {
-      change(command, SetGravity{gravity->gravity});
-    } else if (const auto* const timestep = std::get_if<TimestepCommand>(&command.what)) {
-      change(command, SetTimestep{timestep->dt});
-    } else if (const auto* const emit = std::get_if<EmitCommand>(&command.what)) {
-      change(command, Emit{emit->forces});
+    } else if (const std::optional<Change> change =
+                   scene_change(command, simulation, [&](const std::string& list) {
+                     return lists[list] = options.files.node_list(list);
+                   })) {
+      if (command.every)
+        simulation.schedule_every(*command.at, *change);
+      else if (command.at)
+        simulation.schedule(*command.at, *change);
+      else
+        simulation.apply(*change);
     } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
       first_frame();
       simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
@@ -183,36 +162,52 @@ struct SceneRun::State {
     const double exact = span / c.every;
     if (!(exact <= most_samples))
       throw Error("over 1e9 steps, expected fewer");
+    const auto sample = [&](double time) {
+      simulation.step_to(time);
+      under_way = RunCommand{time, c.every};
+      answer();
+    };
     // A hair more than a whole number of steps is rounding; a last one may be shorter.
     const auto count = static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12)));
-    for (std::int64_t k = 1; k < count; ++k) {
-      simulation.step_to(start + static_cast<double>(k) * c.every);
-      answer();
-    }
-    if (!(span == 0)) {
-      simulation.step_to(c.until); // which refuses a past one
-      answer();
-    }
+    for (std::int64_t k = 1; k < count; ++k)
+      sample(start + static_cast<double>(k) * c.every);
+    if (!(span == 0))
+      sample(c.until); // which refuses a past one
   }
 
-  /// The frame before anything moves.
+  /// The frame before anything moves, and what the result must know of new objects.
   void first_frame() {
     if (simulation.object_count() == 0)
       throw Error("there is no object, expected an object command first");
-    if (options.result == nullptr || counts.frames > 0)
+    if (options.result == nullptr)
+      return;
+    static const Model none;
+    for (; in_result < simulation.object_count(); ++in_result) {
+      const Model& model = options.result->wants_models() ? simulation.model(in_result) : none;
+      deliver([&] { options.result->add_object(simulation.name(in_result), model); });
+    }
+    if (counts.frames > 0)
       return;
     std::vector<std::vector<double>> rest;
     std::vector<FrameObject> frame;
-    for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-      rest.emplace_back(3 * simulation.model(i).nodes.size());
-      frame.push_back({rest.back(), {}});
-    }
+    for (std::size_t i = 0; i < simulation.object_count(); ++i)
+      rest.emplace_back(simulation.known(i) ? 3 * simulation.model(i).nodes.size() : 0);
+    for (const std::vector<double>& one : rest)
+      frame.push_back({one, {}});
     deliver([&] { options.result->add_frame(0, frame); });
     ++counts.frames;
   }
 
   void answer() {
     ++steps;
+    if (options.reply)
+      deliver([&] {
+        options.reply(options.binary ? binary_answer(simulation, steps)
+                                     : text_answer(simulation, steps));
+      });
+    simulation.take_jumps();
+    if (options.latency != nullptr)
+      deliver([&] { options.latency->answered(steps, simulation.time()); });
     if (options.result != nullptr) {
       std::vector<FrameObject> frame;
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
@@ -221,69 +216,108 @@ struct SceneRun::State {
       ++counts.frames;
     }
     if (options.measure)
-      measure();
-    if (options.reply)
-      deliver([&] { options.reply(reply()); });
-  }
-
-  std::string reply() const {
-    std::string text = "step " + std::to_string(steps) + " ";
-    append(text, simulation.time());
-    text += '\n';
-    for (std::size_t i = 0; simulation.emits_forces() && i < simulation.object_count(); ++i) {
-      const std::vector<NodeVector>& forces = simulation.contact_forces(i);
-      text += "forces " + simulation.name(i) + " " + std::to_string(forces.size()) + "\n";
-      for (const NodeVector& f : forces) {
-        text += std::to_string(f.node) + " ";
-        append(text, f.value, '\n');
-      }
-    }
-    for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
-      const std::vector<Node>& nodes = simulation.model(i).nodes;
-      const std::span<const double> u = simulation.displacement(i);
-      text += "shapes " + simulation.name(i) + " " + std::to_string(nodes.size()) + "\n";
-      for (std::size_t k = 0; k < nodes.size(); ++k)
-        append(text, nodes[k].position + Vec3{u[3 * k], u[3 * k + 1], u[3 * k + 2]}, '\n');
-    }
-    return text + "done\n";
+      deliver([&] { measure(); });
+    if (options.events != nullptr)
+      deliver([&] { options.events->keep(); });
   }
 
   void measure() {
     digest.add(simulation.time());
     for (std::size_t i = 0; i < simulation.object_count(); ++i) {
       const std::span<const double> u = simulation.displacement(i);
+      const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+      // Whether an object was read must not matter.
+      if (forces.empty() && std::all_of(u.begin(), u.end(), [](double x) { return x == 0; }))
+        continue;
       digest.add(u);
       for (std::size_t k = 0; k < u.size(); k += 3)
         counts.largest_displacement =
             std::max(counts.largest_displacement, norm({u[k], u[k + 1], u[k + 2]}));
-      for (const NodeVector& f : simulation.contact_forces(i)) {
+      for (const NodeVector& f : forces) {
         digest.add(std::uint64_t{f.node});
         digest.add_bytes(&f.value, sizeof f.value);
       }
     }
   }
 
-  static constexpr double default_step = 1.0 / 60;
+  /// The line was carried out.
+  void accept(std::string_view text, const Command& command) {
+    ++counts.commands;
+    deliver([&] {
+      if (options.record != nullptr)
+        options.record->line(text, command, lists);
+      if (options.events != nullptr)
+        options.events->keep();
+    });
+  }
+
+  /// The line was not carried out, or only in part if it asked for many steps.
+  void refuse(std::uint64_t at, const std::string& text) {
+    ++counts.errors;
+    if (first_error == 0) {
+      first_error = at;
+      first_error_text = text;
+    }
+    deliver([&] {
+      if (options.record != nullptr) {
+        if (under_way)
+          options.record->run(under_way->until, under_way->every);
+        for (const std::size_t object : simulation.take_renewed())
+          options.record->renew(simulation.name(object));
+      }
+      if (options.events != nullptr) {
+        options.events->drop();
+        options.events->message(simulation.time(), "error", std::to_string(at) + ": " + text);
+        options.events->keep();
+      }
+      if (!options.serve)
+        throw Error(name + ":" + std::to_string(at), text);
+      if (options.reply) {
+        const std::string said = at == line ? text : "line " + std::to_string(at) + ": " + text;
+        options.reply(options.binary ? binary_error(steps, text_error(line, said))
+                                     : text_error(line, said));
+      }
+    });
+  }
 };
 
 SceneRun::SceneRun(std::string name, const Context& context, SceneOptions options)
     : state_(std::make_unique<State>(std::move(name), context, std::move(options))) {}
 SceneRun::~SceneRun() = default;
 
-void SceneRun::line(std::string_view text) {
+template <class Work>
+void SceneRun::numbered(Work&& work) {
   State& s = *state_;
   ++s.line;
+  s.lists.clear();
+  s.under_way.reset();
   try {
-    at_line(s.name, s.line, [&] {
-      const std::optional<Command> command = parse_scene_line(text);
-      if (!command)
-        return;
-      ++s.counts.commands;
-      s.execute(*command);
-    });
+    try {
+      work();
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      s.refuse(s.line, with_place(error));
+    } catch (const WrongFile& file) {
+      s.refuse(file.line, file.text);
+    }
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
   }
+}
+
+void SceneRun::line(std::string_view text) {
+  numbered([&] {
+    const std::optional<Command> command = parse_scene_line(text);
+    if (!command)
+      return;
+    state_->execute(*command);
+    state_->accept(text, *command);
+  });
+}
+
+void SceneRun::overlong_line() {
+  numbered([] { throw Error("a line of over 16 MiB, expected shorter ones"); });
 }
 
 void SceneRun::finish() {
@@ -291,11 +325,14 @@ void SceneRun::finish() {
   try {
     at(s.name, [&] {
       if (s.counts.commands == 0)
-        throw Error("no command, expected object, step or another, see scene(5)");
+        throw first_error().value_or(
+            Error("no command, expected object, step or another, see scene(5)"));
       s.first_frame();
     });
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
+  } catch (const WrongFile& file) {
+    throw Error(s.name + ":" + std::to_string(file.line), file.text);
   }
   if (!s.options.warn)
     return;
@@ -305,6 +342,17 @@ void SceneRun::finish() {
     s.options.warn(s.name + ": " + std::to_string(s.simulation.pending()) +
                    (s.simulation.pending() == 1 ? " event lies" : " events lie") +
                    " behind the last step and did not happen");
+}
+
+std::optional<Error> SceneRun::first_error() const {
+  const State& s = *state_;
+  if (s.counts.errors == 0)
+    return std::nullopt;
+  return Error(s.name + ":" + std::to_string(s.first_error),
+               s.first_error_text +
+                   (s.counts.errors == 1
+                        ? ""
+                        : " (the first of " + std::to_string(s.counts.errors) + " errors)"));
 }
 
 const Simulation& SceneRun::simulation() const {
@@ -317,22 +365,33 @@ SceneCounts SceneRun::counts() const {
   return counts;
 }
 
+StepLatency* SceneRun::latency() const {
+  return state_->options.latency;
+}
+
 void run_scene(Input& input, SceneRun& run) {
   // The stream's buffer hands out what has come so far and waits only for more.
   std::streambuf& bytes = *input.stream().rdbuf();
   std::string line;
+  bool overlong = false;
   for (;;) {
+    const bool waits = bytes.in_avail() <= 0;
     const auto c = bytes.sbumpc();
+    if (waits && run.latency() != nullptr)
+      run.latency()->line_arrived();
     const bool end = c == std::streambuf::traits_type::eof();
     if (!end && c != '\n') {
-      if (line.size() == longest_line)
-        throw Error(input.name(), "a line of over 1 MiB, expected shorter ones");
-      line += static_cast<char>(c);
+      overlong = overlong || line.size() == longest_line;
+      if (!overlong)
+        line += static_cast<char>(c);
       continue;
     }
-    if (!end || !line.empty())
+    if (overlong)
+      run.overlong_line();
+    else if (!end || !line.empty())
       run.line(line);
     line.clear();
+    overlong = false;
     if (end)
       break;
   }

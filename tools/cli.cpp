@@ -583,6 +583,8 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       if (::write(2, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
         throw Error("cannot write the statistics to standard error");
     }
+    if (run.failure_)
+      throw Error(*run.failure_);
     return 0;
   } catch (const UsageError& error) {
     print_message(s.name, error.what());

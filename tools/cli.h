@@ -75,6 +75,8 @@ public:
   }
   /// `tool: warning: text` on standard error unless -q.
   void warn(const std::string& text);
+  /// The program ends with this message and status 1 once all is reported, --stats too.
+  void fail_at_end(const Error& error) { failure_ = error; }
   /// `tool: text` on standard error with -v.
   void say(const std::string& text);
 
@@ -94,6 +96,7 @@ private:
   std::string output_ = "-", to_, format_;
   bool keep_unchanged_ = false, verbose_ = false, quiet_ = false, stats_wanted_ = false;
   Stats stats_;
+  std::optional<Error> failure_;
 };
 
 /// Refines an option just declared.

@@ -1,16 +1,28 @@
 // ffe-run: scene -> replies, shapes, forces.
 
+#include "formats/event_log.h"
 #include "formats/results_writer.h"
+#include "formats/scene_record.h"
 #include "formats/scene_run.h"
+#include "formats/step_latency.h"
 #include "tools/cli.h"
+#include "tools/run_report.h"
 
-#include <cmath>
 #include <memory>
 #include <optional>
+#include <string>
 
 using namespace gewebe;
 
 namespace {
+
+struct Arguments {
+  std::string scene = "-";
+  bool serve = false, binary = false, verify = false;
+  std::optional<double> rate;
+  double tolerance = 0;
+  std::string events, record, latencies;
+};
 
 /// The kind of result, or unknown where there is none but replies.
 Kind result_kind(const cli::Run& run) {
@@ -22,78 +34,92 @@ Kind result_kind(const cli::Run& run) {
   return kind;
 }
 
-void report(cli::Run& run, const SceneRun& scene) {
-  const SceneCounts counts = scene.counts();
-  const SimulationCounts steps = scene.simulation().counts();
-  const ElastostaticCounts& still = steps.elastostatic;
-  cli::Stats& stats = run.stats();
-  stats.set("commands", counts.commands);
-  stats.set("objects", static_cast<std::uint64_t>(scene.simulation().object_count()));
-  stats.set("nodes", counts.nodes);
-  stats.set("steps", steps.steps);
-  stats.set("frames", counts.frames);
-  stats.set("time", scene.simulation().time());
-  stats.set("integration_steps", steps.integration);
-  stats.set("skipped_at_rest", steps.resting);
-  const std::uint64_t advances = steps.resting + steps.moving;
-  stats.set("sleeping_share",
-            advances == 0 ? 0.0
-                          : static_cast<double>(steps.resting) / static_cast<double>(advances));
-  const SimulationState state = scene.simulation().state();
-  stats.set("kinetic_energy", state.kinetic_energy);
-  stats.set("elastic_energy", state.elastic_energy);
-  stats.set("largest_strain", state.strain);
-  if (std::isfinite(state.safe_step))
-    stats.set("safe_step", state.safe_step);
-  stats.set("updates", still.updates);
-  stats.set("skipped_unchanged", still.unchanged);
-  stats.set("factors", still.factors);
-  stats.set("solves", still.solves);
-  stats.set("columns_read", still.columns_read);
-  stats.set("backward_error", still.backward_error);
-  stats.set("contact_error", still.contact_error);
-  stats.set("largest_displacement", counts.largest_displacement);
-  stats.set("digest", counts.digest);
-}
-
-void work(cli::Run& run, const std::string& path) {
+void work(cli::Run& run, const Arguments& in) {
   const Kind kind = result_kind(run);
   std::unique_ptr<ResultWriter> result;
   if (kind != Kind::unknown)
     result = open_result(kind, run.output(), run.output_options(is_binary(kind)));
   std::optional<Output> replies;
   if (kind == Kind::unknown || (run.output() != "-" && !run.quiet()))
-    replies.emplace("-", Output::Options{.binary = false});
-  Input input(path, false);
+    replies.emplace("-", Output::Options{.binary = in.binary});
+  else if (in.serve || in.binary)
+    throw UsageError(std::string(in.serve ? "--serve" : "--binary") +
+                     " is about answers, of which there are none here, expected it without --to, "
+                     "and without -q beside -o");
+  std::optional<EventLog> events;
+  if (!in.events.empty())
+    events.emplace(in.events, run.output_options(false));
+  StepLatency latency(in.rate.value_or(0));
+  if (!in.latencies.empty())
+    latency.log_to(in.latencies, run.output_options(false));
+  Input input(in.scene, false);
+  std::optional<SceneRecord> record;
+  if (!in.record.empty())
+    record.emplace(in.record, run.output_options(false), input.name());
 
   SceneOptions options;
   options.files = scene_files(input.name(), run.context());
   options.warn = [&](const std::string& text) { run.warn(text); };
+  options.serve = in.serve;
+  options.binary = in.binary;
+  options.rate = in.rate.value_or(0);
   options.result = result.get();
+  options.events = events ? &*events : nullptr;
+  options.record = record ? &*record : nullptr;
+  options.latency = &latency;
   options.measure = run.stats_wanted();
+  options.measure_error = in.verify || (run.stats_wanted() && !in.rate);
+  options.tolerance = in.tolerance;
   if (replies)
-    options.reply = [&](std::string_view text) {
-      replies->write(text);
+    options.reply = [&](std::string_view bytes) {
+      replies->write(bytes);
       replies->stream().flush(); // at once: who asked waits for it
     };
   SceneRun scene(input.name(), run.context(), options);
-  run.timed("run", [&] { run_scene(input, scene); });
+  const auto keep_logs = [&] {
+    if (events)
+      events->commit();
+    if (record)
+      record->commit();
+    latency.commit();
+  };
+  try {
+    run.timed("run", [&] { run_scene(input, scene); });
+  } catch (const Error&) {
+    keep_logs(); // they tell how it came to this
+    throw;
+  }
   run.timed("write", [&] {
     if (result)
       result->commit();
     if (replies)
       replies->commit();
+    keep_logs();
   });
   if (run.stats_wanted())
-    report(run, scene);
+    report_scene(run, scene, latency, {in.rate.value_or(0), options.measure_error});
+  if (in.verify)
+    require_verified(scene, in.tolerance);
+  if (const std::optional<Error> error = scene.first_error())
+    run.fail_at_end(*error);
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
   cli::Program p("ffe-run", "Runs a scene of deformable objects, command by command.");
-  std::string scene = "-";
+  Arguments in;
   p.output_kinds(result_kinds());
-  p.operand("SCENE", scene, "the scene");
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, scene); });
+  p.flag("--serve", in.serve, "answer a wrong line and go on");
+  p.flag("--binary", in.binary, "answer in binary frames of float32");
+  p.option("--events", in.events, "FILE", "who touched what when, as CSV");
+  p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
+  p.option("--tolerance", in.tolerance, "E",
+           "error that shapes may have, of their largest displacement")
+      .range(0, 0.1);
+  p.flag("--verify", in.verify, "fail unless every shape is as exact as it should be");
+  p.option("--rate", in.rate, "HZ", "steps a second that are wanted").positive();
+  p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
+  p.operand("SCENE", in.scene, "the scene");
+  return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }

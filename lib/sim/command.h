@@ -68,12 +68,21 @@ struct RunCommand {
   double until = 0, every = 0; ///< every > 0
 };
 
+struct MethodCommand {
+  std::string object;
+  Method method = Method::ela;
+};
+struct RenewCommand {
+  std::string object;
+};
+
 struct Command {
-  std::optional<double> at; ///< when; absent: now. Never for object, step and run.
+  std::optional<double> at; ///< when; absent: now. Never for object, step, run
+                            ///< and renew.
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
                ReleaseCommand, GravityCommand, TimestepCommand, EmitCommand, StepCommand,
-               RunCommand>
+               RunCommand, MethodCommand, RenewCommand>
       what;
 };
 

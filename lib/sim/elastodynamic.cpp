@@ -161,6 +161,20 @@ void Elastodynamic::set_motion(std::span<const NodeMotion> motion) {
   apply_load();
 }
 
+void Elastodynamic::restore(const State& state) {
+  time_ = state.time;
+  rows_ = state.rows;
+  std::copy(rows_.begin() + static_cast<std::ptrdiff_t>(layout_.movable), rows_.end(),
+            next_.begin() + static_cast<std::ptrdiff_t>(layout_.movable));
+  motion_shown_ = false;
+  resting_ = state.resting;
+}
+
+void Elastodynamic::renew() {
+  if (implicit_)
+    implicit_ = std::make_unique<ImplicitEuler>(model_);
+}
+
 template <class At>
 Vec3 Elastodynamic::outer_force(const Driven& driven, double time, const At& position) const {
   Vec3 force = driven.steady + pulse(time, driven.period) * driven.pulsing;

@@ -71,6 +71,19 @@ public:
   /// Gives the nodes another state; it wakes. \pre as many as nodes; 0 where the model holds them
   void set_motion(std::span<const NodeMotion> motion);
 
+  /// What decides, with the load, how it goes on, but for what is kept to be quick (see renew).
+  struct State {
+    double time = 0;
+    std::vector<NodeRow> rows;
+    bool resting = false;
+  };
+  State state() const { return {time_, rows_, resting_}; }
+  const Load& load() const noexcept { return load_; }
+  /// Goes back. \pre a state of this object under the present load
+  void restore(const State& state);
+  /// Forgets an implicit step's matrix and factor, which serve for several steps.
+  void renew();
+
   /// What holds the displaced nodes: the force on the object, per node in ascending order; 0 along
   /// axes that the model holds.
   std::vector<NodeVector> contact_forces() const;

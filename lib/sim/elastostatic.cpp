@@ -171,6 +171,8 @@ struct Elastostatic::State {
     return changed;
   }
 
+  void forget_outer() { outer_gravity = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
+
   void renew_outer(const Load& now) {
     if (outer_known(now))
       return;
@@ -181,7 +183,7 @@ struct Elastostatic::State {
     if (now.gravity == outer_gravity && changed.size() < now.force.size() &&
         increments < most_increments) {
       fresh = std::move(outer);
-      outer_gravity = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; // unknown, should the sum fail
+      forget_outer(); // should the sum fail
       compliance.add(changed, 0, fresh);
       ++increments;
     } else {
@@ -195,12 +197,13 @@ struct Elastostatic::State {
     outer_force = now.force;
   }
 
-  /// The displacements under all but the contacts, at the axes of `wanted`.
+  /// The displacements under all but the contacts, at the axes of `wanted`. The same bits whatever
+  /// shapes were asked for.
   std::vector<double> outer_at(const Load& now, std::span<const std::size_t> wanted) {
     std::vector<double> values;
     values.reserve(wanted.size());
     const std::vector<std::uint32_t> nodes = nodes_of(now.force);
-    if (!outer_known(now) && compliance.columns_pay(nodes)) {
+    if (compliance.columns_pay(nodes)) {
       renew_weight(now.gravity);
       compliance.need(nodes);
       for (const std::size_t axis : wanted) {
@@ -212,6 +215,8 @@ struct Elastostatic::State {
       }
       return values;
     }
+    if (increments > 0)
+      forget_outer();
     renew_outer(now);
     for (const std::size_t axis : wanted)
       values.push_back(outer[axis]);

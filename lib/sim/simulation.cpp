@@ -10,51 +10,44 @@
 
 namespace gewebe {
 
+using simulation::add_counts;
+
 std::string simulation::number_text(double value) {
   std::array<char, 32> text{};
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+void simulation::add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
+  sum.updates += more.updates;
+  sum.unchanged += more.unchanged;
+  sum.shapes += more.shapes;
+  sum.terms += more.terms;
+  sum.skipped += more.skipped;
+  sum.solves += more.solves;
+  sum.columns_read += more.columns_read;
+  sum.factors += more.factors;
+  sum.backward_error = std::max(sum.backward_error, more.backward_error);
+  sum.contact_error = std::max(sum.contact_error, more.contact_error);
+  sum.shape_error = std::max(sum.shape_error, more.shape_error);
+}
+
 Simulation::Simulation(const Context& context, SimulationOptions options)
-    : context_(context), options_(std::move(options)) {
+    : context_(context), options_(std::move(options)), undo_(std::make_unique<Undo>()) {
   context_.progress = nullptr;
 }
 Simulation::~Simulation() = default;
-
-void Simulation::add_object(const std::string& name, Model model, Method method,
-                            StiffnessParts parts, Integration integration) {
-  for (const auto& other : objects_)
-    if (other->name == name)
-      throw Error("there is an object '" + name + "' already, expected another name");
-  auto object = std::make_unique<Object>();
-  object->name = name;
-  object->model = std::move(model);
-  object->method = method;
-  object->integration = integration;
-  object->displacement.assign(3 * object->model.nodes.size(), 0);
-  object->load.gravity = gravity_;
-  object->shown = object->load.empty();
-  if (method == Method::ffe)
-    object->still.emplace(object->model, std::move(parts), context_,
-                          ElastostaticOptions{.measure_error = options_.measure_error,
-                                              .tolerance = options_.tolerance});
-  objects_.push_back(std::move(object));
-  if (method == Method::ffe)
-    return;
-  try {
-    bodies_.push_back(make_body({objects_.size() - 1}));
-  } catch (...) {
-    objects_.pop_back();
-    throw;
-  }
-}
 
 const std::string& Simulation::name(std::size_t object) const {
   return objects_.at(object)->name;
 }
 
 const Model& Simulation::model(std::size_t object) const {
-  return objects_.at(object)->model;
+  need_model(*objects_.at(object));
+  return objects_[object]->model;
+}
+
+bool Simulation::known(std::size_t object) const {
+  return objects_.at(object)->known;
 }
 
 Method Simulation::method(std::size_t object) const {
@@ -83,30 +76,24 @@ const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) co
 
 SimulationCounts Simulation::counts() const {
   SimulationCounts all = counts_;
-  ElastostaticCounts& sum = all.elastostatic;
   for (const auto& object : objects_) {
-    if (!object->still)
-      continue;
-    const ElastostaticCounts c = object->still->counts();
-    sum.updates += c.updates;
-    sum.unchanged += c.unchanged;
-    sum.shapes += c.shapes;
-    sum.terms += c.terms;
-    sum.skipped += c.skipped;
-    sum.shape_error = std::max(sum.shape_error, c.shape_error);
-    sum.solves += c.solves;
-    sum.columns_read += c.columns_read;
-    sum.factors += c.factors;
-    sum.backward_error = std::max(sum.backward_error, c.backward_error);
-    sum.contact_error = std::max(sum.contact_error, c.contact_error);
+    add_counts(all.elastostatic, object->spent);
+    if (object->still)
+      add_counts(all.elastostatic, object->still->counts());
   }
   return all;
+}
+
+std::vector<std::size_t> Simulation::take_renewed() {
+  return std::exchange(renewed_, {});
 }
 
 SimulationState Simulation::state() const {
   SimulationState state;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const auto& object = objects_[i];
+    if (!object->known)
+      continue;
     state.strain = std::max(state.strain, linear_range(object->model, displacement(i)).strain);
     if (object->body == nullptr)
       continue;

@@ -62,13 +62,43 @@ struct SetTimestep {
 struct Emit {
   bool forces = false; ///< else shapes
 };
+/// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
+/// no velocity; an elastostatic one takes its own shape at once.
+struct SetMethod {
+  std::size_t object = 0;
+  Method method = Method::ela;
+};
+/// Forgets what is kept to be quick (factors, columns, running sums): the next shape is computed
+/// from the load or the state of motion alone.
+struct Renew {
+  std::size_t object = 0;
+};
 using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetGravity,
-                            SetTimestep, Emit>;
+                            SetTimestep, Emit, SetMethod, Renew>;
+
+/// Where what an object consists of comes from: asked for when it is first needed, the stiffness
+/// again after a Renew. What they throw leaves the call that needed it.
+struct ObjectSource {
+  std::function<Model()> model;
+  std::function<StiffnessParts(const Model&)> stiffness{}; ///< none: K is factorised
+};
 
 struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
   double tolerance = 0;                           ///< as well
+  bool shapes = false;                            ///< shapes are wanted of each step, as if emitted
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
+  /// A step or change that throws leaves the state as it was, which costs a copy of what moves.
+  bool guard = false;
+  double rate = 0; ///< steps a second that are wanted; 0: any. Too large contact sets are warned of
+  /// Told of each change as it takes effect, at time().
+  std::function<void(const Change&)> applied{};
+};
+
+/// How far the shape of an object jumped when it became elastostatic.
+struct MethodJump {
+  std::size_t object = 0;
+  double size = 0; ///< mm, of the node that moved most
 };
 
 struct SimulationCounts {
@@ -77,6 +107,7 @@ struct SimulationCounts {
   std::uint64_t resting = 0;       ///< advances that an object at rest did not need
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
+  double largest_jump = 0;         ///< mm, see MethodJump
 };
 
 /// Of the last step.
@@ -98,17 +129,24 @@ public:
   /// simulated by this method; Cancelled
   void add_object(const std::string& name, Model model, Method method, StiffnessParts parts = {},
                   Integration integration = Integration::semi_implicit);
+  /// One of which nothing is read before it is needed: at the latest when something acts on it.
+  /// Until then it rests. \throw Error if there is one of that name
+  void add_object(const std::string& name, ObjectSource source, Method method,
+                  Integration integration = Integration::semi_implicit);
 
   std::size_t object_count() const noexcept { return objects_.size(); }
   const std::string& name(std::size_t object) const;
+  /// Read now if it was not needed before. \throw as its source
   const Model& model(std::size_t object) const;
+  /// Whether its model was needed so far.
+  bool known(std::size_t object) const;
   Method method(std::size_t object) const;
   /// \throw Error naming those there are
   std::size_t find(const std::string& name) const;
 
   /// Takes effect now. \pre objects and nodes exist, numbers are finite
   /// \throw Error if a node should move along an axis that the model holds, or objects can't be
-  /// attached
+  /// attached or change their method
   void apply(const Change& change);
   /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier.
   /// \throw Error as apply, and if the time is past
@@ -130,10 +168,17 @@ public:
   void step(double dt);
   void step_to(double time);
 
-  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes. The shape of an
-  /// elastostatic object is computed when it is first asked for. \throw Error as step
+  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes. Of an object whose
+  /// model was not needed: none. The shape of an elastostatic object is computed when it is first
+  /// asked for. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
+
+  /// Since they were last taken: jumps; and objects for which a call that threw (under guard) did
+  /// what Renew does.
+  const std::vector<MethodJump>& jumps() const noexcept { return jumps_; }
+  void take_jumps() noexcept { jumps_.clear(); }
+  std::vector<std::size_t> take_renewed();
 
   SimulationCounts counts() const;
   SimulationState state() const;
@@ -141,6 +186,7 @@ public:
 private:
   struct Object;
   struct Body;
+  struct Undo;
   struct Tie {
     std::size_t object = 0, other = 0;
     std::uint32_t node = 0, other_node = 0;
@@ -151,8 +197,22 @@ private:
     double origin = 0, period = 0; ///< of a repeated one
     double round = 0;
   };
+  void insert(std::unique_ptr<Object> object);
+  void need_model(Object& object) const;
+  void need_body(std::size_t object);
+  Elastostatic& still_of(Object& object) const;
+  void update_still(Object& object, const Load& load);
   void check(const Change& change) const;
+  void apply_now(const Change& change);
   void attach(const Attach& tie);
+  void set_method(std::size_t index, Method method);
+  void renew(Object& object);
+  template <class Work>
+  void guarded(Work&& work);
+  void open_undo();
+  void take_back() noexcept;
+  void keep_load(Object& object);
+  void keep_body(Body& body);
   void displace(Object& object, const SetDisplacement& set);
   [[noreturn]] void raise(const Body& body) const;
   std::unique_ptr<Body> make_body(std::vector<std::size_t> parts);
@@ -163,6 +223,8 @@ private:
   void show(Object& object);
   void shape(Object& object) const;
   bool may_leave_range(Object& object, double most) const;
+  void show_motion(Object& object);
+  void update_in_time(Object& object);
   void warn_of_range(Object& object) const;
   double integration_step(Body& body);
 
@@ -178,6 +240,9 @@ private:
   double sum_ = 0, lost_ = 0; ///< of the steps so far, and what rounding took from it
   bool emit_forces_ = false, emit_shapes_ = false;
   SimulationCounts counts_;
+  std::vector<MethodJump> jumps_;
+  std::vector<std::size_t> renewed_;
+  std::unique_ptr<Undo> undo_;
 };
 
 } // namespace gewebe

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <tuple>
 #include <utility>
 
 namespace gewebe {
@@ -91,16 +92,19 @@ std::unique_ptr<Simulation::Body> Simulation::make_body(std::vector<std::size_t>
 }
 
 void Simulation::attach(const Attach& tie) {
+  need_body(tie.object);
+  need_body(tie.other);
   Object &a = *objects_[tie.object], &b = *objects_[tie.other];
-  const auto place = [](const Object& o, std::uint32_t node) {
+  const std::size_t ties = ties_.size();
+  const auto position = [](const Object& o, std::uint32_t node) {
     return o.model.nodes[node].position + o.body->moving->motion()[o.offset + node].displacement;
   };
   for (const std::uint32_t node : tie.nodes) {
-    const Vec3 here = place(a, node);
+    const Vec3 here = position(a, node);
     std::uint32_t nearest = tie.others[0];
     double least = HUGE_VAL;
     for (const std::uint32_t other : tie.others) {
-      const Vec3 d = place(b, other) - here;
+      const Vec3 d = position(b, other) - here;
       if (dot(d, d) < least) {
         least = dot(d, d);
         nearest = other;
@@ -113,10 +117,30 @@ void Simulation::attach(const Attach& tie) {
     parts.insert(parts.end(), b.body->parts.begin(), b.body->parts.end());
   std::sort(parts.begin(), parts.end());
   const Body *const first = a.body, *const second = b.body;
-  std::unique_ptr<Body> body = make_body(std::move(parts));
-  std::erase_if(bodies_,
-                [&](const auto& old) { return old.get() == first || old.get() == second; });
-  bodies_.push_back(std::move(body));
+  std::unique_ptr<Body> body;
+  std::vector<std::pair<Object*, std::pair<Body*, std::size_t>>> were;
+  for (const std::size_t part : parts)
+    were.push_back({objects_[part].get(), {objects_[part]->body, objects_[part]->offset}});
+  try {
+    body = make_body(std::move(parts));
+  } catch (...) {
+    ties_.resize(ties);
+    throw;
+  }
+  std::vector<std::unique_ptr<Body>> others;
+  for (auto& one : bodies_)
+    if (one.get() != first && one.get() != second)
+      others.push_back(std::move(one));
+    else if (undo_->open)
+      // Shared, for what can be called can be copied.
+      undo_->note([this, were, old = std::make_shared<std::unique_ptr<Body>>(std::move(one))] {
+        for (const auto& [object, place] : were)
+          std::tie(object->body, object->offset) = place;
+        bodies_.push_back(std::move(*old));
+      });
+  others.push_back(std::move(body));
+  bodies_ = std::move(others);
+  undo_->note([this] { bodies_.pop_back(); });
 }
 
 double Simulation::integration_step(Body& body) {
@@ -137,9 +161,13 @@ double Simulation::integration_step(Body& body) {
 
 void Simulation::move_bodies(double to) {
   const double duration = to - time_;
+  for (std::size_t i = 0; i < objects_.size(); ++i)
+    if (objects_[i]->method == Method::ela && !objects_[i]->load.empty())
+      need_body(i);
   for (const auto& body : bodies_) {
     if (!body->changed)
       continue;
+    keep_body(*body);
     Load load; // of all parts
     for (const std::size_t part : body->parts) {
       const Object& object = *objects_[part];
@@ -165,6 +193,7 @@ void Simulation::move_bodies(double to) {
     body->taken = 0;
     if (body->moving->resting())
       continue;
+    keep_body(*body);
     awake.push_back(body.get());
     step.push_back(integration_step(*body));
   }
@@ -182,6 +211,8 @@ void Simulation::move_bodies(double to) {
   for (Body* const body : awake)
     if (body->failure)
       raise(*body);
+  for (const auto& object : objects_)
+    counts_.resting += object->method == Method::ela && object->body == nullptr ? 1 : 0;
   for (const auto& body : bodies_)
     for (const std::size_t part : body->parts) {
       counts_.integration += body->taken;

@@ -26,7 +26,7 @@ void Simulation::check(const Change& change) const {
   const auto* const set = std::get_if<SetDisplacement>(&change);
   if (set == nullptr)
     return;
-  const Model& model = objects_.at(set->object)->model;
+  const Model& model = this->model(set->object);
   for (const std::uint32_t node : set->nodes)
     for (int a = 0; a < 3; ++a)
       if (is_fixed(model, node, a) && set->displacement[a] != 0)
@@ -36,9 +36,24 @@ void Simulation::check(const Change& change) const {
 
 void Simulation::apply(const Change& change) {
   check(change);
+  // The others can't fail behind their check.
+  if (std::holds_alternative<Attach>(change) || std::holds_alternative<SetMethod>(change))
+    guarded([&] { apply_now(change); });
+  else
+    apply_now(change);
+  if (options_.applied)
+    options_.applied(change);
+}
+
+/// \pre check(change) passes
+void Simulation::apply_now(const Change& change) {
   Object* touched = nullptr;
+  const auto touch = [&](std::size_t object) {
+    touched = objects_.at(object).get();
+    keep_load(*touched);
+  };
   if (const auto* const force = std::get_if<SetForce>(&change)) {
-    touched = objects_.at(force->object).get();
+    touch(force->object);
     for (const std::uint32_t node : force->nodes) {
       touched->load.force_period.erase(node);
       if (force->force == Vec3{}) {
@@ -50,19 +65,19 @@ void Simulation::apply(const Change& change) {
         touched->load.force_period[node] = force->period;
     }
   } else if (const auto* const press = std::get_if<SetPressure>(&change)) {
-    touched = objects_.at(press->object).get();
+    touch(press->object);
     for (const std::uint32_t node : press->nodes)
       if (press->pressure.pressure == 0)
         touched->load.pressure.erase(node);
       else
         touched->load.pressure[node] = press->pressure;
   } else if (const auto* const set = std::get_if<SetDisplacement>(&change)) {
-    touched = objects_.at(set->object).get();
+    touch(set->object);
     displace(*touched, *set);
   } else if (const auto* const tie = std::get_if<Attach>(&change)) {
     attach(*tie);
   } else if (const auto* const release = std::get_if<Release>(&change)) {
-    touched = objects_.at(release->object).get();
+    touch(release->object);
     for (const std::uint32_t node : release->nodes) {
       touched->load.force.erase(node);
       touched->load.force_period.erase(node);
@@ -73,6 +88,7 @@ void Simulation::apply(const Change& change) {
   } else if (const auto* const pull = std::get_if<SetGravity>(&change)) {
     gravity_ = pull->gravity;
     for (const auto& object : objects_) {
+      keep_load(*object);
       object->load.gravity = gravity_;
       object->shown = false;
       if (object->body != nullptr)
@@ -80,6 +96,11 @@ void Simulation::apply(const Change& change) {
     }
   } else if (const auto* const wish = std::get_if<SetTimestep>(&change)) {
     timestep_ = wish->dt;
+  } else if (const auto* const method = std::get_if<SetMethod>(&change)) {
+    set_method(method->object, method->method);
+  } else if (const auto* const again = std::get_if<Renew>(&change)) {
+    touch(again->object);
+    renew(*touched);
   } else if (std::get<Emit>(change).forces) {
     emit_forces_ = true;
   } else {

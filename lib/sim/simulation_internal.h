@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,11 +20,16 @@ namespace simulation {
 /// The shortest text that reads back exactly.
 std::string number_text(double value);
 
+/// Counts add up, errors are the larger ones.
+void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
+
 } // namespace simulation
 
 struct Simulation::Object {
   std::string name;
-  Model model; // never moves: the methods refer to it
+  ObjectSource source;
+  Model model; // never moves: the methods refer to it; empty until it is known
+  bool known = false;
   Method method = Method::ela;
   Load load;
   Integration integration = Integration::semi_implicit;
@@ -32,13 +39,18 @@ struct Simulation::Object {
 
   std::vector<double> displacement;
   std::vector<NodeVector> forces;
+  std::vector<double> before; // displacement and forces of the step before the last
+  std::vector<NodeVector> forces_before;
   bool shown = true;  // forces are those of the present state, and of ela the displacement
-  bool shaped = true; // of ffe the displacement too
+  bool shaped = true; // of ffe the displacement too, under this load
+  Load shown_load, load_before;
   double shown_time = 0;
   bool warned_range = false;
   double shortest_edge = 0; // mm; 0: not yet known
   double looked_at = 0;     // largest displacement when the range was last looked at
   int not_looked = 0;
+  int slow = 0;             // updates in a row that took too long for the rate
+  ElastostaticCounts spent; // of what was renewed
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.
@@ -52,5 +64,36 @@ struct Simulation::Body {
   std::uint64_t taken = 0; // by the last advance
   std::exception_ptr failure;
 };
+
+/// What a failed call takes back: every change of what decides how the scene goes on is noted
+/// before it is made.
+struct Simulation::Undo {
+  bool open = false;
+  std::vector<std::function<void()>> back; // carried out from the last to the first; must not throw
+  std::set<const Body*> kept;              // whose motion was noted
+  std::set<Object*> updated;               // whose elastostatic state moved on
+
+  void note(std::function<void()> one) {
+    if (open)
+      back.push_back(std::move(one));
+  }
+};
+
+/// Does all of the work or, if it throws under guard, nothing.
+template <class Work>
+void Simulation::guarded(Work&& work) {
+  if (!options_.guard || undo_->open) {
+    work();
+    return;
+  }
+  open_undo();
+  try {
+    work();
+  } catch (...) {
+    take_back();
+    throw;
+  }
+  *undo_ = {};
+}
 
 } // namespace gewebe

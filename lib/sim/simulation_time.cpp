@@ -3,6 +3,7 @@
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double strain_limit = 0.1, turn_limit = 0.2;
 constexpr double same_time = 1e-9; // of a step's length
+constexpr int slow_enough = 10;    // updates in a row, the first ones read and factorise
 
 std::string percent(double part) {
   return number_text(std::round(1000 * part) / 10) + " %";
@@ -25,7 +27,7 @@ void Simulation::step(double dt) {
   // Neumaier's sum: ten steps of 0.1 s end at 1 s.
   const double sum = sum_ + dt;
   const double lost = lost_ + (sum_ >= dt ? (sum_ - sum) + dt : (dt - sum) + sum_);
-  advance(std::max(sum + lost, time_));
+  guarded([&] { advance(std::max(sum + lost, time_)); });
   sum_ = sum;
   lost_ = lost;
 }
@@ -34,7 +36,7 @@ void Simulation::step_to(double time) {
   if (!(time >= time_))
     throw Error("the time " + number_text(time) + " s is past, expected " + number_text(time_) +
                 " s or later");
-  advance(time);
+  guarded([&] { advance(time); });
   sum_ = time;
   lost_ = 0;
 }
@@ -59,6 +61,8 @@ void Simulation::advance(double to) {
   };
   while (!events_.empty() && events_.begin()->first <= to + slack) {
     move_to(std::min(events_.begin()->first, to));
+    if (undo_->open)
+      undo_->note([this, due = *events_.begin()] { events_.insert(events_.begin(), due); });
     Event event = std::move(events_.begin()->second);
     events_.erase(events_.begin());
     apply(event.change);
@@ -68,47 +72,98 @@ void Simulation::advance(double to) {
       if (!(next > time_))
         throw Error("the period " + number_text(event.period) +
                     " s is lost in the rounding of the time, expected a longer one");
-      events_.emplace(next, std::move(event));
+      const auto place = events_.emplace(next, std::move(event));
+      undo_->note([this, place] { events_.erase(place); });
     }
   }
   move_to(to);
-  for (const auto& object : objects_)
-    if (!object->shown || (object->still && object->load.changes_until() > object->shown_time))
+  for (const auto& object : objects_) {
+    if (emit_shapes_)
+      need_model(*object);
+    if (!object->shown ||
+        (object->method == Method::ffe && object->load.changes_until() > object->shown_time))
       at_object(*object, [&] { show(*object); });
+    if (!emit_shapes_ && !options_.shapes)
+      continue;
+    if (undo_->open && !object->shaped)
+      undo_->updated.insert(object.get());
+    shape(*object); // now, so that a failure is one of this step
+  }
   ++counts_.steps;
 }
 
 void Simulation::show(Object& object) {
-  if (object.still) {
-    object.still->update(load_at(object.load, object.model, time_));
+  if (object.body != nullptr || !object.load.empty())
+    need_model(object);
+  undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time] {
+    std::swap(object.displacement, object.before);
+    std::swap(object.forces, object.forces_before);
+    std::swap(object.shown_load, object.load_before);
+    object.shown = shown;
+    object.shaped = shaped;
+    object.shown_time = time;
+  });
+  std::swap(object.displacement, object.before);
+  std::swap(object.forces, object.forces_before);
+  std::swap(object.shown_load, object.load_before);
+  object.forces.clear();
+  if (object.method == Method::ffe && (object.still || !object.load.empty())) {
+    object.shown_load = load_at(object.load, object.model, time_);
+    update_in_time(object);
     object.forces = object.still->contact_forces();
     object.shaped = false; // until somebody asks for it
     // Who never asks is warned too, if the contacts alone may leave the range.
     double most = 0;
-    for (const auto& [node, d] : object.load.displacement)
+    for (const auto& [node, d] : object.shown_load.displacement)
       most = std::max({most, std::abs(d.x), std::abs(d.y), std::abs(d.z)});
     if (!object.warned_range && may_leave_range(object, most))
       shape(object);
   } else {
-    const std::span<const NodeMotion> motion =
-        object.body->moving->motion().subspan(object.offset, object.model.nodes.size());
-    for (std::size_t i = 0; i < motion.size(); ++i)
-      for (int a = 0; a < 3; ++a)
-        object.displacement[3 * i + static_cast<std::size_t>(a)] = motion[i].displacement[a];
-    object.forces.clear();
-    for (const NodeVector& f : object.body->moving->contact_forces())
-      if (f.node >= object.offset && f.node - object.offset < object.model.nodes.size())
-        object.forces.push_back({f.node - static_cast<std::uint32_t>(object.offset), f.value});
+    object.displacement.assign(3 * object.model.nodes.size(), 0);
+    object.shaped = true;
+    if (object.body != nullptr)
+      show_motion(object);
   }
   object.shown_time = time_;
   object.shown = true;
+}
+
+void Simulation::show_motion(Object& object) {
+  const std::span<const NodeMotion> motion =
+      object.body->moving->motion().subspan(object.offset, object.model.nodes.size());
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      object.displacement[3 * i + static_cast<std::size_t>(a)] = motion[i].displacement[a];
+  for (const NodeVector& f : object.body->moving->contact_forces())
+    if (f.node >= object.offset && f.node - object.offset < object.model.nodes.size())
+      object.forces.push_back({f.node - static_cast<std::uint32_t>(object.offset), f.value});
+}
+
+void Simulation::update_in_time(Object& object) {
+  const bool watched = options_.rate > 0 && options_.warn && !object.load.displacement.empty();
+  if (!watched || object.slow == slow_enough) {
+    update_still(object, object.shown_load);
+    return;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  update_still(object, object.shown_load);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  object.slow = taken.count() * options_.rate > 1 ? object.slow + 1 : 0;
+  if (object.slow == slow_enough)
+    options_.warn("object " + object.name + " at " + number_text(time_) + " s: its " +
+                  std::to_string(object.load.displacement.size()) +
+                  " displaced nodes are too many for " + number_text(options_.rate) +
+                  " steps a second, the last step took " +
+                  number_text(std::round(1e6 * taken.count()) / 1e3) + " ms for it");
 }
 
 void Simulation::shape(Object& object) const {
   if (object.shaped)
     return;
   at_object(object, [&] {
-    const std::span<const double> u = object.still->displacement();
+    Elastostatic& still = still_of(object);
+    still.update(object.shown_load); // as it is, but where a change of method looked ahead
+    const std::span<const double> u = still.displacement();
     object.displacement.assign(u.begin(), u.end());
   });
   object.shaped = true;

@@ -74,7 +74,7 @@ test_a_wrong_line_ends_the_run_and_leaves_no_result() {
   organ
   local line
   for line in 'cut organ 1 2' 'force organ 0 nan 0 0' 'force organ 999 0 0 1' 'displace organ 0 1 0 0' 'step -1' 'object x none.ela' \
-    'object x organ.ela store=none.h5' 'object x organ.ela store=organ.ela' 'force organ z>9 0 0 1' 'run 0 every 1' 'at 0 step' '"'; do
+    'object x organ.ela store=none.h5' 'force organ z>9 0 0 1' 'run 0 every 1' 'at 0 step' '"'; do
     printf '%s\n' 'object organ organ.ela' 'step' "$line" 'step' >in.scene
     echo old >out.h5
     expect_failure 1 ffe-run ffe-run in.scene -o out.h5 >answers
@@ -189,10 +189,10 @@ test_stored_stiffness_gives_the_same_shape() {
   grep -q '"columns_read":0,' store=factor.h5.json || fail 'columns were read' "$(<store=factor.h5.json)"
   # Of another model, cut off.
   exp2ela --fix 'z<0 or 6' organ.ela -o other.ela
-  printf 'object o other.ela store=columns.h5\nstep\n' >other.scene
+  printf 'object o other.ela store=columns.h5\nforce o 4 0 0 1\nstep\n' >other.scene
   expect_failure 1 ffe-run ffe-run other.scene
   head -c 3000 columns.h5 >cut.h5
-  printf 'object o organ.ela store=cut.h5\nstep\n' >other.scene
+  printf 'object o organ.ela store=cut.h5\nforce o 4 0 0 1\nstep\n' >other.scene
   expect_failure 1 ffe-run ffe-run other.scene
   rm organ.ela other.ela pull.scene other.scene ./*.h5 ./*.json ./*.txt
 }

@@ -76,14 +76,26 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(parsed<AttachCommand>("attach a 1 b z<3 500").stiffness, 500);
   EXPECT_EQ(parsed<AttachCommand>("attach a 1 b z<3 500").other, "b");
   EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela integration=implicit").implicit);
+  // What an object has no use for now it may have by another method.
+  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela store=x method=ela").method, Method::ela);
+  EXPECT_EQ(parsed<MethodCommand>("method a ffe").method, Method::ffe);
+  EXPECT_EQ(parsed<MethodCommand>("method a ela").object, "a");
+  EXPECT_EQ(parsed<RenewCommand>("renew a").object, "a");
+}
+
+TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"force", "a", "z>3 and not 7", "1"},
+        {"object", "", "a#b", "c\td"}})
+    EXPECT_EQ(scene_words(scene_line(words)), words);
+  EXPECT_EQ(scene_words("a\"b c\"d  # e"), (std::vector<std::string>{"ab cd"}));
 }
 
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known = "expected one of object, force, pressure, displace, attach, release, "
-                            "gravity, timestep, emit, "
-                            "step, run, at";
-  for (const char* word :
-       {"instrument", "grasp", "method", "two-step", "cut", "steps", "STEP", "\"\""})
+                            "gravity, method, timestep, emit, "
+                            "step, run, renew, at";
+  for (const char* word : {"instrument", "grasp", "two-step", "cut", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{
       {"object", "no NAME, expected object NAME"},
@@ -97,7 +109,6 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"object a b store=", "'store=' is no use here"},
       {"object a b store=x store=y", "'store=y' is no use here"},
       {"object a b method=ela method=ela", "'method=ela' is no use here"},
-      {"object a b method=ela store=x", "no use for a store"},
       {"object a b c", "'c' is no use here"},
       {"object a \"b", "a quote without an end"},
       {"force a", "no NODES"},
@@ -141,7 +152,10 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"pressure a 1", "expected pressure NAME NODES p [period T]"},
       {"displace a 1 0 0 1 over -1", "a time that is not positive"},
       {"attach a 1 b 2 0", "a stiffness that is not positive"},
-      {"object a b method=ffe integration=implicit", "is for method=ela"},
+      {"method a", "no method, expected method NAME ffe|ela"},
+      {"method a fem", "'fem' is no method"},
+      {"renew", "no NAME, expected renew NAME"},
+      {"at 1 renew a", "'renew' is no command behind at T"},
       {"at 1", "no command, expected at [every] T"},
       {"at 1 step", "'step' is no command behind at T, expected one of force"},
       {"at 1 at 2 step", "'at' is no command behind at T"},
@@ -325,7 +339,8 @@ TEST(SceneRun, EachErrorNamesItsLine) {
       {{"object a m", "force b 1 0 0 1"}, "s:2: there is no object 'b', expected one of a"},
       {{"object a m", "object a m"}, "s:2: there is an object 'a' already"},
       {{"object a none"}, "s:1: none: cannot open"},
-      {{"object a m store=x.h5"}, "s:1: x.h5: is of another model"},
+      {{"object a m store=x.h5", "step", "force a 4 0 0 1", "step"},
+       "s:1: x.h5: is of another model"},
       {{"object a m", "force a 9999 0 0 1"},
        "s:2: selector '9999': node 9999 does not exist, expected 0 to "},
       {{"object a m", "force a z>999 0 0 1"}, "s:2: selector 'z>999' selects no node"},
@@ -338,7 +353,10 @@ TEST(SceneRun, EachErrorNamesItsLine) {
        "s:3: the time 1 s is past, expected 2 s or later"},
       {{"object a m", "step 2", "run 1 every 1"}, "s:3: the time 1 s is past"},
       {{"object a m", "run 1e30 every 1e-9"}, "s:2: over 1e9 steps"},
-      {{"object a two method=ffe"}, "s:1: "}, // nothing holds it
+      {{"object a two method=ffe", "force a 0 1 0 0", "step"},
+       "s:3: object a at 0.016666666666666666 s: the stiffness matrix is singular"},
+      {{"object a m", "object b m", "attach a 4 b 6 1", "method b ffe"},
+       "s:4: object b is attached to a and moves with it, expected one that is attached to none"},
       {{"object a two", "force a 0 1e308 0 0", "step 10"}, "s:3: object a at "},
       {{"object a m", "timestep 1e-30", "force a 4 0 0 1", "step 1"},
        "s:4: object a at 0 s: a step of this length takes over 1e9 integration steps"},
@@ -395,7 +413,7 @@ TEST(SceneRun, LinesComeFromAnInput) {
   Input again(scene.path(), false);
   SceneRun lost(again.name(), Context{}, options);
   EXPECT_THROW(run_scene(again, lost), Error);
-  std::ofstream(scene.path()) << std::string(2 << 20, 'x');
+  std::ofstream(scene.path()) << std::string(17 << 20, 'x');
   Input endless(scene.path(), false);
   SceneRun refused(endless.name(), Context{}, options);
   EXPECT_THROW(run_scene(endless, refused), Error);

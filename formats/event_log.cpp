@@ -1,0 +1,152 @@
+#include "formats/event_log.h"
+
+#include "base/number_text.h"
+
+#include <variant>
+
+namespace gewebe {
+
+namespace {
+
+/// A row of the log; what does not apply stays empty.
+struct Row {
+  double time = 0;
+  std::string what;
+  std::string object;
+  std::vector<std::uint32_t> nodes{};
+  std::optional<Vec3> vector{};
+  std::optional<double> value{};
+  double duration = 0; ///< s; 0: none
+  std::string other{};
+  std::vector<std::uint32_t> others{};
+  std::string text{};
+};
+
+std::string quoted(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text)
+    result += c == '"' ? std::string("\"\"") : std::string(1, c < 0x20 && c >= 0 ? ' ' : c);
+  return result + '"';
+}
+
+std::string csv(const Row& row) {
+  std::string line = number_text(row.time) + "," + row.what + "," + row.object + "," +
+                     node_ranges(row.nodes, ' ') + ",";
+  for (int a = 0; a < 3; ++a)
+    line += (row.vector ? number_text((*row.vector)[a]) : "") + ",";
+  line += (row.value ? number_text(*row.value) : "") + ",";
+  line += (row.duration > 0 ? number_text(row.duration) : "") + "," + row.other + "," +
+          node_ranges(row.others, ' ') + ",";
+  return line + (row.text.empty() ? "" : quoted(row.text)) + "\n";
+}
+
+/// What each change says.
+struct Describe {
+  const Simulation& simulation;
+  Row row{.time = simulation.time(), .what = {}, .object = {}};
+
+  void of(std::size_t object, const char* what) {
+    row.object = simulation.name(object);
+    row.what = what;
+  }
+  void operator()(const SetForce& c) {
+    of(c.object, "force");
+    row.nodes = c.nodes;
+    row.vector = c.force;
+    row.duration = c.period;
+  }
+  void operator()(const SetPressure& c) {
+    of(c.object, "pressure");
+    row.nodes = c.nodes;
+    row.value = c.pressure.pressure;
+    row.duration = c.pressure.period;
+  }
+  void operator()(const SetDisplacement& c) {
+    of(c.object, "displace");
+    row.nodes = c.nodes;
+    row.vector = c.displacement;
+    row.duration = c.over;
+  }
+  void operator()(const Attach& c) {
+    of(c.object, "attach");
+    row.nodes = c.nodes;
+    row.value = c.stiffness;
+    row.other = simulation.name(c.other);
+    row.others = c.others;
+  }
+  void operator()(const Release& c) {
+    of(c.object, "release");
+    row.nodes = c.nodes;
+  }
+  void operator()(const SetGravity& c) {
+    row.what = "gravity";
+    row.vector = c.gravity;
+  }
+  void operator()(const SetTimestep& c) {
+    row.what = "timestep";
+    row.value = c.dt;
+  }
+  void operator()(const Emit& c) {
+    row.what = "emit";
+    row.text = c.forces ? "forces" : "shapes";
+  }
+  void operator()(const SetMethod& c) {
+    of(c.object, "method");
+    row.text = method_name(c.method);
+    if (c.method == Method::ffe && !simulation.jumps().empty() &&
+        simulation.jumps().back().object == c.object)
+      row.value = simulation.jumps().back().size;
+  }
+  void operator()(const Renew& c) { of(c.object, "renew"); }
+};
+
+} // namespace
+
+std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator) {
+  std::string text;
+  for (std::size_t i = 0; i < nodes.size();) {
+    std::size_t last = i;
+    while (last + 1 < nodes.size() && nodes[last + 1] == nodes[last] + 1)
+      ++last;
+    if (!text.empty())
+      text += separator;
+    text += std::to_string(nodes[i]);
+    if (last > i)
+      text += "-" + std::to_string(nodes[last]);
+    i = last + 1;
+  }
+  return text;
+}
+
+EventLog::EventLog(const std::string& path, const Output::Options& options)
+    : output_(path, options) {
+  output_.write("time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text\n");
+}
+
+void EventLog::object(double time, const std::string& name, const std::string& model,
+                      Method method) {
+  rows_.push_back(csv(
+      {.time = time, .what = "object", .object = name, .text = model + " " + method_name(method)}));
+}
+
+void EventLog::change(const Simulation& simulation, const Change& change) {
+  Describe describe{simulation};
+  std::visit(describe, change);
+  rows_.push_back(csv(describe.row));
+}
+
+void EventLog::message(double time, const char* what, std::string_view text) {
+  rows_.push_back(csv({.time = time, .what = what, .object = {}, .text = std::string(text)}));
+}
+
+void EventLog::keep() {
+  for (const std::string& row : rows_)
+    output_.write(row);
+  rows_.clear();
+}
+
+void EventLog::commit() {
+  output_.commit();
+}
+
+} // namespace gewebe

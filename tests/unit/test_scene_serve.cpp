@@ -1,0 +1,281 @@
+// Scenes that are driven: wrong lines, records, events, latencies, series of shapes.
+
+#include "base/digest.h"
+#include "base/error.h"
+#include "formats/event_log.h"
+#include "formats/frames_binary.h"
+#include "formats/results_mesh.h"
+#include "formats/scene_record.h"
+#include "formats/scene_run.h"
+#include "formats/step_latency.h"
+#include "scratch.h"
+#include "sim_models.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <iterator>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::organ;
+
+std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text.find('\n', at);
+    lines.push_back(text.substr(at, end - at));
+    at = end == std::string::npos ? text.size() : end + 1;
+  }
+  return lines;
+}
+
+struct Served {
+  std::string replies, error, digest;
+  std::uint64_t errors = 0;
+};
+
+/// Over files that are named by their last part: m and n organs, two a pair of masses.
+Served serve(const std::vector<std::string>& lines, const std::string& record = "",
+             const std::string& events = "", bool serving = true) {
+  Served out;
+  SceneOptions options;
+  const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
+  options.files.model = [&](const std::string& name) {
+    if (base(name) == "two")
+      return test::two_masses();
+    if (base(name) != "m")
+      throw Error(name, "cannot open");
+    return organ(1);
+  };
+  options.files.store = [](const std::string& name, const Model&) -> StiffnessParts {
+    throw Error(name, "is damaged");
+  };
+  options.files.node_list = [](const std::string&) { return std::string("4 6-7 # nodes\n"); };
+  options.reply = [&](std::string_view text) { out.replies += text; };
+  options.serve = serving;
+  options.measure = true;
+  std::optional<SceneRecord> log;
+  if (!record.empty())
+    options.record = &log.emplace(record, Output::Options{}, "-");
+  std::optional<EventLog> table;
+  if (!events.empty())
+    options.events = &table.emplace(events, Output::Options{.binary = false});
+  Context context;
+  context.threads = 1;
+  SceneRun run("s", context, options);
+  try {
+    for (const std::string& line : lines)
+      run.line(line);
+    run.finish();
+  } catch (const Error& error) {
+    out.error = error.place() + ": " + error.what();
+  }
+  if (log)
+    log->commit();
+  if (table)
+    table->commit();
+  out.errors = run.counts().errors;
+  out.digest = run.counts().digest;
+  return out;
+}
+
+std::string without_errors(const std::string& replies) {
+  std::string text;
+  for (const std::string& line : lines_of(replies))
+    if (!line.starts_with("error "))
+      text += line + "\n";
+  return text;
+}
+
+TEST(SceneServe, EveryCommandLeavesTheStateAloneWhereItIsWrong) {
+  const std::vector<std::string> start{"object a m",      "object b m method=ffe",
+                                       "emit shapes",     "displace a 4 0.01 0 0.3 over 0.02",
+                                       "force b 4 3 1 2", "at 0.012 force a 6 0 0 3",
+                                       "step 0.01"};
+  const std::vector<std::string> wrong{"object a m",
+                                       "object c",
+                                       "force a 999 0 0 1",
+                                       "force z 4 0 0 1",
+                                       "force a 4 0 0 nan",
+                                       "displace a 5 0 0 1",
+                                       "displace b 4,4,5 0 0 1",
+                                       "pressure a z>999 3",
+                                       "attach a 4 b 4 9",
+                                       "attach a 4 a 6 9",
+                                       "release a",
+                                       "gravity 1 2 inf",
+                                       "timestep 0",
+                                       "emit all",
+                                       "step -1",
+                                       "step 1e300x",
+                                       "run 0.005 every 0.01",
+                                       "run 1 every 0",
+                                       "run 1e30 every 1e-9",
+                                       "method a fem",
+                                       "method z ela",
+                                       "renew z",
+                                       "at 0.001 force a 4 1 1 1",
+                                       "at 1 step",
+                                       "cut a 4",
+                                       "at -1 release a 4",
+                                       "\"",
+                                       std::string("st\0ep", 5),
+                                       "object d m store=x method=ela now"};
+  const std::vector<std::string> end{"step 0.01", "release b all", "release a all", "step 0.01"};
+  std::vector<std::string> right = start, all = start;
+  all.insert(all.end(), wrong.begin(), wrong.end());
+  for (std::vector<std::string>* lines : {&right, &all})
+    lines->insert(lines->end(), end.begin(), end.end());
+  const Served calm = serve(right), served = serve(all);
+  EXPECT_EQ(calm.errors, 0U);
+  EXPECT_EQ(served.error, "");
+  EXPECT_EQ(served.errors, wrong.size());
+  EXPECT_EQ(without_errors(served.replies), calm.replies);
+  EXPECT_EQ(served.digest, calm.digest);
+  for (std::size_t i = 0; i < wrong.size(); ++i)
+    EXPECT_NE(served.replies.find("error " + std::to_string(start.size() + 1 + i) + ": "),
+              std::string::npos)
+        << wrong[i];
+  // Without serving the first of them is the end.
+  EXPECT_NE(serve(all, "", "", false).error.find("s:8: there is an object 'a' already"),
+            std::string::npos);
+}
+
+TEST(SceneServe, ARecordOfAnyRunDoesTheSameAgain) {
+  const ScratchFile record(".scene");
+  std::mt19937 random(7);
+  const auto pick = [&](const std::vector<std::string>& words) {
+    return words[random() % words.size()];
+  };
+  std::size_t errors = 0;
+  for (int round = 0; round < 40; ++round) {
+    std::vector<std::string> lines{"object a m",
+                                   "object b m method=ffe",
+                                   "object c m integration=implicit",
+                                   "object d two",
+                                   "object e two method=ffe",
+                                   "object f none",
+                                   "object g m store=x",
+                                   "emit forces"};
+    for (int k = 0; k < 25; ++k) {
+      const std::string object = pick({"a", "b", "c", "a", "b", "d", "e", "f", "g"});
+      const std::string node =
+          object == "d" || object == "e" ? pick({"0", "1"}) : pick({"4", "6", "@list", "3", "7"});
+      const std::string number = pick({"0.1", "-0.3", "0.2", "0", "0.5", "-1", "-0.2", "1e300"});
+      lines.push_back(pick({"", "", "", "at 0.0" + std::to_string(random() % 90) + " "}) +
+                      pick({"force " + object + " " + node + " " + number + " 0 " + number,
+                            "displace " + object + " " + node + " 0 0 " + number,
+                            "displace " + object + " " + node + " 0 0.2 0 over 0.03",
+                            "release " + object + " " + node, "release " + object + " all",
+                            "release a all", "release b all", "release c all", "release d all",
+                            "release e all", "method " + object + " " + pick({"ffe", "ela"}),
+                            "attach a 4 " + object + " " + node + " 30", "nonsense", "emit shapes",
+                            "gravity 0 0 " + pick({"-100", "0"})}));
+      if (random() % 2 == 0)
+        lines.push_back(pick({"step 0.004", "step 0.002", "run 0.03 every 0.007", "step 0"}));
+    }
+    const Served live = serve(lines, record.path());
+    const Served again = serve(lines_of(content(record.path())), "", "", false);
+    EXPECT_EQ(again.error, "") << content(record.path());
+    EXPECT_EQ(again.replies, without_errors(live.replies));
+    EXPECT_EQ(again.digest, live.digest);
+    errors += live.errors;
+  }
+  EXPECT_GT(errors, 200U);
+}
+
+TEST(SceneServe, ARunThatFailsHalfWayKeepsWhatWasAnswered) {
+  const ScratchFile record(".scene");
+  const Served live =
+      serve({"object a two", "at 0.0251 force a 0 1e308 0 0", "run 1 every 0.01"}, record.path());
+  EXPECT_EQ(live.errors, 1U);
+  EXPECT_NE(live.replies.find("step 3 0.03\ndone\nerror 3: object a at "), std::string::npos)
+      << live.replies;
+  EXPECT_EQ(lines_of(content(record.path())).back().substr(0, 4), "run ");
+  EXPECT_EQ(serve(lines_of(content(record.path()))).replies, without_errors(live.replies));
+}
+
+TEST(SceneServe, NodeListsAreInTheRecordByNumber) {
+  const ScratchFile record(".scene");
+  const Served live = serve({"object a m", "force a \"@x.list or @'y z' and z>1\" 0 0 1 # @no",
+                             "force a (@x) 1 0 0", "step"},
+                            record.path());
+  EXPECT_EQ(live.error, "");
+  const std::vector<std::string> lines = lines_of(content(record.path()));
+  ASSERT_EQ(lines.size(), 4U);
+  EXPECT_EQ(lines[1], "force a \"4,6-7 or 4,6-7 and z>1\" 0 0 1");
+  EXPECT_EQ(lines[2], "force a (4,6-7) 1 0 0");
+  EXPECT_EQ(serve(lines).digest, live.digest);
+}
+
+TEST(SceneServe, EventsSayWhoTouchedWhatWhen) {
+  const ScratchFile table(".csv");
+  serve({"object a m", "force a @list 1 2 3 period 0.5", "at 0.01 displace a 4,6 0 0 1 over 2",
+         "wrong, \"so\"", "step 0.02", "at 1 release a all", "step 1e9"},
+        "", table.path());
+  const std::vector<std::string> rows = lines_of(content(table.path()));
+  ASSERT_EQ(rows.size(), 6U);
+  EXPECT_EQ(rows[1], "0,object,a,,,,,,,,,\"m ela\"");
+  EXPECT_EQ(rows[2], "0,force,a,4 6-7,1,2,3,,0.5,,,");
+  EXPECT_TRUE(rows[3].starts_with("0,error,,,,,,,,,,\"4: 'wrong,' is no command"));
+  EXPECT_EQ(rows[4], "0.01,displace,a,4 6,0,0,1,,2,,,");
+  EXPECT_TRUE(rows[5].starts_with("0.02,error,,,,,,,,,,\"7: object a at "));
+}
+
+TEST(StepLatency, QuantilesAreThoseOfTheSteps) {
+  StepLatency latency(1e-3);
+  EXPECT_EQ(latency.quantile(0.5), 0);
+  latency.line_arrived();
+  for (std::uint64_t k = 1; k <= 1000; ++k)
+    latency.answered(k, 0);
+  EXPECT_EQ(latency.steps(), 1000U);
+  EXPECT_EQ(latency.missed(), 0U);
+  EXPECT_GT(latency.quantile(0.5), 0);
+  EXPECT_LE(latency.quantile(0.5), latency.quantile(0.99));
+  EXPECT_LE(latency.quantile(0.999), latency.largest());
+  EXPECT_EQ(latency.quantile(1), latency.largest());
+  StepLatency strict(1e15);
+  strict.line_arrived();
+  strict.answered(1, 0);
+  EXPECT_EQ(strict.missed(), 1U);
+}
+
+TEST(ResultsMesh, ASeriesHasOneFileForEachFrame) {
+  const ScratchFile name;
+  const std::string folder = name.path() + ".folder";
+  std::filesystem::create_directory(folder);
+  const Model model = organ(1);
+  const auto writer = open_mesh_result(Kind::ply, folder + "/run_%03d.ply", Output::Options{});
+  writer->add_object("o", model);
+  std::vector<double> u(3 * model.nodes.size());
+  for (int k = 0; k < 3; ++k) {
+    const FrameObject frame{u, {}};
+    writer->add_frame(k, std::span(&frame, 1));
+    u[0] += 1;
+  }
+  writer->commit();
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names, (std::vector<std::string>{"run_000.ply", "run_001.ply", "run_002.ply"}));
+  EXPECT_NE(content(folder + "/run_000.ply"), content(folder + "/run_002.ply"));
+  for (const char* pattern : {"%s.ply", "%.ply", "%d%d.ply", "%4d.ply", "%00d.ply", "%010d.ply"})
+    EXPECT_THROW(open_mesh_result(Kind::ply, folder + "/" + pattern, {}), UsageError) << pattern;
+  std::filesystem::remove_all(folder);
+}
+
+} // namespace
+} // namespace gewebe

@@ -1,0 +1,281 @@
+// Objects that are read late, change their method, and steps that are taken back.
+
+#include "base/error.h"
+#include "sim/simulation.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
+
+std::vector<double> shape(const Simulation& s, std::size_t object) {
+  return {s.displacement(object).begin(), s.displacement(object).end()};
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); i += 3)
+    largest = std::max(largest, norm(Vec3{a[i] - b[i], a[i + 1] - b[i + 1], a[i + 2] - b[i + 2]}));
+  return largest;
+}
+
+/// How often an object's parts were asked for.
+struct Asked {
+  int model = 0, stiffness = 0;
+};
+
+ObjectSource counted(Asked& asked) {
+  return {[&] {
+            ++asked.model;
+            return organ();
+          },
+          [&](const Model&) {
+            ++asked.stiffness;
+            return StiffnessParts{};
+          }};
+}
+
+TEST(SimulationLazy, NothingIsReadBeforeItIsNeeded) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    std::vector<Asked> asked(4);
+    Simulation s(one_thread(), {});
+    for (std::size_t i = 0; i < asked.size(); ++i)
+      s.add_object("o" + std::to_string(i), counted(asked[i]), method);
+    s.step(0.1);
+    s.apply(SetMethod{3, method == Method::ffe ? Method::ela : Method::ffe});
+    s.step(0.1);
+    for (const Asked& one : asked)
+      EXPECT_EQ(one.model + one.stiffness, 0);
+    const std::uint32_t node = free_nodes(s.model(1))[0];
+    EXPECT_EQ(asked[1].model, 1);
+    s.step(0.1);
+    EXPECT_EQ(asked[1].stiffness, 0);
+    s.apply(SetForce{2, {node}, {0, 0, 10}});
+    s.step(0.1);
+    s.step(0.1);
+    EXPECT_EQ(asked[2].model, 1);
+    EXPECT_EQ(asked[2].stiffness, method == Method::ffe ? 1 : 0);
+    EXPECT_EQ(asked[0].model + asked[3].model, 0);
+    EXPECT_TRUE(s.known(2) && !s.known(0));
+    EXPECT_TRUE(s.displacement(0).empty());
+    EXPECT_GT(largest_difference(shape(s, 2), std::vector<double>(s.displacement(2).size())), 0);
+    s.apply(SetGravity{{0, 0, -1}}); // acts on all
+    s.step(0.1);
+    for (const Asked& one : asked)
+      EXPECT_EQ(one.model, 1);
+  }
+}
+
+TEST(SimulationLazy, WhatIsReadLateMovesAsWhatWasThereAtOnce) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Asked asked;
+    Simulation late(one_thread(), {}), early(one_thread(), {});
+    late.add_object("o", counted(asked), method);
+    early.add_object("o", organ(), method);
+    const std::uint32_t node = free_nodes(early.model(0))[0];
+    for (Simulation* s : {&late, &early}) {
+      s->step(0.1);
+      s->apply(SetForce{0, {node}, {0, 0, 10}});
+      s->step(0.01);
+      s->apply(Release{0, {node}});
+      s->step(0.013);
+    }
+    EXPECT_EQ(shape(late, 0), shape(early, 0));
+  }
+}
+
+TEST(SimulationMethod, AnElastostaticObjectStartsToMoveAtItsShapeAndAtRest) {
+  Simulation s(one_thread(), {});
+  s.add_object("o", {[] { return organ(); }}, Method::ffe);
+  const std::uint32_t node = free_nodes(s.model(0))[0], other = free_nodes(s.model(0))[5];
+  s.apply(SetDisplacement{0, {node}, {0.1, 0, 0.2}});
+  s.apply(SetForce{0, {other}, {0, 5, 0}});
+  s.step(0.1);
+  const std::vector<double> still = shape(s, 0);
+  s.apply(SetMethod{0, Method::ela});
+  EXPECT_EQ(s.method(0), Method::ela);
+  s.step(0);
+  EXPECT_EQ(shape(s, 0), still);
+  EXPECT_EQ(s.state().kinetic_energy, 0);
+  EXPECT_TRUE(s.jumps().empty());
+  s.step(0.001);
+  // It starts near its equilibrium: linear and non-linear shapes differ a little.
+  EXPECT_GT(s.state().kinetic_energy, 0);
+  EXPECT_LT(largest_difference(shape(s, 0), still), 0.02);
+  EXPECT_EQ(s.displacement(0)[3 * std::size_t{node}], 0.1);
+}
+
+TEST(SimulationMethod, AMovingObjectTakesItsElastostaticShapeAndTellsTheJump) {
+  Simulation s(one_thread(), {}), same(one_thread(), {});
+  s.add_object("o", {[] { return organ(); }}, Method::ela);
+  same.add_object("o", {[] { return organ(); }}, Method::ffe);
+  const std::uint32_t node = free_nodes(s.model(0))[0];
+  for (Simulation* one : {&s, &same}) {
+    one->apply(SetDisplacement{0, {node}, {0.1, 0, 0.2}});
+    one->step(0.003);
+  }
+  const std::vector<double> moving = shape(s, 0), still = shape(same, 0);
+  s.apply(SetMethod{0, Method::ffe});
+  s.step(0);
+  EXPECT_EQ(shape(s, 0), still);
+  ASSERT_EQ(s.jumps().size(), 1U);
+  EXPECT_EQ(s.jumps()[0].size, largest_difference(moving, still));
+  EXPECT_GT(s.jumps()[0].size, 1e-3);
+  EXPECT_EQ(s.counts().largest_jump, s.jumps()[0].size);
+  s.take_jumps();
+  // There and back again, at a time; what is not touched jumps nowhere.
+  s.schedule(0.01, SetMethod{0, Method::ela});
+  s.schedule(0.01, SetMethod{0, Method::ffe});
+  s.step(0.01);
+  ASSERT_EQ(s.jumps().size(), 1U);
+  EXPECT_EQ(s.jumps()[0].size, 0);
+  EXPECT_EQ(shape(s, 0), still);
+}
+
+TEST(SimulationMethod, RefusedWhereItCannotBe) {
+  Simulation s(one_thread(), {.guard = true});
+  s.add_object("a", {[] { return organ(); }}, Method::ela);
+  s.add_object("b", {[] { return organ(); }}, Method::ela);
+  s.add_object("loose", {[] { return test::two_masses(); }}, Method::ela);
+  s.add_object("massless", {[] { return test::two_masses(0); }}, Method::ffe);
+  s.apply(Attach{0, {1}, 1, {2}, 10});
+  EXPECT_THROW(s.apply(SetMethod{0, Method::ffe}), Error);
+  EXPECT_EQ(s.method(0), Method::ela);
+  s.apply(SetForce{2, {0}, {1, 0, 0}});
+  s.step(0.01);
+  const std::vector<double> before = shape(s, 2);
+  EXPECT_THROW(s.apply(SetMethod{2, Method::ffe}), Error); // nothing holds it
+  EXPECT_EQ(s.method(2), Method::ela);
+  s.step(0);
+  EXPECT_EQ(shape(s, 2), before);
+  s.step(0.01);
+  EXPECT_NE(shape(s, 2), before);
+  s.apply(SetMethod{3, Method::ela}); // untouched
+  s.apply(SetForce{3, {0}, {1, 0, 0}});
+  EXPECT_THROW(s.step(0.01), Error);
+  s.apply(Release{3, {0}});
+  s.step(0.01);
+}
+
+/// What a scene with one object of each kind does, with steps that fail in between, which tells
+/// what each of them renewed; or without them, but renewing the same.
+std::vector<double> disturbed(bool with_failures, std::vector<std::vector<std::size_t>>& renewals) {
+  Simulation s(one_thread(), {.guard = true});
+  s.add_object("moving", {[] { return organ(); }}, Method::ela);
+  s.add_object("still", {[] { return organ(); }}, Method::ffe);
+  s.add_object("implicit", {[] { return organ(); }}, Method::ela, Integration::implicit);
+  s.add_object("partner", {[] { return organ(); }}, Method::ela);
+  // What moves explodes before the elastostatic objects follow, what is loose fails behind them.
+  s.add_object("bomb", {[] { return test::two_masses(); }}, Method::ela);
+  s.add_object("loose", {[] { return test::two_masses(); }}, Method::ffe);
+  const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
+  std::vector<double> all;
+  std::size_t steps = 0;
+  const auto step = [&](double dt) {
+    if (with_failures) {
+      const double time = s.time();
+      const std::size_t pending = s.pending();
+      renewals.emplace_back();
+      for (const std::size_t culprit : {4U, 5U}) {
+        s.apply(SetForce{culprit, {0}, {1e308, 0, 0}});
+        EXPECT_THROW(s.step(culprit == 4 ? dt + 1 : dt / 2), Error);
+        s.apply(Release{culprit, {0}});
+        EXPECT_EQ(s.time(), time);
+        EXPECT_EQ(s.pending(), pending);
+        for (const std::size_t object : s.take_renewed())
+          renewals.back().push_back(object);
+      }
+    } else {
+      for (const std::size_t object : renewals.at(steps))
+        s.apply(Renew{object});
+    }
+    ++steps;
+    s.step(dt);
+    for (std::size_t i = 0; i < 4; ++i) {
+      all.insert(all.end(), s.displacement(i).begin(), s.displacement(i).end());
+      for (const NodeVector& f : s.contact_forces(i))
+        all.push_back(f.value.x);
+    }
+    all.push_back(s.state().kinetic_energy);
+    all.push_back(s.emits_forces() ? 1 : 0);
+    for (const MethodJump& jump : s.jumps())
+      all.push_back(jump.size);
+    s.take_jumps();
+  };
+  s.apply(SetForce{0, {nodes[1]}, {0, 30, 0}, 0.05});
+  s.apply(SetForce{1, {nodes[1]}, {0, 30, 0}});
+  s.apply(SetForce{2, {nodes[1]}, {0, 30, 0}});
+  s.apply(SetDisplacement{0, {nodes[3]}, {0, 0, 0.2}, 0.025});
+  s.apply(SetDisplacement{1, {nodes[3]}, {0, 0, 0.2}, 0.025});
+  s.schedule(0.015, Release{0, {nodes[3]}});
+  s.schedule_every(0.008, SetForce{1, {nodes[7]}, {1, 1, 1}});
+  s.schedule(0.021, Attach{0, {nodes[2], nodes[4]}, 3, {nodes[5]}, 300});
+  s.schedule(0.5, Emit{true});
+  s.schedule(0.022, SetMethod{2, Method::ffe});
+  s.schedule(0.031, SetMethod{1, Method::ela});
+  s.schedule(0.033, SetMethod{2, Method::ela});
+  for (int k = 0; k < 8; ++k)
+    step(0.007);
+  step(0.5);
+  return all;
+}
+
+TEST(SimulationUndo, AStepThatFailsLeavesNoTrace) {
+  std::vector<std::vector<std::size_t>> renewals;
+  const std::vector<double> b = disturbed(true, renewals), a = disturbed(false, renewals);
+  std::size_t renewed = 0;
+  for (const auto& of_step : renewals)
+    renewed += of_step.size();
+  EXPECT_GT(renewed, 5U);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    ASSERT_EQ(a[i], b[i]) << i;
+}
+
+TEST(SimulationUndo, WithoutGuardItLeavesOne) { // so the test above can fail
+  for (const bool guard : {false, true}) {
+    Simulation s(one_thread(), {.guard = guard});
+    s.add_object("bomb", {[] { return test::two_masses(); }}, Method::ela);
+    s.apply(SetForce{0, {0}, {1e308, 0, 0}});
+    EXPECT_THROW(s.step(10), Error);
+    s.apply(Release{0, {0}});
+    if (guard)
+      s.step(1);
+    else
+      EXPECT_THROW(s.step(1), Error);
+  }
+}
+
+TEST(SimulationUndo, AnEventThatFailsStaysUntilItCanHappen) {
+  Simulation s(one_thread(), {.guard = true});
+  s.add_object("a", {[] { return organ(); }}, Method::ela);
+  s.add_object("b", {[] { return organ(); }}, Method::ela);
+  s.schedule(0.01, Emit{true});
+  s.schedule(0.02, Attach{0, {1}, 1, {2}, 10});
+  s.apply(SetMethod{1, Method::ffe});
+  EXPECT_THROW(s.step(0.03), Error);
+  EXPECT_EQ(s.pending(), 2U);
+  EXPECT_FALSE(s.emits_forces());
+  EXPECT_EQ(s.time(), 0);
+  s.step(0.015);
+  EXPECT_TRUE(s.emits_forces());
+  EXPECT_THROW(s.step(0.015), Error);
+  s.apply(SetMethod{1, Method::ela});
+  s.step(0.015);
+  EXPECT_EQ(s.pending(), 0U);
+}
+
+} // namespace
+} // namespace gewebe
