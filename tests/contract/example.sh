@@ -121,3 +121,24 @@ test_wireframe_draws_fewer_triangles() {
     [[ -e $GEWEBE_ROOT/examples/wireframe/$file ]] || fail "clean left $file"
   done
 }
+
+# Figure 4-9's scene, coarse: closed organs, two thirds of the nodes elastostatic, a grasp that is seen, and no warning.
+test_cholecystectomy_is_made_of_particles() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file organ
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/cholecystectomy/{Makefile,*.tube,*.awk,*.scene,*.materials,liver.particles} .
+  make SCALE=1.5 FRAMES=12 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  sed -n 's/^[0-9]* nodes, \(.*\) % of them elastostatic\.$/\1/p' log | awk '{ ok = $1 > 60 && $1 < 72 } END { exit !ok }' ||
+    fail "not about 66 % are elastostatic" "$(tail -2 log)"
+  for organ in liver gallbladder ducts arteries intestine; do
+    exp2ela --stats=stats $organ.ela -o /dev/null
+    grep -q '"boundary_edges":0' stats || fail "$organ is not closed" "$(<stats)"
+  done
+  ! cmp -s before.png after.png || fail 'the grasp is not to be seen'
+  rm log stats
+  make -s SCALE=1.5 FRAMES=12 clean
+  for file in *; do
+    [[ -e $GEWEBE_ROOT/examples/cholecystectomy/$file ]] || fail "clean left $file"
+  done
+}
