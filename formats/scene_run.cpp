@@ -86,6 +86,19 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
     parts.factor = [store, facts] { return store->factor(facts); };
     return parts;
   };
+  files.second_stage = [resolve](const std::string& name, const Model& model) {
+    const auto store = std::make_shared<StiffnessStore>(resolve(name));
+    const std::optional<StiffnessFacts> facts = store->second_stage(store->facts(model));
+    if (!facts)
+      throw Error(resolve(name), "no second stage of this object, expected one, "
+                                 "see --stage of ffe-precompute(1)");
+    return [store, facts] {
+      StiffnessParts parts;
+      parts.columns = store->columns(*facts);
+      parts.factor = [store, facts] { return store->factor(*facts); };
+      return parts;
+    };
+  };
   files.node_list = [resolve](const std::string& name) {
     return Input(resolve(name), false).read_all();
   };
@@ -99,6 +112,7 @@ struct SceneRun::State {
   SceneCounts counts;
   Digest digest;
   std::uint64_t line = 0, steps = 0;
+  std::vector<std::string> stores; ///< by object; "" where it has none
 
   State(std::string n, const Context& context, SceneOptions o)
       : name(std::move(n)), options(std::move(o)),
@@ -128,6 +142,7 @@ struct SceneRun::State {
     counts.nodes += model.nodes.size();
     simulation.add_object(c.name, std::move(model), c.method, std::move(parts),
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
+    stores.push_back(c.store);
     if (options.result != nullptr)
       deliver([&] {
         options.result->add_object(c.name, simulation.model(simulation.object_count() - 1));
@@ -166,6 +181,14 @@ struct SceneRun::State {
       change(command, SetGravity{gravity->gravity});
     } else if (const auto* const timestep = std::get_if<TimestepCommand>(&command.what)) {
       change(command, SetTimestep{timestep->dt});
+    } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
+      SetTwoStep set{
+          simulation.find(two_step->object), {two_step->threshold, two_step->series}, {}};
+      if (stores.at(set.object).empty())
+        throw Error("object " + two_step->object +
+                    " has no store, expected one with a second stage");
+      set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
+      change(command, set);
     } else if (const auto* const emit = std::get_if<EmitCommand>(&command.what)) {
       change(command, Emit{emit->forces});
     } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
@@ -297,6 +320,7 @@ void SceneRun::finish() {
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
   }
+  s.simulation.warn_of_thresholds();
   if (!s.options.warn)
     return;
   if (s.steps == 0)

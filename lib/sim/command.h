@@ -58,6 +58,11 @@ struct GravityCommand {
 struct TimestepCommand {
   double dt = 0; ///< > 0
 };
+struct TwoStepCommand {
+  std::string object;
+  double threshold = 0; ///< > 0
+  bool series = false;
+};
 struct EmitCommand {
   bool forces = false; ///< else shapes
 };
@@ -72,8 +77,8 @@ struct Command {
   std::optional<double> at; ///< when; absent: now. Never for object, step and run.
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
-               ReleaseCommand, GravityCommand, TimestepCommand, EmitCommand, StepCommand,
-               RunCommand>
+               ReleaseCommand, GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand,
+               StepCommand, RunCommand>
       what;
 };
 

@@ -99,6 +99,12 @@ SimulationCounts Simulation::counts() const {
     sum.factors += c.factors;
     sum.backward_error = std::max(sum.backward_error, c.backward_error);
     sum.contact_error = std::max(sum.contact_error, c.contact_error);
+    if (!object->two_step)
+      continue;
+    const ElastostaticCounts second = object->two_step->second_counts();
+    sum.solves += second.solves;
+    sum.columns_read += second.columns_read;
+    sum.factors += second.factors;
   }
   return all;
 }

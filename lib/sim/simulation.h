@@ -8,6 +8,7 @@
 #include "sim/elastodynamic.h"
 #include "sim/elastostatic.h"
 #include "sim/load.h"
+#include "sim/two_step.h"
 
 #include <cmath>
 #include <cstddef>
@@ -59,11 +60,17 @@ struct SetGravity {
 struct SetTimestep {
   double dt = 0;
 };
+/// The two-step method for an elastostatic object from now on.
+struct SetTwoStep {
+  std::size_t object = 0;
+  TwoStepOptions options;
+  std::function<StiffnessParts()> second; ///< asked once for an object
+};
 struct Emit {
   bool forces = false; ///< else shapes
 };
 using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetGravity,
-                            SetTimestep, Emit>;
+                            SetTimestep, SetTwoStep, Emit>;
 
 struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
@@ -135,6 +142,10 @@ public:
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
+  /// Behind the last step: warns, once per object, where the threshold of the two-step method was
+  /// never reached.
+  void warn_of_thresholds();
+
   SimulationCounts counts() const;
   SimulationState state() const;
 
@@ -154,6 +165,7 @@ private:
   void check(const Change& change) const;
   void attach(const Attach& tie);
   void displace(Object& object, const SetDisplacement& set);
+  void set_two_step(Object& object, const SetTwoStep& set);
   [[noreturn]] void raise(const Body& body) const;
   std::unique_ptr<Body> make_body(std::vector<std::size_t> parts);
   void move_bodies(double to);

@@ -23,6 +23,13 @@ void Simulation::check(const Change& change) const {
                   " is implicit and the other is not, expected both alike");
     return;
   }
+  if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
+    const Object& object = *objects_.at(stages->object);
+    if (object.method != Method::ffe)
+      throw Error("object " + object.name +
+                  " is elastodynamic (ela), expected an elastostatic one for two-step");
+    return;
+  }
   const auto* const set = std::get_if<SetDisplacement>(&change);
   if (set == nullptr)
     return;
@@ -80,6 +87,9 @@ void Simulation::apply(const Change& change) {
     }
   } else if (const auto* const wish = std::get_if<SetTimestep>(&change)) {
     timestep_ = wish->dt;
+  } else if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
+    touched = objects_.at(stages->object).get();
+    set_two_step(*touched, *stages);
   } else if (std::get<Emit>(change).forces) {
     emit_forces_ = true;
   } else {

@@ -27,8 +27,9 @@ struct Simulation::Object {
   Load load;
   Integration integration = Integration::semi_implicit;
   std::optional<Elastostatic> still;
-  Body* body = nullptr;   // of an elastodynamic object
-  std::size_t offset = 0; // of its nodes in the body
+  std::optional<TwoStep> two_step; // over `still`
+  Body* body = nullptr;            // of an elastodynamic object
+  std::size_t offset = 0;          // of its nodes in the body
 
   std::vector<double> displacement;
   std::vector<NodeVector> forces;
@@ -39,6 +40,7 @@ struct Simulation::Object {
   double shortest_edge = 0; // mm; 0: not yet known
   double looked_at = 0;     // largest displacement when the range was last looked at
   int not_looked = 0;
+  bool warned_threshold = false;
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.

@@ -80,8 +80,14 @@ void Simulation::advance(double to) {
 
 void Simulation::show(Object& object) {
   if (object.still) {
-    object.still->update(load_at(object.load, object.model, time_));
-    object.forces = object.still->contact_forces();
+    const Load load = load_at(object.load, object.model, time_);
+    if (object.two_step) {
+      object.two_step->update(*object.still, load);
+      object.forces = object.two_step->contact_forces();
+    } else {
+      object.still->update(load);
+      object.forces = object.still->contact_forces();
+    }
     object.shaped = false; // until somebody asks for it
     // Who never asks is warned too, if the contacts alone may leave the range.
     double most = 0;
@@ -108,7 +114,8 @@ void Simulation::shape(Object& object) const {
   if (object.shaped)
     return;
   at_object(object, [&] {
-    const std::span<const double> u = object.still->displacement();
+    const std::span<const double> u = object.two_step ? object.two_step->displacement(*object.still)
+                                                      : object.still->displacement();
     object.displacement.assign(u.begin(), u.end());
   });
   object.shaped = true;

@@ -142,3 +142,24 @@ test_cholecystectomy_is_made_of_particles() {
     [[ -e $GEWEBE_ROOT/examples/cholecystectomy/$file ]] || fail "clean left $file"
   done
 }
+
+# Figure 3-10: the curve bends at F0, and displacements give back the forces of its points.
+test_two_step_gives_back_its_forces() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/two-step/{Makefile,*.awk,*.gnuplot} .
+  make all check >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  # Displacements at f0 and 2 f0: slopes C1 and C1 - C2, or C2, where C2 = C1/4.
+  awk -F, '$1 == "first" { first[$2] = $5 } $1 != "first" && $1 != "second" { u[$1, $2] = $5 }
+    END { c = first[20000]; two = (u["two", 40000] - u["two", 20000]) / c; series = (u["series", 40000] - u["series", 20000]) / c
+      exit !(u["two", 20000] == c && two > 0.7499999 && two < 0.7500001 && series > 0.2499999 && series < 0.2500001) }' two-step.csv ||
+    fail 'other slopes' "$(grep 0000, two-step.csv)"
+  # A wrong force is seen.
+  sed -i '$s/[^,]*$/1/' inverse.csv
+  ! make check >log 2>&1 || fail 'a wrong force passes'
+  make -s clean
+  for file in *; do
+    [[ $file == log || -e $GEWEBE_ROOT/examples/two-step/$file ]] || fail "clean left $file"
+  done
+}
