@@ -86,6 +86,11 @@ struct Describe {
     row.what = "timestep";
     row.value = c.dt;
   }
+  void operator()(const SetTwoStep& c) {
+    of(c.object, "two-step");
+    row.value = c.options.threshold;
+    row.text = c.options.series ? "series" : "";
+  }
   void operator()(const Emit& c) {
     row.what = "emit";
     row.text = c.forces ? "forces" : "shapes";

@@ -192,6 +192,16 @@ What parse_timestep(Words& in) {
   return c;
 }
 
+What parse_two_step(Words& in) {
+  TwoStepCommand c;
+  c.object = in.name();
+  c.threshold = in.number("force");
+  if (!(c.threshold > 0))
+    in.fail("a threshold that is not positive");
+  c.series = in.take("series");
+  return c;
+}
+
 What parse_emit(Words& in) {
   const std::string& word = in.word("word");
   if (word != "shapes" && word != "forces")
@@ -241,8 +251,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 13>& verbs() {
-  static const std::array<Verb, 13> all{{
+const std::array<Verb, 14>& verbs() {
+  static const std::array<Verb, 14> all{{
       {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
@@ -253,6 +263,7 @@ const std::array<Verb, 13>& verbs() {
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
+      {"two-step", "two-step NAME f0 [series], f0 positive", true, parse_two_step},
       {"emit", "emit shapes|forces", true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},

@@ -7,6 +7,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <memory>
+#include <optional>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -41,6 +43,19 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
     parts.columns = store->columns(facts);
     parts.factor = [store, facts] { return store->factor(facts); };
     return parts;
+  };
+  files.second_stage = [resolve](const std::string& name, const Model& model) {
+    const auto store = std::make_shared<StiffnessStore>(resolve(name));
+    const std::optional<StiffnessFacts> facts = store->second_stage(store->facts(model));
+    if (!facts)
+      throw Error(resolve(name), "no second stage of this object, expected one, "
+                                 "see --stage of ffe-precompute(1)");
+    return [store, facts] {
+      StiffnessParts parts;
+      parts.columns = store->columns(*facts);
+      parts.factor = [store, facts] { return store->factor(*facts); };
+      return parts;
+    };
   };
   files.node_list = [resolve](const std::string& name) {
     return Input(resolve(name), false).read_all();

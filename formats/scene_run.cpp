@@ -78,6 +78,7 @@ struct SceneRun::State {
   std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
   std::uint64_t first_error = 0;
   std::string first_error_text;
+  std::vector<std::string> stores; ///< by object; "" where it has none
 
   State(std::string n, const Context& context, SceneOptions o)
       : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
@@ -130,23 +131,38 @@ struct SceneRun::State {
     };
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
+    stores.push_back(c.store);
     if (options.events != nullptr)
       options.events->object(simulation.time(), c.name, c.model, c.method);
+  }
+
+  SetTwoStep stages(const TwoStepCommand& c) {
+    SetTwoStep set{simulation.find(c.object), {c.threshold, c.series}, {}};
+    if (stores.at(set.object).empty())
+      throw Error("object " + c.object + " has no store, expected one with a second stage");
+    set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
+    return set;
+  }
+
+  void schedule(const Command& command, const Change& change) {
+    if (command.every)
+      simulation.schedule_every(*command.at, change);
+    else if (command.at)
+      simulation.schedule(*command.at, change);
+    else
+      simulation.apply(change);
   }
 
   void execute(const Command& command) {
     if (const auto* const object = std::get_if<ObjectCommand>(&command.what)) {
       add(*object);
+    } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
+      schedule(command, stages(*two_step));
     } else if (const std::optional<Change> change =
                    scene_change(command, simulation, [&](const std::string& list) {
                      return lists[list] = options.files.node_list(list);
                    })) {
-      if (command.every)
-        simulation.schedule_every(*command.at, *change);
-      else if (command.at)
-        simulation.schedule(*command.at, *change);
-      else
-        simulation.apply(*change);
+      schedule(command, *change);
     } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
       first_frame();
       simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
@@ -334,6 +350,7 @@ void SceneRun::finish() {
   } catch (const WrongFile& file) {
     throw Error(s.name + ":" + std::to_string(file.line), file.text);
   }
+  s.simulation.warn_of_thresholds();
   if (!s.options.warn)
     return;
   if (s.steps == 0)

@@ -28,6 +28,10 @@ struct SceneFiles {
   std::function<Model(const std::string& name)> model;
   /// \throw Error, among others if the store is of another model
   std::function<StiffnessParts(const std::string& name, const Model& model)> store;
+  /// What the store has of the object's second stage, read when asked for.
+  /// \throw Error, among others if it has none
+  std::function<std::function<StiffnessParts()>(const std::string& name, const Model& model)>
+      second_stage;
   LoadNodeList node_list;
 };
 

@@ -58,6 +58,11 @@ struct GravityCommand {
 struct TimestepCommand {
   double dt = 0; ///< > 0
 };
+struct TwoStepCommand {
+  std::string object;
+  double threshold = 0; ///< > 0
+  bool series = false;
+};
 struct EmitCommand {
   bool forces = false; ///< else shapes
 };
@@ -81,8 +86,8 @@ struct Command {
                             ///< and renew.
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
-               ReleaseCommand, GravityCommand, TimestepCommand, EmitCommand, StepCommand,
-               RunCommand, MethodCommand, RenewCommand>
+               ReleaseCommand, GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand,
+               StepCommand, RunCommand, MethodCommand, RenewCommand>
       what;
 };
 

@@ -80,6 +80,12 @@ SimulationCounts Simulation::counts() const {
     add_counts(all.elastostatic, object->spent);
     if (object->still)
       add_counts(all.elastostatic, object->still->counts());
+    if (!object->two_step)
+      continue;
+    const ElastostaticCounts second = object->two_step->second_counts();
+    all.elastostatic.solves += second.solves;
+    all.elastostatic.columns_read += second.columns_read;
+    all.elastostatic.factors += second.factors;
   }
   return all;
 }

@@ -8,6 +8,7 @@
 #include "sim/elastodynamic.h"
 #include "sim/elastostatic.h"
 #include "sim/load.h"
+#include "sim/two_step.h"
 
 #include <cmath>
 #include <cstddef>
@@ -59,6 +60,12 @@ struct SetGravity {
 struct SetTimestep {
   double dt = 0;
 };
+/// The two-step method for an elastostatic object from now on.
+struct SetTwoStep {
+  std::size_t object = 0;
+  TwoStepOptions options;
+  std::function<StiffnessParts()> second; ///< asked once for an object
+};
 struct Emit {
   bool forces = false; ///< else shapes
 };
@@ -74,7 +81,7 @@ struct Renew {
   std::size_t object = 0;
 };
 using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetGravity,
-                            SetTimestep, Emit, SetMethod, Renew>;
+                            SetTimestep, SetTwoStep, Emit, SetMethod, Renew>;
 
 /// Where what an object consists of comes from: asked for when it is first needed, the stiffness
 /// again after a Renew. What they throw leaves the call that needed it.
@@ -179,6 +186,9 @@ public:
   const std::vector<MethodJump>& jumps() const noexcept { return jumps_; }
   void take_jumps() noexcept { jumps_.clear(); }
   std::vector<std::size_t> take_renewed();
+  /// Behind the last step: warns, once per object, where the threshold of the two-step method was
+  /// never reached.
+  void warn_of_thresholds();
 
   SimulationCounts counts() const;
   SimulationState state() const;
@@ -214,6 +224,10 @@ private:
   void keep_load(Object& object);
   void keep_body(Body& body);
   void displace(Object& object, const SetDisplacement& set);
+  void set_two_step(Object& object, const SetTwoStep& set);
+  void update_stages(Object& object, const Load& load) const;
+  std::span<const double> still_shape(Object& object) const;
+  const std::vector<NodeVector>& still_forces(const Object& object) const;
   [[noreturn]] void raise(const Body& body) const;
   std::unique_ptr<Body> make_body(std::vector<std::size_t> parts);
   void move_bodies(double to);

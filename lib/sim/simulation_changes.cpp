@@ -23,6 +23,13 @@ void Simulation::check(const Change& change) const {
                   " is implicit and the other is not, expected both alike");
     return;
   }
+  if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
+    const Object& object = *objects_.at(stages->object);
+    if (object.method != Method::ffe)
+      throw Error("object " + object.name +
+                  " is elastodynamic (ela), expected an elastostatic one for two-step");
+    return;
+  }
   const auto* const set = std::get_if<SetDisplacement>(&change);
   if (set == nullptr)
     return;
@@ -101,6 +108,9 @@ void Simulation::apply_now(const Change& change) {
   } else if (const auto* const again = std::get_if<Renew>(&change)) {
     touch(again->object);
     renew(*touched);
+  } else if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
+    touch(stages->object);
+    set_two_step(*touched, *stages);
   } else if (std::get<Emit>(change).forces) {
     emit_forces_ = true;
   } else {

@@ -34,8 +34,11 @@ struct Simulation::Object {
   Load load;
   Integration integration = Integration::semi_implicit;
   std::optional<Elastostatic> still;
-  Body* body = nullptr;   // of an elastodynamic object
-  std::size_t offset = 0; // of its nodes in the body
+  std::optional<TwoStepOptions> stages;   // what two-step says of it
+  std::function<StiffnessParts()> second; // its second stage
+  std::optional<TwoStep> two_step;        // over `still`, made when needed
+  Body* body = nullptr;            // of an elastodynamic object
+  std::size_t offset = 0;          // of its nodes in the body
 
   std::vector<double> displacement;
   std::vector<NodeVector> forces;
@@ -51,6 +54,7 @@ struct Simulation::Object {
   int not_looked = 0;
   int slow = 0;             // updates in a row that took too long for the rate
   ElastostaticCounts spent; // of what was renewed
+  bool warned_threshold = false;
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.

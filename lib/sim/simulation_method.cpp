@@ -28,7 +28,7 @@ void Simulation::set_method(std::size_t index, Method method) {
   std::span<const double> still;
   if (object.still || !object.load.empty()) {
     update_still(object, load_at(object.load, object.model, time_));
-    still = object.still->displacement();
+    still = still_shape(object);
   }
   if (method == Method::ela) {
     if (!still.empty()) {
@@ -71,6 +71,12 @@ void Simulation::renew(Object& object) {
   if (object.still) {
     simulation::add_counts(object.spent, object.still->counts());
     object.still.reset();
+  }
+  if (object.two_step) {
+    ElastostaticCounts second = object.two_step->second_counts();
+    second.updates = second.unchanged = 0; // those of the first stage count
+    simulation::add_counts(object.spent, second);
+    object.two_step.reset();
   }
   if (object.body != nullptr && object.integration == Integration::implicit)
     object.body->moving->renew();

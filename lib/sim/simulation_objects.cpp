@@ -87,7 +87,7 @@ Elastostatic& Simulation::still_of(Object& object) const {
 void Simulation::update_still(Object& object, const Load& load) {
   if (undo_->open)
     undo_->updated.insert(&object);
-  still_of(object).update(load);
+  update_stages(object, load);
 }
 
 } // namespace gewebe

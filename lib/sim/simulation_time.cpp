@@ -110,7 +110,7 @@ void Simulation::show(Object& object) {
   if (object.method == Method::ffe && (object.still || !object.load.empty())) {
     object.shown_load = load_at(object.load, object.model, time_);
     update_in_time(object);
-    object.forces = object.still->contact_forces();
+    object.forces = still_forces(object);
     object.shaped = false; // until somebody asks for it
     // Who never asks is warned too, if the contacts alone may leave the range.
     double most = 0;
@@ -161,9 +161,8 @@ void Simulation::shape(Object& object) const {
   if (object.shaped)
     return;
   at_object(object, [&] {
-    Elastostatic& still = still_of(object);
-    still.update(object.shown_load); // as it is, but where a change of method looked ahead
-    const std::span<const double> u = still.displacement();
+    update_stages(object, object.shown_load); // as it is, but where a change of method looked ahead
+    const std::span<const double> u = still_shape(object);
     object.displacement.assign(u.begin(), u.end());
   });
   object.shaped = true;

@@ -121,3 +121,45 @@ test_wireframe_draws_fewer_triangles() {
     [[ -e $GEWEBE_ROOT/examples/wireframe/$file ]] || fail "clean left $file"
   done
 }
+
+# Figure 4-9's scene, coarse: closed organs, two thirds of the nodes elastostatic, a grasp that is seen, and no warning.
+test_cholecystectomy_is_made_of_particles() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file organ
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/cholecystectomy/{Makefile,*.tube,*.awk,*.scene,*.materials,liver.particles} .
+  make SCALE=1.5 FRAMES=12 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  sed -n 's/^[0-9]* nodes, \(.*\) % of them elastostatic\.$/\1/p' log | awk '{ ok = $1 > 60 && $1 < 72 } END { exit !ok }' ||
+    fail "not about 66 % are elastostatic" "$(tail -2 log)"
+  for organ in liver gallbladder ducts arteries intestine; do
+    exp2ela --stats=stats $organ.ela -o /dev/null
+    grep -q '"boundary_edges":0' stats || fail "$organ is not closed" "$(<stats)"
+  done
+  ! cmp -s before.png after.png || fail 'the grasp is not to be seen'
+  rm log stats
+  make -s SCALE=1.5 FRAMES=12 clean
+  for file in *; do
+    [[ -e $GEWEBE_ROOT/examples/cholecystectomy/$file ]] || fail "clean left $file"
+  done
+}
+
+# Figure 3-10: the curve bends at F0, and displacements give back the forces of its points.
+test_two_step_gives_back_its_forces() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/two-step/{Makefile,*.awk,*.gnuplot} .
+  make all check >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  # Displacements at f0 and 2 f0: slopes C1 and C1 - C2, or C2, where C2 = C1/4.
+  awk -F, '$1 == "first" { first[$2] = $5 } $1 != "first" && $1 != "second" { u[$1, $2] = $5 }
+    END { c = first[20000]; two = (u["two", 40000] - u["two", 20000]) / c; series = (u["series", 40000] - u["series", 20000]) / c
+      exit !(u["two", 20000] == c && two > 0.7499999 && two < 0.7500001 && series > 0.2499999 && series < 0.2500001) }' two-step.csv ||
+    fail 'other slopes' "$(grep 0000, two-step.csv)"
+  # A wrong force is seen.
+  sed -i '$s/[^,]*$/1/' inverse.csv
+  ! make check >log 2>&1 || fail 'a wrong force passes'
+  make -s clean
+  for file in *; do
+    [[ $file == log || -e $GEWEBE_ROOT/examples/two-step/$file ]] || fail "clean left $file"
+  done
+}

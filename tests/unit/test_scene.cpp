@@ -58,6 +58,10 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(parsed<GravityCommand>("gravity 0 0 -9810").gravity, (Vec3{0, 0, -9810}));
   EXPECT_EQ(parsed<TimestepCommand>("timestep 1e-4").dt, 1e-4);
   EXPECT_TRUE(parsed<EmitCommand>("emit forces").forces);
+  EXPECT_EQ(parsed<TwoStepCommand>("two-step a 2.5e5").threshold, 2.5e5);
+  EXPECT_FALSE(parsed<TwoStepCommand>("two-step a 2.5e5").series);
+  EXPECT_TRUE(parsed<TwoStepCommand>("two-step a 2.5e5 series").series);
+  EXPECT_EQ(parse_scene_line("at 1 two-step a 3 series").value().at, 1);
   EXPECT_FALSE(parsed<EmitCommand>("emit shapes").forces);
   EXPECT_FALSE(parsed<StepCommand>("step").dt);
   EXPECT_EQ(parsed<StepCommand>("step 0").dt, 0);
@@ -93,9 +97,9 @@ TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
 
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known = "expected one of object, force, pressure, displace, attach, release, "
-                            "gravity, method, timestep, emit, "
+                            "gravity, method, timestep, two-step, emit, "
                             "step, run, renew, at";
-  for (const char* word : {"instrument", "grasp", "two-step", "cut", "steps", "STEP", "\"\""})
+  for (const char* word : {"instrument", "grasp", "cut", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{
       {"object", "no NAME, expected object NAME"},
@@ -133,6 +137,10 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"timestep", "expected timestep dt"},
       {"timestep 0", "not positive"},
       {"timestep -1", "not positive"},
+      {"two-step", "no NAME"},
+      {"two-step a", "no force, expected two-step NAME f0 [series]"},
+      {"two-step a 0", "a threshold that is not positive"},
+      {"two-step a 5 serial", "surplus word 'serial'"},
       {"emit", "expected emit shapes|forces"},
       {"emit pictures", "'pictures' can't be emitted"},
       {"emit shapes forces", "surplus word 'forces'"},

@@ -1,0 +1,311 @@
+#include "base/error.h"
+#include "sim/simulation.h"
+#include "sim/two_step.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+/// Every spring stiffer by a factor of its own between `from` and `to`.
+Model stiffened(Model model, double from, double to) {
+  std::mt19937 engine(7);
+  for (Spring& s : model.springs)
+    s.stiffness *= from + (to - from) * static_cast<double>(engine()) / 4294967296.0;
+  return model;
+}
+
+StiffnessParts parts_of(const Model& model) {
+  StiffnessParts parts;
+  parts.factor = [&model] { return Factor(stiffness_matrix(model), Context{}); };
+  return parts;
+}
+
+struct Stages {
+  Model model, stiff;
+  Elastostatic first;
+  TwoStep two;
+
+  Stages(Model one, Model other, const TwoStepOptions& options)
+      : model(std::move(one)), stiff(std::move(other)), first(model, {}, Context{}),
+        two(model, parts_of(stiff), Context{}, options) {}
+  Stages(const Stages&) = delete;
+  Stages& operator=(const Stages&) = delete;
+
+  std::vector<double> shape(const Load& load) {
+    two.update(first, load);
+    const std::span<const double> u = two.displacement(first);
+    return {u.begin(), u.end()};
+  }
+};
+
+std::vector<double> compliance_times(const Model& model, const Load& load) {
+  Elastostatic object(model, {}, Context{});
+  object.update(load);
+  const std::span<const double> u = object.displacement();
+  return {u.begin(), u.end()};
+}
+
+/// Largest difference over the largest of b.
+double difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double error = 0, size = 0;
+  EXPECT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double e = std::abs(a[i] - b[i]);
+    error = std::isnan(e) ? e : std::max(error, e);
+    size = std::max(size, std::abs(b[i]));
+  }
+  return error / size;
+}
+
+Load times(double factor, const Load& load) {
+  Load more = load;
+  for (auto& [node, force] : more.force)
+    force *= factor;
+  more.gravity *= factor;
+  return more;
+}
+
+std::vector<double> combined(double a, const std::vector<double>& x, double b,
+                             const std::vector<double>& y) {
+  std::vector<double> sum;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    sum.push_back(a * x[i] + b * y[i]);
+  return sum;
+}
+
+/// Forces on some nodes and weight, together of norm 1.
+Load unit_load(const Model& model) {
+  Load load{.gravity = {0, 100, -981}};
+  const std::vector<std::uint32_t> nodes = free_nodes(model);
+  for (std::size_t k = 0; k < 5; ++k)
+    load.force[nodes[7 * k]] = {std::sin(1.0 + static_cast<double>(k)), 0.3, -0.2};
+  load.force[nodes[3]] = {0, 2, 0};
+  return times(1 / load_norm(model, load), load);
+}
+
+Vec3 at(const std::vector<double>& u, std::size_t node) {
+  return {u[3 * node], u[3 * node + 1], u[3 * node + 2]};
+}
+
+TEST(TwoStep, LoadNormCountsForcesAndWeightOfFreeAxes) {
+  Model model = test::two_masses(2);
+  model.nodes[0].fixed = fixed_all;
+  model.nodes[1].fixed = fixed_y;
+  Load load;
+  load.force[0] = {100, 100, 100};
+  load.force[1] = {1, 50, -2};
+  EXPECT_DOUBLE_EQ(load_norm(model, load), std::sqrt(5.0));
+  load.gravity = {1, 7, 3};
+  EXPECT_DOUBLE_EQ(load_norm(model, load), 5); // (1 + 2, -, -2 + 6)
+}
+
+// One spring: u = f/k up to f0, then the line of slope 1/k1 - 1/k2, or 1/k2 in series.
+TEST(TwoStep, OneSpringFollowsFigure3_10) {
+  for (const bool series : {false, true}) {
+    Model soft = test::two_masses();
+    soft.nodes[0].fixed = fixed_all;
+    soft.nodes[1].fixed = fixed_y | fixed_z;
+    Model stiff = soft;
+    stiff.springs[0].stiffness = 4;
+    Stages s(soft, stiff, {.threshold = 2, .series = series});
+    const double slope = series ? 0.25 : 0.75;
+    for (const double f : {0.0, 0.5, 1.0, 2.0, 2.5, 4.0, 100.0, -1.0, -3.0}) {
+      const double size = std::abs(f);
+      const double u = std::copysign(std::min(size, 2.0) + slope * std::max(0.0, size - 2), f);
+      Load pull;
+      pull.force[1] = {f, 0, 0};
+      EXPECT_NEAR(s.shape(pull)[3], u, 1e-14 * size) << f;
+      Load hold;
+      hold.displacement[1] = {u, 0, 0};
+      EXPECT_EQ(s.shape(hold)[3], u);
+      ASSERT_EQ(s.two.contact_forces().size(), 1U);
+      EXPECT_NEAR(s.two.contact_forces()[0].value.x, f, 1e-13 * size) << f;
+      EXPECT_NEAR(s.two.load(), size, 1e-13 * size);
+    }
+    EXPECT_NEAR(s.two.largest(), 100, 1e-11);
+  }
+}
+
+TEST(TwoStep, IsContinuousAndHasTheSlopesOfItsStages) {
+  const Model model = organ(), stiff = stiffened(model, 3, 6);
+  const Load unit = unit_load(model);
+  const double f0 = 50;
+  const std::vector<double> c1 = compliance_times(model, unit), c2 = compliance_times(stiff, unit);
+  for (const bool series : {false, true}) {
+    Stages s(model, stiff, {.threshold = f0, .series = series});
+    EXPECT_LT(difference(s.shape(times(0.5 * f0, unit)), combined(0.5 * f0, c1, 0, c2)), 1e-12);
+    EXPECT_EQ(s.two.second_counts().factors, 0U) << "the second stage is not needed yet";
+    const std::vector<double> below = s.shape(times(f0 * (1 - 1e-9), unit));
+    const std::vector<double> above = s.shape(times(f0 * (1 + 1e-9), unit));
+    EXPECT_LT(difference(above, below), 1e-8);
+    const std::vector<double> rise =
+        combined(1, s.shape(times(3 * f0, unit)), -1, s.shape(times(2 * f0, unit)));
+    EXPECT_LT(difference(rise, series ? combined(0, c1, f0, c2) : combined(f0, c1, -f0, c2)),
+              1e-11);
+    // The check sees another slope, and another threshold.
+    EXPECT_GT(difference(rise, combined(f0, c1, 0, c2)), 1e-3);
+    Stages other(model, stiff, {.threshold = f0 * (1 + 1e-6), .series = series});
+    EXPECT_GT(difference(other.shape(times(2 * f0, unit)), s.shape(times(2 * f0, unit))), 1e-8);
+  }
+}
+
+TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const Load unit = unit_load(model);
+  const double f0 = 50;
+  for (const bool series : {false, true})
+    for (const double size : {0.3, 0.999, 1.0, 1.001, 1.5, 4.0, 30.0, 1e4}) {
+      Stages s(model, stiff, {.threshold = f0, .series = series});
+      const Load given = times(size * f0, unit);
+      const std::vector<double> u = s.shape(given);
+      // The same with some of the nodes held where they are, the rest of the load as it was.
+      Load held = given;
+      std::map<std::uint32_t, Vec3> force;
+      int k = 0;
+      for (const auto& [node, f] : given.force)
+        if (++k % 3 != 0) {
+          held.displacement[node] = at(u, node);
+          force[node] = f;
+          if (k == 1)
+            force[node] = {}; // here the load stays as well, so that nothing more is needed
+          else
+            held.force.erase(node);
+        }
+      const std::vector<double> again = s.shape(held);
+      EXPECT_LT(difference(again, u), 1e-10) << series << " " << size;
+      EXPECT_NEAR(s.two.load(), size * f0, 1e-10 * size * f0);
+      double error = 0;
+      ASSERT_EQ(s.two.contact_forces().size(), force.size());
+      for (const NodeVector& f : s.two.contact_forces()) {
+        error = std::max(error, norm(f.value - force.at(f.node)));
+        EXPECT_EQ(at(again, f.node), held.displacement.at(f.node));
+      }
+      EXPECT_LT(error, 1e-10 * size * f0) << series << " " << size;
+      // From a cached contact too, and back below the threshold.
+      Load nearer = held;
+      for (auto& [node, d] : nearer.displacement)
+        d *= 1.001;
+      EXPECT_GT(difference(s.shape(nearer), u), 1e-5);
+      EXPECT_LT(difference(s.shape(held), u), 1e-10);
+      (void)s.shape({});
+      EXPECT_EQ(s.two.load(), 0);
+    }
+}
+
+TEST(TwoStep, HalfHeldNodesAreGraspedAlongTheirFreeAxes) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  std::uint32_t half = 0, whole = 0;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    (model.nodes[i].fixed == fixed_z     ? half
+     : model.nodes[i].fixed == fixed_all ? whole
+                                         : half) = model.nodes[i].fixed == fixed_none ? half : i;
+  ASSERT_EQ(model.nodes[half].fixed, fixed_z);
+  ASSERT_EQ(model.nodes[whole].fixed, fixed_all);
+  Stages s(model, stiff, {.threshold = 1});
+  Load load;
+  load.force[half] = {30, -40, 99};
+  const std::vector<double> u = s.shape(load);
+  EXPECT_DOUBLE_EQ(s.two.load(), 50);
+  Load held;
+  held.displacement[half] = {at(u, half).x, at(u, half).y, 0};
+  held.displacement[whole] = {};
+  EXPECT_LT(difference(s.shape(held), u), 1e-11);
+  for (const NodeVector& f : s.two.contact_forces())
+    EXPECT_LT(norm(f.value - (f.node == half ? Vec3{30, -40, 0} : Vec3{})), 1e-9);
+  // Nothing but what can't move: no force, no threshold.
+  Load nothing;
+  nothing.displacement[whole] = {};
+  EXPECT_EQ(s.shape(nothing), std::vector<double>(u.size(), 0.0));
+}
+
+TEST(TwoStep, RefusesAStageThatIsNotStiffer) {
+  const Model model = organ();
+  const Model mixed = stiffened(model, 0.2, 3);
+  const std::uint32_t node = free_nodes(model)[4];
+  Load hold;
+  hold.displacement[node] = {0, 0, 1};
+  Stages s(model, mixed, {.threshold = 1e-3});
+  std::string message;
+  try {
+    (void)s.shape(hold);
+  } catch (const Error& error) {
+    message = error.what();
+  }
+  EXPECT_NE(message.find("C1 - C2 is not positive definite"), std::string::npos) << message;
+  EXPECT_NE(message.find("series"), std::string::npos) << message;
+  // Under the threshold nothing of it is asked; in series any stage will do.
+  s.two.set({.threshold = 1e12});
+  EXPECT_EQ(at(s.shape(hold), node).z, 1);
+  s.two.set({.threshold = 1e-3, .series = true});
+  const std::vector<double> u = s.shape(hold);
+  EXPECT_EQ(at(u, node).z, 1);
+  Load pull;
+  pull.force[node] = s.two.contact_forces()[0].value;
+  EXPECT_LT(difference(s.shape(pull), u), 1e-10);
+  for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(s.two.set({.threshold = bad}), Error);
+}
+
+TEST(TwoStep, RootIsFoundFarBeyondTheThreshold) {
+  // Two blocks that share no eigenvectors, pulled along a poor direction.
+  const std::vector<double> a1{4, 1, 1, 3}, a2{1.5, 0.9, 0.9, 1};
+  for (const bool series : {false, true}) {
+    const TwoStepContact contact(a1, a2, 2, series);
+    for (const double far : {1.0, 1e2, 1e6, 1e12}) {
+      const std::vector<double> d{far, -far}, none{0, 0};
+      const TwoStepContact::Answer answer = contact.solve({d, none, none, none, 0, 1});
+      const double f = std::hypot(answer.force[0], answer.force[1]);
+      const double s = std::min(1.0, 1 / f);
+      EXPECT_NEAR(answer.s, s, 1e-15);
+      for (std::size_t i = 0; i < 2; ++i) {
+        const double one = a1[i] * answer.force[0] + a1[2 + i] * answer.force[1],
+                     two = a2[i] * answer.force[0] + a2[2 + i] * answer.force[1];
+        EXPECT_NEAR(series ? s * one + (1 - s) * two : one - (1 - s) * two, d[i], 1e-13 * far);
+      }
+    }
+  }
+}
+
+TEST(TwoStep, InASimulationByEventsWithAWarning) {
+  std::vector<std::string> warnings;
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  Simulation s({}, {.warn = [&](const std::string& text) { warnings.push_back(text); }});
+  s.add_object("still", model, Method::ffe);
+  s.add_object("moving", model, Method::ela);
+  const std::uint32_t node = free_nodes(model)[2];
+  const auto second = [&] { return parts_of(stiff); };
+  EXPECT_THROW(s.apply(SetTwoStep{1, {.threshold = 1}, second}), Error);
+  s.apply(SetForce{0, {node}, {0, 3, 0}});
+  s.schedule(0.5, SetTwoStep{0, {.threshold = 1}, second});
+  s.step(0.25);
+  const std::vector<double> one(s.displacement(0).begin(), s.displacement(0).end());
+  s.step(0.25);
+  const std::vector<double> two(s.displacement(0).begin(), s.displacement(0).end());
+  Stages stages(model, stiff, {.threshold = 1});
+  Load load;
+  load.force[node] = {0, 3, 0};
+  EXPECT_EQ(two, stages.shape(load));
+  EXPECT_GT(difference(two, one), 0.05);
+  s.warn_of_thresholds();
+  EXPECT_TRUE(warnings.empty());
+  s.apply(SetTwoStep{0, {.threshold = 10}, second});
+  s.step(0.1);
+  EXPECT_EQ(std::vector<double>(s.displacement(0).begin(), s.displacement(0).end()), one);
+  for (int k = 0; k < 2; ++k)
+    s.warn_of_thresholds();
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("object still"), std::string::npos);
+  EXPECT_NE(warnings[0].find("3 at most"), std::string::npos) << warnings[0];
+}
+
+} // namespace
+} // namespace gewebe
