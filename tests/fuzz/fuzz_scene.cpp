@@ -1,12 +1,15 @@
-// Any bytes as a scene over two small models: an Error, or a run whose answers are well-formed.
+// Any bytes as a scene over small models: an Error, or a run whose answers are well-formed. Served,
+// each line that is refused is answered and takes no time; in binary the frames follow one another.
 
 #include "base/error.h"
+#include "formats/frames_binary.h"
 #include "formats/scene_run.h"
 #include "model/model.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <string>
 #include <string_view>
 
@@ -40,10 +43,36 @@ Model small_model() {
 
 struct Stop {};
 
-} // namespace
+/// Whether the bytes are whole frames, of which the last is `kind`.
+bool are_frames(std::string_view bytes, FrameKind kind) {
+  std::uint32_t last = UINT32_MAX;
+  while (!bytes.empty()) {
+    std::uint32_t magic = 0;
+    std::uint64_t count = 0;
+    if (bytes.size() < 28)
+      return false;
+    std::memcpy(&magic, bytes.data(), 4);
+    std::memcpy(&last, bytes.data() + 4, 4);
+    std::memcpy(&count, bytes.data() + 20, 8);
+    if (magic != frame_magic || count > (bytes.size() - 28) / 4)
+      return false;
+    bytes.remove_prefix(28 + 4 * count);
+  }
+  return last == static_cast<std::uint32_t>(kind);
+}
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::size_t answers = 0, objects = 0;
+bool is_answer(std::string_view text, bool binary, bool& refusal) {
+  if (binary) {
+    refusal = are_frames(text, FrameKind::error);
+    return refusal || are_frames(text, FrameKind::done);
+  }
+  refusal = text.starts_with("error ");
+  return refusal ? text.find('\n') == text.size() - 1
+                 : text.starts_with("step ") && text.ends_with("\ndone\n");
+}
+
+void play(std::string_view text, bool serving, bool binary) {
+  std::size_t answers = 0, objects = 0, refusals = 0;
   SceneOptions options;
   options.files.model = [&](const std::string&) {
     if (++objects > 4)
@@ -54,13 +83,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     throw Error(name, "no store here");
   };
   options.files.node_list = [](const std::string&) { return std::string("1 3"); };
-  options.reply = [&](std::string_view text) {
-    if (!text.starts_with("step ") || !text.ends_with("\ndone\n"))
+  options.reply = [&](std::string_view reply) {
+    bool refusal = false;
+    if (!is_answer(reply, binary, refusal))
       std::abort();
-    if (++answers > 20) // a long run is no fault
+    refusals += refusal ? 1 : 0;
+    if (!refusal && ++answers > 20) // a long run is no fault
       throw Stop{};
   };
+  options.serve = serving;
+  options.binary = binary;
   options.measure = true;
+  options.measure_error = true;
   Context context;
   context.threads = 1;
   std::size_t asked = 0;
@@ -70,18 +104,35 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return false;
   };
   SceneRun run("fuzz", context, options);
-  std::string_view text(reinterpret_cast<const char*>(data), size);
   try {
     while (!text.empty()) {
       const std::size_t end = text.find('\n');
-      run.line(text.substr(0, end));
+      const std::string_view line = text.substr(0, end);
+      const double time = run.simulation().time();
+      const std::size_t refused = refusals, answered = answers,
+                        pending = run.simulation().pending();
+      run.line(line);
+      if (refusals > refused + 1 || (refusals > 0 && !serving))
+        std::abort();
+      if (refusals > refused && answers == answered &&
+          (run.simulation().time() != time || run.simulation().pending() != pending))
+        std::abort();
       text = end == std::string_view::npos ? "" : text.substr(end + 1);
     }
     run.finish();
-  } catch (const Error& error) { // what bad input is for
-    if (!error.place().starts_with("fuzz"))
+  } catch (const Error& error) {                       // what bad input is for
+    if (!error.place().starts_with("fuzz") && !binary) // there, what does not fit has no place
       std::abort();
   } catch (const Stop&) {
   }
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  play(text, false, false);
+  play(text, true, false);
+  play(text, true, true);
   return 0;
 }
