@@ -54,13 +54,17 @@ test_both_backends_draw_the_same() {
   has_gl || skip 'no OpenGL'
   command -v python3 >/dev/null || skip 'no python3'
   bumps >bumps.pgm
-  local options=(--structure bumps.pgm --texture bumps.pgm --color "1,0.6,0.5" --uv-scale 1 --view iso --shade 0.4 --size 200x150 --to ppm)
-  emboss-render --backend gl --stats=stats.json "${options[@]}" in.off -o gl.ppm
-  emboss-render --backend cpu "${options[@]}" in.off -o cpu.ppm
-  grep -q '"backend":"gl","platform":"[a-z ]*","renderer":"..*","target":"RGBA..F","passes":2' stats.json || fail 'stats do not name OpenGL' "$(<stats.json)"
-  local max many
-  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
-  ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max"
+  local options=(--structure bumps.pgm --texture bumps.pgm --color "1,0.6,0.5" --uv-scale 1 --view iso --shade 0.4 --size 200x150 --filter linear --to ppm)
+  local mode max many where
+  for mode in 3 2 1 shader; do
+    where=vertex
+    [[ $mode != shader ]] || where=pixel
+    emboss-render --backend gl --passes $mode --stats=stats.json "${options[@]}" in.off -o gl.ppm
+    emboss-render --backend cpu --tbn $where "${options[@]}" in.off -o cpu.ppm
+    grep -q '"backend":"gl","platform":"[a-z ]*","renderer":"..*","target":"RGBA..F","passes":'"${mode/shader/1}" stats.json || fail 'stats do not name OpenGL' "$(<stats.json)"
+    read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+    ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max, with --passes $mode"
+  done
   # That this can fail: another light.
   emboss-render --backend cpu "${options[@]}" --light 1,2,30 in.off -o cpu.ppm
   read -r max many <<<"$(difference gl.ppm cpu.ppm)"

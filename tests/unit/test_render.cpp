@@ -271,7 +271,7 @@ TEST(RenderDrawing, SameForAnyThreadsAndOffsetsPointToTheLight) {
   DrawingOptions options;
   options.texcoords = options.structure = true;
   options.light = {0, 0, 0}; // within the first: nothing to shift
-  options.offset = 0.1;
+  options.offset = {0.1, 0.1};
   options.shade = 0.5;
   Context one, two;
   one.threads = 1;
