@@ -726,9 +726,6 @@ inline void gather(const KernelScene& scene, const KernelTile& tile, std::int32_
 inline void draw_row(const KernelScene& scene, const KernelTile& tile, std::int32_t row,
                      const std::uint32_t* seen, Corners& corners, Slots& slots) {
   std::uint8_t* const out = tile.out + static_cast<std::size_t>(row) * tile.row_bytes;
-  for (std::int32_t x = 0; x < tile.width; ++x)
-    for (int n = 0; n < 3; ++n)
-      out[3 * x + n] = static_cast<std::uint8_t>(scene.background >> (8 * n));
   gather(scene, tile, row, seen, corners, slots);
   float mean[raster_tile_width][3];
   if (tile.samples > 1)
@@ -742,19 +739,24 @@ inline void draw_row(const KernelScene& scene, const KernelTile& tile, std::int3
       }
   for (std::size_t at = 0; at < slots.count; at += lanes) {
     const Colors colors = shade(scene, slots, at);
-    float rgb[lanes][3];
-    for (int n = 0; n < 3; ++n)
-      for (int i = 0; i < lanes; ++i)
-        rgb[i][n] = colors.c[n][i];
     const std::size_t end = slots.count - at < lanes ? slots.count - at : lanes;
-    for (std::size_t i = 0; i < end; ++i) {
-      const std::uint8_t x = slots.pixel[at + i];
-      if (tile.samples == 1)
-        to_bytes(rgb[i], out + std::size_t{3} * x);
-      else
-        for (int n = 0; n < 3; ++n)
-          mean[x][n] += slots.weight[at + i] * rgb[i][n];
+    if (tile.samples == 1) {
+      Ints bytes[3];
+      for (int n = 0; n < 3; ++n)
+        bytes[n] = to_ints(colors.c[n] * splat(255.0F) + splat(0.5F));
+      const Ints packed = bytes[0] | bytes[1] << 8 | bytes[2] << 16;
+      for (std::size_t i = 0; i < end; ++i) {
+        std::uint8_t* const to = out + std::size_t{3} * slots.pixel[at + i];
+        const auto value = static_cast<std::uint32_t>(packed[i]);
+        to[0] = static_cast<std::uint8_t>(value);
+        to[1] = static_cast<std::uint8_t>(value >> 8);
+        to[2] = static_cast<std::uint8_t>(value >> 16);
+      }
+      continue;
     }
+    for (std::size_t i = 0; i < end; ++i)
+      for (int n = 0; n < 3; ++n)
+        mean[slots.pixel[at + i]][n] += slots.weight[at + i] * colors.c[n][i];
   }
   if (tile.samples > 1)
     for (std::int32_t x = 0; x < tile.width; ++x)
@@ -775,14 +777,14 @@ inline std::uint64_t draw_tile(const KernelScene& scene, const KernelScreen& scr
   std::uint64_t covered = 0;
   Corners corners;
   Slots slots;
+  std::uint8_t blank[3 * raster_tile_width];
+  for (std::size_t x = 0; x < sizeof blank; ++x)
+    blank[x] = static_cast<std::uint8_t>(scene.background >> (8 * (x % 3)));
   for (std::int32_t row = 0; row < tile.height; ++row) {
-    if (tile.count == 0) {
-      std::uint8_t* const out = tile.out + static_cast<std::size_t>(row) * tile.row_bytes;
-      for (std::int32_t x = 0; x < tile.width; ++x)
-        for (int n = 0; n < 3; ++n)
-          out[3 * x + n] = static_cast<std::uint8_t>(scene.background >> (8 * n));
+    std::memcpy(tile.out + static_cast<std::size_t>(row) * tile.row_bytes, blank,
+                std::size_t{3} * static_cast<std::size_t>(tile.width));
+    if (tile.count == 0)
       continue;
-    }
     draw_row(scene, tile, row, seen, corners, slots);
     for (int s = 0; s < tile.samples; ++s)
       for (std::int32_t x = 0; x < tile.width; ++x)
