@@ -57,9 +57,9 @@ BEGIN {
         put(0.13 * v + 0.08 * w + 0.07 * e, 0.010 * v + 0.005 * w + 0.065 * e, 0.02 * v + 0.01 * w + 0.06 * e)
       } else if (what == "structure") { # each lobule a dome, with finer grain
         lobules("lobule", 11, x + 0.012 * noise("shake", 24, x, y), y + 0.012 * noise("shaken", 24, x, y))
-        h = clamp(2.1 * (f2 - f1)); h = 0.62 * sqrt(h) * (1 - 0.25 * f1 * f1)
+        h = clamp(1.7 * (f2 - f1)); h = 0.75 * smooth(h) * (1 - 0.2 * f1 * f1)
         lobules("acinus", 37, x, y)
-        h += 0.13 * clamp(1.6 * (f2 - f1)) + 0.25 * cloud("grain", 8, x, y)
+        h += 0.07 * clamp(1.6 * (f2 - f1)) + 0.18 * cloud("grain", 5, x, y)
         printf "%d\n", 65535 * clamp(h) + 0.5
       } else { # what is mirrored: two lamps and their glow on the wet film, a rim of scattered light
         dx = 2 * x - 1; dy = 1 - 2 * y; rr = sqrt(dx * dx + dy * dy)
