@@ -80,7 +80,7 @@ struct GlRenderer::State {
   void load_textures();
   void use(int unit, GLuint texture, const std::optional<Texture>& layer, bool shifted = false);
   void drop_units();
-  int use_colors(int from);
+  int use_colors(int unit);
   void next_pass(GLenum source, GLenum destination);
   void draw_geometry(const Context& context);
   void draw_three(const Context& context);
