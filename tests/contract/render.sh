@@ -115,3 +115,21 @@ test_it_loads_only_what_it_uses() {
   ! grep -Eq 'lib(openvdb|cholmod|mpfr|openblas)' <<<"$libraries" || fail 'it loads too much' "$libraries"
   grep -q libepoxy <<<"$libraries" || fail 'it does not load epoxy' "$libraries"
 }
+
+test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
+  cube >in.off
+  exp2ela in.off -o cube.ela
+  printf '%s\n' 'object cube cube.ela' step step step step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  emboss-render --backend cpu --size 24x20 --frames all --to rgb --stats=stats.json run.h5 -o all.rgb
+  local frames
+  frames=$(grep -o '"pictures":[0-9]*' stats.json | cut -d: -f2)
+  ((frames > 1)) || fail 'one frame is no film' "$(<stats.json)"
+  grep -q "\"pictures_kept\":$((frames - 1))" stats.json || fail 'pictures were drawn again' "$(<stats.json)"
+  [[ $(wc -c <all.rgb) == $((frames * 24 * 20 * 3)) ]] || fail 'another number of bytes than frames have'
+  emboss-render --backend cpu --size 24x20 --frames 0:-1:2 run.h5 -o 'f%03d.png'
+  [[ -e f000.png && ! -e f001.png ]] || fail 'the numbers of the frames are not those of the files' ./*.png
+  expect_failure 1 emboss-render emboss-render --backend cpu --frames 0:99 run.h5 -o x.rgb
+  expect_failure 2 emboss-render emboss-render --backend cpu --frames a:b run.h5 -o x.rgb
+  expect_failure 2 emboss-render emboss-render --backend cpu --frames all run.h5 -o 'f%s.png'
+}
