@@ -15,19 +15,21 @@
 #pragma GCC diagnostic ignored "-Wpsabi" // no vector crosses a call that is not inlined
 
 namespace gewebe {
+
+constexpr int lanes = 8;
+constexpr std::uint32_t nothing = UINT32_MAX;
+constexpr int stride = raster_tile_width + lanes; // of a row: lanes may reach beyond the tile
+constexpr int plane = stride * raster_tile_height;
+constexpr int slot_count = 4 * raster_tile_width + lanes;
+// Four samples on a rotated grid, in subpixels from the pixel's centre.
+constexpr std::int32_t sample_x[4] = {-32, 96, -96, 32}, sample_y[4] = {-96, -32, 32, 96};
+
 namespace {
 
 using Floats = float __attribute__((vector_size(32)));
 using Ints = std::int32_t __attribute__((vector_size(32)));
 using Words = std::uint32_t __attribute__((vector_size(32)));
 using Doubles = double __attribute__((vector_size(64)));
-
-constexpr int lanes = 8;
-constexpr std::uint32_t nothing = UINT32_MAX;
-constexpr int stride =
-    raster_tile_width + lanes; // of a tile's rows, so that lanes may reach beyond
-constexpr int plane = stride * raster_tile_height;
-constexpr int slot_count = 4 * raster_tile_width + lanes;
 
 template <class To, class From>
 inline To as(From from) {
@@ -110,9 +112,6 @@ inline Floats inverse_or_zero(Floats length) {
 // --- Which triangle is seen
 // -----------------------------------------------------------------------------
 
-// Four samples on a rotated grid, in subpixels from the pixel's centre.
-constexpr std::int32_t sample_x[4] = {-32, 96, -96, 32}, sample_y[4] = {-96, -32, 32, 96};
-
 /// A triangle relative to the tile, inside where all three edge functions are >= 0:
 /// e = c + dx · x + dy · y in pixels of the tile.
 template <class Number>
@@ -185,15 +184,15 @@ inline void cover_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3]
                           float* depth, std::uint32_t* seen) {
   Edges<Number> edges;
   Nearness near{0, 0, 0, z[0], z[0]};
-  constexpr std::int32_t pixel = 1 << raster_subpixel_bits;
+  constexpr std::int32_t pixel = 1 << raster_subpixel_bits, half = pixel / 2;
   Number ex[3], ey[3];
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
     ex[k] = static_cast<Number>(x[b]) - static_cast<Number>(x[a]);
     ey[k] = static_cast<Number>(y[b]) - static_cast<Number>(y[a]);
     // ex (y - a.y) - ey (x - a.x) at the centres of pixels
-    edges.c[k] = ex[k] * (pixel / 2 - static_cast<Number>(y[a])) -
-                 ey[k] * (pixel / 2 - static_cast<Number>(x[a]));
+    edges.c[k] =
+        ex[k] * (half - static_cast<Number>(y[a])) - ey[k] * (half - static_cast<Number>(x[a]));
     edges.dx[k] = -ey[k] * pixel;
     edges.dy[k] = ex[k] * pixel;
     const double weight = static_cast<double>(z[k]) / area;
@@ -217,8 +216,8 @@ inline void cover_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3]
       moved.c[k] +=
           ex[k] * static_cast<Number>(sample_y[s]) - ey[k] * static_cast<Number>(sample_x[s]);
     there.c += (near.dx * sample_x[s] + near.dy * sample_y[s]) / pixel;
-    cover<Number>(moved, there, left, right, top, bottom, shown, depth + s * plane,
-                  seen + s * plane);
+    cover<Number>(moved, there, left, right, top, bottom, shown, depth + std::ptrdiff_t{s} * plane,
+                  seen + std::ptrdiff_t{s} * plane);
   }
 }
 
@@ -590,7 +589,7 @@ inline Colors sample(const KernelTexture& texture, const Slots& slots, std::size
     return sample_level(texture, first_level(texture), s, t);
   const KernelLevel& l = texture.levels[0];
   Floats most = splat(0.0F);
-  for (int a = 0; a < 2; ++a) {
+  for (std::size_t a = 0; a < 2; ++a) {
     const Floats u = load<Floats>(slots.change[2 * a] + at) * splat(static_cast<float>(l.width));
     const Floats v =
         load<Floats>(slots.change[2 * a + 1] + at) * splat(static_cast<float>(l.height));
@@ -669,8 +668,9 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
 }
 
 inline void to_bytes(const float (&rgb)[3], std::uint8_t* out) {
-  for (int n = 0; n < 3; ++n)
-    out[n] = static_cast<std::uint8_t>(rgb[n] * 255.0F + 0.5F);
+  for (int n = 0; n < 3; ++n) // as the lanes round
+    out[n] =
+        static_cast<std::uint8_t>(rgb[n] * 255.0F + 0.5F); // NOLINT(bugprone-incorrect-roundings)
 }
 
 /// Lists the row's pixels with what is seen in them, in runs of one triangle.
