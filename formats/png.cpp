@@ -3,6 +3,7 @@
 #include "base/error.h"
 
 #include <png.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -110,8 +111,10 @@ bool write_all(Job& job, const Image& image) {
     return false;
   png_set_write_fn(job.png, &job, take, flush);
   png_set_user_limits(job.png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-  png_set_compression_level(job.png, 6);
-  png_set_filter(job.png, PNG_FILTER_TYPE_BASE, PNG_ALL_FILTERS);
+  // Of pictures made here nearly as small as level 6 with all filters, in a fifth of the time.
+  png_set_compression_level(job.png, 1);
+  png_set_compression_strategy(job.png, Z_RLE);
+  png_set_filter(job.png, PNG_FILTER_TYPE_BASE, PNG_FILTER_PAETH);
   png_set_IHDR(job.png, job.info, image.width, image.height, 8,
                image.channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);

@@ -5,6 +5,8 @@
 #include "formats/mesh_file.h"
 #include "formats/results.h"
 
+#include <algorithm>
+#include <charconv>
 #include <utility>
 
 namespace gewebe {
@@ -37,12 +39,51 @@ std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& op
   return surfaces;
 }
 
+std::int64_t whole_number(const Input& input, const std::string& word, const std::string& part) {
+  std::int64_t value = 0;
+  const auto [rest, status] = std::from_chars(part.data(), part.data() + part.size(), value);
+  if (status != std::errc{} || rest != part.data() + part.size())
+    throw UsageError(input.name(), "--frames: '" + word + "', expected all, K, A:B or A:B:STEP");
+  return value;
+}
+
 void refuse(bool wrong, const Input& input, const char* what) {
   if (wrong)
     throw UsageError(input.name(), what);
 }
 
 } // namespace
+
+std::vector<std::int64_t> result_frames(const Input& input, const std::string& word) {
+  if (input.name() == "-")
+    throw Error(input.name(), "a result comes by a pipe, expected the name of its file");
+  const auto count = static_cast<std::int64_t>(read_result_index(input.name()).times.size());
+  std::vector<std::int64_t> parts;
+  if (word == "all")
+    parts = {0, -1};
+  else
+    for (std::size_t from = 0; from <= word.size();) {
+      const std::size_t end = std::min(word.find(':', from), word.size());
+      parts.push_back(whole_number(input, word, word.substr(from, end - from)));
+      from = end + 1;
+    }
+  if (parts.size() > 3 || (parts.size() == 3 && parts[2] < 1))
+    throw UsageError(input.name(),
+                     "--frames: '" + word + "', expected all, K, A:B or A:B:STEP, STEP at least 1");
+  const auto from_start = [&](std::int64_t k) { return k < 0 ? k + count : k; };
+  const std::int64_t first = from_start(parts[0]),
+                     last = from_start(parts.size() > 1 ? parts[1] : parts[0]);
+  if (first < 0 || last >= count || first > last)
+    throw Error(input.name(), "there are no frames " + word + ", expected some of 0 to " +
+                                  std::to_string(count - 1));
+  std::vector<std::int64_t> frames;
+  const std::int64_t step = parts.size() > 2 ? parts[2] : 1;
+  for (std::int64_t k = first;; k += step) {
+    frames.push_back(k);
+    if (last - k < step)
+      return frames;
+  }
+}
 
 const std::vector<Kind>& readable_surface_kinds() {
   static const std::vector<Kind> kinds = [] {

@@ -26,6 +26,11 @@ const std::vector<Kind>& readable_surface_kinds();
 /// The words of --unit.
 const std::vector<std::string>& surface_unit_names();
 
+/// The frames of a result that a word stands for: "all", "K", "A:B" or "A:B:STEP", both ends
+/// included, negative ones counted from the last (-1).
+/// \throw Error with place if there are no such frames; UsageError if it is none of these words
+std::vector<std::int64_t> result_frames(const Input& input, const std::string& word);
+
 /// The surfaces of `input` in mm, in order; those of a result with their points at rest.
 /// \throw Error with place, also if a result comes by a pipe, or has no such object or frame;
 /// UsageError for options that the kind has no use for

@@ -1,20 +1,18 @@
 // emboss-render: mesh, model or result -> picture.
 
+#include "base/digest.h"
 #include "formats/image_file.h"
 #include "formats/surface_file.h"
-#include "render/picture.h"
-#include "render/uv.h"
 #include "tools/cli.h"
 #include "tools/render_arguments.h"
+#include "tools/render_pictures.h"
 
 #include <cstdlib>
 
 using namespace gewebe;
 namespace {
 
-std::vector<Surface> read(cli::Run& run, SurfaceReadOptions options, const std::string& path) {
-  Input input(path);
-  options.kind = input_kind(input.peek(4096), path, run.format());
+std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions& options) {
   std::vector<Surface> surfaces = read_surfaces(input, options, run.context());
   run.stats().set("surfaces", std::uint64_t{surfaces.size()});
   run.stats().set("triangles", triangle_count(surfaces));
@@ -25,61 +23,70 @@ std::vector<Surface> read(cli::Run& run, SurfaceReadOptions options, const std::
   return surfaces;
 }
 
-/// The look with its textures; one that was not asked for is not read.
-Look look_of(const cli::Run& run, const cli::RenderArguments& a) {
-  Look look = a.look;
-  const auto load = [&](const std::string& path) {
-    Input input(path);
-    return read_image(input, run.context());
-  };
-  if (!a.base.empty())
-    look.base = texture_from(load(a.base));
-  if (!a.structure.empty())
-    look.structure = texture_from(luminance(load(a.structure)));
-  return look;
-}
-
-void tell(cli::Stats& stats, const PictureReport& told, const Image& picture) {
-  stats.set("backend", backend_names()[static_cast<std::size_t>(told.backend)]);
-  if (told.backend == Backend::gl) {
-    stats.set("platform", told.platform);
-    stats.set("renderer", told.renderer);
-    stats.set("target", told.target);
+/// PATTERN with its "%d" or "%04d" replaced; "%%" is one "%".
+std::string numbered(const std::string& pattern, std::int64_t n) {
+  std::string name;
+  bool used = false;
+  for (std::size_t at = 0; at < pattern.size(); ++at) {
+    if (pattern[at] != '%') {
+      name += pattern[at];
+      continue;
+    }
+    const std::size_t end = pattern.find_first_not_of("0123456789", at + 1);
+    if (end != std::string::npos && pattern[end] == 'd' && end - at <= 3 && !used) {
+      const std::string digits = std::to_string(n);
+      const std::size_t width =
+          end == at + 1 ? 0 : std::stoul(pattern.substr(at + 1, end - at - 1));
+      name += std::string(width > digits.size() ? width - digits.size() : 0, '0') + digits;
+      used = true;
+    } else if (end == at + 1 && pattern[end] == '%') {
+      name += '%';
+    } else {
+      throw UsageError("-o: '" + pattern +
+                       "', expected one %d or %04d for the number of the frame");
+    }
+    at = end;
   }
-  stats.set("passes", told.passes);
-  stats.set("triangles_drawn", told.triangles);
-  stats.set("samples_covered", told.covered);
-  stats.set("width", std::uint64_t{picture.width});
-  stats.set("height", std::uint64_t{picture.height});
-  stats.set("digest", image_digest(picture));
+  return name;
 }
 
 void work(cli::Run& run, const cli::RenderArguments& a) {
   const Kind to = output_kind(run.to(), run.output(), Kind::png, picture_kinds());
-  Output output(run.output(), run.output_options(true));
-  std::vector<Surface> surfaces =
-      run.timed("read", [&] { return read(run, a.reading, a.surface); });
-  const Look look = run.timed("textures", [&] { return look_of(run, a); });
-  const Camera camera =
-      make_camera(a.camera, rest_box(surfaces), a.picture.width, a.picture.height);
-  DrawingOptions options = a.drawing;
-  options.light = a.light.value_or(default_light(camera));
-  const Drawing drawing = run.timed("prepare", [&] {
-    if (options.texcoords)
-      run.stats().set("surfaces_mapped", add_texcoords(surfaces, a.mapping, run.context()));
-    return make_drawing(surfaces, options, run.context());
-  });
-  PictureReport told;
-  const Image picture = run.timed(
-      "draw", [&] { return make_picture(drawing, camera, look, a.picture, run.context(), &told); });
-  if (!told.gl_failure.empty())
-    run.warn(told.gl_failure + "; drawn without OpenGL (--backend cpu)");
-  run.timed("write", [&] { write_image(output, picture, to); });
-  output.commit();
-  run.stats().set("eye", camera.eye);
-  run.stats().set("looks_at", camera.target);
-  run.stats().set("light", options.light);
-  tell(run.stats(), told, picture);
+  const bool many = !a.frames.empty() && run.output().find('%') != std::string::npos;
+  std::optional<Output> one;
+  if (!many)
+    one.emplace(run.output(), run.output_options(true));
+  Input input(a.surface);
+  SurfaceReadOptions reading = a.reading;
+  reading.kind = input_kind(input.peek(4096), a.surface, run.format());
+  std::vector<std::int64_t> frames;
+  if (!a.frames.empty()) {
+    if (reading.kind != Kind::hdf5)
+      throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
+    frames = result_frames(input, a.frames);
+  } else {
+    frames.push_back(reading.frame.value_or(-1));
+  }
+  cli::Pictures pictures(run, a);
+  Digest digest;
+  Image picture;
+  for (const std::int64_t frame : frames) {
+    if (!a.frames.empty())
+      reading.frame = frame;
+    picture = pictures.of(run.timed("read", [&] { return read(run, input, reading); }));
+    digest.add(picture.values);
+    run.timed("write", [&] {
+      if (!many)
+        return write_image(*one, picture, to);
+      Output output(numbered(run.output(), frame), run.output_options(true));
+      write_image(output, picture, to);
+      output.commit();
+    });
+  }
+  if (one)
+    one->commit();
+  pictures.tell(run.stats(), picture);
+  run.stats().set("digest", digest.hex());
 }
 
 } // namespace
@@ -87,7 +94,7 @@ void work(cli::Run& run, const cli::RenderArguments& a) {
 int main(int argc, char** argv) {
   // Mesa reads these when EGL starts: no talk, and textures filtered in floats instead of 8 bits.
   (void)::setenv("EGL_LOG_LEVEL", "fatal", 0);
-  (void)::setenv("GALLIVM_PERF", "no_aos_sampling", 0);
+  (void)::setenv("GALLIVM_PERF", "no_aos_sampling,no_filter_hacks", 0);
   cli::Program p("emboss-render", "Draws a mesh, a model or a result with embossed textures.");
   cli::RenderArguments a;
   declare(p, a);

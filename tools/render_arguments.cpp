@@ -1,74 +1,209 @@
 #include "tools/render_arguments.h"
 
+#include <algorithm>
+#include <cmath>
 #include <tuple>
-#include <vector>
+#include <utility>
 
 namespace gewebe::cli {
 namespace {
 
-void refuse(bool wrong, const char* what) {
+void refuse(bool wrong, const std::string& what) {
   if (wrong)
     throw UsageError(what);
 }
 
-void complete(RenderArguments& a) {
-  const bool textured = !a.base.empty() || !a.structure.empty();
-  refuse(a.camera.eye && (!a.view.empty() || a.camera.distance),
-         "--eye with --view or --distance, expected one way to place the camera");
-  refuse(!textured && (a.uv != "auto" || a.mapping.edge),
-         "--uv or --uv-scale without texture, expected --texture or --structure");
-  refuse(a.uv != "auto" && a.uv != "box" && a.mapping.edge,
-         "--uv-scale for another mapping, expected --uv box");
-  std::vector<std::string> inputs{a.surface};
-  for (const std::string& texture : {a.base, a.structure})
-    if (!texture.empty())
-      inputs.push_back(texture);
-  check_one_pipe(inputs);
+std::vector<std::string> words_of(const std::string& list) {
+  std::vector<std::string> words;
+  for (std::size_t from = 0; from <= list.size();) {
+    const std::size_t end = std::min(list.find(',', from), list.size());
+    words.push_back(list.substr(from, end - from));
+    from = end + 1;
+  }
+  return words;
+}
+
+using Layers = std::array<std::pair<const char*, RenderLayer*>, 4>;
+
+Layers layers_of(RenderArguments& a) {
+  return {{{"texture", &a.base},
+           {"detail", &a.detail},
+           {"reflection", &a.reflection},
+           {"structure", &a.structure}}};
+}
+
+RenderLayer& layer_of(const Layers& layers, const std::string& option, const std::string& name) {
+  for (const auto& [word, layer] : layers)
+    if (name == word)
+      return *layer;
+  throw UsageError(option + ": '" + name +
+                   "' is no texture, expected texture, detail, reflection or structure");
+}
+
+/// A word for all textures, or a list of TEXTURE=WORD.
+template <class Set>
+void for_layers(const Layers& layers, const std::string& option, const std::string& list,
+                const Set& set) {
   try {
-    std::tie(a.picture.width, a.picture.height) = picture_size_from_text(a.size);
+    for (const std::string& part : words_of(list)) {
+      const std::size_t mid = part.find('=');
+      if (mid != std::string::npos)
+        set(layer_of(layers, option, part.substr(0, mid)).options, part.substr(mid + 1));
+      else
+        for (const auto& [word, layer] : layers)
+          set(layer->options, part);
+    }
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    throw UsageError(option + ": " + error.what());
+  }
+}
+
+void complete_textures(RenderArguments& a) {
+  const Layers layers = layers_of(a);
+  for_layers(layers, "--filter", a.words.filter, [](TextureOptions& o, const std::string& w) {
+    o.filter = texture_filter_from_name(w);
+  });
+  for_layers(layers, "--wrap", a.words.wrap,
+             [](TextureOptions& o, const std::string& w) { o.wrap = texture_wrap_from_name(w); });
+  if (a.words.sphere != "none")
+    for (const std::string& name : words_of(a.words.sphere))
+      layer_of(layers, "--sphere", name).options.sphere = true;
+  a.drawing.structure = !a.structure.path.empty();
+  a.drawing.texcoords = a.drawing.structure;
+  for (const auto& [word, layer] : layers)
+    if (!layer->path.empty()) {
+      (layer->options.sphere ? a.drawing.sphere : a.drawing.texcoords) = true;
+    }
+}
+
+void complete_modes(RenderArguments& a) {
+  a.picture.backend = backend_from_name(a.words.backend);
+  a.picture.gl.mode = gl_mode_from_name(a.words.passes);
+  a.picture.gl.wide = a.words.target == "float";
+  a.picture.gl.rgb_scale = static_cast<int>(a.words.rgb_scale);
+  a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample);
+  a.picture.samples = static_cast<int>(a.words.msaa);
+  refuse(a.words.msaa != 1 && a.words.msaa != 4,
+         "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
+  if (a.words.tbn != "auto")
+    a.picture.per_pixel = a.words.tbn == "pixel";
+  refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
+         "--tbn pixel for fixed functions, expected --passes shader");
+  if (a.words.compare.empty())
+    return;
+  a.compare = words_of(a.words.compare);
+  for (const std::string& mode : a.compare)
+    refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
+           "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
+}
+
+void complete_camera(RenderArguments& a) {
+  refuse(a.camera.eye && (!a.words.view.empty() || a.camera.distance),
+         "--eye with --view or --distance, expected one way to place the camera");
+  if (!a.words.view.empty())
+    a.camera.view = a.words.view;
+  a.camera.azimuth = a.words.orbit[0];
+  a.camera.elevation = a.words.orbit[1];
+  refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),
+         "--orbit: expected an azimuth up to 3600 and an elevation from -90 to 90 degrees");
+  try {
+    std::tie(a.picture.width, a.picture.height) = picture_size_from_text(a.words.size);
   } catch (const Error& error) {
     throw UsageError(std::string("--size: ") + error.what());
   }
-  a.picture.supersample = static_cast<std::uint32_t>(a.supersample);
-  a.picture.backend = backend_from_name(a.backend);
-  if (!a.view.empty())
-    a.camera.view = a.view;
-  a.drawing.texcoords = textured;
-  a.drawing.structure = !a.structure.empty();
-  if (a.uv != "auto")
-    a.mapping.mapping = uv_mapping_from_name(a.uv);
 }
 
-} // namespace
+void complete(RenderArguments& a) {
+  complete_textures(a);
+  complete_modes(a);
+  complete_camera(a);
+  refuse(!a.drawing.texcoords && (a.words.uv != "auto" || a.mapping.edge),
+         "--uv or --uv-scale without texture, expected --texture or --structure");
+  refuse(a.words.uv != "auto" && a.words.uv != "box" && a.mapping.edge,
+         "--uv-scale for another mapping, expected --uv box");
+  if (a.words.uv != "auto")
+    a.mapping.mapping = uv_mapping_from_name(a.words.uv);
+  refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
+  if (a.words.light_direction) {
+    a.light = a.words.light_direction;
+    a.drawing.directional = true;
+    refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
+  }
+  refuse(!a.frames.empty() && a.reading.frame.has_value(),
+         "--frame and --frames, expected one of them");
+  std::vector<std::string> inputs{a.surface};
+  for (const auto& [word, layer] : layers_of(a))
+    if (!layer->path.empty())
+      inputs.push_back(layer->path);
+  check_one_pipe(inputs);
+}
 
-void declare(Program& p, RenderArguments& a) {
-  p.option("--texture", a.base, "FILE", "colours: PNG or PNM");
-  p.option("--structure", a.structure, "FILE", "heights to emboss: brightness of a PNG or PNM");
-  p.option("--offset", a.drawing.offset, "D", "shift of the heights in texture coordinates")
-      .range(-1, 1);
+void declare_textures(Program& p, RenderArguments& a) {
+  p.option("--texture", a.base.path, "FILE", "colours: PNG or PNM");
+  p.option("--detail", a.detail.path, "FILE", "colours added to them");
+  p.option("--reflection", a.reflection.path, "FILE", "what a moist surface mirrors, added too");
+  p.option("--structure", a.structure.path, "FILE",
+           "heights to emboss: brightness of a PNG or PNM");
+  p.option("--sphere", a.words.sphere, "LIST",
+           "textures seen as in a mirror: texture, detail, reflection, structure; none");
+  p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
+  p.option("--wrap", a.words.wrap, "WORD", "repeat, clamp, mirror; or TEXTURE=WORD,...");
+  p.option("--offset", a.offset, "D", "shift of the heights in texture coordinates").range(-1, 1);
+  p.option("--offset-texels", a.offset_texels, "N", "the same in texels of the structure");
   p.option("--light", a.light, "X,Y,Z", "place of the light in mm, else above the camera, left");
+  p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
   p.option("--shade", a.drawing.shade, "K", "share of Lambert's law, 0 to 1").range(0, 1);
   p.option("--color", a.look.color, "R,G,B", "factor of the colours, 0 to 1").range(0, 1);
   p.option("--background", a.look.background, "R,G,B", "0 to 1").range(0, 1);
-  p.option("--uv", a.uv, "MAP", "auto (the mesh's coordinates, else box), box, sphere, cylinder")
+  p.option("--uv", a.words.uv, "MAP",
+           "auto (the mesh's coordinates, else box), box, sphere, cylinder")
       .one_of({"auto", "box", "sphere", "cylinder"});
   p.option("--uv-scale", a.mapping.edge, "MM", "edge of the texture for box, else half the mesh")
       .positive();
-  p.option("--view", a.view, "SIDE", "front (if no --eye), back, left, right, top, bottom, iso")
+}
+
+void declare_camera(Program& p, RenderArguments& a) {
+  p.option("--view", a.words.view, "SIDE",
+           "front (if no --eye), back, left, right, top, bottom, iso")
       .one_of(view_names());
+  p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
+      .count(2);
   p.option("--distance", a.camera.distance, "MM", "of the eye, else so that all is seen")
       .positive();
   p.option("--eye", a.camera.eye, "X,Y,Z", "place of the camera in mm");
   p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
   p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
   p.option("--fov", a.camera.fov, "DEG", "angle across the shorter side").range(1, 170);
-  p.option("--size", a.size, "WxH", "pixels of the picture, N for a square");
-  p.option("--supersample", a.supersample, "N", "a pixel is the mean of N x N samples").range(1, 8);
-  p.option("--backend", a.backend, "NAME", "gl, cpu; auto: gl or else cpu").one_of(backend_names());
-  p.option("--passes", a.passes, "N", "OpenGL passes with a structure").one_of({"2"});
+  p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
+  p.option("--supersample", a.words.supersample, "N", "a pixel is the mean of N x N samples")
+      .range(1, 8);
+  p.option("--msaa", a.words.msaa, "N", "1, or 4 samples along outlines").range(1, 4);
+}
+
+} // namespace
+
+void declare(Program& p, RenderArguments& a) {
+  declare_textures(p, a);
+  p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
+      .one_of({"textured", "flat", "wireframe"});
+  declare_camera(p, a);
+  p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl or else cpu")
+      .one_of(backend_names());
+  p.option("--passes", a.words.passes, "N", "with OpenGL: 3, 2, 1, or shader")
+      .one_of(gl_mode_names());
+  p.option("--gl-target", a.words.target, "KIND", "of OpenGL's colours: float, 8bit")
+      .one_of({"float", "8bit"});
+  p.option("--rgb-scale", a.words.rgb_scale, "S", "of --passes 1: 2, or 1 (darker)").range(1, 2);
+  p.option("--tbn", a.words.tbn, "WHERE",
+           "frame of the light: vertex, pixel; auto: as the mode can")
+      .one_of({"auto", "vertex", "pixel"});
+  p.option("--compare", a.words.compare, "MODES", "side by side, such as 3,2,1,shader,cpu");
   p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
       .range(-1, 1e15);
+  p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
   p.check([&a] { complete(a); });
 }

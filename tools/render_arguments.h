@@ -9,23 +9,45 @@
 #include "render/uv.h"
 #include "tools/cli.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace gewebe::cli {
 
+/// One of the four textures.
+struct RenderLayer {
+  std::string path; ///< "": absent
+  TextureOptions options;
+};
+
 struct RenderArguments {
-  std::string surface = "-", base, structure, uv = "auto", view, backend = "auto", size = "512";
-  std::string passes = "2"; // the only algorithm so far
+  std::string surface = "-";
+  RenderLayer base, detail, reflection, structure;
+  Look look; ///< colours; its textures are read later
   std::optional<Vec3> light;
-  std::int64_t supersample = 1;
-  Look look;
+  double offset = 0.02;
+  std::optional<double> offset_texels; ///< of the structure instead
+  std::string style = "textured";
+  std::vector<std::string> compare; ///< modes side by side
   SurfaceReadOptions reading;
+  std::string frames; ///< of a result, "": one
   CameraOptions camera;
   DrawingOptions drawing;
   UvOptions mapping;
   PictureOptions picture;
+
+  // Words that declare() turns into the above.
+  struct Words {
+    std::string size = "512", backend = "auto", uv = "auto", view, passes = "shader",
+                target = "float", tbn = "auto", filter = "mipmap", wrap = "repeat",
+                sphere = "reflection", compare;
+    std::vector<double> orbit{0, 0};
+    std::int64_t supersample = 1, msaa = 1, rgb_scale = 2;
+    std::optional<Vec3> light_direction;
+  } words;
 };
 
 /// Declares the options and the checks that hold them against each other.

@@ -50,6 +50,36 @@ void orient(Camera& camera, const Vec3& back, const std::optional<Vec3>& up, con
   camera.up = cross(camera.back, camera.right);
 }
 
+/// Cosine and sine of an angle in degrees.
+std::array<double, 2> cos_sin(double degrees) {
+  degrees -= 360 * std::floor(degrees / 360);
+  const double quarters = std::floor(degrees / 90);
+  const double t = tangent((degrees - 90 * quarters) / 2);
+  const double c = (1 - t * t) / (1 + t * t), s = 2 * t / (1 + t * t);
+  switch (static_cast<int>(quarters)) {
+  case 0:
+    return {c, s};
+  case 1:
+    return {-s, c};
+  case 2:
+    return {-c, -s};
+  default:
+    return {s, -c};
+  }
+}
+
+/// Walks around the target: first to the right around `up`, then upwards.
+void orbit(Camera& camera, double azimuth, double elevation) {
+  const auto turn = [](Vec3& a, Vec3& b, double degrees) { // from a towards b
+    const auto [c, s] = cos_sin(degrees);
+    const Vec3 turned = a * c + b * s;
+    b = b * c - a * s;
+    a = turned;
+  };
+  turn(camera.back, camera.right, azimuth);
+  turn(camera.back, camera.up, elevation);
+}
+
 /// The distance from the target at which the whole box is seen.
 double fitting_distance(const Camera& camera, const Box3& box) {
   double distance = 0;
@@ -88,8 +118,13 @@ Camera make_camera(const CameraOptions& options, const Box3& fit, std::uint32_t 
   if (!(norm(back) > 0))
     throw Error("eye and target are the same point, expected two");
   orient(camera, back, options.up, options.eye ? Vec3{0, 0, 1} : view.up);
-  camera.eye = options.eye.value_or(
-      camera.target + camera.back * options.distance.value_or(fitting_distance(camera, box)));
+  if (options.azimuth != 0 || options.elevation != 0)
+    orbit(camera, options.azimuth, options.elevation);
+  const double distance =
+      options.eye ? norm(back) : options.distance.value_or(fitting_distance(camera, box));
+  camera.eye = camera.target + camera.back * distance;
+  if (options.eye && options.azimuth == 0 && options.elevation == 0)
+    camera.eye = *options.eye;
   if (!is_finite(camera.eye) || !is_finite(camera.back) || !is_finite(camera.right))
     throw Error("the camera's place is beyond all numbers, expected a smaller object");
   return camera;

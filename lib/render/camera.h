@@ -16,8 +16,10 @@ namespace gewebe {
 const std::vector<std::string>& view_names();
 
 struct CameraOptions {
-  std::string view = "front";     ///< where `eye` is not given
-  std::optional<Vec3> eye;        ///< mm
+  std::string view = "front"; ///< where `eye` is not given
+  std::optional<Vec3> eye;    ///< mm
+  double azimuth = 0;   ///< degrees by which `view` or `eye` is turned around up, to the right
+  double elevation = 0; ///< degrees by which it is raised, -90 … 90
   std::optional<Vec3> target;     ///< mm, else the centre of the box to fit
   std::optional<Vec3> up;         ///< else +z (+y where the view is along z)
   std::optional<double> distance; ///< of eye and target in mm, else so that the box fits

@@ -30,11 +30,30 @@ Vec3 direction_to(const Vec3& light, const Vec3& p) {
   return distance > 0 ? to / distance : Vec3{};
 }
 
+/// 0 for a vertex at the light.
+Vec3 to_light(const DrawingOptions& options, const Vec3& p) {
+  return options.directional ? direction_to(options.light, {}) : direction_to(options.light, p);
+}
+
+std::array<float, 2> in_sphere_map(const Camera& camera, const Vec3& p, const Vec3& normal) {
+  const Vec3 to = direction_to(p, camera.eye);
+  const Vec3 mirrored = to - normal * (2 * dot(normal, to));
+  const Vec3 v{dot(mirrored, camera.right), dot(mirrored, camera.up),
+               dot(mirrored, camera.back) + 1};
+  const double m = 2 * norm(v);
+  return {static_cast<float>(m > 0 ? v.x / m + 0.5 : 0.5),
+          static_cast<float>(m > 0 ? v.y / m + 0.5 : 0.5)};
+}
+
+std::array<float, 3> in_floats(const Vec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
 void append(Drawing& drawing, const Surface& surface, const DrawingOptions& options,
             const Context& context) {
   const TriangleMesh& mesh = surface.mesh;
   std::vector<Vec3> normals;
-  if (options.structure || options.shade > 0)
+  if (options.structure || options.sphere || options.shade > 0)
     normals = render_normals(mesh);
   const TexturedVertices vertices =
       options.texcoords
@@ -46,25 +65,39 @@ void append(Drawing& drawing, const Surface& surface, const DrawingOptions& opti
     throw Error(std::to_string(base + vertices.point.size()) + " vertices, expected at most " +
                 std::to_string(UINT32_MAX));
   drawing.vertices.resize(base + vertices.point.size());
+  const bool frames = options.per_pixel && (options.structure || options.sphere);
+  if (frames)
+    drawing.frames.resize(drawing.vertices.size());
   parallel_blocks(context, vertices.point.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       const Vec3& p = mesh.points[vertices.point[v]];
       const Vec3 place = (p - drawing.origin) / drawing.scale;
       DrawVertex& out = drawing.vertices[base + v];
-      for (int a = 0; a < 3; ++a)
-        out.position[static_cast<std::size_t>(a)] = static_cast<float>(place[a]);
-      const Vec3 to_light = direction_to(options.light, p);
+      out.position = in_floats(place);
+      const Vec3 light = to_light(options, p);
+      const Vec3 normal = normals.empty() ? Vec3{} : normals[vertices.point[v]];
       if (options.texcoords)
         out.st = out.shifted = vertices.st[v];
-      if (options.structure) {
-        const double ds = options.offset * dot(to_light, vertices.tangent[v]);
-        const double dt = options.offset * dot(to_light, vertices.bitangent[v]);
-        out.shifted = {static_cast<float>(out.st[0] + ds), static_cast<float>(out.st[1] + dt)};
+      if (frames) {
+        DrawFrame& frame = drawing.frames[base + v];
+        frame.normal = in_floats(normal);
+        if (options.structure) {
+          frame.tangent = in_floats(vertices.tangent[v]);
+          frame.side =
+              dot(cross(normal, vertices.tangent[v]), vertices.bitangent[v]) < 0 ? -1.0F : 1.0F;
+        }
+      } else {
+        if (options.structure) {
+          const double ds = options.offset[0] * dot(light, vertices.tangent[v]);
+          const double dt = options.offset[1] * dot(light, vertices.bitangent[v]);
+          out.shifted = {static_cast<float>(out.st[0] + ds), static_cast<float>(out.st[1] + dt)};
+        }
+        if (options.sphere)
+          out.sphere = in_sphere_map(options.camera, p, normal);
       }
       if (options.shade > 0)
-        out.shade = static_cast<float>(
-            1 - options.shade +
-            options.shade * std::clamp(dot(to_light, normals[vertices.point[v]]), 0.0, 1.0));
+        out.shade = static_cast<float>(1 - options.shade +
+                                       options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
     }
   });
   for (Triangle t : vertices.triangles) {
@@ -90,6 +123,12 @@ Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& op
     throw Error("the mesh spans more than the largest number, expected less");
   if (half > 1e-300)
     drawing.scale = half;
+  drawing.directional = options.directional;
+  drawing.light = options.directional ? direction_to(options.light, {})
+                                      : (options.light - drawing.origin) / drawing.scale;
+  drawing.offset = options.offset;
+  drawing.camera = options.camera;
+  drawing.camera.eye = (options.camera.eye - drawing.origin) / drawing.scale;
   for (const Surface& surface : surfaces)
     append(drawing, surface, options, context);
   return drawing;
@@ -100,9 +139,9 @@ double drawing_bytes(std::span<const Surface> surfaces) {
   double points = 0;
   for (const Surface& surface : surfaces)
     points += static_cast<double>(surface.mesh.points.size());
-  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 32, on the
-  // screen 48; corner lists, faces, indices.
-  return triangles * (3 * (88.0 + 32 + 48 + 16) + 32 + 3 * 12) + points * 64;
+  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, on
+  // the screen 12; corner lists, faces, indices.
+  return triangles * (3 * (88.0 + 68 + 12 + 16) + 32 + 3 * 12) + points * 64;
 }
 
 std::uint64_t triangle_count(std::span<const Surface> surfaces) {

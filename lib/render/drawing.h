@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "base/mesh.h"
 #include "base/vec3.h"
+#include "render/camera.h"
 
 #include <array>
 #include <cstddef>
@@ -13,12 +14,20 @@
 
 namespace gewebe {
 
-/// In single precision, as OpenGL takes them, so that both backends draw the same geometry.
+/// In single precision, as OpenGL takes them, so that all ways of drawing have the same geometry.
 struct DrawVertex {
   std::array<float, 3> position{}; ///< (p - origin) / scale, within -1 … 1
   std::array<float, 2> st{};       ///< of the base texture, and of the structure
   std::array<float, 2> shifted{};  ///< (s + ds, t + dt), towards the light
+  std::array<float, 2> sphere{};   ///< in sphere maps
   float shade = 1;                 ///< factor of the base colour, 0 … 1
+};
+
+/// Where shifts and sphere maps are found for each pixel instead.
+struct DrawFrame {
+  std::array<float, 3> normal{};
+  std::array<float, 3> tangent{}; ///< direction of growing s, perpendicular to the normal, or 0
+  float side = 1;                 ///< bitangent = side · normal × tangent
 };
 
 struct Drawing {
@@ -26,7 +35,13 @@ struct Drawing {
   Vec3 origin;
   double scale = 1; ///< > 0
   std::vector<DrawVertex> vertices;
+  std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
   std::vector<Triangle> triangles;
+  // What frames are used with, in coordinates of positions.
+  Vec3 light; ///< place, or unit vector to it
+  bool directional = false;
+  std::array<double, 2> offset{}; ///< of the structure
+  Camera camera;                  ///< eye and axes
 };
 
 /// A mesh to draw.
@@ -38,15 +53,21 @@ struct Surface {
 struct DrawingOptions {
   bool texcoords = false; ///< a base or a structure texture is there
   bool structure = false; ///< a structure texture is there: offsets are computed
-  Vec3 light;             ///< lP, mm, in the space of the mesh
-  double offset = 0.02;   ///< length of the offset, in texture coordinates
-  double shade = 0;       ///< share of Lambert's law in the base colour, 0 … 1
+  bool sphere = false;    ///< a texture is sphere-mapped
+  bool per_pixel = false; ///< frames instead of offsets and places in sphere maps
+  Vec3 light;             ///< lP, mm, in the space of the mesh; or a vector to it
+  bool directional = false;
+  std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
+  double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
+  Camera camera;                            ///< that sees the sphere maps
 };
 
 /// All surfaces in one, in order. Per vertex (report eq. 3.2)
 ///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
 /// with the frame of tangents.h, and shade = 1 - k + k max(0, L·N) for a share k. L is 0 for a
-/// vertex at the light. Nothing that was not asked for is computed.
+/// vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for
+/// the view's mirror image (x, y, z) at the normal, in axes right, up, back, and
+/// m = 2 |(x, y, z + 1)|. Nothing that was not asked for is computed.
 /// \pre check_mesh passes for every mesh; with `texcoords` all meshes have them
 /// \throw Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,

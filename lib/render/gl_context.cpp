@@ -171,6 +171,11 @@ GlContext::~GlContext() = default;
 GlContext::GlContext(GlContext&&) noexcept = default;
 GlContext& GlContext::operator=(GlContext&&) noexcept = default;
 
+void GlContext::make_current() {
+  if (eglMakeCurrent(state_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context) != EGL_TRUE)
+    throw Error("EGL can't make its context current, expected it to");
+}
+
 const std::string& GlContext::platform() const {
   return state_->platform;
 }

@@ -17,6 +17,8 @@ public:
   GlContext(GlContext&&) noexcept;
   GlContext& operator=(GlContext&&) noexcept;
 
+  /// For a thread that has several. \throw Error if EGL fails
+  void make_current();
   const std::string& platform() const; ///< "surfaceless", "device", "software device"
   const std::string& renderer() const; ///< what OpenGL calls itself
   int max_side() const;                ///< of pictures and textures

@@ -36,6 +36,19 @@ Image shrunk(const Image& image, std::uint32_t factor) {
   return small;
 }
 
+Image side_by_side(const std::vector<Image>& images) {
+  Image all{0, images.front().height, images.front().channels, {}};
+  for (const Image& image : images)
+    all.width += image.width;
+  for (std::size_t y = 0; y < all.height; ++y)
+    for (const Image& image : images) {
+      const std::size_t row = std::size_t{image.width} * image.channels;
+      const auto from = image.values.begin() + static_cast<std::ptrdiff_t>(y * row);
+      all.values.insert(all.values.end(), from, from + static_cast<std::ptrdiff_t>(row));
+    }
+  return all;
+}
+
 std::string image_digest(const Image& image) {
   Digest digest;
   digest.add(image.values);

@@ -16,6 +16,14 @@ struct Image {
   bool operator==(const Image&) const = default;
 };
 
+/// A height, or a brightness, for each pixel in 16 bits, rows from the top.
+struct Heights {
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::uint16_t> values; ///< width · height
+
+  bool operator==(const Heights&) const = default;
+};
+
 /// The brightness of each pixel, one channel: Rec. 709 weights on the stored values; the image
 /// itself if it is gray.
 Image luminance(const Image& image);
@@ -23,6 +31,9 @@ Image luminance(const Image& image);
 /// Each pixel the mean of factor × factor pixels, rounded. \pre both sides are multiples of factor,
 /// which is 1 to 256
 Image shrunk(const Image& image, std::uint32_t factor);
+
+/// The images side by side, from left to right. \pre of equal height and channels, one at least
+Image side_by_side(const std::vector<Image>& images);
 
 /// XXH3-64 of the values, 16 hexadecimal digits.
 std::string image_digest(const Image& image);

@@ -16,9 +16,11 @@ namespace gewebe {
 /// structure r = 0.5, which leaves the base as it is.
 struct Look {
   std::optional<Texture> base;
-  std::optional<Texture> structure; ///< the height f, one channel
-  Vec3 color{1, 1, 1};              ///< factor of the base, 0 … 1
-  Vec3 background{1, 1, 1};         ///< 0 … 1
+  std::optional<Texture> detail;     ///< added to the base
+  std::optional<Texture> reflection; ///< added to both; of what surrounds the surface
+  std::optional<Texture> structure;  ///< the height f, one channel
+  Vec3 color{1, 1, 1};               ///< factor of the base, 0 … 1
+  Vec3 background{1, 1, 1};          ///< 0 … 1
 };
 
 /// s of the composition: makes up for r being 0.5 where the structure is flat.
@@ -29,9 +31,9 @@ inline double relief(double height, double height_to_light) {
   return 0.5 + 0.5 * (height - height_to_light);
 }
 
-/// min(1, s r min(1, base)) on stored values.
-inline double compose(double base, double r) {
-  return std::min(1.0, emboss_scale * r * std::min(1.0, base));
+/// min(1, s r min(1, min(1, base + detail) + reflection)) on stored values (report 3.2.4 and 4.2).
+inline double compose(double base, double detail, double reflection, double r) {
+  return std::min(1.0, emboss_scale * r * std::min(1.0, std::min(1.0, base + detail) + reflection));
 }
 
 /// A value 0 … 1 as 8 bits, rounded; values outside are clamped.

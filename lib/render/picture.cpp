@@ -2,47 +2,12 @@
 
 #include "base/error.h"
 #include "render/gl_context.h"
-#include "render/gl_passes.h"
 #include "render/raster_cpu.h"
 
 #include <algorithm>
 #include <charconv>
 
 namespace gewebe {
-namespace {
-
-Image by_gl(const Drawing& drawing, const Projection& projection, const Look& look,
-            std::uint32_t width, std::uint32_t height, const Context& context,
-            PictureReport& report) {
-  require_memory(context, render_gl_bytes(width, height), "the picture");
-  GlContext gl;
-  GlReport drawn;
-  Image image = render_gl(gl, drawing, projection, look, width, height, context, &drawn);
-  report.backend = Backend::gl;
-  report.platform = gl.platform();
-  report.renderer = gl.renderer();
-  report.target = drawn.target;
-  report.passes = drawn.passes;
-  report.triangles = drawing.triangles.size();
-  report.covered = drawn.covered;
-  return image;
-}
-
-Image by_cpu(const Drawing& drawing, const Projection& projection, const Look& look,
-             std::uint32_t width, std::uint32_t height, const Context& context,
-             PictureReport& report) {
-  require_memory(context, render_cpu_bytes(width, height, context), "the picture");
-  RenderReport drawn;
-  Image image = render_cpu(drawing, projection, look, width, height, context, &drawn);
-  report.backend = Backend::cpu;
-  report.passes = 1;
-  report.triangles = drawn.triangles;
-  report.covered = drawn.covered;
-  return image;
-}
-
-} // namespace
-
 const std::vector<std::string>& backend_names() {
   static const std::vector<std::string> names{"auto", "gl", "cpu"};
   return names;
@@ -71,29 +36,109 @@ std::pair<std::uint32_t, std::uint32_t> picture_size_from_text(std::string_view 
   return {side(text.substr(0, mid)), side(text.substr(mid + 1))};
 }
 
-Image make_picture(const Drawing& drawing, const Camera& camera, const Look& look,
-                   const PictureOptions& options, const Context& context, PictureReport* report) {
-  const std::uint64_t width = std::uint64_t{options.width} * options.supersample;
-  const std::uint64_t height = std::uint64_t{options.height} * options.supersample;
-  if (std::max(width, height) > max_picture_side)
-    throw Error("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
-                " samples, expected sides up to " + std::to_string(max_picture_side));
-  const auto w = static_cast<std::uint32_t>(width), h = static_cast<std::uint32_t>(height);
-  const Projection projection = make_projection(camera, drawing.box, drawing.origin, drawing.scale);
-  PictureReport ours;
-  PictureReport& told = report != nullptr ? *report : ours;
-  if (options.backend != Backend::cpu) {
+struct Painter::State {
+  State(const Look& l, const PictureOptions& o, const Context& c)
+      : look(l), options(o), context(c) {
+    const std::uint64_t w = std::uint64_t{options.width} * options.supersample;
+    const std::uint64_t h = std::uint64_t{options.height} * options.supersample;
+    if (std::max(w, h) > max_picture_side)
+      throw Error("a picture of " + std::to_string(w) + " x " + std::to_string(h) +
+                  " samples, expected sides up to " + std::to_string(max_picture_side));
+    width = static_cast<std::uint32_t>(w);
+    height = static_cast<std::uint32_t>(h);
+    if (options.backend != Backend::cpu)
+      attempt([&] {
+        require_memory(context, render_gl_bytes(width, height, options.samples), "the picture");
+        gl.emplace();
+        GlOptions with_samples = options.gl;
+        with_samples.samples = options.samples;
+        renderer.emplace(*gl, look, width, height, with_samples);
+      });
+    if (!renderer)
+      require_memory(context, render_cpu_bytes(width, height, options.samples, context),
+                     "the picture");
+  }
+
+  ~State() {
+    try { // objects are deleted in the context that has them
+      if (gl)
+        gl->make_current();
+    } catch (const Error&) { // they go with the context
+    }
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  /// What fails is an error for Backend::gl, and ends OpenGL for automatic.
+  template <class Work>
+  void attempt(Work&& work) {
     try {
-      return shrunk(by_gl(drawing, projection, look, w, h, context, told), options.supersample);
+      work();
     } catch (const Cancelled&) {
       throw;
     } catch (const Error& error) {
       if (options.backend == Backend::gl)
         throw;
-      told.gl_failure = error.what();
+      gl_failure = error.what();
+      renderer.reset();
+      gl.reset();
     }
   }
-  return shrunk(by_cpu(drawing, projection, look, w, h, context, told), options.supersample);
+
+  Look look;
+  PictureOptions options;
+  Context context;
+  std::uint32_t width = 0, height = 0;
+  std::optional<GlContext> gl;
+  std::optional<GlRenderer> renderer;
+  std::string gl_failure;
+};
+
+Painter::Painter(const Look& look, const PictureOptions& options, const Context& context)
+    : state_(std::make_unique<State>(look, options, context)) {}
+Painter::~Painter() = default;
+
+bool Painter::per_pixel() const {
+  const PictureOptions& options = state_->options;
+  const bool can = options.backend == Backend::cpu || options.gl.mode == GlMode::shader;
+  return options.per_pixel.value_or(can);
+}
+
+Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport* report) {
+  State& s = *state_;
+  const Projection projection = make_projection(camera, drawing.box, drawing.origin, drawing.scale);
+  PictureReport ours;
+  PictureReport& told = report != nullptr ? *report : ours;
+  Image image;
+  if (s.renderer)
+    s.attempt([&] {
+      s.gl->make_current();
+      s.renderer->set_drawing(drawing);
+      s.renderer->draw(projection, s.context);
+      image = s.renderer->read(s.context);
+      told.backend = Backend::gl;
+      told.platform = s.gl->platform();
+      told.renderer = s.gl->renderer();
+      told.target = s.renderer->target();
+      told.passes = s.renderer->passes();
+      told.triangles = drawing.triangles.size();
+    });
+  told.gl_failure = s.gl_failure;
+  if (!s.renderer) {
+    RenderReport drawn;
+    image = render_cpu(drawing, projection, s.look, s.width, s.height, s.options.samples, s.context,
+                       &drawn);
+    told.backend = Backend::cpu;
+    told.passes = 1;
+    told.triangles = drawn.triangles;
+    told.covered = drawn.covered;
+  }
+  return shrunk(image, s.options.supersample);
+}
+
+Image make_picture(const Drawing& drawing, const Camera& camera, const Look& look,
+                   const PictureOptions& options, const Context& context, PictureReport* report) {
+  return Painter(look, options, context).paint(drawing, camera, report);
 }
 
 } // namespace gewebe

@@ -4,10 +4,13 @@
 #include "base/context.h"
 #include "render/camera.h"
 #include "render/drawing.h"
+#include "render/gl_renderer.h"
 #include "render/image.h"
 #include "render/look.h"
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,21 +37,45 @@ struct PictureOptions {
   Backend backend = Backend::automatic;
   std::uint32_t width = 512, height = 512;
   std::uint32_t supersample = 1; ///< a pixel is the mean of this many samples squared
+  int samples = 1;               ///< of each of them, 1 or 4 (multisampling)
+  GlOptions gl;                  ///< of the backend gl; its samples don't count
+  std::optional<bool> per_pixel; ///< frames for each pixel; nothing: where the mode can
 };
 
 struct PictureReport {
   Backend backend = Backend::cpu;         ///< that drew
   std::string gl_failure;                 ///< why OpenGL did not, where it was tried
-  std::string platform, renderer, target; ///< OpenGL's, see gl_context.h and gl_passes.h
+  std::string platform, renderer, target; ///< OpenGL's, see gl_context.h and gl_renderer.h
   int passes = 1;
   std::uint64_t triangles = 0; ///< cpu: in the view and not without area; gl: all
-  std::uint64_t covered = 0;   ///< samples
+  std::uint64_t covered = 0;   ///< samples; cpu alone
 };
 
-/// The picture, three channels. Both backends draw the same: values differ by 2 of 255 at most
-/// where the picture is continuous.
-/// \throw Error if sides times supersample exceed max_picture_side or the estimate the memory, and,
-/// with Backend::gl, where OpenGL fails; Cancelled
+/// Draws pictures of one look and size. What a sequence keeps is kept: the context of OpenGL, the
+/// shader, the textures there.
+class Painter {
+public:
+  /// With Backend::automatic OpenGL is tried, and what fails kept for the report.
+  /// \throw Error if sides times supersample exceed max_picture_side or the estimate the memory,
+  /// and, with Backend::gl, where OpenGL fails
+  Painter(const Look& look, const PictureOptions& options, const Context& context);
+  ~Painter();
+  Painter(const Painter&) = delete;
+  Painter& operator=(const Painter&) = delete;
+
+  /// Whether drawings should have frames: for the rasteriser and the shader, unless told otherwise.
+  bool per_pixel() const;
+  /// The picture, three channels. All modes draw the same: of 255, values differ by 2 at most where
+  /// the picture is continuous, for one kind of drawings.
+  /// \throw Error where OpenGL fails; Cancelled
+  Image paint(const Drawing& drawing, const Camera& camera, PictureReport* report = nullptr);
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// One picture.
 Image make_picture(const Drawing& drawing, const Camera& camera, const Look& look,
                    const PictureOptions& options, const Context& context,
                    PictureReport* report = nullptr);

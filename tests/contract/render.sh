@@ -54,13 +54,17 @@ test_both_backends_draw_the_same() {
   has_gl || skip 'no OpenGL'
   command -v python3 >/dev/null || skip 'no python3'
   bumps >bumps.pgm
-  local options=(--structure bumps.pgm --texture bumps.pgm --color "1,0.6,0.5" --uv-scale 1 --view iso --shade 0.4 --size 200x150 --to ppm)
-  emboss-render --backend gl --stats=stats.json "${options[@]}" in.off -o gl.ppm
-  emboss-render --backend cpu "${options[@]}" in.off -o cpu.ppm
-  grep -q '"backend":"gl","platform":"[a-z ]*","renderer":"..*","target":"RGBA..F","passes":2' stats.json || fail 'stats do not name OpenGL' "$(<stats.json)"
-  local max many
-  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
-  ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max"
+  local options=(--structure bumps.pgm --texture bumps.pgm --color "1,0.6,0.5" --uv-scale 1 --view iso --shade 0.4 --size 200x150 --filter linear --to ppm)
+  local mode max many where
+  for mode in 3 2 1 shader; do
+    where=vertex
+    [[ $mode != shader ]] || where=pixel
+    emboss-render --backend gl --passes $mode --stats=stats.json "${options[@]}" in.off -o gl.ppm
+    emboss-render --backend cpu --tbn $where "${options[@]}" in.off -o cpu.ppm
+    grep -q '"backend":"gl","platform":"[a-z ]*","renderer":"..*","target":"RGBA..F","passes":'"${mode/shader/1}" stats.json || fail 'stats do not name OpenGL' "$(<stats.json)"
+    read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+    ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max, with --passes $mode"
+  done
   # That this can fail: another light.
   emboss-render --backend cpu "${options[@]}" --light 1,2,30 in.off -o cpu.ppm
   read -r max many <<<"$(difference gl.ppm cpu.ppm)"
@@ -110,4 +114,22 @@ test_it_loads_only_what_it_uses() {
   libraries=$(ldd "$BUILD/emboss-render")
   ! grep -Eq 'lib(openvdb|cholmod|mpfr|openblas)' <<<"$libraries" || fail 'it loads too much' "$libraries"
   grep -q libepoxy <<<"$libraries" || fail 'it does not load epoxy' "$libraries"
+}
+
+test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
+  cube >in.off
+  exp2ela in.off -o cube.ela
+  printf '%s\n' 'object cube cube.ela' step step step step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  emboss-render --backend cpu --size 24x20 --frames all --to rgb --stats=stats.json run.h5 -o all.rgb
+  local frames
+  frames=$(grep -o '"pictures":[0-9]*' stats.json | cut -d: -f2)
+  ((frames > 1)) || fail 'one frame is no film' "$(<stats.json)"
+  grep -q "\"pictures_kept\":$((frames - 1))" stats.json || fail 'pictures were drawn again' "$(<stats.json)"
+  [[ $(wc -c <all.rgb) == $((frames * 24 * 20 * 3)) ]] || fail 'another number of bytes than frames have'
+  emboss-render --backend cpu --size 24x20 --frames 0:-1:2 run.h5 -o 'f%03d.png'
+  [[ -e f000.png && ! -e f001.png ]] || fail 'the numbers of the frames are not those of the files' ./*.png
+  expect_failure 1 emboss-render emboss-render --backend cpu --frames 0:99 run.h5 -o x.rgb
+  expect_failure 2 emboss-render emboss-render --backend cpu --frames a:b run.h5 -o x.rgb
+  expect_failure 2 emboss-render emboss-render --backend cpu --frames all run.h5 -o 'f%s.png'
 }

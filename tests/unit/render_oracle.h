@@ -3,6 +3,7 @@
 // nothing of lib/render but the plain data that it is asked about.
 
 #include "base/mesh.h"
+#include "base/parallel.h"
 #include "render/camera.h"
 #include "render/image.h"
 
@@ -20,8 +21,13 @@ namespace gewebe::test {
 struct OracleScene {
   TriangleMesh mesh;                    ///< with texture coordinates
   std::optional<Image> base, structure; ///< the structure is gray
+  std::optional<Image> detail;          ///< by the mesh's coordinates
+  std::optional<Image> reflection;      ///< sphere-mapped
   Vec3 color{1, 1, 1}, light;
   double offset = 0, shade = 0;
+  bool directional = false; ///< `light` is a vector to it
+  bool per_pixel = false;   ///< frames for each pixel, not offsets for each vertex
+  bool mipmap = false;
   bool clamp_early = false; ///< what 8-bit blending does: a negative control
 };
 
@@ -37,6 +43,12 @@ public:
       : scene_(scene), camera_(camera), width_(width), height_(height) {
     find_frames();
     bound();
+    for (const auto& [image, levels] : {std::pair{&scene.base, &base_},
+                                        {&scene.structure, &structure_},
+                                        {&scene.detail, &detail_},
+                                        {&scene.reflection, &reflection_}})
+      if (*image)
+        *levels = levels_of(**image, scene.mipmap);
   }
 
   OraclePixel pixel(double x, double y) const {
@@ -68,9 +80,16 @@ private:
     std::array<double, 3> value{};
   };
   struct Frame {
-    Vec3 tangent_sum;
-    double ds = 0, dt = 0, shade = 1;
+    Vec3 tangent_sum, normal, tangent;
+    double side = 1, ds = 0, dt = 0, shade = 1;
+    std::array<double, 2> sphere{};
   };
+  /// A level of a texture, rows from the top, values 0 … 1.
+  struct Level {
+    std::size_t width = 0, height = 0, channels = 0;
+    std::vector<double> values;
+  };
+  using Levels = std::vector<Level>;
   using Key = std::tuple<std::uint32_t, float, float, bool>;
 
   const Vec3& corner(std::size_t t, std::size_t c) const {
@@ -114,18 +133,76 @@ private:
       Vec3 tangent = frame.tangent_sum - n * dot(n, frame.tangent_sum);
       tangent = norm(tangent) > 0 ? tangent / norm(tangent) : Vec3{};
       const Vec3 bitangent = cross(n, tangent) * (std::get<3>(where) ? -1.0 : 1.0);
-      const Vec3 to = scene_.light - scene_.mesh.points[p];
-      const Vec3 l = norm(to) > 0 ? to / norm(to) : Vec3{};
+      const Vec3 l = to_light(scene_.mesh.points[p]);
+      frame.normal = n;
+      frame.tangent = tangent;
+      frame.side = std::get<3>(where) ? -1 : 1;
+      frame.sphere = sphere_map(scene_.mesh.points[p], n);
       frame.ds = scene_.offset * dot(l, tangent);
       frame.dt = scene_.offset * dot(l, bitangent);
       frame.shade = 1 - scene_.shade + scene_.shade * std::max(0.0, dot(l, n));
     }
   }
 
+  static Vec3 unit(const Vec3& v) { return norm(v) > 0 ? v / norm(v) : Vec3{}; }
+  Vec3 to_light(const Vec3& p) const {
+    return unit(scene_.directional ? scene_.light : scene_.light - p);
+  }
+
+  /// OpenGL 2.1 specification, section 2.11.4.
+  std::array<double, 2> sphere_map(const Vec3& p, const Vec3& normal) const {
+    const Vec3 d = p - camera_.eye;
+    const Vec3 u = unit({dot(d, camera_.right), dot(d, camera_.up), dot(d, camera_.back)});
+    const Vec3 n{dot(normal, camera_.right), dot(normal, camera_.up), dot(normal, camera_.back)};
+    const Vec3 r = u - 2 * n * dot(n, u);
+    const double m = 2 * std::sqrt(r.x * r.x + r.y * r.y + (r.z + 1) * (r.z + 1));
+    return {r.x / m + 0.5, r.y / m + 0.5};
+  }
+
+  /// By area, from the level before, whose values have 8 bits, 16 for gray; halves are rounded up.
+  static Levels levels_of(const Image& image, bool all) {
+    Levels levels{{image.width, image.height, image.channels, {}}};
+    for (const std::uint8_t value : image.values)
+      levels[0].values.push_back(value / 255.0);
+    const double steps = image.channels == 1 ? 65535 : 255;
+    while (all && (levels.back().width > 1 || levels.back().height > 1)) {
+      const Level& fine = levels.back();
+      Level coarse{std::max<std::size_t>(1, fine.width / 2),
+                   std::max<std::size_t>(1, fine.height / 2),
+                   fine.channels,
+                   {}};
+      const double across = static_cast<double>(fine.width) / static_cast<double>(coarse.width);
+      const double down = static_cast<double>(fine.height) / static_cast<double>(coarse.height);
+      const auto part = [](std::size_t i, double size, std::size_t j) { // of j in output i
+        const auto a = static_cast<double>(i), b = static_cast<double>(j);
+        return std::max(0.0, std::min((a + 1) * size, b + 1) - std::max(a * size, b));
+      };
+      // Levels count from the bottom, where an odd row is shared differently: turn them.
+      const auto from_bottom = [](std::size_t y, std::size_t n) { return n - 1 - y; };
+      for (std::size_t y = 0; y < coarse.height; ++y)
+        for (std::size_t x = 0; x < coarse.width; ++x)
+          for (std::size_t c = 0; c < coarse.channels; ++c) {
+            double sum = 0;
+            for (std::size_t v = 0; v < fine.height; ++v) {
+              const double wy =
+                  part(from_bottom(y, coarse.height), down, from_bottom(v, fine.height));
+              for (std::size_t u = 0; wy > 0 && u < fine.width; ++u)
+                sum +=
+                    wy * part(x, across, u) * fine.values[(v * fine.width + u) * fine.channels + c];
+            }
+            coarse.values.push_back(std::floor(sum / (across * down) * steps + (0.5 + 1e-9)) /
+                                    steps);
+          }
+      levels.push_back(std::move(coarse));
+    }
+    return levels;
+  }
+
   /// Where a triangle can be seen, to pass over the others quickly.
   void bound() {
     bounds_.resize(scene_.mesh.triangles.size());
-    rows_.resize(static_cast<std::size_t>(height_));
+    columns_ = static_cast<std::size_t>(width_) / cell + 1;
+    cells_.resize(columns_ * (static_cast<std::size_t>(height_) / cell + 1));
     for (std::size_t t = 0; t < bounds_.size(); ++t) {
       Box3& box = bounds_[t];
       for (std::size_t c = 0; c < 3; ++c) {
@@ -138,11 +215,14 @@ private:
         box.add({(dot(d, camera_.right) / depth / camera_.tan_x + 1) / 2 * width_,
                  (1 - dot(d, camera_.up) / depth / camera_.tan_y) / 2 * height_, 0});
       }
-      const auto clamped = [&](double row) {
-        return static_cast<std::size_t>(std::clamp(row, 0.0, height_ - 1));
+      const auto cell_of = [](double at, double most) {
+        return static_cast<std::size_t>(std::clamp(at, 0.0, most - 1)) / cell;
       };
-      for (std::size_t row = clamped(box.min.y - 1); row <= clamped(box.max.y + 1); ++row)
-        rows_[row].push_back(t);
+      for (std::size_t row = cell_of(box.min.y - 1, height_);
+           row <= cell_of(box.max.y + 1, height_); ++row)
+        for (std::size_t column = cell_of(box.min.x - 1, width_);
+             column <= cell_of(box.max.x + 1, width_); ++column)
+          cells_[row * columns_ + column].push_back(t);
     }
   }
 
@@ -151,8 +231,9 @@ private:
                      camera_.up * ((1 - 2 * y / height_) * camera_.tan_y) - camera_.back;
     std::size_t hit = SIZE_MAX;
     std::array<double, 3> weights{};
-    const double row = std::clamp(std::floor(y), 0.0, height_ - 1);
-    for (const std::size_t t : rows_[static_cast<std::size_t>(row)]) {
+    const auto row = static_cast<std::size_t>(std::clamp(y, 0.0, height_ - 1)) / cell;
+    const auto column = static_cast<std::size_t>(std::clamp(x, 0.0, width_ - 1)) / cell;
+    for (const std::size_t t : cells_[row * columns_ + column]) {
       const Box3& box = bounds_[t];
       if (!(x >= box.min.x - 0.01 && x <= box.max.x + 0.01 && y >= box.min.y - 0.01 &&
             y <= box.max.y + 0.01))
@@ -174,6 +255,8 @@ private:
     if (hit == SIZE_MAX)
       return false;
     double s = 0, t = 0, ds = 0, dt = 0, shade = 0;
+    Vec3 place, normal, tangent;
+    std::array<double, 2> around{};
     for (std::size_t c = 0; c < 3; ++c) {
       const Frame& frame = frames_.at(key(hit, c));
       s += weights[c] * st(hit, c)[0];
@@ -181,23 +264,81 @@ private:
       ds += weights[c] * frame.ds;
       dt += weights[c] * frame.dt;
       shade += weights[c] * frame.shade;
+      place += weights[c] * corner(hit, c);
+      normal += weights[c] * frame.normal;
+      tangent += weights[c] * frame.tangent;
+      for (std::size_t a = 0; a < 2; ++a)
+        around[a] += weights[c] * frame.sphere[a];
     }
+    if (scene_.per_pixel) {
+      const Vec3 n = unit(normal), along = unit(tangent - n * dot(n, tangent)), l = to_light(place);
+      ds = scene_.offset * dot(l, along);
+      dt = scene_.offset * frames_.at(key(hit, 0)).side * dot(l, cross(n, along));
+      around = sphere_map(place, n);
+    }
+    const auto change = scene_.mipmap ? changes(hit, x, y) : std::array<double, 4>{};
     for (std::size_t c = 0; c < 3; ++c) {
       double base = scene_.color[static_cast<int>(c)] * shade;
       if (scene_.base)
-        base *= texel(*scene_.base, s, t, c);
-      const double r = scene_.structure ? 0.5 + 0.5 * (texel(*scene_.structure, s, t, c) -
-                                                       texel(*scene_.structure, s + ds, t + dt, c))
+        base *= value(base_, change, s, t, c);
+      base = std::min(1.0, base);
+      if (scene_.detail)
+        base = std::min(1.0, base + value(detail_, change, s, t, c));
+      if (scene_.reflection)
+        base = std::min(1.0, base + texel(reflection_[0], around[0], around[1], c));
+      const double r = scene_.structure ? 0.5 + 0.5 * (value(structure_, change, s, t, c) -
+                                                       value(structure_, change, s + ds, t + dt, c))
                                         : 0.5;
-      nearest.value[c] = scene_.clamp_early ? std::min(1.0, 2 * r) * base
-                                            : std::min(1.0, 2 * r * std::min(1.0, base));
+      nearest.value[c] =
+          scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
     }
     return true;
   }
 
+  /// ds/dx, dt/dx, ds/dy, dt/dy in the plane of a triangle, by differences.
+  std::array<double, 4> changes(std::size_t hit, double x, double y) const {
+    const auto at = [&](double px, double py) {
+      const Vec3 ray = camera_.right * ((2 * px / width_ - 1) * camera_.tan_x) +
+                       camera_.up * ((1 - 2 * py / height_) * camera_.tan_y) - camera_.back;
+      const Vec3 e1 = corner(hit, 1) - corner(hit, 0), e2 = corner(hit, 2) - corner(hit, 0);
+      const Vec3 to = camera_.eye - corner(hit, 0);
+      const double det = dot(e1, cross(ray, e2));
+      const double u = dot(to, cross(ray, e2)) / det, v = dot(ray, cross(to, e1)) / det;
+      std::array<double, 2> result{};
+      for (std::size_t a = 0; a < 2; ++a)
+        result[a] = (1 - u - v) * st(hit, 0)[a] + u * st(hit, 1)[a] + v * st(hit, 2)[a];
+      return result;
+    };
+    constexpr double h = 1e-4;
+    const auto left = at(x - h, y), right = at(x + h, y), up = at(x, y - h), down = at(x, y + h);
+    return {(right[0] - left[0]) / (2 * h), (right[1] - left[1]) / (2 * h),
+            (down[0] - up[0]) / (2 * h), (down[1] - up[1]) / (2 * h)};
+  }
+
+  static double value(const Levels& levels, const std::array<double, 4>& change, double s, double t,
+                      std::size_t channel) {
+    const auto w = static_cast<double>(levels[0].width), h = static_cast<double>(levels[0].height);
+    const double covered = std::max(std::hypot(change[0] * w, change[1] * h),
+                                    std::hypot(change[2] * w, change[3] * h));
+    std::size_t k = 0;
+    double power = 1;
+    while (covered >= 2 * power) {
+      power *= 2;
+      ++k;
+    }
+    if (covered <= 1 || levels.size() == 1)
+      return texel(levels[0], s, t, channel);
+    if (k + 1 >= levels.size())
+      return texel(levels.back(), s, t, channel);
+    const double part = covered / power - 1;
+    return (1 - part) * texel(levels[k], s, t, channel) +
+           part * texel(levels[k + 1], s, t, channel);
+  }
+
   /// Bilinear by its definition: a sum over all four texels of value times two triangle functions.
-  static double texel(const Image& image, double s, double t, std::size_t channel) {
-    const double x = s * image.width - 0.5, y = (1 - t) * image.height - 0.5;
+  static double texel(const Level& image, double s, double t, std::size_t channel) {
+    const auto width = static_cast<double>(image.width), height = static_cast<double>(image.height);
+    const double x = s * width - 0.5, y = (1 - t) * height - 0.5;
     double sum = 0;
     for (int j = 0; j < 2; ++j)
       for (int i = 0; i < 2; ++i) {
@@ -205,8 +346,8 @@ private:
         const auto wrap = [](double a, double n) {
           return static_cast<std::size_t>(std::fmod(std::fmod(a, n) + n, n));
         };
-        const std::size_t at = wrap(v, image.height) * image.width + wrap(u, image.width);
-        sum += (1 - std::fabs(x - u)) * (1 - std::fabs(y - v)) / 255 *
+        const std::size_t at = wrap(v, height) * image.width + wrap(u, width);
+        sum += (1 - std::fabs(x - u)) * (1 - std::fabs(y - v)) *
                image.values[at * image.channels + (image.channels == 1 ? 0 : channel)];
       }
     return sum;
@@ -217,38 +358,61 @@ private:
   double width_, height_;
   std::map<Key, Frame> frames_;
   std::vector<Box3> bounds_;
-  std::vector<std::vector<std::size_t>> rows_; // triangles that may be seen in each
+  static constexpr std::size_t cell = 8; // pixels
+  std::size_t columns_ = 0;
+  std::vector<std::vector<std::size_t>> cells_; // triangles that may be seen in each
+  Levels base_, structure_, detail_, reflection_;
 };
+
+using OraclePicture = std::vector<OraclePixel>;
+
+inline OraclePicture oracle_picture(const OracleScene& scene, const Camera& camera,
+                                    std::uint32_t width, std::uint32_t height) {
+  const Oracle oracle(scene, camera, width, height);
+  OraclePicture picture(std::size_t{width} * height);
+  parallel_blocks({}, height, 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y)
+      for (std::size_t x = 0; x < width; ++x)
+        picture[y * width + x] =
+            oracle.pixel(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
+  });
+  return picture;
+}
 
 struct OracleComparison {
   std::uint64_t covered = 0, interior = 0;
-  double max = 0, rms = 0; ///< in 1/255, over interior pixels
+  double max = 0, rms = 0; ///< in 1/255, over interior pixels, of the oracle's real numbers
+  double rms_rounded = 0;  ///< of the oracle rounded to 8 bits, as a picture is
 };
 
-/// Holds `picture` (its background must be none of the object's colours) against the oracle.
+/// Holds `picture` against the oracle's.
+inline OracleComparison compare(const Image& picture, const OraclePicture& oracle) {
+  OracleComparison result;
+  double squares = 0, rounded = 0;
+  for (std::size_t at = 0; at < oracle.size(); ++at) {
+    result.covered += oracle[at].hit ? 1U : 0U;
+    if (!oracle[at].interior)
+      continue;
+    ++result.interior;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double value = 255 * oracle[at].value[c];
+      const double error = std::fabs(picture.values[3 * at + c] - value);
+      const double steps = picture.values[3 * at + c] - std::floor(value + 0.5);
+      result.max = std::max(result.max, error);
+      squares += error * error;
+      rounded += steps * steps;
+    }
+  }
+  if (result.interior > 0) {
+    result.rms = std::sqrt(squares / (3 * static_cast<double>(result.interior)));
+    result.rms_rounded = std::sqrt(rounded / (3 * static_cast<double>(result.interior)));
+  }
+  return result;
+}
+
 inline OracleComparison compare(const Image& picture, const OracleScene& scene,
                                 const Camera& camera) {
-  const Oracle oracle(scene, camera, picture.width, picture.height);
-  OracleComparison result;
-  double squares = 0;
-  for (std::size_t y = 0; y < picture.height; ++y)
-    for (std::size_t x = 0; x < picture.width; ++x) {
-      const OraclePixel pixel =
-          oracle.pixel(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
-      result.covered += pixel.hit ? 1U : 0U;
-      if (!pixel.interior)
-        continue;
-      ++result.interior;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double error =
-            std::fabs(picture.values[3 * (y * picture.width + x) + c] - 255 * pixel.value[c]);
-        result.max = std::max(result.max, error);
-        squares += error * error;
-      }
-    }
-  if (result.interior > 0)
-    result.rms = std::sqrt(squares / (3 * static_cast<double>(result.interior)));
-  return result;
+  return compare(picture, oracle_picture(scene, camera, picture.width, picture.height));
 }
 
 } // namespace gewebe::test

@@ -8,6 +8,7 @@
 #include "render/drawing.h"
 #include "render/image.h"
 #include "render/picture.h"
+#include "render/style.h"
 #include "render/tangents.h"
 #include "render/texture.h"
 #include "render/uv.h"
@@ -271,7 +272,7 @@ TEST(RenderDrawing, SameForAnyThreadsAndOffsetsPointToTheLight) {
   DrawingOptions options;
   options.texcoords = options.structure = true;
   options.light = {0, 0, 0}; // within the first: nothing to shift
-  options.offset = 0.1;
+  options.offset = {0.1, 0.1};
   options.shade = 0.5;
   Context one, two;
   one.threads = 1;
@@ -314,6 +315,68 @@ TEST(RenderDrawing, LightOnAVertexAndNothingToDraw) {
   surfaces[0].mesh.points[0].x = -1.5e308;
   surfaces[0].mesh.points[1].x = 1.5e308;
   EXPECT_THROW((void)make_drawing(surfaces, options, {}), Error);
+}
+
+TEST(RenderDrawing, NormalsThatAreNoNumbersAreReplaced) {
+  TriangleMesh mesh = test::sheet(1, 1);
+  mesh.normals.assign(mesh.points.size(), {NAN, 0, 1});
+  mesh.normals[0] = {0, 0, 0};
+  mesh.normals[1] = {0, 1, 0};
+  const std::vector<Vec3> normals = render_normals(mesh);
+  const std::vector<Vec3> own = area_normals(mesh.points, mesh.triangles);
+  EXPECT_EQ(normals[0], own[0]);
+  EXPECT_EQ(normals[1], (Vec3{0, 1, 0}));
+  EXPECT_EQ(normals[2], own[2]);
+}
+
+TEST(RenderDrawing, SphereMapsSeeTheMiddleWhereTheSurfaceFacesTheEye) {
+  std::vector<Surface> surfaces(1);
+  surfaces[0].mesh = test::sphere_mesh(4, 10, {0, 0, 0});
+  DrawingOptions options;
+  options.sphere = true;
+  options.camera = make_camera({}, bounding_box(surfaces[0].mesh), 64, 64); // from +y
+  const Drawing drawing = make_drawing(surfaces, options, {});
+  for (const DrawVertex& v : drawing.vertices) {
+    const double x = v.sphere[0] - 0.5, y = v.sphere[1] - 0.5;
+    EXPECT_LE(std::sqrt(x * x + y * y), 0.5 + 1e-6);
+    if (v.position[1] > 0.999F) {
+      EXPECT_LT(std::sqrt(x * x + y * y), 0.03);
+    }
+    if (v.position[1] > 0.5F && v.position[2] > 0.3F) { // what lies above is mirrored
+      EXPECT_GT(y, 0.1);
+    }
+  }
+}
+
+TEST(RenderStyle, FacetsHaveTheirOwnPointsAndEdgesAreDrawnOnce) {
+  Surface surface;
+  surface.mesh = test::sphere_mesh(2, 10, {0, 0, 0});
+  const Surface facets = faceted(surface);
+  EXPECT_EQ(facets.mesh.points.size(), 3 * surface.mesh.triangles.size());
+  EXPECT_EQ(surface_area(facets.mesh), surface_area(surface.mesh));
+  const Camera camera = make_camera({}, bounding_box(surface.mesh), 100, 100);
+  const Surface edges = wireframe(surface, camera, 2, 100);
+  EXPECT_EQ(edges.mesh.triangles.size(), 2 * surface.mesh.triangles.size() * 3 / 2);
+  for (std::size_t n = 0; n < edges.mesh.points.size(); n += 2) { // two pixels wide
+    const Vec3 p = edges.mesh.points[n], q = edges.mesh.points[n + 1];
+    const double depth = -dot((p + q) / 2 - camera.eye, camera.back);
+    EXPECT_NEAR(norm(p - q) / depth / (2 * camera.tan_y) * 100, 2, 1e-9);
+  }
+}
+
+TEST(RenderCamera, OrbitsAroundItsTarget) {
+  const Box3 box{{-1, -1, -1}, {1, 1, 1}};
+  CameraOptions options;
+  options.distance = 10;
+  options.azimuth = 90; // from the front (+y) to the camera's right (-x)
+  EXPECT_LT(norm(make_camera(options, box, 9, 9).eye - Vec3{-10, 0, 0}), 1e-12);
+  options.azimuth = -450;
+  EXPECT_LT(norm(make_camera(options, box, 9, 9).eye - Vec3{10, 0, 0}), 1e-12);
+  options.azimuth = 0;
+  options.elevation = 30;
+  const Camera raised = make_camera(options, box, 9, 9);
+  EXPECT_LT(norm(raised.eye - Vec3{0, 10 * std::sqrt(0.75), 5}), 1e-12);
+  EXPECT_NEAR(dot(cross(raised.right, raised.up), raised.back), 1, 1e-12);
 }
 
 TEST(RenderImage, LuminanceAndShrinking) {

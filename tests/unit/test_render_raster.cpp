@@ -8,6 +8,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
 #include <random>
 
 namespace gewebe {
@@ -36,7 +40,7 @@ std::uint64_t count(const Drawing& drawing, std::uint32_t width, std::uint32_t h
   if (only != SIZE_MAX)
     part.triangles = {drawing.triangles[only]};
   RenderReport report;
-  (void)render_cpu(part, pixels(width, height), {}, width, height, {}, &report);
+  (void)render_cpu(part, pixels(width, height), {}, width, height, 1, {}, &report);
   return report.covered;
 }
 
@@ -78,7 +82,7 @@ TEST(RenderRaster, TopLeftRuleOnPixelCentres) {
   EXPECT_EQ(count(drawing, 8, 8), 16U); // rows and columns 0 to 3
   Look look;
   look.background = {0, 0, 0};
-  const Image image = render_cpu(drawing, pixels(8, 8), look, 8, 8, {});
+  const Image image = render_cpu(drawing, pixels(8, 8), look, 8, 8, 1, {});
   for (std::size_t y = 0; y < 8; ++y)
     for (std::size_t x = 0; x < 8; ++x)
       EXPECT_EQ(image.values[3 * (8 * y + x)], x < 4 && y < 4 ? 255 : 0) << x << " " << y;
@@ -103,12 +107,12 @@ TEST(RenderRaster, FirstOfCoincidentAndNearestOfAllIsSeen) {
   const auto seen = [&](std::size_t triangles) {
     Drawing part = drawing;
     part.triangles.resize(triangles);
-    return render_cpu(part, projection, {}, 8, 8, {}).values[0];
+    return render_cpu(part, projection, {}, 8, 8, 1, {}).values[0];
   };
   EXPECT_EQ(seen(2), 77); // 0.3
   projection.matrix[3] = {0, 0, 1, 1};
   EXPECT_EQ(seen(2), 77);
-  EXPECT_EQ(seen(3), 229); // 0.9, a little less in single precision
+  EXPECT_NEAR(seen(3), 229.5, 0.5); // 0.9
 }
 
 TEST(RenderRaster, ASurfaceAroundTheCameraFillsThePictureWhateverIsClipped) {
@@ -144,7 +148,7 @@ TEST(RenderRaster, HugeAndTinyTrianglesAreExact) {
   EXPECT_EQ(count(drawing, 8, 8), 0U);
 }
 
-TEST(RenderRaster, SameBytesForAnyThreads) {
+TEST(RenderRaster, SameBytesForAnyThreadsAndCpu) {
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = test::sphere_mesh(5, 10, {0, 0, 0});
   const Camera camera = make_camera({}, bounding_box(surfaces[0].mesh), 301, 203);
@@ -156,15 +160,75 @@ TEST(RenderRaster, SameBytesForAnyThreads) {
   picture.height = 203;
   picture.backend = Backend::cpu;
   std::string digest;
-  for (const int threads : {1, 2, 7}) {
+  for (const int threads : {1, 2, 7, -1}) {
     Context context;
-    context.threads = threads;
+    context.threads = std::abs(threads);
+    if (threads < 0)
+      context.cpu = CpuLevel::baseline;
     const Image image =
         make_picture(make_drawing(surfaces, options, context), camera, {}, picture, context);
     if (digest.empty())
       digest = image_digest(image);
     EXPECT_EQ(image_digest(image), digest) << threads;
   }
+}
+
+// A sheet over the picture whose coordinates run from -2 to 3, seen pixel by pixel.
+TEST(RenderRaster, WrapsAndFiltersAreThoseOfTheTexture) {
+  Image image{5, 4, 3, {}};
+  for (unsigned n = 0; n < 60; ++n)
+    image.values.push_back(static_cast<std::uint8_t>((n * 89) % 256));
+  Drawing drawing;
+  drawing.vertices = {vertex(0, 0), vertex(200, 0), vertex(200, 200), vertex(0, 200)};
+  const std::array<std::array<float, 2>, 4> st{{{-2, 3}, {3, 3}, {3, -2}, {-2, -2}}};
+  for (std::size_t n = 0; n < 4; ++n)
+    drawing.vertices[n].st = st[n];
+  drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
+  for (const TextureWrap wrap : {TextureWrap::repeat, TextureWrap::clamp, TextureWrap::mirror})
+    for (const TextureFilter filter : {TextureFilter::linear, TextureFilter::nearest}) {
+      Look look;
+      look.base = texture_from(image, {filter, wrap, false});
+      for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
+        Context context;
+        context.cpu = level;
+        const Image picture = render_cpu(drawing, pixels(200, 200), look, 200, 200, 1, context);
+        double most = 0;
+        for (std::uint32_t y = 0; y < 200; ++y)
+          for (std::uint32_t x = 0; x < 200; ++x) {
+            const double s = -2 + 5 * (x + 0.5) / 200, t = 3 - 5 * (y + 0.5) / 200;
+            std::array<double, 3> wanted = sample(*look.base, s, t);
+            if (filter == TextureFilter::nearest) {
+              const auto inside = [&](double at) {
+                if (wrap == TextureWrap::clamp)
+                  return std::clamp(at, 0.0, 0.999999);
+                const double part = at - std::floor(at);
+                const bool back = wrap == TextureWrap::mirror && std::fmod(std::floor(at), 2) != 0;
+                return back ? 1 - part : part;
+              };
+              wanted = texel(*look.base, 0, static_cast<std::uint32_t>(5 * inside(s)),
+                             static_cast<std::uint32_t>(4 * inside(t)));
+            }
+            for (std::size_t c = 0; c < 3; ++c)
+              most = std::max(most,
+                              std::fabs(picture.values[3 * (200 * y + x) + c] - 255 * wanted[c]));
+          }
+        EXPECT_LE(most, 0.502) << static_cast<int>(wrap) << static_cast<int>(filter);
+      }
+    }
+}
+
+// One edge through the middle of pixels: four samples see a part of them, and sums are those of
+// areas.
+TEST(RenderRaster, FourSamplesSmoothOutlinesAndNothingElse) {
+  Drawing drawing;
+  drawing.vertices = {vertex(-50, -50), vertex(30.5, -50), vertex(30.5, 90), vertex(-50, 90)};
+  drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
+  Look look;
+  look.background = {0, 0, 0};
+  const Image image = render_cpu(drawing, pixels(64, 40), look, 64, 40, 4, {});
+  for (std::size_t y = 0; y < 40; ++y)
+    for (std::size_t x = 0; x < 64; ++x)
+      EXPECT_EQ(image.values[3 * (64 * y + x)], x < 30 ? 255 : x == 30 ? 128 : 0) << x << " " << y;
 }
 
 TEST(RenderPicture, BackgroundAloneAndLimits) {

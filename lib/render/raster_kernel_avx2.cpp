@@ -1,0 +1,10 @@
+#include "render/raster_kernel_lanes_internal.h"
+
+namespace gewebe {
+
+std::uint64_t draw_tile_avx2(const KernelScene& scene, const KernelScreen& screen,
+                             const KernelTile& tile) {
+  return draw_tile(scene, screen, tile);
+}
+
+} // namespace gewebe
