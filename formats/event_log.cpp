@@ -49,6 +49,10 @@ struct Describe {
     row.object = simulation.name(object);
     row.what = what;
   }
+  void about(std::size_t instrument, const char* what) {
+    row.other = simulation.instrument_name(instrument);
+    row.what = what;
+  }
   void operator()(const SetForce& c) {
     of(c.object, "force");
     row.nodes = c.nodes;
@@ -78,6 +82,22 @@ struct Describe {
     of(c.object, "release");
     row.nodes = c.nodes;
   }
+  void operator()(const SetInstrument& c) {
+    about(c.instrument, "instrument");
+    row.vector = c.pose.place;
+    row.value = c.shape.radius;
+  }
+  void operator()(const MoveInstrument& c) {
+    about(c.instrument, "move");
+    row.vector = c.place;
+    row.duration = c.over;
+  }
+  void operator()(const Grasp& c) {
+    of(c.object, "grasp");
+    row.nodes = c.nodes;
+    row.other = simulation.instrument_name(c.instrument);
+  }
+  void operator()(const Withdraw& c) { about(c.instrument, "withdraw"); }
   void operator()(const SetGravity& c) {
     row.what = "gravity";
     row.vector = c.gravity;
@@ -93,7 +113,7 @@ struct Describe {
   }
   void operator()(const Emit& c) {
     row.what = "emit";
-    row.text = c.forces ? "forces" : "shapes";
+    row.text = c.instruments ? "instruments" : c.forces ? "forces" : "shapes";
   }
   void operator()(const SetMethod& c) {
     of(c.object, "method");

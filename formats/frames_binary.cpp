@@ -61,6 +61,15 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append_single(bytes, nodes[k].position + Vec3{u[3 * k], u[3 * k + 1], u[3 * k + 2]});
   }
+  for (std::uint32_t k = 0; simulation.emits_instruments() && k < simulation.instrument_count();
+       ++k) {
+    const InstrumentReport report = simulation.instrument(k);
+    if (!report.present)
+      continue;
+    append_head(bytes, {FrameKind::instrument, k, step, 9});
+    for (const Vec3& v : {report.pose.place, report.force, report.torque})
+      append_single(bytes, v);
+  }
   append_head(bytes, {FrameKind::done, 0, step, 2});
   append(bytes, simulation.time());
   return bytes;

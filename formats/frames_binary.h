@@ -13,12 +13,13 @@ inline constexpr std::uint32_t frame_magic = 0x46425747; ///< "GWBF" in the stre
 
 /// What the payload of a frame is.
 enum class FrameKind : std::uint32_t {
-  shapes = 0, ///< 3 float32 of each node: where it stands
-  forces = 1, ///< 3 float32 of each displaced node, those of the frame before
-  nodes = 2,  ///< uint32: the numbers of the displaced nodes
-  done = 3,   ///< one float64, the time: the answer is whole
-  error = 4,  ///< text, filled up with zero bytes: a line was refused
-  jump = 5,   ///< one float32, mm: the object became elastostatic
+  shapes = 0,     ///< 3 float32 of each node: where it stands
+  forces = 1,     ///< 3 float32 of each displaced node, those of the frame before
+  nodes = 2,      ///< uint32: the numbers of the displaced nodes
+  done = 3,       ///< one float64, the time: the answer is whole
+  error = 4,      ///< text, filled up with zero bytes: a line was refused
+  jump = 5,       ///< one float32, mm: the object became elastostatic
+  instrument = 6, ///< 9 float32: place, force, torque; object is its place among the instruments
 };
 
 /// The head of each frame, without gaps: 28 bytes.
@@ -29,8 +30,8 @@ struct FrameHead {
   std::uint64_t count = 0;  ///< of values of 4 bytes that follow
 };
 
-/// The frames that answer a step: jump, then nodes and forces, then shapes of all objects, as far
-/// as the scene emits them, then done. \pre as text_answer
+/// The frames that answer a step: jump, then nodes and forces, then shapes of all objects, then
+/// instruments, as far as the scene emits them, then done. \pre as text_answer
 /// \throw Error where a number does not fit single precision
 std::string binary_answer(const Simulation& simulation, std::uint64_t step);
 

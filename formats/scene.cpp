@@ -181,6 +181,66 @@ What parse_release(Words& in) {
   return c;
 }
 
+What parse_instrument(Words& in) {
+  InstrumentCommand c;
+  c.name = in.name();
+  const std::string& kind = in.word("shape");
+  if (kind != "sphere" && kind != "capsule")
+    in.fail(shown(kind) + " is no shape");
+  const bool capsule = kind == "capsule";
+  c.shape.radius = in.number("radius");
+  if (!(c.shape.radius > 0))
+    in.fail("a radius that is not positive");
+  c.pose.place = in.vector("number");
+  if (capsule)
+    c.shape.axis = in.vector("number") - c.pose.place;
+  if (in.take("friction"))
+    c.shape.friction = in.number("friction");
+  if (!(c.shape.friction >= 0))
+    in.fail("a negative friction");
+  return c;
+}
+
+/// A quaternion, or the degrees of a turn about an axis.
+std::optional<Quaternion> parse_turn(Words& in) {
+  if (in.take("turn")) {
+    const Vec3 axis = in.vector("number");
+    const double degrees = in.number("angle");
+    if (axis == Vec3{})
+      in.fail("an axis without direction");
+    return turn_about(axis, degrees);
+  }
+  if (!in.take("quaternion"))
+    return std::nullopt;
+  Quaternion q;
+  for (double* const part : {&q.w, &q.x, &q.y, &q.z})
+    *part = in.number("number");
+  if (q == Quaternion{0, 0, 0, 0})
+    in.fail("a quaternion of length 0");
+  return unit(q);
+}
+
+What parse_move(Words& in) {
+  MoveCommand c;
+  c.instrument = in.name();
+  c.place = in.vector("number");
+  c.turn = parse_turn(in);
+  c.over = in.time_after("over");
+  return c;
+}
+
+What parse_grasp(Words& in) {
+  GraspCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.instrument = in.name();
+  return c;
+}
+
+What parse_withdraw(Words& in) {
+  return WithdrawCommand{in.name()};
+}
+
 What parse_gravity(Words& in) {
   return GravityCommand{in.vector("number")};
 }
@@ -204,9 +264,9 @@ What parse_two_step(Words& in) {
 
 What parse_emit(Words& in) {
   const std::string& word = in.word("word");
-  if (word != "shapes" && word != "forces")
+  if (word != "shapes" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
-  return EmitCommand{word == "forces"};
+  return EmitCommand{word == "forces", word == "instruments"};
 }
 
 What parse_step(Words& in) {
@@ -251,8 +311,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 14>& verbs() {
-  static const std::array<Verb, 14> all{{
+const std::array<Verb, 18>& verbs() {
+  static const std::array<Verb, 18> all{{
       {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
@@ -260,11 +320,19 @@ const std::array<Verb, 14>& verbs() {
       {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
       {"release", "release NAME NODES", true, parse_release},
+      {"instrument",
+       "instrument NAME sphere R x y z [friction MU] or instrument NAME capsule R x y z x y z "
+       "[friction MU]",
+       true, parse_instrument},
+      {"move", "move NAME x y z [turn ax ay az DEGREES|quaternion w x y z] [over T]", true,
+       parse_move},
+      {"grasp", "grasp NAME NODES INSTRUMENT", true, parse_grasp},
+      {"withdraw", "withdraw NAME", true, parse_withdraw},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
       {"two-step", "two-step NAME f0 [series], f0 positive", true, parse_two_step},
-      {"emit", "emit shapes|forces", true, parse_emit},
+      {"emit", "emit shapes|forces|instruments", true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},

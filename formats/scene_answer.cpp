@@ -1,5 +1,7 @@
 #include "formats/scene_answer.h"
 
+#include "formats/scene_instrument.h"
+
 #include <array>
 #include <charconv>
 #include <span>
@@ -49,6 +51,8 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append(text, nodes[k].position + Vec3{u[3 * k], u[3 * k + 1], u[3 * k + 2]}, '\n');
   }
+  if (simulation.emits_instruments())
+    text += instrument_reply(simulation);
   return text + "done\n";
 }
 

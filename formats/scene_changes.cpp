@@ -1,10 +1,12 @@
 #include "formats/scene_changes.h"
 
+#include "formats/scene_instrument.h"
+
 #include <variant>
 
 namespace gewebe {
 
-std::optional<Change> scene_change(const Command& command, const Simulation& simulation,
+std::optional<Change> scene_change(const Command& command, Simulation& simulation,
                                    const LoadNodeList& lists) {
   if (const auto* const force = std::get_if<ForceCommand>(&command.what)) {
     SetForce set{simulation.find(force->object), {}, force->force, force->period};
@@ -40,12 +42,14 @@ std::optional<Change> scene_change(const Command& command, const Simulation& sim
   if (const auto* const timestep = std::get_if<TimestepCommand>(&command.what))
     return SetTimestep{timestep->dt};
   if (const auto* const emit = std::get_if<EmitCommand>(&command.what))
-    return Emit{emit->forces};
+    return Emit{emit->forces, emit->instruments};
   if (const auto* const method = std::get_if<MethodCommand>(&command.what))
     return SetMethod{simulation.find(method->object), method->method};
   if (const auto* const renew = std::get_if<RenewCommand>(&command.what))
     return Renew{simulation.find(renew->object)};
-  return std::nullopt;
+  return instrument_change(command, simulation, [&](std::size_t object, const Selector& selector) {
+    return select_nodes(simulation.model(object), selector, lists);
+  });
 }
 
 } // namespace gewebe

@@ -11,7 +11,7 @@ namespace gewebe {
 
 /// What the command changes, or nothing if it is none that does.
 /// \throw Error if an object or node does not exist; what the object's model and `lists` throw
-std::optional<Change> scene_change(const Command& command, const Simulation& simulation,
+std::optional<Change> scene_change(const Command& command, Simulation& simulation,
                                    const LoadNodeList& lists);
 
 } // namespace gewebe

@@ -3,6 +3,7 @@
 
 #include "base/vec3.h"
 #include "model/selector.h"
+#include "sim/instrument.h"
 
 #include <optional>
 #include <string>
@@ -52,6 +53,25 @@ struct ReleaseCommand {
   std::string object;
   Selector nodes;
 };
+struct InstrumentCommand {
+  std::string name;
+  InstrumentShape shape;
+  Pose pose;
+};
+struct MoveCommand {
+  std::string instrument;
+  Vec3 place;
+  std::optional<Quaternion> turn; ///< from how it came to the scene; none: as it is
+  double over = 0;                ///< s
+};
+struct GraspCommand {
+  std::string object;
+  Selector nodes;
+  std::string instrument;
+};
+struct WithdrawCommand {
+  std::string instrument;
+};
 struct GravityCommand {
   Vec3 gravity;
 };
@@ -64,7 +84,8 @@ struct TwoStepCommand {
   bool series = false;
 };
 struct EmitCommand {
-  bool forces = false; ///< else shapes
+  bool forces = false;      ///< else shapes
+  bool instruments = false; ///< rather
 };
 struct StepCommand {
   std::optional<double> dt; ///< >= 0
@@ -86,8 +107,9 @@ struct Command {
                             ///< and renew.
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
-               ReleaseCommand, GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand,
-               StepCommand, RunCommand, MethodCommand, RenewCommand>
+               ReleaseCommand, InstrumentCommand, MoveCommand, GraspCommand, WithdrawCommand,
+               GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand, StepCommand,
+               RunCommand, MethodCommand, RenewCommand>
       what;
 };
 

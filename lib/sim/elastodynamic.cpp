@@ -206,8 +206,8 @@ Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
   return vector_of(traits_[row].constant);
 }
 
-bool Elastodynamic::found_at_rest(double h, double time) const {
-  if (load_.changes_until() > time)
+bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const {
+  if (load_.changes_until() > time || (touch_ && !touch_->still(time)))
     return false;
   const double speed = rest_tolerance * size_ / h, acceleration = speed / h;
   for (const NodeRow& row : rows_)
@@ -219,9 +219,14 @@ bool Elastodynamic::found_at_rest(double h, double time) const {
     if (inverse == Vec3{})
       continue;
     const std::uint32_t node = layout_.node_of_row[row];
+    if (touch_ && touch_->inside(node, now[node].displacement))
+      return false;
     const Vec3 outer = drives_.empty() ? vector_of(traits_[row].constant) : outer_force(node, time);
     const Vec3 force = spring_force(network_, now, node) + outer;
-    if (!within({force.x * inverse.x, force.y * inverse.y, force.z * inverse.z}, acceleration))
+    const Vec3 a{force.x * inverse.x, force.y * inverse.y, force.z * inverse.z};
+    if (!within(a, acceleration) &&
+        !(touch_ &&
+          within(touch_->left_of(node, now[node].displacement, inverse, a, touches), acceleration)))
       return false;
   }
   return true;
@@ -237,7 +242,12 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));
   const double h = duration / count;
-  if (found_at_rest(h, start)) {
+  std::vector<NodeTouch> touches;
+  if (found_at_rest(h, start, touches)) {
+    std::sort(touches.begin(), touches.end(),
+              [](const NodeTouch& a, const NodeTouch& b) { return a.node < b.node; });
+    if (touch_)
+      touch_->rest(std::move(touches), duration);
     for (NodeRow& row : rows_)
       std::fill(std::begin(row.v), std::end(row.v), 0.0);
     motion_shown_ = false;
@@ -274,9 +284,13 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
     std::uint64_t s = 0;
     for (bool stop = false; s < steps && !stop; ++s) {
       const double time = start + static_cast<double>(s) * h;
-      for (std::size_t b = first; b < last; ++b)
+      const ContactMoment moment = touch_ ? touch_->moment(s, steps, time, h) : ContactMoment{};
+      for (std::size_t b = first; b < last; ++b) {
         if (!step_block(b, now, next, h, time, context.cpu))
           odd[s % 2].store(true, std::memory_order_relaxed);
+        if (touch_)
+          touch_->keep_out(b, moment, traits_.data(), next);
+      }
       if (thread == 0 && context.cancelled && context.cancelled())
         cancelled[s % 2].store(true, std::memory_order_relaxed);
       point.meet(round);
@@ -317,6 +331,17 @@ bool Elastodynamic::step_block(std::size_t block, const NodeRow* now, NodeRow* n
       put(u, next[row].u);
     }
   return finite;
+}
+
+void Elastodynamic::set_instruments(std::vector<std::optional<MovingInstrument>> instruments) {
+  if (!touch_ && !instruments.empty())
+    touch_ = std::make_unique<DynamicContact>(model_, layout_);
+  if (touch_)
+    touch_->begin(std::move(instruments));
+}
+
+std::vector<NodeTouch> Elastodynamic::take_touches() {
+  return touch_ ? touch_->take() : std::vector<NodeTouch>{};
 }
 
 void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,

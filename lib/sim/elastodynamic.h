@@ -12,6 +12,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "model/model.h"
+#include "sim/dynamic_contact.h"
 #include "sim/implicit_euler.h"
 #include "sim/load.h"
 #include "sim/spring_force.h"
@@ -20,6 +21,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -88,6 +90,14 @@ public:
   /// axes that the model holds.
   std::vector<NodeVector> contact_forces() const;
 
+  /// Instruments during the advances to come, by number; none of them: no cost. Wakes nobody.
+  /// \pre semi-implicit
+  void set_instruments(std::vector<std::optional<MovingInstrument>> instruments);
+  void wake() { resting_ = false; }
+  /// Impulses (forces times s) of the instruments since the last call, by ascending node and
+  /// instrument.
+  std::vector<NodeTouch> take_touches();
+
 private:
   /// A row whose force changes with time or shape.
   struct Driven {
@@ -107,7 +117,7 @@ private:
   };
 
   void apply_load();
-  bool found_at_rest(double h, double time) const;
+  bool found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const;
   template <class At>
   Vec3 outer_force(const Driven& driven, double time, const At& position) const;
   void run_steps(std::uint64_t steps, double h, double start, const Context& context);
@@ -126,6 +136,7 @@ private:
   std::vector<NodeRow> rows_, next_;
   std::vector<Drive> drives_; ///< by block; empty where nothing changes
   std::unique_ptr<ImplicitEuler> implicit_;
+  std::unique_ptr<DynamicContact> touch_; ///< while there are instruments
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

@@ -3,10 +3,12 @@
 
 #include "base/vec3.h"
 #include "model/model.h"
+#include "sim/instrument.h"
 
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <optional>
 
 namespace gewebe {
 
@@ -39,14 +41,26 @@ struct NodePressure {
   bool operator==(const NodePressure&) const = default;
 };
 
-/// A displaced node's way, taken smoothly from `start` to `end` s.
+/// What takes a node along: a point of a rigid body on its way, and where the node rests.
+struct Carrier {
+  PoseWay way;
+  Vec3 point, rest;
+
+  Vec3 at(double time) const { return way.at(time)(point) - rest; }
+  bool operator==(const Carrier&) const = default;
+};
+
+/// A displaced node's way, taken smoothly from `start` to `end` s, straight or with a rigid body.
 struct Travel {
   Vec3 from, to;
   double start = 0, end = 0;
+  std::optional<Carrier> by{};
 
   Vec3 at(double time) const {
     if (!(time < end))
       return to;
+    if (by)
+      return by->at(time);
     const double x = time > start ? (time - start) / (end - start) : 0;
     return from + smooth_step(x) * (to - from);
   }

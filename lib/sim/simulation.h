@@ -7,6 +7,7 @@
 #include "sim/command.h"
 #include "sim/elastodynamic.h"
 #include "sim/elastostatic.h"
+#include "sim/instrument.h"
 #include "sim/load.h"
 #include "sim/two_step.h"
 
@@ -50,9 +51,32 @@ struct Attach {
   std::vector<std::uint32_t> others;
   double stiffness = 0; ///< g/s², of each spring
 };
-struct Release { ///< of force, pressure and displacement
+struct Release { ///< of force, pressure, displacement and grasp
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
+};
+/// Puts an instrument there, in place of itself, or moves it from where it is; see
+/// add_instrument().
+struct SetInstrument {
+  std::size_t instrument = 0;
+  InstrumentShape shape; ///< radius > 0, friction >= 0
+  Pose pose;             ///< turn of length 1
+};
+struct MoveInstrument {
+  std::size_t instrument = 0;
+  Vec3 place;
+  std::optional<Quaternion> turn; ///< of length 1; none: as it is
+  double over = 0;                ///< s that the way takes
+};
+/// Nodes follow an instrument as parts of it, from where they stand.
+struct Grasp {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  std::size_t instrument = 0;
+};
+/// Takes an instrument away; what it grasped is released.
+struct Withdraw {
+  std::size_t instrument = 0;
 };
 struct SetGravity {
   Vec3 gravity;
@@ -67,7 +91,8 @@ struct SetTwoStep {
   std::function<StiffnessParts()> second; ///< asked once for an object
 };
 struct Emit {
-  bool forces = false; ///< else shapes
+  bool forces = false;      ///< else shapes
+  bool instruments = false; ///< rather
 };
 /// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
 /// no velocity; an elastostatic one takes its own shape at once.
@@ -80,8 +105,9 @@ struct SetMethod {
 struct Renew {
   std::size_t object = 0;
 };
-using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetGravity,
-                            SetTimestep, SetTwoStep, Emit, SetMethod, Renew>;
+using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
+                            MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
+                            Emit, SetMethod, Renew>;
 
 /// Where what an object consists of comes from: asked for when it is first needed, the stiffness
 /// again after a Renew. What they throw leaves the call that needed it.
@@ -115,6 +141,14 @@ struct SimulationCounts {
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
   double largest_jump = 0;         ///< mm, see MethodJump
+};
+
+/// An instrument at the end of the last step.
+struct InstrumentReport {
+  bool present = false;
+  Pose pose;
+  Vec3 force, torque;    ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
+  std::size_t nodes = 0; ///< that it touches or grasps
 };
 
 /// Of the last step.
@@ -151,6 +185,15 @@ public:
   /// \throw Error naming those there are
   std::size_t find(const std::string& name) const;
 
+  /// An instrument that is in no place until SetInstrument; its number, the old one where there is
+  /// one of that name.
+  std::size_t add_instrument(const std::string& name);
+  std::size_t instrument_count() const noexcept { return instruments_.size(); }
+  const std::string& instrument_name(std::size_t instrument) const;
+  /// \throw Error naming those there are
+  std::size_t find_instrument(const std::string& name) const;
+  InstrumentReport instrument(std::size_t instrument) const;
+
   /// Takes effect now. \pre objects and nodes exist, numbers are finite
   /// \throw Error if a node should move along an axis that the model holds, or objects can't be
   /// attached or change their method
@@ -169,15 +212,17 @@ public:
   std::optional<double> timestep() const noexcept { return timestep_; }
   bool emits_forces() const noexcept { return emit_forces_; }
   bool emits_shapes() const noexcept { return emit_shapes_; }
+  bool emits_instruments() const noexcept { return emit_instruments_; }
 
   /// Goes on by dt >= 0, or to `time` (now or later), through the events up to and at its end.
   /// Times add up without the rounding of each sum. \throw Error "object NAME at T s: …", Cancelled
   void step(double dt);
   void step_to(double time);
 
-  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes. Of an object whose
-  /// model was not needed: none. The shape of an elastostatic object is computed when it is first
-  /// asked for. \throw Error as step
+  /// Of the last step: 3 n numbers, mm, and what holds the displaced nodes and pushes those that
+  /// instruments touch, by ascending node. Of an object whose model was not needed: none. The shape
+  /// of an elastostatic object is computed when it is first asked for; instruments' forces on an
+  /// elastodynamic one are means over the last step. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
@@ -197,6 +242,7 @@ private:
   struct Object;
   struct Body;
   struct Undo;
+  struct Instrument;
   struct Tie {
     std::size_t object = 0, other = 0;
     std::uint32_t node = 0, other_node = 0;
@@ -241,18 +287,37 @@ private:
   void update_in_time(Object& object);
   void warn_of_range(Object& object) const;
   double integration_step(Body& body);
+  void check_instrument(const Change& change) const;
+  bool apply_instrument(const Change& change);
+  void carry(const Instrument& instrument);
+  void drop_grips(std::size_t object, const std::vector<std::uint32_t>& nodes);
+  void drop_grips(std::size_t instrument);
+  void note_poses();
+  void guide(Body& body, double to);
+  void keep_instruments();
+  void need_contact(Object& object);
+  void end_guiding(double to);
+  bool touched_anew(Object& object);
+  std::optional<Pose> pose_at(std::size_t moment, std::size_t instrument) const;
+  bool instruments_there() const;
+  void follow_instruments(Object& object);
+  void take_touches();
+  void add_touches(Object& object);
 
   Context context_;
   SimulationOptions options_;
   std::vector<std::unique_ptr<Object>> objects_;
   std::vector<std::unique_ptr<Body>> bodies_;
   std::vector<Tie> ties_;
+  std::vector<std::unique_ptr<Instrument>> instruments_;
+  /// In this step: where the instruments stood, one after the other.
+  std::vector<std::vector<std::optional<Pose>>> poses_;
   std::multimap<double, Event> events_;
   Vec3 gravity_;
   std::optional<double> timestep_;
   double time_ = 0;
   double sum_ = 0, lost_ = 0; ///< of the steps so far, and what rounding took from it
-  bool emit_forces_ = false, emit_shapes_ = false;
+  bool emit_forces_ = false, emit_shapes_ = false, emit_instruments_ = false;
   SimulationCounts counts_;
   std::vector<MethodJump> jumps_;
   std::vector<std::size_t> renewed_;

@@ -162,7 +162,7 @@ double Simulation::integration_step(Body& body) {
 void Simulation::move_bodies(double to) {
   const double duration = to - time_;
   for (std::size_t i = 0; i < objects_.size(); ++i)
-    if (objects_[i]->method == Method::ela && !objects_[i]->load.empty())
+    if (objects_[i]->method == Method::ela && (!objects_[i]->load.empty() || instruments_there()))
       need_body(i);
   for (const auto& body : bodies_) {
     if (!body->changed)
@@ -191,6 +191,7 @@ void Simulation::move_bodies(double to) {
   std::vector<double> step;
   for (const auto& body : bodies_) {
     body->taken = 0;
+    guide(*body, to);
     if (body->moving->resting())
       continue;
     keep_body(*body);
@@ -211,15 +212,19 @@ void Simulation::move_bodies(double to) {
   for (Body* const body : awake)
     if (body->failure)
       raise(*body);
+  end_guiding(to);
+  for (Body* const body : awake)
+    body->touch_time += duration;
   for (const auto& object : objects_)
     counts_.resting += object->method == Method::ela && object->body == nullptr ? 1 : 0;
-  for (const auto& body : bodies_)
+  for (const auto& body : bodies_) {
     for (const std::size_t part : body->parts) {
       counts_.integration += body->taken;
       counts_.resting += body->taken == 0 ? 1 : 0;
       counts_.moving += body->taken == 0 ? 0 : 1;
       objects_[part]->shown = objects_[part]->shown && body->taken == 0;
     }
+  }
 }
 
 /// What ended a body's motion, with its object's name.

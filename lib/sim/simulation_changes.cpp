@@ -10,6 +10,7 @@ namespace gewebe {
 using simulation::number_text;
 
 void Simulation::check(const Change& change) const {
+  check_instrument(change);
   if (const auto* const tie = std::get_if<Attach>(&change)) {
     const Object &a = *objects_.at(tie->object), &b = *objects_.at(tie->other);
     for (const Object* const o : {&a, &b})
@@ -54,6 +55,8 @@ void Simulation::apply(const Change& change) {
 
 /// \pre check(change) passes
 void Simulation::apply_now(const Change& change) {
+  if (apply_instrument(change))
+    return;
   Object* touched = nullptr;
   const auto touch = [&](std::size_t object) {
     touched = objects_.at(object).get();
@@ -80,11 +83,13 @@ void Simulation::apply_now(const Change& change) {
         touched->load.pressure[node] = press->pressure;
   } else if (const auto* const set = std::get_if<SetDisplacement>(&change)) {
     touch(set->object);
+    drop_grips(set->object, set->nodes);
     displace(*touched, *set);
   } else if (const auto* const tie = std::get_if<Attach>(&change)) {
     attach(*tie);
   } else if (const auto* const release = std::get_if<Release>(&change)) {
     touch(release->object);
+    drop_grips(release->object, release->nodes);
     for (const std::uint32_t node : release->nodes) {
       touched->load.force.erase(node);
       touched->load.force_period.erase(node);
@@ -111,6 +116,8 @@ void Simulation::apply_now(const Change& change) {
   } else if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
     touch(stages->object);
     set_two_step(*touched, *stages);
+  } else if (std::get<Emit>(change).instruments) {
+    emit_instruments_ = true;
   } else if (std::get<Emit>(change).forces) {
     emit_forces_ = true;
   } else {

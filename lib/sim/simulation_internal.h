@@ -3,11 +3,13 @@
 
 #include "base/error.h"
 #include "sim/simulation.h"
+#include "sim/static_contact.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -37,8 +39,8 @@ struct Simulation::Object {
   std::optional<TwoStepOptions> stages;   // what two-step says of it
   std::function<StiffnessParts()> second; // its second stage
   std::optional<TwoStep> two_step;        // over `still`, made when needed
-  Body* body = nullptr;            // of an elastodynamic object
-  std::size_t offset = 0;          // of its nodes in the body
+  Body* body = nullptr;                   // of an elastodynamic object
+  std::size_t offset = 0;                 // of its nodes in the body
 
   std::vector<double> displacement;
   std::vector<NodeVector> forces;
@@ -55,6 +57,25 @@ struct Simulation::Object {
   int slow = 0;             // updates in a row that took too long for the rate
   ElastostaticCounts spent; // of what was renewed
   bool warned_threshold = false;
+
+  std::unique_ptr<StaticContact> contact; // of an elastostatic object, once there are instruments
+  std::vector<NodeTouch> touches;         // as shown
+  bool warned_stuck = false, warned_unsolved = false, warned_stages = false;
+};
+
+struct Simulation::Instrument {
+  struct Grip {
+    std::size_t object = 0;
+    std::uint32_t node = 0;
+    Vec3 point; // on the instrument
+  };
+  std::string name;
+  InstrumentShape shape;
+  bool present = false;
+  PoseWay way;
+  std::vector<Grip> grips;
+  Pose before;          // where elastodynamic objects last met it
+  bool changed = false; // since then put or withdrawn
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.
@@ -65,7 +86,11 @@ struct Simulation::Body {
   double safe = 0; // largest stable step
   bool changed = true;
   bool warned_step = false;
-  std::uint64_t taken = 0; // by the last advance
+  bool warned_implicit = false;
+  bool touched = false;         // by an instrument, in the last step
+  double touch_time = 0;        // over which impulses were summed
+  std::optional<Box3> rest_box; // while at rest
+  std::uint64_t taken = 0;      // by the last advance
   std::exception_ptr failure;
 };
 

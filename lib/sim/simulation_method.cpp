@@ -30,6 +30,9 @@ void Simulation::set_method(std::size_t index, Method method) {
     update_still(object, load_at(object.load, object.model, time_));
     still = still_shape(object);
   }
+  if (!object.touches.empty() && object.method == Method::ffe && object.shown && object.shaped)
+    still = object.displacement; // instruments among what acts
+  object.contact.reset();
   if (method == Method::ela) {
     if (!still.empty()) {
       need_body(index);
@@ -78,6 +81,7 @@ void Simulation::renew(Object& object) {
     simulation::add_counts(object.spent, second);
     object.two_step.reset();
   }
+  object.contact.reset();
   if (object.body != nullptr && object.integration == Integration::implicit)
     object.body->moving->renew();
   object.shown = false;

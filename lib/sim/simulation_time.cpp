@@ -77,11 +77,14 @@ void Simulation::advance(double to) {
     }
   }
   move_to(to);
+  note_poses();
+  take_touches();
   for (const auto& object : objects_) {
     if (emit_shapes_)
       need_model(*object);
     if (!object->shown ||
-        (object->method == Method::ffe && object->load.changes_until() > object->shown_time))
+        (object->method == Method::ffe && object->load.changes_until() > object->shown_time) ||
+        touched_anew(*object))
       at_object(*object, [&] { show(*object); });
     if (!emit_shapes_ && !options_.shapes)
       continue;
@@ -89,12 +92,23 @@ void Simulation::advance(double to) {
       undo_->updated.insert(object.get());
     shape(*object); // now, so that a failure is one of this step
   }
+  if (poses_.size() > 1)
+    poses_.erase(poses_.begin(), poses_.end() - 1);
   ++counts_.steps;
 }
 
 void Simulation::show(Object& object) {
   if (object.body != nullptr || !object.load.empty())
     need_model(object);
+  const bool near = object.method == Method::ffe && (object.contact || instruments_there());
+  const bool meets = near && !object.stages;
+  if (near && !meets && !object.warned_stages && options_.warn) {
+    object.warned_stages = true;
+    options_.warn("object " + object.name +
+                  " follows two steps of stiffness: instruments don't touch it");
+  }
+  if (meets)
+    shape(object); // that it comes from
   undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time] {
     std::swap(object.displacement, object.before);
     std::swap(object.forces, object.forces_before);
@@ -107,7 +121,16 @@ void Simulation::show(Object& object) {
   std::swap(object.forces, object.forces_before);
   std::swap(object.shown_load, object.load_before);
   object.forces.clear();
-  if (object.method == Method::ffe && (object.still || !object.load.empty())) {
+  if (meets) {
+    object.displacement = object.before;
+    object.shown_load = load_at(object.load, object.model, time_);
+    follow_instruments(object);
+    object.shaped = true;
+    if (!object.warned_range)
+      warn_of_range(object);
+    if (object.still)
+      object.forces = object.still->contact_forces();
+  } else if (object.method == Method::ffe && (object.still || !object.load.empty())) {
     object.shown_load = load_at(object.load, object.model, time_);
     update_in_time(object);
     object.forces = still_forces(object);
@@ -124,6 +147,7 @@ void Simulation::show(Object& object) {
     if (object.body != nullptr)
       show_motion(object);
   }
+  add_touches(object);
   object.shown_time = time_;
   object.shown = true;
 }

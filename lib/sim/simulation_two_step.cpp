@@ -1,4 +1,5 @@
-// The two-step method of elastostatic objects, and what both ways of finding a shape have in common.
+// The two-step method of elastostatic objects, and what both ways of finding a shape have in
+// common.
 
 #include "base/error.h"
 #include "sim/simulation_internal.h"
@@ -10,13 +11,13 @@ namespace gewebe {
 using simulation::number_text;
 
 void Simulation::set_two_step(Object& object, const SetTwoStep& set) {
-  undo_->note([&object, stages = object.stages, second = object.second,
-               warned = object.warned_threshold] {
-    object.stages = stages;
-    object.second = second;
-    object.warned_threshold = warned;
-    object.two_step.reset();
-  });
+  undo_->note(
+      [&object, stages = object.stages, second = object.second, warned = object.warned_threshold] {
+        object.stages = stages;
+        object.second = second;
+        object.warned_threshold = warned;
+        object.two_step.reset();
+      });
   object.stages = set.options;
   if (!object.second)
     object.second = set.second;

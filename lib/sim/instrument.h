@@ -1,0 +1,91 @@
+#pragma once
+// Rigid instruments that touch objects: a sphere or a capsule (all points within a radius of a
+// segment), where it stands and how it moves. Both are convex, so that for any unit vector n all
+// that lies beyond the support plane n·y = support(n) is outside.
+
+#include "base/vec3.h"
+
+namespace gewebe {
+
+/// A rotation; need not be of unit length until made so.
+struct Quaternion {
+  double w = 1, x = 0, y = 0, z = 0;
+
+  bool operator==(const Quaternion&) const = default;
+};
+
+double length(const Quaternion& q);
+/// \pre length(q) > 0 and finite
+Quaternion unit(const Quaternion& q);
+/// By `degrees` about `axis`. \pre norm(axis) > 0
+Quaternion turn_about(const Vec3& axis, double degrees);
+/// \pre length(q) == 1
+Vec3 turned(const Quaternion& q, const Vec3& v);
+Vec3 turned_back(const Quaternion& q, const Vec3& v);
+
+/// Where a rigid body's own point r stands: place + turned(turn, r).
+struct Pose {
+  Vec3 place; ///< of its origin
+  Quaternion turn;
+
+  Vec3 operator()(const Vec3& r) const { return place + turned(turn, r); }
+  Vec3 inverse(const Vec3& p) const { return turned_back(turn, p - place); }
+  bool operator==(const Pose&) const = default;
+};
+
+/// On the straight way from a to b, by the shorter rotation; exact at 0 and 1. \pre 0 <= x <= 1
+Pose between(const Pose& a, const Pose& b, double x);
+
+/// From one pose to another, smoothly, from `start` to `end` s.
+struct PoseWay {
+  Pose from, to;
+  double start = 0, end = 0;
+
+  Pose at(double time) const;
+  bool operator==(const PoseWay&) const = default;
+};
+
+/// The origin is a sphere's centre, or the first end of a capsule's segment.
+struct InstrumentShape {
+  double radius = 1;   ///< mm, > 0
+  Vec3 axis;           ///< from the first end to the second; 0: a sphere
+  double friction = 0; ///< Coulomb's coefficient
+};
+
+/// An instrument at one moment.
+struct PlacedInstrument {
+  Vec3 a, ab;                ///< first end of the segment, and from there to the second
+  double inverse_square = 0; ///< 1/|ab|², or 0
+  double radius = 0, friction = 0;
+
+  PlacedInstrument() = default;
+  PlacedInstrument(const InstrumentShape& shape, const Pose& pose);
+
+  /// The point of the segment nearest to p.
+  Vec3 nearest(const Vec3& p) const;
+  /// Of p from the surface, below 0 inside.
+  double distance(const Vec3& p) const { return norm(p - nearest(p)) - radius; }
+  /// The largest n·y of all its points. \pre norm(n) == 1
+  double support(const Vec3& n) const { return dot(n, a) + std::fmax(0, dot(n, ab)) + radius; }
+  /// Out of the surface nearest to p; where p is on the segment (within 1e-9 of the radius) any way
+  /// out that is perpendicular to it, along `wish` as far as may be.
+  Vec3 normal(const Vec3& p, const Vec3& wish = {}) const;
+  Box3 box() const;
+};
+
+/// No point of the shape moves further between the two poses than this.
+double travel(const InstrumentShape& shape, const Pose& from, const Pose& to);
+
+/// Where p on a rigid body goes when the body moves.
+inline Vec3 carried(const Pose& from, const Pose& to, const Vec3& p) {
+  return from == to ? p : to(from.inverse(p));
+}
+
+/// Whether a point of one box may be a point of the other, grown by `margin` all around.
+inline bool near(const Box3& a, const Box3& b, double margin = 0) {
+  return a.min.x - margin <= b.max.x && b.min.x - margin <= a.max.x &&
+         a.min.y - margin <= b.max.y && b.min.y - margin <= a.max.y &&
+         a.min.z - margin <= b.max.z && b.min.z - margin <= a.max.z;
+}
+
+} // namespace gewebe

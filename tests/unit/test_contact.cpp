@@ -1,0 +1,99 @@
+#include "sim/dynamic_contact.h"
+#include "sim/elastodynamic.h"
+#include "sim/elastostatic.h"
+#include "sim/static_contact.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace gewebe {
+namespace {
+
+const Vec3 middle{100, -50, 30}; // of the organ, a ball of radius 20
+
+Vec3 place(const Model& model, std::span<const double> u, std::size_t i) {
+  return model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+}
+
+/// Of the free node that is deepest inside, over the radius.
+double depth(const Model& model, std::span<const double> u, const PlacedInstrument& placed) {
+  double least = HUGE_VAL;
+  for (const std::uint32_t i : test::free_nodes(model))
+    least = std::min(least, placed.distance(place(model, u, i)));
+  return -least / placed.radius;
+}
+
+TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
+  const Model model = test::organ(4);
+  Elastostatic still(model, {}, Context{});
+  std::vector<double> u(3 * model.nodes.size());
+  StaticContact contact(model, u);
+  Pose before{middle + Vec3{0.3, 0.2, 28.5}, {}};
+  for (const double friction : {0.0, 0.3})
+    for (const double z : {27.0, 25.0, 26.0}) {
+      const InstrumentShape shape{8, {}, friction};
+      const Pose now{middle + Vec3{0.3 + friction, 0.2, z}, {}};
+      const std::vector<std::optional<MovedInstrument>> moved{MovedInstrument{shape, before, now}};
+      contact.update([&]() -> Elastostatic& { return still; }, {}, moved, u);
+      before = now;
+      const PlacedInstrument placed(shape, now);
+      EXPECT_TRUE(contact.solved());
+      EXPECT_LT(depth(model, u, placed), 1e-6);
+      EXPECT_GT(depth(model, u, PlacedInstrument({8.1, {}, 0}, now)), 1e-3); // it would show
+      ASSERT_GT(contact.touches().size(), 2U);
+      for (const NodeTouch& t : contact.touches()) {
+        const Vec3 n = placed.normal(place(model, u, t.node));
+        const double push = dot(t.force, n), drag = norm(t.force - push * n);
+        EXPECT_GT(push, 0);
+        EXPECT_LE(drag, friction * push + 1e-6 * norm(t.force));
+      }
+    }
+  contact.update([&]() -> Elastostatic& { return still; }, {}, {}, u); // gone
+  EXPECT_TRUE(contact.touches().empty());
+  for (const double x : u)
+    EXPECT_LT(std::abs(x), 1e-9);
+}
+
+TEST(DynamicContact, KeepsMovingNodesOutAndBalancesThemAtRest) {
+  const Model model = test::organ(3);
+  Elastodynamic moving(model);
+  const InstrumentShape shape{8, {}, 0};
+  const Pose start{middle + Vec3{0.3, 0.2, 28.5}, {}}, end{middle + Vec3{0.3, 0.2, 26.5}, {}};
+  const auto displacement = [&] {
+    std::vector<double> u;
+    for (const NodeMotion& m : moving.motion())
+      u.insert(u.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
+    return u;
+  };
+  const double h = 0.9 * safe_step(model);
+  Pose before = start;
+  const PoseWay way{start, end, 0, 0.2};
+  for (int k = 0; k < 40; ++k) {
+    const double time = 0.01 * k;
+    moving.set_instruments({MovingInstrument{shape, before, way}});
+    moving.wake();
+    moving.advance(0.01, h, Context{}, time);
+    before = way.at(time + 0.01);
+    EXPECT_LT(depth(model, displacement(), PlacedInstrument(shape, before)), 1e-6) << k;
+    for (const NodeTouch& t : moving.take_touches()) {
+      const Vec3 at = model.nodes[t.node].position + moving.motion()[t.node].displacement;
+      EXPECT_GT(dot(t.force, at - before.place), 0); // never pulls
+    }
+  }
+  // At rest the instrument's force is what the springs hold against.
+  moving.set_instruments({MovingInstrument{shape, before, way}});
+  moving.advance(20, h, Context{}, 0.4);
+  (void)moving.take_touches();
+  moving.advance(0.5, h, Context{}, 20.4);
+  const SpringNetwork network = spring_network(model);
+  const std::vector<NodeTouch> touches = moving.take_touches();
+  EXPECT_FALSE(touches.empty());
+  for (const NodeTouch& t : touches) {
+    const Vec3 pull = spring_force(network, moving.motion(), t.node);
+    EXPECT_LT(norm(t.force / 0.5 + pull), 1e-3 * norm(pull));
+  }
+}
+
+} // namespace
+} // namespace gewebe

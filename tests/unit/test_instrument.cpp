@@ -1,0 +1,146 @@
+#include "sim/instrument.h"
+
+#include "sim/load.h"
+#include "sim/surface_blocks.h"
+#include "sim_models.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <set>
+
+namespace gewebe {
+namespace {
+
+const double half = std::sqrt(0.5);
+
+TEST(Instrument, TurnsAreRotations) {
+  const Quaternion quarter = turn_about({0, 0, 2}, 90);
+  EXPECT_LT(norm(turned(quarter, {1, 2, 3}) - Vec3{-2, 1, 3}), 1e-15);
+  EXPECT_LT(norm(turned_back(quarter, turned(quarter, {1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
+  EXPECT_EQ(unit({0, 0, 0, 1e-200}), (Quaternion{0, 0, 0, 1}));
+  EXPECT_EQ(unit({1e300, 0, 0, 0}), Quaternion{});
+  const Pose pose{{5, 0, 0}, quarter};
+  EXPECT_LT(norm(pose({1, 0, 0}) - Vec3{5, 1, 0}), 1e-15);
+  EXPECT_LT(norm(pose.inverse(pose({1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
+}
+
+TEST(Instrument, AWayIsSmoothAndTakesTheShorterTurn) {
+  Quaternion end = turn_about({0, 0, 1}, 90);
+  end = {-end.w, -end.x, -end.y, -end.z}; // the same turn
+  const PoseWay way{{}, {{2, 0, 0}, end}, 1, 3};
+  EXPECT_EQ(way.at(0), way.from);
+  EXPECT_EQ(way.at(1), way.from);
+  EXPECT_EQ(way.at(3), way.to);
+  EXPECT_EQ(way.at(9), way.to);
+  const Pose middle = way.at(2);
+  EXPECT_LT(norm(middle.place - Vec3{1, 0, 0}), 1e-15);
+  EXPECT_LT(norm(turned(middle.turn, {1, 0, 0}) - Vec3{half, half, 0}), 1e-15);
+  EXPECT_LT(norm(way.at(1.01).place), 2e-4); // slow at first
+  const PoseWay jump{{}, {{2, 0, 0}, {}}, 1, 1};
+  EXPECT_EQ(jump.at(1), jump.to);
+}
+
+TEST(Instrument, DistancesOfSphereAndCapsule) {
+  const PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
+  EXPECT_EQ(sphere.distance({1, 0, 5}), 3);
+  EXPECT_EQ(sphere.distance({1, 0.5, 0}), -1.5);
+  EXPECT_EQ(sphere.normal({1, 0.5, 0}), (Vec3{0, 1, 0}));
+  EXPECT_EQ(sphere.support({0, 0, -1}), 2);
+  // Turned so that its segment goes from (1, 0, 0) to (1, 4, 0).
+  const PlacedInstrument capsule({1, {4, 0, 0}, 0}, {{1, 0, 0}, turn_about({0, 0, 1}, 90)});
+  EXPECT_NEAR(capsule.distance({1, 7, 0}), 2, 1e-14);
+  EXPECT_NEAR(capsule.distance({1, -1, 0}), 0, 1e-14);
+  EXPECT_NEAR(capsule.distance({3, 2, 0}), 1, 1e-14);
+  EXPECT_NEAR(capsule.support({0, 1, 0}), 5, 1e-14);
+  EXPECT_NEAR(capsule.support({0, -1, 0}), 1, 1e-14);
+  const Box3 box = capsule.box();
+  EXPECT_LT(norm(box.min - Vec3{0, -1, -1}) + norm(box.max - Vec3{2, 5, 1}), 1e-14);
+}
+
+TEST(Instrument, WhereThereIsNoNormalTheWishIsTaken) {
+  const PlacedInstrument sphere({2, {}, 0}, {{1, 0, 0}, {}});
+  EXPECT_EQ(sphere.normal({1, 0, 0}, {0, -3, 0}), (Vec3{0, -1, 0}));
+  EXPECT_EQ(norm(sphere.normal({1, 0, 0})), 1);
+  const PlacedInstrument capsule({1, {4, 0, 0}, 0}, {});
+  EXPECT_LT(norm(capsule.normal({2, 0, 0}, {5, 0, 2}) - Vec3{0, 0, 1}), 1e-15);
+  for (const Vec3 wish : {Vec3{}, Vec3{1, 0, 0}}) {
+    const Vec3 n = capsule.normal({2, 0, 0}, wish);
+    EXPECT_NEAR(norm(n), 1, 1e-15);
+    EXPECT_NEAR(n.x, 0, 1e-15);
+  }
+}
+
+TEST(Instrument, BeyondAnySupportPlaneIsOutside) {
+  const PlacedInstrument capsule({0.7, {1, 2, 3}, 0}, {{4, 5, 6}, turn_about({1, 1, 0}, 33)});
+  for (int k = 0; k < 500; ++k) {
+    const Vec3 v{std::sin(1.0 * k), std::sin(1.7 * k + 1), std::sin(2.3 * k + 2)};
+    const Vec3 n = v / norm(v), across = cross(n, {0.3, 0.4, 0.5});
+    const Vec3 p = capsule.support(n) * n + 3 * std::sin(5.1 * k) * across;
+    EXPECT_GE(capsule.distance(p), -1e-12);
+    EXPECT_GE(capsule.support(n), dot(n, capsule.a) + capsule.radius);
+  }
+}
+
+TEST(Instrument, NoPointTravelsFurther) {
+  const InstrumentShape shape{0.5, {3, 0, 0}, 0};
+  for (const double degrees : {0.0, 1.0, 45.0, 179.0, 180.0}) {
+    const Pose from{{1, 2, 3}, turn_about({0, 1, 0}, 20)};
+    const Pose to{{1.5, 2, 2}, turn_about({0.1, 1, 0.3}, 20 + degrees)};
+    double way = 0;
+    Vec3 before = from(shape.axis);
+    for (int k = 1; k <= 1000; ++k) {
+      const Vec3 now = between(from, to, k / 1000.0)(shape.axis);
+      way += norm(now - before);
+      before = now;
+    }
+    EXPECT_LE(way, travel(shape, from, to) * (1 + 1e-9));
+    EXPECT_GE(way, norm(to.place - from.place) / 4);
+  }
+  EXPECT_EQ(travel(shape, {}, {}), 0);
+}
+
+TEST(Instrument, ACarriedNodeFollowsTheTurn) {
+  const Vec3 rest{1, 0, 0};
+  const PoseWay way{{}, {{0, 0, 2}, turn_about({0, 0, 1}, 180)}, 0, 1};
+  const Travel travel{{}, {-2, 0, 2}, 0, 1, Carrier{way, rest, rest}};
+  EXPECT_EQ(travel.at(0), Vec3{});
+  EXPECT_EQ(travel.at(1), (Vec3{-2, 0, 2}));
+  const Vec3 middle = rest + travel.at(0.5);
+  EXPECT_LT(norm(middle - Vec3{0, 1, 1}), 1e-15); // on the circle, not through its middle
+}
+
+TEST(SurfaceBlocks, FindAllNodesInABox) {
+  const Model model = test::organ(3);
+  SurfaceBlocks blocks(model);
+  std::vector<double> u(3 * model.nodes.size());
+  for (std::size_t k = 0; k < u.size(); ++k)
+    u[k] = std::sin(static_cast<double>(k));
+  for (const bool moved : {false, true}) {
+    if (moved)
+      blocks.set_shape(model, u);
+    const auto place = [&](std::size_t i) {
+      const Vec3 by{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+      return model.nodes[i].position + (moved ? by : Vec3{});
+    };
+    std::size_t asked = 0;
+    for (std::uint32_t i = 0; i < surface_count(model); i += 7) {
+      const Vec3 c = place(i), r{1.5, 1.5, 1.5};
+      const Box3 box{c - r, c + r};
+      std::set<std::uint32_t> found;
+      blocks.visit_near(box, [&](std::uint32_t node) { EXPECT_TRUE(found.insert(node).second); });
+      asked += found.size();
+      for (std::uint32_t j = 0; j < surface_count(model); ++j) {
+        const Vec3 p = place(j);
+        if (p.x >= box.min.x && p.x <= box.max.x && p.y >= box.min.y && p.y <= box.max.y &&
+            p.z >= box.min.z && p.z <= box.max.z) {
+          EXPECT_TRUE(found.contains(j));
+        }
+      }
+    }
+    EXPECT_LT(asked, surface_count(model) * surface_count(model) / 7 / 2); // and not all
+  }
+  blocks.visit_near({{1e6, 0, 0}, {2e6, 1, 1}}, [](std::uint32_t) { FAIL(); });
+}
+
+} // namespace
+} // namespace gewebe

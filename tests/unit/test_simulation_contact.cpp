@@ -1,0 +1,455 @@
+#include "base/error.h"
+#include "sim/simulation.h"
+#include "sim_models.h"
+#include "stiffness_models.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <string>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+Vec3 moved(const Simulation& s, std::size_t object, std::size_t node) {
+  const std::span<const double> u = s.displacement(object);
+  return {u[3 * node], u[3 * node + 1], u[3 * node + 2]};
+}
+
+Vec3 place(const Simulation& s, std::size_t object, std::size_t node) {
+  return s.model(object).nodes[node].position + moved(s, object, node);
+}
+
+SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
+  return {0, {radius, {}, friction}, {at, {}}};
+}
+
+/// Of the node that is deepest in the instrument, over its radius; nodes that no force moves count
+/// for nothing.
+double depth(const Simulation& s, std::size_t object, const InstrumentShape& shape,
+             const Pose& pose) {
+  const PlacedInstrument placed(shape, pose);
+  double least = HUGE_VAL;
+  const Model& model = s.model(object);
+  for (std::size_t i = 0; i < surface_count(model); ++i)
+    if (model.nodes[i].fixed == fixed_none)
+      least = std::min(least, placed.distance(place(s, object, i)));
+  return -least / shape.radius;
+}
+
+/// The top of the organ of the tests, which is a ball of radius 20 about this.
+const Vec3 middle{100, -50, 30};
+
+/// An organ pressed from above by a sphere, in small steps.
+std::unique_ptr<Simulation> pressed(Method method, double friction, double by, double radius = 8,
+                                    int rounds = 4, int threads = 1) {
+  Context context;
+  context.threads = threads;
+  auto s = std::make_unique<Simulation>(context, SimulationOptions{});
+  s->add_object("o", organ(rounds), method);
+  s->add_instrument("tool");
+  const Vec3 start = middle + Vec3{0.3, 0.2, 20 + radius};
+  s->apply(sphere(radius, start, friction));
+  s->apply(MoveInstrument{0, start - Vec3{0, 0, by}, {}, 0.2});
+  s->step(0.3);
+  return s;
+}
+
+TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
+  // Nodes that hang on three springs each, with no spring between them: u = f / k.
+  Model m;
+  m.name = "sheet";
+  m.materials.resize(1);
+  m.materials[0].name = "m";
+  const double k = 50;
+  std::vector<Node> held;
+  for (int y = -3; y <= 3; ++y)
+    for (int x = -3; x <= 3; ++x) {
+      const auto node = static_cast<std::uint32_t>(m.nodes.size());
+      Node n;
+      n.position = {1.0 * x, 1.0 * y, 0};
+      n.mass = 0.01;
+      n.drag = 0.5;
+      m.nodes.push_back(n);
+      for (int a = 0; a < 3; ++a) {
+        Node end = n;
+        end.position[a] += 1000; // far: the direction does not turn
+        end.fixed = fixed_all;
+        held.push_back(end);
+        m.springs.push_back(
+            {node, static_cast<std::uint32_t>(49 + held.size() - 1), SpringKind::edge, k, 0, 1000});
+      }
+    }
+  m.nodes.insert(m.nodes.end(), held.begin(), held.end());
+  check_model(m);
+  const double radius = 5, down = 0.4;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s({}, {});
+    s.add_object("sheet", m, method);
+    s.add_instrument("tool");
+    s.apply(sphere(radius, {0, 0, radius + 1}));
+    s.apply(MoveInstrument{0, {0, 0, radius - down}, {}, 0.5});
+    s.step(method == Method::ffe ? 0.5 : 20);
+    s.step(0.1); // forces are means over a step
+    // Each node alone: out of the sphere by the shortest way, as its compliance is the same all
+    // around.
+    Vec3 sum;
+    std::size_t touched = 0;
+    const Vec3 c{0, 0, radius - down};
+    const double exact = method == Method::ffe ? 1e-9 : 1e-3; // of f/k; far springs turn a little
+    for (std::uint32_t i = 0; i < 49; ++i) {
+      const Vec3 rest = m.nodes[i].position;
+      const double inside = radius - norm(rest - c);
+      Vec3 force;
+      if (inside > 0)
+        force = k * inside / norm(rest - c) * (rest - c);
+      sum += force;
+      const std::vector<NodeVector>& forces = s.contact_forces(0);
+      const auto f = std::find_if(forces.begin(), forces.end(),
+                                  [&](const NodeVector& v) { return v.node == i; });
+      EXPECT_EQ(f != forces.end(), inside > 0) << i;
+      EXPECT_LT(norm(k * moved(s, 0, i) - force), exact * k * down) << i;
+      if (f == forces.end())
+        continue;
+      ++touched;
+      EXPECT_LT(norm(f->value - force), exact * k * down) << i;
+    }
+    EXPECT_EQ(touched, 9U);
+    const InstrumentReport tool = s.instrument(0);
+    EXPECT_EQ(tool.nodes, touched);
+    EXPECT_LT(norm(tool.force + sum), exact * norm(sum));
+    EXPECT_LT(norm(tool.torque), exact * norm(sum)); // all forces pass through the centre
+    EXPECT_GT(tool.force.z, 0);
+  }
+}
+
+TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    const auto s = pressed(method, 0, 3);
+    const InstrumentReport tool = s->instrument(0);
+    EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), 1e-6);
+    EXPECT_GT(depth(*s, 0, {8, {}, 0}, tool.pose), -1e-6);  // touches
+    EXPECT_GT(depth(*s, 0, {8.1, {}, 0}, tool.pose), 1e-3); // a larger one would not be kept out
+    Vec3 sum;
+    const std::vector<NodeVector>& forces = s->contact_forces(0);
+    ASSERT_GT(forces.size(), 3U);
+    for (const NodeVector& f : forces) {
+      const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
+      EXPECT_GT(dot(f.value, n), 0);
+      if (method == Method::ffe) {
+        EXPECT_LT(norm(cross(f.value, n)), 1e-7 * norm(f.value));
+      }
+      sum += f.value;
+    }
+    EXPECT_LT(norm(tool.force + sum), 1e-12 * norm(sum));
+    if (method == Method::ela)
+      continue;
+    // Reactions of the model's supports balance what the instrument does.
+    std::vector<double> f(3 * s->model(0).nodes.size());
+    multiply_stiffness(s->model(0), s->displacement(0), f);
+    Vec3 supports;
+    double wrong = 0;
+    for (std::uint32_t i = 0; i < s->model(0).nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        if (is_fixed(s->model(0), i, a)) {
+          supports[a] += f[3 * i + static_cast<std::size_t>(a)];
+        } else {
+          double outer = 0;
+          for (const NodeVector& c : forces)
+            if (c.node == i)
+              outer = c.value[a];
+          wrong = std::max(wrong, std::abs(f[3 * i + static_cast<std::size_t>(a)] - outer));
+        }
+    EXPECT_LT(wrong, 1e-9 * norm(sum)); // K u = f
+    EXPECT_LT(norm(supports + sum), 1e-9 * norm(sum));
+  }
+}
+
+TEST(SimulationContact, BothMethodsAgreeAtRest) {
+  const auto still = pressed(Method::ffe, 0, 0.1, 8, 3);
+  const auto moving = pressed(Method::ela, 0, 0.1, 8, 3);
+  moving->step(10);
+  moving->step(0.1);
+  const Vec3 a = still->instrument(0).force, b = moving->instrument(0).force;
+  EXPECT_LT(norm(a - b), 0.15 * norm(a)); // as the linear and the nonlinear organ do
+  EXPECT_LT(depth(*moving, 0, {8, {}, 0}, moving->instrument(0).pose), 1e-6);
+}
+
+TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const double friction : {0.2, 5.0}) {
+      const auto s = pressed(method, friction, 2, 8, 3);
+      const Vec3 from = s->instrument(0).pose.place;
+      const std::vector<NodeVector> before = s->contact_forces(0);
+      const Vec3 at = place(*s, 0, before[before.size() / 2].node);
+      s->apply(MoveInstrument{0, from + Vec3{1.5, 0, 0}, {}, 0.5});
+      s->step(0.5);
+      const InstrumentReport tool = s->instrument(0);
+      EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), 1e-6);
+      std::size_t slipping = 0;
+      Vec3 drag;
+      for (const NodeVector& f : s->contact_forces(0)) {
+        const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
+        const double fn = dot(f.value, n);
+        const Vec3 ft = f.value - fn * n;
+        EXPECT_GE(fn, 0);
+        if (method == Method::ffe) {
+          EXPECT_LE(norm(ft), friction * fn * (1 + 1e-6));
+        }
+        slipping += norm(ft) > 0.99 * friction * fn ? 1 : 0;
+        drag += ft;
+      }
+      EXPECT_GT(drag.x, 0); // nodes are dragged along, against their slip
+      EXPECT_LT(tool.force.x, 0);
+      const double gone = (place(*s, 0, before[before.size() / 2].node) - at).x;
+      if (friction < 1) {
+        EXPECT_GT(slipping, 0U);
+        EXPECT_LT(gone, 1.2);
+      } else if (method == Method::ffe) {
+        EXPECT_NEAR(gone, 1.5, 1e-6); // sticks
+      } else {
+        EXPECT_NEAR(gone, 1.5, 0.3);
+      }
+    }
+}
+
+TEST(SimulationContact, NothingIsDoneFarAway) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s({}, {});
+    s.add_object("o", organ(), method);
+    s.add_instrument("tool");
+    s.apply(sphere(5, middle + Vec3{60, 0, 0}));
+    s.step(0.01);
+    for (int k = 0; k < 5; ++k) {
+      s.apply(MoveInstrument{0, middle + Vec3{60, 1.0 * k, 0}, {}, 0.01});
+      s.step(0.01);
+    }
+    EXPECT_EQ(s.counts().integration, 0U);
+    EXPECT_EQ(s.counts().elastostatic.updates, 0U);
+    EXPECT_TRUE(s.contact_forces(0).empty());
+    EXPECT_EQ(s.instrument(0).force, Vec3{});
+    s.apply(MoveInstrument{0, middle + Vec3{22, 0, 0}, {}, 0.01});
+    s.step(0.02);
+    EXPECT_FALSE(s.contact_forces(0).empty());
+    s.apply(Withdraw{0});
+    s.step(30);
+    EXPECT_TRUE(s.contact_forces(0).empty());
+    EXPECT_FALSE(s.instrument(0).present);
+    for (const double u : s.displacement(0))
+      EXPECT_LT(std::abs(u), 1e-7);
+  }
+}
+
+TEST(SimulationContact, AContactAtRestCostsNothing) {
+  Simulation s({}, {});
+  s.add_object("moving", organ(), Method::ela);
+  s.add_object("still", organ(), Method::ffe);
+  s.add_instrument("tool");
+  s.apply(sphere(8, middle + Vec3{0.3, 0.2, 27}));
+  s.step(50);
+  s.step(1); // found at rest
+  const std::uint64_t steps = s.counts().integration, updates = s.counts().elastostatic.updates;
+  const Vec3 force = s.instrument(0).force;
+  EXPECT_GT(force.z, 0);
+  s.step(10);
+  EXPECT_EQ(s.counts().integration, steps);
+  EXPECT_EQ(s.counts().elastostatic.updates, updates);
+  EXPECT_EQ(s.instrument(0).force, force); // it still holds
+  s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 26.9}, {}, 0.01});
+  s.step(0.02);
+  EXPECT_GT(s.counts().integration, steps);
+  EXPECT_GT(s.instrument(0).force.z, force.z);
+}
+
+TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const double over : {0.0, 0.002}) {
+      Simulation s({}, {});
+      s.add_object("o", organ(4), method);
+      s.add_instrument("tool");
+      s.apply(sphere(8, middle + Vec3{0.3, 0.2, 28.5}));
+      s.step(0.001);
+      s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 18}, {}, over});
+      s.step(0.01);
+      // What was above is now below it, not on the other side.
+      EXPECT_GT(s.instrument(0).force.z, 0) << method_name(method) << over;
+      EXPECT_LT(depth(s, 0, {8, {}, 0}, s.instrument(0).pose), 1e-6);
+      std::uint32_t top = 0;
+      for (std::uint32_t i = 0; i < surface_count(s.model(0)); ++i)
+        if (s.model(0).nodes[i].position.z > s.model(0).nodes[top].position.z)
+          top = i;
+      EXPECT_LT(place(s, 0, top).z, middle.z + 12);
+    }
+}
+
+TEST(SimulationContact, GraspedNodesFollowExactly) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s({}, {});
+    s.add_object("o", organ(), method);
+    s.add_instrument("forceps");
+    s.apply(SetInstrument{0, {3, {10, 0, 0}, 0}, {middle + Vec3{0, 0, 22}, {}}});
+    const std::vector<std::uint32_t> nodes{free_nodes(s.model(0))[3], free_nodes(s.model(0))[8]};
+    s.apply(Grasp{0, nodes, 0});
+    const Pose start{middle + Vec3{0, 0, 22}, {}};
+    const Pose end{middle + Vec3{1, 2, 23}, turn_about({1, 2, 3}, 25)};
+    s.apply(MoveInstrument{0, end.place, end.turn, 0.1});
+    const PoseWay way{start, end, 0, 0.1};
+    for (int k = 1; k <= 5; ++k) {
+      s.step(0.025);
+      const Pose now = way.at(s.time());
+      EXPECT_EQ(s.instrument(0).pose, now);
+      for (const std::uint32_t node : nodes)
+        EXPECT_LT(norm(place(s, 0, node) - now(start.inverse(s.model(0).nodes[node].position))),
+                  1e-12);
+    }
+    EXPECT_EQ(s.instrument(0).nodes, 2U);
+    const Vec3 held = s.contact_forces(0)[0].value + s.contact_forces(0)[1].value;
+    EXPECT_GT(norm(held), 0);
+    EXPECT_LT(norm(s.instrument(0).force + held), 1e-12 * norm(held));
+    s.apply(Release{0, {nodes[0]}});
+    EXPECT_EQ(s.instrument(0).nodes, 1U);
+    s.apply(MoveInstrument{0, end.place + Vec3{5, 0, 0}, {}, 0});
+    s.step(0.01);
+    EXPECT_LT(norm(place(s, 0, nodes[1]) -
+                   (end(start.inverse(s.model(0).nodes[nodes[1]].position)) + Vec3{5, 0, 0})),
+              1e-12);
+    EXPECT_GT(norm(place(s, 0, nodes[0]) -
+                   (end(start.inverse(s.model(0).nodes[nodes[0]].position)) + Vec3{5, 0, 0})),
+              1);
+    s.apply(Withdraw{0});
+    s.step(0.01);
+    EXPECT_TRUE(s.contact_forces(0).empty());
+    EXPECT_THROW(s.apply(MoveInstrument{0, {}, {}, 0}), Error);
+    std::uint32_t fixed = 0;
+    while (s.model(0).nodes[fixed].fixed == fixed_none)
+      ++fixed;
+    s.apply(SetInstrument{0, {3, {}, 0}, {middle + Vec3{0, 0, 30}, {}}});
+    EXPECT_THROW(s.apply(Grasp{0, {fixed}, 0}), Error);
+  }
+}
+
+TEST(SimulationContact, TheSameBytesForAnyNumberOfThreads) {
+  std::vector<std::vector<double>> results;
+  for (const int threads : {1, 2, 3}) {
+    std::vector<double>& r = results.emplace_back();
+    for (const Method method : {Method::ffe, Method::ela}) {
+      const auto s = pressed(method, 0.3, 2, 8, 4, threads);
+      r.insert(r.end(), s->displacement(0).begin(), s->displacement(0).end());
+      for (const NodeVector& f : s->contact_forces(0))
+        r.insert(r.end(), {1.0 * f.node, f.value.x, f.value.y, f.value.z});
+    }
+    ASSERT_EQ(r.size(), results[0].size());
+    EXPECT_EQ(0, std::memcmp(r.data(), results[0].data(), r.size() * sizeof(double)));
+  }
+}
+
+/// A liver, real where there is one.
+Model liver() {
+  const std::string path = test::shared_file("sofa_liver_smooth.obj");
+  if (path.empty()) {
+    TriangleMesh mesh = test::ball(3, 1);
+    for (Vec3& p : mesh.points)
+      p = {60 * p.x, 40 * p.y, 25 * p.z};
+    return test::model_of(mesh);
+  }
+  return test::model_of_file(path, "cm");
+}
+
+TEST(SimulationContact, DrawnAlongALiver) {
+  const Model model = liver();
+  Box3 box;
+  for (std::size_t i = 0; i < surface_count(model); ++i)
+    box.add(model.nodes[i].position);
+  const Vec3 c = 0.5 * (box.min + box.max), size = box.size();
+  const double radius = 0.15 * box.longest_side();
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const double friction : {0.0, 0.3}) {
+      if (method == Method::ela && friction == 0)
+        continue; // it takes its time
+      std::vector<std::string> warnings;
+      Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
+      s.add_object("liver", model, method);
+      s.add_instrument("tool");
+      const Vec3 start{c.x - 0.2 * size.x, c.y, box.max.z + radius};
+      s.apply(sphere(radius, start, friction));
+      std::size_t touched = 0;
+      double deepest = -HUGE_VAL;
+      for (int k = 1; k <= 16; ++k) {
+        const double x = k / 16.0;
+        const Vec3 to{c.x + (0.4 * x - 0.2) * size.x, c.y + 0.1 * size.y * std::sin(6 * x),
+                      box.max.z + radius - std::min(1.0, 4 * x) * 0.25 * size.z};
+        s.apply(MoveInstrument{0, to, {}, 0.02});
+        s.step(0.02);
+        deepest = std::max(deepest, depth(s, 0, {radius, {}, 0}, {to, {}}));
+        for (const NodeVector& f : s.contact_forces(0)) {
+          ++touched;
+          const Vec3 n = (place(s, 0, f.node) - to) / radius;
+          EXPECT_GE(dot(f.value, n), method == Method::ffe ? 0 : -1e-2 * norm(f.value));
+        }
+      }
+      EXPECT_LT(deepest, 1e-6);
+      EXPECT_GT(touched, 50U);
+      for (const std::string& w : warnings)
+        EXPECT_EQ(w.find("not exact"), std::string::npos) << w;
+    }
+}
+
+TEST(SimulationContact, StrangeScenes) {
+  struct Strange {
+    const char* name;
+    double radius;
+    Vec3 at;
+  };
+  const Model model = organ();
+  const std::uint32_t node = free_nodes(model)[5];
+  const Vec3 at = model.nodes[node].position;
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const Strange& strange :
+         {Strange{"tiny, its centre at a node", 1e-4, at}, Strange{"its centre at a node", 4, at},
+          Strange{"huge", 1e5, middle + Vec3{0, 0, 1e5 + 19}},
+          Strange{"around all of it", 50, middle}, Strange{"in the middle", 10, middle},
+          Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}}}) {
+      std::vector<std::string> warnings;
+      Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
+      s.add_object("o", model, method);
+      s.add_instrument("tool");
+      s.apply(sphere(strange.radius, strange.at));
+      for (int k = 0; k < 3; ++k)
+        s.step(0.001);
+      for (const double u : s.displacement(0))
+        ASSERT_TRUE(std::isfinite(u)) << strange.name;
+      EXPECT_LT(depth(s, 0, {strange.radius, {}, 0}, {strange.at, {}}), 1e-6)
+          << strange.name << " " << method_name(method);
+      for (const NodeVector& f : s.contact_forces(0))
+        EXPECT_GE(dot(f.value, place(s, 0, f.node) - strange.at), 0) << strange.name;
+    }
+}
+
+TEST(SimulationContact, TwoInstrumentsAtOneNode) {
+  const Model model = organ();
+  const Vec3 top = middle + Vec3{0, 0, 20};
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const double apart : {7.0, 3.0, 1e-3}) { // pinched, overlapping
+      Simulation s({}, {});
+      s.add_object("o", model, method);
+      s.add_instrument("left");
+      s.add_instrument("right");
+      for (const std::size_t k : {0U, 1U}) {
+        const Vec3 at = top + Vec3{k == 0 ? -apart : apart, 0, 2};
+        s.apply(SetInstrument{k, {6, {}, 0.1}, {at, {}}});
+      }
+      for (int k = 0; k < 3; ++k)
+        s.step(0.001);
+      for (const std::size_t k : {0U, 1U}) {
+        EXPECT_LT(depth(s, 0, {6, {}, 0}, s.instrument(k).pose), 1e-6)
+            << method_name(method) << apart;
+      }
+      EXPECT_FALSE(s.contact_forces(0).empty());
+    }
+}
+
+} // namespace
+} // namespace gewebe
