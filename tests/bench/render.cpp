@@ -47,7 +47,8 @@ struct Scene {
 
 Scene make_scene(std::size_t wanted, bool with_oracle) {
   Scene scene;
-  const auto across = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(wanted) / 4) + 0.5);
+  const auto across =
+      static_cast<std::uint32_t>(std::lround(std::sqrt(static_cast<double>(wanted) / 4)));
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = test::torus(2 * across, across, false);
   scene.triangles = surfaces[0].mesh.triangles.size();

@@ -18,6 +18,7 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <map>
 
 namespace gewebe {
 namespace {
@@ -125,13 +126,21 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   return make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
 }
 
-OracleComparison held_against_oracle(Case c, const Mode& mode, double sign = 1,
-                                     bool clamp_early = false) {
+/// `name` names the case within its test: modes share its oracle.
+OracleComparison held_against_oracle(Case c, const Mode& mode, const std::string& name = "",
+                                     double sign = 1, bool clamp_early = false) {
   Camera camera;
   const Image image = draw(c, mode, camera, c.scene.light, sign);
   c.scene.clamp_early = clamp_early;
   c.scene.per_pixel = mode.per_pixel;
-  return compare(image, c.scene, camera);
+  static std::map<std::string, test::OraclePicture> kept;
+  const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
+  test::OraclePicture& oracle =
+      kept[test.substr(0, test.find('/')) + " " + name + (mode.per_pixel ? " pixel" : " vertex") +
+           (clamp_early ? " clamped" : "")];
+  if (oracle.empty())
+    oracle = oracle_picture(c.scene, camera, image.width, image.height);
+  return compare(image, oracle);
 }
 
 class RenderOracle : public testing::TestWithParam<Mode> {
@@ -142,7 +151,7 @@ protected:
   }
 
   static void expect_equal(const Case& c, const char* name) {
-    const OracleComparison result = held_against_oracle(c, GetParam());
+    const OracleComparison result = held_against_oracle(c, GetParam(), name);
     RecordProperty(std::string(name) + ".rms", std::to_string(result.rms_rounded));
     EXPECT_GT(result.covered, 3000U);
     EXPECT_GT(static_cast<double>(result.interior), 0.85 * static_cast<double>(result.covered));
@@ -217,7 +226,7 @@ TEST_P(RenderOracle, DetailReflectionAndLightFarAway) {
   const OracleComparison result = held_against_oracle(c, GetParam());
   EXPECT_LE(result.rms_rounded, GetParam().wide ? GetParam().rms : 1.5);
   c.scene.structure.reset();
-  EXPECT_LE(held_against_oracle(c, GetParam()).rms_rounded, GetParam().wide ? 0.1 : 0.9);
+  EXPECT_LE(held_against_oracle(c, GetParam(), "flat").rms_rounded, 0.1);
 }
 
 TEST_P(RenderOracle, TexturesThatShrink) {
@@ -237,14 +246,14 @@ TEST_P(RenderOracle, TexturesThatShrink) {
 TEST_P(RenderOracle, WrongSignOfTheOffsetIsSeen) {
   const Case c = textured(torus(60, 30, false), "top");
   EXPECT_LE(held_against_oracle(c, GetParam()).max, GetParam().wide ? 2 : 4);
-  const OracleComparison wrong = held_against_oracle(c, GetParam(), -1);
+  const OracleComparison wrong = held_against_oracle(c, GetParam(), "", -1);
   EXPECT_GT(wrong.max, 20);
   EXPECT_GT(wrong.rms, 5);
 }
 
 TEST_P(RenderOracle, EarlyClampIsSeen) {
   const OracleComparison wrong =
-      held_against_oracle(textured(torus(60, 30, false), "top"), GetParam(), 1, true);
+      held_against_oracle(textured(torus(60, 30, false), "top"), GetParam(), "", 1, true);
   EXPECT_GT(wrong.max, 20);
 }
 
@@ -291,7 +300,8 @@ TEST_P(RenderOracle, FlatRampHasItsAnalyticValue) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, RenderOracle, testing::ValuesIn(modes),
+INSTANTIATE_TEST_SUITE_P(Modes, RenderOracle,
+                         testing::ValuesIn(std::begin(modes), std::begin(modes) + 7),
                          [](const auto& parameter) { return parameter.param.name; });
 
 // The figures of the man page, at 512 x 512: every mode on four shapes.

@@ -209,8 +209,8 @@ TEST(RenderRaster, WrapsAndFiltersAreThoseOfTheTexture) {
                              static_cast<std::uint32_t>(4 * inside(t)));
             }
             for (std::size_t c = 0; c < 3; ++c)
-              most = std::max(most,
-                              std::fabs(picture.values[3 * (200 * y + x) + c] - 255 * wanted[c]));
+              most = std::max(most, std::fabs(picture.values[3 * (std::size_t{200} * y + x) + c] -
+                                              255 * wanted[c]));
           }
         EXPECT_LE(most, 0.502) << static_cast<int>(wrap) << static_cast<int>(filter);
       }
