@@ -394,12 +394,12 @@ struct Elastostatic::State {
     base.clear();
     held_modes.clear();
     std::vector<std::uint8_t> fixed(axes, 0);
+    for (const auto& entry : now.displacement)
+      std::fill_n(fixed.begin() + static_cast<std::ptrdiff_t>(axis_of(entry.first, 0)), 3, 1);
     bool any_free = false;
-    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a) {
-        fixed[axis_of(i, a)] = now.displacement.contains(i) ? 1 : 0;
+    for (std::uint32_t i = 0; i < model.nodes.size() && !any_free; ++i)
+      for (int a = 0; a < 3; ++a)
         any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model, i, a));
-      }
     if (any_free) {
       ++counts.factors;
       held.emplace(factorise_axes(model, fixed, context));
@@ -444,9 +444,12 @@ struct Elastostatic::State {
           prescribed[axis_of(entry.first, a)] = factor * values[at++];
     };
     std::vector<double> coefficients, rest;
-    const bool rigid = held_modes.express(wanted, coefficients, rest);
     std::vector<double> shape;
-    if (rigid || held_modes.open()) {
+    const bool rigid = held && held_modes.express(wanted, coefficients, rest);
+    if (!held) { // nothing is left to give way
+      spread(wanted, 1);
+      shape = std::move(prescribed);
+    } else if (rigid || held_modes.open()) {
       if (base.empty() || base_gravity != now.gravity || base_force != now.force) {
         held_shape(f, prescribed, base);
         base_gravity = now.gravity;
