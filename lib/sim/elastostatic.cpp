@@ -98,7 +98,8 @@ struct Elastostatic::State {
   bool by_block = false;             // how the present load is met
   ShapeModes modes;                  // of this set: question to shape
 
-  // K with these nodes held.
+  // K with these nodes held, and what its springs add to it.
+  std::vector<SymmetricBlock> spring_blocks;
   std::map<std::uint32_t, Vec3> held_nodes;
   std::optional<AxisSolver> held; // none where nothing is free
   std::optional<ColumnCache> held_columns;
@@ -126,7 +127,8 @@ struct Elastostatic::State {
   }
 
   std::vector<double> outer_load(const Load& now) const {
-    std::vector<double> f = weights(now.gravity);
+    std::vector<double> f =
+        now.gravity == Vec3{} ? std::vector<double>(axes, 0) : weights(now.gravity);
     for (const auto& [node, force] : now.force)
       for (int a = 0; a < 3; ++a)
         f[axis_of(node, a)] += force[a];
@@ -229,9 +231,9 @@ struct Elastostatic::State {
     const std::size_t m = now.displacement.size();
     if (options.block_limit != SIZE_MAX)
       return m <= options.block_limit;
-    const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
-    const std::size_t most = compliance.stored(nodes) ? block_stored : block_solved;
-    return m <= std::min(most, compliance.capacity());
+    if (m > std::min(block_stored, compliance.capacity()))
+      return false;
+    return m <= block_solved || compliance.stored(nodes_of(now.displacement));
   }
 
   bool join(std::uint32_t node) {
@@ -388,6 +390,8 @@ struct Elastostatic::State {
   void renew_held(const Load& now) {
     if (!held_nodes.empty() && same_nodes(now.displacement, held_nodes))
       return;
+    if (spring_blocks.empty())
+      spring_blocks = stiffness_blocks(model);
     held.reset();
     held_nodes.clear();
     held_columns.reset();
@@ -420,7 +424,7 @@ struct Elastostatic::State {
   void held_shape(std::span<const double> f, std::span<const double> prescribed,
                   std::vector<double>& shape) {
     std::vector<double> product(axes, 0);
-    multiply_stiffness(model, prescribed, product);
+    multiply_stiffness(model, spring_blocks, prescribed, product);
     shape.resize(axes);
     for (std::size_t r = 0; r < axes; ++r)
       shape[r] = (f.empty() ? 0 : f[r]) - product[r];
@@ -481,7 +485,7 @@ struct Elastostatic::State {
       for (int a = 0; a < 3; ++a)
         shape[axis_of(node, a)] = d[a];
     std::vector<double> product(axes, 0);
-    multiply_stiffness(model, shape, product);
+    multiply_stiffness(model, spring_blocks, shape, product);
     forces.clear();
     for (const auto& entry : now.displacement) {
       Vec3 force;

@@ -144,19 +144,41 @@ StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock
                   [](const Spring& s) { return s.stiffness == 0 && s.damping == 0; });
 }
 
+namespace {
+
+void multiply_spring(const Spring& s, const SymmetricBlock& block, std::span<const double> u,
+                     std::span<double> f) {
+  const std::size_t i = 3 * std::size_t{s.i}, j = 3 * std::size_t{s.j};
+  const std::array<double, 3> stretch{u[i] - u[j], u[i + 1] - u[j + 1], u[i + 2] - u[j + 2]};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double force = block[entry[a][0]] * stretch[0] + block[entry[a][1]] * stretch[1] +
+                         block[entry[a][2]] * stretch[2];
+    f[i + a] += force;
+    f[j + a] -= force;
+  }
+}
+
+} // namespace
+
 void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f) {
   std::fill(f.begin(), f.end(), 0.0);
-  for (const Spring& s : model.springs) {
-    const Block block = block_of(model, s);
-    const std::size_t i = 3 * std::size_t{s.i}, j = 3 * std::size_t{s.j};
-    const std::array<double, 3> stretch{u[i] - u[j], u[i + 1] - u[j + 1], u[i + 2] - u[j + 2]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double force = block[entry[a][0]] * stretch[0] + block[entry[a][1]] * stretch[1] +
-                           block[entry[a][2]] * stretch[2];
-      f[i + a] += force;
-      f[j + a] -= force;
-    }
-  }
+  for (const Spring& s : model.springs)
+    multiply_spring(s, block_of(model, s), u, f);
+}
+
+std::vector<SymmetricBlock> stiffness_blocks(const Model& model) {
+  std::vector<SymmetricBlock> blocks;
+  blocks.reserve(model.springs.size());
+  for (const Spring& s : model.springs)
+    blocks.push_back(block_of(model, s));
+  return blocks;
+}
+
+void multiply_stiffness(const Model& model, std::span<const SymmetricBlock> blocks,
+                        std::span<const double> u, std::span<double> f) {
+  std::fill(f.begin(), f.end(), 0.0);
+  for (std::size_t k = 0; k < blocks.size(); ++k)
+    multiply_spring(model.springs[k], blocks[k], u, f);
 }
 
 double stiffness_norm(const StiffnessMatrix& matrix) {

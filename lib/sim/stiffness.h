@@ -49,6 +49,12 @@ StiffnessMatrix spring_matrix(const Model& model, std::span<const SymmetricBlock
 /// reactions. \pre u.size() == f.size() == 3 n
 void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f);
 
+/// What each spring adds to K, to multiply more than once: the same bits.
+std::vector<SymmetricBlock> stiffness_blocks(const Model& model);
+/// As above. \pre blocks are those of the model
+void multiply_stiffness(const Model& model, std::span<const SymmetricBlock> blocks,
+                        std::span<const double> u, std::span<double> f);
+
 /// y = K x. \pre x.size() == y.size() == matrix.order(), they don't overlap
 void multiply(const StiffnessMatrix& matrix, std::span<const double> x, std::span<double> y);
 
