@@ -10,9 +10,8 @@
 #include "base/parallel.h"
 #include "model/build.h"
 #include "sim/column_sum.h"
-#include "sim/compliance_columns.h"
-#include "sim/condition.h"
 #include "sim/elastostatic.h"
+#include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 
@@ -38,33 +37,10 @@ void report(const char* stage, const std::string& program, std::size_t nodes, st
   std::fflush(stdout);
 }
 
-/// Columns in memory, as a store would give them.
-class Columns final : public ColumnSource, public ColumnSink {
-public:
-  Columns(std::size_t count, std::vector<std::uint32_t> nodes, bool single)
-      : count_(count), nodes_(std::move(nodes)), single_(single) {}
-  void write(std::size_t, std::span<const double> columns, double) override {
-    columns_.emplace_back(columns.begin(), columns.end());
-  }
-  std::size_t node_count() const override { return count_; }
-  const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
-  void read(std::size_t k, std::span<double> out) const override {
-    std::copy(columns_[k].begin(), columns_[k].end(), out.begin());
-  }
-  bool single() const override { return single_; }
-
-private:
-  std::size_t count_;
-  std::vector<std::uint32_t> nodes_;
-  bool single_;
-  std::vector<std::vector<double>> columns_;
-};
-
 struct Organ {
   Model model;
   StiffnessMatrix matrix;
   FactorData factor;
-  double norm = 0;
   std::vector<std::uint32_t> patch; ///< ascending
 };
 
@@ -91,14 +67,7 @@ struct Way {
 };
 
 StiffnessParts parts_of(const Organ& organ, bool single) {
-  StiffnessParts parts;
-  auto columns = std::make_unique<Columns>(organ.model.nodes.size(), organ.patch, single);
-  const Factor factor(organ.factor);
-  (void)compliance_columns(organ.matrix, factor, organ.norm, organ.patch, with_threads(2),
-                           *columns);
-  parts.columns = std::move(columns);
-  parts.factor = [&organ] { return Factor(organ.factor); };
-  return parts;
+  return memory_parts(organ.matrix, organ.factor, organ.patch, single);
 }
 
 /// Every displacement changes with every update, as of a surface that is pressed in.
@@ -288,10 +257,9 @@ int main() {
     (void)std::fputs("contact: no shared data, a ball instead\n", stderr);
     mesh = test::sphere_mesh(5, 100, {});
   }
-  Organ organ{build_model(mesh, {}, Context{}).model, {}, {}, 0, {}};
+  Organ organ{build_model(mesh, {}, Context{}).model, {}, {}, {}};
   organ.matrix = stiffness_matrix(organ.model);
   organ.factor = Factor(organ.matrix, Context{}).data();
-  organ.norm = stiffness_norm(organ.matrix);
   organ.patch = patch_of(organ.model, 1000, 200);
   bench_streaming<double>(organ, "float64");
   bench_streaming<float>(organ, "float32");

@@ -1,0 +1,48 @@
+#pragma once
+// Columns of a compliance that stay in memory, as a store would give them, for the benchmarks.
+
+#include "base/columns.h"
+#include "sim/compliance.h"
+#include "sim/compliance_columns.h"
+#include "sim/condition.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace gewebe::timing {
+
+class MemoryColumns final : public ColumnSource, public ColumnSink {
+public:
+  MemoryColumns(std::size_t count, std::vector<std::uint32_t> nodes, bool single)
+      : count_(count), nodes_(std::move(nodes)), single_(single) {}
+  void write(std::size_t, std::span<const double> columns, double) override {
+    columns_.emplace_back(columns.begin(), columns.end());
+  }
+  std::size_t node_count() const override { return count_; }
+  const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
+  void read(std::size_t k, std::span<double> out) const override {
+    std::copy(columns_[k].begin(), columns_[k].end(), out.begin());
+  }
+  bool single() const override { return single_; }
+
+private:
+  std::size_t count_;
+  std::vector<std::uint32_t> nodes_;
+  bool single_;
+  std::vector<std::vector<double>> columns_;
+};
+
+/// Factor and columns of these nodes (ascending), as float32 where `single`.
+inline StiffnessParts memory_parts(const StiffnessMatrix& matrix, const FactorData& data,
+                                   const std::vector<std::uint32_t>& nodes, bool single) {
+  StiffnessParts parts;
+  auto columns = std::make_unique<MemoryColumns>(matrix.row_of_axis.size() / 3, nodes, single);
+  (void)compliance_columns(matrix, Factor(data), stiffness_norm(matrix), nodes, {}, *columns);
+  parts.columns = std::move(columns);
+  parts.factor = [&data] { return Factor(data); };
+  return parts;
+}
+
+} // namespace gewebe::timing
