@@ -85,7 +85,7 @@ void elastodynamic(const Organ& organ, double size, const std::vector<double>& e
   const double step = implicit ? 1.0 / 60 : safe_step_fraction * safe_step(organ.model);
   object.set_load(pull(organ, size, 0));
   double spent = 0, time = 0;
-  for (double chunk = implicit ? 0.1 : 0.01; time < 60 && spent < 20000 && !object.resting();
+  for (double chunk = implicit ? 0.1 : 0.01; time < 60 && spent < 8000 && !object.resting();
        chunk = 0.3 * time) {
     spent +=
         processor_milliseconds([&] { (void)object.advance(chunk, step, with_threads(1), time); });
