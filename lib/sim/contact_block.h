@@ -14,10 +14,10 @@ class ContactBlock {
 public:
   std::size_t size() const noexcept { return size_; }
 
-  /// Appends the row `row` of the matrix: its entries with the rows there are, then its diagonal.
+  /// Appends one row of the matrix: its entries with the rows there are, then its diagonal.
   /// \return false, and nothing changed, if the matrix would not be positive definite \pre
-  /// row.size() == size() + 1
-  bool append(std::span<const double> row);
+  /// added.size() == size() + 1
+  bool append(std::span<const double> added);
 
   /// Removes the rows and columns [first, first + count).
   void remove(std::size_t first, std::size_t count);

@@ -154,6 +154,66 @@ test_the_python_example_agrees_with_ffe_run() {
   ! compare 1.000001 || fail 'the check sees nothing'
 }
 
+# Forces and displaced nodes together: the same shape and the same forces by columns, by the factor, and by an independent
+# dense solution in Python of the matrix that stands in the store.
+test_contact_by_columns_by_the_factor_and_by_python() {
+  local python way
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  exp2ela --primitive sphere:24x12 --name ball -o ball.ela
+  ffe-precompute --columns surface ball.ela -o columns.h5
+  ffe-precompute ball.ela -o factor.h5
+  for way in columns factor; do
+    printf '%s\n' "object ball ball.ela store=$way.h5" 'force ball 40 1e-3 0 2e-3' 'displace ball 100 0 1e-4 2e-4' \
+      'displace ball 101,102,130-139 1e-4 0 0' 'emit forces' 'emit shapes' step >scene
+    ffe-run --verify scene >$way.txt
+  done
+  "$python" - columns.txt factor.txt <<'END' || fail 'Python says something else'
+import sys, h5py, numpy
+store = h5py.File("factor.h5")["ball"]
+p, i, x, axis = (store["K"][name][:] for name in ("p", "i", "x", "axis"))
+n = len(p) - 1
+K = numpy.zeros((n, n))
+for c in range(n):
+    K[i[p[c]:p[c + 1]], c] = K[c, i[p[c]:p[c + 1]]] = x[p[c]:p[c + 1]]
+row = {a: r for r, a in enumerate(axis)}
+f, d = numpy.zeros(n), {}
+for a, value in enumerate((1e-3, 0, 2e-3)):
+    f[row[3 * 40 + a]] = value
+for node in [100, 101, 102, *range(130, 140)]:
+    for a, value in enumerate((0, 1e-4, 2e-4) if node == 100 else (1e-4, 0, 0)):
+        d[row[3 * node + a]] = value
+held = numpy.array(sorted(d))
+free = numpy.setdiff1d(numpy.arange(n), held)
+u = numpy.zeros(n)
+u[held] = [d[r] for r in held]
+u[free] = numpy.linalg.solve(K[numpy.ix_(free, free)], f[free] - K[numpy.ix_(free, held)] @ u[held])
+force = K @ u - f
+tolerance = 10 * 2.2e-16 * store.attrs["condition"]
+lines = open("ball.ela").read().split("\n")
+at = next(k for k, line in enumerate(lines) if line.startswith("nodes "))
+count = int(lines[at].split()[1])
+rest = numpy.array([[float(w) for w in line.split()[:3]] for line in lines[at + 1:at + 1 + count]])
+full = numpy.zeros(3 * count)
+full[axis] = u
+for name in sys.argv[1:]:
+    text = open(name).read().split("\n")
+    at = next(k for k, line in enumerate(text) if line.startswith("shapes "))
+    shape = numpy.array([[float(w) for w in line.split()] for line in text[at + 1:at + 1 + count]])
+    off = abs(shape - rest - full.reshape(-1, 3)).max()
+    assert off <= tolerance * abs(full).max() + 4e-16 * abs(rest).max(), (name, off)
+    assert not abs(shape - rest - 1.001 * full.reshape(-1, 3)).max() <= tolerance * abs(full).max() + 4e-16 * abs(rest).max()
+    for node in (100, 101, 135):  # exact to the rounding of the position
+        want = (0, 1e-4, 2e-4) if node == 100 else (1e-4, 0, 0)
+        assert abs(shape[node] - (rest[node] + want)).max() <= 1e-12 * 2e-4 + 2.3e-16 * abs(rest).max()
+    at = next(k for k, line in enumerate(text) if line.startswith("forces "))
+    told = {int(w[0]): [float(v) for v in w[1:]] for w in (line.split() for line in text[at + 1:at + 14])}
+    assert len(told) == 13
+    for node, value in told.items():
+        off = abs(numpy.array(value) - [force[row[3 * node + a]] for a in range(3)]).max()
+        assert off <= tolerance * abs(force).max(), (name, node, off)
+END
+}
+
 # What the man page says of datasets and attributes is what h5dump shows.
 test_h5dump_shows_what_the_page_says() {
   command -v h5dump >/dev/null || skip 'no h5dump'
