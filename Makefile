@@ -60,6 +60,9 @@ FUZZ := $(FUZZ_SRC:tests/fuzz/%.cpp=$(BUILD)/%)
 BENCH := $(BENCH_SRC:tests/bench/%.cpp=$(BUILD)/bench_%)
 ARCHIVE := $(BUILD)/libgewebe.a
 SHARED := $(BUILD)/obj/tools/shared.a
+# What reads volumes, for a program that seldom does: loaded when one comes (formats/volume_plugin.h).
+PLUGIN := $(BUILD)/gewebe-volume.so
+PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 
 obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
 OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) tests/fuzz/replay.cpp)
@@ -86,7 +89,7 @@ endif
 ifeq ($(config),fuzz)
 all: $(FUZZ)
 else
-all: $(TOOLS) $(ARCHIVE)
+all: $(TOOLS) $(ARCHIVE) $(PLUGIN)
 endif
 
 deps:
@@ -122,7 +125,10 @@ $(ARCHIVE) $(SHARED):
 $(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 
-$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE)
+$(PLUGIN): $(ARCHIVE)
+	$(CXX) $(flags_$(config)) $(LDFLAGS) -shared -o $@ -Wl,-u,gewebe_view_volume $^ -Wl,--as-needed $(LIBS)
+
+$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE) | $(PLUGIN)
 	$(LINK) $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
 
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
@@ -145,13 +151,13 @@ endif
 # --- Tests ------------------------------------------------------------------------------------------
 
 # T=NAME runs the tests of that name (or pattern) alone; SET=fast unit tests, bad input and fuzz corpora.
-check: $(TOOLS) $(ARCHIVE) $(UNIT) $(FUZZ) | $(FIRST)
+check: $(TOOLS) $(ARCHIVE) $(PLUGIN) $(UNIT) $(FUZZ) | $(FIRST)
 	@CXX='$(CXX)' MAKE='$(MAKE_COMMAND)' tests/run --config '$(config)' $(if $(SET),--set '$(SET)') $(if $(T),--test '$(T)')
 ifeq ($(config),coverage)
 	@scripts/coverage $(BUILD)
 endif
 
-golden-update: $(TOOLS) | $(FIRST)
+golden-update: $(TOOLS) $(PLUGIN) | $(FIRST)
 	@tests/golden/run update --config '$(config)' $(if $(T),--test '$(T)')
 
 stress: $(STRESS) $(TOOLS) | $(FIRST)
@@ -219,6 +225,7 @@ install: all
 	@test '$(config)' != fuzz || { echo 'install: config=fuzz has no programs' >&2; exit 1; }
 	$(INSTALL) -d '$(call to,$(BINDIR))' '$(call to,$(LIBDIR))/pkgconfig'
 	$(if $(TOOLS),$(INSTALL) $(TOOLS) '$(call to,$(BINDIR))')
+	$(INSTALL) -D -m 644 $(PLUGIN) '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
 	$(INSTALL) -m 644 $(ARCHIVE) '$(call to,$(LIBDIR))'
 	$(foreach h,$(HEADERS),$(INSTALL) -D -m 644 $h '$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)' &&) true
 	$(foreach m,$(MAN),$(INSTALL) -D -m 644 $m '$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)' &&) true
@@ -232,10 +239,11 @@ ours := $(sort $(dir $(HEADERS:lib/%=%)))
 system_dir := $(filter /usr /usr/local,$(DESTDIR)$(PREFIX))
 uninstall:
 	rm -f $(foreach t,$(TOOLS),'$(call to,$(BINDIR))/$(notdir $t)') '$(call to,$(LIBDIR))/libgewebe.a' '$(PC)'
+	rm -f '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
 	rm -f $(foreach h,$(HEADERS),'$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)')
 	rm -f $(foreach m,$(MAN),'$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)')
 	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') '$(call to,$(INCLUDEDIR))/gewebe' \
-	  '$(call to,$(LIBDIR))/pkgconfig' $(foreach s,1 5 7,'$(call to,$(MANDIR))/man$s'); do \
+	  '$(call to,$(PLUGINDIR))' '$(call to,$(LIBDIR))/pkgconfig' $(foreach s,1 5 7,'$(call to,$(MANDIR))/man$s'); do \
 	  rmdir "$$folder" 2>/dev/null || true; done
 ifeq ($(system_dir),)
 	@for folder in '$(BINDIR)' '$(LIBDIR)' '$(INCLUDEDIR)' '$(MANDIR)'; do \

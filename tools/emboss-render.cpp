@@ -1,4 +1,4 @@
-// emboss-render: mesh, model or result -> picture.
+// emboss-render: mesh, model, result or volume -> picture.
 
 #include "base/digest.h"
 #include "formats/image_file.h"
@@ -6,6 +6,7 @@
 #include "tools/cli.h"
 #include "tools/render_arguments.h"
 #include "tools/render_pictures.h"
+#include "tools/render_volume.h"
 
 #include <cstdlib>
 
@@ -59,6 +60,13 @@ void work(cli::Run& run, const cli::RenderArguments& a) {
   Input input(a.surface);
   SurfaceReadOptions reading = a.reading;
   reading.kind = input_kind(input.peek(4096), a.surface, run.format());
+  check_kind(a, input, reading.kind);
+  if (reading.kind == Kind::vdb) {
+    const Image picture = cli::volume_picture(run, a, input);
+    run.timed("write", [&] { write_image(*one, picture, to); });
+    one->commit();
+    return run.stats().set("digest", image_digest(picture));
+  }
   std::vector<std::int64_t> frames;
   if (!a.frames.empty()) {
     if (reading.kind != Kind::hdf5)
@@ -95,11 +103,14 @@ int main(int argc, char** argv) {
   // Mesa reads these when EGL starts: no talk, and textures filtered in floats instead of 8 bits.
   (void)::setenv("EGL_LOG_LEVEL", "fatal", 0);
   (void)::setenv("GALLIVM_PERF", "no_aos_sampling,no_filter_hacks", 0);
-  cli::Program p("emboss-render", "Draws a mesh, a model or a result with embossed textures.");
+  cli::Program p("emboss-render",
+                 "Draws a mesh, a model or a result with embossed textures, or a volume.");
   cli::RenderArguments a;
   declare(p, a);
   p.output_kinds(picture_kinds());
-  p.input_kinds(readable_surface_kinds());
-  p.operand("SURFACE", a.surface, "the mesh, model or result of a run");
+  std::vector<Kind> kinds = readable_surface_kinds();
+  kinds.push_back(Kind::vdb);
+  p.input_kinds(kinds);
+  p.operand("SURFACE", a.surface, "the mesh, model, result of a run, or volume");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
 }

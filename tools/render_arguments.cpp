@@ -1,5 +1,8 @@
 #include "tools/render_arguments.h"
 
+#include "render/color_ramp.h"
+#include "tools/render_volume.h"
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -119,6 +122,7 @@ void complete(RenderArguments& a) {
   complete_textures(a);
   complete_modes(a);
   complete_camera(a);
+  complete_volume(a);
   refuse(!a.drawing.texcoords && (a.words.uv != "auto" || a.mapping.edge),
          "--uv or --uv-scale without texture, expected --texture or --structure");
   refuse(a.words.uv != "auto" && a.words.uv != "box" && a.mapping.edge,
@@ -137,6 +141,8 @@ void complete(RenderArguments& a) {
   for (const auto& [word, layer] : layers_of(a))
     if (!layer->path.empty())
       inputs.push_back(layer->path);
+  if (std::ranges::find(color_ramp_names(), a.volume.ramp) == color_ramp_names().end())
+    inputs.push_back(a.volume.ramp);
   check_one_pipe(inputs);
 }
 
@@ -205,6 +211,7 @@ void declare(Program& p, RenderArguments& a) {
       .range(-1, 1e15);
   p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
+  declare_volume(p, a);
   p.check([&a] { complete(a); });
 }
 

@@ -7,6 +7,7 @@
 #include "render/look.h"
 #include "render/picture.h"
 #include "render/uv.h"
+#include "render/volume_view.h"
 #include "tools/cli.h"
 
 #include <array>
@@ -21,6 +22,13 @@ namespace gewebe::cli {
 struct RenderLayer {
   std::string path; ///< "": absent
   TextureOptions options;
+};
+
+/// What a volume alone is asked for, as words and as what they mean.
+struct RenderVolume {
+  std::string slice, maximum, ramp;
+  std::vector<double> range;
+  VolumeViewOptions view; ///< its mode, axis and place
 };
 
 struct RenderArguments {
@@ -38,6 +46,7 @@ struct RenderArguments {
   DrawingOptions drawing;
   UvOptions mapping;
   PictureOptions picture;
+  RenderVolume volume;
 
   // Words that declare() turns into the above.
   struct Words {

@@ -49,6 +49,13 @@ test_uninstall_leaves_nothing() {
   staged_make install /opt/gewebe
   find stage -type f | sort >laid
   grep -q 'bin/' laid || fail 'no program was installed'
+  grep -q 'lib/gewebe/gewebe-volume.so' laid || fail 'what reads volumes was not installed'
+  metaball2vol --voxel 2 "$GEWEBE_ROOT"/tests/golden/in/five.particles | stage/opt/gewebe/bin/emboss-render --size 8 -o slice.png ||
+    fail 'the installed program sees no volume'
+  mv stage/opt/gewebe/lib/gewebe/gewebe-volume.so away.so
+  metaball2vol --voxel 2 "$GEWEBE_ROOT"/tests/golden/in/five.particles >in.vdb
+  expect_failure 1 emboss-render stage/opt/gewebe/bin/emboss-render in.vdb -o slice.png
+  mv away.so stage/opt/gewebe/lib/gewebe/gewebe-volume.so
   grep -q 'share/man/man1/' laid || fail 'no man page was installed'
   grep -q 'lib/pkgconfig/gewebe.pc' laid || fail 'no gewebe.pc was installed'
   ! grep -q _internal laid || fail 'an internal header was installed'
