@@ -4,7 +4,7 @@
 #include "base/columns.h"
 #include "base/context.h"
 #include "sim/load.h"
-#include "sim/slot_pool_internal.h"
+#include "sim/slot_pool.h"
 
 #include <cstddef>
 #include <cstdint>
