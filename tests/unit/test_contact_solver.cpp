@@ -28,10 +28,10 @@ std::vector<double> compliance_of(const Model& model, const std::vector<std::uin
   std::vector<double> w(size * size), f(3 * model.nodes.size()), u(f.size());
   for (std::size_t c = 0; c < size; ++c) {
     f.assign(f.size(), 0);
-    f[3 * nodes[c / 3] + c % 3] = 1;
+    f[3 * std::size_t{nodes[c / 3]} + c % 3] = 1;
     solve_axes(k, factor, f, u);
     for (std::size_t r = 0; r < size; ++r)
-      w[c * size + r] = u[3 * nodes[r / 3] + r % 3];
+      w[c * size + r] = u[3 * std::size_t{nodes[r / 3]} + r % 3];
   }
   return w;
 }
@@ -42,8 +42,8 @@ Vec3 moved(const std::vector<double>& w, std::size_t m, const std::vector<Contac
   for (std::size_t j = 0; j < contacts.size(); ++j)
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
-        u[a] += w[(3 * contacts[j].node + static_cast<std::size_t>(b)) * 3 * m + 3 * node +
-                  static_cast<std::size_t>(a)] *
+        u[a] += w[(3 * std::size_t{contacts[j].node} + static_cast<std::size_t>(b)) * 3 * m +
+                  3 * node + static_cast<std::size_t>(a)] *
                 force[j][b];
   return u;
 }

@@ -155,13 +155,14 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
     for (std::uint32_t i = 0; i < s->model(0).nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
         if (is_fixed(s->model(0), i, a)) {
-          supports[a] += f[3 * i + static_cast<std::size_t>(a)];
+          supports[a] += f[3 * std::size_t{i} + static_cast<std::size_t>(a)];
         } else {
           double outer = 0;
           for (const NodeVector& c : forces)
             if (c.node == i)
               outer = c.value[a];
-          wrong = std::max(wrong, std::abs(f[3 * i + static_cast<std::size_t>(a)] - outer));
+          wrong = std::max(wrong,
+                           std::abs(f[3 * std::size_t{i} + static_cast<std::size_t>(a)] - outer));
         }
     EXPECT_LT(wrong, 1e-9 * norm(sum)); // K u = f
     EXPECT_LT(norm(supports + sum), 1e-9 * norm(sum));
