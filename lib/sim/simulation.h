@@ -282,6 +282,7 @@ private:
   void at_object(const Object& object, Work&& work) const; ///< names object and time in an Error
   void show(Object& object);
   void shape(Object& object) const;
+  void shape_in_step(Object& object);
   bool may_leave_range(Object& object, double most) const;
   void show_motion(Object& object);
   void update_in_time(Object& object);

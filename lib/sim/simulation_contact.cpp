@@ -334,9 +334,11 @@ bool Simulation::touched_anew(Object& object) {
 
 void Simulation::need_contact(Object& object) {
   need_model(object);
-  shape(object);
-  if (!object.contact)
-    object.contact = std::make_unique<StaticContact>(object.model, object.displacement);
+  shape_in_step(object);
+  if (object.contact)
+    return;
+  undo_->note([&object] { object.contact.reset(); });
+  object.contact = std::make_unique<StaticContact>(object.model, object.displacement);
 }
 
 std::optional<Pose> Simulation::pose_at(std::size_t moment, std::size_t instrument) const {

@@ -32,7 +32,9 @@ void Simulation::set_method(std::size_t index, Method method) {
   }
   if (!object.touches.empty() && object.method == Method::ffe && object.shown && object.shaped)
     still = object.displacement; // instruments among what acts
-  object.contact.reset();
+  // Shared, for what can be called can be copied.
+  const auto contact = std::make_shared<std::unique_ptr<StaticContact>>(std::move(object.contact));
+  undo_->note([&object, contact] { object.contact = std::move(*contact); });
   if (method == Method::ela) {
     if (!still.empty()) {
       need_body(index);
@@ -54,7 +56,6 @@ void Simulation::set_method(std::size_t index, Method method) {
       const auto at = std::find_if(bodies_.begin(), bodies_.end(),
                                    [&](const auto& b) { return b.get() == object.body; });
       const auto place = at - bodies_.begin();
-      // Shared, for what can be called can be copied.
       const auto body = std::make_shared<std::unique_ptr<Body>>(std::move(*at));
       bodies_.erase(at);
       object.body = nullptr;

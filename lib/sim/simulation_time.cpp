@@ -108,7 +108,7 @@ void Simulation::show(Object& object) {
                   " follows two steps of stiffness: instruments don't touch it");
   }
   if (meets)
-    shape(object); // that it comes from
+    shape_in_step(object); // that it comes from
   undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time] {
     std::swap(object.displacement, object.before);
     std::swap(object.forces, object.forces_before);
@@ -192,6 +192,15 @@ void Simulation::shape(Object& object) const {
   object.shaped = true;
   if (!object.warned_range)
     warn_of_range(object);
+}
+
+/// During a step, which may be taken back: the shape is then computed anew.
+void Simulation::shape_in_step(Object& object) {
+  if (undo_->open && !object.shaped) {
+    undo_->updated.insert(&object);
+    undo_->note([&object] { object.shaped = false; });
+  }
+  shape(object);
 }
 
 /// Whether it is worth to look at all edges where the largest displacement is this (mm).

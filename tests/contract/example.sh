@@ -163,3 +163,22 @@ test_two_step_gives_back_its_forces() {
     [[ $file == log || -e $GEWEBE_ROOT/examples/two-step/$file ]] || fail "clean left $file"
   done
 }
+
+# A sphere is drawn along a liver: it is pushed away by all that it touches, by either method.
+test_instrument_is_drawn_along() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file method
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/instrument/{Makefile,draw.scene,liver.particles} .
+  for method in ela ffe; do
+    make VOXEL=6 METHOD=$method >log 2>&1 || fail "the example fails with $method:" "$(tail -3 log)"
+    # Touched from the way down to the end; without friction's share the force is up.
+    awk -F, 'NR > 1 { up += $7 > 0; down += $7 < 0 } END { exit !(up > 30 && down == 0) }' force.csv ||
+      fail "$method: the sphere is not pushed up" "$(<force.csv)"
+    ! cmp -s frame-0.png frame-20.png || fail 'the sphere is not to be seen'
+    make -s clean
+  done
+  for file in *; do
+    [[ $file == log || -e $GEWEBE_ROOT/examples/instrument/$file ]] || fail "clean left $file"
+  done
+}

@@ -87,6 +87,34 @@ test_a_step_that_fails_is_taken_back() {
   rm organ.ela loose.ela start bomb rest live answers calm record.scene stderr.txt
 }
 
+test_a_step_with_instruments_in_contact_is_taken_back() {
+  need ffe-run exp2ela
+  organ
+  cube | awk 'NR > 2 && NF == 3 { $1 += 50 } 1' | exp2ela --format off --centrals 0 -o loose.ela # away from the instruments
+  local way status
+  # A probe pushes two objects and a clip holds a node of each; the step that fails moves both and
+  # withdraws one, or switches the methods.
+  for way in 'at 0.0201 withdraw clip' 'at 0.0201 method still ela' 'at 0.0201 method moving ffe' 'at 0.0201 instrument probe sphere 2 1 1 3'; do
+    printf '%s\n' 'object still organ.ela method=ffe' 'object moving organ.ela' 'object loose loose.ela' 'emit forces' 'emit shapes' \
+      'emit instruments' 'instrument probe sphere 1 1 1 2.2 friction 0.3' 'instrument clip capsule 0.2 -3 0 2 -3 0 4' 'grasp still 4 clip' \
+      'grasp moving 4 clip' 'move probe 1 1 1.9 over 0.01' 'move clip -3 0 2.05 over 0.01' 'run 0.02 every 0.005' >start
+    printf '%s\n' "$way" 'move probe 1.3 1 1.8 over 0.01' 'force loose 6 1e300 1e300 0' 'step 0.005' 'release loose all' 'move probe 1.2 1 1.9 over 0.01' >bomb
+    printf '%s\n' 'run 0.05 every 0.005' 'method still ela' 'step 0.005' 'method moving ffe' 'step 0.01' 'method still ffe' \
+      'step 0.005' 'method moving ela' 'step 0.005' 'withdraw probe' 'step 0.005' >rest
+    status=0
+    cat start bomb rest | ffe-run --serve --record record.scene --stats=live.json >live 2>stderr.txt || status=$?
+    [[ $status == 1 && $(grep -c '^error .* no longer finite' live) == 1 && $(grep -c '^error ' live) == 1 ]] || fail "$way: status $status" "$(grep ^error live)" "$(<stderr.txt)"
+    grep -v '^error ' live >answers
+    ffe-run --stats=again.json record.scene 2>/dev/null | cmp - answers || fail "$way: another answer"
+    [[ $(digest live.json) == "$(digest again.json)" ]] || fail "$way: another digest"
+    grep -q '^probe .* [1-9]' answers || fail 'nothing is touched'
+    # Another way of the probe is seen.
+    sed -i '0,/move probe 1 1 1.9/s//move probe 1 1 1.91/' record.scene
+    ! ffe-run record.scene 2>/dev/null | cmp -s - answers || fail 'another scene, the same answers'
+  done
+  rm organ.ela loose.ela start bomb rest live answers record.scene stderr.txt live.json again.json
+}
+
 test_only_what_is_touched_is_read() {
   need ffe-run exp2ela ffe-precompute
   organ
