@@ -354,8 +354,10 @@ void Simulation::follow_instruments(Object& object) {
     undo_->updated.insert(&object);
   const std::size_t count = instruments_.size();
   bool solved = true;
-  const bool changed =
-      !object.shown || object.load.changes_until() > object.shown_time || !object.touches.empty();
+  // An object that nothing ever acted on has no shape to find.
+  const bool changed = !object.touches.empty() ||
+                       ((object.still || !object.load.empty()) &&
+                        (!object.shown || object.load.changes_until() > object.shown_time));
   for (std::size_t p = poses_.size() > 1 ? 1 : 0; p < poses_.size(); ++p) {
     std::vector<MovedInstrument> moved;
     for (std::size_t k = 0; k < count; ++k)
@@ -377,7 +379,7 @@ void Simulation::follow_instruments(Object& object) {
         }
       object.contact->update([&]() -> Elastostatic& { return still_of(object); }, object.shown_load,
                              here, object.displacement,
-                             changed&& p + 1 == poses_.size() && part == parts);
+                             (changed) && p + 1 == poses_.size() && part == parts);
       solved = solved && object.contact->solved();
     }
   }
