@@ -84,12 +84,12 @@ void elastodynamic(const Organ& organ, double size, const std::vector<double>& e
   const bool implicit = integration == Integration::implicit;
   const double step = implicit ? 1.0 / 60 : safe_step_fraction * safe_step(organ.model);
   object.set_load(pull(organ, size, 0));
-  double spent = 0, time = 0;
-  for (double chunk = implicit ? 0.1 : 0.01; time < 60 && spent < 8000 && !object.resting();
-       chunk = 0.3 * time) {
+  double spent = 0, time = 0, chunk = implicit ? 0.1 : 0.01;
+  while (time < 60 && spent < 8000 && !object.resting()) {
     spent +=
         processor_milliseconds([&] { (void)object.advance(chunk, step, with_threads(1), time); });
     time += chunk;
+    chunk = 0.3 * time;
     std::vector<double> u;
     for (const NodeMotion& m : object.motion())
       for (int a = 0; a < 3; ++a)
