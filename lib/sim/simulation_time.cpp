@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
+#include <memory>
 #include <utility>
 
 namespace gewebe {
@@ -59,10 +61,13 @@ void Simulation::advance(double to) {
     move_bodies(time);
     time_ = std::max(time_, time);
   };
-  while (!events_.empty() && events_.begin()->first <= to + slack) {
+  const auto due = [&] { return !events_.empty() && events_.begin()->first <= to + slack; };
+  if (undo_->open && due()) // a repeated one may come and go several times
+    undo_->note([this, before = std::make_shared<std::multimap<double, Event>>(events_)] {
+      std::swap(events_, *before);
+    });
+  while (due()) {
     move_to(std::min(events_.begin()->first, to));
-    if (undo_->open)
-      undo_->note([this, due = *events_.begin()] { events_.insert(events_.begin(), due); });
     Event event = std::move(events_.begin()->second);
     events_.erase(events_.begin());
     apply(event.change);
@@ -72,8 +77,7 @@ void Simulation::advance(double to) {
       if (!(next > time_))
         throw Error("the period " + number_text(event.period) +
                     " s is lost in the rounding of the time, expected a longer one");
-      const auto place = events_.emplace(next, std::move(event));
-      undo_->note([this, place] { events_.erase(place); });
+      events_.emplace(next, std::move(event));
     }
   }
   move_to(to);
