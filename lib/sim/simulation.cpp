@@ -4,18 +4,11 @@
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <utility>
 
 namespace gewebe {
 
 using simulation::add_counts;
-
-std::string simulation::number_text(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 void simulation::add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
   sum.updates += more.updates;

@@ -377,9 +377,9 @@ void Simulation::follow_instruments(Object& object) {
           here[k] = MovedInstrument{way.shape, between(way.before, way.now, at(part - 1)),
                                     between(way.before, way.now, at(part))};
         }
+      const bool last = changed && p + 1 == poses_.size() && part == parts;
       object.contact->update([&]() -> Elastostatic& { return still_of(object); }, object.shown_load,
-                             here, object.displacement,
-                             (changed) && p + 1 == poses_.size() && part == parts);
+                             here, object.displacement, last);
       solved = solved && object.contact->solved();
     }
   }

@@ -2,6 +2,7 @@
 // What a Simulation holds, and how its units write numbers.
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "sim/simulation.h"
 #include "sim/static_contact.h"
 
@@ -19,8 +20,7 @@ namespace gewebe {
 
 namespace simulation {
 
-/// The shortest text that reads back exactly.
-std::string number_text(double value);
+using gewebe::number_text;
 
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
