@@ -1,6 +1,7 @@
 #include "sim/factor.h"
 
 #include "base/error.h"
+#include "sim/frontal_factor.h"
 #include "sim/supernodal_solve_internal.h"
 
 #include <cholmod.h>
@@ -313,6 +314,47 @@ std::size_t Factor::solve_units(std::span<const std::int64_t> places,
     x[static_cast<std::size_t>(places[c]) * width + c] = 1;
   solve_panel(x, width);
   return width;
+}
+
+std::vector<std::uint32_t> elimination_order(const SpringGraph& graph) {
+  // The graph of the nodes that can move, its lower triangle.
+  std::vector<std::int64_t> start{0}, row, number(graph.axes.size(), -1);
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < graph.axes.size(); ++i)
+    if (graph.axes[i] > 0) {
+      number[i] = static_cast<std::int64_t>(nodes.size());
+      nodes.push_back(i);
+    }
+  if (nodes.empty())
+    return nodes;
+  for (const std::uint32_t i : nodes) {
+    const std::size_t first = row.size();
+    row.push_back(number[i]);
+    for (const auto& arm : graph.of(i))
+      if (number[arm.node] > number[i])
+        row.push_back(number[arm.node]);
+    std::sort(row.begin() + static_cast<std::ptrdiff_t>(first), row.end());
+    start.push_back(static_cast<std::int64_t>(row.size()));
+  }
+  cholmod_sparse a{};
+  a.nrow = a.ncol = nodes.size();
+  a.nzmax = row.size();
+  a.p = start.data();
+  a.i = row.data();
+  a.stype = -1;
+  a.itype = CHOLMOD_LONG;
+  a.xtype = CHOLMOD_PATTERN;
+  a.dtype = CHOLMOD_DOUBLE;
+  a.sorted = a.packed = true;
+  Common common;
+  const auto turn = blas_turn(); // for METIS
+  cholmod_factor* factor = cholmod_l_analyze(&a, common.get());
+  common.check("the order of elimination");
+  std::vector<std::uint32_t> order(nodes.size());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    order[k] = nodes[static_cast<std::size_t>(static_cast<const std::int64_t*>(factor->Perm)[k])];
+  (void)cholmod_l_free_factor(&factor, common.get());
+  return order;
 }
 
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,

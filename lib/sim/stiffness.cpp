@@ -11,14 +11,7 @@
 
 namespace gewebe {
 
-namespace {
-
-using Block = SymmetricBlock;
-
-constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
-
-/// k [n nᵀ + (1 - l0/l)(I - n nᵀ)]
-Block block_of(const Model& model, const Spring& s) {
+SymmetricBlock stiffness_block(const Model& model, const Spring& s) {
   const Vec3 d = model.nodes[s.j].position - model.nodes[s.i].position;
   const double l = norm(d);
   const Vec3 n = d / l;
@@ -29,6 +22,12 @@ Block block_of(const Model& model, const Spring& s) {
   };
   return {value(0, 0), value(0, 1), value(0, 2), value(1, 1), value(1, 2), value(2, 2)};
 }
+
+namespace {
+
+using Block = SymmetricBlock;
+
+constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
 
 /// The springs that start at each node, by their other end.
 struct Rows {
@@ -133,7 +132,7 @@ StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
 StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed) {
   std::vector<Block> blocks(model.springs.size());
   for (std::size_t e = 0; e < blocks.size(); ++e)
-    blocks[e] = block_of(model, model.springs[e]);
+    blocks[e] = stiffness_block(model, model.springs[e]);
   return assemble(model, blocks, {}, fixed, [](const Spring& s) { return s.stiffness == 0; });
 }
 
@@ -163,14 +162,14 @@ void multiply_spring(const Spring& s, const SymmetricBlock& block, std::span<con
 void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f) {
   std::fill(f.begin(), f.end(), 0.0);
   for (const Spring& s : model.springs)
-    multiply_spring(s, block_of(model, s), u, f);
+    multiply_spring(s, stiffness_block(model, s), u, f);
 }
 
 std::vector<SymmetricBlock> stiffness_blocks(const Model& model) {
   std::vector<SymmetricBlock> blocks;
   blocks.reserve(model.springs.size());
   for (const Spring& s : model.springs)
-    blocks.push_back(block_of(model, s));
+    blocks.push_back(stiffness_block(model, s));
   return blocks;
 }
 

@@ -37,6 +37,9 @@ StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_
 /// A symmetric 3 × 3 matrix, entries xx xy xz yy yz zz.
 using SymmetricBlock = std::array<double, 6>;
 
+/// What a spring of the model adds to K.
+SymmetricBlock stiffness_block(const Model& model, const Spring& spring);
+
 /// The sum over the springs of blocks[e] at (i,i) and (j,j) and its negative at (i,j) and (j,i),
 /// plus diagonal[i] (where there is one) on the axes of node i. Springs without stiffness and
 /// damping make no entry, so that models of one structure have matrices of one pattern. \pre a

@@ -9,7 +9,8 @@
 namespace gewebe {
 
 /// L as in cholmod_factor: supernode k has columns super[k] … super[k+1]-1, rows s[pi[k] …
-/// pi[k+1]-1], its own columns first, and values x[px[k] …], column by column.
+/// pi[k+1]-1], its own columns first, and values x[px[k] …], column by column; or, where those are
+/// apart, at blocks[k].
 struct SupernodalArrays {
   std::size_t supernodes = 0;
   const std::int64_t* super = nullptr;
@@ -17,6 +18,7 @@ struct SupernodalArrays {
   const std::int64_t* px = nullptr;
   const std::int64_t* s = nullptr;
   const double* x = nullptr;
+  const double* const* blocks = nullptr;
 };
 
 inline constexpr std::size_t panel_width = 8;

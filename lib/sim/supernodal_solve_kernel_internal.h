@@ -67,7 +67,8 @@ inline Supernode supernode(const SupernodalArrays& a, std::size_t k) {
   const auto first = static_cast<std::size_t>(a.super[k]);
   const auto columns = static_cast<std::size_t>(a.super[k + 1]) - first;
   const auto rows = static_cast<std::size_t>(a.pi[k + 1] - a.pi[k]);
-  return {columns, rows - columns, rows, first, a.s + a.pi[k] + columns, a.x + a.px[k]};
+  const double* const l = a.blocks != nullptr ? a.blocks[k] : a.x + a.px[k];
+  return {columns, rows - columns, rows, first, a.s + a.pi[k] + columns, l};
 }
 
 /// N rows from `r` on lose what columns [0, count) contribute; `x` are the supernode's own,

@@ -1,0 +1,507 @@
+#include "sim/frontal_factor.h"
+
+#include "base/parallel.h"
+#include "sim/condition.h"
+#include "sim/factor.h"
+#include "sim/front_kernel_internal.h"
+#include "sim/front_tree.h"
+#include "sim/stiffness.h"
+#include "sim/supernodal_solve_internal.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+// Based on: Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::uint32_t none = FrontTree::none;
+constexpr double worth_threads = 1e6; // operations
+constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
+
+/// The free axes of a node.
+struct FreeAxes {
+  std::array<std::uint8_t, 3> axis{};
+  std::uint8_t count = 0;
+};
+
+FreeAxes free_axes(const Model& model, std::uint32_t node) {
+  FreeAxes free;
+  for (std::uint8_t a = 0; a < 3; ++a)
+    if ((model.nodes[node].fixed >> a & 1) == 0)
+      free.axis[free.count++] = a;
+  return free;
+}
+
+double operations_of(double columns, double below) {
+  return columns * columns * columns / 3 + columns * columns * below + columns * below * below;
+}
+
+} // namespace
+
+struct FrontalFactor::State {
+  struct Front {
+    std::size_t rows = 0, columns = 0;
+    std::vector<double> l;    // rows x columns
+    std::vector<double> rest; // what it leaves to its parent, the lower triangle counts
+  };
+
+  FrontTree tree;
+  std::vector<Front> fronts;
+  FrontalWork work;
+  CpuLevel cpu = CpuLevel::baseline;
+
+  // Of the model as it was factorised, to tell what changed.
+  SpringGraph graph;
+  std::vector<Spring> springs;
+  std::vector<Vec3> position;
+  std::vector<std::uint8_t> fixed;
+
+  // L as the solver wants it.
+  std::vector<std::int64_t> super, pi, s;
+  std::vector<const double*> blocks;
+  std::vector<std::uint32_t> axis_of_row;
+  std::size_t longest = 1, entries = 0, rest_entries = 0;
+
+  // ---- a front
+
+  /// Rows of a front by its nodes: where each node's begin. One for each thread.
+  using Rows = std::vector<std::uint32_t>;
+
+  void assemble(const Model& model, std::size_t f, Rows& row, std::vector<double>& least) {
+    Front& front = fronts[f];
+    const auto own = tree.eliminated(f);
+    std::uint32_t next = 0;
+    for (const std::uint32_t node : own) {
+      row[node] = next;
+      next += graph.axes[node];
+    }
+    front.columns = next;
+    for (const std::uint32_t node : tree.boundary_of(f)) {
+      row[node] = next;
+      next += graph.axes[node];
+    }
+    front.rows = next;
+    front.l.assign(front.rows * front.columns, 0.0);
+    front.rest.assign((front.rows - front.columns) * (front.rows - front.columns), 0.0);
+    least.clear();
+    for (const std::uint32_t node : own) {
+      const FreeAxes free = free_axes(model, node);
+      SymmetricBlock diagonal{};
+      for (const auto& arm : graph.of(node)) {
+        const SymmetricBlock block = stiffness_block(model, model.springs[arm.spring]);
+        for (std::size_t k = 0; k < 6; ++k)
+          diagonal[k] += block[k];
+        if (tree.position[arm.node] == none || tree.position[arm.node] < tree.position[node])
+          continue;
+        const FreeAxes other = free_axes(model, arm.node);
+        for (std::size_t a = 0; a < free.count; ++a)
+          for (std::size_t b = 0; b < other.count; ++b)
+            front.l[(row[node] + a) * front.rows + row[arm.node] + b] -=
+                block[entry[free.axis[a]][other.axis[b]]];
+      }
+      for (std::size_t a = 0; a < free.count; ++a) {
+        for (std::size_t b = a; b < free.count; ++b)
+          front.l[(row[node] + a) * front.rows + row[node] + b] +=
+              diagonal[entry[free.axis[a]][free.axis[b]]];
+        least.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
+      }
+    }
+  }
+
+  /// What a child leaves comes to where its boundary stands in this front.
+  void take_over(std::size_t f, std::size_t child, const Rows& row,
+                 std::vector<std::uint32_t>& to) {
+    Front& front = fronts[f];
+    const Front& from = fronts[child];
+    to.clear();
+    for (const std::uint32_t node : tree.boundary_of(child))
+      for (std::uint32_t a = 0; a < graph.axes[node]; ++a)
+        to.push_back(row[node] + a);
+    const std::size_t below = front.rows - front.columns;
+    for (std::size_t c = 0; c < to.size(); ++c) {
+      const double* const column = from.rest.data() + c * to.size();
+      if (to[c] < front.columns) {
+        double* const into = front.l.data() + to[c] * front.rows;
+        for (std::size_t r = c; r < to.size(); ++r)
+          into[to[r]] += column[r];
+      } else {
+        double* const into = front.rest.data() + (to[c] - front.columns) * below;
+        for (std::size_t r = c; r < to.size(); ++r)
+          into[to[r] - front.columns] += column[r];
+      }
+    }
+  }
+
+  struct Scratch {
+    Rows row;
+    std::vector<double> least, packed;
+    std::vector<std::uint32_t> to;
+  };
+
+  void compute(const Model& model, std::size_t f, std::span<const std::uint32_t> children,
+               Scratch& scratch, const Context& context) {
+    assemble(model, f, scratch.row, scratch.least);
+    for (const std::uint32_t child : children)
+      take_over(f, child, scratch.row, scratch.to);
+    Front& front = fronts[f];
+    const FrontKernel& kernel =
+        cpu == CpuLevel::baseline ? front_kernel_baseline : front_kernel_avx2;
+    const FrontArrays arrays{front.rows, front.columns, front.l.data(), front.rest.data()};
+    scratch.packed.resize((front.rows + front_strip) * front_panel);
+    for (std::size_t begin = 0; begin < front.columns; begin += front_panel) {
+      const std::size_t count = std::min(front_panel, front.columns - begin);
+      const std::size_t done =
+          kernel.eliminate(arrays, begin, count, scratch.least.data(), scratch.packed.data());
+      if (done < count)
+        throw NotPositiveDefinite(axis_at(model, f, begin + done));
+      const std::size_t rows = front.rows - begin - count;
+      const std::size_t strips = (rows + front_strip - 1) / front_strip;
+      const auto take = [&](std::size_t first, std::size_t last) {
+        for (std::size_t strip = first; strip < last; ++strip)
+          kernel.take(arrays, begin, count, scratch.packed.data(), strip);
+      };
+      if (static_cast<double>(rows) * static_cast<double>(rows * count) < worth_threads ||
+          thread_count(context) == 1)
+        take(0, strips);
+      else
+        parallel_blocks(context, strips, 4, take);
+    }
+  }
+
+  std::size_t axis_at(const Model& model, std::size_t f, std::size_t row) const {
+    for (const std::uint32_t node : tree.eliminated(f)) {
+      if (row < graph.axes[node])
+        return 3 * std::size_t{node} + free_axes(model, node).axis[row];
+      row -= graph.axes[node];
+    }
+    return 0;
+  }
+
+  // ---- all of them
+
+  std::vector<std::vector<std::uint32_t>> children_of() const {
+    std::vector<std::vector<std::uint32_t>> children(tree.fronts());
+    for (std::uint32_t f = 0; f < tree.fronts(); ++f)
+      if (tree.parent[f] != none)
+        children[tree.parent[f]].push_back(f);
+    return children;
+  }
+
+  double operations(std::size_t f) const {
+    double columns = 0, below = 0;
+    for (const std::uint32_t node : tree.eliminated(f))
+      columns += graph.axes[node];
+    for (const std::uint32_t node : tree.boundary_of(f))
+      below += graph.axes[node];
+    return operations_of(columns, below);
+  }
+
+  double bytes_needed() const {
+    double bytes = 0;
+    for (std::size_t f = 0; f < tree.fronts(); ++f) {
+      double columns = 0, below = 0;
+      for (const std::uint32_t node : tree.eliminated(f))
+        columns += graph.axes[node];
+      for (const std::uint32_t node : tree.boundary_of(f))
+        below += graph.axes[node];
+      bytes += 8 * (columns * (columns + below) + below * below);
+    }
+    return bytes;
+  }
+
+  /// Computes the fronts that are wanted. Subtrees of little work go to one thread each, what is
+  /// above them has all threads.
+  void factorise(const Model& model, const std::vector<char>& wanted, const Context& context) {
+    const std::size_t count = tree.fronts();
+    const std::vector<std::vector<std::uint32_t>> children = children_of();
+    std::vector<double> under(count, 0); // operations wanted in the subtree
+    work = {count, 0, 0, 0};
+    for (std::size_t f = 0; f < count; ++f) {
+      const double one = operations(f);
+      work.all_operations += one;
+      if (wanted[f]) {
+        ++work.computed;
+        work.operations += one;
+        under[f] += one;
+      }
+      if (tree.parent[f] != none)
+        under[tree.parent[f]] += under[f];
+    }
+    const double share = work.operations / 16;
+    std::vector<std::pair<std::size_t, std::size_t>> subtrees; // ranges of fronts
+    std::vector<std::size_t> above;
+    std::vector<std::size_t> smallest(count);
+    for (std::size_t f = 0; f < count; ++f)
+      smallest[f] = children[f].empty() ? f : smallest[children[f][0]];
+    for (std::size_t f = 0; f < count; ++f) {
+      if (under[f] > share) {
+        if (wanted[f])
+          above.push_back(f);
+      } else if (under[f] > 0 && (tree.parent[f] == none || under[tree.parent[f]] > share)) {
+        subtrees.emplace_back(smallest[f], f + 1);
+      }
+    }
+    Context quiet = context;
+    quiet.progress = nullptr;
+    Context alone = quiet;
+    alone.threads = 1;
+    Scratch scratch;
+    scratch.row.resize(graph.axes.size());
+    parallel_blocks(quiet, subtrees.size(), 1, [&](std::size_t begin, std::size_t end) {
+      Scratch own;
+      own.row.resize(graph.axes.size());
+      for (std::size_t k = begin; k < end; ++k)
+        for (std::size_t f = subtrees[k].first; f < subtrees[k].second; ++f)
+          if (wanted[f])
+            compute(model, f, children[f], own, alone);
+    });
+    for (const std::size_t f : above)
+      compute(model, f, children[f], scratch, quiet);
+  }
+
+  void lay_out(const Model& model) {
+    const std::size_t count = tree.fronts();
+    super.assign(1, 0);
+    pi.assign(1, 0);
+    s.clear();
+    blocks.clear();
+    axis_of_row.clear();
+    longest = 1;
+    entries = rest_entries = 0;
+    std::vector<std::uint32_t> row(graph.axes.size(), none);
+    for (const std::uint32_t node : tree.sequence) {
+      row[node] = static_cast<std::uint32_t>(axis_of_row.size());
+      const FreeAxes free = free_axes(model, node);
+      for (std::size_t a = 0; a < free.count; ++a)
+        axis_of_row.push_back(3 * node + free.axis[a]);
+    }
+    for (std::size_t f = 0; f < count; ++f) {
+      const auto add = [&](std::span<const std::uint32_t> nodes) {
+        for (const std::uint32_t node : nodes)
+          for (std::uint32_t a = 0; a < graph.axes[node]; ++a)
+            s.push_back(row[node] + a);
+      };
+      add(tree.eliminated(f));
+      super.push_back(super.back() + static_cast<std::int64_t>(fronts[f].columns));
+      add(tree.boundary_of(f));
+      pi.push_back(static_cast<std::int64_t>(s.size()));
+      blocks.push_back(fronts[f].l.data());
+      longest = std::max(longest, fronts[f].rows - fronts[f].columns);
+      entries += fronts[f].l.size();
+      rest_entries += fronts[f].rest.size();
+    }
+  }
+
+  void remember(const Model& model) {
+    springs = model.springs;
+    position.resize(model.nodes.size());
+    fixed.resize(model.nodes.size());
+    for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+      position[i] = model.nodes[i].position;
+      fixed[i] = model.nodes[i].fixed;
+    }
+  }
+
+  // ---- changes
+
+  /// Whether a node's row of K is as it was, its neighbours' numbers aside.
+  bool same_row(const Model& model, const SpringGraph& now, std::uint32_t node,
+                std::uint32_t before, std::span<const std::uint32_t> place) const {
+    const auto arms = now.of(node), old = graph.of(before);
+    if (arms.size() != old.size() || model.nodes[node].fixed != fixed[before] ||
+        !(model.nodes[node].position == position[before]))
+      return false;
+    for (std::size_t k = 0; k < arms.size(); ++k) {
+      const std::uint32_t there = place.empty() ? old[k].node : place[old[k].node];
+      if (arms[k].node != there || !(model.nodes[there].position == position[old[k].node]))
+        return false;
+      const Spring &a = model.springs[arms[k].spring], &b = springs[old[k].spring];
+      if (a.stiffness != b.stiffness || a.rest != b.rest)
+        return false;
+    }
+    return true;
+  }
+
+  /// Whether the tree serves this graph too: the same nodes free, and no spring where none was.
+  bool still_fits(const SpringGraph& now, std::span<const std::uint32_t> place) const {
+    if (!place.empty() || now.axes != graph.axes)
+      return false;
+    std::vector<std::uint32_t> mark(now.axes.size(), none);
+    for (std::uint32_t i = 0; i < now.axes.size(); ++i) {
+      for (const auto& arm : graph.of(i))
+        mark[arm.node] = i;
+      for (const auto& arm : now.of(i))
+        if (mark[arm.node] != i)
+          return false;
+    }
+    return true;
+  }
+
+  /// The order of elimination before, with what came since. A copy is eliminated right behind what
+  /// it is a copy of, so that it fills as that does.
+  std::vector<std::uint32_t> order_for(const SpringGraph& now,
+                                       std::span<const std::uint32_t> origin,
+                                       std::span<const std::uint32_t> place) const {
+    const std::size_t n = now.axes.size();
+    std::vector<std::uint32_t> copy(graph.axes.size(), none), next(n, none); // lists of copies
+    for (std::size_t i = origin.size(); i-- > 0;)
+      if (place[origin[i]] != i)
+        next[i] = std::exchange(copy[origin[i]], static_cast<std::uint32_t>(i));
+    std::vector<std::uint32_t> order;
+    order.reserve(n);
+    std::vector<char> ordered(n, 0);
+    const auto put = [&](std::uint32_t node) {
+      if (now.axes[node] > 0 && !ordered[node])
+        order.push_back(node);
+      ordered[node] = 1;
+    };
+    for (const std::uint32_t old : tree.sequence) {
+      put(place.empty() ? old : place[old]);
+      for (std::uint32_t c = copy[old]; c != none; c = next[c])
+        put(c);
+    }
+    for (std::uint32_t i = 0; i < n; ++i) // what was not free before
+      put(i);
+    return order;
+  }
+
+  void renew(const Model& model, std::span<const std::uint32_t> origin,
+             std::span<const std::uint32_t> place, const Context& context) {
+    cpu = context.cpu;
+    SpringGraph now = spring_graph(model);
+    const std::size_t n = model.nodes.size();
+    std::vector<char> changed(n, 1);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t old = origin.empty() ? i : origin[i];
+      if (place.empty() || place[old] == i)
+        changed[i] = !same_row(model, now, i, old, place);
+    }
+    std::vector<char> wanted;
+    if (still_fits(now, place)) {
+      graph = std::move(now);
+      wanted.assign(tree.fronts(), 0);
+      for (std::size_t f = 0; f < tree.fronts(); ++f) {
+        for (const std::uint32_t node : tree.eliminated(f))
+          wanted[f] = static_cast<char>(wanted[f] | changed[node]);
+        if (wanted[f] && tree.parent[f] != none)
+          wanted[tree.parent[f]] = 1;
+      }
+      factorise(model, wanted, context);
+    } else {
+      const std::vector<std::uint32_t> order = order_for(now, origin, place);
+      graph = std::move(now);
+      wanted = grow(order, changed, place);
+      require_memory(context, bytes_needed(), "the factor of the stiffness matrix");
+      factorise(model, wanted, context);
+    }
+    lay_out(model);
+    remember(model);
+  }
+
+  /// The tree of this order, with the fronts that are as they were. \return which are not
+  std::vector<char> grow(std::span<const std::uint32_t> order, const std::vector<char>& changed,
+                         std::span<const std::uint32_t> place) {
+    const FrontTree before = std::exchange(tree, front_tree(graph, order));
+    std::vector<Front> had = std::exchange(fronts, std::vector<Front>(tree.fronts()));
+    const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
+    // Old fronts by the first node that they eliminated.
+    std::vector<std::uint32_t> front_of(graph.axes.size(), none);
+    for (std::uint32_t f = 0; f < before.fronts(); ++f)
+      front_of[placed(before.eliminated(f)[0])] = f;
+    const auto same = [&](std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
+      return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                        [&](std::uint32_t x, std::uint32_t y) { return x == placed(y); });
+    };
+    std::vector<char> wanted(tree.fronts(), 0);
+    for (std::size_t f = 0; f < tree.fronts(); ++f) {
+      const auto own = tree.eliminated(f);
+      const std::uint32_t old = front_of[own[0]];
+      if (old != none)
+        fronts[f] = std::move(had[old]); // if only for its memory
+      const bool kept =
+          !wanted[f] && old != none && same(own, before.eliminated(old)) &&
+          same(tree.boundary_of(f), before.boundary_of(old)) &&
+          std::none_of(own.begin(), own.end(), [&](std::uint32_t i) { return changed[i] != 0; });
+      if (kept)
+        continue;
+      wanted[f] = 1;
+      if (tree.parent[f] != none)
+        wanted[tree.parent[f]] = 1;
+    }
+    return wanted;
+  }
+};
+
+FrontalFactor::FrontalFactor(const Model& model, const Context& context)
+    : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.cpu = context.cpu;
+  s.graph = spring_graph(model);
+  const std::vector<std::uint32_t> order = elimination_order(s.graph);
+  if (order.empty())
+    throw Error("every node is fixed along every axis, expected a node that can move");
+  s.tree = front_tree(s.graph, order);
+  require_memory(context, s.bytes_needed(), "the factor of the stiffness matrix");
+  s.fronts.resize(s.tree.fronts());
+  s.factorise(model, std::vector<char>(s.tree.fronts(), 1), context);
+  s.lay_out(model);
+  s.remember(model);
+}
+
+FrontalFactor::~FrontalFactor() = default;
+FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
+FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
+
+FrontalWork FrontalFactor::renew(const Model& model, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place, const Context& context) {
+  state_->renew(model, origin, place, context);
+  return state_->work;
+}
+
+std::size_t FrontalFactor::axes() const noexcept {
+  return 3 * state_->graph.axes.size();
+}
+
+std::size_t FrontalFactor::entries() const noexcept {
+  return state_->entries;
+}
+
+std::size_t FrontalFactor::bytes() const noexcept {
+  return 8 * (state_->entries + state_->rest_entries);
+}
+
+const FrontalWork& FrontalFactor::work() const noexcept {
+  return state_->work;
+}
+
+void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) const {
+  const State& s = *state_;
+  const SupernodalArrays l{s.super.size() - 1, s.super.data(), s.pi.data(),    nullptr,
+                           s.s.data(),         nullptr,        s.blocks.data()};
+  const std::size_t order = s.axis_of_row.size(), all = axes();
+  std::vector<double> x, work(s.longest * panel_width);
+  for (std::size_t first = 0; first < columns;) {
+    const std::size_t count = std::min(Factor::most_units, columns - first);
+    const std::size_t width =
+        count == 1 ? 1 : (count + panel_width - 1) / panel_width * panel_width;
+    x.assign(order * width, 0.0);
+    double* const from = over_axes.data() + first * all;
+    for (std::size_t k = 0; k < order; ++k)
+      for (std::size_t j = 0; j < count; ++j)
+        x[k * width + j] = from[j * all + s.axis_of_row[k]] + 0.0; // no -0
+    (s.cpu == CpuLevel::baseline ? solve_supernodal_baseline
+                                 : solve_supernodal_avx2)(l, x.data(), width, work.data());
+    std::fill_n(from, count * all, 0.0);
+    for (std::size_t k = 0; k < order; ++k)
+      for (std::size_t j = 0; j < count; ++j)
+        from[j * all + s.axis_of_row[k]] = x[k * width + j];
+    first += count;
+  }
+}
+
+} // namespace gewebe

@@ -1,0 +1,68 @@
+#pragma once
+// A sparse Cholesky factor of K that follows changes of the model: cuts, new nodes, other
+// stiffnesses. It keeps what each front of the elimination tree left to its parent (Liu 1992), so
+// that after a change only the fronts of changed nodes and their ancestors are computed again: an
+// exact factor, whatever the rank of the change, and no rounding adds up from change to change.
+//
+// A cut that is local leaves most fronts alone, wherever it is; what is computed again is a way to
+// the root of the tree. Memory is about three times that of the factor alone.
+
+#include "base/context.h"
+#include "model/model.h"
+#include "sim/spring_graph.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// What a factorisation did.
+struct FrontalWork {
+  std::size_t fronts = 0, computed = 0; ///< of how many, how many were computed
+  double operations = 0;                ///< floating-point, of those computed
+  double all_operations = 0;            ///< of a factorisation of everything
+};
+
+class FrontalFactor {
+public:
+  /// The factor of K of the model at rest. Nodes are eliminated in an order of its own finding
+  /// (nested dissection or minimum degree, whichever fills less).
+  /// \pre check_model(model) passes
+  /// \throw NotPositiveDefinite (sim/factor.h; its row is an axis, 3 i + a) where a pivot is less
+  /// than its diagonal entry over max_condition, so that K's condition exceeds that; Error if no
+  /// axis is free or memory exceeds the context's; Cancelled
+  FrontalFactor(const Model& model, const Context& context);
+  ~FrontalFactor();
+  FrontalFactor(FrontalFactor&&) noexcept;
+  FrontalFactor& operator=(FrontalFactor&&) noexcept;
+
+  /// Goes over to a model that came from the one before: `origin` says of each node which one it
+  /// was, `place` of each one before which it is now (see model/cut.h); both may be empty where
+  /// nodes stayed. Equal to a fresh factor with the same tree, bit by bit.
+  /// \throw as the constructor; then the factor is of no use
+  FrontalWork renew(const Model& model, std::span<const std::uint32_t> origin,
+                    std::span<const std::uint32_t> place, const Context& context);
+
+  std::size_t axes() const noexcept;    ///< 3 n
+  std::size_t entries() const noexcept; ///< doubles in L
+  std::size_t bytes() const noexcept;   ///< with what is kept of fronts
+  const FrontalWork& work() const noexcept;
+
+  /// In place, for right-hand sides over all axes one behind the other; 0 on fixed ones. Safe from
+  /// many threads at once; the bits of each don't depend on the others. \pre over_axes.size() ==
+  /// axes() * columns
+  void solve(std::span<double> over_axes, std::size_t columns = 1) const;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// An order of elimination for the nodes with free axes, by CHOLMOD: of nested dissection (METIS)
+/// and minimum degree (AMD) the one that fills less.
+std::vector<std::uint32_t> elimination_order(const SpringGraph& graph);
+
+} // namespace gewebe

@@ -1,0 +1,236 @@
+// The factor that follows changes: equal to a fresh one, by its solutions and, with the same tree,
+// by its bits; cheap where a change is local.
+
+#include "sim/frontal_factor.h"
+
+#include "sim/axis_solver.h"
+#include "sim/factor.h"
+#include "mesh_fixtures.h"
+#include "stiffness_models.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <random>
+#include <tuple>
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+namespace {
+
+Model round_organ(int rounds) {
+  return model_of(sphere_mesh(rounds, 20, {1, 2, 3}));
+}
+
+std::vector<double> loads(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<double> f(count);
+  for (double& value : f)
+    value = uniform(random);
+  return f;
+}
+
+std::vector<double> solved(const FrontalFactor& factor, std::vector<double> f) {
+  factor.solve(f, f.size() / factor.axes());
+  return f;
+}
+
+/// By CHOLMOD's factor.
+std::vector<double> reference(const Model& model, std::vector<double> f) {
+  factorise_axes(model, Context{}).solve(f);
+  return f;
+}
+
+double difference(std::span<const double> a, std::span<const double> b) {
+  EXPECT_EQ(a.size(), b.size());
+  double most = 0, size = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    most = std::max(most, std::abs(a[k] - b[k]));
+    size = std::max(size, std::abs(b[k]));
+  }
+  return size > 0 ? most / size : HUGE_VAL;
+}
+
+bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), 8 * a.size()) == 0;
+}
+
+Context context_of(int threads, CpuLevel cpu = best_cpu_level()) {
+  Context context;
+  context.threads = threads;
+  context.cpu = cpu;
+  return context;
+}
+
+/// The springs nearest to a node.
+std::vector<std::size_t> near(const Model& model, std::uint32_t node, std::size_t count) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t e = 0; e < model.springs.size(); ++e) {
+    const Vec3 d = model.nodes[model.springs[e].i].position - model.nodes[node].position;
+    order.emplace_back(dot(d, d), e);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<std::size_t> springs;
+  for (std::size_t k = 0; k < count; ++k)
+    springs.push_back(order[k].second);
+  return springs;
+}
+
+struct Doubled {
+  Model model;
+  std::vector<std::uint32_t> origin, place;
+};
+
+/// A node gets a copy that takes every second of its springs, and half of the central one.
+Doubled doubled(const Model& model, std::uint32_t node) {
+  Doubled d{model, {}, {}};
+  const auto s = static_cast<std::uint32_t>(surface_count(model));
+  const auto n = static_cast<std::uint32_t>(model.nodes.size());
+  d.model.nodes.insert(d.model.nodes.begin() + s, model.nodes[node]);
+  for (std::uint32_t i = 0; i <= n; ++i)
+    d.origin.push_back(i < s ? i : i == s ? node : i - 1);
+  for (std::uint32_t i = 0; i < n; ++i)
+    d.place.push_back(i < s ? i : i + 1);
+  d.model.springs.clear();
+  std::size_t turn = 0;
+  for (Spring spring : model.springs) {
+    spring.i = d.place[spring.i];
+    spring.j = d.place[spring.j];
+    const bool here = spring.i == node || spring.j == node;
+    Spring other = spring;
+    std::uint32_t& end = other.i == node ? other.i : other.j;
+    if (here && spring.kind == SpringKind::central) {
+      spring.stiffness /= 2;
+      other.stiffness /= 2;
+      end = s;
+      d.model.springs.push_back(other);
+    } else if (here && ++turn % 2 == 0) {
+      end = s;
+      spring = other;
+    }
+    d.model.springs.push_back(spring);
+  }
+  for (Spring& spring : d.model.springs)
+    if (spring.i > spring.j)
+      std::swap(spring.i, spring.j);
+  std::sort(d.model.springs.begin(), d.model.springs.end(), [](const Spring& a, const Spring& b) {
+    return std::tuple(a.kind, a.i, a.j) < std::tuple(b.kind, b.i, b.j);
+  });
+  for (Node& one : d.model.nodes)
+    if (one.central >= 0)
+      one.central = static_cast<std::int32_t>(d.place[static_cast<std::size_t>(one.central)]);
+  return d;
+}
+
+} // namespace
+
+TEST(FrontalFactor, SolvesAsAnyOther) {
+  for (const bool partly : {false, true}) {
+    Model model = round_organ(4);
+    if (partly)
+      for (std::size_t i = 0; i < 300; ++i)
+        model.nodes[7 * i].fixed = static_cast<std::uint8_t>(i % 8);
+    const FrontalFactor factor(model, Context{});
+    const std::vector<double> f = loads(3 * model.nodes.size(), 1);
+    EXPECT_LT(difference(solved(factor, f), reference(model, f)), 1e-9);
+    EXPECT_EQ(factor.work().computed, factor.work().fronts);
+  }
+}
+
+TEST(FrontalFactor, AllRightHandSidesAlike) {
+  const Model model = round_organ(3);
+  const FrontalFactor factor(model, Context{});
+  const std::size_t axes = factor.axes();
+  const std::vector<double> f = loads(30 * axes, 2), all = solved(factor, f);
+  for (const std::size_t c : {0, 7, 24, 29}) {
+    const auto at = static_cast<std::ptrdiff_t>(c * axes);
+    const std::vector<double> one(f.begin() + at,
+                                  f.begin() + at + static_cast<std::ptrdiff_t>(axes));
+    EXPECT_EQ(std::memcmp(solved(factor, one).data(), all.data() + at, 8 * axes), 0) << c;
+  }
+}
+
+TEST(FrontalFactor, ThreadsAndProcessorsGiveTheSameBits) {
+  const Model model = round_organ(4);
+  const std::vector<double> f = loads(3 * model.nodes.size(), 3);
+  const std::vector<double> once = solved(FrontalFactor(model, context_of(1)), f);
+  EXPECT_TRUE(same_bits(once, solved(FrontalFactor(model, context_of(2)), f)));
+  EXPECT_TRUE(same_bits(once, solved(FrontalFactor(model, context_of(2, CpuLevel::baseline)), f)));
+}
+
+TEST(FrontalFactor, FollowsStiffnessesAndComesBackToTheSameBits) {
+  const Model model = round_organ(4);
+  const std::vector<double> f = loads(3 * model.nodes.size(), 4);
+  FrontalFactor factor(model, Context{});
+  const std::vector<double> first = solved(factor, f);
+  Model other = model;
+  for (const std::size_t e : near(model, 100, 24))
+    other.springs[e].stiffness *= 0.01;
+  const FrontalWork work = factor.renew(other, {}, {}, Context{});
+  EXPECT_GT(work.computed, 0u);
+  EXPECT_LT(work.computed, work.fronts / 5) << "a local change";
+  EXPECT_LT(work.operations, 0.7 * work.all_operations);
+  EXPECT_LT(difference(solved(factor, f), reference(other, f)), 1e-9);
+  EXPECT_GT(difference(solved(factor, f), first), 1e-6) << "the change must show";
+  (void)factor.renew(model, {}, {}, Context{});
+  EXPECT_TRUE(same_bits(solved(factor, f), first));
+  EXPECT_EQ(factor.renew(model, {}, {}, Context{}).computed, 0u);
+}
+
+TEST(FrontalFactor, FollowsCutSprings) {
+  Model model = round_organ(3);
+  FrontalFactor factor(model, Context{});
+  std::mt19937 random(5);
+  for (int cut = 0; cut < 20; ++cut) {
+    for (const std::size_t e :
+         near(model, static_cast<std::uint32_t>(random() % model.nodes.size()), 1 + random() % 5))
+      if (model.springs[e].kind != SpringKind::central)
+        model.springs[e].stiffness = 0;
+    std::erase_if(model.springs, [](const Spring& s) { return s.stiffness == 0; });
+    (void)factor.renew(model, {}, {}, Context{});
+    const std::vector<double> f = loads(3 * model.nodes.size(), 6);
+    ASSERT_LT(difference(solved(factor, f), reference(model, f)), 1e-8) << cut;
+  }
+}
+
+TEST(FrontalFactor, FollowsDoubledNodes) {
+  Model model = round_organ(4);
+  FrontalFactor factor(model, Context{});
+  std::mt19937 random(7);
+  for (int cut = 0; cut < 20; ++cut) {
+    const Doubled now = doubled(model, static_cast<std::uint32_t>(random() % surface_count(model)));
+    model = now.model;
+    ASSERT_NO_THROW(check_model(model));
+    const FrontalWork work = factor.renew(model, now.origin, now.place, Context{});
+    EXPECT_LT(work.computed, work.fronts / 3);
+    ASSERT_EQ(factor.axes(), 3 * model.nodes.size());
+    const std::vector<double> f = loads(3 * model.nodes.size(), 8);
+    ASSERT_LT(difference(solved(factor, f), reference(model, f)), 1e-8) << cut;
+  }
+}
+
+TEST(FrontalFactor, NamesTheAxisOfAPivotThatVanishes) {
+  Model model = round_organ(3);
+  FrontalFactor factor(model, Context{});
+  std::erase_if(model.springs, [](const Spring& s) { return s.i == 11 || s.j == 11; });
+  try {
+    (void)factor.renew(model, {}, {}, Context{});
+    FAIL() << "node 11 hangs at nothing";
+  } catch (const NotPositiveDefinite& error) {
+    EXPECT_EQ(error.row() / 3, 11u);
+  }
+}
+
+TEST(FrontalFactor, RefusesWhatDoesNotFit) {
+  const Model model = round_organ(3);
+  Context context;
+  context.max_memory = 100000;
+  EXPECT_THROW(FrontalFactor(model, context), Error);
+  Model fixed = model;
+  for (Node& node : fixed.nodes)
+    node.fixed = fixed_all;
+  EXPECT_THROW(FrontalFactor(fixed, Context{}), Error);
+}
