@@ -27,7 +27,7 @@ Compliance::Compliance(const Model& model, StiffnessParts parts, const Context& 
   };
   cache_.emplace(model.nodes.size(), parts_.columns.get(), solve_columns,
                  std::min(static_cast<double>(context.max_memory) / 4, most_column_bytes), bounded);
-  if (!parts_.factor)
+  if (!parts_.factor && !parts_.changing)
     (void)whole();
 }
 
@@ -41,8 +41,18 @@ const AxisSolver& Compliance::whole() {
 }
 
 void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
-  whole().solve(over_axes, columns);
+  if (parts_.changing)
+    parts_.changing->solve(over_axes, columns);
+  else
+    whole().solve(over_axes, columns);
   solves_ += columns;
+}
+
+/// Doubles of L, as far as it is known.
+std::size_t Compliance::entries() const {
+  if (parts_.changing)
+    return parts_.changing->entries();
+  return solver_ ? solver_->factor.entries() : typical_fill * axes();
 }
 
 bool Compliance::stored(std::span<const std::uint32_t> nodes) const {
@@ -55,9 +65,8 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
   // A solve reads L twice, with little to do at a time; columns are read once, as fast as memory
   // gives them. Measured, 10,004 nodes, L of 2.1e6: a solve of 4 ms is worth 110 nodes' columns of
   // float64, 130 of float32.
-  const std::size_t entries = solver_ ? solver_->factor.entries() : typical_fill * axes();
   const bool single = parts_.columns && parts_.columns->single();
-  const std::size_t even = std::max<std::size_t>(1, (single ? 6 : 5) * entries / (3 * axes()));
+  const std::size_t even = std::max<std::size_t>(1, (single ? 6 : 5) * entries() / (3 * axes()));
   return nodes.size() <= std::min(even, capacity()) && stored(nodes);
 }
 

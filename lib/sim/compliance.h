@@ -7,6 +7,7 @@
 #include "model/model.h"
 #include "sim/axis_solver.h"
 #include "sim/column_cache.h"
+#include "sim/frontal_factor.h"
 #include "sim/load.h"
 
 #include <cstddef>
@@ -19,11 +20,12 @@
 
 namespace gewebe {
 
-/// What was computed beforehand. The factor is asked for once, when first needed; without it K is
+/// What was computed beforehand. The factor is asked for once, when first needed; without any K is
 /// factorised by the constructor. Columns may be absent or of some nodes.
 struct StiffnessParts {
   std::function<Factor()> factor;
   std::unique_ptr<ColumnSource> columns;
+  std::shared_ptr<const FrontalFactor> changing{}; ///< in its place, of a model that was cut
 };
 
 class Compliance {
@@ -65,6 +67,7 @@ public:
 
 private:
   const AxisSolver& whole();
+  std::size_t entries() const;
   const Model& model_;
   StiffnessParts parts_;
   Context context_;

@@ -37,6 +37,14 @@ FreeAxes free_axes(const Model& model, std::uint32_t node) {
   return free;
 }
 
+/// 0, 1, 2 …: nothing has moved.
+bool ascend_by_one(std::span<const std::uint32_t> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    if (numbers[i] != i)
+      return false;
+  return true;
+}
+
 double operations_of(double columns, double below) {
   return columns * columns * columns / 3 + columns * columns * below + columns * below * below;
 }
@@ -356,7 +364,9 @@ struct FrontalFactor::State {
     order.reserve(n);
     std::vector<char> ordered(n, 0);
     const auto put = [&](std::uint32_t node) {
-      if (now.axes[node] > 0 && !ordered[node])
+      if (node == none || ordered[node])
+        return;
+      if (now.axes[node] > 0)
         order.push_back(node);
       ordered[node] = 1;
     };
@@ -375,6 +385,8 @@ struct FrontalFactor::State {
     cpu = context.cpu;
     SpringGraph now = spring_graph(model);
     const std::size_t n = model.nodes.size();
+    if (n == graph.axes.size() && ascend_by_one(origin) && ascend_by_one(place))
+      origin = place = {};
     std::vector<char> changed(n, 1);
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::uint32_t old = origin.empty() ? i : origin[i];
@@ -412,7 +424,8 @@ struct FrontalFactor::State {
     // Old fronts by the first node that they eliminated.
     std::vector<std::uint32_t> front_of(graph.axes.size(), none);
     for (std::uint32_t f = 0; f < before.fronts(); ++f)
-      front_of[placed(before.eliminated(f)[0])] = f;
+      if (const std::uint32_t node = placed(before.eliminated(f)[0]); node != none)
+        front_of[node] = f;
     const auto same = [&](std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
       return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                         [&](std::uint32_t x, std::uint32_t y) { return x == placed(y); });

@@ -3,9 +3,9 @@
 
 #include "sim/frontal_factor.h"
 
+#include "mesh_fixtures.h"
 #include "sim/axis_solver.h"
 #include "sim/factor.h"
-#include "mesh_fixtures.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
@@ -233,4 +233,27 @@ TEST(FrontalFactor, RefusesWhatDoesNotFit) {
   for (Node& node : fixed.nodes)
     node.fixed = fixed_all;
   EXPECT_THROW(FrontalFactor(fixed, Context{}), Error);
+}
+
+TEST(FrontalFactor, FollowsNodesThatAreGone) {
+  const Model model = round_organ(3);
+  FrontalFactor factor(model, Context{});
+  // Without node 5 and its springs, and what was drawn with it.
+  Model less = model;
+  std::vector<std::uint32_t> origin, place;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    place.push_back(i < 5 ? i : i == 5 ? UINT32_MAX : i - 1);
+    if (i != 5)
+      origin.push_back(i);
+  }
+  less.nodes.erase(less.nodes.begin() + 5);
+  std::erase_if(less.springs, [](const Spring& s) { return s.i == 5 || s.j == 5; });
+  for (Spring& s : less.springs) {
+    s.i = place[s.i];
+    s.j = place[s.j];
+  }
+  const FrontalWork work = factor.renew(less, origin, place, Context{});
+  EXPECT_LT(work.computed, work.fronts);
+  const std::vector<double> f = loads(3 * less.nodes.size(), 9);
+  EXPECT_LT(difference(solved(factor, f), reference(less, f)), 1e-9);
 }
