@@ -54,7 +54,7 @@ private:
   std::vector<std::uint32_t> nodes_;
   std::vector<std::size_t> stored_; ///< by nodes_: its place in before_->nodes()
   mutable bool prepared_ = false;
-  mutable std::vector<double> response_; ///< C' W, [rank][3 n']
+  mutable std::vector<double> response_; ///< C' W, packed as ResponseSum takes it
   mutable std::vector<double> answers_;  ///< C Q, [rank][3 n], where solve_before is given
 };
 

@@ -18,6 +18,7 @@
 // severed spring, however many springs the copies carry.
 
 #include "base/context.h"
+#include "model/cut_origin.h"
 #include "model/model.h"
 
 #include <cstddef>
@@ -44,9 +45,6 @@ struct SparseRows {
   /// x += factor row r.
   void add_to(std::size_t r, double factor, std::span<double> x) const;
 };
-
-/// An old node that the later model has no copy of.
-inline constexpr std::uint32_t gone_node = UINT32_MAX;
 
 struct StiffnessChange {
   std::size_t old_axes = 0, new_axes = 0; ///< 3 n, 3 n'
