@@ -1,6 +1,7 @@
 // ffe-precompute: model -> stiffness store.
 
 #include "tools/store_making.h"
+#include "tools/store_update.h"
 
 using namespace gewebe;
 namespace {
@@ -18,20 +19,27 @@ void discard(Output& output, StiffnessStoreWriter& writer) {
 }
 
 void work(cli::Run& run, const StoreArguments& a) {
-  if (run.output() == "-")
+  const bool in_place = !a.update.empty() && run.output() == "-";
+  const std::string& path = in_place ? a.update : run.output();
+  if (path == "-")
     throw UsageError("expected -o FILE, since a store cannot go to standard output");
   Output::Options options = run.output_options(true);
   options.sync = true;
   const std::optional<StiffnessStore> first = first_stages(run, a);
+  std::optional<StiffnessStore> before_cut;
+  if (!a.update.empty())
+    before_cut.emplace(a.update);
   options.part = a.touched.has_value() && !first;
-  Output output(run.output(), options);
+  Output output(path, options);
   // What is no file is refused before the work.
   StiffnessStoreWriter writer(output, first ? first->shard() : a.shard);
   StoreTotals totals;
   try {
     if (first)
       copy_store(*first, writer, totals);
-    if (a.merge)
+    if (before_cut)
+      update_store(run, a, *before_cut, writer, totals);
+    else if (a.merge)
       run.timed("merge", [&] { merge_stores(a.inputs, writer, totals); });
     else
       add_models(run, a, first ? &*first : nullptr, writer, totals);
@@ -40,14 +48,13 @@ void work(cli::Run& run, const StoreArguments& a) {
     throw;
   } catch (const Error& error) {
     // What can't be written, or stands in the way, is kept; what is wrong would end the same again.
-    if (error.place() != output.name() && !error.place().starts_with(run.output() + ".part"))
+    if (error.place() != output.name() && !error.place().starts_with(path + ".part"))
       discard(output, writer);
     throw;
   }
   try {
     if (a.verify) // what the disk holds, before it takes its name
-      run.timed("verify",
-                [&] { verify_store(run, StiffnessStore(output.temporary()), run.output()); });
+      run.timed("verify", [&] { verify_store(run, StiffnessStore(output.temporary()), path); });
   } catch (const Error&) {
     discard(output, writer);
     throw;
@@ -55,7 +62,7 @@ void work(cli::Run& run, const StoreArguments& a) {
   output.commit();
   writer.remove_journal();
   if (run.stats_wanted())
-    report_store(run, totals, writer);
+    report_store(run, path, totals, writer);
 }
 
 } // namespace

@@ -60,6 +60,9 @@ void declare(cli::Program& p, StoreArguments& a) {
       .range(1, 2);
   p.option("--shard", a.shard_text, "I/N", "compute the I-th of N parts");
   p.flag("--merge", a.merge, "join parts, which stand in the place of models");
+  p.option("--update", a.update, "STORE",
+           "make the store of a cut model from that of the one before");
+  p.option("--before", a.before, "MODEL", "the model before the cut, for --update");
   p.option("--jobs", a.jobs, "N", "models read and factorised ahead").range(1, 1024);
   p.flag("--verify", a.verify, "read the store back and recompute some columns another way");
   p.flag("--info", a.info, "say what is in a store, which stands in the place of MODEL");
@@ -67,6 +70,17 @@ void declare(cli::Program& p, StoreArguments& a) {
 }
 
 void complete(StoreArguments& a) {
+  if (a.update.empty() != a.before.empty())
+    throw UsageError("--update and --before go together");
+  if (!a.update.empty()) {
+    refuse_making(a, "--update");
+    refuse(a.info, "--info", "--update");
+    refuse(a.merge, "--merge", "--update");
+    if (a.inputs.size() != 1)
+      throw UsageError("expected one cut model with --update");
+    cli::check_one_pipe({a.before, a.inputs[0]});
+    return;
+  }
   if (a.info)
     refuse_making(a, "--info");
   refuse(a.info && a.merge, "--merge", "--info");

@@ -15,6 +15,7 @@ namespace gewebe {
 struct StoreArguments {
   std::vector<std::string> inputs; ///< models; the store for --info, shards for --merge
   std::string columns = "none", precision = "float64", method = "direct", shard_text;
+  std::string update, before; ///< the store of the model before a cut, and that model
   std::optional<double> force, threshold;
   std::optional<std::int64_t> steps;
   std::int64_t stage = 1, jobs = 1;

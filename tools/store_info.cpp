@@ -139,7 +139,8 @@ void report_kept(cli::Run& run, const StiffnessStoreWriter& writer) {
     run.say(part + ": the columns of " + std::to_string(writer.kept()) + " nodes are taken up");
 }
 
-void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer) {
+void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
+                  const StiffnessStoreWriter& writer) {
   cli::Stats& stats = run.stats();
   stats.set("objects", totals.objects);
   stats.set("nodes", totals.nodes);
@@ -151,7 +152,7 @@ void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStore
   stats.set("residual", totals.residual);
   stats.set("columns", totals.columns);
   stats.set("kept_columns", 3 * writer.kept());
-  stats.set("bytes", std::uint64_t{std::filesystem::file_size(run.output())});
+  stats.set("bytes", std::uint64_t{std::filesystem::file_size(path)});
   stats.set("matrix_digest", digest_text(writer.matrix_digest()));
   stats.set("digest", digest_text(writer.digest()));
 }

@@ -28,7 +28,8 @@ struct StoreTotals {
   double norm = 0, condition = 0, residual = 0;
 };
 
-/// What --stats says of a store that stands under its name.
-void report_store(cli::Run& run, const StoreTotals& totals, const StiffnessStoreWriter& writer);
+/// What --stats says of a store that stands under its name, `path`.
+void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
+                  const StiffnessStoreWriter& writer);
 
 } // namespace gewebe

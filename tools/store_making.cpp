@@ -153,6 +153,8 @@ void compute(cli::Run& run, const Prepared& p, const StiffnessMethod& method,
   });
 }
 
+} // namespace
+
 void add(StoreTotals& totals, const StiffnessFacts& facts, const StiffnessMatrix& matrix,
          const Factor& factor, std::size_t nodes, double residual) {
   totals = {totals.objects + 1,
@@ -165,8 +167,6 @@ void add(StoreTotals& totals, const StiffnessFacts& facts, const StiffnessMatrix
             std::max(totals.condition, facts.condition),
             std::max(totals.residual, residual)};
 }
-
-} // namespace
 
 void add_models(cli::Run& run, const StoreArguments& a, const StiffnessStore* store,
                 StiffnessStoreWriter& writer, StoreTotals& totals) {
@@ -251,9 +251,14 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
 
 } // namespace
 
+void copy_object(const StiffnessStore& store, const std::string& group,
+                 StiffnessStoreWriter& writer, StoreTotals& totals) {
+  join_object({&store}, group, writer, totals);
+}
+
 void copy_store(const StiffnessStore& store, StiffnessStoreWriter& writer, StoreTotals& totals) {
   for (const std::string& group : store.objects())
-    join_object({&store}, group, writer, totals);
+    copy_object(store, group, writer, totals);
 }
 
 void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& writer,

@@ -14,6 +14,14 @@ namespace gewebe {
 void add_models(cli::Run& run, const StoreArguments& a, const StiffnessStore* store,
                 StiffnessStoreWriter& writer, StoreTotals& totals);
 
+/// Counts an object that was written.
+void add(StoreTotals& totals, const StiffnessFacts& facts, const StiffnessMatrix& matrix,
+         const Factor& factor, std::size_t nodes, double residual);
+
+/// Copies one object of a store, but no second stage. \throw Error if it is damaged
+void copy_object(const StiffnessStore& store, const std::string& group,
+                 StiffnessStoreWriter& writer, StoreTotals& totals);
+
 /// Copies all objects of a store, but no second stage. \throw Error if it is damaged
 void copy_store(const StiffnessStore& store, StiffnessStoreWriter& writer, StoreTotals& totals);
 

@@ -1,0 +1,96 @@
+#pragma once
+// Cuts: springs of a model that are gone, edges of its surface that have come apart.
+//
+// Along opened edges the fan of triangles round a node falls into pieces. The piece with the
+// largest area keeps the node, each other one gets a copy of it. What a node has is shared among
+// its copies by area, what an edge has among the triangles beside it, so that nothing is lost: as
+// long as copies stand where their node was, masses and springs add up to what they were, but for
+// springs that are gone. The surface stays manifold where it was, with one boundary loop more for
+// each wound.
+
+#include "model/model.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// What is to be severed, of one model. Lists ascend, without repetitions.
+struct Cut {
+  /// Removed outright, whatever their kind. Triangles beside a spring of kind edge vanish with it.
+  std::vector<std::size_t> springs;
+  /// Edges i < j of the surface along which it comes apart.
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  /// A spring without a triangle (central, or free) that the cut passes on one side of its node:
+  /// the copy that has this corner of a triangle gets no share of it.
+  struct Side {
+    std::uint32_t corner = 0; ///< 3 triangle + k
+    std::uint32_t other = 0;  ///< the spring's other end
+
+    auto operator<=>(const Side&) const = default;
+  };
+  std::vector<Side> sides;
+
+  bool empty() const { return springs.empty() && edges.empty(); }
+};
+
+/// Both at once, of the same model.
+Cut merged(const Cut& a, const Cut& b);
+
+struct CutModel {
+  /// In `place`: a node that is no longer in the model.
+  static constexpr std::uint32_t gone = std::numeric_limits<std::uint32_t>::max();
+
+  Model model;
+  std::vector<std::uint32_t> origin; ///< by node: the node before that it is, or is a copy of
+  std::vector<std::uint32_t> place;  ///< by node before: its number now, or gone
+  std::vector<double> share;         ///< by node: its part of what the node before had, sums 1
+  Cut left;                ///< edges asked for that did not come apart yet, of the new model
+  std::size_t doubled = 0; ///< copies
+  std::size_t removed = 0; ///< springs of which nothing is left
+  std::size_t split = 0;   ///< springs that have become several
+
+  bool changed() const { return doubled > 0 || removed > 0; }
+};
+
+/// The model with the cut carried out. Nodes of the surface keep their numbers, copies stand behind
+/// them by ascending node, central nodes behind these. A single edge with surface all round does
+/// not come apart: it is `left`, to be asked for again with its neighbour.
+///
+/// Bending springs across an edge that came apart are gone, others follow their triangles; so do
+/// edge springs. A central spring is shared by area. Any other spring without a triangle goes with
+/// the copy on whose side its other end lies.
+///
+/// The result passes check_model. \pre check_model(model) passes \throw Error if a spring or edge
+/// does not exist
+CutModel cut_model(const Model& model, const Cut& cut);
+
+/// \throw Error if a node of the surface that the model holds has lost its last spring
+void require_held(const Model& before, const CutModel& cut);
+
+/// Some nodes of a model as a model of their own.
+struct ModelPart {
+  Model model;
+  std::vector<std::uint32_t> origin; ///< by node: its number in the whole
+};
+
+/// What came off by a cut.
+struct FreeParts {
+  ModelPart rest;
+  std::vector<ModelPart> parts; ///< by smallest node
+};
+
+/// Parts of a cut model, connected by springs and triangles, that hung together with more before
+/// and now have no node that the model holds along any axis. Where there is none that is held, the
+/// part with the most nodes stays (ties: the one with the smallest node). Central nodes that no
+/// spring holds any more and that can move, or to which no node belongs, are left out.
+FreeParts free_parts(const Model& before, const CutModel& cut);
+
+/// The cut model without the parts that came off, as one step from the model before.
+CutModel without_parts(CutModel cut, ModelPart rest);
+
+} // namespace gewebe

@@ -1,0 +1,368 @@
+#include "model/cut_select.h"
+
+#include "base/context.h"
+#include "base/error.h"
+#include "base/number_text.h"
+#include "model/edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
+
+void put_in_order(Cut& cut) {
+  const auto tidy = [](auto& list) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  };
+  tidy(cut.springs);
+  tidy(cut.edges);
+  tidy(cut.sides);
+}
+
+std::vector<Vec3> positions(const Model& model, std::span<const double> displacement) {
+  std::vector<Vec3> all;
+  all.reserve(model.nodes.size());
+  for (const Node& n : model.nodes)
+    all.push_back(n.position);
+  for (std::size_t i = 0; i < displacement.size() / 3; ++i)
+    all[i] += {displacement[3 * i], displacement[3 * i + 1], displacement[3 * i + 2]};
+  return all;
+}
+
+/// A whole plane, but only near some nodes.
+struct PlaneArea {
+  Vec3 point, normal;
+  std::vector<std::uint8_t> nodes; ///< by node; empty: all
+
+  double side(const Vec3& p) const { return dot(normal, p - point); }
+  bool near(const Vec3&, const Vec3&) const { return true; }
+  bool has(std::uint32_t node) const { return nodes.empty() || nodes[node] != 0; }
+  bool parts(const Vec3&, const Vec3& a, const Vec3& b) const {
+    return (side(a) > 0) != (side(b) > 0);
+  }
+  bool pierced(const Vec3& a, const Vec3& b) const { return parts({}, a, b); }
+};
+
+/// Four-sided pieces.
+class QuadArea {
+public:
+  explicit QuadArea(std::span<const SweptQuad> quads) {
+    for (const SweptQuad& q : quads) {
+      const Vec3 n = cross(q[2] - q[0], q[3] - q[1]);
+      const double size = norm(n);
+      if (!(size > 0))
+        continue;
+      pieces_.push_back({q, n / size});
+      for (const Vec3& p : q)
+        box_.add(p);
+    }
+  }
+  bool empty() const { return pieces_.empty(); }
+  const Box3& box() const { return box_; }
+  /// Whether a box reaches this one.
+  bool near(const Vec3& min, const Vec3& max) const {
+    for (int a = 0; a < 3; ++a)
+      if (!(min[a] <= box_.max[a] && max[a] >= box_.min[a]))
+        return false;
+    return true;
+  }
+  bool has(std::uint32_t) const { return true; }
+  bool parts(const Vec3& middle, const Vec3& a, const Vec3& b) const {
+    return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) {
+      return (p.side(a) > 0) != (p.side(b) > 0) && p.covers(middle);
+    });
+  }
+  bool pierced(const Vec3& a, const Vec3& b) const {
+    return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& p) {
+      const double s = p.side(a), t = p.side(b);
+      return (s > 0) != (t > 0) && p.covers(a + s / (s - t) * (b - a));
+    });
+  }
+
+private:
+  struct Piece {
+    SweptQuad corner;
+    Vec3 normal;
+
+    double side(const Vec3& p) const { return dot(normal, p - corner[0]); }
+    /// Whether the point projects into one of the two triangles.
+    bool covers(const Vec3& p) const {
+      return covers(p, corner[1], corner[2]) || covers(p, corner[2], corner[3]);
+    }
+    bool covers(const Vec3& p, const Vec3& b, const Vec3& c) const {
+      const Vec3& a = corner[0];
+      const double u = dot(normal, cross(b - a, p - a)), v = dot(normal, cross(c - b, p - b)),
+                   w = dot(normal, cross(a - c, p - c));
+      return (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+    }
+  };
+  std::vector<Piece> pieces_;
+  Box3 box_;
+};
+
+/// The corners of triangles at each node.
+struct CornersOfNodes {
+  std::vector<std::uint32_t> first, corners;
+
+  explicit CornersOfNodes(const Model& model) : first(model.nodes.size() + 1) {
+    for (const Triangle& t : model.triangles)
+      for (const std::uint32_t node : t)
+        ++first[node + std::size_t{1}];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    corners.resize(3 * model.triangles.size());
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    for (std::uint32_t t = 0; t < model.triangles.size(); ++t)
+      for (std::uint32_t k = 0; k < 3; ++k)
+        corners[next[model.triangles[t][k]]++] = 3 * t + k;
+  }
+  std::span<const std::uint32_t> of(std::uint32_t node) const {
+    return {corners.data() + first[node], corners.data() + first[node + std::size_t{1}]};
+  }
+};
+
+/// Pairs of nodes opposite to each other across an edge, ascending.
+std::vector<std::array<std::uint32_t, 2>> opposite_pairs(const Model& model,
+                                                         const EdgeTable& edges) {
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (const auto around = edges.around(e); around.size() == 2) {
+      const std::uint32_t a = model.triangles[around[0] / 3][around[0] % 3],
+                          b = model.triangles[around[1] / 3][around[1] % 3];
+      pairs.push_back({std::min(a, b), std::max(a, b)});
+    }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+template <class Area>
+Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) {
+  Cut cut;
+  const EdgeTable edges = edge_table(model.triangles, model.nodes.size(), one_thread());
+  std::vector<Vec3> middle;
+  middle.reserve(model.triangles.size());
+  double reach = 0; // of a triangle from the midpoint of its edge
+  for (const Triangle& t : model.triangles) {
+    middle.push_back((at[t[0]] + at[t[1]] + at[t[2]]) / 3);
+    for (const std::uint32_t corner : t)
+      reach = std::max(reach, norm(at[corner] - middle.back()));
+  }
+  const Vec3 grown{2 * reach, 2 * reach, 2 * reach};
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const auto [i, j] = edges.ends[e];
+    const auto around = edges.around(e);
+    const Vec3 here = 0.5 * (at[i] + at[j]);
+    if (around.size() < 2 || !area.has(i) || !area.has(j) || !area.near(here - grown, here + grown))
+      continue;
+    bool apart = false;
+    for (std::size_t k = 1; k < around.size(); ++k)
+      apart = apart || area.parts(here, middle[around[0] / 3], middle[around[k] / 3]);
+    if (apart)
+      cut.edges.push_back(edges.ends[e]);
+  }
+
+  // Springs without a triangle.
+  const CornersOfNodes fans(model);
+  std::vector<std::array<std::uint32_t, 2>> across;
+  const auto passes = [&](std::uint32_t from, std::uint32_t to, std::vector<Cut::Side>& sides) {
+    const std::span<const std::uint32_t> corners = fans.of(from);
+    if (corners.empty())
+      return area.pierced(at[from], at[to]);
+    std::size_t count = 0;
+    for (const std::uint32_t c : corners)
+      if (area.pierced(middle[c / 3], at[to])) {
+        sides.push_back({c, to});
+        ++count;
+      }
+    return count == corners.size();
+  };
+  std::size_t edge = 0;
+  for (std::size_t s = 0; s < model.springs.size(); ++s) {
+    const Spring& spring = model.springs[s];
+    const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
+    if (spring.kind == SpringKind::edge) {
+      while (edge < edges.size() && edges.ends[edge] < ends)
+        ++edge;
+      if (edge < edges.size() && edges.ends[edge] == ends)
+        continue;
+    }
+    const bool central = spring.kind == SpringKind::central;
+    if (!area.has(spring.i) || !(central || area.has(spring.j)))
+      continue;
+    Vec3 low = at[spring.i], high = low;
+    for (int a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], at[spring.j][a]);
+      high[a] = std::max(high[a], at[spring.j][a]);
+    }
+    if (!area.near(low - grown, high + grown))
+      continue;
+    std::vector<Cut::Side> sides;
+    const bool severed =
+        passes(spring.i, spring.j, sides) || (!central && passes(spring.j, spring.i, sides));
+    if (!severed && sides.empty())
+      continue;
+    if (spring.kind == SpringKind::bend) {
+      if (across.empty())
+        across = opposite_pairs(model, edges);
+      if (std::binary_search(across.begin(), across.end(), ends))
+        continue; // gone with the edge that it crosses
+    }
+    if (severed)
+      cut.springs.push_back(s);
+    else
+      cut.sides.insert(cut.sides.end(), sides.begin(), sides.end());
+  }
+  put_in_order(cut);
+  return cut;
+}
+
+std::string text(const Vec3& v) {
+  return number_text(v.x) + " " + number_text(v.y) + " " + number_text(v.z);
+}
+
+std::vector<std::uint8_t> flags(const Model& model, std::span<const std::uint32_t> nodes) {
+  std::vector<std::uint8_t> all(model.nodes.size());
+  for (const std::uint32_t node : nodes)
+    all[node] = 1;
+  return all;
+}
+
+} // namespace
+
+Cut springs_between(const Model& model, std::span<const std::uint32_t> from,
+                    std::span<const std::uint32_t> to) {
+  const std::vector<std::uint8_t> a = flags(model, from), b = flags(model, to);
+  Cut cut;
+  for (std::size_t s = 0; s < model.springs.size(); ++s) {
+    const auto [i, j] = std::pair(model.springs[s].i, model.springs[s].j);
+    if ((a[i] != 0 && b[j] != 0) || (a[j] != 0 && b[i] != 0))
+      cut.springs.push_back(s);
+  }
+  if (cut.springs.empty())
+    throw Error("no spring joins these nodes, expected at least one that is not cut yet");
+  return cut;
+}
+
+Cut plane_cut(const Model& model, const CutPlane& plane, std::span<const std::uint32_t> nodes) {
+  PlaneArea area{plane.point, plane.normal / norm(plane.normal), {}};
+  if (!nodes.empty())
+    area.nodes = flags(model, nodes);
+  Cut cut = area_cut(model, positions(model, {}), area);
+  if (cut.empty())
+    throw Error("the plane through " + text(plane.point) + " across " + text(plane.normal) +
+                " meets no edge between triangles" + (nodes.empty() ? "" : " of these nodes") +
+                " and no spring, expected one that is not cut yet");
+  return cut;
+}
+
+Cut swept_cut(const Model& model, std::span<const double> displacement,
+              std::span<const SweptQuad> areas) {
+  const QuadArea area(areas);
+  if (area.empty())
+    return {};
+  const std::vector<Vec3> at = positions(model, displacement);
+  Box3 box;
+  for (const Vec3& p : at)
+    box.add(p);
+  if (!area.near(box.min, box.max))
+    return {};
+  return area_cut(model, at, area);
+}
+
+namespace {
+
+/// Opens the fan of `node` across the way to `far`. \return whether it can
+bool open_across(const Model& model, const std::vector<Vec3>& at, const EdgeTable& edges,
+                 const CornersOfNodes& fans, std::uint32_t node, std::uint32_t far,
+                 std::vector<std::array<std::uint32_t, 2>>& opened) {
+  const Vec3 way = at[far] - at[node];
+  Vec3 normal;
+  for (const std::uint32_t c : fans.of(node)) {
+    const Triangle& t = model.triangles[c / 3];
+    normal += cross(at[t[1]] - at[t[0]], at[t[2]] - at[t[0]]);
+  }
+  const Vec3 aside = cross(normal, way);
+  struct Choice {
+    double cosine = 2;
+    std::array<std::uint32_t, 2> edge{};
+  };
+  std::array<Choice, 2> best; // on either side
+  bool border = false;
+  for (const std::uint32_t c : fans.of(node))
+    for (std::uint32_t k = 1; k < 3; ++k) {
+      const std::uint32_t other = model.triangles[c / 3][(c + k - c / 3 * 3) % 3];
+      const std::array<std::uint32_t, 2> ends{std::min(node, other), std::max(node, other)};
+      const auto e = std::lower_bound(edges.ends.begin(), edges.ends.end(), ends);
+      if (edges.around(static_cast<std::size_t>(e - edges.ends.begin())).size() != 2) {
+        border = true;
+        continue;
+      }
+      const Vec3 d = at[other] - at[node];
+      const double size = norm(d) * norm(way);
+      if (other == far || !(size > 0))
+        continue;
+      Choice& choice = best[dot(d, aside) > 0 ? 1 : 0];
+      const double cosine = std::abs(dot(d, way)) / size;
+      if (cosine < choice.cosine)
+        choice = {cosine, ends};
+    }
+  // At the border of the surface one edge is enough to part the fan.
+  if (border && best[0].cosine > best[1].cosine)
+    std::swap(best[0], best[1]);
+  if (best[0].cosine > 1 || (!border && best[1].cosine > 1))
+    return false;
+  opened.push_back(best[0].edge);
+  if (!border)
+    opened.push_back(best[1].edge);
+  return true;
+}
+
+} // namespace
+
+Cut torn_cut(const Model& model, std::span<const double> displacement, double strain) {
+  const std::vector<Vec3> at = positions(model, displacement);
+  std::vector<std::size_t> torn;
+  std::vector<double> pull(model.nodes.size());
+  for (std::size_t s = 0; s < model.springs.size(); ++s) {
+    const Spring& spring = model.springs[s];
+    const double length = norm(at[spring.j] - at[spring.i]), more = length - spring.rest;
+    if (more > 0) {
+      pull[spring.i] += spring.stiffness * more;
+      pull[spring.j] += spring.stiffness * more;
+    }
+    if (length > (1 + strain) * spring.rest)
+      torn.push_back(s);
+  }
+  Cut cut;
+  if (torn.empty())
+    return cut;
+  const EdgeTable edges = edge_table(model.triangles, model.nodes.size(), one_thread());
+  const CornersOfNodes fans(model);
+  for (const std::size_t s : torn) {
+    const Spring& spring = model.springs[s];
+    const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
+    const auto e = std::lower_bound(edges.ends.begin(), edges.ends.end(), ends);
+    const bool beside = spring.kind == SpringKind::edge && e != edges.ends.end() && *e == ends;
+    const bool i_first = pull[spring.i] >= pull[spring.j];
+    const std::uint32_t first = i_first ? spring.i : spring.j,
+                        second = i_first ? spring.j : spring.i;
+    if (!beside || !(open_across(model, at, edges, fans, first, second, cut.edges) ||
+                     open_across(model, at, edges, fans, second, first, cut.edges)))
+      cut.springs.push_back(s);
+  }
+  put_in_order(cut);
+  return cut;
+}
+
+} // namespace gewebe

@@ -1,0 +1,89 @@
+// Where the nodes of cut models come from: found again as the cut had it.
+
+#include "model/cut_origin.h"
+
+#include "base/error.h"
+#include "model/cut.h"
+#include "sim/stiffness_change.h"
+#include "stiffness_models.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+namespace {
+
+/// Opens the surface between triangles on both sides of a plane, where they are in front of
+/// another.
+Cut opened(const Model& model, double x, double above) {
+  Cut cut;
+  std::map<std::array<std::uint32_t, 2>, int> sides;
+  for (const Triangle& t : model.triangles) {
+    Vec3 middle;
+    for (const std::uint32_t corner : t)
+      middle = middle + model.nodes[corner].position;
+    if (middle.z / 3 < above)
+      continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [i, j] = std::minmax(t[k], t[(k + 1) % 3]);
+      sides[{i, j}] |= middle.x / 3 < x ? 1 : 2;
+    }
+  }
+  for (const auto& [edge, both] : sides)
+    if (both == 3)
+      cut.edges.push_back(edge);
+  return cut;
+}
+
+Model ball_model() {
+  Model model = model_of(ball(3, 20));
+  for (std::size_t i = 0; i < surface_count(model); i += 17)
+    model.nodes[i].fixed = fixed_all;
+  return model;
+}
+
+TEST(CutOrigin, FindsWhatTheCutSays) {
+  const Model before = ball_model();
+  const CutModel cut = cut_model(before, opened(before, 1, 5));
+  ASSERT_GT(cut.doubled, 5u);
+  const CutOrigin found = find_cut_origin(before, cut.model);
+  EXPECT_EQ(found.origin, cut.origin);
+  EXPECT_EQ(found.place, cut.place);
+}
+
+TEST(CutOrigin, CopiesOfCopiesGoToTheirSide) {
+  const Model before = ball_model();
+  const CutModel first = cut_model(before, opened(before, 1, 8));
+  const CutModel second = cut_model(first.model, opened(first.model, 1, 0));
+  ASSERT_GT(second.doubled, 1u);
+  const CutOrigin found = find_cut_origin(first.model, second.model);
+  EXPECT_EQ(found.origin, second.origin);
+  EXPECT_EQ(found.place, second.place);
+}
+
+TEST(CutOrigin, TheRankIsThreeForEachCopyAndOneForEachSeveredSpring) {
+  const Model before = ball_model();
+  Cut cut = opened(before, 1, 5);
+  const CutModel open = cut_model(before, cut);
+  std::size_t fixed = 0;
+  for (std::size_t i = 0; i < open.model.nodes.size(); ++i)
+    if (open.place[open.origin[i]] != i && open.model.nodes[i].fixed == fixed_all)
+      ++fixed;
+  const StiffnessChange change = stiffness_change(before, open.model, open.origin, open.place);
+  EXPECT_LE(change.rank(), 3 * (open.doubled - fixed) + open.removed);
+  EXPECT_GE(change.rank(), 3 * (open.doubled - fixed));
+}
+
+TEST(CutOrigin, AnotherModelIsRefused) {
+  const Model before = ball_model();
+  Model other = before;
+  other.nodes[7].position.z += 1e-12;
+  EXPECT_THROW((void)find_cut_origin(before, other), Error);
+}
+
+} // namespace
