@@ -24,6 +24,8 @@ public:
   virtual std::size_t node_count() const = 0;
   /// The nodes that have columns, ascending.
   virtual const std::vector<std::uint32_t>& nodes() const = 0;
+  /// Whether to read those of so many nodes is cheaper than to solve for them.
+  virtual bool pays(std::size_t count) const { return count > 0; }
   /// Reads the columns of nodes()[k]. \pre out.size() == 9 n \throw Error if they can't be read or
   /// are damaged
   virtual void read(std::size_t k, std::span<double> out) const = 0;

@@ -102,8 +102,11 @@ void ColumnCache::need(std::span<const std::uint32_t> nodes) {
     else
       missing.push_back(node);
   make_room(missing.size());
+  const auto there = static_cast<std::size_t>(
+      std::count_if(missing.begin(), missing.end(), [&](std::uint32_t i) { return stored(i); }));
+  const bool read = source_ != nullptr && source_->pays(there);
   for (const std::uint32_t node : missing) {
-    if (!stored(node)) {
+    if (!read || !stored(node)) {
       unknown.push_back(node);
       continue;
     }

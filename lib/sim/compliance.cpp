@@ -27,7 +27,7 @@ Compliance::Compliance(const Model& model, StiffnessParts parts, const Context& 
   };
   cache_.emplace(model.nodes.size(), parts_.columns.get(), solve_columns,
                  std::min(static_cast<double>(context.max_memory) / 4, most_column_bytes), bounded);
-  if (!parts_.factor && !parts_.changing)
+  if (!parts_.factor && !parts_.solve)
     (void)whole();
 }
 
@@ -41,8 +41,8 @@ const AxisSolver& Compliance::whole() {
 }
 
 void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
-  if (parts_.changing)
-    parts_.changing->solve(over_axes, columns);
+  if (parts_.solve)
+    parts_.solve(over_axes, columns);
   else
     whole().solve(over_axes, columns);
   solves_ += columns;
@@ -50,8 +50,8 @@ void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
 
 /// Doubles of L, as far as it is known.
 std::size_t Compliance::entries() const {
-  if (parts_.changing)
-    return parts_.changing->entries();
+  if (parts_.solve)
+    return parts_.solve_entries;
   return solver_ ? solver_->factor.entries() : typical_fill * axes();
 }
 

@@ -7,7 +7,6 @@
 #include "model/model.h"
 #include "sim/axis_solver.h"
 #include "sim/column_cache.h"
-#include "sim/frontal_factor.h"
 #include "sim/load.h"
 
 #include <cstddef>
@@ -20,12 +19,16 @@
 
 namespace gewebe {
 
-/// What was computed beforehand. The factor is asked for once, when first needed; without any K is
-/// factorised by the constructor. Columns may be absent or of some nodes.
+/// What was computed beforehand. The factor is asked for once, when first needed; without it, and
+/// without another solver, K is factorised by the constructor. Columns may be absent or of some
+/// nodes.
 struct StiffnessParts {
   std::function<Factor()> factor;
   std::unique_ptr<ColumnSource> columns;
-  std::shared_ptr<const FrontalFactor> changing{}; ///< in its place, of a model that was cut
+  /// In place of the factor: solves over all axes, in place, as AxisSolver::solve; and what that
+  /// reads, in doubles.
+  std::function<void(std::span<double> over_axes, std::size_t columns)> solve{};
+  std::size_t solve_entries = 0;
 };
 
 class Compliance {

@@ -36,9 +36,9 @@ std::vector<double> packed(const std::vector<double>& columns, std::size_t rows,
 
 CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
                                    StiffnessChange change, AxesSolve solve, const Context& context,
-                                   AxesSolve solve_before)
+                                   AxesSolve solve_before, std::size_t solve_entries)
     : before_(std::move(before)), change_(std::move(change)), solve_(std::move(solve)),
-      solve_before_(std::move(solve_before)), context_(context) {
+      solve_before_(std::move(solve_before)), solve_entries_(solve_entries), context_(context) {
   context_.progress = nullptr;
   if (3 * before_->node_count() != change_.old_axes)
     throw Error("the columns are of " + std::to_string(before_->node_count()) +
@@ -51,6 +51,14 @@ CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
       nodes_.push_back(node);
       stored_.push_back(k);
     }
+}
+
+bool CorrectedColumns::pays(std::size_t count) const {
+  const auto entries = static_cast<double>(solve_entries_);
+  const auto rank = static_cast<double>(change_.rank()), columns = 3 * static_cast<double>(count);
+  const double respond = prepared_ ? 0 : rank * entries * (solve_before_ ? 2 : 1);
+  const double correct = columns * rank * static_cast<double>(change_.new_axes) / 2;
+  return count > 0 && (solve_entries_ == 0 || respond + correct <= columns * entries);
 }
 
 void CorrectedColumns::prepare() const {

@@ -24,15 +24,20 @@ public:
   /// \param solve_before of the earlier K, or null; where it is given, what the cut answers is
   /// found by rank() solves of that instead of from the columns, so that columns of float32 are no
   /// less exact than they were
+  /// \param solve_entries doubles that `solve` reads twice for a right-hand side; 0: reading always
+  /// pays
   /// \throw Error if the columns are of another number of nodes
   CorrectedColumns(std::shared_ptr<const ColumnSource> before, StiffnessChange change,
-                   AxesSolve solve, const Context& context, AxesSolve solve_before = {});
+                   AxesSolve solve, const Context& context, AxesSolve solve_before = {},
+                   std::size_t solve_entries = 0);
 
   std::size_t node_count() const override { return change_.origin.size(); }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
   /// Not from several threads at once. \throw Error what the columns before and the solves throw
   void read(std::size_t k, std::span<double> out) const override;
   bool single() const override { return before_->single(); }
+  /// By the operations that each way takes, the responses counted while they are not there.
+  bool pays(std::size_t count) const override;
   void read_single(std::size_t k, std::span<float> out) const override;
 
   /// As read, of nodes first to first + count - 1, one behind the other: faster than one by one,
@@ -50,6 +55,7 @@ private:
   std::shared_ptr<const ColumnSource> before_;
   StiffnessChange change_;
   AxesSolve solve_, solve_before_;
+  std::size_t solve_entries_ = 0;
   Context context_;
   std::vector<std::uint32_t> nodes_;
   std::vector<std::size_t> stored_; ///< by nodes_: its place in before_->nodes()

@@ -1,0 +1,189 @@
+#include "sim/cut_stiffness.h"
+
+#include "base/error.h"
+#include "model/cut.h"
+#include "sim/condition.h"
+#include "sim/corrected_columns.h"
+#include "sim/factor.h"
+#include "sim/stiffness.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+// Microseconds, measured on 10,004 nodes: an operation of a front, and of a solve with many
+// right-hand sides; what a renewal and a correction do for each node, whatever is cut.
+constexpr double front_operation = 1.6e-4, solve_operation = 1.0e-4;
+constexpr double renewal_node = 0.35, correction_node = 0.25;
+// Of all operations, what a cut reaches as long as none has told.
+constexpr double usual_reach = 0.3;
+// Each solution takes a pass over the corrections; beyond so many it costs as much again.
+constexpr std::size_t most_rank = 48;
+// The order of elimination is found anew when following has made it so much worse.
+constexpr double worn_out = 1.6;
+// Beyond this condition of the small system a renewal is worth its digits.
+constexpr double most_condition = 1e8;
+
+std::vector<std::uint32_t> identity(std::size_t count) {
+  std::vector<std::uint32_t> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0U);
+  return numbers;
+}
+
+/// Two steps as one.
+void follow(std::vector<std::uint32_t>& origin, std::vector<std::uint32_t>& place,
+            std::span<const std::uint32_t> next_origin, std::span<const std::uint32_t> next_place) {
+  std::vector<std::uint32_t> from;
+  from.reserve(next_origin.size());
+  for (const std::uint32_t node : next_origin)
+    from.push_back(origin[node]);
+  for (std::uint32_t& node : place)
+    if (node != CutModel::gone)
+      node = next_place[node];
+  origin = std::move(from);
+}
+
+/// What the two take up: three for each copy, one for each spring that is gone or weaker.
+std::size_t copies(std::span<const std::uint32_t> origin, std::span<const std::uint32_t> place) {
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < origin.size(); ++i)
+    count += place[origin[i]] != i ? 1 : 0;
+  return count;
+}
+
+[[noreturn]] void tell_what_moves(const Model& model, const Context& context) {
+  const StiffnessMatrix matrix = stiffness_matrix(model);
+  StiffnessCheck check;
+  (void)checked_factor(model, matrix, context, check);
+  throw SingularStiffness("the stiffness matrix is nearly singular, expected more that holds it");
+}
+
+} // namespace
+
+CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
+                           std::shared_ptr<const ColumnSource> columns, const Context& context)
+    : first_(std::move(first)), now_(first_), columns_(std::move(columns)), context_(context),
+      first_origin_(identity(first_->nodes.size())), first_place_(first_origin_) {
+  context_.progress = nullptr;
+}
+
+void CutStiffness::prepare() {
+  if (factor_ != nullptr)
+    return;
+  try {
+    factor_ = std::make_shared<FrontalFactor>(*now_, context_);
+  } catch (const NotPositiveDefinite&) {
+    tell_what_moves(*now_, context_);
+  }
+  factored_ = now_;
+  correction_.reset();
+  origin_ = place_ = identity(now_->nodes.size());
+  fresh_operations_ = factor_->work().all_operations;
+}
+
+/// By what each would take; none: the factor does not serve.
+std::optional<CutWay> CutStiffness::cheapest(CutWork& work) const {
+  const auto nodes = static_cast<double>(now_->nodes.size());
+  const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
+  work.renewal_us = nodes * renewal_node + reach * front_operation;
+  const auto rank = static_cast<double>(work.rank);
+  work.correction_us =
+      nodes * correction_node +
+      rank * solve_operation * (4 * static_cast<double>(factor_->entries()) + rank * rank);
+  if (work.rank <= most_rank && work.correction_us < work.renewal_us)
+    return CutWay::correction;
+  return CutWay::renewal;
+}
+
+CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
+                          std::span<const std::uint32_t> place, std::optional<CutWay> way) {
+  CutWork work;
+  follow(first_origin_, first_place_, origin, place);
+  now_ = std::move(next);
+  if (factor_ != nullptr) {
+    follow(origin_, place_, origin, place);
+    const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
+    work.rank = 3 * copies(origin_, place_);
+    std::optional<StiffnessChange> change;
+    if (const std::optional<CutWay> guess = way ? way : cheapest(work);
+        guess == CutWay::correction && !some_gone) {
+      change = stiffness_change(*factored_, *now_, origin_, place_);
+      work.rank = change->rank();
+    }
+    if (!way)
+      way = change ? cheapest(work) : CutWay::renewal;
+    if (way == CutWay::correction && change) {
+      try {
+        const std::shared_ptr<const FrontalFactor> factor = factor_;
+        auto correction = std::make_shared<const WoodburySolver>(
+            std::move(*change),
+            [factor](std::span<double> f, std::size_t columns) { factor->solve(f, columns); },
+            context_);
+        if (correction->condition() < most_condition) {
+          correction_ = std::move(correction);
+          work.way = CutWay::correction;
+          return work;
+        }
+      } catch (const Cancelled&) {
+        throw;
+      } catch (const Error&) {
+        // Singular, or nearly: a renewal tells.
+      }
+    }
+    correction_.reset();
+    if (way != CutWay::fresh && factor_->work().all_operations < worn_out * fresh_operations_) {
+      try {
+        ++*generation_;
+        work.factor = factor_->renew(*now_, origin_, place_, context_);
+      } catch (const NotPositiveDefinite&) {
+        factor_.reset();
+        tell_what_moves(*now_, context_);
+      } catch (...) {
+        factor_.reset();
+        throw;
+      }
+      work.way = CutWay::renewal;
+      reached_ = work.factor.operations;
+      factored_ = now_;
+      origin_ = place_ = identity(now_->nodes.size());
+      return work;
+    }
+    factor_.reset();
+  }
+  prepare();
+  work.factor = factor_->work();
+  return work;
+}
+
+/// Solves for the model of now, and refuses when another cut has changed the factor.
+AxesSolve CutStiffness::solver() const {
+  return [factor = std::shared_ptr<const FrontalFactor>(factor_), correction = correction_,
+          generation = generation_, made = *generation_](std::span<double> f, std::size_t columns) {
+    if (*generation != made)
+      throw Error("the object was cut since, expected its new stiffness to be asked");
+    if (correction != nullptr)
+      correction->solve(f, columns);
+    else
+      factor->solve(f, columns);
+  };
+}
+
+StiffnessParts CutStiffness::parts() const {
+  StiffnessParts parts;
+  parts.solve = solver();
+  parts.solve_entries = factor_->entries();
+  if (correction_ != nullptr)
+    parts.solve_entries += correction_->change().rank() * factor_->axes();
+  if (columns_ != nullptr)
+    parts.columns = std::make_unique<CorrectedColumns>(
+        columns_, stiffness_change(*first_, *now_, first_origin_, first_place_), parts.solve,
+        context_, AxesSolve{}, parts.solve_entries);
+  return parts;
+}
+
+} // namespace gewebe
