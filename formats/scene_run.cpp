@@ -64,6 +64,32 @@ auto of_object(std::uint64_t line, Work&& work) {
   }
 }
 
+/// What a result of the first model knows of an object that may be cut: where its nodes stand, and
+/// copies as the node itself; nodes that came off stay where they were at rest.
+struct FirstShape {
+  std::vector<double> displacement;
+  std::vector<NodeVector> forces;
+
+  FrameObject of(const Simulation& simulation, std::size_t object) {
+    const std::span<const double> now = simulation.displacement(object);
+    const std::vector<NodeVector>& held = simulation.contact_forces(object);
+    const std::span<const std::uint32_t> places = simulation.places(object);
+    if (places.empty())
+      return {now, held};
+    displacement.assign(3 * places.size(), 0);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (places[i] != CutModel::gone)
+        for (std::size_t a = 0; a < 3; ++a)
+          displacement[3 * i + a] = now[3 * std::size_t{places[i]} + a];
+    std::map<std::uint32_t, Vec3> sums;
+    for (const NodeVector& f : held)
+      sums[simulation.first_nodes(object)[f.node]] += f.value;
+    for (const auto& [node, value] : sums)
+      forces.push_back({node, value});
+    return {displacement, forces};
+  }
+};
+
 } // namespace
 
 struct SceneRun::State {
@@ -131,14 +157,15 @@ struct SceneRun::State {
     };
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
-    stores.push_back(c.store);
+    stores.resize(simulation.object_count()); // parts that came off have none
+    stores.back() = c.store;
     if (options.events != nullptr)
       options.events->object(simulation.time(), c.name, c.model, c.method);
   }
 
   SetTwoStep stages(const TwoStepCommand& c) {
     SetTwoStep set{simulation.find(c.object), {c.threshold, c.series}, {}};
-    if (stores.at(set.object).empty())
+    if (set.object >= stores.size() || stores[set.object].empty())
       throw Error("object " + c.object + " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
     return set;
@@ -191,23 +218,29 @@ struct SceneRun::State {
       sample(c.until); // which refuses a past one
   }
 
+  /// What the result must know of new objects.
+  void add_results() {
+    static const Model none;
+    for (; in_result < simulation.object_count(); ++in_result) {
+      const Model& model =
+          options.result->wants_models() ? simulation.first_model(in_result) : none;
+      deliver([&] { options.result->add_object(simulation.name(in_result), model); });
+    }
+  }
+
   /// The frame before anything moves, and what the result must know of new objects.
   void first_frame() {
     if (simulation.object_count() == 0)
       throw Error("there is no object, expected an object command first");
     if (options.result == nullptr)
       return;
-    static const Model none;
-    for (; in_result < simulation.object_count(); ++in_result) {
-      const Model& model = options.result->wants_models() ? simulation.model(in_result) : none;
-      deliver([&] { options.result->add_object(simulation.name(in_result), model); });
-    }
+    add_results();
     if (counts.frames > 0)
       return;
     std::vector<std::vector<double>> rest;
     std::vector<FrameObject> frame;
     for (std::size_t i = 0; i < simulation.object_count(); ++i)
-      rest.emplace_back(simulation.known(i) ? 3 * simulation.model(i).nodes.size() : 0);
+      rest.emplace_back(simulation.known(i) ? 3 * simulation.first_model(i).nodes.size() : 0);
     for (const std::vector<double>& one : rest)
       frame.push_back({one, {}});
     deliver([&] { options.result->add_frame(0, frame); });
@@ -222,12 +255,18 @@ struct SceneRun::State {
                                      : text_answer(simulation, steps));
       });
     simulation.take_jumps();
+    if (options.events != nullptr)
+      for (const Cutting& c : simulation.cuttings())
+        options.events->cutting(simulation, c);
+    simulation.take_cuttings();
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
     if (options.result != nullptr) {
+      add_results();
       std::vector<FrameObject> frame;
+      std::vector<FirstShape> shapes(simulation.object_count());
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
-        frame.push_back({simulation.displacement(i), simulation.contact_forces(i)});
+        frame.push_back(shapes[i].of(simulation, i));
       deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }

@@ -2,6 +2,7 @@
 // The commands of a scene, scene(5), as data.
 
 #include "base/vec3.h"
+#include "model/cut_select.h"
 #include "model/selector.h"
 #include "sim/instrument.h"
 
@@ -102,6 +103,20 @@ struct RenewCommand {
   std::string object;
 };
 
+struct CutCommand {
+  std::string object;
+  std::optional<CutPlane> plane; ///< none: springs
+  std::optional<Selector> nodes; ///< that a plane may pass; springs start at these
+  std::optional<Selector> others;
+};
+struct TearCommand {
+  std::string object;
+  double strain = 0; ///< 0: none any more
+};
+struct RestoreCommand {
+  std::string object;
+};
+
 struct Command {
   std::optional<double> at; ///< when; absent: now. Never for object, step, run
                             ///< and renew.
@@ -109,7 +124,7 @@ struct Command {
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
                ReleaseCommand, InstrumentCommand, MoveCommand, GraspCommand, WithdrawCommand,
                GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand, StepCommand,
-               RunCommand, MethodCommand, RenewCommand>
+               RunCommand, MethodCommand, RenewCommand, CutCommand, TearCommand, RestoreCommand>
       what;
 };
 
