@@ -279,7 +279,10 @@ private:
     s.j = std::max(ends[0], ends[1]);
     s.stiffness *= part;
     s.damping *= part;
-    result_.model.springs.push_back(s);
+    const auto is_copy = [&](std::uint32_t i) {
+      return i >= surface_ && i < surface_ + copies_.size();
+    };
+    (is_copy(s.i) || is_copy(s.j) ? fresh_ : result_.model.springs).push_back(s);
   }
 
   /// A spring in parts, whose weights are not negative; it is gone if there is none.
@@ -309,6 +312,11 @@ private:
         ++result_.removed;
         continue;
       }
+      if (touched_[spring.i] == 0 && touched_[spring.j] == 0 &&
+          (spring.kind != SpringKind::bend || copies_.empty())) { // as it was
+        add(spring, {number(spring.i), number(spring.j)}, 1);
+        continue;
+      }
       if (spring.kind == SpringKind::central) {
         central_spring(spring);
       } else if (spring.kind == SpringKind::bend) {
@@ -324,10 +332,15 @@ private:
           free_spring(spring);
       }
     }
-    std::sort(result_.model.springs.begin(), result_.model.springs.end(),
-              [](const Spring& a, const Spring& b) {
-                return std::tie(a.kind, a.i, a.j) < std::tie(b.kind, b.i, b.j);
-              });
+    // Those without a copy are in order: nodes keep theirs.
+    const auto before = [](const Spring& a, const Spring& b) {
+      return std::tie(a.kind, a.i, a.j) < std::tie(b.kind, b.i, b.j);
+    };
+    std::sort(fresh_.begin(), fresh_.end(), before);
+    std::vector<Spring>& all = result_.model.springs;
+    const auto middle = static_cast<std::ptrdiff_t>(all.size());
+    all.insert(all.end(), fresh_.begin(), fresh_.end());
+    std::inplace_merge(all.begin(), all.begin() + middle, all.end(), before);
   }
 
   /// The ends of an edge as a triangle beside it has them.
@@ -531,6 +544,7 @@ private:
   std::vector<std::uint32_t> node_at_;               ///< by corner: its node now
   std::map<std::uint32_t, std::vector<Piece>> fans_; ///< of doubled nodes, what keeps it first
   std::vector<std::uint32_t> copies_;                ///< of which node
+  std::vector<Spring> fresh_;                        ///< that join copies
   CutModel result_;
 };
 

@@ -19,7 +19,7 @@ namespace {
 // Microseconds, measured on 10,004 nodes: an operation of a front, and of a solve with many
 // right-hand sides; what a renewal and a correction do for each node, whatever is cut.
 constexpr double front_operation = 1.6e-4, solve_operation = 1.0e-4;
-constexpr double renewal_node = 0.35, correction_node = 0.25;
+constexpr double renewal_node = 0.3, correction_node = 0.1;
 // Of all operations, what a cut reaches as long as none has told.
 constexpr double usual_reach = 0.3;
 // Each solution takes a pass over the corrections; beyond so many it costs as much again.
@@ -28,6 +28,8 @@ constexpr std::size_t most_rank = 48;
 constexpr double worn_out = 1.6;
 // Beyond this condition of the small system a renewal is worth its digits.
 constexpr double most_condition = 1e8;
+// Below this the condition may be too large, and is estimated.
+constexpr double weak_pivot = 1e-7;
 
 std::vector<std::uint32_t> identity(std::size_t count) {
   std::vector<std::uint32_t> numbers(count);
@@ -56,11 +58,21 @@ std::size_t copies(std::span<const std::uint32_t> origin, std::span<const std::u
   return count;
 }
 
-[[noreturn]] void tell_what_moves(const Model& model, const Context& context) {
+constexpr const char* nearly_singular =
+    "the stiffness matrix is nearly singular, expected more that holds the object";
+
+/// \throw SingularStiffness if K is, naming what moves
+void tell_what_moves(const Model& model, const Context& context) {
   const StiffnessMatrix matrix = stiffness_matrix(model);
   StiffnessCheck check;
   (void)checked_factor(model, matrix, context, check);
-  throw SingularStiffness("the stiffness matrix is nearly singular, expected more that holds it");
+}
+
+double dot_product(std::span<const double> a, std::span<const double> b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k)
+    sum += a[k] * b[k];
+  return sum;
 }
 
 } // namespace
@@ -72,13 +84,43 @@ CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
   context_.progress = nullptr;
 }
 
+/// \throw SingularStiffness if the condition is too large; a pivot is the first to tell, then
+/// inverse iteration, which costs some solves.
+void CutStiffness::require_condition() const {
+  if (factor_->weakest_pivot() > weak_pivot)
+    return;
+  const std::vector<SymmetricBlock> blocks = stiffness_blocks(*now_);
+  std::vector<double> x(factor_->axes()), f(x.size());
+  double least = HUGE_VAL, most = 0; // Rayleigh quotients
+  for (std::size_t k = 0; k < x.size(); ++k)
+    x[k] = 1 + 0.5 * std::sin(static_cast<double>(k));
+  for (int round = 0; round < 4; ++round) {
+    factor_->solve(x);
+    const double size = std::sqrt(dot_product(x, x));
+    for (double& value : x)
+      value /= size;
+    multiply_stiffness(*now_, blocks, x, f);
+    least = std::min(least, dot_product(x, f));
+  }
+  for (const SymmetricBlock& block : blocks)
+    most = std::max({most, block[0], block[3], block[5]});
+  if (!(least > 10 * most / max_condition))
+    (void)tell_what_moves(*now_, context_);
+}
+
 void CutStiffness::prepare() {
   if (factor_ != nullptr)
     return;
   try {
     factor_ = std::make_shared<FrontalFactor>(*now_, context_);
+    require_condition();
   } catch (const NotPositiveDefinite&) {
+    factor_.reset();
     tell_what_moves(*now_, context_);
+    throw SingularStiffness(nearly_singular);
+  } catch (...) {
+    factor_.reset();
+    throw;
   }
   factored_ = now_;
   correction_.reset();
@@ -92,9 +134,8 @@ std::optional<CutWay> CutStiffness::cheapest(CutWork& work) const {
   const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
   work.renewal_us = nodes * renewal_node + reach * front_operation;
   const auto rank = static_cast<double>(work.rank);
-  work.correction_us =
-      nodes * correction_node +
-      rank * solve_operation * (4 * static_cast<double>(factor_->entries()) + rank * rank);
+  work.correction_us = nodes * correction_node +
+                       (2 + rank) * solve_operation * 4 * static_cast<double>(factor_->entries());
   if (work.rank <= most_rank && work.correction_us < work.renewal_us)
     return CutWay::correction;
   return CutWay::renewal;
@@ -103,9 +144,10 @@ std::optional<CutWay> CutStiffness::cheapest(CutWork& work) const {
 CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
                           std::span<const std::uint32_t> place, std::optional<CutWay> way) {
   CutWork work;
+  prepare(); // whether it was announced or not, the same way is gone
   follow(first_origin_, first_place_, origin, place);
   now_ = std::move(next);
-  if (factor_ != nullptr) {
+  if (way != CutWay::fresh) {
     follow(origin_, place_, origin, place);
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
@@ -136,13 +178,15 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
       }
     }
     correction_.reset();
-    if (way != CutWay::fresh && factor_->work().all_operations < worn_out * fresh_operations_) {
+    if (factor_->work().all_operations < worn_out * fresh_operations_) {
       try {
         ++*generation_;
         work.factor = factor_->renew(*now_, origin_, place_, context_);
+        require_condition();
       } catch (const NotPositiveDefinite&) {
         factor_.reset();
         tell_what_moves(*now_, context_);
+        throw SingularStiffness(nearly_singular);
       } catch (...) {
         factor_.reset();
         throw;
@@ -153,8 +197,8 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
       origin_ = place_ = identity(now_->nodes.size());
       return work;
     }
-    factor_.reset();
   }
+  factor_.reset();
   prepare();
   work.factor = factor_->work();
   return work;

@@ -44,7 +44,7 @@ public:
 
   /// Goes over to the model of the next cut; see CutModel for origin and place. Which way is taken
   /// depends on the models alone, so that a run repeated is the same to the bit. \param way to
-  /// take, where there is a factor; none: the cheapest
+  /// take; none: the cheapest
   /// \throw SingularStiffness naming what moves freely, and as FrontalFactor; nothing serves then
   CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
               std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
@@ -56,6 +56,7 @@ public:
 private:
   std::optional<CutWay> cheapest(CutWork& work) const;
   AxesSolve solver() const;
+  void require_condition() const;
   std::shared_ptr<const Model> first_, factored_, now_;
   std::shared_ptr<const ColumnSource> columns_;
   Context context_;

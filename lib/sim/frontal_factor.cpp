@@ -56,6 +56,7 @@ struct FrontalFactor::State {
     std::size_t rows = 0, columns = 0;
     std::vector<double> l;    // rows x columns
     std::vector<double> rest; // what it leaves to its parent, the lower triangle counts
+    double weakest = 1;       // pivot over diagonal entry
   };
 
   FrontTree tree;
@@ -74,6 +75,7 @@ struct FrontalFactor::State {
   std::vector<const double*> blocks;
   std::vector<std::uint32_t> axis_of_row;
   std::size_t longest = 1, entries = 0, rest_entries = 0;
+  double weakest = 1;
 
   // ---- a front
 
@@ -157,6 +159,7 @@ struct FrontalFactor::State {
     for (const std::uint32_t child : children)
       take_over(f, child, scratch.row, scratch.to);
     Front& front = fronts[f];
+    front.weakest = 1;
     const FrontKernel& kernel =
         cpu == CpuLevel::baseline ? front_kernel_baseline : front_kernel_avx2;
     const FrontArrays arrays{front.rows, front.columns, front.l.data(), front.rest.data()};
@@ -167,6 +170,10 @@ struct FrontalFactor::State {
           kernel.eliminate(arrays, begin, count, scratch.least.data(), scratch.packed.data());
       if (done < count)
         throw NotPositiveDefinite(axis_at(model, f, begin + done));
+      for (std::size_t c = begin; c < begin + count; ++c) {
+        const double root = front.l[c * front.rows + c];
+        front.weakest = std::min(front.weakest, root * root / (scratch.least[c] * max_condition));
+      }
       const std::size_t rows = front.rows - begin - count;
       const std::size_t strips = (rows + front_strip - 1) / front_strip;
       const auto take = [&](std::size_t first, std::size_t last) {
@@ -281,6 +288,7 @@ struct FrontalFactor::State {
     axis_of_row.clear();
     longest = 1;
     entries = rest_entries = 0;
+    weakest = 1;
     std::vector<std::uint32_t> row(graph.axes.size(), none);
     for (const std::uint32_t node : tree.sequence) {
       row[node] = static_cast<std::uint32_t>(axis_of_row.size());
@@ -300,6 +308,7 @@ struct FrontalFactor::State {
       pi.push_back(static_cast<std::int64_t>(s.size()));
       blocks.push_back(fronts[f].l.data());
       longest = std::max(longest, fronts[f].rows - fronts[f].columns);
+      weakest = std::min(weakest, fronts[f].weakest);
       entries += fronts[f].l.size();
       rest_entries += fronts[f].rest.size();
     }
@@ -490,6 +499,10 @@ std::size_t FrontalFactor::bytes() const noexcept {
 
 const FrontalWork& FrontalFactor::work() const noexcept {
   return state_->work;
+}
+
+double FrontalFactor::weakest_pivot() const noexcept {
+  return state_->weakest;
 }
 
 void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) const {

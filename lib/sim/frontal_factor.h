@@ -50,6 +50,9 @@ public:
   std::size_t entries() const noexcept; ///< doubles in L
   std::size_t bytes() const noexcept;   ///< with what is kept of fronts
   const FrontalWork& work() const noexcept;
+  /// The least pivot of all, over its diagonal entry of K: the reciprocal bounds the condition of K
+  /// from below.
+  double weakest_pivot() const noexcept;
 
   /// In place, for right-hand sides over all axes one behind the other; 0 on fixed ones. Safe from
   /// many threads at once; the bits of each don't depend on the others. \pre over_axes.size() ==

@@ -182,6 +182,8 @@ struct SimulationCounts {
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
   double largest_jump = 0;         ///< mm, see MethodJump
   std::uint64_t cuts = 0;          ///< that changed a model
+  /// Of elastostatic objects: how their stiffness followed, see CutWay.
+  std::uint64_t cut_corrections = 0, cut_renewals = 0, cut_factors = 0;
 };
 
 /// An instrument at the end of the last step.
@@ -198,6 +200,8 @@ struct SimulationState {
   double strain = 0;                             ///< largest of any spring
   double safe_step = HUGE_VAL;                   ///< least of the elastodynamic objects
 };
+
+class CutStiffness;
 
 class Simulation {
 public:
@@ -360,7 +364,11 @@ private:
   void cut_now(const CutObject& change);
   void restore_now(std::size_t index);
   void carry_out(std::size_t index, CutModel cut);
-  StiffnessParts cut_parts(Object& object, const CutModel& cut);
+  CutStiffness* stiffness_of(Object& object) const;
+  void announce_cut(std::size_t index);
+  void announce_cuts(const Change& change);
+  std::optional<StiffnessParts> cut_parts(Object& object, std::shared_ptr<const Model> next,
+                                          const CutModel& cut);
   std::unique_ptr<Object> renumbered(const Object& old, std::shared_ptr<Model> model) const;
   void move_all(std::size_t index, const Moves& moves, std::vector<std::unique_ptr<Object>> pieces);
   void move_shown(const Object& old, const Moves& moves,

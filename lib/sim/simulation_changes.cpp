@@ -53,6 +53,8 @@ void Simulation::apply(const Change& change) {
     guarded([&] { apply_now(change); });
   else
     apply_now(change);
+  if (!std::holds_alternative<CutObject>(change))
+    announce_cuts(change);
   if (options_.applied)
     options_.applied(change);
 }
@@ -166,6 +168,7 @@ void Simulation::schedule(double time, const Change& change) {
     return;
   }
   check(change);
+  announce_cuts(change);
   events_.emplace(time, Event{change});
 }
 

@@ -1,6 +1,7 @@
 // Cuts: what they sever when they take effect, what comes off, what it means for the methods.
 
 #include "sim/condition.h"
+#include "sim/cut_stiffness.h"
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
@@ -33,13 +34,65 @@ auto of_object(const std::string& name, Work&& work) {
 
 } // namespace
 
-/// What is known of the stiffness of a cut model, from the object as it was before; nothing: K is
-/// factorised when it is needed. Nodes of the object may be gone with a part (CutModel::place). May
-/// change what the object keeps to be quick, for it is renewed where the cut is taken back.
-StiffnessParts Simulation::cut_parts(Object& object, const CutModel& cut) {
-  (void)object;
-  (void)cut;
-  return {};
+/// The stiffness of an elastostatic object, to follow its cuts; nothing: no solution was asked of
+/// it so far. It goes over to the next object, and is made anew where a cut is taken back.
+CutStiffness* Simulation::stiffness_of(Object& object) const {
+  if (object.stiffness || !object.still)
+    return object.stiffness.get();
+  const std::shared_ptr<const Model> first = object.first ? object.first : object.held;
+  StiffnessParts parts;
+  if (object.source.stiffness)
+    parts = object.source.stiffness(*first);
+  auto stiffness = std::make_unique<CutStiffness>(first, std::move(parts.columns), context_);
+  if (object.first)
+    (void)stiffness->cut(object.held, object.first_nodes, object.places);
+  object.stiffness = std::move(stiffness);
+  return object.stiffness.get();
+}
+
+/// That the object will be cut, so that its first cut costs no more than others.
+void Simulation::announce_cut(std::size_t index) {
+  Object& object = *objects_.at(index);
+  if (object.method != Method::ffe || object.stages)
+    return;
+  try {
+    if (CutStiffness* const stiffness = stiffness_of(object); stiffness != nullptr)
+      stiffness->prepare();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) { // told where it is needed
+    object.stiffness.reset();
+  }
+}
+
+void Simulation::announce_cuts(const Change& change) {
+  if (const auto* const cut = std::get_if<CutObject>(&change))
+    announce_cut(cut->object);
+  else if (const auto* const tearing = std::get_if<SetTear>(&change))
+    announce_cut(tearing->object);
+  else if (const auto* const set = std::get_if<SetInstrument>(&change);
+           set != nullptr && set->shape.blade)
+    for (std::size_t i = 0; i < objects_.size(); ++i)
+      announce_cut(i);
+}
+
+/// Of a cut model, from the object as it was before; nothing: K is factorised when it is needed.
+/// Nodes of the object may be gone with a part (CutModel::place).
+std::optional<StiffnessParts>
+Simulation::cut_parts(Object& object, std::shared_ptr<const Model> next, const CutModel& cut) {
+  CutStiffness* const stiffness = stiffness_of(object);
+  if (stiffness == nullptr)
+    return std::nullopt;
+  try {
+    const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
+    ++(work.way == CutWay::correction ? counts_.cut_corrections
+       : work.way == CutWay::renewal  ? counts_.cut_renewals
+                                      : counts_.cut_factors);
+    return stiffness->parts();
+  } catch (...) {
+    object.stiffness.reset();
+    throw;
+  }
 }
 
 /// Whether it is known and of one stage; who says otherwise is warned once.
@@ -100,19 +153,20 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
 
   const std::size_t removed = cut.removed, doubled = cut.doubled;
   CutModel rest = without_parts(std::move(cut), std::move(free.rest));
+  const auto now = std::make_shared<Model>(std::move(rest.model));
   std::optional<StiffnessParts> prepared;
   if (old.method == Method::ffe) {
     if (undo_->open && old.still)
       undo_->updated.insert(&old);
     try {
-      prepared = cut_parts(old, rest);
+      prepared = cut_parts(old, now, rest);
     } catch (const SingularStiffness&) {
       prepared.reset(); // found when the shape is asked for
     }
   }
   std::vector<std::unique_ptr<Object>> pieces;
-  Object& next =
-      *pieces.emplace_back(renumbered(old, std::make_shared<Model>(std::move(rest.model))));
+  Object& next = *pieces.emplace_back(renumbered(old, now));
+  next.stiffness = std::move(old.stiffness);
   next.first = old.first ? old.first : old.held;
   next.prepared = std::move(prepared);
   next.scored = std::move(rest.left);

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "sim/cut_stiffness.h"
 #include "sim/simulation.h"
 #include "sim/static_contact.h"
 
@@ -71,8 +72,9 @@ struct Simulation::Object {
   std::shared_ptr<Model> first;           // the model as it came, of a cut one
   std::vector<std::uint32_t> first_nodes; // see Simulation
   std::vector<std::uint32_t> places;
-  std::optional<StiffnessParts> prepared; // of the cut model, by cut_parts
-  Cut scored;                             // edges that wait to come apart
+  std::optional<StiffnessParts> prepared;  // of the cut model, by cut_parts
+  std::unique_ptr<CutStiffness> stiffness; // that made them
+  Cut scored;                              // edges that wait to come apart
   double tear = 0;
   bool warned_cut = false;
 };

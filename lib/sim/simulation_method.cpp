@@ -82,6 +82,8 @@ void Simulation::renew(Object& object) {
     simulation::add_counts(object.spent, second);
     object.two_step.reset();
   }
+  object.stiffness.reset();
+  object.prepared.reset();
   object.contact.reset();
   if (object.body != nullptr && object.integration == Integration::implicit)
     object.body->moving->renew();

@@ -86,7 +86,8 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     try {
       fresh.emplace(factorise_axes(*now, context));
     } catch (const Error&) { // a part that hangs at too little
-      ++refused;
+      if (++refused > 3)
+        continue;
       bool told = false;
       try {
         CutStiffness other(model, nullptr, context);

@@ -1,0 +1,179 @@
+// The stiffness of an object that is cut: whichever way it is followed, equal to a fresh one.
+
+#include "sim/cut_stiffness.h"
+
+#include "mesh_fixtures.h"
+#include "model/cut_select.h"
+#include "random_cuts.h"
+#include "sim/axis_solver.h"
+#include "sim/condition.h"
+#include "stiffness_models.h"
+#include "tests/bench/memory_columns.h"
+
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <random>
+
+using namespace gewebe;
+using namespace gewebe::test;
+
+namespace {
+
+std::shared_ptr<const Model> round_organ(int rounds) {
+  return std::make_shared<const Model>(model_of(sphere_mesh(rounds, 20, {1, 2, 3})));
+}
+
+double difference(std::span<const double> a, std::span<const double> b) {
+  EXPECT_EQ(a.size(), b.size());
+  double most = 0, size = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    most = std::max(most, std::abs(a[k] - b[k]));
+    size = std::max(size, std::abs(b[k]));
+  }
+  return size > 0 ? most / size : HUGE_VAL;
+}
+
+/// One that opens the surface.
+CutModel opened(const Model& model, double length) {
+  const SweptQuad area = blade_at(model, 100, 0.3, length * mean_edge(model), mean_edge(model));
+  return cut_model(model, swept_cut(model, {}, std::span(&area, 1)));
+}
+
+std::vector<double> fresh(const Model& model, std::vector<double> f) {
+  const AxisSolver solver = factorise_axes(model, Context{});
+  solver.solve(f, f.size() / (3 * model.nodes.size()));
+  return f;
+}
+
+} // namespace
+
+TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
+  for (const CutWay way : {CutWay::correction, CutWay::renewal, CutWay::fresh}) {
+    const auto model = round_organ(4);
+    CutStiffness stiffness(model, nullptr, Context{});
+    stiffness.prepare();
+    CutModel cut = opened(*model, 5);
+    ASSERT_GT(cut.doubled, 0u);
+    const auto now = std::make_shared<const Model>(std::move(cut.model));
+    const CutWork work = stiffness.cut(now, cut.origin, cut.place, way);
+    EXPECT_EQ(work.way, way);
+    const std::vector<double> f = random_vector(3 * now->nodes.size(), 1);
+    std::vector<double> u = f;
+    stiffness.parts().solve(u, 1);
+    EXPECT_LT(difference(u, fresh(*now, f)), 1e-8);
+  }
+}
+
+TEST(CutStiffness, ManyCutsInARow) {
+  auto model = round_organ(3);
+  CutStiffness stiffness(model, nullptr, Context{});
+  std::mt19937 random(3);
+  int corrected = 0, renewed = 0;
+  for (int done = 0; done < 25;) {
+    std::optional<CutModel> next = random_cut(*model, random, 6);
+    if (!next)
+      continue;
+    auto now = std::make_shared<const Model>(std::move(next->model));
+    const std::vector<double> f = random_vector(3 * now->nodes.size(), 2);
+    std::vector<double> expected;
+    try {
+      expected = fresh(*now, f);
+    } catch (const SingularStiffness&) {
+      continue;
+    }
+    const CutWork work = stiffness.cut(now, next->origin, next->place);
+    corrected += work.way == CutWay::correction ? 1 : 0;
+    renewed += work.way == CutWay::renewal ? 1 : 0;
+    std::vector<double> u = f;
+    stiffness.parts().solve(u, 1);
+    ASSERT_LT(difference(u, expected), 1e-8) << done;
+    model = now;
+    ++done;
+  }
+  EXPECT_GT(corrected, 0) << "small cuts are corrected";
+  EXPECT_GT(renewed, 0) << "until there are too many";
+}
+
+TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
+  const auto model = round_organ(4);
+  const StiffnessMatrix matrix = stiffness_matrix(*model);
+  const FactorData factor = Factor(matrix, {}).data();
+  CutStiffness stiffness(model, timing::memory_parts(matrix, factor, {3, 500, 1000}, false).columns,
+                         Context{});
+  CutModel cut = opened(*model, 4);
+  const auto now = std::make_shared<const Model>(std::move(cut.model));
+  (void)stiffness.cut(now, cut.origin, cut.place);
+  const StiffnessParts parts = stiffness.parts();
+  ASSERT_NE(parts.columns, nullptr);
+  EXPECT_FALSE(parts.columns->pays(1)) << "one node is solved for";
+  for (std::size_t k = 0; k < parts.columns->nodes().size(); ++k) {
+    std::vector<double> columns(9 * now->nodes.size()), right(columns.size(), 0);
+    parts.columns->read(k, columns);
+    for (std::size_t a = 0; a < 3; ++a)
+      right[a * 3 * now->nodes.size() + 3 * std::size_t{parts.columns->nodes()[k]} + a] = 1;
+    EXPECT_LT(difference(columns, fresh(*now, right)), 1e-9) << k;
+  }
+  EXPECT_TRUE(parts.columns->pays(1)) << "now that the responses are there";
+}
+
+TEST(CutStiffness, NamesWhatMovesFreely) {
+  // A node that hangs at one spring, with its tension: nothing holds it across.
+  const auto model = round_organ(3);
+  CutStiffness stiffness(model, nullptr, Context{});
+  Cut cut;
+  bool one = true;
+  for (std::size_t e = 0; e < model->springs.size(); ++e)
+    if (model->springs[e].i == 40 || model->springs[e].j == 40) {
+      if (!one)
+        cut.springs.push_back(e);
+      one = false;
+    }
+  CutModel next = cut_model(*model, cut);
+  const auto now = std::make_shared<const Model>(std::move(next.model));
+  try {
+    (void)stiffness.cut(now, next.origin, next.place);
+    FAIL() << "node 40 can move";
+  } catch (const SingularStiffness& error) {
+    EXPECT_NE(std::string(error.what()).find("40"), std::string::npos) << error.what();
+  }
+}
+
+TEST(CutStiffness, WhatWasHandedOutBeforeRefuses) {
+  const auto model = round_organ(3);
+  CutStiffness stiffness(model, nullptr, Context{});
+  stiffness.prepare();
+  const StiffnessParts before = stiffness.parts();
+  CutModel cut = opened(*model, 4);
+  const auto now = std::make_shared<const Model>(std::move(cut.model));
+  (void)stiffness.cut(now, cut.origin, cut.place, CutWay::renewal);
+  std::vector<double> f(3 * model->nodes.size(), 1);
+  EXPECT_THROW(before.solve(f, 1), Error);
+}
+
+TEST(CutStiffness, RepeatedIsTheSameToTheBit) {
+  std::vector<double> first;
+  for (const int threads : {1, 2, 1}) {
+    Context context;
+    context.threads = threads;
+    auto model = round_organ(3);
+    CutStiffness stiffness(model, nullptr, context);
+    if (threads == 2)
+      stiffness.prepare(); // announced or not
+    std::mt19937 random(5);
+    for (int done = 0; done < 6;) {
+      std::optional<CutModel> next = random_cut(*model, random, 4);
+      if (!next)
+        continue;
+      model = std::make_shared<const Model>(std::move(next->model));
+      (void)stiffness.cut(model, next->origin, next->place);
+      ++done;
+    }
+    std::vector<double> u = random_vector(3 * model->nodes.size(), 4);
+    stiffness.parts().solve(u, 1);
+    if (first.empty())
+      first = u;
+    ASSERT_EQ(u.size(), first.size());
+    EXPECT_EQ(std::memcmp(u.data(), first.data(), 8 * u.size()), 0) << threads;
+  }
+}
