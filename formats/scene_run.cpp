@@ -79,6 +79,7 @@ struct SceneRun::State {
   std::uint64_t first_error = 0;
   std::string first_error_text;
   std::vector<std::string> stores; ///< by object; "" where it has none
+  std::vector<std::string> models; ///< files that objects were made of
 
   State(std::string n, const Context& context, SceneOptions o)
       : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
@@ -132,6 +133,7 @@ struct SceneRun::State {
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
     stores.push_back(c.store);
+    models.push_back(c.model);
     if (options.events != nullptr)
       options.events->object(simulation.time(), c.name, c.model, c.method);
   }
@@ -142,6 +144,15 @@ struct SceneRun::State {
       throw Error("object " + c.object + " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
     return set;
+  }
+
+  void write(const EmitModelCommand& c) {
+    const std::size_t object = simulation.find(c.object);
+    if (!options.files.write_model)
+      throw Error("models can't be written here");
+    if (std::find(models.begin(), models.end(), c.file) != models.end())
+      throw Error(c.file + " is the model of an object of this scene, expected another file");
+    options.files.write_model(c.file, simulation.model(object));
   }
 
   void schedule(const Command& command, const Change& change) {
@@ -158,6 +169,8 @@ struct SceneRun::State {
       add(*object);
     } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
       schedule(command, stages(*two_step));
+    } else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what)) {
+      write(*emit);
     } else if (const std::optional<Change> change =
                    scene_change(command, simulation, [&](const std::string& list) {
                      return lists[list] = options.files.node_list(list);
