@@ -123,6 +123,25 @@ struct Describe {
       row.value = simulation.jumps().back().size;
   }
   void operator()(const Renew& c) { of(c.object, "renew"); }
+  void operator()(const CutObject& c) {
+    of(c.object, "cut");
+    if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
+      row.nodes = springs->from;
+      row.others = springs->to;
+      row.text = "springs";
+      return;
+    }
+    const auto& plane = std::get<PlaneToCut>(c.what);
+    row.nodes = plane.nodes.value_or(std::vector<std::uint32_t>{});
+    row.vector = plane.plane.point;
+    const Vec3& n = plane.plane.normal;
+    row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z);
+  }
+  void operator()(const SetTear& c) {
+    of(c.object, "tear");
+    row.value = c.strain;
+  }
+  void operator()(const Restore& c) { of(c.object, "restore"); }
 };
 
 } // namespace
@@ -158,6 +177,22 @@ void EventLog::change(const Simulation& simulation, const Change& change) {
   Describe describe{simulation};
   std::visit(describe, change);
   rows_.push_back(csv(describe.row));
+}
+
+void EventLog::cutting(const Simulation& simulation, const Cutting& c) {
+  const bool part = c.kind == Cutting::Kind::part;
+  rows_.push_back(
+      csv({.time = c.time,
+           .what = c.kind == Cutting::Kind::cut     ? "severed"
+                   : part                           ? "part"
+                   : c.kind == Cutting::Kind::loose ? "loose"
+                                                    : "restored",
+           .object = simulation.name(c.object),
+           .value = static_cast<double>(c.nodes),
+           .other = part ? simulation.name(c.part) : "",
+           .text = c.kind == Cutting::Kind::cut ? std::to_string(c.springs) + " springs, " +
+                                                      std::to_string(c.doubled) + " nodes doubled"
+                                                : c.text}));
 }
 
 void EventLog::message(double time, const char* what, std::string_view text) {

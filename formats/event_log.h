@@ -19,6 +19,8 @@ public:
   /// A new object, of this model file.
   void object(double time, const std::string& name, const std::string& model, Method method);
   void change(const Simulation& simulation, const Change& change);
+  /// What cutting did to an object.
+  void cutting(const Simulation& simulation, const Cutting& cutting);
   /// `what` is "error" or "warning".
   void message(double time, const char* what, std::string_view text);
 

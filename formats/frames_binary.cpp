@@ -1,6 +1,7 @@
 #include "formats/frames_binary.h"
 
 #include "base/error.h"
+#include "formats/scene_answer.h"
 
 #include <cmath>
 #include <cstddef>
@@ -35,6 +36,23 @@ void append_single(std::string& bytes, const Vec3& v) {
     append_single(bytes, v[a]);
 }
 
+void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
+  const auto frame = [&](FrameKind kind, std::size_t object, auto... values) {
+    append_head(bytes, {kind, static_cast<std::uint32_t>(object), step, sizeof...(values)});
+    (append(bytes, static_cast<std::uint32_t>(values)), ...);
+  };
+  switch (c.kind) {
+  case Cutting::Kind::cut:
+    return frame(FrameKind::cut, c.object, c.springs, c.doubled, c.nodes);
+  case Cutting::Kind::part:
+    return frame(FrameKind::part, c.part, c.object, c.nodes);
+  case Cutting::Kind::loose:
+    return frame(FrameKind::loose, c.object, c.nodes);
+  case Cutting::Kind::restored:
+    return frame(FrameKind::restored, c.object, c.nodes);
+  }
+}
+
 } // namespace
 
 std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
@@ -44,6 +62,16 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     append_single(bytes, jump.size);
   }
   const auto objects = static_cast<std::uint32_t>(simulation.object_count());
+  for (const Cutting& c : simulation.cuttings())
+    append_cutting(bytes, c, step);
+  for (std::uint32_t i = 0; simulation.emits_shapes() && i < objects; ++i) {
+    if (!topology_changed(simulation, i))
+      continue;
+    const std::vector<Triangle>& triangles = simulation.model(i).triangles;
+    append_head(bytes, {FrameKind::triangles, i, step, 3 * triangles.size()});
+    for (const Triangle& t : triangles)
+      append(bytes, t);
+  }
   for (std::uint32_t i = 0; simulation.emits_forces() && i < objects; ++i) {
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
     append_head(bytes, {FrameKind::nodes, i, step, forces.size()});

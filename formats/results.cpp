@@ -61,8 +61,8 @@ std::optional<ShapeGroup> shape_in_frame(const hdf5::Group& objects, const std::
   for (std::uint64_t k = 1; cuts.has(std::to_string(k)); ++k) {
     hdf5::Group cut = cuts.group(std::to_string(k));
     const auto first = cut.number<std::uint64_t>("first_frame");
-    if (first <= found.first)
-      cut.fail("begins in frame " + std::to_string(first) + ", expected a later one than " +
+    if (first < found.first)
+      cut.fail("begins in frame " + std::to_string(first) + ", expected none before " +
                std::to_string(found.first));
     if (first > frame)
       break;

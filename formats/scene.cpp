@@ -185,6 +185,15 @@ What parse_instrument(Words& in) {
   InstrumentCommand c;
   c.name = in.name();
   const std::string& kind = in.word("shape");
+  if (kind == "blade") {
+    c.shape.blade = true;
+    c.shape.radius = 0;
+    c.pose.place = in.vector("number");
+    c.shape.axis = in.vector("number") - c.pose.place;
+    if (c.shape.axis == Vec3{})
+      in.fail("an edge without length");
+    return c;
+  }
   if (kind != "sphere" && kind != "capsule")
     in.fail(shown(kind) + " is no shape");
   const bool capsule = kind == "capsule";
@@ -308,6 +317,42 @@ What parse_method(Words& in) {
   return c;
 }
 
+What parse_cut(Words& in) {
+  CutCommand c;
+  c.object = in.name();
+  const std::string& kind = in.word("'springs' or 'plane'");
+  if (kind == "plane") {
+    CutPlane& plane = c.plane.emplace();
+    plane.point = in.vector("number");
+    plane.normal = in.vector("number");
+    const double size = norm(plane.normal);
+    if (!(size > 0 && std::isfinite(size)))
+      in.fail("a normal without direction");
+    if (!in.done())
+      c.nodes = in.nodes();
+  } else if (kind == "springs") {
+    c.nodes = in.nodes();
+    if (!in.done())
+      c.others = in.nodes();
+  } else {
+    in.fail(shown(kind) + " can't be cut");
+  }
+  return c;
+}
+
+What parse_tear(Words& in) {
+  TearCommand c;
+  c.object = in.name();
+  c.strain = in.number("strain");
+  if (!(c.strain >= 0))
+    in.fail("a negative strain");
+  return c;
+}
+
+What parse_restore(Words& in) {
+  return RestoreCommand{in.name()};
+}
+
 What parse_renew(Words& in) {
   return RenewCommand{in.name()};
 }
@@ -319,8 +364,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 18>& verbs() {
-  static const std::array<Verb, 18> all{{
+const std::array<Verb, 21>& verbs() {
+  static const std::array<Verb, 21> all{{
       {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
@@ -329,13 +374,17 @@ const std::array<Verb, 18>& verbs() {
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
       {"release", "release NAME NODES", true, parse_release},
       {"instrument",
-       "instrument NAME sphere R x y z [friction MU] or instrument NAME capsule R x y z x y z "
-       "[friction MU]",
+       "instrument NAME sphere R x y z [friction MU], instrument NAME capsule R x y z x y z "
+       "[friction MU] or instrument NAME blade x y z x y z",
        true, parse_instrument},
       {"move", "move NAME x y z [turn ax ay az DEGREES|quaternion w x y z] [over T]", true,
        parse_move},
       {"grasp", "grasp NAME NODES INSTRUMENT", true, parse_grasp},
       {"withdraw", "withdraw NAME", true, parse_withdraw},
+      {"cut", "cut NAME springs NODES [NODES] or cut NAME plane px py pz nx ny nz [NODES]", true,
+       parse_cut},
+      {"tear", "tear NAME STRAIN, 0 or more", true, parse_tear},
+      {"restore", "restore NAME", true, parse_restore},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},

@@ -2,6 +2,7 @@
 
 #include "formats/scene_instrument.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <span>
@@ -27,6 +28,30 @@ void append(std::string& text, const Vec3& v, char end) {
 
 } // namespace
 
+std::string cutting_line(const Simulation& simulation, const Cutting& c) {
+  const std::string& name = simulation.name(c.object);
+  const std::string nodes = " nodes " + std::to_string(c.nodes);
+  switch (c.kind) {
+  case Cutting::Kind::cut:
+    return "cut " + name + " springs " + std::to_string(c.springs) + " doubled " +
+           std::to_string(c.doubled) + nodes;
+  case Cutting::Kind::part:
+    return "part " + name + " " + simulation.name(c.part) + nodes;
+  case Cutting::Kind::loose:
+    return "loose " + name + nodes;
+  default:
+    return "restored " + name + nodes;
+  }
+}
+
+bool topology_changed(const Simulation& simulation, std::size_t object) {
+  const std::vector<Cutting>& all = simulation.cuttings();
+  return std::any_of(all.begin(), all.end(), [&](const Cutting& c) {
+    return c.kind != Cutting::Kind::loose &&
+           (c.kind == Cutting::Kind::part ? c.part : c.object) == object;
+  });
+}
+
 std::string text_answer(const Simulation& simulation, std::uint64_t step) {
   std::string text = "step " + std::to_string(step) + " ";
   append(text, simulation.time());
@@ -35,6 +60,16 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
     text += "jump " + simulation.name(jump.object) + " ";
     append(text, jump.size);
     text += '\n';
+  }
+  for (const Cutting& c : simulation.cuttings())
+    text += cutting_line(simulation, c) + "\n";
+  for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
+    if (!topology_changed(simulation, i))
+      continue;
+    const std::vector<Triangle>& triangles = simulation.model(i).triangles;
+    text += "triangles " + simulation.name(i) + " " + std::to_string(triangles.size()) + "\n";
+    for (const Triangle& t : triangles)
+      text += std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
   }
   for (std::size_t i = 0; simulation.emits_forces() && i < simulation.object_count(); ++i) {
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);

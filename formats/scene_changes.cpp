@@ -2,9 +2,32 @@
 
 #include "formats/scene_instrument.h"
 
+#include <utility>
 #include <variant>
 
 namespace gewebe {
+
+namespace {
+
+Change cut_change(const CutCommand& cut, Simulation& simulation, const LoadNodeList& lists) {
+  CutObject change{simulation.find(cut.object), {}};
+  const auto nodes = [&](const std::optional<Selector>& selector) {
+    return select_nodes(simulation.model(change.object), *selector, lists);
+  };
+  if (cut.plane) {
+    PlaneToCut what{*cut.plane, {}};
+    if (cut.nodes)
+      what.nodes = nodes(cut.nodes);
+    change.what = std::move(what);
+  } else {
+    SpringsToCut what{nodes(cut.nodes), {}};
+    what.to = cut.others ? nodes(cut.others) : what.from;
+    change.what = std::move(what);
+  }
+  return change;
+}
+
+} // namespace
 
 std::optional<Change> scene_change(const Command& command, Simulation& simulation,
                                    const LoadNodeList& lists) {
@@ -47,6 +70,12 @@ std::optional<Change> scene_change(const Command& command, Simulation& simulatio
     return SetMethod{simulation.find(method->object), method->method};
   if (const auto* const renew = std::get_if<RenewCommand>(&command.what))
     return Renew{simulation.find(renew->object)};
+  if (const auto* const cut = std::get_if<CutCommand>(&command.what))
+    return cut_change(*cut, simulation, lists);
+  if (const auto* const tear = std::get_if<TearCommand>(&command.what))
+    return SetTear{simulation.find(tear->object), tear->strain};
+  if (const auto* const restore = std::get_if<RestoreCommand>(&command.what))
+    return Restore{simulation.find(restore->object)};
   return instrument_change(command, simulation, [&](std::size_t object, const Selector& selector) {
     return select_nodes(simulation.model(object), selector, lists);
   });

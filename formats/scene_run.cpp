@@ -16,6 +16,7 @@
 #include <istream>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -132,7 +133,8 @@ struct SceneRun::State {
     };
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
-    stores.push_back(c.store);
+    stores.resize(simulation.object_count()); // parts that came off have none
+    stores.back() = c.store;
     models.push_back(c.model);
     if (options.events != nullptr)
       options.events->object(simulation.time(), c.name, c.model, c.method);
@@ -140,7 +142,7 @@ struct SceneRun::State {
 
   SetTwoStep stages(const TwoStepCommand& c) {
     SetTwoStep set{simulation.find(c.object), {c.threshold, c.series}, {}};
-    if (stores.at(set.object).empty())
+    if (set.object >= stores.size() || stores[set.object].empty())
       throw Error("object " + c.object + " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
     return set;
@@ -204,23 +206,48 @@ struct SceneRun::State {
       sample(c.until); // which refuses a past one
   }
 
+  /// What the result must know of new objects, and of those that were cut since the last frame.
+  void add_results(bool cut) {
+    static const Model none;
+    const bool models_too = options.result->wants_models();
+    for (; in_result < simulation.object_count(); ++in_result) {
+      const Model& model = models_too ? simulation.first_model(in_result) : none;
+      const bool part = std::any_of(
+          simulation.cuttings().begin(), simulation.cuttings().end(),
+          [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
+      deliver([&] {
+        if (part)
+          options.result->add_part(simulation.name(in_result), model);
+        else
+          options.result->add_object(simulation.name(in_result), model);
+      });
+    }
+    if (!cut || !models_too)
+      return;
+    std::set<std::size_t> changed;
+    for (const Cutting& c : simulation.cuttings())
+      if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
+        changed.insert(c.object);
+    for (const std::size_t object : changed)
+      deliver([&] {
+        options.result->change_object(object, simulation.model(object),
+                                      simulation.first_nodes(object));
+      });
+  }
+
   /// The frame before anything moves, and what the result must know of new objects.
   void first_frame() {
     if (simulation.object_count() == 0)
       throw Error("there is no object, expected an object command first");
     if (options.result == nullptr)
       return;
-    static const Model none;
-    for (; in_result < simulation.object_count(); ++in_result) {
-      const Model& model = options.result->wants_models() ? simulation.model(in_result) : none;
-      deliver([&] { options.result->add_object(simulation.name(in_result), model); });
-    }
+    add_results(false);
     if (counts.frames > 0)
       return;
     std::vector<std::vector<double>> rest;
     std::vector<FrameObject> frame;
     for (std::size_t i = 0; i < simulation.object_count(); ++i)
-      rest.emplace_back(simulation.known(i) ? 3 * simulation.model(i).nodes.size() : 0);
+      rest.emplace_back(simulation.known(i) ? 3 * simulation.first_model(i).nodes.size() : 0);
     for (const std::vector<double>& one : rest)
       frame.push_back({one, {}});
     deliver([&] { options.result->add_frame(0, frame); });
@@ -235,15 +262,20 @@ struct SceneRun::State {
                                      : text_answer(simulation, steps));
       });
     simulation.take_jumps();
+    if (options.events != nullptr)
+      for (const Cutting& c : simulation.cuttings())
+        options.events->cutting(simulation, c);
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
     if (options.result != nullptr) {
+      add_results(true);
       std::vector<FrameObject> frame;
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
         frame.push_back({simulation.displacement(i), simulation.contact_forces(i)});
       deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }
+    simulation.take_cuttings();
     if (options.measure)
       deliver([&] { measure(); });
     if (options.events != nullptr)

@@ -2,6 +2,7 @@
 // The commands of a scene, scene(5), as data.
 
 #include "base/vec3.h"
+#include "model/cut_select.h"
 #include "model/selector.h"
 #include "sim/instrument.h"
 
@@ -106,6 +107,20 @@ struct RenewCommand {
   std::string object;
 };
 
+struct CutCommand {
+  std::string object;
+  std::optional<CutPlane> plane; ///< none: springs
+  std::optional<Selector> nodes; ///< that a plane may pass; springs start at these
+  std::optional<Selector> others;
+};
+struct TearCommand {
+  std::string object;
+  double strain = 0; ///< 0: none any more
+};
+struct RestoreCommand {
+  std::string object;
+};
+
 struct Command {
   std::optional<double> at; ///< when; absent: now. Never for object, step, run
                             ///< and renew.
@@ -113,7 +128,8 @@ struct Command {
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
                ReleaseCommand, InstrumentCommand, MoveCommand, GraspCommand, WithdrawCommand,
                GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand, EmitModelCommand,
-               StepCommand, RunCommand, MethodCommand, RenewCommand>
+               StepCommand, RunCommand, MethodCommand, RenewCommand, CutCommand, TearCommand,
+               RestoreCommand>
       what;
 };
 

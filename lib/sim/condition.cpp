@@ -398,8 +398,8 @@ namespace {
   if (!motion)
     throw Error("the model is unstable at rest: springs shorter than their rest length push nodes "
                 "aside, expected springs near it");
-  throw Error("the stiffness matrix is " + how + ": " + motion_text(*motion) + ", " +
-              remedy(motion->kind));
+  throw SingularStiffness("the stiffness matrix is " + how + ": " + motion_text(*motion) + ", " +
+                          remedy(motion->kind));
 }
 
 /// The largest backward error of some right-hand sides: noise, and a unit force in the middle.

@@ -3,6 +3,7 @@
 // doesn't.
 
 #include "base/context.h"
+#include "base/error.h"
 #include "model/model.h"
 #include "sim/factor.h"
 #include "sim/stiffness.h"
@@ -18,6 +19,12 @@ namespace gewebe {
 inline constexpr double max_condition = 1e12;
 /// Backward error that every solution must keep.
 inline constexpr double max_backward_error = 1e-14;
+
+/// The matrix determines no displacements: something moves freely, or nearly so.
+class SingularStiffness : public Error {
+public:
+  using Error::Error;
+};
 
 /// Estimate of ‖K⁻¹‖₁, a lower bound that is rarely off by more than a factor of 3 (Hager 1984;
 /// Higham 1988, algorithm 2.4).
@@ -67,9 +74,9 @@ struct StiffnessCheck {
 };
 
 /// The factor of a matrix that determines displacements.
-/// \throw Error naming the component, its free motion and a remedy if the condition exceeds
-/// max_condition; if the model is unstable at rest, as by springs far too short for their rest
-/// length; if a solution exceeds max_backward_error; what Factor throws
+/// \throw SingularStiffness naming the component, its free motion and a remedy if the condition
+/// exceeds max_condition; Error if the model is unstable at rest, as by springs far too short for
+/// their rest length; if a solution exceeds max_backward_error; what Factor throws
 Factor checked_factor(const Model& model, const StiffnessMatrix& matrix, const Context& context,
                       StiffnessCheck& check);
 

@@ -1,7 +1,7 @@
 #pragma once
 // Rigid instruments that touch objects: a sphere or a capsule (all points within a radius of a
-// segment), where it stands and how it moves. Both are convex, so that for any unit vector n all
-// that lies beyond the support plane n·y = support(n) is outside.
+// segment), where it stands and how it moves; and blades, which push nothing. Both are convex, so
+// that for any unit vector n all that lies beyond the support plane n·y = support(n) is outside.
 
 #include "base/vec3.h"
 
@@ -47,9 +47,10 @@ struct PoseWay {
 
 /// The origin is a sphere's centre, or the first end of a capsule's segment.
 struct InstrumentShape {
-  double radius = 1;   ///< mm, > 0
+  double radius = 1;   ///< mm, > 0; of a blade 0
   Vec3 axis;           ///< from the first end to the second; 0: a sphere
   double friction = 0; ///< Coulomb's coefficient
+  bool blade = false;  ///< an edge along the axis, without radius: it cuts what it sweeps over
 };
 
 /// An instrument at one moment.

@@ -39,6 +39,19 @@ const Model& Simulation::model(std::size_t object) const {
   return objects_[object]->model;
 }
 
+const Model& Simulation::first_model(std::size_t object) const {
+  need_model(*objects_.at(object));
+  return objects_[object]->first ? *objects_[object]->first : objects_[object]->model;
+}
+
+std::span<const std::uint32_t> Simulation::first_nodes(std::size_t object) const {
+  return objects_.at(object)->first_nodes;
+}
+
+std::span<const std::uint32_t> Simulation::places(std::size_t object) const {
+  return objects_.at(object)->places;
+}
+
 bool Simulation::known(std::size_t object) const {
   return objects_.at(object)->known;
 }

@@ -3,6 +3,8 @@
 // event, elastostatic ones take their shape when it is asked for, at the end of a step.
 
 #include "base/context.h"
+#include "model/cut.h"
+#include "model/cut_select.h"
 #include "model/model.h"
 #include "sim/command.h"
 #include "sim/elastodynamic.h"
@@ -105,9 +107,30 @@ struct SetMethod {
 struct Renew {
   std::size_t object = 0;
 };
+/// What a cut severs: springs between sets of nodes, or what a plane passes, of all nodes or some.
+struct SpringsToCut {
+  std::vector<std::uint32_t> from, to;
+};
+struct PlaneToCut {
+  CutPlane plane;
+  std::optional<std::vector<std::uint32_t>> nodes;
+};
+struct CutObject {
+  std::size_t object = 0;
+  std::variant<SpringsToCut, PlaneToCut> what;
+};
+/// Springs that are stretched beyond this tear from now on; 0: none any more.
+struct SetTear {
+  std::size_t object = 0;
+  double strain = 0;
+};
+/// The model as it came; what has come off stays an object of its own.
+struct Restore {
+  std::size_t object = 0;
+};
 using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
                             MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
-                            Emit, SetMethod, Renew>;
+                            Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
 /// Where what an object consists of comes from: asked for when it is first needed, the stiffness
 /// again after a Renew. What they throw leaves the call that needed it.
@@ -134,6 +157,23 @@ struct MethodJump {
   double size = 0; ///< mm, of the node that moved most
 };
 
+/// What cutting did to an object.
+struct Cutting {
+  enum class Kind {
+    cut,     ///< by a command, a blade or tearing
+    part,    ///< came off as an object of its own
+    loose,   ///< what hangs together can move freely: it goes on elastodynamic
+    restored ///< its model is whole again
+  };
+  Kind kind = Kind::cut;
+  std::size_t object = 0;
+  std::size_t part = 0;                 ///< the new object
+  std::size_t springs = 0, doubled = 0; ///< that are gone; copies of nodes
+  std::size_t nodes = 0;                ///< of the object (of the part), now
+  double time = 0;
+  std::string text; ///< of loose: what moves
+};
+
 struct SimulationCounts {
   std::uint64_t steps = 0;         ///< of the scene
   std::uint64_t integration = 0;   ///< integration steps of elastodynamic objects
@@ -141,6 +181,7 @@ struct SimulationCounts {
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
   double largest_jump = 0;         ///< mm, see MethodJump
+  std::uint64_t cuts = 0;          ///< that changed a model
 };
 
 /// An instrument at the end of the last step.
@@ -177,8 +218,15 @@ public:
 
   std::size_t object_count() const noexcept { return objects_.size(); }
   const std::string& name(std::size_t object) const;
-  /// Read now if it was not needed before. \throw as its source
+  /// Read now if it was not needed before. The first one of an object lives as long as this; a cut
+  /// one as long as nothing more is cut. \throw as its source
   const Model& model(std::size_t object) const;
+  /// The model as it came. \throw as its source
+  const Model& first_model(std::size_t object) const;
+  /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
+  std::span<const std::uint32_t> first_nodes(std::size_t object) const;
+  /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.
+  std::span<const std::uint32_t> places(std::size_t object) const;
   /// Whether its model was needed so far.
   bool known(std::size_t object) const;
   Method method(std::size_t object) const;
@@ -231,6 +279,9 @@ public:
   const std::vector<MethodJump>& jumps() const noexcept { return jumps_; }
   void take_jumps() noexcept { jumps_.clear(); }
   std::vector<std::size_t> take_renewed();
+  /// Since they were last taken, in the order in which they happened.
+  const std::vector<Cutting>& cuttings() const noexcept { return cuttings_; }
+  void take_cuttings() noexcept { cuttings_.clear(); }
   /// Behind the last step: warns, once per object, where the threshold of the two-step method was
   /// never reached.
   void warn_of_thresholds();
@@ -275,7 +326,8 @@ private:
   std::span<const double> still_shape(Object& object) const;
   const std::vector<NodeVector>& still_forces(const Object& object) const;
   [[noreturn]] void raise(const Body& body) const;
-  std::unique_ptr<Body> make_body(std::vector<std::size_t> parts);
+  using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
+  std::unique_ptr<Body> make_body(std::vector<std::size_t> parts, const Motions* motions = nullptr);
   void move_bodies(double to);
   void advance(double to);
   template <class Work>
@@ -304,6 +356,25 @@ private:
   void follow_instruments(Object& object);
   void take_touches();
   void add_touches(Object& object);
+  struct Moves;
+  void cut_now(const CutObject& change);
+  void restore_now(std::size_t index);
+  void carry_out(std::size_t index, CutModel cut);
+  StiffnessParts cut_parts(Object& object, const CutModel& cut);
+  std::unique_ptr<Object> renumbered(const Object& old, std::shared_ptr<Model> model) const;
+  void move_all(std::size_t index, const Moves& moves, std::vector<std::unique_ptr<Object>> pieces);
+  void move_shown(const Object& old, const Moves& moves,
+                  const std::vector<std::unique_ptr<Object>>& pieces) const;
+  void move_grips(std::size_t index, const Moves& moves);
+  void move_events(std::size_t index, const Moves& moves);
+  void move_ties(std::size_t index, const Moves& moves);
+  void renew_bodies(const std::vector<std::size_t>& objects, const Motions& motions);
+  std::string free_name(const std::string& name) const;
+  std::vector<SweptQuad> swept_areas();
+  void sweep_blades();
+  void tear();
+  bool may_cut(Object& object);
+  void find_free_motion(std::size_t index);
 
   Context context_;
   SimulationOptions options_;
@@ -322,6 +393,7 @@ private:
   SimulationCounts counts_;
   std::vector<MethodJump> jumps_;
   std::vector<std::size_t> renewed_;
+  std::vector<Cutting> cuttings_;
   std::unique_ptr<Undo> undo_;
 };
 

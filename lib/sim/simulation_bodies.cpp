@@ -19,7 +19,9 @@ constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a ten
 
 } // namespace
 
-std::unique_ptr<Simulation::Body> Simulation::make_body(std::vector<std::size_t> parts) {
+/// \param motions of parts, by object; none: as they move now
+std::unique_ptr<Simulation::Body> Simulation::make_body(std::vector<std::size_t> parts,
+                                                        const Motions* motions) {
   auto body = std::make_unique<Body>();
   std::vector<std::size_t> offset;
   const Model* model = &objects_[parts[0]]->model;
@@ -48,6 +50,10 @@ std::unique_ptr<Simulation::Body> Simulation::make_body(std::vector<std::size_t>
   std::vector<NodeMotion> motion;
   for (const std::size_t part : parts) {
     const Object& object = *objects_[part];
+    if (motions != nullptr) {
+      motion.insert(motion.end(), motions->at(part).begin(), motions->at(part).end());
+      continue;
+    }
     if (object.body == nullptr) {
       motion.resize(motion.size() + object.model.nodes.size());
       continue;

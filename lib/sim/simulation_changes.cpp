@@ -29,6 +29,9 @@ void Simulation::check(const Change& change) const {
     if (object.method != Method::ffe)
       throw Error("object " + object.name +
                   " is elastodynamic (ela), expected an elastostatic one for two-step");
+    if (object.first)
+      throw Error("object " + object.name +
+                  " is cut and its second stage is not, expected one that is whole");
     return;
   }
   const auto* const set = std::get_if<SetDisplacement>(&change);
@@ -45,7 +48,8 @@ void Simulation::check(const Change& change) const {
 void Simulation::apply(const Change& change) {
   check(change);
   // The others can't fail behind their check.
-  if (std::holds_alternative<Attach>(change) || std::holds_alternative<SetMethod>(change))
+  if (std::holds_alternative<Attach>(change) || std::holds_alternative<SetMethod>(change) ||
+      std::holds_alternative<CutObject>(change) || std::holds_alternative<Restore>(change))
     guarded([&] { apply_now(change); });
   else
     apply_now(change);
@@ -110,6 +114,14 @@ void Simulation::apply_now(const Change& change) {
     timestep_ = wish->dt;
   } else if (const auto* const method = std::get_if<SetMethod>(&change)) {
     set_method(method->object, method->method);
+  } else if (const auto* const cut = std::get_if<CutObject>(&change)) {
+    cut_now(*cut);
+  } else if (const auto* const whole = std::get_if<Restore>(&change)) {
+    restore_now(whole->object);
+  } else if (const auto* const tearing = std::get_if<SetTear>(&change)) {
+    Object& object = *objects_.at(tearing->object);
+    undo_->note([&object, old = object.tear] { object.tear = old; });
+    object.tear = tearing->strain;
   } else if (const auto* const again = std::get_if<Renew>(&change)) {
     touch(again->object);
     renew(*touched);

@@ -113,9 +113,11 @@ bool Simulation::apply_instrument(const Change& change) {
   if (const auto* const set = std::get_if<SetInstrument>(&change)) {
     Instrument& i = *instruments_.at(set->instrument);
     drop_grips(set->instrument);
+    i.changed = i.changed || !set->shape.blade || (i.present && !i.shape.blade);
     i.present = false;
     note_poses(); // it takes no way from where it was
-    i.present = i.changed = true;
+    i.present = true;
+    i.path.clear();
     i.shape = set->shape;
     i.way = {set->pose, set->pose, time_, time_};
     i.before = set->pose;
@@ -126,7 +128,10 @@ bool Simulation::apply_instrument(const Change& change) {
     carry(i);
   } else if (const auto* const grasp = std::get_if<Grasp>(&change)) {
     Instrument& i = there(grasp->instrument);
+    if (i.shape.blade)
+      throw Error("the instrument " + i.name + " is a blade, expected one that can hold nodes");
     Object& object = *objects_.at(grasp->object);
+    shape_in_step(object); // where the nodes stand
     keep_load(object);
     drop_grips(grasp->object, grasp->nodes);
     const Pose pose = i.way.at(time_);
@@ -147,7 +152,7 @@ bool Simulation::apply_instrument(const Change& change) {
     Instrument& i = there(withdraw->instrument);
     drop_grips(withdraw->instrument);
     i.present = false;
-    i.changed = true;
+    i.changed = i.changed || !i.shape.blade;
   } else {
     return false;
   }
@@ -194,9 +199,14 @@ void Simulation::drop_grips(std::size_t instrument) {
 void Simulation::note_poses() {
   if (instruments_.empty())
     return;
-  std::vector<std::optional<Pose>> now;
-  for (const auto& i : instruments_)
-    now.push_back(i->present ? std::optional(i->way.at(time_)) : std::nullopt);
+  std::vector<std::optional<Pose>> now; // of those that push
+  for (const auto& i : instruments_) {
+    now.push_back(i->present && !i->shape.blade ? std::optional(i->way.at(time_)) : std::nullopt);
+    if (!i->present || !i->shape.blade)
+      continue;
+    if (const Pose pose = i->way.at(time_); i->path.empty() || i->path.back() != pose)
+      i->path.push_back(pose);
+  }
   if (poses_.empty() || poses_.back() != now)
     poses_.push_back(std::move(now));
 }
@@ -210,9 +220,10 @@ void Simulation::guide(Body& body, double to) {
   std::vector<std::optional<MovingInstrument>> all;
   bool any = false;
   for (const auto& i : instruments_) {
-    any = any || i->present;
-    all.push_back(i->present ? std::optional(MovingInstrument{i->shape, i->before, i->way})
-                             : std::nullopt);
+    const bool pushes = i->present && !i->shape.blade;
+    any = any || pushes;
+    all.push_back(pushes ? std::optional(MovingInstrument{i->shape, i->before, i->way})
+                         : std::nullopt);
   }
   if (any && objects_[body.parts[0]]->integration == Integration::implicit) {
     if (!body.warned_implicit && options_.warn)
@@ -235,10 +246,10 @@ void Simulation::guide(Body& body, double to) {
     }
     for (const auto& i : instruments_) {
       const Pose now = i->way.at(to);
-      if (!i->changed && i->before == now)
+      if (!i->changed && (i->before == now || i->shape.blade))
         continue;
-      if (body.touched ||
-          (i->present && near(box_between(i->shape, i->before, now), *body.rest_box)))
+      if (body.touched || (i->present && !i->shape.blade &&
+                           near(box_between(i->shape, i->before, now), *body.rest_box)))
         body.moving->wake();
     }
   }
@@ -308,7 +319,7 @@ void Simulation::take_touches() {
 /// Whether there are, or have just been.
 bool Simulation::instruments_there() const {
   return std::any_of(instruments_.begin(), instruments_.end(),
-                     [](const auto& i) { return i->present || i->changed; });
+                     [](const auto& i) { return (i->present && !i->shape.blade) || i->changed; });
 }
 
 /// Whether instruments moved where this object feels it.

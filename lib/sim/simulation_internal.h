@@ -13,7 +13,9 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -28,9 +30,12 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 } // namespace simulation
 
 struct Simulation::Object {
+  explicit Object(std::shared_ptr<Model> m = std::make_shared<Model>())
+      : held(std::move(m)), model(*held) {}
   std::string name;
   ObjectSource source;
-  Model model; // never moves: the methods refer to it; empty until it is known
+  std::shared_ptr<Model> held;
+  Model& model; // never moves: the methods refer to it; empty until it is known
   bool known = false;
   Method method = Method::ela;
   Load load;
@@ -61,6 +66,33 @@ struct Simulation::Object {
   std::unique_ptr<StaticContact> contact; // of an elastostatic object, once there are instruments
   std::vector<NodeTouch> touches;         // as shown
   bool warned_stuck = false, warned_unsolved = false, warned_stages = false;
+
+  // A cut makes another object that takes this one's place.
+  std::shared_ptr<Model> first;           // the model as it came, of a cut one
+  std::vector<std::uint32_t> first_nodes; // see Simulation
+  std::vector<std::uint32_t> places;
+  std::optional<StiffnessParts> prepared; // of the cut model, by cut_parts
+  Cut scored;                             // edges that wait to come apart
+  double tear = 0;
+  bool warned_cut = false;
+};
+
+/// Where the nodes of an object have gone.
+struct Simulation::Moves {
+  struct To {
+    std::size_t object = 0;
+    std::uint32_t node = 0;
+    double share = 1; // of what the node had
+    bool main = true; // of several: which one goes on as that node
+  };
+  std::vector<std::size_t> objects; // itself, new ones
+  std::vector<std::size_t> first;   // by node, and the end
+  std::vector<To> all;
+
+  std::span<const To> of(std::uint32_t node) const {
+    return {all.data() + first[node], all.data() + first[node + std::size_t{1}]};
+  }
+  void add(std::vector<std::pair<std::uint32_t, To>> ways, std::size_t nodes);
 };
 
 struct Simulation::Instrument {
@@ -74,8 +106,9 @@ struct Simulation::Instrument {
   bool present = false;
   PoseWay way;
   std::vector<Grip> grips;
-  Pose before;          // where elastodynamic objects last met it
-  bool changed = false; // since then put or withdrawn
+  std::vector<Pose> path; // of a blade: what it has passed in this step
+  Pose before;            // where elastodynamic objects last met it
+  bool changed = false;   // since then put or withdrawn
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.

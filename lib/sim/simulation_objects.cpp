@@ -74,13 +74,16 @@ void Simulation::need_body(std::size_t object) {
 
 Elastostatic& Simulation::still_of(Object& object) const {
   need_model(object);
-  if (!object.still)
-    object.still.emplace(object.model,
-                         object.source.stiffness ? object.source.stiffness(object.model)
-                                                 : StiffnessParts{},
-                         context_,
-                         ElastostaticOptions{.measure_error = options_.measure_error,
-                                             .tolerance = options_.tolerance});
+  if (object.still)
+    return *object.still;
+  StiffnessParts parts;
+  if (object.prepared)
+    parts = *std::exchange(object.prepared, std::nullopt);
+  else if (!object.first && object.source.stiffness)
+    parts = object.source.stiffness(object.model);
+  object.still.emplace(object.model, std::move(parts), context_,
+                       ElastostaticOptions{.measure_error = options_.measure_error,
+                                           .tolerance = options_.tolerance});
   return *object.still;
 }
 

@@ -83,6 +83,9 @@ void Simulation::advance(double to) {
   move_to(to);
   note_poses();
   take_touches();
+  sweep_blades();
+  for (std::size_t i = 0; i < objects_.size(); ++i)
+    at_object(*objects_[i], [&] { find_free_motion(i); });
   for (const auto& object : objects_) {
     if (emit_shapes_)
       need_model(*object);
@@ -98,6 +101,7 @@ void Simulation::advance(double to) {
   }
   if (poses_.size() > 1)
     poses_.erase(poses_.begin(), poses_.end() - 1);
+  tear();
   ++counts_.steps;
 }
 

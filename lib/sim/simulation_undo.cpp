@@ -12,7 +12,7 @@ void Simulation::open_undo() {
   keep_instruments();
   undo_->note([this, time = time_, sum = sum_, lost = lost_, gravity = gravity_,
                timestep = timestep_, forces = emit_forces_, shapes = emit_shapes_, counts = counts_,
-               jumps = jumps_, ties = ties_.size()] {
+               jumps = jumps_, ties = ties_.size(), cuttings = cuttings_] {
     time_ = time;
     sum_ = sum;
     lost_ = lost;
@@ -22,6 +22,7 @@ void Simulation::open_undo() {
     emit_shapes_ = shapes;
     counts_ = counts;
     jumps_ = jumps;
+    cuttings_ = cuttings;
     ties_.resize(ties);
   });
 }

@@ -85,6 +85,15 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(parsed<MethodCommand>("method a ffe").method, Method::ffe);
   EXPECT_EQ(parsed<MethodCommand>("method a ela").object, "a");
   EXPECT_EQ(parsed<RenewCommand>("renew a").object, "a");
+  EXPECT_FALSE(parsed<CutCommand>("cut a springs z<3").others);
+  EXPECT_TRUE(parsed<CutCommand>("cut a springs z<3 z>3").others);
+  EXPECT_FALSE(parsed<CutCommand>("cut a plane 1 2 3 0 0 2").nodes);
+  EXPECT_EQ(parsed<CutCommand>("cut a plane 1 2 3 0 0 2 z<3").plane->normal.z, 2);
+  EXPECT_EQ(parsed<TearCommand>("tear a 0.5").strain, 0.5);
+  EXPECT_EQ(parse_scene_line("at 1 restore a").value().at, 1);
+  EXPECT_TRUE(parsed<InstrumentCommand>("instrument k blade 1 2 3 1 2 8").shape.blade);
+  EXPECT_EQ(parsed<InstrumentCommand>("instrument k blade 1 2 3 1 2 8").shape.axis,
+            (Vec3{0, 0, 5}));
 }
 
 TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
@@ -98,9 +107,9 @@ TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known =
       "expected one of object, force, pressure, displace, attach, release, "
-      "instrument, move, grasp, withdraw, gravity, method, timestep, two-step, emit, "
-      "step, run, renew, at";
-  for (const char* word : {"cut", "steps", "STEP", "\"\""})
+      "instrument, move, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
+      "two-step, emit, step, run, renew, at";
+  for (const char* word : {"slice", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{
       {"object", "no NAME, expected object NAME"},
@@ -164,6 +173,21 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"method a", "no method, expected method NAME ffe|ela"},
       {"method a fem", "'fem' is no method"},
       {"renew", "no NAME, expected renew NAME"},
+      {"cut a",
+       "no 'springs' or 'plane', expected cut NAME springs NODES [NODES] or cut NAME plane"},
+      {"cut a 3", "'3' can't be cut"},
+      {"cut a springs", "no NODES"},
+      {"cut a springs 1 2 3", "surplus word '3'"},
+      {"cut a plane 0 0 0 0 0", "no number"},
+      {"cut a plane 0 0 0 0 0 0", "a normal without direction"},
+      {"cut a plane 0 0 0 0 0 1e999", "'1e999' is no number"},
+      {"cut a plane 0 0 0 0 0 1 z> 3", "selector 'z>': column"},
+      {"tear a", "no strain, expected tear NAME STRAIN"},
+      {"tear a -0.1", "a negative strain"},
+      {"restore", "no NAME, expected restore NAME"},
+      {"instrument a blade 0 0 0 0 0 0", "an edge without length"},
+      {"instrument a blade 0 0 0 0 0", "no number"},
+      {"instrument a blade 0 0 0 0 0 1 friction 1", "surplus word 'friction'"},
       {"at 1 renew a", "'renew' is no command behind at T"},
       {"at 1", "no command, expected at [every] T"},
       {"at 1 step", "'step' is no command behind at T, expected one of force"},

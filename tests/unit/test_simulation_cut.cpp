@@ -1,0 +1,461 @@
+// Scenes in which objects are cut: what is kept, what comes off, what is taken back.
+
+#include "base/error.h"
+#include "model/cut_select.h"
+#include "sim/simulation.h"
+#include "sim_models.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::free_nodes, test::organ;
+
+Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
+
+std::vector<double> shape(const Simulation& s, std::size_t object) {
+  const std::span<const double> u = s.displacement(object);
+  return {u.begin(), u.end()};
+}
+
+/// An organ whose upper part hangs on springs of the surface alone once it is cut.
+Model soft_organ() {
+  Model model = organ(3);
+  for (std::size_t i = surface_count(model); i < model.nodes.size(); ++i)
+    model.nodes[i].fixed = fixed_none;
+  return model;
+}
+
+const CutPlane through_the_top{{100, -50, 41}, {0, 0, 1}};
+CutObject lobe_off(std::size_t object = 0) {
+  return {object, PlaneToCut{through_the_top, {}}};
+}
+
+std::uint32_t highest(const Model& model) {
+  std::uint32_t top = 0;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (model.nodes[i].position.z > model.nodes[top].position.z)
+      top = i;
+  return top;
+}
+
+std::size_t count(const Simulation& s, Cutting::Kind kind) {
+  return static_cast<std::size_t>(std::count_if(s.cuttings().begin(), s.cuttings().end(),
+                                                [&](const Cutting& c) { return c.kind == kind; }));
+}
+
+/// Nodes in a band over the top: a plane through them is an incision.
+PlaneToCut incision(const Model& model) {
+  PlaneToCut cut{{{100.2, -50, 30}, {1, 0.1, 0}}, std::vector<std::uint32_t>{}};
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (model.nodes[i].position.z > 40)
+      cut.nodes->push_back(i);
+  return cut;
+}
+
+TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
+  Simulation s(one_thread(), {});
+  s.add_object("organ", organ(3), Method::ffe);
+  const std::uint32_t node = free_nodes(s.model(0))[20];
+  s.apply(SetForce{0, {node}, {0, 40, 25}});
+  s.apply(SetDisplacement{0, {highest(s.model(0))}, {0, 0, 0.5}});
+  s.step(0.1);
+  const std::vector<double> before = shape(s, 0);
+  s.apply(CutObject{0, incision(s.model(0))});
+  ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
+  EXPECT_GT(s.cuttings()[0].doubled, 2U);
+  s.step(0.1);
+  EXPECT_EQ(count(s, Cutting::Kind::loose), 0U);
+  const std::vector<double> after = shape(s, 0);
+  ASSERT_EQ(after.size(), 3 * s.model(0).nodes.size());
+  // Afresh.
+  Load load{};
+  const Model& model = s.model(0);
+  const std::span<const std::uint32_t> first = s.first_nodes(0);
+  std::vector<double> mass(s.first_model(0).nodes.size());
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    if (first[i] == node)
+      load.force[i] = model.nodes[i].mass / s.first_model(0).nodes[node].mass * Vec3{0, 40, 25};
+    if (first[i] == highest(s.first_model(0)))
+      load.displacement[i] = {0, 0, 0.5};
+  }
+  Elastostatic fresh(model, {}, one_thread());
+  fresh.update(load);
+  const std::span<const double> want = fresh.displacement();
+  double largest = 0, worst = 0, opened = 0;
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    largest = std::max(largest, std::abs(want[i]));
+    worst = std::max(worst, std::abs(want[i] - after[i]));
+  }
+  EXPECT_LT(worst, 1e-8 * largest);
+  for (std::size_t i = 0; i < before.size() && i < 3 * surface_count(s.first_model(0)); ++i)
+    opened = std::max(opened, std::abs(before[i] - after[i]));
+  EXPECT_GT(opened, 1e-4 * largest); // it does matter
+}
+
+TEST(SimulationCut, NothingMovesWhereNothingIsSeveredThatCarries) {
+  // A closed wound answers as before: copies that are displaced alike.
+  Simulation s(one_thread(), {});
+  s.add_object("organ", organ(2, false), Method::ffe);
+  const PlaneToCut cut = incision(s.model(0));
+  std::vector<std::uint32_t> near;
+  for (const auto& [i, j] : plane_cut(s.model(0), cut.plane, *cut.nodes).edges)
+    near.insert(near.end(), {i, j});
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  std::erase_if(near, [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != fixed_none; });
+  s.apply(SetDisplacement{0, near, {0.1, 0.2, 0.3}});
+  s.step(0.1);
+  const std::vector<double> before = shape(s, 0);
+  const std::size_t centrals = s.model(0).nodes.size() - surface_count(s.model(0));
+  s.apply(CutObject{0, cut});
+  s.step(0.1);
+  const std::vector<double> after = shape(s, 0);
+  // Central springs that the plane severs count, so only where there are none.
+  EXPECT_GT(centrals, 0U);
+  for (const std::uint32_t node : near)
+    for (std::size_t a = 0; a < 3; ++a)
+      EXPECT_EQ(after[3 * node + a], before[3 * node + a]);
+  for (std::uint32_t i = 0; i < s.first_nodes(0).size(); ++i)
+    if (i >= surface_count(s.first_model(0)) && i < surface_count(s.model(0))) {
+      for (std::size_t a = 0; a < 3; ++a)
+        EXPECT_EQ(after[3 * i + a], before[3 * s.first_nodes(0)[i] + a]);
+    }
+}
+
+TEST(SimulationCut, ALobeComesOffAndFalls) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {});
+    s.add_object("organ", soft_organ(), method);
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.step(0.02);
+    const double mass = total_mass(s.model(0));
+    s.schedule(0.03, lobe_off());
+    s.step(0.02);
+    ASSERT_EQ(s.object_count(), 2U);
+    EXPECT_EQ(s.name(1), "organ.1");
+    EXPECT_EQ(s.method(1), Method::ela);
+    EXPECT_EQ(count(s, Cutting::Kind::cut), 1U);
+    EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
+    EXPECT_NEAR(total_mass(s.model(0)) + total_mass(s.model(1)), mass, 1e-12 * mass);
+    s.take_cuttings();
+    const auto height = [&] {
+      const std::vector<double> u = shape(s, 1);
+      double sum = 0;
+      for (std::size_t i = 0; i < u.size(); i += 3)
+        sum += u[i + 2] / static_cast<double>(u.size() / 3);
+      return sum;
+    };
+    const double start = height();
+    s.step(0.1);
+    // It falls freely, drag aside.
+    EXPECT_LT(height() - start, -0.7 * 9810 * 0.1 * 0.1 / 2);
+    EXPECT_GT(height() - start, -1.5 * 9810 * (0.11 * 0.11) / 2);
+    for (const std::size_t object : {0U, 1U})
+      for (const double u : shape(s, object))
+        ASSERT_TRUE(std::isfinite(u));
+  }
+}
+
+TEST(SimulationCut, APartGoesOnWithItsMomentum) {
+  Simulation s(one_thread(), {});
+  Model model = organ(3);
+  for (Node& n : model.nodes) {
+    n.fixed = fixed_none;
+    n.drag = 0;
+  }
+  s.add_object("organ", model, Method::ela);
+  s.apply(SetGravity{{100, 0, 0}});
+  s.step(0.5);
+  s.apply(SetGravity{{}});
+  s.apply(lobe_off());
+  ASSERT_EQ(s.object_count(), 2U);
+  const auto middle = [&](std::size_t object) {
+    Vec3 sum;
+    double mass = 0;
+    const std::vector<double> u = shape(s, object);
+    for (std::size_t i = 0; i < u.size() / 3; ++i) {
+      const double m = s.model(object).nodes[i].mass;
+      sum += m * Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+      mass += m;
+    }
+    return sum / mass;
+  };
+  s.step(0);
+  const Vec3 first = middle(0), part = middle(1);
+  s.step(0.2);
+  // 50 mm/s each.
+  EXPECT_NEAR((middle(0) - first).x, 10, 1e-6);
+  EXPECT_NEAR((middle(1) - part).x, 10, 1e-6);
+}
+
+TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
+  Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), Method::ela);
+  const std::uint32_t top = highest(s.model(0)), low = free_nodes(s.model(0))[0];
+  ASSERT_LT(s.model(0).nodes[low].position.z, 40);
+  const std::size_t probe = s.add_instrument("probe");
+  s.apply(SetInstrument{probe, {1, {}, 0}, {{100, -50, 80}, {}}});
+  s.apply(Grasp{0, {top}, probe});
+  s.apply(SetForce{0, {low}, {5, 0, 0}});
+  s.schedule(0.05, Release{0, {low, top}});
+  s.step(0.01);
+  s.apply(lobe_off());
+  s.step(0.01);
+  ASSERT_EQ(s.object_count(), 2U);
+  EXPECT_EQ(s.contact_forces(0).size(), 0U);
+  EXPECT_EQ(s.contact_forces(1).size(), 1U); // the probe holds the lobe
+  EXPECT_EQ(s.instrument(probe).nodes, 1U);
+  EXPECT_EQ(s.pending(), 2U); // one for each object
+  s.apply(MoveInstrument{probe, {100, -50, 90}, {}, 0});
+  s.step(0.01);
+  const std::uint32_t held = s.contact_forces(1)[0].node;
+  EXPECT_NEAR(shape(s, 1)[3 * held + 2], 10, 1e-9);
+  s.step(0.05);
+  EXPECT_EQ(s.contact_forces(1).size(), 0U);
+  EXPECT_EQ(s.pending(), 0U);
+}
+
+TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
+  BuildOptions options;
+  options.bend = true;
+  options.centrals = 0;
+  Model model = build_model(test::ball(1, 10), options, Context{}).model;
+  for (Node& n : model.nodes)
+    n.fixed = n.position.z < 0 ? fixed_all : fixed_none;
+  std::vector<std::string> warnings;
+  SimulationOptions how;
+  how.warn = [&](const std::string& text) { warnings.push_back(text); };
+  how.guard = true;
+  Simulation s(one_thread(), how);
+  s.add_object("organ", model, Method::ffe);
+  s.apply(SetGravity{{0, 0, -1}});
+  s.step(0.01);
+  // All springs of the topmost node but one are gone.
+  const std::uint32_t top = highest(model);
+  std::vector<std::uint32_t> others;
+  bool kept = false;
+  for (const Spring& spring : model.springs)
+    if (spring.i == top || spring.j == top) {
+      if (kept)
+        others.push_back(spring.i == top ? spring.j : spring.i);
+      kept = true; // an edge, for these come first
+    }
+  std::sort(others.begin(), others.end());
+  s.apply(CutObject{0, SpringsToCut{{top}, others}});
+  s.step(0.01);
+  ASSERT_EQ(count(s, Cutting::Kind::loose), 1U);
+  EXPECT_EQ(s.method(0), Method::ela);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("goes on elastodynamic"), std::string::npos);
+  s.step(0.1);
+  for (const double u : shape(s, 0))
+    EXPECT_TRUE(std::isfinite(u));
+}
+
+TEST(SimulationCut, RestoreMakesItWholeAgain) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {}), never(one_thread(), {});
+    for (Simulation* one : {&s, &never}) {
+      one->add_object("organ", organ(3), method);
+      one->apply(SetForce{0, {free_nodes(one->model(0))[20]}, {0, 10, 5}});
+      one->step(0.01);
+    }
+    s.apply(CutObject{0, incision(s.model(0))});
+    s.step(0.01);
+    s.apply(Restore{0});
+    EXPECT_EQ(s.model(0), never.model(0));
+    s.step(30);
+    never.step(30.01);
+    const std::vector<double> a = shape(s, 0), b = shape(never, 0);
+    double largest = 0;
+    for (const double value : b)
+      largest = std::max(largest, std::abs(value));
+    for (std::size_t i = 0; i < a.size(); ++i)
+      ASSERT_NEAR(a[i], b[i], 1e-6 * largest);
+    EXPECT_THROW(s.apply(Restore{0}), Error);
+  }
+}
+
+TEST(SimulationCut, BadCutsAreRefusedAndChangeNothing) {
+  SimulationOptions how;
+  how.guard = true;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), how);
+    s.add_object("organ", organ(2), method);
+    s.apply(SetForce{0, {free_nodes(s.model(0))[3]}, {0, 1, 5}});
+    s.step(0.01);
+    const Model before = s.model(0);
+    const std::vector<double> u = shape(s, 0);
+    std::uint32_t fixed = 0;
+    while (before.nodes[fixed].fixed == fixed_none)
+      ++fixed;
+    std::vector<std::uint32_t> all(before.nodes.size());
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      all[i] = i;
+    const CutObject bad[]{
+        {0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}},
+        {0, PlaneToCut{{{100, -50, 30}, {0, 0, 1}}, std::vector<std::uint32_t>{fixed}}},
+        {0, SpringsToCut{{0}, {0}}},
+        {0, SpringsToCut{{fixed}, all}},
+    };
+    for (const CutObject& cut : bad) {
+      try {
+        s.apply(cut);
+        ADD_FAILURE() << "no error";
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("organ"), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find("expected"), std::string::npos) << error.what();
+      }
+      EXPECT_EQ(s.model(0), before);
+    }
+    EXPECT_TRUE(s.cuttings().empty());
+    EXPECT_EQ(shape(s, 0), u);
+    s.apply(CutObject{0, incision(s.model(0))});
+    EXPECT_THROW(s.apply(CutObject{0, incision(before)}), Error); // nothing is left
+    EXPECT_EQ(s.cuttings().size(), 1U);
+  }
+}
+
+TEST(SimulationCut, AStepThatFailsTakesACutBack) {
+  SimulationOptions how;
+  how.guard = true;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), how), calm(one_thread(), how);
+    for (Simulation* one : {&s, &calm}) {
+      one->add_object("organ", soft_organ(), method);
+      one->add_object("other", organ(1), Method::ela);
+      one->apply(SetForce{0, {highest(one->model(0))}, {0, 10, 5}});
+      one->apply(SetGravity{{0, 0, -100}});
+      one->step(0.01);
+    }
+    const Model before = s.model(0);
+    const std::size_t probe = s.add_instrument("probe"), same = calm.add_instrument("probe");
+    for (Simulation* one : {&s, &calm})
+      one->apply(SetInstrument{one == &s ? probe : same, {1, {}, 0}, {{100, -50, 90}, {}}});
+    s.apply(Grasp{0, {highest(before)}, probe});
+    calm.apply(Grasp{0, {highest(before)}, same});
+    s.schedule(0.015, lobe_off());
+    s.schedule(0.018, CutObject{1, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
+    EXPECT_THROW(s.step(0.01), Error);
+    EXPECT_EQ(s.object_count(), 2U);
+    EXPECT_EQ(s.model(0), before);
+    EXPECT_EQ(s.time(), 0.01);
+    EXPECT_EQ(s.pending(), 2U);
+    EXPECT_TRUE(s.cuttings().empty());
+    EXPECT_EQ(shape(s, 0), shape(calm, 0));
+    // Up to the cut it goes on as if nothing had been.
+    s.step_to(0.014);
+    if (method == Method::ffe)
+      calm.apply(Renew{0});
+    calm.step_to(0.014);
+    EXPECT_EQ(shape(s, 0), shape(calm, 0));
+    EXPECT_EQ(s.contact_forces(0), calm.contact_forces(0));
+  }
+}
+
+TEST(SimulationCut, ABladeCutsWhatItSweepsOver) {
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const int steps : {1, 50}) {
+      Simulation s(one_thread(), {});
+      s.add_object("organ", organ(4), method);
+      s.apply(SetForce{0, {highest(s.model(0))}, {0, 1, 5}});
+      const std::size_t blade = s.add_instrument("blade");
+      InstrumentShape edge;
+      edge.radius = 0;
+      edge.blade = true;
+      edge.axis = {0, 0, -8};
+      s.apply(SetInstrument{blade, edge, {{88, -50.3, 53}, {}}});
+      s.step(0);
+      s.apply(MoveInstrument{blade, {112, -50.3, 53}, {}, 1});
+      for (int k = 0; k < steps; ++k)
+        s.step(1.0 / steps);
+      EXPECT_GE(count(s, Cutting::Kind::cut), 1U);
+      std::size_t doubled = 0;
+      for (const Cutting& c : s.cuttings())
+        doubled += c.doubled;
+      EXPECT_GT(doubled, 8U) << steps;
+      EXPECT_EQ(s.instrument(blade).nodes, 0U);
+      EXPECT_THROW(s.apply(Grasp{0, {free_nodes(s.model(0))[2]}, blade}), Error);
+    }
+}
+
+TEST(SimulationCut, StretchedTissueTears) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {});
+    BuildOptions options;
+    options.centrals = 0;
+    options.bend = true;
+    Model model = build_model(test::sheet(8, 4), options, Context{}).model;
+    for (Node& n : model.nodes)
+      n.fixed = n.position.x < 0.5 ? fixed_all : fixed_z;
+    std::vector<std::uint32_t> right;
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+      if (model.nodes[i].position.x > 7.5)
+        right.push_back(i);
+    s.add_object("sheet", model, method);
+    s.apply(SetTear{0, 0.3});
+    for (int k = 1; k <= 40; ++k) {
+      s.apply(SetDisplacement{0, right, {0.12 * k, 0, 0}});
+      s.step(0.05);
+      for (std::size_t object = 0; object < s.object_count(); ++object)
+        for (const double u : shape(s, object))
+          ASSERT_TRUE(std::isfinite(u));
+    }
+    EXPECT_GT(count(s, Cutting::Kind::cut), 0U);
+  }
+}
+
+TEST(SimulationCut, TheSameForAnyNumberOfThreads) {
+  std::vector<double> first;
+  for (const int threads : {1, 2}) {
+    Context context;
+    context.threads = threads;
+    Simulation s(context, {});
+    s.add_object("organ", soft_organ(), Method::ffe);
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.step(0.01);
+    s.apply(CutObject{0, incision(s.model(0))});
+    s.step(0.01);
+    s.apply(lobe_off());
+    s.step(0.05);
+    std::vector<double> all = shape(s, 0);
+    const std::vector<double> part = shape(s, 1);
+    all.insert(all.end(), part.begin(), part.end());
+    if (threads == 1)
+      first = all;
+    else
+      EXPECT_EQ(all, first);
+  }
+}
+
+TEST(SimulationCut, WhatIsTiedStaysTied) {
+  Simulation s(one_thread(), {});
+  s.add_object("organ", soft_organ(), Method::ela);
+  s.add_object("weight", test::two_masses(), Method::ela);
+  const std::uint32_t top = highest(s.model(0));
+  s.apply(Attach{0, {top}, 1, {0}, 1e4});
+  s.apply(SetGravity{{0, 0, -1000}});
+  s.step(0.01);
+  s.apply(lobe_off());
+  s.step(0.3);
+  ASSERT_EQ(s.object_count(), 3U);
+  // The lobe and what is tied to it fall together.
+  const double lobe = shape(s, 2)[2], weight = shape(s, 1)[2];
+  EXPECT_LT(lobe, -20);
+  EXPECT_NEAR(lobe, weight, 10);
+  EXPECT_THROW(s.apply(SetMethod{1, Method::ffe}), Error);
+}
+
+} // namespace
+} // namespace gewebe
