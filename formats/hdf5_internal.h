@@ -82,7 +82,13 @@ class Object {
 public:
   ~Object();
   Object(Object&&) noexcept = default;
-  Object& operator=(Object&&) noexcept = default;
+  /// What it was before goes with `other`, and ends with it.
+  Object& operator=(Object&& other) noexcept {
+    handle_ = std::move(other.handle_);
+    file_.swap(other.file_);
+    name_.swap(other.name_);
+    return *this;
+  }
   /// How messages name it: "/uterus/factor".
   const std::string& name() const noexcept { return name_; }
   /// \throw Error, place = path of the file, text "'NAME': what"

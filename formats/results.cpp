@@ -4,6 +4,7 @@
 #include "formats/hdf5_internal.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace gewebe {
@@ -39,6 +40,37 @@ std::uint64_t rows_of_three(const hdf5::Dataset& dataset) {
   return dataset.rows();
 }
 
+/// The group that holds the shape of an object in a frame, and the first frame that it holds.
+struct ShapeGroup {
+  hdf5::Group group;
+  std::uint64_t first = 0;
+};
+
+/// Nothing where the object comes later.
+std::optional<ShapeGroup> shape_in_frame(const hdf5::Group& objects, const std::string& name,
+                                         std::uint64_t frame) {
+  ShapeGroup found{objects.group(name)};
+  const hdf5::Group object = objects.group(name);
+  if (object.has_attribute("first_frame"))
+    found.first = object.number<std::uint64_t>("first_frame");
+  if (frame < found.first)
+    return std::nullopt;
+  if (!object.has("cuts"))
+    return found;
+  const hdf5::Group cuts = object.group("cuts");
+  for (std::uint64_t k = 1; cuts.has(std::to_string(k)); ++k) {
+    hdf5::Group cut = cuts.group(std::to_string(k));
+    const auto first = cut.number<std::uint64_t>("first_frame");
+    if (first < found.first)
+      cut.fail("begins in frame " + std::to_string(first) + ", expected none before " +
+               std::to_string(found.first));
+    if (first > frame)
+      break;
+    found = {std::move(cut), first};
+  }
+  return found;
+}
+
 } // namespace
 
 ResultIndex read_result_index(const std::string& path) {
@@ -63,7 +95,14 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
     throw Error(path, "there is no object '" + object + "', expected " +
                           (list.empty() ? "one, but there is none" : "one of " + list));
   }
-  const hdf5::Group group = objects.group(object);
+  const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
+  if (!shape) {
+    ResultSurface none;
+    none.there = false;
+    return none;
+  }
+  const hdf5::Group& group = shape->group;
+  const std::uint64_t begin = shape->first;
   const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
   const std::uint64_t n = rows_of_three(points);
   const auto surface = group.number<std::uint64_t>("surface_nodes");
@@ -72,14 +111,14 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
                std::to_string(n));
   const hdf5::Dataset displacement = group.dataset("displacement", hdf5::Number::float32);
   displacement.require_shape({displacement.rows(), n, 3});
-  if (frame >= displacement.rows())
+  if (frame - begin >= displacement.rows())
     throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
-                          std::to_string(displacement.rows() - 1));
+                          std::to_string(begin + displacement.rows() - 1));
 
   std::vector<double> rest(3 * n);
   std::vector<float> moved(3 * n);
   points.read_rows(0, std::span<double>(rest));
-  displacement.read_rows(frame, std::span<float>(moved));
+  displacement.read_rows(frame - begin, std::span<float>(moved));
   ResultSurface result;
   result.rest.reserve(surface);
   result.mesh.points.reserve(surface);

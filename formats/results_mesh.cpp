@@ -50,8 +50,12 @@ std::optional<Pattern> pattern_in(const std::string& path) {
 class Shapes {
 public:
   void add(const Model& model) {
-    models_.push_back(&model);
+    surfaces_.push_back(surface_mesh(model));
     last_.emplace_back(3 * model.nodes.size());
+  }
+  void change(std::size_t object, const Model& model) {
+    surfaces_.at(object) = surface_mesh(model);
+    last_[object].assign(3 * model.nodes.size(), 0);
   }
   void set(std::span<const FrameObject> objects) {
     for (std::size_t i = 0; i < objects.size(); ++i)
@@ -74,10 +78,10 @@ private:
   TriangleMesh joined() const {
     TriangleMesh all;
     bool textured = false;
-    for (const Model* model : models_)
-      textured = textured || !model->texcoords.empty();
-    for (std::size_t k = 0; k < models_.size(); ++k) {
-      TriangleMesh mesh = surface_mesh(*models_[k]);
+    for (const TriangleMesh& surface : surfaces_)
+      textured = textured || !surface.texcoords.empty();
+    for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+      TriangleMesh mesh = surfaces_[k];
       const auto shift = static_cast<std::uint32_t>(all.points.size());
       if (all.points.size() + mesh.points.size() > UINT32_MAX)
         throw Error("the objects have over 2^32 nodes, expected fewer");
@@ -88,7 +92,7 @@ private:
         all.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
       mesh.texcoords.resize(textured ? mesh.triangles.size() : 0);
       all.texcoords.insert(all.texcoords.end(), mesh.texcoords.begin(), mesh.texcoords.end());
-      if (models_.size() > 1)
+      if (surfaces_.size() > 1)
         all.part.insert(all.part.end(), mesh.triangles.size(), static_cast<std::int32_t>(k));
       else
         all.material = std::move(mesh.material);
@@ -96,7 +100,7 @@ private:
     return all;
   }
 
-  std::vector<const Model*> models_;
+  std::vector<TriangleMesh> surfaces_;
   std::vector<std::vector<double>> last_;
 };
 
@@ -106,6 +110,10 @@ public:
       : kind_(kind), output_(path, options) {}
 
   void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
+  void change_object(std::size_t object, const Model& model,
+                     std::span<const std::uint32_t> /*origin*/) override {
+    shapes_.change(object, model);
+  }
   void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
     shapes_.set(objects);
   }
@@ -123,6 +131,10 @@ public:
       : kind_(kind), pattern_(std::move(pattern)), options_(options) {}
 
   void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
+  void change_object(std::size_t object, const Model& model,
+                     std::span<const std::uint32_t> /*origin*/) override {
+    shapes_.change(object, model);
+  }
   void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
     shapes_.set(objects);
     Output output(pattern_.name(frame_++), options_);

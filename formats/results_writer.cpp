@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 namespace gewebe {
@@ -74,43 +75,35 @@ public:
 
   void add_object(const std::string& name, const Model& model) override {
     in_place([&] {
-      hdf5::Group group = groups_->create_group(name);
-      const std::uint64_t n = model.nodes.size();
-      group.set("order", static_cast<std::uint32_t>(objects_.size()));
-      group.set("model", model.name);
-      group.set("surface_nodes", static_cast<std::uint64_t>(surface_count(model)));
-      std::vector<double> points;
-      points.reserve(3 * n);
-      for (const Node& node : model.nodes)
-        points.insert(points.end(), {node.position.x, node.position.y, node.position.z});
-      group.write("points", std::span<const double>(points), {n, 3});
-      const TriangleMesh mesh = surface_mesh(model);
-      std::vector<std::uint32_t> corners;
-      corners.reserve(3 * mesh.triangles.size());
-      for (const Triangle& t : mesh.triangles)
-        corners.insert(corners.end(), t.begin(), t.end());
-      group.write("triangles", std::span<const std::uint32_t>(corners), {mesh.triangles.size(), 3});
-      if (!mesh.texcoords.empty()) {
-        std::vector<float> st;
-        st.reserve(6 * mesh.texcoords.size());
-        for (const auto& t : mesh.texcoords)
-          st.insert(st.end(), t.begin(), t.end());
-        group.write("texcoords", std::span<const float>(st), {mesh.texcoords.size(), 3, 2});
-      }
-      if (!mesh.material.empty())
-        group.write("material", mesh.material);
-      const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
-      hdf5::Dataset displacement =
-          group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
-      const std::vector<float> rest(3 * n);
+      Object& object = begin(name, model, 0);
+      const std::vector<float> rest(3 * model.nodes.size());
       for (std::uint64_t f = 0; f < frames_; ++f)
-        displacement.append(std::span<const float>(rest));
-      hdf5::Group forces = group.create_group("forces");
-      hdf5::Dataset frame = forces.create_growing("frame", hdf5::Number::uint64, {}, 512);
-      hdf5::Dataset node = forces.create_growing("node", hdf5::Number::uint32, {}, 512);
-      hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
-      objects_.push_back({name, n, mesh.triangles.size(), std::move(displacement), std::move(frame),
-                          std::move(node), std::move(force)});
+        object.displacement.append(std::span<const float>(rest));
+    });
+  }
+
+  void add_part(const std::string& name, const Model& model) override {
+    in_place([&] { begin(name, model, frames_).group.set("first_frame", frames_); });
+  }
+
+  void change_object(std::size_t index, const Model& model,
+                     std::span<const std::uint32_t> origin) override {
+    in_place([&] {
+      Object& object = objects_.at(index);
+      if (!object.cuts)
+        object.cuts.emplace(object.group.create_group("cuts"));
+      const std::string number = std::to_string(object.shapes.size());
+      hdf5::Group cut = object.cuts->create_group(number);
+      cut.set("first_frame", frames_);
+      std::vector<std::uint32_t> from(origin.begin(), origin.end());
+      if (from.empty()) {
+        from.resize(model.nodes.size());
+        std::iota(from.begin(), from.end(), 0U);
+      }
+      cut.write("origin", from);
+      object.displacement = add_shape(cut, model);
+      object.shapes.push_back({"/objects/" + object.name + "/cuts/" + number, model.nodes.size(),
+                               model.triangles.size(), frames_});
     });
   }
 
@@ -148,11 +141,66 @@ public:
   }
 
 private:
+  /// Triangles and displacements of an object in some frames.
+  struct Shape {
+    std::string path;
+    std::uint64_t nodes = 0, triangles = 0, first = 0; ///< frame
+  };
   struct Object {
     std::string name;
-    std::uint64_t nodes = 0, triangles = 0;
+    hdf5::Group group;
     hdf5::Dataset displacement, frame, node, force;
+    std::vector<Shape> shapes;
+    std::optional<hdf5::Group> cuts;
   };
+
+  Object& begin(const std::string& name, const Model& model, std::uint64_t first) {
+    hdf5::Group group = groups_->create_group(name);
+    group.set("order", static_cast<std::uint32_t>(objects_.size()));
+    group.set("model", model.name);
+    hdf5::Dataset displacement = add_shape(group, model);
+    hdf5::Group forces = group.create_group("forces");
+    hdf5::Dataset frame = forces.create_growing("frame", hdf5::Number::uint64, {}, 512);
+    hdf5::Dataset node = forces.create_growing("node", hdf5::Number::uint32, {}, 512);
+    hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
+    objects_.push_back({name,
+                        std::move(group),
+                        std::move(displacement),
+                        std::move(frame),
+                        std::move(node),
+                        std::move(force),
+                        {{"/objects/" + name, model.nodes.size(), model.triangles.size(), first}},
+                        std::nullopt});
+    return objects_.back();
+  }
+
+  /// What stands in a group of a model at rest; the displacements to come.
+  static hdf5::Dataset add_shape(hdf5::Group& group, const Model& model) {
+    const std::uint64_t n = model.nodes.size();
+    group.set("surface_nodes", static_cast<std::uint64_t>(surface_count(model)));
+    std::vector<double> points;
+    points.reserve(3 * n);
+    for (const Node& node : model.nodes)
+      points.insert(points.end(), {node.position.x, node.position.y, node.position.z});
+    group.write("points", std::span<const double>(points), {n, 3});
+    const TriangleMesh mesh = surface_mesh(model);
+    std::vector<std::uint32_t> corners;
+    corners.reserve(3 * mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles)
+      corners.insert(corners.end(), t.begin(), t.end());
+    group.write("triangles", std::span<const std::uint32_t>(corners), {mesh.triangles.size(), 3});
+    if (!mesh.texcoords.empty()) {
+      std::vector<float> st;
+      st.reserve(6 * mesh.texcoords.size());
+      for (const auto& t : mesh.texcoords)
+        st.insert(st.end(), t.begin(), t.end());
+      group.write("texcoords", std::span<const float>(st), {mesh.texcoords.size(), 3, 2});
+    }
+    if (!mesh.material.empty())
+      group.write("material", mesh.material);
+    const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
+    return group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
+  }
 
   static Output::Options with_sync(Output::Options options) {
     options.sync = true;
@@ -182,7 +230,8 @@ private:
                    "<Time Value=\"" +
                    number_text(times_[f]) + "\"/>\n");
       for (const Object& object : objects_)
-        xdmf_->write(grid(object, f));
+        if (object.shapes.front().first <= f)
+          xdmf_->write(grid(object, f));
       xdmf_->write("</Grid>\n");
     }
     xdmf_->write("</Grid>\n</Domain>\n</Xdmf>\n");
@@ -194,10 +243,16 @@ private:
   }
 
   std::string grid(const Object& object, std::uint64_t frame) {
-    const std::string group = "/objects/" + object.name;
-    const std::string n = std::to_string(object.nodes), t = std::to_string(object.triangles);
+    std::size_t which = 0;
+    while (which + 1 < object.shapes.size() && object.shapes[which + 1].first <= frame)
+      ++which;
+    const Shape& shape = object.shapes[which];
+    const std::uint64_t end =
+        which + 1 < object.shapes.size() ? object.shapes[which + 1].first : frames_;
+    const std::string& group = shape.path;
+    const std::string n = std::to_string(shape.nodes), t = std::to_string(shape.triangles);
     std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
-    if (object.triangles > 0)
+    if (shape.triangles > 0)
       text += "<Topology TopologyType=\"Triangle\" NumberOfElements=\"" + t + "\">\n" +
               array(group + "/triangles", t + " 3", R"(NumberType="UInt" Precision="4")") +
               "</Topology>\n";
@@ -207,9 +262,9 @@ private:
             array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
             "</Geometry>\n<Attribute Name=\"displacement\" AttributeType=\"Vector\" "
             "Center=\"Node\">\n<DataItem ItemType=\"HyperSlab\" Dimensions=\"" +
-            n + " 3\">\n<DataItem Format=\"XML\" Dimensions=\"3 3\">" + std::to_string(frame) +
-            " 0 0 1 1 1 1 " + n + " 3</DataItem>\n" +
-            array(group + "/displacement", std::to_string(frames_) + " " + n + " 3",
+            n + " 3\">\n<DataItem Format=\"XML\" Dimensions=\"3 3\">" +
+            std::to_string(frame - shape.first) + " 0 0 1 1 1 1 " + n + " 3</DataItem>\n" +
+            array(group + "/displacement", std::to_string(end - shape.first) + " " + n + " 3",
                   R"(NumberType="Float" Precision="4")") +
             "</DataItem>\n</Attribute>\n</Grid>\n";
     return text;

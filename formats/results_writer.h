@@ -7,6 +7,8 @@
 #include "model/model.h"
 #include "sim/load.h"
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,8 +32,15 @@ public:
   /// Whether it writes shapes; else models may be empty, and displacements too.
   virtual bool wants_models() const { return true; }
   /// An object that is in all frames to come; in those before it was at rest. Names differ and need
-  /// no quoting. The model must live as long as the writer.
+  /// no quoting.
   virtual void add_object(const std::string& name, const Model& model) = 0;
+  /// One that came off another, which is in no frame before.
+  virtual void add_part(const std::string& name, const Model& model) { add_object(name, model); }
+  /// The model of an object, in the order in which they were added, is another from the next frame
+  /// on, as after a cut. Nothing to who writes no shapes. \param origin by node: the node of its
+  /// first model that it is, or is a copy of; empty: all as they came
+  virtual void change_object(std::size_t /*object*/, const Model& /*model*/,
+                             std::span<const std::uint32_t> /*origin*/) {}
   /// \pre as many objects as were added, in their order
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
   /// Nothing appears without it, but for the files of a series. \throw Error

@@ -273,6 +273,14 @@ What parse_two_step(Words& in) {
 
 What parse_emit(Words& in) {
   const std::string& word = in.word("word");
+  if (word == "model") {
+    EmitModelCommand c;
+    c.object = in.name();
+    c.file = in.word("FILE");
+    if (c.file.empty())
+      in.fail("an empty name of a file");
+    return c;
+  }
   if (word != "shapes" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
   return EmitCommand{word == "forces", word == "instruments"};
@@ -381,7 +389,7 @@ const std::array<Verb, 21>& verbs() {
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
       {"two-step", "two-step NAME f0 [series], f0 positive", true, parse_two_step},
-      {"emit", "emit shapes|forces|instruments", true, parse_emit},
+      {"emit", "emit shapes|forces|instruments, or emit model NAME FILE", true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
@@ -468,6 +476,8 @@ std::optional<Command> parse_scene_line(std::string_view line) {
     words.erase(words.begin(), words.begin() + (command.every ? 2 : 1));
   }
   command.what = parse_command(std::move(words), command.at.has_value());
+  if (command.at && std::holds_alternative<EmitModelCommand>(command.what))
+    throw Error("emit model behind at T, expected it between steps");
   return command;
 }
 

@@ -60,6 +60,14 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
   files.node_list = [resolve](const std::string& name) {
     return Input(resolve(name), false).read_all();
   };
+  files.write_model = [resolve, context](const std::string& name, const Model& model) {
+    Output::Options whole;
+    whole.binary = false;
+    whole.sync = true;
+    Output output(resolve(name), whole);
+    write_ela(output, model, context);
+    output.commit();
+  };
   return files;
 }
 

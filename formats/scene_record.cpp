@@ -80,10 +80,13 @@ std::string SceneRecord::moved(const std::string& file) const {
 void SceneRecord::line(std::string_view text, const Command& command,
                        const std::map<std::string, std::string>& lists) {
   const bool object = std::holds_alternative<ObjectCommand>(command.what);
-  if (object ? prefix_.empty() : lists.empty())
+  const bool model = std::holds_alternative<EmitModelCommand>(command.what);
+  if (object || model ? prefix_.empty() : lists.empty())
     return write(text);
   std::vector<std::string> words = scene_words(text);
-  if (object) {
+  if (model) {
+    words[3] = moved(words[3]);
+  } else if (object) {
     words[2] = moved(words[2]);
     for (std::string& word : words)
       if (word.starts_with("store="))

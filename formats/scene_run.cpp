@@ -16,6 +16,7 @@
 #include <istream>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -64,32 +65,6 @@ auto of_object(std::uint64_t line, Work&& work) {
   }
 }
 
-/// What a result of the first model knows of an object that may be cut: where its nodes stand, and
-/// copies as the node itself; nodes that came off stay where they were at rest.
-struct FirstShape {
-  std::vector<double> displacement;
-  std::vector<NodeVector> forces;
-
-  FrameObject of(const Simulation& simulation, std::size_t object) {
-    const std::span<const double> now = simulation.displacement(object);
-    const std::vector<NodeVector>& held = simulation.contact_forces(object);
-    const std::span<const std::uint32_t> places = simulation.places(object);
-    if (places.empty())
-      return {now, held};
-    displacement.assign(3 * places.size(), 0);
-    for (std::size_t i = 0; i < places.size(); ++i)
-      if (places[i] != CutModel::gone)
-        for (std::size_t a = 0; a < 3; ++a)
-          displacement[3 * i + a] = now[3 * std::size_t{places[i]} + a];
-    std::map<std::uint32_t, Vec3> sums;
-    for (const NodeVector& f : held)
-      sums[simulation.first_nodes(object)[f.node]] += f.value;
-    for (const auto& [node, value] : sums)
-      forces.push_back({node, value});
-    return {displacement, forces};
-  }
-};
-
 } // namespace
 
 struct SceneRun::State {
@@ -105,6 +80,7 @@ struct SceneRun::State {
   std::uint64_t first_error = 0;
   std::string first_error_text;
   std::vector<std::string> stores; ///< by object; "" where it has none
+  std::vector<std::string> models; ///< files that objects were made of
 
   State(std::string n, const Context& context, SceneOptions o)
       : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
@@ -159,6 +135,7 @@ struct SceneRun::State {
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
     stores.resize(simulation.object_count()); // parts that came off have none
     stores.back() = c.store;
+    models.push_back(c.model);
     if (options.events != nullptr)
       options.events->object(simulation.time(), c.name, c.model, c.method);
   }
@@ -169,6 +146,15 @@ struct SceneRun::State {
       throw Error("object " + c.object + " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
     return set;
+  }
+
+  void write(const EmitModelCommand& c) {
+    const std::size_t object = simulation.find(c.object);
+    if (!options.files.write_model)
+      throw Error("models can't be written here");
+    if (std::find(models.begin(), models.end(), c.file) != models.end())
+      throw Error(c.file + " is the model of an object of this scene, expected another file");
+    options.files.write_model(c.file, simulation.model(object));
   }
 
   void schedule(const Command& command, const Change& change) {
@@ -185,6 +171,8 @@ struct SceneRun::State {
       add(*object);
     } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
       schedule(command, stages(*two_step));
+    } else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what)) {
+      write(*emit);
     } else if (const std::optional<Change> change =
                    scene_change(command, simulation, [&](const std::string& list) {
                      return lists[list] = options.files.node_list(list);
@@ -218,14 +206,33 @@ struct SceneRun::State {
       sample(c.until); // which refuses a past one
   }
 
-  /// What the result must know of new objects.
-  void add_results() {
+  /// What the result must know of new objects, and of those that were cut since the last frame.
+  void add_results(bool cut) {
     static const Model none;
+    const bool models_too = options.result->wants_models();
     for (; in_result < simulation.object_count(); ++in_result) {
-      const Model& model =
-          options.result->wants_models() ? simulation.first_model(in_result) : none;
-      deliver([&] { options.result->add_object(simulation.name(in_result), model); });
+      const Model& model = models_too ? simulation.first_model(in_result) : none;
+      const bool part = std::any_of(
+          simulation.cuttings().begin(), simulation.cuttings().end(),
+          [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
+      deliver([&] {
+        if (part)
+          options.result->add_part(simulation.name(in_result), model);
+        else
+          options.result->add_object(simulation.name(in_result), model);
+      });
     }
+    if (!cut || !models_too)
+      return;
+    std::set<std::size_t> changed;
+    for (const Cutting& c : simulation.cuttings())
+      if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
+        changed.insert(c.object);
+    for (const std::size_t object : changed)
+      deliver([&] {
+        options.result->change_object(object, simulation.model(object),
+                                      simulation.first_nodes(object));
+      });
   }
 
   /// The frame before anything moves, and what the result must know of new objects.
@@ -234,7 +241,7 @@ struct SceneRun::State {
       throw Error("there is no object, expected an object command first");
     if (options.result == nullptr)
       return;
-    add_results();
+    add_results(false);
     if (counts.frames > 0)
       return;
     std::vector<std::vector<double>> rest;
@@ -258,18 +265,17 @@ struct SceneRun::State {
     if (options.events != nullptr)
       for (const Cutting& c : simulation.cuttings())
         options.events->cutting(simulation, c);
-    simulation.take_cuttings();
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
     if (options.result != nullptr) {
-      add_results();
+      add_results(true);
       std::vector<FrameObject> frame;
-      std::vector<FirstShape> shapes(simulation.object_count());
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
-        frame.push_back(shapes[i].of(simulation, i));
+        frame.push_back({simulation.displacement(i), simulation.contact_forces(i)});
       deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }
+    simulation.take_cuttings();
     if (options.measure)
       deliver([&] { measure(); });
     if (options.events != nullptr)

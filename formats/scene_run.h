@@ -33,6 +33,8 @@ struct SceneFiles {
   std::function<std::function<StiffnessParts()>(const std::string& name, const Model& model)>
       second_stage;
   LoadNodeList node_list;
+  /// Writes a model whole or not at all. May be absent. \throw Error
+  std::function<void(const std::string& name, const Model& model)> write_model;
 };
 
 /// From files; relative names count from the folder of `scene`, or from the working folder where

@@ -34,7 +34,8 @@ std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& op
   for (const std::string& name : names) {
     const std::int64_t which = frame < 0 ? frames - 1 : frame;
     ResultSurface read = read_result_surface(path, name, static_cast<std::size_t>(which));
-    surfaces.push_back({std::move(read.mesh), std::move(read.rest)});
+    if (read.there || !options.object.empty())
+      surfaces.push_back({std::move(read.mesh), std::move(read.rest)});
   }
   return surfaces;
 }

@@ -80,18 +80,19 @@ Image Pictures::of(std::vector<Surface> surfaces) {
   if (!camera_)
     start(surfaces);
   ++pictures_;
-  const bool same = pictures_ > 1 && drawn_points_.size() == surfaces.size() &&
-                    std::equal(surfaces.begin(), surfaces.end(), drawn_points_.begin(),
-                               [](const Surface& s, const std::vector<Vec3>& points) {
-                                 return s.mesh.points == points;
-                               });
+  const bool same =
+      pictures_ > 1 && drawn_.size() == surfaces.size() &&
+      std::equal(surfaces.begin(), surfaces.end(), drawn_.begin(),
+                 [](const Surface& s, const Drawn& drawn) {
+                   return s.mesh.points == drawn.points && s.mesh.triangles == drawn.triangles;
+                 });
   if (same) {
     ++kept_;
     return last_;
   }
-  drawn_points_.clear();
+  drawn_.clear();
   for (const Surface& surface : surfaces)
-    drawn_points_.push_back(surface.mesh.points);
+    drawn_.push_back({surface.mesh.points, surface.mesh.triangles});
   surfaces = styled(std::move(surfaces));
   if (drawing_.texcoords)
     mapped_ = run_.timed(

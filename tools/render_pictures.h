@@ -13,7 +13,8 @@
 namespace gewebe::cli {
 
 /// Camera and light stand where the first surfaces at rest place them. What a sequence keeps is
-/// kept: textures, and the picture where no point moved.
+/// kept: textures, and the picture where no point moved and no
+/// triangle is another.
 class Pictures {
 public:
   /// Reads the textures. \throw Error with place
@@ -23,6 +24,10 @@ public:
   void tell(Stats& stats, const Image& last) const;
 
 private:
+  struct Drawn {
+    std::vector<Vec3> points;
+    std::vector<Triangle> triangles;
+  };
   struct Mode {
     std::unique_ptr<Painter> painter;
     PictureReport report;
@@ -37,7 +42,7 @@ private:
   std::vector<Mode> modes_;
   std::optional<Camera> camera_;
   DrawingOptions drawing_;
-  std::vector<std::vector<Vec3>> drawn_points_;
+  std::vector<Drawn> drawn_;
   Image last_;
   std::uint64_t pictures_ = 0, kept_ = 0, mapped_ = 0;
 };

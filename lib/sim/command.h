@@ -88,6 +88,10 @@ struct EmitCommand {
   bool forces = false;      ///< else shapes
   bool instruments = false; ///< rather
 };
+/// Writes the model as it is now, at rest.
+struct EmitModelCommand {
+  std::string object, file;
+};
 struct StepCommand {
   std::optional<double> dt; ///< >= 0
 };
@@ -123,8 +127,9 @@ struct Command {
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ForceCommand, PressureCommand, DisplaceCommand, AttachCommand,
                ReleaseCommand, InstrumentCommand, MoveCommand, GraspCommand, WithdrawCommand,
-               GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand, StepCommand,
-               RunCommand, MethodCommand, RenewCommand, CutCommand, TearCommand, RestoreCommand>
+               GravityCommand, TimestepCommand, TwoStepCommand, EmitCommand, EmitModelCommand,
+               StepCommand, RunCommand, MethodCommand, RenewCommand, CutCommand, TearCommand,
+               RestoreCommand>
       what;
 };
 

@@ -250,3 +250,22 @@ test_it_needs_none_of_the_heavy_libraries() {
   need ffe-run ldd
   ! ldd "$(command -v ffe-run)" | grep -E 'openvdb|assimp|epoxy|png|Imath' || fail 'ffe-run loads what it does not use'
 }
+
+test_emitted_models_are_read_back() {
+  need ffe-run exp2ela
+  pull method=ffe
+  printf '%s\n' 'object o organ.ela method=ffe' 'emit model o copy.ela' 'displace o 6 0 0 1' step 'emit model o again.ela' >emit.scene
+  mkdir folder
+  (cd folder && ffe-run -q ../emit.scene --record ../folder/record.scene >/dev/null)
+  cmp organ.ela copy.ela || fail 'another model'
+  cmp organ.ela again.ela || fail 'the shape of a step stands in the model'
+  [[ $(grep -c 'emit model o ../' folder/record.scene) == 2 ]] || fail "$(<folder/record.scene)"
+  local line
+  for line in 'emit model o organ.ela' 'emit model p copy.ela' 'emit model o' 'emit model o ""' 'emit model o none/copy.ela' \
+    'at 1 emit model o x.ela' 'emit model o .'; do
+    printf '%s\n' 'object o organ.ela method=ffe' "$line" >wrong.scene
+    expect_failure 1 ffe-run ffe-run wrong.scene
+  done
+  cmp organ.ela copy.ela || fail 'a refusal wrote something'
+  rm -r folder ./*.ela ./*.scene
+}

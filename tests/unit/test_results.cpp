@@ -6,6 +6,7 @@
 #include "scratch.h"
 #include "sim_models.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -225,6 +226,130 @@ TEST(Results, CutAndDamagedFilesAreErrors) {
     errors += complaint([&] {
                 for (const std::string& object : read_result_index(copy).objects)
                   check_mesh(read_result_surface(copy, object, 1).mesh);
+              }).empty()
+                  ? 0
+                  : 1;
+  }
+  EXPECT_GT(errors, 0U);
+}
+
+/// The frames that change_object and add_part leave: 0 and 1 whole, 2 cut, 3 cut once more and with
+/// a part beside it.
+struct CutRun {
+  Model whole = textured(), cut = whole, again = whole, part = test::organ(1);
+  CutRun() {
+    const auto copy = [](Model& model, std::uint32_t from) { // behind the surface, at one corner
+      const auto at = static_cast<std::uint32_t>(surface_count(model));
+      model.nodes.insert(model.nodes.begin() + at, model.nodes[from]);
+      for (Node& node : model.nodes)
+        node.central += node.central >= 0 ? 1 : 0;
+      for (Triangle& t : model.triangles)
+        if (const auto corner = std::find(t.begin(), t.end(), from); corner != t.end()) {
+          *corner = at;
+          return;
+        }
+    };
+    copy(cut, 5);
+    again = cut;
+    copy(again, 7);
+  }
+  std::vector<double> displaced(const Model& model, double by) const {
+    return std::vector<double>(3 * model.nodes.size(), by);
+  }
+  std::vector<std::uint32_t> origin(const Model& model) const {
+    std::vector<std::uint32_t> from(model.nodes.size());
+    const std::size_t surface = surface_count(whole), copies = surface_count(model) - surface;
+    for (std::size_t i = 0; i < from.size(); ++i)
+      from[i] = static_cast<std::uint32_t>(i < surface            ? i
+                                           : i < surface + copies ? (i == surface ? 5 : 7)
+                                                                  : i - copies);
+    return from;
+  }
+  void write(Kind kind, const std::string& path) const {
+    const std::unique_ptr<ResultWriter> result =
+        open_result(kind, path, Output::Options{.binary = is_binary(kind)});
+    const std::vector<NodeVector> none;
+    const auto frame = [&](double time, const Model& model, double by, bool with_part = false) {
+      const std::vector<double> u = displaced(model, by), v = displaced(part, -by);
+      std::vector<FrameObject> objects{{u, none}};
+      if (with_part)
+        objects.push_back({v, none});
+      result->add_frame(time, objects);
+    };
+    result->add_object("o", whole);
+    frame(0, whole, 0);
+    frame(1, whole, 1);
+    {
+      const Model passing = cut; // it may go
+      result->change_object(0, passing, origin(passing));
+    }
+    frame(2, cut, 2);
+    result->change_object(0, again, origin(again));
+    result->add_part("o.1", part);
+    frame(3, again, 3, true);
+    frame(4, again, 4, true);
+    result->commit();
+  }
+};
+
+TEST(Results, ShapesThatCutsChangeAreReadAsTheyWere) {
+  const ScratchFolder folder;
+  const CutRun run;
+  const std::string path = folder / "run.h5";
+  run.write(Kind::hdf5, path);
+  EXPECT_EQ(read_result_index(path).objects, (std::vector<std::string>{"o", "o.1"}));
+  const Model* const models[] = {&run.whole, &run.whole, &run.cut, &run.again, &run.again};
+  for (std::size_t frame = 0; frame < 5; ++frame) {
+    const TriangleMesh surface = surface_mesh(*models[frame]);
+    const ResultSurface read = read_result_surface(path, "o", frame);
+    const auto by = static_cast<double>(frame);
+    EXPECT_TRUE(read.there);
+    EXPECT_EQ(read.mesh.triangles, surface.triangles) << frame;
+    EXPECT_EQ(read.mesh.texcoords, surface.texcoords) << frame;
+    EXPECT_EQ(read.rest, surface.points) << frame;
+    ASSERT_EQ(read.mesh.points.size(), surface.points.size()) << frame;
+    EXPECT_EQ(read.mesh.points.back(), surface.points.back() + Vec3(by, by, by)) << frame;
+    EXPECT_EQ(read_result_surface(path, "o.1", frame).there, frame >= 3) << frame;
+  }
+  EXPECT_EQ(read_result_surface(path, "o.1", 4).mesh.points[0],
+            run.part.nodes[0].position - Vec3(4, 4, 4));
+  EXPECT_EQ(complaint([&] { (void)read_result_surface(path, "o", 5); }),
+            path + ": there is no frame 5, expected 0 to 4");
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group cuts = file.root().group("objects").group("o").group("cuts");
+  EXPECT_EQ(cuts.groups(), (std::vector<std::string>{"1", "2"}));
+  EXPECT_EQ(cuts.group("2").read<std::uint32_t>("origin", run.again.nodes.size()),
+            run.origin(run.again));
+}
+
+TEST(Results, EachShapeOfASeriesHasItsOwnTriangles) {
+  const ScratchFolder folder;
+  const CutRun run;
+  run.write(Kind::ply, folder / "r%d.ply");
+  EXPECT_EQ(read_ply(bytes_of(folder / "r1.ply"), "").triangles, run.whole.triangles);
+  EXPECT_EQ(read_ply(bytes_of(folder / "r2.ply"), "").triangles, run.cut.triangles);
+  const TriangleMesh last = read_ply(bytes_of(folder / "r4.ply"), "");
+  EXPECT_EQ(last.triangles.size(), run.again.triangles.size() + run.part.triangles.size());
+  EXPECT_EQ(last.part.back(), 1);
+  run.write(Kind::obj, folder / "last.obj");
+  run.write(Kind::csv, folder / "f.csv");
+}
+
+TEST(Results, DamagedCutsAreErrors) {
+  const ScratchFolder folder;
+  const CutRun run;
+  const std::string path = folder / "run.h5", copy = folder / "copy.h5";
+  run.write(Kind::hdf5, path);
+  const std::string whole = bytes_of(path);
+  std::size_t errors = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 1 + whole.size() / 300) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 0x15);
+    std::ofstream(copy, std::ios::binary) << changed;
+    errors += complaint([&] {
+                for (const std::string& object : read_result_index(copy).objects)
+                  for (std::size_t frame = 0; frame < 5; ++frame)
+                    check_mesh(read_result_surface(copy, object, frame).mesh);
               }).empty()
                   ? 0
                   : 1;
