@@ -7,13 +7,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <set>
 #include <string>
 #include <utility>
 
 namespace gewebe {
 
 namespace {
+
+constexpr int most_rounds = 8; ///< of tidying the rim of a cut
 
 Context one_thread() {
   Context context;
@@ -159,18 +163,49 @@ Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) 
       reach = std::max(reach, norm(at[corner] - middle.back()));
   }
   const Vec3 grown{2 * reach, 2 * reach, 2 * reach};
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  std::vector<std::size_t> opened;
+  const auto open = [&](std::size_t e) {
     const auto [i, j] = edges.ends[e];
     const auto around = edges.around(e);
     const Vec3 here = 0.5 * (at[i] + at[j]);
     if (around.size() < 2 || !area.has(i) || !area.has(j) || !area.near(here - grown, here + grown))
-      continue;
-    bool apart = false;
+      return false;
     for (std::size_t k = 1; k < around.size(); ++k)
-      apart = apart || area.parts(here, middle[around[0] / 3], middle[around[k] / 3]);
-    if (apart)
-      cut.edges.push_back(edges.ends[e]);
+      if (area.parts(here, middle[around[0] / 3], middle[around[k] / 3]))
+        return true;
+    return false;
+  };
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (open(e))
+      opened.push_back(e);
+  // A triangle that would be left with one neighbour on its side goes to the other one: it counts
+  // as standing where its neighbour there does. So the rim has no teeth that hang loosely.
+  for (int round = 0; round < most_rounds; ++round) {
+    std::map<std::uint32_t, std::pair<int, std::uint32_t>> teeth; // opened edges, who is across
+    for (const std::size_t e : opened) {
+      const auto around = edges.around(e);
+      if (around.size() != 2)
+        continue;
+      for (const std::size_t k : {0U, 1U}) {
+        auto& [count, across] = teeth[around[k] / 3];
+        across = count++ == 0 ? around[1 - k] / 3 : across;
+      }
+    }
+    std::set<std::uint32_t> moved;
+    for (const auto& [t, tooth] : teeth)
+      if (tooth.first > 1 && !moved.contains(tooth.second)) {
+        middle[t] = middle[tooth.second];
+        moved.insert(t);
+      }
+    if (moved.empty())
+      break;
+    opened.clear();
+    for (std::size_t e = 0; e < edges.size(); ++e)
+      if (open(e))
+        opened.push_back(e);
   }
+  for (const std::size_t e : opened)
+    cut.edges.push_back(edges.ends[e]);
 
   // Springs without a triangle.
   const CornersOfNodes fans(model);

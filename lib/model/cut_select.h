@@ -3,9 +3,10 @@
 // tear.
 //
 // A triangle is on the side of the area on which its middle lies. Edges between triangles of
-// different sides come apart where their midpoints project into the area. A spring without a
-// triangle is severed if it pierces the area; of a node with triangles it starts in their middles,
-// for the node itself stands on the cut.
+// different sides come apart where their midpoints project into the area. A triangle that would
+// hang by one edge goes to the other side, which leaves a rim without loose teeth. A spring without
+// a triangle is severed if it pierces the area; of a node with triangles it starts in their
+// middles, for the node itself stands on the cut.
 
 #include "model/cut.h"
 #include "model/model.h"
