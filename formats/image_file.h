@@ -14,6 +14,9 @@ namespace gewebe {
 /// \throw Error with place: neither of them, damaged, or beyond context.max_memory
 Image read_image(Input& input, const Context& context);
 
+/// Its brightness with all bits that it has, up to 16. \throw as read_image
+Heights read_heights(Input& input, const Context& context);
+
 /// png, ppm, rgb.
 const std::vector<Kind>& picture_kinds();
 

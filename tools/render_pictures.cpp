@@ -23,8 +23,10 @@ Look look_of(const RenderArguments& a, const Context& context) {
     look.detail = texture_from(load(a.detail, context), a.detail.options);
   if (!a.reflection.path.empty())
     look.reflection = texture_from(load(a.reflection, context), a.reflection.options);
-  if (!a.structure.path.empty())
-    look.structure = texture_from(luminance(load(a.structure, context)), a.structure.options);
+  if (!a.structure.path.empty()) {
+    Input input(a.structure.path);
+    look.structure = texture_from(read_heights(input, context), a.structure.options);
+  }
   return look;
 }
 

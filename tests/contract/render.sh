@@ -108,6 +108,22 @@ test_bumps_are_lit_from_the_side_of_the_light() {
   [[ $(brighter 100,1,50) == right ]] || fail 'light from the right brightens the left'
 }
 
+# A ramp that rises by a fortieth has one brightness: in 16 bits it is seen so, in 8 bits as steps.
+test_heights_keep_their_16_bits() {
+  local backend backends=(cpu)
+  ! has_gl || backends+=(gl)
+  printf 'OFF\n4 2 0\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n3 0 1 2\n3 0 2 3\n' >in.off
+  shades() { # MAXVAL OPTION...
+    awk -v top="$1" 'BEGIN { print "P2 256 2", top; for (n = 0; n < 512; ++n) print int(top * (0.4 + (n % 256) / 10240) + 0.5) }' >in.pgm
+    emboss-render "${@:2}" --structure in.pgm --wrap clamp --uv-scale 2 --offset 0.2 --view top --distance 2 --color 0.8,0.8,0.8 --size 100 --light-direction 1,0,0.1 in.off --to ppm |
+      tail -c 15000 | head -c 240 | od -An -v -tu1 -w3 | sort -u | wc -l
+  }
+  for backend in "${backends[@]}"; do
+    [[ $(shades 65535 --backend "$backend") == 1 ]] || fail "16 bits are not smooth with $backend" "$(shades 65535 --backend "$backend")"
+    (($(shades 255 --backend "$backend") > 1)) || fail "8 bits are not steps with $backend, so that nothing is shown"
+  done
+}
+
 test_it_loads_only_what_it_uses() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   local libraries

@@ -21,6 +21,7 @@ namespace gewebe::test {
 struct OracleScene {
   TriangleMesh mesh;                    ///< with texture coordinates
   std::optional<Image> base, structure; ///< the structure is gray
+  std::optional<Heights> heights;       ///< a structure of 16 bits instead
   std::optional<Image> detail;          ///< by the mesh's coordinates
   std::optional<Image> reflection;      ///< sphere-mapped
   Vec3 color{1, 1, 1}, light;
@@ -48,7 +49,11 @@ public:
                                         {&scene.detail, &detail_},
                                         {&scene.reflection, &reflection_}})
       if (*image)
-        *levels = levels_of(**image, scene.mipmap);
+        *levels = levels_of(**image, 255, scene.mipmap);
+    if (scene.heights)
+      structure_ = levels_of(
+          DeepImage{scene.heights->width, scene.heights->height, 1, scene.heights->values}, 65535,
+          scene.mipmap);
   }
 
   OraclePixel pixel(double x, double y) const {
@@ -160,10 +165,11 @@ private:
   }
 
   /// By area, from the level before, whose values have 8 bits, 16 for gray; halves are rounded up.
-  static Levels levels_of(const Image& image, bool all) {
+  template <class Value>
+  static Levels levels_of(const Pixels<Value>& image, double top, bool all) {
     Levels levels{{image.width, image.height, image.channels, {}}};
-    for (const std::uint8_t value : image.values)
-      levels[0].values.push_back(value / 255.0);
+    for (const Value value : image.values)
+      levels[0].values.push_back(value / top);
     const double steps = image.channels == 1 ? 65535 : 255;
     while (all && (levels.back().width > 1 || levels.back().height > 1)) {
       const Level& fine = levels.back();
@@ -286,9 +292,10 @@ private:
         base = std::min(1.0, base + value(detail_, change, s, t, c));
       if (scene_.reflection)
         base = std::min(1.0, base + texel(reflection_[0], around[0], around[1], c));
-      const double r = scene_.structure ? 0.5 + 0.5 * (value(structure_, change, s, t, c) -
-                                                       value(structure_, change, s + ds, t + dt, c))
-                                        : 0.5;
+      const double r = scene_.structure || scene_.heights
+                           ? 0.5 + 0.5 * (value(structure_, change, s, t, c) -
+                                          value(structure_, change, s + ds, t + dt, c))
+                           : 0.5;
       nearest.value[c] =
           scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
     }

@@ -95,7 +95,7 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   light = c.scene.directional ? c.scene.light : default_light(camera);
   DrawingOptions options;
   options.texcoords = true;
-  options.structure = c.scene.structure.has_value();
+  options.structure = c.scene.structure || c.scene.heights;
   options.sphere = c.scene.reflection.has_value();
   options.per_pixel = mode.per_pixel;
   options.light = light;
@@ -110,6 +110,8 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
     look.base = texture_from(*c.scene.base, filter);
   if (c.scene.structure)
     look.structure = texture_from(*c.scene.structure, filter);
+  if (c.scene.heights)
+    look.structure = texture_from(*c.scene.heights, filter);
   if (c.scene.detail)
     look.detail = texture_from(*c.scene.detail, filter);
   filter.sphere = true;
@@ -240,6 +242,35 @@ TEST_P(RenderOracle, TexturesThatShrink) {
   c.scene.base = spots(45, 37, 3);
   c.scene.structure = spots(64, 51, 1);
   expect_equal(c, "mipmaps");
+}
+
+// Heights of 16 bits that change by a twelfth over the whole texture: in 8 bits they are 21 steps.
+TEST_P(RenderOracle, ShallowHeightsAreSmoothIn16BitsAndStepsIn8) {
+  Case c;
+  c.scene.mesh = quad(100, 70, 1, 1);
+  c.camera.view = "top";
+  c.scene.offset = 0.2;
+  c.scene.color = {1, 0.9, 0.8};
+  Heights heights{96, 64, {}};
+  Image steps{96, 64, 1, {}};
+  for (unsigned y = 0; y < 64; ++y)
+    for (unsigned x = 0; x < 96; ++x) {
+      const double f = 0.5 + 0.04 * std::sin(x / 96.0 * 6.2831853) * std::cos(y / 64.0 * 6.2831853);
+      heights.values.push_back(static_cast<std::uint16_t>(f * 65535));
+      steps.values.push_back(static_cast<std::uint8_t>(f * 255));
+    }
+  c.scene.heights = heights;
+  expect_equal(c, "smooth");
+  // Drawn of the steps, and held against the smooth ones.
+  Case coarse = c;
+  coarse.scene.heights.reset();
+  coarse.scene.structure = steps;
+  Camera camera;
+  const Image image = draw(coarse, GetParam(), camera, c.scene.light);
+  c.scene.per_pixel = GetParam().per_pixel;
+  const OracleComparison stepped = compare(image, c.scene, camera);
+  RecordProperty("stepped.rms", std::to_string(stepped.rms_rounded));
+  EXPECT_GT(stepped.rms_rounded, 0.35);
 }
 
 // What the comparison must see.
