@@ -2,6 +2,7 @@
 
 #include "formats/image_file.h"
 #include "render/style.h"
+#include "tools/render_materials.h"
 
 #include <algorithm>
 #include <utility>
@@ -27,6 +28,7 @@ Look look_of(const RenderArguments& a, const Context& context) {
     Input input(a.structure.path);
     look.structure = texture_from(read_heights(input, context), a.structure.options);
   }
+  add_material_looks(look, a, context);
   return look;
 }
 
@@ -59,9 +61,12 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   drawing_.camera = *camera_;
   drawing_.light = a.light.value_or(default_light(*camera_));
   drawing_.offset = {a.offset, a.offset};
-  if (a.offset_texels && look_.structure)
-    drawing_.offset = {*a.offset_texels / look_.structure->width(),
-                       *a.offset_texels / look_.structure->height()};
+  const auto structured = std::ranges::find_if(
+      look_.others, [](const Look& look) { return look.structure.has_value(); });
+  if (const Look& look = look_.structure || structured == look_.others.end() ? look_ : *structured;
+      a.offset_texels && look.structure)
+    drawing_.offset = {*a.offset_texels / look.structure->width(),
+                       *a.offset_texels / look.structure->height()};
   run_.timed("start", [&] {
     for (const PictureOptions& options : options_)
       modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});
@@ -106,6 +111,7 @@ Image Pictures::of(std::vector<Surface> surfaces) {
       drawing_.per_pixel = per_pixel;
       drawing =
           run_.timed("prepare", [&] { return make_drawing(surfaces, drawing_, run_.context()); });
+      tell_groups(*drawing);
     }
     images.push_back(
         run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
@@ -114,6 +120,21 @@ Image Pictures::of(std::vector<Surface> surfaces) {
   }
   last_ = images.size() == 1 ? std::move(images.front()) : side_by_side(images);
   return last_;
+}
+
+/// How many triangles have which look; a look that none has is a mistake more likely than not.
+void Pictures::tell_groups(const Drawing& drawing) {
+  if (groups_told_ || drawing.group_start.empty() || drawing.triangles.empty())
+    return;
+  groups_told_ = true;
+  std::vector<std::uint64_t> counts;
+  for (std::size_t g = 0; g < group_count(drawing); ++g)
+    counts.push_back(triangles_of_group(drawing, g).size());
+  run_.stats().set("triangles_by_look", counts);
+  for (std::size_t g = 1; g < counts.size(); ++g)
+    if (counts[g] == 0)
+      run_.warn("no triangle is of " + arguments_.words.by + " " +
+                std::to_string(drawing_.groups[g - 1]));
 }
 
 void Pictures::tell(Stats& stats, const Image& last) const {

@@ -28,6 +28,7 @@ private:
     PictureReport report;
   };
   void start(const std::vector<Surface>& surfaces);
+  void tell_groups(const Drawing& drawing);
   std::vector<Surface> styled(std::vector<Surface> surfaces) const;
 
   Run& run_;
@@ -39,6 +40,7 @@ private:
   DrawingOptions drawing_;
   std::vector<std::vector<Vec3>> drawn_points_;
   Image last_;
+  bool groups_told_ = false;
   std::uint64_t pictures_ = 0, kept_ = 0, mapped_ = 0;
 };
 

@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace gewebe {
@@ -37,6 +39,9 @@ struct Drawing {
   std::vector<DrawVertex> vertices;
   std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
   std::vector<Triangle> triangles;
+  /// Where the triangles of groups 1, 2, … begin, which have looks of their own; group 0 comes
+  /// first.
+  std::vector<std::size_t> group_start;
   // What frames are used with, in coordinates of positions.
   Vec3 light; ///< place, or unit vector to it
   bool directional = false;
@@ -44,11 +49,25 @@ struct Drawing {
   Camera camera;                  ///< eye and axes
 };
 
+inline std::size_t group_count(const Drawing& drawing) {
+  return drawing.group_start.size() + 1;
+}
+std::span<const Triangle> triangles_of_group(const Drawing& drawing, std::size_t group);
+
 /// A mesh to draw.
 struct Surface {
   TriangleMesh mesh;
   std::vector<Vec3> rest; ///< where its points were at rest; empty: where they are
 };
+
+/// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
+/// them are 0), or the number of the surface.
+enum class GroupBy : std::uint8_t { material, part, surface };
+
+/// "material", "part", "object".
+const std::vector<std::string>& group_by_names();
+/// \throw Error if there is no such word
+GroupBy group_by_from_name(std::string_view name);
 
 struct DrawingOptions {
   bool texcoords = false; ///< a base or a structure texture is there
@@ -60,9 +79,11 @@ struct DrawingOptions {
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
   Camera camera;                            ///< that sees the sphere maps
+  GroupBy group_by = GroupBy::material;
+  std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
 };
 
-/// All surfaces in one, in order. Per vertex (report eq. 3.2)
+/// All surfaces in one, in order within each group. Per vertex (report eq. 3.2)
 ///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
 /// with the frame of tangents.h, and shade = 1 - k + k max(0, L·N) for a share k. L is 0 for a
 /// vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for

@@ -124,6 +124,50 @@ test_heights_keep_their_16_bits() {
   done
 }
 
+# Two squares side by side, of materials 4 and 0 and of parts 0 and 1.
+two_materials() {
+  printf '%s\n' ply 'format ascii 1.0' 'element vertex 8' 'property double x' 'property double y' 'property double z' 'element face 4' \
+    'property list uchar int vertex_indices' 'property int part' 'property int material' end_header \
+    '0 0 0' '2 0 0' '2 2 0' '0 2 0' '2 0 0' '4 0 0' '4 2 0' '2 2 0' '3 0 1 2 0 4' '3 0 2 3 0 4' '3 4 5 6 1 0' '3 4 6 7 1 0'
+}
+test_materials_have_their_own_textures() {
+  two_materials >in.ply
+  printf 'P3 1 1 255 200 0 0\n' >red.ppm
+  printf 'P3 1 1 255 0 0 180\n' >blue.ppm
+  # The colours of the left and of the right square.
+  colors() {
+    emboss-render --backend cpu --view top --size 40x20 --distance 4 --stats=stats.json "$@" --to ppm |
+      tail -c 2400 | od -An -v -tu1 -w120 -j1200 | awk 'NR == 1 { print $31, $32, $33, $91, $92, $93 }'
+  }
+  [[ $(colors --texture blue.ppm --texture 4=red.ppm in.ply) == '200 0 0 0 0 180' ]] || fail 'materials' "$(colors --texture blue.ppm --texture 4=red.ppm in.ply)"
+  grep -q '"triangles_by_look":\[2,2\]' stats.json || fail 'no counts' "$(<stats.json)"
+  [[ $(colors --texture 0=red.ppm --texture 4=blue.ppm in.ply) == '0 0 180 200 0 0' ]] || fail 'no texture for all'
+  [[ $(colors --by part --texture 1=red.ppm in.ply) == '255 255 255 200 0 0' ]] || fail 'by part'
+  [[ $(colors --color 0=0,1,0 --color 0.2,0.2,0.2 --texture 4=blue.ppm in.ply) == '0 0 36 0 255 0' ]] || fail 'colours, and what is not given'
+  # A model, whose materials exp2ela numbers.
+  exp2ela --material 1=uterus in.ply -o in.ela
+  [[ $(colors --texture 1=red.ppm --color 0=0,0,1 in.ela) == '0 0 255 200 0 0' ]] || fail 'a model' "$(colors --texture 1=red.ppm --color 0=0,0,1 in.ela)"
+  emboss-render --backend cpu --color 7=1,0,0 in.ply -o out.png 2>stderr.txt
+  [[ $(<stderr.txt) == 'emboss-render: warning: no triangle is of material 7' ]] || fail 'a material that is not there' "$(<stderr.txt)"
+  expect_failure 1 emboss-render emboss-render --backend cpu --texture 0=none.ppm in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --texture 1= in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --texture 1=red.ppm --texture 1=red.ppm in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --by part in.ply -o out.png
+}
+
+# The objects of a run, each with its own.
+test_objects_have_their_own_textures() {
+  cube >in.off
+  exp2ela in.off -o a.ela
+  awk 'NR > 2 && NF == 3 { $1 += 3 } { print }' in.off >b.off
+  exp2ela b.off -o b.ela
+  printf '%s\n' 'object left a.ela' 'object right b.ela' step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  emboss-render --backend cpu --by object --color 0=1,0,0 --color 1=0,0,1 --background 0,1,0 --view top --size 60x40 --stats=stats.json run.h5 --to ppm >out.ppm
+  grep -q '"triangles_by_look":\[0,12,12\]' stats.json || fail 'no counts' "$(<stats.json)"
+  [[ $(tail -c 7200 out.ppm | od -An -v -tu1 -w3 | sort -u | wc -l) == 3 ]] || fail 'not two colours on a third'
+}
+
 test_it_loads_only_what_it_uses() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   local libraries

@@ -298,6 +298,40 @@ TEST(RenderDrawing, SameForAnyThreadsAndOffsetsPointToTheLight) {
   EXPECT_TRUE(shifted);
 }
 
+TEST(RenderDrawing, TrianglesAreGroupedByMaterialPartOrSurface) {
+  std::vector<Surface> surfaces(2);
+  for (Surface& surface : surfaces) {
+    surface.mesh = test::sheet(3, 1); // six triangles
+    surface.mesh.part = {0, 1, 2, 0, 1, 2};
+  }
+  surfaces[1].mesh.material = {5, 5, 4, 0, 5, 7};
+  DrawingOptions options;
+  const Drawing plain = make_drawing(surfaces, options, {});
+  EXPECT_EQ(group_count(plain), 1U);
+  EXPECT_EQ(triangles_of_group(plain, 0).size(), 12U);
+  // Where each group's triangles stand in the plain drawing, in order.
+  const auto groups = [&](GroupBy by, std::vector<std::int32_t> numbers) {
+    options.group_by = by;
+    options.groups = std::move(numbers);
+    const Drawing drawing = make_drawing(surfaces, options, {});
+    std::vector<std::vector<std::size_t>> found;
+    for (std::size_t g = 0; g < group_count(drawing); ++g) {
+      found.emplace_back();
+      for (const Triangle& t : triangles_of_group(drawing, g))
+        found.back().push_back(
+            static_cast<std::size_t>(std::find(plain.triangles.begin(), plain.triangles.end(), t) -
+                                     plain.triangles.begin()));
+    }
+    return found;
+  };
+  using Found = std::vector<std::vector<std::size_t>>;
+  EXPECT_EQ(groups(GroupBy::material, {4, 5}), (Found{{0, 1, 2, 3, 4, 5, 9, 11}, {8}, {6, 7, 10}}));
+  EXPECT_EQ(groups(GroupBy::material, {0}), (Found{{6, 7, 8, 10, 11}, {0, 1, 2, 3, 4, 5, 9}}));
+  EXPECT_EQ(groups(GroupBy::part, {2, 1, 9}),
+            (Found{{0, 3, 6, 9}, {2, 5, 8, 11}, {1, 4, 7, 10}, {}}));
+  EXPECT_EQ(groups(GroupBy::surface, {1}), (Found{{0, 1, 2, 3, 4, 5}, {6, 7, 8, 9, 10, 11}}));
+}
+
 TEST(RenderDrawing, LightOnAVertexAndNothingToDraw) {
   std::vector<Surface> surfaces(1);
   DrawingOptions options;
