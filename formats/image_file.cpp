@@ -41,11 +41,15 @@ const std::vector<Kind>& picture_kinds() {
   return kinds;
 }
 
+std::string image_bytes(const Image& image, Kind kind) {
+  return kind == Kind::ppm ? write_ppm(image) : write_png(image);
+}
+
 void write_image(Output& output, const Image& image, Kind kind) {
   if (kind == Kind::rgb)
     output.write(image.values.data(), image.values.size());
   else
-    output.write(kind == Kind::ppm ? write_ppm(image) : write_png(image));
+    output.write(image_bytes(image, kind));
 }
 
 } // namespace gewebe

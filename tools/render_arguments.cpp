@@ -190,6 +190,9 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
       .range(-1, 1e15);
   p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
+  p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
+  p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
+      .range(1, 100000);
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
   declare_volume(p, a);
   p.check([&a] { complete(a); });

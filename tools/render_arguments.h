@@ -49,7 +49,8 @@ struct RenderArguments {
   std::string style = "textured";
   std::vector<std::string> compare; ///< modes side by side
   SurfaceReadOptions reading;
-  std::string frames; ///< of a result, "": one
+  std::string frames;                           ///< of a result, "": one
+  std::optional<std::int64_t> turn, turn_light; ///< pictures in one turn
   CameraOptions camera;
   DrawingOptions drawing;
   UvOptions mapping;

@@ -50,17 +50,32 @@ std::array<float, 3> in_floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-void append(Drawing& drawing, const Surface& surface, const DrawingOptions& options,
-            const Context& context) {
+/// Renews what of `kept` `change` leaves no longer true.
+void prepare(DrawingParts& kept, const Surface& surface, const DrawingOptions& options,
+             DrawingChange change, DrawingCounts& counts, const Context& context) {
+  if (change == DrawingChange::view)
+    return;
   const TriangleMesh& mesh = surface.mesh;
-  std::vector<Vec3> normals;
   if (options.structure || options.sphere || options.shade > 0)
-    normals = render_normals(mesh);
-  const TexturedVertices vertices =
-      options.texcoords
-          ? split_vertices(mesh, mesh.texcoords, options.structure ? &normals : nullptr, context)
-          : plain_vertices(mesh);
+    kept.normals = render_normals(mesh);
+  counts.frames += options.structure ? 1U : 0U;
+  if (change == DrawingChange::points) {
+    if (options.structure)
+      renew_frames(kept.vertices, mesh, mesh.texcoords, kept.normals, context);
+    return;
+  }
+  counts.splits += options.texcoords ? 1U : 0U;
+  kept.vertices = options.texcoords
+                      ? split_vertices(mesh, mesh.texcoords,
+                                       options.structure ? &kept.normals : nullptr, context)
+                      : plain_vertices(mesh);
+}
 
+void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
+            const DrawingOptions& options, const Context& context) {
+  const TriangleMesh& mesh = surface.mesh;
+  const std::vector<Vec3>& normals = parts.normals;
+  const TexturedVertices& vertices = parts.vertices;
   const std::size_t base = drawing.vertices.size();
   if (base + vertices.point.size() > UINT32_MAX)
     throw Error(std::to_string(base + vertices.point.size()) + " vertices, expected at most " +
@@ -101,9 +116,14 @@ void append(Drawing& drawing, const Surface& surface, const DrawingOptions& opti
                                        options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
     }
   });
+}
+
+/// Those of the vertices appended last.
+void append_triangles(Drawing& drawing, const TexturedVertices& vertices) {
+  const auto base = static_cast<std::uint32_t>(drawing.vertices.size() - vertices.point.size());
   for (Triangle t : vertices.triangles) {
     for (std::uint32_t& corner : t)
-      corner += static_cast<std::uint32_t>(base);
+      corner += base;
     drawing.triangles.push_back(t);
   }
 }
@@ -139,33 +159,64 @@ void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOpt
   drawing.triangles = std::move(sorted);
 }
 
-} // namespace
-
-Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
-                     const Context& context) {
-  Drawing drawing;
-  for (const Surface& surface : surfaces)
-    for (const Vec3& p : surface.mesh.points)
-      drawing.box.add(p);
-  if (drawing.box.empty())
-    return drawing;
-  drawing.origin = drawing.box.min * 0.5 + drawing.box.max * 0.5;
-  const double half = drawing.box.longest_side() / 2;
-  if (!std::isfinite(half))
-    throw Error("the mesh spans more than the largest number, expected less");
-  if (half > 1e-300)
-    drawing.scale = half;
+void set_view(Drawing& drawing, const DrawingOptions& options) {
   drawing.directional = options.directional;
   drawing.light = options.directional ? direction_to(options.light, {})
                                       : (options.light - drawing.origin) / drawing.scale;
   drawing.offset = options.offset;
   drawing.camera = options.camera;
   drawing.camera.eye = (options.camera.eye - drawing.origin) / drawing.scale;
+}
+
+} // namespace
+
+Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
+                     const Context& context) {
+  DrawingMaker maker;
+  (void)maker.make(surfaces, options, DrawingChange::all, context);
+  return std::move(maker).drawing();
+}
+
+const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const DrawingOptions& options,
+                                  DrawingChange change, const Context& context) {
+  ++counts_.drawings;
+  if (change == DrawingChange::view && options.per_pixel && !(options.shade > 0)) {
+    set_view(drawing_, options); // nothing of it stands at vertices
+    return drawing_;
+  }
+  Drawing drawing;
+  drawing.version = ++counts_.vertices;
+  if (change != DrawingChange::all) {
+    drawing.triangles = std::move(drawing_.triangles);
+    drawing.group_start = std::move(drawing_.group_start);
+  }
+  drawing_ = {};
   for (const Surface& surface : surfaces)
-    append(drawing, surface, options, context);
-  if (!options.groups.empty())
+    for (const Vec3& p : surface.mesh.points)
+      drawing.box.add(p);
+  if (drawing.box.empty()) {
+    drawing_ = std::move(drawing);
+    return drawing_;
+  }
+  drawing.origin = drawing.box.min * 0.5 + drawing.box.max * 0.5;
+  const double half = drawing.box.longest_side() / 2;
+  if (!std::isfinite(half))
+    throw Error("the mesh spans more than the largest number, expected less");
+  if (half > 1e-300)
+    drawing.scale = half;
+  set_view(drawing, options);
+  parts_.resize(surfaces.size());
+  const bool sorted = change != DrawingChange::all;
+  for (std::size_t n = 0; n < surfaces.size(); ++n) {
+    prepare(parts_[n], surfaces[n], options, change, counts_, context);
+    append(drawing, surfaces[n], parts_[n], options, context);
+    if (!sorted)
+      append_triangles(drawing, parts_[n].vertices);
+  }
+  if (!sorted && !options.groups.empty())
     group(drawing, surfaces, options);
-  return drawing;
+  drawing_ = std::move(drawing);
+  return drawing_;
 }
 
 std::span<const Triangle> triangles_of_group(const Drawing& drawing, std::size_t group) {

@@ -5,6 +5,7 @@
 #include "base/mesh.h"
 #include "base/vec3.h"
 #include "render/camera.h"
+#include "render/tangents.h"
 
 #include <array>
 #include <cstddef>
@@ -12,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -42,6 +44,7 @@ struct Drawing {
   /// Where the triangles of groups 1, 2, … begin, which have looks of their own; group 0 comes
   /// first.
   std::vector<std::size_t> group_start;
+  std::uint64_t version = 0; ///< of a maker: another one where vertices, frames or triangles are
   // What frames are used with, in coordinates of positions.
   Vec3 light; ///< place, or unit vector to it
   bool directional = false;
@@ -93,6 +96,42 @@ struct DrawingOptions {
 /// \throw Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
                      const Context& context);
+
+/// What is different from the drawing before.
+enum class DrawingChange : std::uint8_t {
+  all,
+  points, ///< points and normals of the same triangles with the same coordinates
+  view    ///< light and camera alone
+};
+
+/// What a maker did.
+struct DrawingCounts {
+  std::uint64_t drawings = 0, vertices = 0; ///< made, and those whose vertices were
+  std::uint64_t splits = 0, frames = 0;     ///< surfaces whose vertices were split, frames made
+};
+
+/// What of a surface a maker keeps.
+struct DrawingParts {
+  TexturedVertices vertices;
+  std::vector<Vec3> normals;
+};
+
+/// Makes the drawings of a sequence: vertices are split once, frames are renewed where the points
+/// move, and a change of view leaves all that doesn't depend on it.
+class DrawingMaker {
+public:
+  /// As make_drawing, with the same values. \pre the first call is with DrawingChange::all, later
+  /// ones say what may have changed; options but light, offset and camera are those of the first
+  const Drawing& make(std::span<const Surface> surfaces, const DrawingOptions& options,
+                      DrawingChange change, const Context& context);
+  const DrawingCounts& counts() const { return counts_; }
+  Drawing drawing() && { return std::move(drawing_); }
+
+private:
+  Drawing drawing_;
+  std::vector<DrawingParts> parts_; ///< by surface
+  DrawingCounts counts_;
+};
 
 /// Bytes that make_drawing and a backend need at most, without pictures and textures.
 double drawing_bytes(std::span<const Surface> surfaces);

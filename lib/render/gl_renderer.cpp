@@ -440,13 +440,17 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     if (s.options.mode == GlMode::shader && group.count > 0)
       s.shaders.try_emplace(shader_kind(*group.look), *group.look, frames);
   }
-  s.light = {};
-  s.light.light = drawing.light;
-  s.light.directional = drawing.directional;
-  s.light.offset = drawing.offset;
-  s.light.camera = drawing.camera;
   s.light.frames.resize(frames ? 1 : 0);
+  set_light(drawing);
   check_gl();
+}
+
+void GlRenderer::set_light(const Drawing& drawing) {
+  Drawing& light = state_->light;
+  light.light = drawing.light;
+  light.directional = drawing.directional;
+  light.offset = drawing.offset;
+  light.camera = drawing.camera;
 }
 
 void GlRenderer::draw(const Projection& projection, const Context& context) {

@@ -185,6 +185,7 @@ test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
   local frames
   frames=$(grep -o '"pictures":[0-9]*' stats.json | cut -d: -f2)
   ((frames > 1)) || fail 'one frame is no film' "$(<stats.json)"
+  grep -q '"vertex_splits":0,"frames_made":0,"vertices_made":1' stats.json || fail 'vertices were made again' "$(<stats.json)"
   grep -q "\"pictures_kept\":$((frames - 1))" stats.json || fail 'pictures were drawn again' "$(<stats.json)"
   [[ $(wc -c <all.rgb) == $((frames * 24 * 20 * 3)) ]] || fail 'another number of bytes than frames have'
   emboss-render --backend cpu --size 24x20 --frames 0:-1:2 run.h5 -o 'f%03d.png'
@@ -192,4 +193,38 @@ test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
   expect_failure 1 emboss-render emboss-render --backend cpu --frames 0:99 run.h5 -o x.rgb
   expect_failure 2 emboss-render emboss-render --backend cpu --frames a:b run.h5 -o x.rgb
   expect_failure 2 emboss-render emboss-render --backend cpu --frames all run.h5 -o 'f%s.png'
+}
+
+# What moves decides what is made again: counts, and the same pictures as one by one.
+test_a_sequence_renews_only_what_changed() {
+  cube >in.off
+  bumps >bumps.pgm
+  exp2ela in.off -o cube.ela
+  printf '%s\n' 'object cube cube.ela' step 'displace cube 0 0.1 0 0' step step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  local look=(--backend cpu --structure bumps.pgm --uv-scale 1 --size 40 --view iso) frame
+  counts() { grep -o '"pictures":[0-9]*,"pictures_kept":[0-9]*,"vertex_splits":[0-9]*,"frames_made":[0-9]*,"vertices_made":[0-9]*' stats.json | sed 's/"[a-z_]*"://g'; }
+  emboss-render "${look[@]}" --frames all --stats=stats.json run.h5 -o 'f%d.ppm'
+  # Rest, a step in which nothing moved, and two in which something did.
+  [[ $(counts) == 4,1,1,3,3 ]] || fail 'frames of a run' "$(counts)"
+  for frame in 0 1 2 3; do
+    emboss-render "${look[@]}" --frame $frame run.h5 -o one.ppm
+    cmp one.ppm f$frame.ppm
+  done
+  ! cmp -s f1.ppm f2.ppm || fail 'nothing moved, so that nothing is shown'
+  # Another view: the frames of tangents stay; and a light that turns.
+  emboss-render "${look[@]}" --turn 3 --stats=stats.json cube.ela -o 't%d.ppm'
+  [[ $(counts) == 3,0,1,1,1 ]] || fail 'a turn' "$(counts)"
+  emboss-render "${look[@]}" --orbit 120,0 --light "$(grep -o '"light":\[[^]]*' stats.json | cut -d[ -f2)" cube.ela -o one.ppm
+  cmp one.ppm t1.ppm
+  emboss-render "${look[@]}" --turn-light 4 --stats=stats.json cube.ela --to rgb -o light.rgb
+  [[ $(counts) == 4,0,1,1,1 && $(wc -c <light.rgb) == 19200 ]] || fail 'a turning light' "$(counts)"
+  ! cmp -s <(head -c 4800 light.rgb) <(tail -c 4800 light.rgb) || fail 'the light does not turn'
+  # By vertex the light stands at the vertices, which are made again, but not split, nor their frames.
+  emboss-render "${look[@]}" --tbn vertex --turn-light 4 --stats=stats.json cube.ela --to rgb -o light.rgb
+  [[ $(counts) == 4,0,1,1,4 ]] || fail 'a turning light by vertex' "$(counts)"
+  if has_gl; then
+    emboss-render "${look[@]:2}" --backend gl --turn 3 --stats=stats.json cube.ela --to rgb -o turn.rgb
+    grep -q '"uploads":1,' stats.json || fail 'OpenGL was given the same again' "$(<stats.json)"
+  fi
 }
