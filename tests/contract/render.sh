@@ -228,3 +228,55 @@ test_a_sequence_renews_only_what_changed() {
     grep -q '"uploads":1,' stats.json || fail 'OpenGL was given the same again' "$(<stats.json)"
   fi
 }
+
+# What is broken in a mesh gives a right picture or one clear line.
+test_degenerate_input() {
+  local backend backends=(cpu) many
+  ! has_gl || backends+=(gl)
+  awk 'BEGIN { print "P2 32 32 255"
+    for (y = -15.5; y < 16; ++y) for (x = -15.5; x < 16; ++x) { h = 1 - (x * x + y * y) / 160; print (h > 0) ? int(255 * h) : 0 } }' >bumps.pgm
+  # A square of 2 x 2; NORMAL stands at each point, ST are the coordinates of its two triangles.
+  square() { # NORMAL ST ST [FACE...]
+    local normal=$1 first=$2 second=$3
+    shift 3
+    printf '%s\n' ply 'format ascii 1.0' 'element vertex 4' 'property double x' 'property double y' 'property double z' ${normal:+'property float nx' 'property float ny' 'property float nz'} \
+      "element face $((2 + $#))" 'property list uchar int vertex_indices' 'property list uchar float texcoord' end_header \
+      "0 0 0 $normal" "2 0 0 $normal" "2 2 0 $normal" "0 2 0 $normal" "3 0 1 2 6 $first" "3 0 2 3 6 $second" "$@"
+  }
+  picture() { emboss-render --backend "$backend" --structure bumps.pgm --texture bumps.pgm --view top --light 5,9,9 --size 48 "$1" -o "$2"; }
+  for backend in "${backends[@]}"; do
+    square '' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+    picture in.ply whole.ppm
+    # Triangles without area in space, drawn or not, change nothing.
+    square '' '0 0 1 0 1 1' '0 0 1 1 0 1' '3 1 1 2 6 0 0 1 0 1 1' '3 0 2 2 6 0 0 1 0 1 1' >in.ply
+    picture in.ply area.ppm
+    cmp whole.ppm area.ppm
+    # Without area in the texture: one texel, flat.
+    square '' '0.5 0.5 0.5 0.5 0.5 0.5' '0.5 0.5 0.5 0.5 0.5 0.5' >in.ply
+    picture in.ply flat.ppm
+    [[ $(tail -c 6912 flat.ppm | od -An -v -tu1 -w3 | sort -u | wc -l) == 2 ]] || fail "$backend: a texture without area is not one colour on the background"
+    # Mirrored, both by the mesh and by the picture's coordinates: the light still comes from its side.
+    square '' '1 0 0 0 0 1' '1 0 0 1 1 1' >in.ply
+    picture in.ply mirrored.ppm
+    read -r _ many <<<"$(difference whole.ppm mirrored.ppm)"
+    ((many < 60)) || fail "$backend: bumps that are symmetric are not in the mirror" "$many"
+    # Normals of zero count as none.
+    square '0 0 0' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+    picture in.ply normals.ppm
+    cmp whole.ppm normals.ppm
+    # The light on a vertex, and the camera on the surface.
+    emboss-render --backend "$backend" --structure bumps.pgm --view top --light 0,0,0 --size 48 in.ply -o out.ppm
+    emboss-render --backend "$backend" --structure bumps.pgm --eye 1,1,0 --target 1,2,0 --size 48 in.ply -o out.ppm
+    # 1 x 1, and more than there is memory for.
+    emboss-render --backend "$backend" --size 1 in.ply --to rgb -o out.rgb
+    [[ $(wc -c <out.rgb) == 3 ]] || fail "$backend: 1 x 1 is not one pixel"
+    rm -f out.png
+    expect_failure 1 emboss-render emboss-render --backend "$backend" --size 8000 --max-memory 50M in.ply -o out.png
+    [[ ! -e out.png ]] || fail "$backend: a failure left a picture"
+  done
+  # Normals that are no numbers are refused by their place.
+  square 'nan 0 1' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+  expect_failure 1 emboss-render emboss-render --backend cpu in.ply -o out.png
+  printf 'OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n' >in.off
+  expect_failure 1 emboss-render emboss-render --backend cpu in.off -o out.png
+}
