@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
@@ -34,6 +35,7 @@ struct Job {
   png_byte channels = 0;
   std::size_t row_bytes = 0;
   int passes = 1;
+  bool deep = false; // 16 bits a value, in the order of this machine
   // writing
   std::string* out = nullptr;
 };
@@ -85,7 +87,13 @@ bool read_head(Job& job) {
     png_set_palette_to_rgb(job.png);
   else if (type == PNG_COLOR_TYPE_GRAY && png_get_bit_depth(job.png, job.info) < 8)
     png_set_expand_gray_1_2_4_to_8(job.png);
-  png_set_scale_16(job.png);
+  if (job.deep) {
+    png_set_expand_16(job.png);
+    if constexpr (std::endian::native == std::endian::little)
+      png_set_swap(job.png);
+  } else {
+    png_set_scale_16(job.png);
+  }
   png_set_strip_alpha(job.png);
   job.passes = png_set_interlace_handling(job.png);
   png_read_update_info(job.png, job.info);
@@ -96,7 +104,7 @@ bool read_head(Job& job) {
   return true;
 }
 
-bool read_rows(Job& job, std::uint8_t* pixels) {
+bool read_rows(Job& job, png_byte* pixels) {
   if (setjmp(png_jmpbuf(job.png)) != 0)
     return false;
   for (int pass = 0; pass < job.passes; ++pass)
@@ -159,11 +167,11 @@ private:
                         ", expected a sound PNG");
 }
 
-} // namespace
-
-Image read_png(std::string_view bytes, const std::string& name) {
+template <class Value>
+Pixels<Value> read(std::string_view bytes, const std::string& name) {
   Job job;
   job.bytes = bytes;
+  job.deep = sizeof(Value) == 2;
   const Session session(job, true);
   if (!read_head(job))
     fail(job, name);
@@ -173,11 +181,21 @@ Image read_png(std::string_view bytes, const std::string& name) {
     throw Error(name, std::to_string(job.width) + " x " + std::to_string(job.height) +
                           " pixels in " + std::to_string(bytes.size()) +
                           " bytes, expected a complete PNG");
-  Image image{job.width, job.height, job.channels, {}};
-  image.values.resize(job.row_bytes * job.height);
-  if (!read_rows(job, image.values.data()))
+  Pixels<Value> image{job.width, job.height, job.channels, {}};
+  image.values.resize(job.row_bytes / sizeof(Value) * job.height);
+  if (!read_rows(job, reinterpret_cast<png_byte*>(image.values.data())))
     fail(job, name);
   return image;
+}
+
+} // namespace
+
+Image read_png(std::string_view bytes, const std::string& name) {
+  return read<std::uint8_t>(bytes, name);
+}
+
+DeepImage read_deep_png(std::string_view bytes, const std::string& name) {
+  return read<std::uint16_t>(bytes, name);
 }
 
 std::string write_png(const Image& image) {

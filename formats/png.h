@@ -13,6 +13,8 @@ namespace gewebe {
 /// \throw Error, place `name`, for anything that libpng refuses, sides above 32768, and headers
 /// that claim more pixels than the bytes can hold
 Image read_png(std::string_view bytes, const std::string& name);
+/// The same in 16 bits; 8 bits v become 257 v.
+DeepImage read_deep_png(std::string_view bytes, const std::string& name);
 
 /// 8 bits a channel, no time stamp, fixed compression: equal images give equal bytes with one zlib.
 /// \throw Error where memory ends

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace gewebe {
 namespace {
@@ -16,16 +17,18 @@ bool is_blank(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
+/// Values are scaled to 0 … the largest that Value holds.
+template <class Value>
 class Reader {
 public:
   Reader(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
-  Image read() {
+  Pixels<Value> read() {
     const char letter = bytes_.size() > 1 && bytes_[0] == 'P' ? bytes_[1] : '?';
     if (letter != '2' && letter != '3' && letter != '5' && letter != '6')
       fail("no PNM, expected P2, P3, P5 or P6");
     at_ = 2;
-    Image image;
+    Pixels<Value> image;
     image.channels = letter == '3' || letter == '6' ? 3 : 1;
     image.width = number("width", 1, max_side);
     image.height = number("height", 1, max_side);
@@ -73,23 +76,40 @@ private:
     return value;
   }
 
-  std::uint8_t scaled(std::uint32_t value) const {
-    return static_cast<std::uint8_t>((value * 255U + maxval_ / 2) / maxval_);
+  Value scaled(std::uint32_t value) const {
+    constexpr std::uint32_t top = std::numeric_limits<Value>::max();
+    return static_cast<Value>(maxval_ == top ? value : (value * top + maxval_ / 2) / maxval_);
   }
 
-  void read_text(Image& image, std::size_t count) {
+  /// The next value where it is plain: digits between blanks. Anything else, errors too, is for
+  /// number().
+  std::uint32_t value() {
+    std::size_t at = at_;
+    for (; at < bytes_.size() && is_blank(bytes_[at]); ++at)
+      line_ += bytes_[at] == '\n' ? 1U : 0U;
+    at_ = at;
+    std::uint32_t sum = 0;
+    for (; at < bytes_.size() && at < at_ + 6 && bytes_[at] >= '0' && bytes_[at] <= '9'; ++at)
+      sum = 10 * sum + static_cast<std::uint32_t>(bytes_[at] - '0');
+    if (at == at_ || at == bytes_.size() || !is_blank(bytes_[at]) || sum > maxval_)
+      return number("value", 0, maxval_);
+    at_ = at;
+    return sum;
+  }
+
+  void read_text(Pixels<Value>& image, std::size_t count) {
     // Each value takes two bytes, the last perhaps one.
     if (count > (bytes_.size() - at_ + 1) / 2)
       fail("too few bytes for " + std::to_string(count) + " values, expected a complete file");
     image.values.reserve(count);
     for (std::size_t n = 0; n < count; ++n)
-      image.values.push_back(scaled(number("value", 0, maxval_)));
+      image.values.push_back(scaled(value()));
     skip_blanks();
     if (at_ != bytes_.size())
       fail("goes on after the last value, expected the end");
   }
 
-  void read_binary(Image& image, std::size_t count) {
+  void read_binary(Pixels<Value>& image, std::size_t count) {
     ++at_; // the blank behind maxval
     const std::size_t width = maxval_ > 255 ? 2 : 1;
     const std::size_t left = at_ < bytes_.size() ? bytes_.size() - at_ : 0;
@@ -117,7 +137,11 @@ private:
 } // namespace
 
 Image read_pnm(std::string_view bytes, const std::string& name) {
-  return Reader(bytes, name).read();
+  return Reader<std::uint8_t>(bytes, name).read();
+}
+
+DeepImage read_deep_pnm(std::string_view bytes, const std::string& name) {
+  return Reader<std::uint16_t>(bytes, name).read();
 }
 
 std::string write_ppm(const Image& image) {

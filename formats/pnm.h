@@ -13,6 +13,8 @@ namespace gewebe {
 /// of 0 or above 32768, a value above maxval, fewer or more values than the header says. Takes no
 /// more memory than the bytes justify.
 Image read_pnm(std::string_view bytes, const std::string& name);
+/// The same, values scaled to 0 … 65535.
+DeepImage read_deep_pnm(std::string_view bytes, const std::string& name);
 
 /// P6 with maxval 255. \pre three channels
 std::string write_ppm(const Image& image);

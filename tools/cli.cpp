@@ -18,6 +18,7 @@
 #include <mutex>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 
 namespace gewebe::cli {
 namespace {
@@ -67,10 +68,12 @@ std::string number_text(double value) {
 struct Spec {
   std::string names, metavar, help;
   std::string default_text;
-  std::string word;     // as typed
-  bool* flag = nullptr; // a flag has no word
+  std::string word;               // as typed
+  std::vector<std::string> words; // instead where values may have numbers
+  bool* flag = nullptr;           // a flag has no word
   bool given = false;
   std::function<void(Spec&, std::string_view)> set; // parses the word, applies the checks
+  std::function<void(Spec&, std::int32_t, std::string_view)> set_numbered;
   bool must_be_positive = false;
   double min = -HUGE_VAL, max = HUGE_VAL;
   std::vector<std::string> choices;
@@ -378,11 +381,55 @@ std::vector<double> parse_list(const Spec& spec, std::string_view word) {
   return values;
 }
 
+/// N of "N=VALUE".
+std::optional<std::int32_t> number_before_value(std::string_view word) {
+  std::int32_t number = 0;
+  const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (status != std::errc{} || rest == word.data() + word.size() || *rest != '=' || word[0] == '-')
+    return std::nullopt;
+  return number;
+}
+
+void set_all(Spec& spec) {
+  std::vector<std::optional<std::int32_t>> numbers;
+  if (!spec.set_numbered)
+    return spec.set(spec, spec.word);
+  for (const std::string_view word : spec.words) {
+    const auto number = number_before_value(word);
+    if (std::ranges::find(numbers, number) != numbers.end())
+      throw UsageError(spec.long_name() + (number ? " " + std::to_string(*number) + "=" : "") +
+                       ": given more than once");
+    numbers.push_back(number);
+    if (number && word.back() == '=')
+      throw UsageError(spec.long_name() + " " + std::string(word) + ": expected " + spec.metavar);
+    if (number)
+      spec.set_numbered(spec, *number, word.substr(word.find('=') + 1));
+    else
+      spec.set(spec, word);
+  }
+}
+
 Vec3 parse_vec3(const Spec& spec, std::string_view word) {
   const std::vector<double> values = parse_list(spec, word);
   return {values[0], values[1], values[2]};
 }
 } // namespace
+
+OptionRef& OptionRef::numbered(std::function<std::string&(std::int32_t)> value_of) {
+  static_cast<Spec*>(spec_)->set_numbered =
+      [value_of = std::move(value_of)](Spec&, std::int32_t n, std::string_view word) {
+        value_of(n) = word;
+      };
+  return *this;
+}
+
+OptionRef& OptionRef::numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of) {
+  static_cast<Spec*>(spec_)->set_numbered =
+      [value_of = std::move(value_of)](Spec& self, std::int32_t n, std::string_view word) {
+        value_of(n) = parse_vec3(self, word);
+      };
+  return *this;
+}
 
 OptionRef Program::option(const std::string& names, std::vector<double>& value,
                           const std::string& metavar, const std::string& help) {
@@ -506,9 +553,11 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       }
       const std::string more =
           spec.default_text.empty() ? "" : " (default " + spec.default_text + ")";
-      app.add_option(spec.names, spec.word, spec.help + more)
-          ->type_name(spec.metavar)
-          ->each([&spec](const std::string&) { spec.given = true; });
+      CLI::Option* const option =
+          spec.set_numbered
+              ? app.add_option(spec.names, spec.words, spec.help + more)->allow_extra_args(false)
+              : app.add_option(spec.names, spec.word, spec.help + more);
+      option->type_name(spec.metavar)->each([&spec](const std::string&) { spec.given = true; });
     }
     for (const State::Operand& operand : s.operands) {
       CLI::Option* option = operand.values != nullptr
@@ -533,7 +582,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     }
     for (const auto& spec : s.specs)
       if (spec->given)
-        spec->set(*spec, spec->word);
+        set_all(*spec);
     for (const State::Operand& operand : s.operands) {
       const std::size_t count =
           operand.values != nullptr ? operand.values->size() : app.count(operand.name);

@@ -106,6 +106,10 @@ public:
   OptionRef& range(double min, double max);
   OptionRef& one_of(std::vector<std::string> words);
   OptionRef& count(std::size_t n); ///< a list must have exactly n numbers
+  /// The option may be given several times: plainly once, and as N=VALUE with another whole number
+  /// N each; `value_of(N)` is where that value goes.
+  OptionRef& numbered(std::function<std::string&(std::int32_t)> value_of);
+  OptionRef& numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of);
 
 private:
   friend class Program;

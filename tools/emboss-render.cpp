@@ -8,7 +8,10 @@
 #include "tools/render_pictures.h"
 #include "tools/render_volume.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <string>
+#include <vector>
 
 using namespace gewebe;
 namespace {
@@ -53,7 +56,8 @@ std::string numbered(const std::string& pattern, std::int64_t n) {
 
 void work(cli::Run& run, const cli::RenderArguments& a) {
   const Kind to = output_kind(run.to(), run.output(), Kind::png, picture_kinds());
-  const bool many = !a.frames.empty() && run.output().find('%') != std::string::npos;
+  const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
+  const bool many = sequence && run.output().find('%') != std::string::npos;
   std::optional<Output> one;
   if (!many)
     one.emplace(run.output(), run.output_options(true));
@@ -72,22 +76,33 @@ void work(cli::Run& run, const cli::RenderArguments& a) {
     if (reading.kind != Kind::hdf5)
       throw UsageError(input.name(), "--frames for no result of a run, expected --frames absent");
     frames = result_frames(input, a.frames);
-  } else {
-    frames.push_back(reading.frame.value_or(-1));
+  } else { // one shape from all sides
+    const std::int64_t count = std::max(a.turn.value_or(1), a.turn_light.value_or(1));
+    for (std::int64_t n = 0; n < count; ++n)
+      frames.push_back(n);
   }
   cli::Pictures pictures(run, a);
   Digest digest;
   Image picture;
+  std::vector<Surface> surfaces;
+  std::string bytes;
   for (const std::int64_t frame : frames) {
     if (!a.frames.empty())
       reading.frame = frame;
-    picture = pictures.of(run.timed("read", [&] { return read(run, input, reading); }));
+    if (!a.frames.empty() || surfaces.empty())
+      surfaces = run.timed("read", [&] { return read(run, input, reading); });
+    picture = pictures.of(surfaces);
     digest.add(picture.values);
     run.timed("write", [&] {
+      if (to != Kind::rgb && !pictures.kept())
+        bytes = image_bytes(picture, to);
+      const auto put = [&](Output& output) {
+        return to == Kind::rgb ? write_image(output, picture, to) : output.write(bytes);
+      };
       if (!many)
-        return write_image(*one, picture, to);
+        return put(*one);
       Output output(numbered(run.output(), frame), run.output_options(true));
-      write_image(output, picture, to);
+      put(output);
       output.commit();
     });
   }

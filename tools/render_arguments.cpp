@@ -1,11 +1,11 @@
 #include "tools/render_arguments.h"
 
 #include "render/color_ramp.h"
+#include "tools/render_camera.h"
+#include "tools/render_materials.h"
 #include "tools/render_volume.h"
 
 #include <algorithm>
-#include <cmath>
-#include <tuple>
 #include <utility>
 
 namespace gewebe::cli {
@@ -102,24 +102,9 @@ void complete_modes(RenderArguments& a) {
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
 }
 
-void complete_camera(RenderArguments& a) {
-  refuse(a.camera.eye && (!a.words.view.empty() || a.camera.distance),
-         "--eye with --view or --distance, expected one way to place the camera");
-  if (!a.words.view.empty())
-    a.camera.view = a.words.view;
-  a.camera.azimuth = a.words.orbit[0];
-  a.camera.elevation = a.words.orbit[1];
-  refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),
-         "--orbit: expected an azimuth up to 3600 and an elevation from -90 to 90 degrees");
-  try {
-    std::tie(a.picture.width, a.picture.height) = picture_size_from_text(a.words.size);
-  } catch (const Error& error) {
-    throw UsageError(std::string("--size: ") + error.what());
-  }
-}
-
 void complete(RenderArguments& a) {
   complete_textures(a);
+  complete_materials(a);
   complete_modes(a);
   complete_camera(a);
   complete_volume(a);
@@ -141,17 +126,28 @@ void complete(RenderArguments& a) {
   for (const auto& [word, layer] : layers_of(a))
     if (!layer->path.empty())
       inputs.push_back(layer->path);
+  for (const std::string& path : material_paths(a))
+    inputs.push_back(path);
   if (std::ranges::find(color_ramp_names(), a.volume.ramp) == color_ramp_names().end())
     inputs.push_back(a.volume.ramp);
   check_one_pipe(inputs);
 }
 
 void declare_textures(Program& p, RenderArguments& a) {
-  p.option("--texture", a.base.path, "FILE", "colours: PNG or PNM");
-  p.option("--detail", a.detail.path, "FILE", "colours added to them");
-  p.option("--reflection", a.reflection.path, "FILE", "what a moist surface mirrors, added too");
-  p.option("--structure", a.structure.path, "FILE",
-           "heights to emboss: brightness of a PNG or PNM");
+  const auto path_of = [&a](RenderLayer RenderMaterial::*layer) {
+    return [&a, layer](std::int32_t n) -> std::string& { return (a.materials[n].*layer).path; };
+  };
+  p.option("--texture", a.base.path, "[N=]FILE", "colours: PNG or PNM; N=: of material N")
+      .numbered(path_of(&RenderMaterial::base));
+  p.option("--detail", a.detail.path, "[N=]FILE", "colours added to them")
+      .numbered(path_of(&RenderMaterial::detail));
+  p.option("--reflection", a.reflection.path, "[N=]FILE", "what a moist surface mirrors, added too")
+      .numbered(path_of(&RenderMaterial::reflection));
+  p.option("--structure", a.structure.path, "[N=]FILE",
+           "heights to emboss: brightness of a PNG or PNM")
+      .numbered(path_of(&RenderMaterial::structure));
+  p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
+      .one_of(group_by_names());
   p.option("--sphere", a.words.sphere, "LIST",
            "textures seen as in a mirror: texture, detail, reflection, structure; none");
   p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
@@ -161,31 +157,15 @@ void declare_textures(Program& p, RenderArguments& a) {
   p.option("--light", a.light, "X,Y,Z", "place of the light in mm, else above the camera, left");
   p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
   p.option("--shade", a.drawing.shade, "K", "share of Lambert's law, 0 to 1").range(0, 1);
-  p.option("--color", a.look.color, "R,G,B", "factor of the colours, 0 to 1").range(0, 1);
+  p.option("--color", a.look.color, "[N=]R,G,B", "factor of the colours, 0 to 1")
+      .range(0, 1)
+      .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
   p.option("--background", a.look.background, "R,G,B", "0 to 1").range(0, 1);
   p.option("--uv", a.words.uv, "MAP",
            "auto (the mesh's coordinates, else box), box, sphere, cylinder")
       .one_of({"auto", "box", "sphere", "cylinder"});
   p.option("--uv-scale", a.mapping.edge, "MM", "edge of the texture for box, else half the mesh")
       .positive();
-}
-
-void declare_camera(Program& p, RenderArguments& a) {
-  p.option("--view", a.words.view, "SIDE",
-           "front (if no --eye), back, left, right, top, bottom, iso")
-      .one_of(view_names());
-  p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
-      .count(2);
-  p.option("--distance", a.camera.distance, "MM", "of the eye, else so that all is seen")
-      .positive();
-  p.option("--eye", a.camera.eye, "X,Y,Z", "place of the camera in mm");
-  p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
-  p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
-  p.option("--fov", a.camera.fov, "DEG", "angle across the shorter side").range(1, 170);
-  p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
-  p.option("--supersample", a.words.supersample, "N", "a pixel is the mean of N x N samples")
-      .range(1, 8);
-  p.option("--msaa", a.words.msaa, "N", "1, or 4 samples along outlines").range(1, 4);
 }
 
 } // namespace
@@ -210,6 +190,9 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
       .range(-1, 1e15);
   p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
+  p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
+  p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
+      .range(1, 100000);
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
   declare_volume(p, a);
   p.check([&a] { complete(a); });

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,12 @@ struct RenderLayer {
   TextureOptions options;
 };
 
+/// What a material, a part or an object has for itself; the rest is as for all.
+struct RenderMaterial {
+  RenderLayer base, detail, reflection, structure;
+  std::optional<Vec3> color;
+};
+
 /// What a volume alone is asked for, as words and as what they mean.
 struct RenderVolume {
   std::string slice, maximum, ramp;
@@ -34,6 +41,7 @@ struct RenderVolume {
 struct RenderArguments {
   std::string surface = "-";
   RenderLayer base, detail, reflection, structure;
+  std::map<std::int32_t, RenderMaterial> materials;
   Look look; ///< colours; its textures are read later
   std::optional<Vec3> light;
   double offset = 0.02;
@@ -41,7 +49,8 @@ struct RenderArguments {
   std::string style = "textured";
   std::vector<std::string> compare; ///< modes side by side
   SurfaceReadOptions reading;
-  std::string frames; ///< of a result, "": one
+  std::string frames;                           ///< of a result, "": one
+  std::optional<std::int64_t> turn, turn_light; ///< pictures in one turn
   CameraOptions camera;
   DrawingOptions drawing;
   UvOptions mapping;
@@ -52,7 +61,7 @@ struct RenderArguments {
   struct Words {
     std::string size = "512", backend = "auto", uv = "auto", view, passes = "shader",
                 target = "float", tbn = "auto", filter = "mipmap", wrap = "repeat",
-                sphere = "reflection", compare;
+                sphere = "reflection", by = "material", compare;
     std::vector<double> orbit{0, 0};
     std::int64_t supersample = 1, msaa = 1, rgb_scale = 2;
     std::optional<Vec3> light_direction;

@@ -1,9 +1,12 @@
 #include "tools/render_pictures.h"
 
 #include "formats/image_file.h"
+#include "render/angles.h"
 #include "render/style.h"
+#include "tools/render_materials.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace gewebe::cli {
@@ -23,8 +26,11 @@ Look look_of(const RenderArguments& a, const Context& context) {
     look.detail = texture_from(load(a.detail, context), a.detail.options);
   if (!a.reflection.path.empty())
     look.reflection = texture_from(load(a.reflection, context), a.reflection.options);
-  if (!a.structure.path.empty())
-    look.structure = texture_from(luminance(load(a.structure, context)), a.structure.options);
+  if (!a.structure.path.empty()) {
+    Input input(a.structure.path);
+    look.structure = texture_from(read_heights(input, context), a.structure.options);
+  }
+  add_material_looks(look, a, context);
   return look;
 }
 
@@ -44,6 +50,14 @@ std::vector<PictureOptions> options_of(const RenderArguments& a) {
   return all;
 }
 
+/// The light walked around the target, about what points up in the picture.
+Vec3 turned_light(const Vec3& light, const Camera& camera, double part, bool directional) {
+  const Vec3 from = directional ? Vec3{} : camera.target, k = camera.up, v = light - from;
+  const Vec3 along = k * dot(k, v), across = v - along;
+  const auto [cosine, sine] = cos_sin(360 * part);
+  return from + along + across * cosine + cross(k, across) * sine;
+}
+
 } // namespace
 
 Pictures::Pictures(Run& run, const RenderArguments& arguments)
@@ -53,17 +67,42 @@ Pictures::Pictures(Run& run, const RenderArguments& arguments)
 
 void Pictures::start(const std::vector<Surface>& surfaces) {
   const RenderArguments& a = arguments_;
-  camera_ = make_camera(a.camera, rest_box(surfaces), a.picture.width, a.picture.height);
-  drawing_.camera = *camera_;
+  box_ = rest_box(surfaces);
+  camera_ = camera_of(0);
   drawing_.light = a.light.value_or(default_light(*camera_));
+  first_light_ = drawing_.light;
   drawing_.offset = {a.offset, a.offset};
-  if (a.offset_texels && look_.structure)
-    drawing_.offset = {*a.offset_texels / look_.structure->width(),
-                       *a.offset_texels / look_.structure->height()};
+  const auto structured = std::ranges::find_if(
+      look_.others, [](const Look& look) { return look.structure.has_value(); });
+  if (const Look& look = look_.structure || structured == look_.others.end() ? look_ : *structured;
+      a.offset_texels && look.structure)
+    drawing_.offset = {*a.offset_texels / look.structure->width(),
+                       *a.offset_texels / look.structure->height()};
   run_.timed("start", [&] {
     for (const PictureOptions& options : options_)
       modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});
   });
+}
+
+Camera Pictures::camera_of(std::uint64_t number) const {
+  const RenderArguments& a = arguments_;
+  CameraOptions options = a.camera;
+  if (a.turn)
+    options.azimuth += 360.0 * static_cast<double>(number) / static_cast<double>(*a.turn);
+  return make_camera(options, box_, a.picture.width, a.picture.height);
+}
+
+/// Places camera and light of a picture; whether one of them is elsewhere than before.
+bool Pictures::place(std::uint64_t number) {
+  const RenderArguments& a = arguments_;
+  const Vec3 eye = drawing_.camera.eye, light = drawing_.light;
+  camera_ = camera_of(number);
+  drawing_.camera = *camera_;
+  if (a.turn_light) {
+    const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
+    drawing_.light = turned_light(first_light_, *camera_, part, drawing_.directional);
+  }
+  return drawing_.camera.eye != eye || drawing_.light != light;
 }
 
 std::vector<Surface> Pictures::styled(std::vector<Surface> surfaces) const {
@@ -76,35 +115,81 @@ std::vector<Surface> Pictures::styled(std::vector<Surface> surfaces) const {
   return surfaces;
 }
 
-Image Pictures::of(std::vector<Surface> surfaces) {
-  if (!camera_)
+namespace {
+
+/// Whether two surfaces have the same triangles, coordinates, materials and rest.
+bool same_but_points(const Surface& kept, const Surface& now, bool coordinates) {
+  const TriangleMesh &a = kept.mesh, &b = now.mesh;
+  return a.points.size() == b.points.size() && a.triangles == b.triangles &&
+         (!coordinates || b.texcoords.empty() || a.texcoords == b.texcoords) && a.part == b.part &&
+         a.material == b.material && kept.rest == now.rest && !now.rest.empty();
+}
+
+} // namespace
+
+/// What the surfaces have that those drawn last had not; takes them over.
+std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool placed) {
+  const auto each = [&](const auto& same) {
+    return pictures_ > 1 && surfaces_.size() == surfaces.size() &&
+           std::equal(surfaces_.begin(), surfaces_.end(), surfaces.begin(), same);
+  };
+  if (arguments_.style != "textured") { // made of the points, and of the camera
+    const bool same =
+        pictures_ > 1 && plain_.size() == surfaces.size() &&
+        std::equal(surfaces.begin(), surfaces.end(), plain_.begin(),
+                   [](const Surface& s, const Drawn& drawn) {
+                     return s.mesh.points == drawn.points && s.mesh.triangles == drawn.triangles;
+                   });
+    if (same && !placed)
+      return std::nullopt;
+    plain_.clear();
+    for (const Surface& surface : surfaces)
+      plain_.push_back({surface.mesh.points, surface.mesh.triangles});
+    surfaces_ = styled(std::move(surfaces));
+    return DrawingChange::all;
+  }
+  if (each([](const Surface& kept, const Surface& now) {
+        return kept.mesh.points == now.mesh.points && kept.mesh.normals == now.mesh.normals &&
+               kept.mesh.triangles == now.mesh.triangles;
+      }))
+    return placed ? std::optional(DrawingChange::view) : std::nullopt;
+  const bool coordinates = !arguments_.mapping.mapping; // else they are made here
+  if (each([&](const Surface& kept, const Surface& now) {
+        return same_but_points(kept, now, coordinates);
+      })) {
+    for (std::size_t n = 0; n < surfaces.size(); ++n) {
+      surfaces_[n].mesh.points = std::move(surfaces[n].mesh.points);
+      surfaces_[n].mesh.normals = std::move(surfaces[n].mesh.normals);
+    }
+    return DrawingChange::points;
+  }
+  surfaces_ = std::move(surfaces);
+  return DrawingChange::all;
+}
+
+const Image& Pictures::of(std::vector<Surface> surfaces) {
+  if (modes_.empty())
     start(surfaces);
-  ++pictures_;
-  const bool same =
-      pictures_ > 1 && drawn_.size() == surfaces.size() &&
-      std::equal(surfaces.begin(), surfaces.end(), drawn_.begin(),
-                 [](const Surface& s, const Drawn& drawn) {
-                   return s.mesh.points == drawn.points && s.mesh.triangles == drawn.triangles;
-                 });
-  if (same) {
+  const bool placed = place(pictures_++);
+  const auto change = run_.timed("compare", [&] { return take(std::move(surfaces), placed); });
+  kept_last_ = !change;
+  if (kept_last_) {
     ++kept_;
     return last_;
   }
-  drawn_.clear();
-  for (const Surface& surface : surfaces)
-    drawn_.push_back({surface.mesh.points, surface.mesh.triangles});
-  surfaces = styled(std::move(surfaces));
-  if (drawing_.texcoords)
+  if (*change == DrawingChange::all && drawing_.texcoords)
     mapped_ = run_.timed(
-        "prepare", [&] { return add_texcoords(surfaces, arguments_.mapping, run_.context()); });
+        "prepare", [&] { return add_texcoords(surfaces_, arguments_.mapping, run_.context()); });
   std::vector<Image> images;
-  std::optional<Drawing> drawing;
+  std::array<const Drawing*, 2> drawings{}; // by what stands at the vertices
   for (Mode& mode : modes_) {
-    const bool per_pixel = mode.painter->per_pixel();
-    if (!drawing || per_pixel != drawing_.per_pixel) {
-      drawing_.per_pixel = per_pixel;
-      drawing =
-          run_.timed("prepare", [&] { return make_drawing(surfaces, drawing_, run_.context()); });
+    drawing_.per_pixel = mode.painter->per_pixel();
+    const Drawing*& drawing = drawings[drawing_.per_pixel ? 1 : 0];
+    if (drawing == nullptr) {
+      DrawingMaker& maker = makers_[drawing_.per_pixel ? 1 : 0];
+      drawing = run_.timed(
+          "prepare", [&] { return &maker.make(surfaces_, drawing_, *change, run_.context()); });
+      tell_groups(*drawing);
     }
     images.push_back(
         run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
@@ -115,6 +200,21 @@ Image Pictures::of(std::vector<Surface> surfaces) {
   return last_;
 }
 
+/// How many triangles have which look; a look that none has is a mistake more likely than not.
+void Pictures::tell_groups(const Drawing& drawing) {
+  if (groups_told_ || drawing.group_start.empty() || drawing.triangles.empty())
+    return;
+  groups_told_ = true;
+  std::vector<std::uint64_t> counts;
+  for (std::size_t g = 0; g < group_count(drawing); ++g)
+    counts.push_back(triangles_of_group(drawing, g).size());
+  run_.stats().set("triangles_by_look", counts);
+  for (std::size_t g = 1; g < counts.size(); ++g)
+    if (counts[g] == 0)
+      run_.warn("no triangle is of " + arguments_.words.by + " " +
+                std::to_string(drawing_.groups[g - 1]));
+}
+
 void Pictures::tell(Stats& stats, const Image& last) const {
   if (drawing_.texcoords)
     stats.set("surfaces_mapped", mapped_);
@@ -123,6 +223,15 @@ void Pictures::tell(Stats& stats, const Image& last) const {
   stats.set("light", drawing_.light);
   stats.set("pictures", pictures_);
   stats.set("pictures_kept", kept_);
+  DrawingCounts counts;
+  for (const DrawingMaker& maker : makers_) {
+    counts.splits += maker.counts().splits;
+    counts.frames += maker.counts().frames;
+    counts.vertices += maker.counts().vertices;
+  }
+  stats.set("vertex_splits", counts.splits);
+  stats.set("frames_made", counts.frames);
+  stats.set("vertices_made", counts.vertices);
   const PictureReport& told = modes_.back().report;
   stats.set("backend", backend_names()[static_cast<std::size_t>(told.backend)]);
   if (told.backend == Backend::gl) {
@@ -131,6 +240,8 @@ void Pictures::tell(Stats& stats, const Image& last) const {
     stats.set("target", told.target);
   }
   stats.set("passes", told.passes);
+  if (told.backend == Backend::gl)
+    stats.set("uploads", told.uploads);
   stats.set("triangles_drawn", told.triangles);
   if (told.backend == Backend::cpu)
     stats.set("samples_covered", told.covered);

@@ -6,20 +6,25 @@
 #include "tools/cli.h"
 #include "tools/render_arguments.h"
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
 
 namespace gewebe::cli {
 
-/// Camera and light stand where the first surfaces at rest place them. What a sequence keeps is
-/// kept: textures, and the picture where no point moved and no
-/// triangle is another.
+/// Camera and light stand where the first surfaces at rest place them, and turn as they were told.
+/// What a sequence keeps is kept: textures; coordinates and vertices as they are split while the
+/// triangles are the same; frames of tangents while no point moves; the picture while camera and
+/// light stand still too.
 class Pictures {
 public:
   /// Reads the textures. \throw Error with place
   Pictures(Run& run, const RenderArguments& arguments);
-  Image of(std::vector<Surface> surfaces);
+  const Image& of(std::vector<Surface> surfaces);
+  /// Whether the last picture is that before it.
+  bool kept() const { return kept_last_; }
   /// What is known at the end.
   void tell(Stats& stats, const Image& last) const;
 
@@ -33,6 +38,10 @@ private:
     PictureReport report;
   };
   void start(const std::vector<Surface>& surfaces);
+  Camera camera_of(std::uint64_t number) const;
+  bool place(std::uint64_t number);
+  std::optional<DrawingChange> take(std::vector<Surface> surfaces, bool placed);
+  void tell_groups(const Drawing& drawing);
   std::vector<Surface> styled(std::vector<Surface> surfaces) const;
 
   Run& run_;
@@ -42,8 +51,14 @@ private:
   std::vector<Mode> modes_;
   std::optional<Camera> camera_;
   DrawingOptions drawing_;
-  std::vector<Drawn> drawn_;
+  std::array<DrawingMaker, 2> makers_; ///< without and with frames for each pixel
+  std::vector<Surface> surfaces_;      ///< as they are drawn
+  std::vector<Drawn> plain_;           ///< surfaces drawn in another style
+  Box3 box_;                           ///< at rest
+  Vec3 first_light_;
   Image last_;
+  bool kept_last_ = false;
+  bool groups_told_ = false;
   std::uint64_t pictures_ = 0, kept_ = 0, mapped_ = 0;
 };
 

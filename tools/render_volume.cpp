@@ -86,7 +86,7 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
     return refuse(!v.slice.empty() || !v.maximum.empty() || !v.ramp.empty() || !v.range.empty(),
                   input,
                   "--slice, --maximum, --ramp or --range for no volume, expected none of them");
-  refuse(a.drawing.texcoords || a.drawing.sphere, input,
+  refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
          "a texture for a volume, expected --ramp or none");
   refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||
              a.picture.samples != 1,

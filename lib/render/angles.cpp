@@ -41,4 +41,21 @@ double turn(double x, double y) {
   return y < 0 ? 1 - part : part;
 }
 
+std::array<double, 2> cos_sin(double degrees) {
+  degrees -= 360 * std::floor(degrees / 360);
+  const double quarters = std::floor(degrees / 90);
+  const double t = tangent((degrees - 90 * quarters) / 2);
+  const double c = (1 - t * t) / (1 + t * t), s = 2 * t / (1 + t * t);
+  switch (static_cast<int>(quarters)) {
+  case 0:
+    return {c, s};
+  case 1:
+    return {-s, c};
+  case 2:
+    return {-c, -s};
+  default:
+    return {s, -c};
+  }
+}
+
 } // namespace gewebe

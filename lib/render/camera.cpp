@@ -50,24 +50,6 @@ void orient(Camera& camera, const Vec3& back, const std::optional<Vec3>& up, con
   camera.up = cross(camera.back, camera.right);
 }
 
-/// Cosine and sine of an angle in degrees.
-std::array<double, 2> cos_sin(double degrees) {
-  degrees -= 360 * std::floor(degrees / 360);
-  const double quarters = std::floor(degrees / 90);
-  const double t = tangent((degrees - 90 * quarters) / 2);
-  const double c = (1 - t * t) / (1 + t * t), s = 2 * t / (1 + t * t);
-  switch (static_cast<int>(quarters)) {
-  case 0:
-    return {c, s};
-  case 1:
-    return {-s, c};
-  case 2:
-    return {-c, -s};
-  default:
-    return {s, -c};
-  }
-}
-
 /// Walks around the target: first to the right around `up`, then upwards.
 void orbit(Camera& camera, double azimuth, double elevation) {
   const auto turn = [](Vec3& a, Vec3& b, double degrees) { // from a towards b

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <utility>
 
 // Based on: report FZKA 7190, 2006, section 3.2.3; Lengyel, Mathematics for 3D Game Programming and
 // Computer Graphics, 2003 (emboss bump mapping).
@@ -49,17 +50,32 @@ std::array<float, 3> in_floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-void append(Drawing& drawing, const Surface& surface, const DrawingOptions& options,
-            const Context& context) {
+/// Renews what of `kept` `change` leaves no longer true.
+void prepare(DrawingParts& kept, const Surface& surface, const DrawingOptions& options,
+             DrawingChange change, DrawingCounts& counts, const Context& context) {
+  if (change == DrawingChange::view)
+    return;
   const TriangleMesh& mesh = surface.mesh;
-  std::vector<Vec3> normals;
   if (options.structure || options.sphere || options.shade > 0)
-    normals = render_normals(mesh);
-  const TexturedVertices vertices =
-      options.texcoords
-          ? split_vertices(mesh, mesh.texcoords, options.structure ? &normals : nullptr, context)
-          : plain_vertices(mesh);
+    kept.normals = render_normals(mesh);
+  counts.frames += options.structure ? 1U : 0U;
+  if (change == DrawingChange::points) {
+    if (options.structure)
+      renew_frames(kept.vertices, mesh, mesh.texcoords, kept.normals, context);
+    return;
+  }
+  counts.splits += options.texcoords ? 1U : 0U;
+  kept.vertices = options.texcoords
+                      ? split_vertices(mesh, mesh.texcoords,
+                                       options.structure ? &kept.normals : nullptr, context)
+                      : plain_vertices(mesh);
+}
 
+void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
+            const DrawingOptions& options, const Context& context) {
+  const TriangleMesh& mesh = surface.mesh;
+  const std::vector<Vec3>& normals = parts.normals;
+  const TexturedVertices& vertices = parts.vertices;
   const std::size_t base = drawing.vertices.size();
   if (base + vertices.point.size() > UINT32_MAX)
     throw Error(std::to_string(base + vertices.point.size()) + " vertices, expected at most " +
@@ -100,38 +116,127 @@ void append(Drawing& drawing, const Surface& surface, const DrawingOptions& opti
                                        options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
     }
   });
+}
+
+/// Those of the vertices appended last.
+void append_triangles(Drawing& drawing, const TexturedVertices& vertices) {
+  const auto base = static_cast<std::uint32_t>(drawing.vertices.size() - vertices.point.size());
   for (Triangle t : vertices.triangles) {
     for (std::uint32_t& corner : t)
-      corner += static_cast<std::uint32_t>(base);
+      corner += base;
     drawing.triangles.push_back(t);
   }
 }
 
-} // namespace
+/// Sorts the triangles by their groups, within which they keep their order.
+void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOptions& options) {
+  std::vector<std::size_t> group_of;
+  group_of.reserve(drawing.triangles.size());
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    const TriangleMesh& mesh = surfaces[s].mesh;
+    const std::vector<std::int32_t>& numbers =
+        options.group_by == GroupBy::part ? mesh.part : mesh.material;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      const std::int32_t number = options.group_by == GroupBy::surface
+                                      ? static_cast<std::int32_t>(s)
+                                  : numbers.empty() ? 0
+                                                    : numbers[t];
+      const auto found = std::ranges::find(options.groups, number);
+      group_of.push_back(found == options.groups.end()
+                             ? 0
+                             : static_cast<std::size_t>(found - options.groups.begin()) + 1);
+    }
+  }
+  std::vector<std::size_t> next(options.groups.size() + 2);
+  for (const std::size_t g : group_of)
+    ++next[g + 1];
+  for (std::size_t g = 1; g < next.size(); ++g)
+    next[g] += next[g - 1];
+  drawing.group_start.assign(next.begin() + 1, next.end() - 1);
+  std::vector<Triangle> sorted(drawing.triangles.size());
+  for (std::size_t t = 0; t < sorted.size(); ++t)
+    sorted[next[group_of[t]]++] = drawing.triangles[t];
+  drawing.triangles = std::move(sorted);
+}
 
-Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
-                     const Context& context) {
-  Drawing drawing;
-  for (const Surface& surface : surfaces)
-    for (const Vec3& p : surface.mesh.points)
-      drawing.box.add(p);
-  if (drawing.box.empty())
-    return drawing;
-  drawing.origin = drawing.box.min * 0.5 + drawing.box.max * 0.5;
-  const double half = drawing.box.longest_side() / 2;
-  if (!std::isfinite(half))
-    throw Error("the mesh spans more than the largest number, expected less");
-  if (half > 1e-300)
-    drawing.scale = half;
+void set_view(Drawing& drawing, const DrawingOptions& options) {
   drawing.directional = options.directional;
   drawing.light = options.directional ? direction_to(options.light, {})
                                       : (options.light - drawing.origin) / drawing.scale;
   drawing.offset = options.offset;
   drawing.camera = options.camera;
   drawing.camera.eye = (options.camera.eye - drawing.origin) / drawing.scale;
+}
+
+} // namespace
+
+Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
+                     const Context& context) {
+  DrawingMaker maker;
+  (void)maker.make(surfaces, options, DrawingChange::all, context);
+  return std::move(maker).drawing();
+}
+
+const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const DrawingOptions& options,
+                                  DrawingChange change, const Context& context) {
+  ++counts_.drawings;
+  if (change == DrawingChange::view && options.per_pixel && !(options.shade > 0)) {
+    set_view(drawing_, options); // nothing of it stands at vertices
+    return drawing_;
+  }
+  Drawing drawing;
+  drawing.version = ++counts_.vertices;
+  if (change != DrawingChange::all) {
+    drawing.triangles = std::move(drawing_.triangles);
+    drawing.group_start = std::move(drawing_.group_start);
+  }
+  drawing_ = {};
   for (const Surface& surface : surfaces)
-    append(drawing, surface, options, context);
-  return drawing;
+    for (const Vec3& p : surface.mesh.points)
+      drawing.box.add(p);
+  if (drawing.box.empty()) {
+    drawing_ = std::move(drawing);
+    return drawing_;
+  }
+  drawing.origin = drawing.box.min * 0.5 + drawing.box.max * 0.5;
+  const double half = drawing.box.longest_side() / 2;
+  if (!std::isfinite(half))
+    throw Error("the mesh spans more than the largest number, expected less");
+  if (half > 1e-300)
+    drawing.scale = half;
+  set_view(drawing, options);
+  parts_.resize(surfaces.size());
+  const bool sorted = change != DrawingChange::all;
+  for (std::size_t n = 0; n < surfaces.size(); ++n) {
+    prepare(parts_[n], surfaces[n], options, change, counts_, context);
+    append(drawing, surfaces[n], parts_[n], options, context);
+    if (!sorted)
+      append_triangles(drawing, parts_[n].vertices);
+  }
+  if (!sorted && !options.groups.empty())
+    group(drawing, surfaces, options);
+  drawing_ = std::move(drawing);
+  return drawing_;
+}
+
+std::span<const Triangle> triangles_of_group(const Drawing& drawing, std::size_t group) {
+  const std::span<const Triangle> all = drawing.triangles;
+  const std::size_t first = group == 0 ? 0 : drawing.group_start[group - 1];
+  const std::size_t end =
+      group < drawing.group_start.size() ? drawing.group_start[group] : all.size();
+  return all.subspan(first, end - first);
+}
+
+const std::vector<std::string>& group_by_names() {
+  static const std::vector<std::string> names{"material", "part", "object"};
+  return names;
+}
+
+GroupBy group_by_from_name(std::string_view name) {
+  const auto found = std::ranges::find(group_by_names(), name);
+  if (found == group_by_names().end())
+    throw Error("'" + std::string(name) + "' tells no groups apart");
+  return static_cast<GroupBy>(found - group_by_names().begin());
 }
 
 double drawing_bytes(std::span<const Surface> surfaces) {
@@ -140,8 +245,8 @@ double drawing_bytes(std::span<const Surface> surfaces) {
   for (const Surface& surface : surfaces)
     points += static_cast<double>(surface.mesh.points.size());
   // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, on
-  // the screen 12; corner lists, faces, indices.
-  return triangles * (3 * (88.0 + 68 + 12 + 16) + 32 + 3 * 12) + points * 64;
+  // the screen 12; corner lists, faces, groups, indices.
+  return triangles * (3 * (88.0 + 68 + 12 + 16) + 32 + 20 + 3 * 12) + points * 64;
 }
 
 std::uint64_t triangle_count(std::span<const Surface> surfaces) {

@@ -5,11 +5,15 @@
 #include "base/mesh.h"
 #include "base/vec3.h"
 #include "render/camera.h"
+#include "render/tangents.h"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -37,6 +41,10 @@ struct Drawing {
   std::vector<DrawVertex> vertices;
   std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
   std::vector<Triangle> triangles;
+  /// Where the triangles of groups 1, 2, … begin, which have looks of their own; group 0 comes
+  /// first.
+  std::vector<std::size_t> group_start;
+  std::uint64_t version = 0; ///< of a maker: another one where vertices, frames or triangles are
   // What frames are used with, in coordinates of positions.
   Vec3 light; ///< place, or unit vector to it
   bool directional = false;
@@ -44,11 +52,25 @@ struct Drawing {
   Camera camera;                  ///< eye and axes
 };
 
+inline std::size_t group_count(const Drawing& drawing) {
+  return drawing.group_start.size() + 1;
+}
+std::span<const Triangle> triangles_of_group(const Drawing& drawing, std::size_t group);
+
 /// A mesh to draw.
 struct Surface {
   TriangleMesh mesh;
   std::vector<Vec3> rest; ///< where its points were at rest; empty: where they are
 };
+
+/// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
+/// them are 0), or the number of the surface.
+enum class GroupBy : std::uint8_t { material, part, surface };
+
+/// "material", "part", "object".
+const std::vector<std::string>& group_by_names();
+/// \throw Error if there is no such word
+GroupBy group_by_from_name(std::string_view name);
 
 struct DrawingOptions {
   bool texcoords = false; ///< a base or a structure texture is there
@@ -60,9 +82,11 @@ struct DrawingOptions {
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
   Camera camera;                            ///< that sees the sphere maps
+  GroupBy group_by = GroupBy::material;
+  std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
 };
 
-/// All surfaces in one, in order. Per vertex (report eq. 3.2)
+/// All surfaces in one, in order within each group. Per vertex (report eq. 3.2)
 ///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
 /// with the frame of tangents.h, and shade = 1 - k + k max(0, L·N) for a share k. L is 0 for a
 /// vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for
@@ -72,6 +96,42 @@ struct DrawingOptions {
 /// \throw Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
                      const Context& context);
+
+/// What is different from the drawing before.
+enum class DrawingChange : std::uint8_t {
+  all,
+  points, ///< points and normals of the same triangles with the same coordinates
+  view    ///< light and camera alone
+};
+
+/// What a maker did.
+struct DrawingCounts {
+  std::uint64_t drawings = 0, vertices = 0; ///< made, and those whose vertices were
+  std::uint64_t splits = 0, frames = 0;     ///< surfaces whose vertices were split, frames made
+};
+
+/// What of a surface a maker keeps.
+struct DrawingParts {
+  TexturedVertices vertices;
+  std::vector<Vec3> normals;
+};
+
+/// Makes the drawings of a sequence: vertices are split once, frames are renewed where the points
+/// move, and a change of view leaves all that doesn't depend on it.
+class DrawingMaker {
+public:
+  /// As make_drawing, with the same values. \pre the first call is with DrawingChange::all, later
+  /// ones say what may have changed; options but light, offset and camera are those of the first
+  const Drawing& make(std::span<const Surface> surfaces, const DrawingOptions& options,
+                      DrawingChange change, const Context& context);
+  const DrawingCounts& counts() const { return counts_; }
+  Drawing drawing() && { return std::move(drawing_); }
+
+private:
+  Drawing drawing_;
+  std::vector<DrawingParts> parts_; ///< by surface
+  DrawingCounts counts_;
+};
 
 /// Bytes that make_drawing and a backend need at most, without pictures and textures.
 double drawing_bytes(std::span<const Surface> surfaces);

@@ -71,7 +71,7 @@ GLuint GlTextures::load(const Texture& texture, bool structure) {
   for (std::size_t n = 0; n < texture.levels.size(); ++n) {
     const TextureLevel& level = texture.levels[n];
     const auto w = static_cast<GLsizei>(level.width), h = static_cast<GLsizei>(level.height);
-    const std::uint32_t* const texels = &texture.texels[level.first];
+    const std::uint32_t* const texels = texture.texels->data() + level.first;
     if (texture.channels == 1) {
       std::vector<std::uint16_t> gray(std::size_t{level.width} * level.height);
       for (std::size_t t = 0; t < gray.size(); ++t)
@@ -175,23 +175,26 @@ void GlTarget::resolve() const {
   glBindFramebuffer(GL_FRAMEBUFFER, read_);
 }
 
-GlGeometry::GlGeometry(const Drawing& drawing, const Vec3& color)
-    : buffers_(delete_buffers), count_(3 * drawing.triangles.size()), color_(color) {
+GlGeometry::GlGeometry(const Drawing& drawing, const Look& look) : buffers_(delete_buffers) {
   vertices_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.vertices.data(),
                          drawing.vertices.size() * sizeof(DrawVertex));
   if (!drawing.frames.empty())
     frames_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.frames.data(),
                          drawing.frames.size() * sizeof(DrawFrame));
-  if (std::ranges::any_of(drawing.vertices, [](const DrawVertex& v) { return v.shade != 1.0F; })) {
-    std::vector<std::array<float, 4>> colors;
-    colors.reserve(drawing.vertices.size());
-    for (const DrawVertex& v : drawing.vertices)
-      colors.push_back({static_cast<float>(color.x * double{v.shade}),
-                        static_cast<float>(color.y * double{v.shade}),
-                        static_cast<float>(color.z * double{v.shade}), 1.0F});
-    colors_ =
-        new_buffer(buffers_, GL_ARRAY_BUFFER, colors.data(), colors.size() * sizeof colors[0]);
-  }
+  if (std::ranges::any_of(drawing.vertices, [](const DrawVertex& v) { return v.shade != 1.0F; }))
+    for (std::size_t g = 0; g < group_count(drawing); ++g) {
+      const Vec3& color = look_of_group(look, g).color;
+      if (std::ranges::any_of(colors_, [&](const auto& c) { return c.first == color; }))
+        continue;
+      std::vector<std::array<float, 4>> colors;
+      colors.reserve(drawing.vertices.size());
+      for (const DrawVertex& v : drawing.vertices)
+        colors.push_back({static_cast<float>(color.x * double{v.shade}),
+                          static_cast<float>(color.y * double{v.shade}),
+                          static_cast<float>(color.z * double{v.shade}), 1.0F});
+      colors_.emplace_back(color, new_buffer(buffers_, GL_ARRAY_BUFFER, colors.data(),
+                                             colors.size() * sizeof colors[0]));
+    }
   indices_ = new_buffer(buffers_, GL_ELEMENT_ARRAY_BUFFER, drawing.triangles.data(),
                         drawing.triangles.size() * sizeof(Triangle));
   glBindBuffer(GL_ARRAY_BUFFER, vertices_); // what pointers count from
@@ -215,25 +218,27 @@ void GlGeometry::use_frames() const {
   glTexCoordPointer(4, GL_FLOAT, sizeof(DrawFrame), at(offsetof(DrawFrame, tangent)));
 }
 
-void GlGeometry::use_colors() const {
-  glColor4d(color_.x, color_.y, color_.z, 1);
-  if (colors_ == 0)
-    return;
-  glBindBuffer(GL_ARRAY_BUFFER, colors_);
-  glEnableClientState(GL_COLOR_ARRAY);
-  glColorPointer(4, GL_FLOAT, 0, nullptr);
+void GlGeometry::use_colors(const Look& look) const {
+  glColor4d(look.color.x, look.color.y, look.color.z, 1);
+  for (const auto& [color, buffer] : colors_)
+    if (color == look.color) {
+      glBindBuffer(GL_ARRAY_BUFFER, buffer);
+      glEnableClientState(GL_COLOR_ARRAY);
+      glColorPointer(4, GL_FLOAT, 0, nullptr);
+    }
 }
 
 void GlGeometry::no_colors() const {
   glDisableClientState(GL_COLOR_ARRAY);
 }
 
-void GlGeometry::draw(const Context& context) const {
+void GlGeometry::draw(std::size_t first, std::size_t count, const Context& context) const {
   constexpr std::size_t piece = 3U << 20; // indices
-  for (std::size_t from = 0; from < count_; from += piece) {
+  const std::size_t end = 3 * (first + count);
+  for (std::size_t from = 3 * first; from < end; from += piece) {
     stop_if_cancelled(context);
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(std::min(piece, count_ - from)),
-                   GL_UNSIGNED_INT, at(from * sizeof(std::uint32_t)));
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(std::min(piece, end - from)), GL_UNSIGNED_INT,
+                   at(from * sizeof(std::uint32_t)));
   }
 }
 

@@ -7,8 +7,10 @@
 
 #include <epoxy/gl.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -66,19 +68,18 @@ private:
 /// A drawing in buffers.
 class GlGeometry {
 public:
-  GlGeometry(const Drawing& drawing, const Vec3& color);
+  GlGeometry(const Drawing& drawing, const Look& look);
   /// Of one unit.
   void use_texcoords(int unit, std::size_t offset, int count) const;
-  void use_frames() const; ///< normals; tangent and side as coordinates of unit 1
-  void use_colors() const; ///< those of the vertices, times the look's
+  void use_frames() const;                 ///< normals; tangent and side as coordinates of unit 1
+  void use_colors(const Look& look) const; ///< those of the vertices, times the look's
   void no_colors() const;
-  void draw(const Context& context) const;
+  void draw(std::size_t first, std::size_t count, const Context& context) const; ///< triangles
 
 private:
   GlNames buffers_;
-  GLuint vertices_ = 0, frames_ = 0, colors_ = 0, indices_ = 0;
-  std::size_t count_;
-  Vec3 color_;
+  GLuint vertices_ = 0, frames_ = 0, indices_ = 0;
+  std::vector<std::pair<Vec3, GLuint>> colors_; ///< where vertices are shaded, by the look's colour
 };
 
 void check_gl();

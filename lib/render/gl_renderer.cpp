@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <map>
 #include <optional>
+#include <span>
+#include <utility>
 
 // Based on: report FZKA 7190, 2006, section 3.2.4, render-pass-3, -2 and -1.
 
@@ -45,6 +48,17 @@ void combine(GLenum target, GLenum function, std::initializer_list<Source> sourc
   }
 }
 
+/// What GlShader makes a difference of.
+unsigned shader_kind(const Look& look) {
+  unsigned kind = 0;
+  for (const auto* texture : {&look.base, &look.detail, &look.reflection, &look.structure})
+    kind = 4 * kind + (*texture ? ((*texture)->options.sphere ? 3U : 1U) : 0U);
+  return kind;
+}
+
+// At most so many passes blend into one group.
+constexpr int most_blended = 16;
+
 } // namespace
 
 const std::vector<std::string>& gl_mode_names() {
@@ -71,13 +85,25 @@ struct GlRenderer::State {
                     " exceeds this OpenGL, expected sides up to " + std::to_string(gl.max_side()));
     };
     at_most("a picture", width, height);
-    for (const auto* texture : {&look.base, &look.detail, &look.reflection, &look.structure})
-      if (*texture)
-        at_most("a texture", (*texture)->width(), (*texture)->height());
+    for (std::size_t g = 0; g <= look.others.size(); ++g) {
+      const Look& own = look_of_group(look, g);
+      for (const auto* texture : {&own.base, &own.detail, &own.reflection, &own.structure})
+        if (*texture)
+          at_most("a texture", (*texture)->width(), (*texture)->height());
+    }
     return width;
   }
 
+  /// Triangles with their look and its textures.
+  struct Group {
+    const Look* look = nullptr;
+    GLuint base = 0, detail = 0, reflection = 0, structure = 0, joined = 0;
+    std::size_t first = 0, count = 0; ///< triangles
+  };
+
+  GLuint load(const std::optional<Texture>& texture, bool is_structure);
   void load_textures();
+  void draw_group(const Context& context);
   void use(int unit, GLuint texture, const std::optional<Texture>& layer, bool shifted = false);
   void drop_units();
   int use_colors(int unit);
@@ -94,31 +120,51 @@ struct GlRenderer::State {
   std::uint32_t width, height;
   GlTarget target;
   GlTextures textures;
-  GLuint base = 0, detail = 0, reflection = 0, structure = 0, joined = 0;
+  using Texels = const void*;
+  std::map<std::pair<Texels, Texels>, GLuint> loaded, joined;
+  std::vector<Group> groups;
+  const Group* now = nullptr; ///< the group that is drawn
   std::optional<GlGeometry> geometry;
-  std::optional<GlShader> shader;
-  Drawing light; ///< without its vertices
-  int units = 0; ///< in use
-  int blended = 0;
+  std::map<unsigned, GlShader> shaders; ///< by shader_kind
+  Drawing light;                        ///< without its vertices
+  int units = 0;                        ///< in use
+  int blended = 0;                      ///< what the stencil holds where the next pass may blend
   int passes = 0;
 };
 
+/// A texture that several groups share is loaded once.
+GLuint GlRenderer::State::load(const std::optional<Texture>& texture, bool is_structure) {
+  if (!texture)
+    return 0;
+  GLuint& name = loaded[{texture->texels.get(), is_structure ? texture->texels.get() : nullptr}];
+  if (name == 0)
+    name = textures.load(*texture, is_structure);
+  return name;
+}
+
 void GlRenderer::State::load_textures() {
-  const bool join = options.mode == GlMode::passes1 && look.structure;
-  if (join) {
-    if (look.base && look.base->options.sphere != look.structure->options.sphere)
-      throw Error("one pass keeps base and structure in one texture, expected both sphere-mapped "
-                  "or neither");
-    joined = textures.load_joined(look.base, *look.structure);
+  for (std::size_t g = 0; g <= look.others.size(); ++g) {
+    const Look& own = look_of_group(look, g);
+    Group& group = groups.emplace_back();
+    group.look = &own;
+    const bool join = options.mode == GlMode::passes1 && own.structure;
+    if (join) {
+      if (own.base && own.base->options.sphere != own.structure->options.sphere)
+        throw Error("one pass keeps base and structure in one texture, expected both "
+                    "sphere-mapped or neither");
+      GLuint& name =
+          joined[{own.base ? own.base->texels.get() : nullptr, own.structure->texels.get()}];
+      if (name == 0)
+        name = textures.load_joined(own.base, *own.structure);
+      group.joined = name;
+    }
+    if (!join)
+      group.base = load(own.base, false);
+    group.detail = load(own.detail, false);
+    group.reflection = load(own.reflection, false);
+    if (!join)
+      group.structure = load(own.structure, true);
   }
-  if (look.base && !join)
-    base = textures.load(*look.base, false);
-  if (look.detail)
-    detail = textures.load(*look.detail, false);
-  if (look.reflection)
-    reflection = textures.load(*look.reflection, false);
-  if (look.structure && !join)
-    structure = textures.load(*look.structure, true);
 }
 
 void GlRenderer::State::use(int unit, GLuint texture, const std::optional<Texture>& layer,
@@ -147,12 +193,12 @@ void GlRenderer::State::drop_units() {
 
 /// min(1, min(1, base + detail) + reflection) by units from `unit` on; the next free one.
 int GlRenderer::State::use_colors(int unit) {
-  if (look.base && base != 0) {
-    use(unit++, base, look.base);
+  if (now->look->base && now->base != 0) {
+    use(unit++, now->base, now->look->base);
     set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   }
   for (const auto& [layer, name] :
-       {std::pair{&look.detail, detail}, {&look.reflection, reflection}})
+       {std::pair{&now->look->detail, now->detail}, {&now->look->reflection, now->reflection}})
     if (*layer) {
       use(unit++, name, *layer);
       combine(GL_COMBINE_RGB, GL_ADD, {{GL_PREVIOUS, GL_SRC_COLOR}, {GL_TEXTURE, GL_SRC_COLOR}});
@@ -174,7 +220,7 @@ void GlRenderer::State::next_pass(GLenum source, GLenum destination) {
 
 void GlRenderer::State::draw_geometry(const Context& context) {
   ++passes;
-  geometry->draw(context);
+  geometry->draw(now->first, now->count, context);
   drop_units();
   geometry->no_colors();
 }
@@ -182,19 +228,19 @@ void GlRenderer::State::draw_geometry(const Context& context) {
 /// f / 2, then (1 - f') / 2 added, then the base blended: c times what stands there, plus what
 /// stands there times c.
 void GlRenderer::State::draw_three(const Context& context) {
-  use(0, structure, look.structure);
+  use(0, now->structure, now->look->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   glColor4f(0.5F, 0.5F, 0.5F, 1);
   draw_geometry(context);
   next_pass(GL_ONE, GL_ONE);
-  use(0, structure, look.structure, true);
+  use(0, now->structure, now->look->structure, true);
   constexpr std::array<float, 4> black{};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, black.data());
   set_env(GL_TEXTURE_ENV_MODE, GL_BLEND);
   glColor4f(0.5F, 0.5F, 0.5F, 1);
   draw_geometry(context);
   next_pass(GL_DST_COLOR, GL_SRC_COLOR);
-  geometry->use_colors();
+  geometry->use_colors(*now->look);
   use_colors(0);
   draw_geometry(context);
 }
@@ -202,9 +248,9 @@ void GlRenderer::State::draw_three(const Context& context) {
 /// With one unit the colours must be summed first: r goes to alpha, and both are multiplied at
 /// last.
 void GlRenderer::State::draw_three_layered(const Context& context) {
-  geometry->use_colors();
-  if (look.base) {
-    use(0, base, look.base);
+  geometry->use_colors(*now->look);
+  if (now->look->base) {
+    use(0, now->base, now->look->base);
     set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   }
   draw_geometry(context);
@@ -215,7 +261,7 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
   };
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_FALSE);
   for (const auto& [layer, name] :
-       {std::pair{&look.detail, detail}, {&look.reflection, reflection}})
+       {std::pair{&now->look->detail, now->detail}, {&now->look->reflection, now->reflection}})
     if (*layer) {
       next_pass(GL_ONE, GL_ONE);
       use(0, name, *layer);
@@ -227,16 +273,16 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
         glBlendEquation(GL_FUNC_ADD);
       }
     }
-  if (!look.structure)
+  if (!now->look->structure)
     return;
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
   next_pass(GL_ONE, GL_ZERO);
-  use(0, structure, look.structure);
+  use(0, now->structure, now->look->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   glColor4f(1, 1, 1, 0.5F);
   draw_geometry(context);
   next_pass(GL_ONE, GL_ONE);
-  use(0, structure, look.structure, true);
+  use(0, now->structure, now->look->structure, true);
   constexpr std::array<float, 4> black{};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, black.data());
   set_env(GL_TEXTURE_ENV_MODE, GL_BLEND);
@@ -250,9 +296,9 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
 /// Pass 1: r = 1/2 f + (1 - 1/2) (1 - f'). (Added as f + (1 - f') - 1/2 the relief would be twice
 /// as strong.) Pass 2: the colours, blended as in three passes.
 void GlRenderer::State::draw_two(const Context& context) {
-  use(0, structure, look.structure);
+  use(0, now->structure, now->look->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_REPLACE);
-  use(1, structure, look.structure, true);
+  use(1, now->structure, now->look->structure, true);
   constexpr std::array<float, 4> half{0.5F, 0.5F, 0.5F, 1.0F};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, half.data());
   combine(GL_COMBINE_RGB, GL_INTERPOLATE,
@@ -263,28 +309,28 @@ void GlRenderer::State::draw_two(const Context& context) {
   glColor4f(1, 1, 1, 1);
   draw_geometry(context);
   next_pass(GL_DST_COLOR, GL_SRC_COLOR);
-  geometry->use_colors();
+  geometry->use_colors(*now->look);
   use_colors(0);
   draw_geometry(context);
 }
 
 /// Alpha: f/2, then f/2 + (1 - f'/2) - 1/2 = r; at last the colours times alpha, scaled.
 void GlRenderer::State::draw_one(const Context& context) {
-  geometry->use_colors();
+  geometry->use_colors(*now->look);
   int unit = 0;
-  if (joined != 0) {
-    use(unit++, joined, look.structure);
+  if (now->joined != 0) {
+    use(unit++, now->joined, now->look->structure);
     combine(GL_COMBINE_RGB, GL_MODULATE,
             {{GL_TEXTURE, GL_SRC_COLOR}, {GL_PRIMARY_COLOR, GL_SRC_COLOR}});
     combine(GL_COMBINE_ALPHA, GL_REPLACE, {{GL_TEXTURE, GL_SRC_ALPHA}});
-    use(unit++, joined, look.structure, true);
+    use(unit++, now->joined, now->look->structure, true);
     combine(GL_COMBINE_RGB, GL_REPLACE, {{GL_PREVIOUS, GL_SRC_COLOR}});
     combine(GL_COMBINE_ALPHA, GL_ADD_SIGNED,
             {{GL_PREVIOUS, GL_SRC_ALPHA}, {GL_TEXTURE, GL_ONE_MINUS_SRC_ALPHA}});
   }
   unit = use_colors(unit);
-  if (joined != 0) {
-    use(unit, joined, look.structure); // a unit without a texture does nothing
+  if (now->joined != 0) {
+    use(unit, now->joined, now->look->structure); // a unit without a texture does nothing
     combine(GL_COMBINE_RGB, GL_MODULATE,
             {{GL_PREVIOUS, GL_SRC_COLOR}, {GL_PREVIOUS, GL_SRC_ALPHA}});
     combine(GL_COMBINE_ALPHA, GL_REPLACE, {{GL_PRIMARY_COLOR, GL_SRC_ALPHA}});
@@ -294,15 +340,15 @@ void GlRenderer::State::draw_one(const Context& context) {
 }
 
 void GlRenderer::State::draw_shader(const Context& context) {
-  shader->use(light);
+  shaders.at(shader_kind(*now->look)).use(light);
   const auto bind = [&](GlUnit unit, GLuint texture) {
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     glBindTexture(GL_TEXTURE_2D, texture);
   };
-  bind(base_unit, base);
-  bind(detail_unit, detail);
-  bind(reflection_unit, reflection);
-  bind(structure_unit, structure);
+  bind(base_unit, now->base);
+  bind(detail_unit, now->detail);
+  bind(reflection_unit, now->reflection);
+  bind(structure_unit, now->structure);
   geometry->use_texcoords(0, offsetof(DrawVertex, st), 2);
   if (light.frames.empty()) {
     geometry->use_texcoords(1, offsetof(DrawVertex, shifted), 2);
@@ -311,10 +357,48 @@ void GlRenderer::State::draw_shader(const Context& context) {
     geometry->use_frames();
   }
   units = 3;
-  geometry->use_colors();
+  geometry->use_colors(*now->look);
   draw_geometry(context);
   glDisableClientState(GL_NORMAL_ARRAY);
   glUseProgram(0);
+}
+
+/// All passes of one group. Where it is seen its first pass leaves a number in the stencil that no
+/// other group left there.
+void GlRenderer::State::draw_group(const Context& context) {
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glDisable(GL_BLEND);
+  glDepthFunc(GL_LESS);
+  if (groups.size() > 1) {
+    if (blended > 255 - most_blended) {
+      glClear(GL_STENCIL_BUFFER_BIT);
+      blended = 0;
+    }
+    glEnable(GL_STENCIL_TEST);
+    glStencilFunc(GL_ALWAYS, ++blended, 0xff);
+    glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
+  } else {
+    glDisable(GL_STENCIL_TEST);
+  }
+  const int first_pass = blended;
+  const bool layered = now->look->detail || now->look->reflection;
+  if (options.mode == GlMode::shader)
+    draw_shader(context);
+  else if (options.mode == GlMode::passes3 && layered)
+    draw_three_layered(context);
+  else if (options.mode == GlMode::passes1 || !now->look->structure)
+    draw_one(context); // without structure one pass does for all
+  else if (options.mode == GlMode::passes3)
+    draw_three(context);
+  else
+    draw_two(context);
+  if (options.samples > 1 && options.wide && blended > first_pass) {
+    glBlendEquation(GL_MIN); // 2 r c, before samples are averaged
+    next_pass(GL_ONE, GL_ONE);
+    glColor4f(1, 1, 1, 1);
+    geometry->draw(now->first, now->count, context);
+    glBlendEquation(GL_FUNC_ADD);
+  }
 }
 
 GlRenderer::GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std::uint32_t height,
@@ -323,9 +407,12 @@ GlRenderer::GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std
   state_->load_textures();
   GLint most = 0;
   glGetIntegerv(GL_MAX_TEXTURE_UNITS, &most);
-  const int wanted = options.mode == GlMode::passes1 && look.structure
-                         ? 3 + (look.detail ? 1 : 0) + (look.reflection ? 1 : 0)
-                         : 2;
+  int wanted = 2;
+  for (std::size_t g = 0; g <= look.others.size(); ++g) {
+    const Look& own = look_of_group(look, g);
+    if (options.mode == GlMode::passes1 && own.structure)
+      wanted = std::max(wanted, 3 + (own.detail ? 1 : 0) + (own.reflection ? 1 : 0));
+  }
   if (most < wanted)
     throw Error("this OpenGL has " + std::to_string(most) + " texture units, expected " +
                 std::to_string(wanted));
@@ -340,17 +427,30 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
   s.geometry.reset();
   if (drawing.triangles.empty())
     return;
-  s.geometry.emplace(drawing, s.look.color);
+  s.geometry.emplace(drawing, s.look);
   const bool frames = !drawing.frames.empty();
-  if (s.options.mode == GlMode::shader && (!s.shader || frames == s.light.frames.empty()))
-    s.shader.emplace(s.look, frames);
-  s.light = {};
-  s.light.light = drawing.light;
-  s.light.directional = drawing.directional;
-  s.light.offset = drawing.offset;
-  s.light.camera = drawing.camera;
+  if (frames == s.light.frames.empty())
+    s.shaders.clear();
+  for (std::size_t g = 0; g < s.groups.size(); ++g) {
+    State::Group& group = s.groups[g];
+    const bool there = g < group_count(drawing);
+    const auto triangles = there ? triangles_of_group(drawing, g) : std::span<const Triangle>{};
+    group.first = there ? static_cast<std::size_t>(triangles.data() - drawing.triangles.data()) : 0;
+    group.count = triangles.size();
+    if (s.options.mode == GlMode::shader && group.count > 0)
+      s.shaders.try_emplace(shader_kind(*group.look), *group.look, frames);
+  }
   s.light.frames.resize(frames ? 1 : 0);
+  set_light(drawing);
   check_gl();
+}
+
+void GlRenderer::set_light(const Drawing& drawing) {
+  Drawing& light = state_->light;
+  light.light = drawing.light;
+  light.directional = drawing.directional;
+  light.offset = drawing.offset;
+  light.camera = drawing.camera;
 }
 
 void GlRenderer::draw(const Projection& projection, const Context& context) {
@@ -365,36 +465,20 @@ void GlRenderer::draw(const Projection& projection, const Context& context) {
   glClearColor(background[0] / 255.0F, background[1] / 255.0F, background[2] / 255.0F, 1);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glDepthMask(GL_TRUE);
+  glClearStencil(0);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT | GL_STENCIL_BUFFER_BIT);
   glDisable(GL_CULL_FACE);
   glDisable(GL_DITHER);
-  glDisable(GL_BLEND);
-  glDisable(GL_STENCIL_TEST);
   glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_LESS);
   s.passes = s.blended = 0;
   if (!s.geometry)
     return;
   set_matrices(projection);
-  const bool layered = s.look.detail || s.look.reflection;
-  const GlMode mode = s.options.mode;
-  if (mode == GlMode::shader)
-    s.draw_shader(context);
-  else if (mode == GlMode::passes3 && layered)
-    s.draw_three_layered(context);
-  else if (mode == GlMode::passes1 || !s.look.structure)
-    s.draw_one(context); // without structure one pass does for all
-  else if (mode == GlMode::passes3)
-    s.draw_three(context);
-  else
-    s.draw_two(context);
-  if (s.options.samples > 1 && s.options.wide && s.blended > 0) {
-    glBlendEquation(GL_MIN); // 2 r c, before samples are averaged
-    s.next_pass(GL_ONE, GL_ONE);
-    glColor4f(1, 1, 1, 1);
-    s.geometry->draw(context);
-    glBlendEquation(GL_FUNC_ADD);
-  }
+  for (const State::Group& group : s.groups)
+    if (group.count > 0) {
+      s.now = &group;
+      s.draw_group(context);
+    }
 }
 
 void GlRenderer::finish() {

@@ -51,6 +51,8 @@ public:
 
   /// \pre a mode of the fixed functions has no use for frames: there are none
   void set_drawing(const Drawing& drawing);
+  /// Of a drawing whose vertices, frames and triangles are those that were set.
+  void set_light(const Drawing& drawing);
   /// \throw Cancelled
   void draw(const Projection& projection, const Context& context);
   void finish(); ///< waits until all is drawn

@@ -17,6 +17,21 @@ Image luminance(const Image& image) {
   return gray;
 }
 
+Heights heights_from(const DeepImage& image) {
+  Heights heights{image.width, image.height, {}};
+  if (image.channels == 1) {
+    heights.values = image.values;
+    return heights;
+  }
+  heights.values.reserve(image.values.size() / 3);
+  for (std::size_t at = 0; at + 2 < image.values.size(); at += 3) {
+    const std::uint32_t sum = 2126U * image.values[at] + 7152U * image.values[at + 1] +
+                              722U * image.values[at + 2] + 5000U; // below 2^30
+    heights.values.push_back(static_cast<std::uint16_t>(sum / 10000U));
+  }
+  return heights;
+}
+
 Image shrunk(const Image& image, std::uint32_t factor) {
   if (factor == 1)
     return image;

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 namespace gewebe {
 
@@ -21,7 +23,13 @@ struct Look {
   std::optional<Texture> structure;  ///< the height f, one channel
   Vec3 color{1, 1, 1};               ///< factor of the base, 0 … 1
   Vec3 background{1, 1, 1};          ///< 0 … 1
+  std::vector<Look> others; ///< of groups 1, 2, … of a drawing; their backgrounds don't count
 };
+
+/// \pre group <= look.others.size()
+inline const Look& look_of_group(const Look& look, std::size_t group) {
+  return group == 0 ? look : look.others[group - 1];
+}
 
 /// s of the composition: makes up for r being 0.5 where the structure is flat.
 constexpr double emboss_scale = 2;

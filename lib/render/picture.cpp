@@ -92,6 +92,7 @@ struct Painter::State {
   std::optional<GlContext> gl;
   std::optional<GlRenderer> renderer;
   std::string gl_failure;
+  std::uint64_t version = 0, uploads = 0; ///< of the drawing that OpenGL has
 };
 
 Painter::Painter(const Look& look, const PictureOptions& options, const Context& context)
@@ -113,7 +114,14 @@ Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport
   if (s.renderer)
     s.attempt([&] {
       s.gl->make_current();
-      s.renderer->set_drawing(drawing);
+      if (drawing.version != 0 && drawing.version == s.version) {
+        s.renderer->set_light(drawing);
+      } else {
+        s.renderer->set_drawing(drawing);
+        s.version = drawing.version;
+        ++s.uploads;
+      }
+      told.uploads = s.uploads;
       s.renderer->draw(projection, s.context);
       image = s.renderer->read(s.context);
       told.backend = Backend::gl;

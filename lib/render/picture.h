@@ -47,6 +47,7 @@ struct PictureReport {
   std::string gl_failure;                 ///< why OpenGL did not, where it was tried
   std::string platform, renderer, target; ///< OpenGL's, see gl_context.h and gl_renderer.h
   int passes = 1;
+  std::uint64_t uploads = 0;   ///< drawings that OpenGL was given, until now
   std::uint64_t triangles = 0; ///< cpu: in the view and not without area; gl: all
   std::uint64_t covered = 0;   ///< samples; cpu alone
 };
@@ -65,6 +66,7 @@ public:
 
   /// Whether drawings should have frames: for the rasteriser and the shader, unless told otherwise.
   bool per_pixel() const;
+  /// \pre the drawing has no more groups than the look; drawings with versions are one maker's
   /// The picture, three channels. All modes draw the same: of 255, values differ by 2 at most where
   /// the picture is continuous, for one kind of drawings.
   /// \throw Error where OpenGL fails; Cancelled

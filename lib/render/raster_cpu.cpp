@@ -7,7 +7,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <list>
 #include <memory>
+#include <span>
 #include <vector>
 
 // Based on: Sutherland and Hodgman, Reentrant Polygon Clipping, 1974; Molnar, Cox, Ellsworth and
@@ -258,7 +260,7 @@ void set(float (&to)[3], const Vec3& from) {
     to[a] = static_cast<float>(from[a]);
 }
 
-/// The look's textures as kernels see them.
+/// A look's textures as kernels see them.
 class Textures {
 public:
   explicit Textures(const Look& look) {
@@ -279,7 +281,7 @@ private:
                             static_cast<std::int32_t>(level.height),
                             static_cast<std::int32_t>(level.first)});
     textures_[n] = {levels_[n].data(),
-                    texture->texels.data(),
+                    texture->texels->data(),
                     static_cast<std::int32_t>(levels_[n].size()),
                     texture->channels == 1,
                     texture->options.filter == TextureFilter::nearest,
@@ -320,10 +322,39 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Loo
   for (std::size_t a = 0; a < 2; ++a)
     scene.offset[a] = static_cast<float>(drawing.offset[a]);
   scene.directional = drawing.directional;
-  const std::array<std::uint8_t, 3> background = stored(look.background);
-  scene.background = background[0] | static_cast<std::uint32_t>(background[1]) << 8 |
-                     static_cast<std::uint32_t>(background[2]) << 16;
   return scene;
+}
+
+std::uint32_t background_of(const Look& look) {
+  const std::array<std::uint8_t, 3> background = stored(look.background);
+  return background[0] | static_cast<std::uint32_t>(background[1]) << 8 |
+         static_cast<std::uint32_t>(background[2]) << 16;
+}
+
+/// The scene of some triangles, linked to that of the next ones.
+struct LookScene {
+  LookScene(const Drawing& drawing, const Viewport& viewport, const Look& look)
+      : textures(look), scene(scene_of(drawing, viewport, look, textures)) {}
+  Textures textures;
+  KernelScene scene;
+};
+
+/// One for each group of triangles, one at least.
+std::list<LookScene> scenes_of(const Drawing& drawing, const Viewport& viewport, const Look& look) {
+  std::list<LookScene> scenes;
+  for (std::size_t g = 0; g < group_count(drawing); ++g) {
+    const std::span<const Triangle> group = triangles_of_group(drawing, g);
+    if (group.empty() && g > 0)
+      continue;
+    KernelScene* const last = scenes.empty() ? nullptr : &scenes.back().scene;
+    KernelScene& scene = scenes.emplace_back(drawing, viewport, look_of_group(look, g)).scene;
+    scene.first = static_cast<std::uint32_t>(group.data() - drawing.triangles.data());
+    scene.count = static_cast<std::uint32_t>(group.size());
+    scene.background = background_of(look);
+    if (last != nullptr)
+      last->next = &scene;
+  }
+  return scenes;
 }
 
 } // namespace
@@ -334,8 +365,7 @@ Image render_cpu(const Drawing& drawing, const Projection& projection, const Loo
   const Viewport viewport(projection, width, height);
   const Screen screen = project(drawing, viewport, context);
   const Bins bins = sorted(screen, width, height, samples, context);
-  const Textures textures(look);
-  const KernelScene scene = scene_of(drawing, viewport, look, textures);
+  const std::list<LookScene> scenes = scenes_of(drawing, viewport, look);
   const KernelScreen kernel_screen{screen.x.data(), screen.y.data(), screen.nearness.data(),
                                    screen.corners.data(), screen.shown.data()};
   const TileKernel draw_tile =
@@ -360,7 +390,7 @@ Image render_cpu(const Drawing& drawing, const Projection& projection, const Loo
     tile.scratch = scratch.get();
     tile.row_bytes = std::size_t{3} * width;
     tile.out = &image.values[tile.row_bytes * top + std::size_t{3} * left];
-    covered[t] = draw_tile(scene, kernel_screen, tile);
+    covered[t] = draw_tile(scenes.front().scene, kernel_screen, tile);
   });
   if (report != nullptr) {
     report->triangles = bins.triangles;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 // Based on: Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2nd edition, 2003
 // (tangent vectors from texture coordinates).
@@ -20,26 +21,26 @@ Vec3 unit_or_zero(const Vec3& v) {
   return length > 0 && std::isfinite(length) ? v / length : Vec3{};
 }
 
-/// How the texture lies on one triangle.
-struct FaceTangent {
-  Vec3 weighted;         ///< unit vector of growing s, times the area
-  bool mirrored = false; ///< s, t and the normal are left-handed
-};
-
-FaceTangent face_tangent(const TriangleMesh& mesh, std::size_t t, const std::array<float, 6>& st) {
-  const Triangle& corner = mesh.triangles[t];
-  const Vec3 e1 = mesh.points[corner[1]] - mesh.points[corner[0]];
-  const Vec3 e2 = mesh.points[corner[2]] - mesh.points[corner[0]];
+/// Twice the signed area of a triangle in its texture, 0 where it is lost in rounding: negative
+/// where s, t and the normal are left-handed.
+double texture_turn(const std::array<float, 6>& st) {
   const double s1 = double{st[2]} - st[0], t1 = double{st[3]} - st[1];
   const double s2 = double{st[4]} - st[0], t2 = double{st[5]} - st[1];
   const double det = s1 * t2 - s2 * t1;
-  FaceTangent face;
-  if (!(std::fabs(det) > 1e-12 * (std::fabs(s1 * t2) + std::fabs(s2 * t1))))
-    return face;
-  face.mirrored = det < 0;
-  const Vec3 direction = (e1 * t2 - e2 * t1) * (det < 0 ? -1.0 : 1.0);
-  face.weighted = unit_or_zero(direction) * (norm(cross(e1, e2)) / 2);
-  return face;
+  return std::fabs(det) > 1e-12 * (std::fabs(s1 * t2) + std::fabs(s2 * t1)) ? det : 0;
+}
+
+/// Unit vector of growing s on a triangle, times its area; 0 where the texture gives none.
+Vec3 face_tangent(const TriangleMesh& mesh, std::size_t t, const std::array<float, 6>& st) {
+  const double turn = texture_turn(st);
+  if (turn == 0)
+    return {};
+  const Triangle& corner = mesh.triangles[t];
+  const Vec3 e1 = mesh.points[corner[1]] - mesh.points[corner[0]];
+  const Vec3 e2 = mesh.points[corner[2]] - mesh.points[corner[0]];
+  const double t1 = double{st[3]} - st[1], t2 = double{st[5]} - st[1];
+  const Vec3 direction = (e1 * t2 - e2 * t1) * (turn < 0 ? -1.0 : 1.0);
+  return unit_or_zero(direction) * (norm(cross(e1, e2)) / 2);
 }
 
 /// The corners (3 t + c) of each point, ascending: corners[start[p]] … corners[start[p + 1] - 1].
@@ -89,17 +90,17 @@ std::vector<Vec3> render_normals(const TriangleMesh& mesh) {
 TexturedVertices split_vertices(const TriangleMesh& mesh,
                                 std::span<const std::array<float, 6>> texcoords,
                                 const std::vector<Vec3>* normals, const Context& context) {
-  std::vector<FaceTangent> faces(mesh.triangles.size());
+  std::vector<std::uint8_t> mirrored(mesh.triangles.size());
   if (normals != nullptr)
-    parallel_blocks(context, faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(context, mirrored.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t)
-        faces[t] = face_tangent(mesh, t, texcoords[t]);
+        mirrored[t] = texture_turn(texcoords[t]) < 0 ? 1 : 0;
     });
 
   const auto key = [&](std::size_t corner) {
     const std::array<float, 6>& st = texcoords[corner / 3];
     const std::size_t c = corner % 3;
-    return std::tuple(st[2 * c], st[2 * c + 1], faces[corner / 3].mirrored);
+    return std::tuple(st[2 * c], st[2 * c + 1], mirrored[corner / 3]);
   };
   // Each point's corners in order of their keys; equal ones share a vertex.
   Corners lists = corners_by_point(mesh);
@@ -127,10 +128,8 @@ TexturedVertices split_vertices(const TriangleMesh& mesh,
   out.point.resize(count);
   out.st.resize(count);
   out.triangles.resize(mesh.triangles.size());
-  if (normals != nullptr) {
-    out.tangent.resize(count);
-    out.bitangent.resize(count);
-  }
+  if (normals != nullptr)
+    out.first_corner.resize(count + 1, lists.corner.size());
   parallel_blocks(context, points, grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       std::size_t vertex = first[p];
@@ -138,26 +137,49 @@ TexturedVertices split_vertices(const TriangleMesh& mesh,
         const auto shared = key(lists.corner[at]);
         out.point[vertex] = static_cast<std::uint32_t>(p);
         out.st[vertex] = {std::get<0>(shared), std::get<1>(shared)};
-        Vec3 sum;
-        for (; at < lists.start[p + 1] && key(lists.corner[at]) == shared; ++at) {
-          const std::size_t corner = lists.corner[at];
-          out.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
-          sum += faces[corner / 3].weighted;
-        }
-        if (normals != nullptr) {
-          const Vec3& n = (*normals)[p];
-          const Vec3 flat = sum - n * dot(n, sum);
-          if (norm(n) > 0 && norm(flat) > 1e-9 * norm(sum)) {
-            out.tangent[vertex] = unit_or_zero(flat);
-            out.bitangent[vertex] =
-                cross(n, out.tangent[vertex]) * (std::get<2>(shared) ? -1.0 : 1.0);
-          }
-        }
+        if (normals != nullptr)
+          out.first_corner[vertex] = at;
+        for (; at < lists.start[p + 1] && key(lists.corner[at]) == shared; ++at)
+          out.triangles[lists.corner[at] / 3][lists.corner[at] % 3] =
+              static_cast<std::uint32_t>(vertex);
         ++vertex;
       }
     }
   });
+  if (normals != nullptr) {
+    out.mirrored.resize(count);
+    for (std::size_t v = 0; v < count; ++v)
+      out.mirrored[v] = mirrored[lists.corner[out.first_corner[v]] / 3] != 0;
+    out.corner = std::move(lists.corner);
+    renew_frames(out, mesh, texcoords, *normals, context);
+  }
   return out;
+}
+
+void renew_frames(TexturedVertices& vertices, const TriangleMesh& mesh,
+                  std::span<const std::array<float, 6>> texcoords, const std::vector<Vec3>& normals,
+                  const Context& context) {
+  std::vector<Vec3> faces(mesh.triangles.size());
+  parallel_blocks(context, faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      faces[t] = face_tangent(mesh, t, texcoords[t]);
+  });
+  const std::size_t count = vertices.point.size();
+  vertices.tangent.assign(count, {});
+  vertices.bitangent.assign(count, {});
+  parallel_blocks(context, count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      Vec3 sum;
+      for (std::size_t at = vertices.first_corner[v]; at < vertices.first_corner[v + 1]; ++at)
+        sum += faces[vertices.corner[at] / 3];
+      const Vec3& n = normals[vertices.point[v]];
+      const Vec3 flat = sum - n * dot(n, sum);
+      if (norm(n) > 0 && norm(flat) > 1e-9 * norm(sum)) {
+        vertices.tangent[v] = unit_or_zero(flat);
+        vertices.bitangent[v] = cross(n, vertices.tangent[v]) * (vertices.mirrored[v] ? -1.0 : 1.0);
+      }
+    }
+  });
 }
 
 } // namespace gewebe

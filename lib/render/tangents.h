@@ -7,6 +7,7 @@
 #include "base/vec3.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,6 +28,10 @@ struct TexturedVertices {
   std::vector<std::array<float, 2>> st; ///< texture coordinates
   std::vector<Triangle> triangles;      ///< those of the mesh, over these vertices
   std::vector<Vec3> tangent, bitangent; ///< only where asked for
+  // What frames are made from again when the points move.
+  std::vector<std::size_t> first_corner; ///< of each vertex in `corner`, and the end
+  std::vector<std::size_t> corner;       ///< 3 t + c
+  std::vector<bool> mirrored;            ///< vertices whose texture is
 };
 
 /// Splits the mesh by `texcoords` (six per triangle). With `normals`, one per point, also the
@@ -37,5 +42,11 @@ struct TexturedVertices {
 TexturedVertices split_vertices(const TriangleMesh& mesh,
                                 std::span<const std::array<float, 6>> texcoords,
                                 const std::vector<Vec3>* normals, const Context& context);
+
+/// Makes the frames anew where the points or normals of a mesh moved whose triangles and
+/// coordinates are those that were split. \pre it was split with normals
+void renew_frames(TexturedVertices& vertices, const TriangleMesh& mesh,
+                  std::span<const std::array<float, 6>> texcoords, const std::vector<Vec3>& normals,
+                  const Context& context);
 
 } // namespace gewebe

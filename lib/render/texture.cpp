@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace gewebe {
 namespace {
@@ -37,19 +38,17 @@ Plane halved(const Plane& from) {
   return to;
 }
 
-void append_level(Texture& texture, const Plane& plane) {
-  texture.levels.push_back({plane.width, plane.height, texture.texels.size()});
+void append_level(Texture& texture, std::vector<std::uint32_t>& texels, const Plane& plane) {
+  texture.levels.push_back({plane.width, plane.height, texels.size()});
   const bool repeats = texture.options.wrap == TextureWrap::repeat;
   for (std::size_t y = 0; y < plane.height; ++y)
     for (std::size_t x = 0; x < plane.width; ++x) {
       const std::uint16_t* const value = &plane.values[(y * plane.width + x) * plane.channels];
       if (plane.channels == 1) {
         const std::size_t right = x + 1 < plane.width ? x + 1 : (repeats ? 0 : x);
-        texture.texels.push_back(*value | std::uint32_t{plane.values[y * plane.width + right]}
-                                              << 16);
+        texels.push_back(*value | std::uint32_t{plane.values[y * plane.width + right]} << 16);
       } else {
-        texture.texels.push_back(value[0] | std::uint32_t{value[1]} << 8 |
-                                 std::uint32_t{value[2]} << 16);
+        texels.push_back(value[0] | std::uint32_t{value[1]} << 8 | std::uint32_t{value[2]} << 16);
       }
     }
 }
@@ -60,12 +59,14 @@ Texture texture_of(Plane plane, const TextureOptions& options) {
   Texture texture;
   texture.options = options;
   texture.channels = plane.channels;
-  append_level(texture, plane);
+  std::vector<std::uint32_t> texels;
+  append_level(texture, texels, plane);
   if (options.filter == TextureFilter::mipmap)
     while (plane.width > 1 || plane.height > 1) {
       plane = halved(plane);
-      append_level(texture, plane);
+      append_level(texture, texels, plane);
     }
+  texture.texels = std::make_shared<const std::vector<std::uint32_t>>(std::move(texels));
   return texture;
 }
 
@@ -142,7 +143,7 @@ Texture texture_from(const Heights& heights, const TextureOptions& options) {
 std::array<double, 3> texel(const Texture& texture, std::size_t level, std::uint32_t x,
                             std::uint32_t y) {
   const TextureLevel& l = texture.levels[level];
-  const std::uint32_t value = texture.texels[l.first + std::size_t{y} * l.width + x];
+  const std::uint32_t value = (*texture.texels)[l.first + std::size_t{y} * l.width + x];
   if (texture.channels == 1) {
     const double gray = (value & 0xffffU) / 65535.0;
     return {gray, gray, gray};

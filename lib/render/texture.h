@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,8 +47,8 @@ struct Texture {
   std::vector<TextureLevel> levels; ///< 0 is the image; further ones for mipmap alone
   /// Rows from the bottom. Colours: red, green, blue from the lowest byte on. Gray: 16 bits, above
   /// them those of the right neighbour (the row's first texel where the texture repeats), so that
-  /// two reads do for a bilinear value.
-  std::vector<std::uint32_t> texels;
+  /// two reads do for a bilinear value. Copies of a texture share them.
+  std::shared_ptr<const std::vector<std::uint32_t>> texels;
 
   std::uint32_t width() const { return levels.front().width; }
   std::uint32_t height() const { return levels.front().height; }

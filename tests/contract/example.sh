@@ -182,3 +182,42 @@ test_instrument_is_drawn_along() {
     [[ $file == log || -e $GEWEBE_ROOT/examples/instrument/$file ]] || fail "clean left $file"
   done
 }
+
+# The relief of two pictures, as what light adds to the same look without heights: their correlation.
+rims() { # FLAT A B (PPMs)
+  python3 - "$@" <<'END'
+import sys
+def values(name):
+    head, rest = open(name, 'rb').read().split(b'255\n', 1)
+    return rest
+flat, a, b = map(values, sys.argv[1:])
+x = [p - f for p, f in zip(a, flat)]
+y = [p - f for p, f in zip(b, flat)]
+# Where one of them is no change both are background, or dark.
+both = [(u, v) for u, v in zip(x, y) if u or v]
+assert len(both) > 20000, len(both)
+mx, my = (sum(c) / len(both) for c in zip(*both))
+sxy = sum((u - mx) * (v - my) for u, v in both)
+print(round(100 * sxy / (sum((u - mx) ** 2 for u, v in both) * sum((v - my) ** 2 for u, v in both)) ** 0.5))
+END
+}
+test_lung_light_from_the_other_side_swaps_the_rims() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  command -v python3 >/dev/null || skip 'no python3'
+  local same opposite light
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/lung/{Makefile,*.particles,*.awk} .
+  make SIZE=200 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  # The example's own commands, for pictures that can be read here, without heights and by another light.
+  command_for() { make -n -B SIZE=200 "$1.png" | grep "^emboss-render.* -o $1.png" | sed "s/ -o $1.png/ -o $2.ppm/"; }
+  eval "$(command_for left left); $(command_for right right)"
+  eval "$(command_for left flat | sed 's/--structure [^ ]*//')"
+  light=$(command_for left near)
+  eval "${light/--light 900,400,0/--light 850,500,100}"
+  opposite=$(rims flat.ppm left.ppm right.ppm)
+  ((opposite < -30)) || fail "light from the other side: the rims correlate by $opposite %, expected below -30"
+  # That it can fail: light that stays on its side.
+  same=$(rims flat.ppm left.ppm near.ppm)
+  ((same > 50)) || fail "light from the same side: the rims correlate by $same %, expected over 50"
+  echo "rims: $opposite % from the other side, $same % from the same side"
+}

@@ -108,6 +108,66 @@ test_bumps_are_lit_from_the_side_of_the_light() {
   [[ $(brighter 100,1,50) == right ]] || fail 'light from the right brightens the left'
 }
 
+# A ramp that rises by a fortieth has one brightness: in 16 bits it is seen so, in 8 bits as steps.
+test_heights_keep_their_16_bits() {
+  local backend backends=(cpu)
+  ! has_gl || backends+=(gl)
+  printf 'OFF\n4 2 0\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n3 0 1 2\n3 0 2 3\n' >in.off
+  shades() { # MAXVAL OPTION...
+    awk -v top="$1" 'BEGIN { print "P2 256 2", top; for (n = 0; n < 512; ++n) print int(top * (0.4 + (n % 256) / 10240) + 0.5) }' >in.pgm
+    emboss-render "${@:2}" --structure in.pgm --wrap clamp --uv-scale 2 --offset 0.2 --view top --distance 2 --color 0.8,0.8,0.8 --size 100 --light-direction 1,0,0.1 in.off --to ppm |
+      tail -c 15000 | head -c 240 | od -An -v -tu1 -w3 | sort -u | wc -l
+  }
+  for backend in "${backends[@]}"; do
+    [[ $(shades 65535 --backend "$backend") == 1 ]] || fail "16 bits are not smooth with $backend" "$(shades 65535 --backend "$backend")"
+    (($(shades 255 --backend "$backend") > 1)) || fail "8 bits are not steps with $backend, so that nothing is shown"
+  done
+}
+
+# Two squares side by side, of materials 4 and 0 and of parts 0 and 1.
+two_materials() {
+  printf '%s\n' ply 'format ascii 1.0' 'element vertex 8' 'property double x' 'property double y' 'property double z' 'element face 4' \
+    'property list uchar int vertex_indices' 'property int part' 'property int material' end_header \
+    '0 0 0' '2 0 0' '2 2 0' '0 2 0' '2 0 0' '4 0 0' '4 2 0' '2 2 0' '3 0 1 2 0 4' '3 0 2 3 0 4' '3 4 5 6 1 0' '3 4 6 7 1 0'
+}
+test_materials_have_their_own_textures() {
+  two_materials >in.ply
+  printf 'P3 1 1 255 200 0 0\n' >red.ppm
+  printf 'P3 1 1 255 0 0 180\n' >blue.ppm
+  # The colours of the left and of the right square.
+  colors() {
+    emboss-render --backend cpu --view top --size 40x20 --distance 4 --stats=stats.json "$@" --to ppm |
+      tail -c 2400 | od -An -v -tu1 -w120 -j1200 | awk 'NR == 1 { print $31, $32, $33, $91, $92, $93 }'
+  }
+  [[ $(colors --texture blue.ppm --texture 4=red.ppm in.ply) == '200 0 0 0 0 180' ]] || fail 'materials' "$(colors --texture blue.ppm --texture 4=red.ppm in.ply)"
+  grep -q '"triangles_by_look":\[2,2\]' stats.json || fail 'no counts' "$(<stats.json)"
+  [[ $(colors --texture 0=red.ppm --texture 4=blue.ppm in.ply) == '0 0 180 200 0 0' ]] || fail 'no texture for all'
+  [[ $(colors --by part --texture 1=red.ppm in.ply) == '255 255 255 200 0 0' ]] || fail 'by part'
+  [[ $(colors --color 0=0,1,0 --color 0.2,0.2,0.2 --texture 4=blue.ppm in.ply) == '0 0 36 0 255 0' ]] || fail 'colours, and what is not given'
+  # A model, whose materials exp2ela numbers.
+  exp2ela --material 1=uterus in.ply -o in.ela
+  [[ $(colors --texture 1=red.ppm --color 0=0,0,1 in.ela) == '0 0 255 200 0 0' ]] || fail 'a model' "$(colors --texture 1=red.ppm --color 0=0,0,1 in.ela)"
+  emboss-render --backend cpu --color 7=1,0,0 in.ply -o out.png 2>stderr.txt
+  [[ $(<stderr.txt) == 'emboss-render: warning: no triangle is of material 7' ]] || fail 'a material that is not there' "$(<stderr.txt)"
+  expect_failure 1 emboss-render emboss-render --backend cpu --texture 0=none.ppm in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --texture 1= in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --texture 1=red.ppm --texture 1=red.ppm in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --by part in.ply -o out.png
+}
+
+# The objects of a run, each with its own.
+test_objects_have_their_own_textures() {
+  cube >in.off
+  exp2ela in.off -o a.ela
+  awk 'NR > 2 && NF == 3 { $1 += 3 } { print }' in.off >b.off
+  exp2ela b.off -o b.ela
+  printf '%s\n' 'object left a.ela' 'object right b.ela' step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  emboss-render --backend cpu --by object --color 0=1,0,0 --color 1=0,0,1 --background 0,1,0 --view top --size 60x40 --stats=stats.json run.h5 --to ppm >out.ppm
+  grep -q '"triangles_by_look":\[0,12,12\]' stats.json || fail 'no counts' "$(<stats.json)"
+  [[ $(tail -c 7200 out.ppm | od -An -v -tu1 -w3 | sort -u | wc -l) == 3 ]] || fail 'not two colours on a third'
+}
+
 test_it_loads_only_what_it_uses() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   local libraries
@@ -125,6 +185,7 @@ test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
   local frames
   frames=$(grep -o '"pictures":[0-9]*' stats.json | cut -d: -f2)
   ((frames > 1)) || fail 'one frame is no film' "$(<stats.json)"
+  grep -q '"vertex_splits":0,"frames_made":0,"vertices_made":1' stats.json || fail 'vertices were made again' "$(<stats.json)"
   grep -q "\"pictures_kept\":$((frames - 1))" stats.json || fail 'pictures were drawn again' "$(<stats.json)"
   [[ $(wc -c <all.rgb) == $((frames * 24 * 20 * 3)) ]] || fail 'another number of bytes than frames have'
   emboss-render --backend cpu --size 24x20 --frames 0:-1:2 run.h5 -o 'f%03d.png'
@@ -132,4 +193,90 @@ test_a_film_has_a_picture_for_each_frame_and_keeps_those_without_motion() {
   expect_failure 1 emboss-render emboss-render --backend cpu --frames 0:99 run.h5 -o x.rgb
   expect_failure 2 emboss-render emboss-render --backend cpu --frames a:b run.h5 -o x.rgb
   expect_failure 2 emboss-render emboss-render --backend cpu --frames all run.h5 -o 'f%s.png'
+}
+
+# What moves decides what is made again: counts, and the same pictures as one by one.
+test_a_sequence_renews_only_what_changed() {
+  cube >in.off
+  bumps >bumps.pgm
+  exp2ela in.off -o cube.ela
+  printf '%s\n' 'object cube cube.ela' step 'displace cube 0 0.1 0 0' step step >in.scene
+  ffe-run -q in.scene -o run.h5 >/dev/null
+  local look=(--backend cpu --structure bumps.pgm --uv-scale 1 --size 40 --view iso) frame
+  counts() { grep -o '"pictures":[0-9]*,"pictures_kept":[0-9]*,"vertex_splits":[0-9]*,"frames_made":[0-9]*,"vertices_made":[0-9]*' stats.json | sed 's/"[a-z_]*"://g'; }
+  emboss-render "${look[@]}" --frames all --stats=stats.json run.h5 -o 'f%d.ppm'
+  # Rest, a step in which nothing moved, and two in which something did.
+  [[ $(counts) == 4,1,1,3,3 ]] || fail 'frames of a run' "$(counts)"
+  for frame in 0 1 2 3; do
+    emboss-render "${look[@]}" --frame $frame run.h5 -o one.ppm
+    cmp one.ppm f$frame.ppm
+  done
+  ! cmp -s f1.ppm f2.ppm || fail 'nothing moved, so that nothing is shown'
+  # Another view: the frames of tangents stay; and a light that turns.
+  emboss-render "${look[@]}" --turn 3 --stats=stats.json cube.ela -o 't%d.ppm'
+  [[ $(counts) == 3,0,1,1,1 ]] || fail 'a turn' "$(counts)"
+  emboss-render "${look[@]}" --orbit 120,0 --light "$(grep -o '"light":\[[^]]*' stats.json | cut -d[ -f2)" cube.ela -o one.ppm
+  cmp one.ppm t1.ppm
+  emboss-render "${look[@]}" --turn-light 4 --stats=stats.json cube.ela --to rgb -o light.rgb
+  [[ $(counts) == 4,0,1,1,1 && $(wc -c <light.rgb) == 19200 ]] || fail 'a turning light' "$(counts)"
+  ! cmp -s <(head -c 4800 light.rgb) <(tail -c 4800 light.rgb) || fail 'the light does not turn'
+  # By vertex the light stands at the vertices, which are made again, but not split, nor their frames.
+  emboss-render "${look[@]}" --tbn vertex --turn-light 4 --stats=stats.json cube.ela --to rgb -o light.rgb
+  [[ $(counts) == 4,0,1,1,4 ]] || fail 'a turning light by vertex' "$(counts)"
+  if has_gl; then
+    emboss-render "${look[@]:2}" --backend gl --turn 3 --stats=stats.json cube.ela --to rgb -o turn.rgb
+    grep -q '"uploads":1,' stats.json || fail 'OpenGL was given the same again' "$(<stats.json)"
+  fi
+}
+
+# What is broken in a mesh gives a right picture or one clear line.
+test_degenerate_input() {
+  local backend backends=(cpu) many
+  ! has_gl || backends+=(gl)
+  awk 'BEGIN { print "P2 32 32 255"
+    for (y = -15.5; y < 16; ++y) for (x = -15.5; x < 16; ++x) { h = 1 - (x * x + y * y) / 160; print (h > 0) ? int(255 * h) : 0 } }' >bumps.pgm
+  # A square of 2 x 2; NORMAL stands at each point, ST are the coordinates of its two triangles.
+  square() { # NORMAL ST ST [FACE...]
+    local normal=$1 first=$2 second=$3
+    shift 3
+    printf '%s\n' ply 'format ascii 1.0' 'element vertex 4' 'property double x' 'property double y' 'property double z' ${normal:+'property float nx' 'property float ny' 'property float nz'} \
+      "element face $((2 + $#))" 'property list uchar int vertex_indices' 'property list uchar float texcoord' end_header \
+      "0 0 0 $normal" "2 0 0 $normal" "2 2 0 $normal" "0 2 0 $normal" "3 0 1 2 6 $first" "3 0 2 3 6 $second" "$@"
+  }
+  picture() { emboss-render --backend "$backend" --structure bumps.pgm --texture bumps.pgm --view top --light 5,9,9 --size 48 "$1" -o "$2"; }
+  for backend in "${backends[@]}"; do
+    square '' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+    picture in.ply whole.ppm
+    # Triangles without area in space, drawn or not, change nothing.
+    square '' '0 0 1 0 1 1' '0 0 1 1 0 1' '3 1 1 2 6 0 0 1 0 1 1' '3 0 2 2 6 0 0 1 0 1 1' >in.ply
+    picture in.ply area.ppm
+    cmp whole.ppm area.ppm
+    # Without area in the texture: one texel, flat.
+    square '' '0.5 0.5 0.5 0.5 0.5 0.5' '0.5 0.5 0.5 0.5 0.5 0.5' >in.ply
+    picture in.ply flat.ppm
+    [[ $(tail -c 6912 flat.ppm | od -An -v -tu1 -w3 | sort -u | wc -l) == 2 ]] || fail "$backend: a texture without area is not one colour on the background"
+    # Mirrored, both by the mesh and by the picture's coordinates: the light still comes from its side.
+    square '' '1 0 0 0 0 1' '1 0 0 1 1 1' >in.ply
+    picture in.ply mirrored.ppm
+    read -r _ many <<<"$(difference whole.ppm mirrored.ppm)"
+    ((many < 60)) || fail "$backend: bumps that are symmetric are not in the mirror" "$many"
+    # Normals of zero count as none.
+    square '0 0 0' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+    picture in.ply normals.ppm
+    cmp whole.ppm normals.ppm
+    # The light on a vertex, and the camera on the surface.
+    emboss-render --backend "$backend" --structure bumps.pgm --view top --light 0,0,0 --size 48 in.ply -o out.ppm
+    emboss-render --backend "$backend" --structure bumps.pgm --eye 1,1,0 --target 1,2,0 --size 48 in.ply -o out.ppm
+    # 1 x 1, and more than there is memory for.
+    emboss-render --backend "$backend" --size 1 in.ply --to rgb -o out.rgb
+    [[ $(wc -c <out.rgb) == 3 ]] || fail "$backend: 1 x 1 is not one pixel"
+    rm -f out.png
+    expect_failure 1 emboss-render emboss-render --backend "$backend" --size 8000 --max-memory 50M in.ply -o out.png
+    [[ ! -e out.png ]] || fail "$backend: a failure left a picture"
+  done
+  # Normals that are no numbers are refused by their place.
+  square 'nan 0 1' '0 0 1 0 1 1' '0 0 1 1 0 1' >in.ply
+  expect_failure 1 emboss-render emboss-render --backend cpu in.ply -o out.png
+  printf 'OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n' >in.off
+  expect_failure 1 emboss-render emboss-render --backend cpu in.off -o out.png
 }

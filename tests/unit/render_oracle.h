@@ -21,6 +21,7 @@ namespace gewebe::test {
 struct OracleScene {
   TriangleMesh mesh;                    ///< with texture coordinates
   std::optional<Image> base, structure; ///< the structure is gray
+  std::optional<Heights> heights;       ///< a structure of 16 bits instead
   std::optional<Image> detail;          ///< by the mesh's coordinates
   std::optional<Image> reflection;      ///< sphere-mapped
   Vec3 color{1, 1, 1}, light;
@@ -28,7 +29,8 @@ struct OracleScene {
   bool directional = false; ///< `light` is a vector to it
   bool per_pixel = false;   ///< frames for each pixel, not offsets for each vertex
   bool mipmap = false;
-  bool clamp_early = false; ///< what 8-bit blending does: a negative control
+  bool clamp_early = false;        ///< what 8-bit blending does: a negative control
+  std::vector<OracleScene> others; ///< textures and colours of materials 1, 2, …
 };
 
 struct OraclePixel {
@@ -43,12 +45,9 @@ public:
       : scene_(scene), camera_(camera), width_(width), height_(height) {
     find_frames();
     bound();
-    for (const auto& [image, levels] : {std::pair{&scene.base, &base_},
-                                        {&scene.structure, &structure_},
-                                        {&scene.detail, &detail_},
-                                        {&scene.reflection, &reflection_}})
-      if (*image)
-        *levels = levels_of(**image, scene.mipmap);
+    add_look(scene);
+    for (const OracleScene& other : scene.others)
+      add_look(other);
   }
 
   OraclePixel pixel(double x, double y) const {
@@ -90,7 +89,26 @@ private:
     std::vector<double> values;
   };
   using Levels = std::vector<Level>;
+  /// What a material looks like.
+  struct OwnLook {
+    const OracleScene* scene;
+    Levels base, structure, detail, reflection;
+  };
   using Key = std::tuple<std::uint32_t, float, float, bool>;
+
+  void add_look(const OracleScene& scene) {
+    OwnLook& look = looks_.emplace_back(OwnLook{&scene, {}, {}, {}, {}});
+    for (const auto& [image, levels] : {std::pair{&scene.base, &look.base},
+                                        {&scene.structure, &look.structure},
+                                        {&scene.detail, &look.detail},
+                                        {&scene.reflection, &look.reflection}})
+      if (*image)
+        *levels = levels_of(**image, 255, scene_.mipmap);
+    if (scene.heights)
+      look.structure = levels_of(
+          DeepImage{scene.heights->width, scene.heights->height, 1, scene.heights->values}, 65535,
+          scene_.mipmap);
+  }
 
   const Vec3& corner(std::size_t t, std::size_t c) const {
     return scene_.mesh.points[scene_.mesh.triangles[t][c]];
@@ -160,10 +178,11 @@ private:
   }
 
   /// By area, from the level before, whose values have 8 bits, 16 for gray; halves are rounded up.
-  static Levels levels_of(const Image& image, bool all) {
+  template <class Value>
+  static Levels levels_of(const Pixels<Value>& image, double top, bool all) {
     Levels levels{{image.width, image.height, image.channels, {}}};
-    for (const std::uint8_t value : image.values)
-      levels[0].values.push_back(value / 255.0);
+    for (const Value value : image.values)
+      levels[0].values.push_back(value / top);
     const double steps = image.channels == 1 ? 65535 : 255;
     while (all && (levels.back().width > 1 || levels.back().height > 1)) {
       const Level& fine = levels.back();
@@ -276,19 +295,24 @@ private:
       dt = scene_.offset * frames_.at(key(hit, 0)).side * dot(l, cross(n, along));
       around = sphere_map(place, n);
     }
+    const OwnLook& look =
+        looks_[scene_.mesh.material.empty() ? 0
+                                            : static_cast<std::size_t>(scene_.mesh.material[hit])];
+    const OracleScene& own = *look.scene;
     const auto change = scene_.mipmap ? changes(hit, x, y) : std::array<double, 4>{};
     for (std::size_t c = 0; c < 3; ++c) {
-      double base = scene_.color[static_cast<int>(c)] * shade;
-      if (scene_.base)
-        base *= value(base_, change, s, t, c);
+      double base = own.color[static_cast<int>(c)] * shade;
+      if (own.base)
+        base *= value(look.base, change, s, t, c);
       base = std::min(1.0, base);
-      if (scene_.detail)
-        base = std::min(1.0, base + value(detail_, change, s, t, c));
-      if (scene_.reflection)
-        base = std::min(1.0, base + texel(reflection_[0], around[0], around[1], c));
-      const double r = scene_.structure ? 0.5 + 0.5 * (value(structure_, change, s, t, c) -
-                                                       value(structure_, change, s + ds, t + dt, c))
-                                        : 0.5;
+      if (own.detail)
+        base = std::min(1.0, base + value(look.detail, change, s, t, c));
+      if (own.reflection)
+        base = std::min(1.0, base + texel(look.reflection[0], around[0], around[1], c));
+      const double r = own.structure || own.heights
+                           ? 0.5 + 0.5 * (value(look.structure, change, s, t, c) -
+                                          value(look.structure, change, s + ds, t + dt, c))
+                           : 0.5;
       nearest.value[c] =
           scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
     }
@@ -361,7 +385,7 @@ private:
   static constexpr std::size_t cell = 8; // pixels
   std::size_t columns_ = 0;
   std::vector<std::vector<std::size_t>> cells_; // triangles that may be seen in each
-  Levels base_, structure_, detail_, reflection_;
+  std::vector<OwnLook> looks_;                  ///< by material
 };
 
 using OraclePicture = std::vector<OraclePixel>;

@@ -90,6 +90,26 @@ TEST(Png, EveryKindGivesItsStoredValues) {
   EXPECT_EQ(read_png(make_png(1, 1, odd, {{9, 8, 7}}), "x"), (Image{1, 1, 3, {9, 8, 7}}));
 }
 
+TEST(Png, SixteenBitsAreKeptWhereTheyAreAskedFor) {
+  EXPECT_EQ(
+      read_deep_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 7, 128, 127, 255, 254}}), "x"),
+      (DeepImage{3, 1, 1, {7, 0x807f, 0xfffe}}));
+  EXPECT_EQ(
+      read_deep_png(make_png(1, 1, {16, PNG_COLOR_TYPE_RGBA}, {{1, 2, 3, 4, 5, 6, 0, 0}}), "x"),
+      (DeepImage{1, 1, 3, {0x102, 0x304, 0x506}}));
+  EXPECT_EQ(read_deep_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
+            (DeepImage{4, 1, 1, {0, 85 * 257, 170 * 257, 65535}}));
+  EXPECT_EQ(read_deep_png(make_png(2, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00010000}}), "x"),
+            (DeepImage{2, 1, 3, {257, 514, 771, 2570, 5140, 7710}}));
+  EXPECT_EQ(read_deep_png(make_png(2, 1, {8, PNG_COLOR_TYPE_GRAY_ALPHA}, {{9, 0, 8, 255}}), "x"),
+            (DeepImage{2, 1, 1, {9 * 257, 8 * 257}}));
+  const Image image = noise(21, 13, 3);
+  const DeepImage deep = read_deep_png(write_png(image), "x");
+  ASSERT_EQ(deep.values.size(), image.values.size());
+  for (std::size_t n = 0; n < deep.values.size(); ++n)
+    EXPECT_EQ(deep.values[n], image.values[n] * 257);
+}
+
 TEST(Png, InterlacedIsTheSameImage) {
   const Image image = noise(21, 13, 3);
   std::vector<std::vector<std::uint8_t>> rows;
@@ -163,6 +183,16 @@ TEST(Pnm, AllFourKinds) {
   EXPECT_EQ(read_pnm(write_ppm(image), "x"), image);
 }
 
+TEST(Pnm, SixteenBitsAreKeptWhereTheyAreAskedFor) {
+  EXPECT_EQ(read_deep_pnm("P2 3 1 65535 0 65535\n32769 ", "x"),
+            (DeepImage{3, 1, 1, {0, 65535, 32769}}));
+  EXPECT_EQ(read_deep_pnm("P3 1 1 255 0 1 255", "x"), (DeepImage{1, 1, 3, {0, 257, 65535}}));
+  EXPECT_EQ(read_deep_pnm("P2 2 1 1000 1 #\n 1000", "x"), (DeepImage{2, 1, 1, {66, 65535}}));
+  EXPECT_EQ(read_deep_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"),
+            (DeepImage{1, 1, 1, {0xff00}}));
+  EXPECT_EQ(read_deep_pnm("P2 2 1 255 0000000012 00001", "x"), (DeepImage{2, 1, 1, {3084, 257}}));
+}
+
 TEST(Pnm, BadFilesAreOneLine) {
   const auto refused = [](const std::string& bytes, const std::string& part) {
     expect_refused([&] { return read_pnm(bytes, "x"); }, part);
@@ -178,6 +208,8 @@ TEST(Pnm, BadFilesAreOneLine) {
   refused("P2 2 1 9\n7\n10", "x:3: no value, expected 0 to 9");
   refused("P2 2 1 9 7 -1", "no value");
   refused("P2 2 1 9 7 x", "no value");
+  refused("P2 2 1 9 7\n999999999999 ", "x:2: no value");
+  refused("P2 2 1 9 7\n\n4x ", "x:3: no value");
   refused("P2 2 1 9 7 7 7", "goes on after the last value");
   refused("P2 30000 30000 255 1", "too few bytes for 900000000 values");
   refused("P6 30000 30000 255 ", "byte 19: 0 bytes of values, expected 2700000000");
@@ -196,6 +228,12 @@ TEST(ImageFile, IsToldByItsFirstBytes) {
     std::ofstream(file.path(), std::ios::binary) << bytes;
     Input input(file.path());
     EXPECT_EQ(read_image(input, {}), image);
+  }
+  {
+    const ScratchFile file(".dat");
+    std::ofstream(file.path()) << "P3 2 1 255 1 0 0  255 255 255 "; // 2126 · 257 / 10000 = 54.6
+    Input input(file.path());
+    EXPECT_EQ(read_heights(input, {}), (Heights{2, 1, {55, 65535}}));
   }
   const ScratchFile file(".png");
   std::ofstream(file.path()) << "GIF89a";

@@ -15,7 +15,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace gewebe {
 namespace {
@@ -296,6 +298,96 @@ TEST(RenderDrawing, SameForAnyThreadsAndOffsetsPointToTheLight) {
       EXPECT_LE(std::fabs(x), 1.0001F);
   }
   EXPECT_TRUE(shifted);
+}
+
+bool equal(const Drawing& a, const Drawing& b) {
+  const auto same = [](const auto& x, const auto& y) {
+    return x.size() == y.size() &&
+           (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof x[0]) == 0);
+  };
+  return same(a.vertices, b.vertices) && same(a.frames, b.frames) && a.triangles == b.triangles &&
+         a.group_start == b.group_start && a.light == b.light && a.origin == b.origin &&
+         a.camera.eye == b.camera.eye;
+}
+
+TEST(RenderDrawing, ASequenceRenewsWhatChangedAndIsTheSameAsDrawingsMadeAnew) {
+  for (const bool per_pixel : {true, false}) {
+    std::vector<Surface> surfaces(2);
+    surfaces[0].mesh = test::sphere_mesh(3, 10, {0, 0, 0});
+    surfaces[1].mesh = test::sphere_mesh(2, 3, {0, 0, 20});
+    surfaces[1].mesh.material.assign(surfaces[1].mesh.triangles.size(), 1);
+    (void)add_texcoords(surfaces, {}, {});
+    DrawingOptions options;
+    options.texcoords = options.structure = options.sphere = true;
+    options.per_pixel = per_pixel;
+    options.groups = {1};
+    options.light = {30, 20, 10};
+    options.camera = make_camera({}, rest_box(surfaces), 64, 64);
+    DrawingMaker maker;
+    const Drawing first = maker.make(surfaces, options, DrawingChange::all, {});
+    EXPECT_TRUE(equal(first, make_drawing(surfaces, options, {})));
+    EXPECT_EQ(maker.counts().splits, 2U);
+    EXPECT_EQ(maker.counts().frames, 2U);
+    // The points move: frames, but no splitting.
+    for (Vec3& p : surfaces[0].mesh.points)
+      p.x *= 1.5;
+    const Drawing moved = maker.make(surfaces, options, DrawingChange::points, {});
+    EXPECT_TRUE(equal(moved, make_drawing(surfaces, options, {})));
+    EXPECT_FALSE(equal(moved, first));
+    EXPECT_NE(moved.version, first.version);
+    EXPECT_EQ(maker.counts().splits, 2U);
+    EXPECT_EQ(maker.counts().frames, 4U);
+    // The light moves: neither.
+    options.light = {-30, 20, 10};
+    options.camera = make_camera({"left", {}, 10, 5, {}, {}, {}, 30}, rest_box(surfaces), 64, 64);
+    const Drawing lit = maker.make(surfaces, options, DrawingChange::view, {});
+    EXPECT_TRUE(equal(lit, make_drawing(surfaces, options, {})));
+    EXPECT_FALSE(equal(lit, moved));
+    EXPECT_EQ(lit.version == moved.version, per_pixel); // nothing at vertices knows the light
+    EXPECT_EQ(maker.counts().splits, 2U);
+    EXPECT_EQ(maker.counts().frames, 4U);
+    EXPECT_EQ(maker.counts().vertices, per_pixel ? 2U : 3U);
+    EXPECT_EQ(maker.counts().drawings, 3U);
+    // That telling it too little is seen.
+    for (Vec3& p : surfaces[0].mesh.points)
+      p.y *= 1.5;
+    EXPECT_FALSE(equal(maker.make(surfaces, options, DrawingChange::view, {}),
+                       make_drawing(surfaces, options, {})));
+  }
+}
+
+TEST(RenderDrawing, TrianglesAreGroupedByMaterialPartOrSurface) {
+  std::vector<Surface> surfaces(2);
+  for (Surface& surface : surfaces) {
+    surface.mesh = test::sheet(3, 1); // six triangles
+    surface.mesh.part = {0, 1, 2, 0, 1, 2};
+  }
+  surfaces[1].mesh.material = {5, 5, 4, 0, 5, 7};
+  DrawingOptions options;
+  const Drawing plain = make_drawing(surfaces, options, {});
+  EXPECT_EQ(group_count(plain), 1U);
+  EXPECT_EQ(triangles_of_group(plain, 0).size(), 12U);
+  // Where each group's triangles stand in the plain drawing, in order.
+  const auto groups = [&](GroupBy by, std::vector<std::int32_t> numbers) {
+    options.group_by = by;
+    options.groups = std::move(numbers);
+    const Drawing drawing = make_drawing(surfaces, options, {});
+    std::vector<std::vector<std::size_t>> found;
+    for (std::size_t g = 0; g < group_count(drawing); ++g) {
+      found.emplace_back();
+      for (const Triangle& t : triangles_of_group(drawing, g))
+        found.back().push_back(
+            static_cast<std::size_t>(std::find(plain.triangles.begin(), plain.triangles.end(), t) -
+                                     plain.triangles.begin()));
+    }
+    return found;
+  };
+  using Found = std::vector<std::vector<std::size_t>>;
+  EXPECT_EQ(groups(GroupBy::material, {4, 5}), (Found{{0, 1, 2, 3, 4, 5, 9, 11}, {8}, {6, 7, 10}}));
+  EXPECT_EQ(groups(GroupBy::material, {0}), (Found{{6, 7, 8, 10, 11}, {0, 1, 2, 3, 4, 5, 9}}));
+  EXPECT_EQ(groups(GroupBy::part, {2, 1, 9}),
+            (Found{{0, 3, 6, 9}, {2, 5, 8, 11}, {1, 4, 7, 10}, {}}));
+  EXPECT_EQ(groups(GroupBy::surface, {1}), (Found{{0, 1, 2, 3, 4, 5}, {6, 7, 8, 9, 10, 11}}));
 }
 
 TEST(RenderDrawing, LightOnAVertexAndNothingToDraw) {

@@ -44,6 +44,7 @@ struct Case {
   OracleScene scene;
   CameraOptions camera;
   std::uint32_t width = 224, height = 160;
+  int samples = 1;
 };
 
 Case textured(TriangleMesh mesh, const std::string& view) {
@@ -88,6 +89,25 @@ bool is_there(const Mode& mode) {
   return mode.backend == Backend::cpu || gl_is_there;
 }
 
+Look look_of(const OracleScene& scene, bool mipmap) {
+  Look look;
+  TextureOptions filter;
+  filter.filter = mipmap ? TextureFilter::mipmap : TextureFilter::linear;
+  if (scene.base)
+    look.base = texture_from(*scene.base, filter);
+  if (scene.structure)
+    look.structure = texture_from(*scene.structure, filter);
+  if (scene.heights)
+    look.structure = texture_from(*scene.heights, filter);
+  if (scene.detail)
+    look.detail = texture_from(*scene.detail, filter);
+  filter.sphere = true;
+  if (scene.reflection)
+    look.reflection = texture_from(*scene.reflection, filter);
+  look.color = scene.color;
+  return look;
+}
+
 Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double sign = 1) {
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
@@ -95,32 +115,28 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   light = c.scene.directional ? c.scene.light : default_light(camera);
   DrawingOptions options;
   options.texcoords = true;
-  options.structure = c.scene.structure.has_value();
+  options.structure = c.scene.structure || c.scene.heights;
   options.sphere = c.scene.reflection.has_value();
+  for (const OracleScene& other : c.scene.others) {
+    options.groups.push_back(static_cast<std::int32_t>(options.groups.size()) + 1);
+    options.structure = options.structure || other.structure;
+    options.sphere = options.sphere || other.reflection;
+  }
   options.per_pixel = mode.per_pixel;
   options.light = light;
   options.directional = c.scene.directional;
   options.offset = {sign * c.scene.offset, sign * c.scene.offset};
   options.shade = c.scene.shade;
   options.camera = camera;
-  Look look;
-  TextureOptions filter;
-  filter.filter = c.scene.mipmap ? TextureFilter::mipmap : TextureFilter::linear;
-  if (c.scene.base)
-    look.base = texture_from(*c.scene.base, filter);
-  if (c.scene.structure)
-    look.structure = texture_from(*c.scene.structure, filter);
-  if (c.scene.detail)
-    look.detail = texture_from(*c.scene.detail, filter);
-  filter.sphere = true;
-  if (c.scene.reflection)
-    look.reflection = texture_from(*c.scene.reflection, filter);
-  look.color = c.scene.color;
+  Look look = look_of(c.scene, c.scene.mipmap);
+  for (const OracleScene& other : c.scene.others)
+    look.others.push_back(look_of(other, c.scene.mipmap));
   look.background = {0, 0, 0};
   PictureOptions picture;
   picture.backend = mode.backend;
   picture.gl.mode = mode.gl;
   picture.gl.wide = mode.wide;
+  picture.samples = c.samples;
   picture.width = c.width;
   picture.height = c.height;
   return make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
@@ -240,6 +256,106 @@ TEST_P(RenderOracle, TexturesThatShrink) {
   c.scene.base = spots(45, 37, 3);
   c.scene.structure = spots(64, 51, 1);
   expect_equal(c, "mipmaps");
+}
+
+// Three materials on one torus: all textures, others without structure, none but a structure.
+Case three_materials() {
+  Case c = textured(torus(60, 30, true), "iso");
+  c.scene.shade = 0.3;
+  for (std::size_t t = 0; t < c.scene.mesh.triangles.size(); ++t)
+    c.scene.mesh.material.push_back(static_cast<std::int32_t>(t / 77 % 3));
+  OracleScene second, third;
+  second.base = spots(19, 64, 3);
+  second.detail = spots(20, 31, 3);
+  second.reflection = spots(33, 40, 3);
+  for (Image* image : {&*second.detail, &*second.reflection})
+    for (std::uint8_t& value : image->values)
+      value = static_cast<std::uint8_t>(value / 3);
+  third.structure = spots(50, 20, 1);
+  third.color = {0.9, 0.3, 0.1};
+  c.scene.others = {second, third};
+  return c;
+}
+
+TEST_P(RenderOracle, EachMaterialHasItsOwnTextures) {
+  Case c = three_materials();
+  expect_equal(c, "three materials");
+  // That it can fail: a picture in which two of them are exchanged.
+  Case exchanged = c;
+  std::swap(exchanged.scene.others[0], exchanged.scene.others[1]);
+  Camera camera;
+  const Image image = draw(exchanged, GetParam(), camera, c.scene.light);
+  c.scene.per_pixel = GetParam().per_pixel;
+  EXPECT_GT(compare(image, c.scene, camera).rms, 20);
+}
+
+// Groups that look alike are one: the same bytes, with four samples too.
+TEST_P(RenderOracle, EqualMaterialsAreDrawnAsOne) {
+  for (const int samples : {1, 4}) {
+    Case c = three_materials();
+    c.samples = samples;
+    c.width = 112;
+    c.height = 80;
+    c.scene.detail = spots(20, 31, 3);
+    c.scene.others.clear();
+    Camera camera;
+    Vec3 light;
+    const Image one = draw(c, GetParam(), camera, light);
+    c.scene.others = {c.scene, c.scene};
+    const Image grouped = draw(c, GetParam(), camera, light);
+    EXPECT_TRUE(grouped == one) << samples;
+    c.scene.others[1].color = {0.4, 0.4, 0.4};
+    EXPECT_FALSE(draw(c, GetParam(), camera, light) == one);
+  }
+}
+
+// More passes than the stencil of OpenGL can count.
+TEST_P(RenderOracle, SixtyMaterials) {
+  Case c = textured(torus(30, 20, false), "iso");
+  c.width = 112;
+  c.height = 80;
+  for (std::size_t t = 0; t < c.scene.mesh.triangles.size(); ++t)
+    c.scene.mesh.material.push_back(static_cast<std::int32_t>(t / 2 % 60));
+  for (int n = 1; n < 60; ++n) {
+    OracleScene& other = c.scene.others.emplace_back();
+    other.structure = c.scene.structure;
+    if (n % 3 == 0)
+      other.detail = spots(8, 8, 3);
+    other.color = {n / 60.0, 0.5, 1 - n / 60.0};
+  }
+  const OracleComparison result = held_against_oracle(c, GetParam());
+  EXPECT_GT(result.interior, 1000U);
+  EXPECT_LE(result.max, 2);
+  EXPECT_LE(result.rms_rounded, GetParam().rms);
+}
+
+// Heights of 16 bits that change by a twelfth over the whole texture: in 8 bits they are 21 steps.
+TEST_P(RenderOracle, ShallowHeightsAreSmoothIn16BitsAndStepsIn8) {
+  Case c;
+  c.scene.mesh = quad(100, 70, 1, 1);
+  c.camera.view = "top";
+  c.scene.offset = 0.2;
+  c.scene.color = {1, 0.9, 0.8};
+  Heights heights{96, 64, {}};
+  Image steps{96, 64, 1, {}};
+  for (unsigned y = 0; y < 64; ++y)
+    for (unsigned x = 0; x < 96; ++x) {
+      const double f = 0.5 + 0.04 * std::sin(x / 96.0 * 6.2831853) * std::cos(y / 64.0 * 6.2831853);
+      heights.values.push_back(static_cast<std::uint16_t>(f * 65535));
+      steps.values.push_back(static_cast<std::uint8_t>(f * 255));
+    }
+  c.scene.heights = heights;
+  expect_equal(c, "smooth");
+  // Drawn of the steps, and held against the smooth ones.
+  Case coarse = c;
+  coarse.scene.heights.reset();
+  coarse.scene.structure = steps;
+  Camera camera;
+  const Image image = draw(coarse, GetParam(), camera, c.scene.light);
+  c.scene.per_pixel = GetParam().per_pixel;
+  const OracleComparison stepped = compare(image, c.scene, camera);
+  RecordProperty("stepped.rms", std::to_string(stepped.rms_rounded));
+  EXPECT_GT(stepped.rms_rounded, 0.35);
 }
 
 // What the comparison must see.

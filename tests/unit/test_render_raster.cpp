@@ -159,18 +159,28 @@ TEST(RenderRaster, SameBytesForAnyThreadsAndCpu) {
   picture.width = 301;
   picture.height = 203;
   picture.backend = Backend::cpu;
-  std::string digest;
-  for (const int threads : {1, 2, 7, -1}) {
-    Context context;
-    context.threads = std::abs(threads);
-    if (threads < 0)
-      context.cpu = CpuLevel::baseline;
-    const Image image =
-        make_picture(make_drawing(surfaces, options, context), camera, {}, picture, context);
-    if (digest.empty())
-      digest = image_digest(image);
-    EXPECT_EQ(image_digest(image), digest) << threads;
-  }
+  Look look;
+  look.others.resize(1);
+  look.others[0].color = {0.8, 0.3, 0.1};
+  for (std::size_t t = 0; t < surfaces[0].mesh.triangles.size(); ++t)
+    surfaces[0].mesh.material.push_back(static_cast<std::int32_t>(t / 5 % 2));
+  for (const int materials : {1, 2})
+    for (const int samples : {1, 4}) {
+      options.groups.assign(static_cast<std::size_t>(materials - 1), 1);
+      picture.samples = samples;
+      std::string digest;
+      for (const int threads : {1, 2, 7, -1}) {
+        Context context;
+        context.threads = std::abs(threads);
+        if (threads < 0)
+          context.cpu = CpuLevel::baseline;
+        const Image image =
+            make_picture(make_drawing(surfaces, options, context), camera, look, picture, context);
+        if (digest.empty())
+          digest = image_digest(image);
+        EXPECT_EQ(image_digest(image), digest) << threads << ' ' << materials << ' ' << samples;
+      }
+    }
 }
 
 // A sheet over the picture whose coordinates run from -2 to 3, seen pixel by pixel.
