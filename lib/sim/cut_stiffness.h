@@ -56,7 +56,7 @@ public:
 private:
   std::optional<CutWay> cheapest(CutWork& work) const;
   AxesSolve solver() const;
-  void require_condition() const;
+  void require_condition();
   std::shared_ptr<const Model> first_, factored_, now_;
   std::shared_ptr<const ColumnSource> columns_;
   Context context_;
@@ -67,6 +67,7 @@ private:
   std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_
   double fresh_operations_ = 0; ///< of the last factor with an order of its own
   double reached_ = 0;          ///< operations of the last renewal
+  double accepted_pivot_ = 1; ///< the weakest for which the condition was found to be small enough
 };
 
 } // namespace gewebe
