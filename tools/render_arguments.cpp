@@ -63,6 +63,49 @@ void for_layers(const Layers& layers, const std::string& option, const std::stri
   }
 }
 
+/// "noise" and "veins", which are no files.
+void complete_solids(const Layers& layers) {
+  for (const auto& [word, layer] : layers) {
+    if (!is_solid_texture(layer->path))
+      continue;
+    const std::string option = std::string("--") + word;
+    refuse(option == "--reflection", "--reflection: '" + layer->path +
+                                         "' is no picture of the surroundings, expected a file");
+    refuse(layer->options.sphere,
+           "--sphere: " + std::string(word) + " is solid, expected a texture from a file");
+    try {
+      layer->solid = solid_texture_from_text(layer->path);
+    } catch (const Error& error) {
+      throw UsageError(option + ": " + error.what());
+    }
+    refuse(option == "--structure" && (layer->path.find("ground=") != std::string::npos ||
+                                       layer->path.find("color=") != std::string::npos),
+           "--structure: heights have no colour, expected neither ground nor color");
+    layer->solid->filtered = layer->options.filter == TextureFilter::mipmap;
+  }
+}
+
+/// What the drawing must have for the textures.
+void complete_drawing(RenderArguments& a, const Layers& layers) {
+  DrawingOptions& drawing = a.drawing;
+  const bool triplanar = a.words.uv == "triplanar";
+  for (const auto& [word, layer] : layers) {
+    if (layer->path.empty())
+      continue;
+    const bool structure = layer == &a.structure;
+    if (layer->solid || (triplanar && !layer->options.sphere)) {
+      drawing.rest = true;
+      drawing.rest_normals = drawing.rest_normals || !layer->solid || structure;
+      drawing.rest_light = drawing.rest_light || structure;
+      a.look.rest.triplanar = a.look.rest.triplanar || !layer->solid;
+      continue;
+    }
+    (layer->options.sphere ? drawing.sphere : drawing.texcoords) = true;
+    drawing.structure = structure;
+    drawing.texcoords = drawing.texcoords || structure;
+  }
+}
+
 void complete_textures(RenderArguments& a) {
   const Layers layers = layers_of(a);
   for_layers(layers, "--filter", a.words.filter, [](TextureOptions& o, const std::string& w) {
@@ -73,12 +116,8 @@ void complete_textures(RenderArguments& a) {
   if (a.words.sphere != "none")
     for (const std::string& name : words_of(a.words.sphere))
       layer_of(layers, "--sphere", name).options.sphere = true;
-  a.drawing.structure = !a.structure.path.empty();
-  a.drawing.texcoords = a.drawing.structure;
-  for (const auto& [word, layer] : layers)
-    if (!layer->path.empty()) {
-      (layer->options.sphere ? a.drawing.sphere : a.drawing.texcoords) = true;
-    }
+  complete_solids(layers);
+  complete_drawing(a, layers);
 }
 
 void complete_modes(RenderArguments& a) {
@@ -92,14 +131,24 @@ void complete_modes(RenderArguments& a) {
          "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
   if (a.words.tbn != "auto")
     a.picture.per_pixel = a.words.tbn == "pixel";
+  refuse(a.words.tbn == "vertex" && a.drawing.rest_light,
+         "--tbn vertex for --uv triplanar or a solid structure, expected pixel or auto");
   refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
          "--tbn pixel for fixed functions, expected --passes shader");
+  constexpr const char* fixed =
+      " for --uv triplanar or a solid texture, expected shader or cpu (--passes shader, --backend "
+      "cpu)";
+  refuse(a.drawing.rest && a.picture.backend == Backend::gl &&
+             a.picture.gl.mode != GlMode::shader && a.words.compare.empty(),
+         "--passes " + a.words.passes + fixed);
   if (a.words.compare.empty())
     return;
   a.compare = words_of(a.words.compare);
   for (const std::string& mode : a.compare)
     refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
+  for (const std::string& mode : a.compare)
+    refuse(a.drawing.rest && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
 }
 
 void complete_camera(RenderArguments& a) {
@@ -123,11 +172,19 @@ void complete(RenderArguments& a) {
   complete_modes(a);
   complete_camera(a);
   complete_volume(a);
-  refuse(!a.drawing.texcoords && (a.words.uv != "auto" || a.mapping.edge),
+  const bool laid_on = a.drawing.texcoords || a.look.rest.triplanar;
+  refuse(!(laid_on || (a.drawing.rest && a.words.uv == "auto")) &&
+             (a.words.uv != "auto" || a.mapping.edge),
          "--uv or --uv-scale without texture, expected --texture or --structure");
-  refuse(a.words.uv != "auto" && a.words.uv != "box" && a.mapping.edge,
-         "--uv-scale for another mapping, expected --uv box");
-  if (a.words.uv != "auto")
+  refuse(a.words.uv != "auto" && a.words.uv != "box" && !a.drawing.rest && a.mapping.edge,
+         "--uv-scale for another mapping, expected --uv box or triplanar");
+  refuse(a.words.uv_sharpness && !a.look.rest.triplanar,
+         "--uv-sharpness for another mapping, expected --uv triplanar");
+  if (a.words.uv_sharpness)
+    a.look.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
+  refuse(a.offset_texels && a.structure.solid,
+         "--offset-texels for a solid structure, which has none, expected --offset");
+  if (a.words.uv != "auto" && a.words.uv != "triplanar")
     a.mapping.mapping = uv_mapping_from_name(a.words.uv);
   refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
   if (a.words.light_direction) {
@@ -147,11 +204,12 @@ void complete(RenderArguments& a) {
 }
 
 void declare_textures(Program& p, RenderArguments& a) {
-  p.option("--texture", a.base.path, "FILE", "colours: PNG or PNM");
-  p.option("--detail", a.detail.path, "FILE", "colours added to them");
+  p.option("--texture", a.base.path, "FILE",
+           "colours: PNG or PNM; noise[:key=value,...] or veins[:...]");
+  p.option("--detail", a.detail.path, "FILE", "colours added to them, likewise");
   p.option("--reflection", a.reflection.path, "FILE", "what a moist surface mirrors, added too");
   p.option("--structure", a.structure.path, "FILE",
-           "heights to emboss: brightness of a PNG or PNM");
+           "heights to emboss: brightness of a PNG or PNM; noise or veins");
   p.option("--sphere", a.words.sphere, "LIST",
            "textures seen as in a mirror: texture, detail, reflection, structure; none");
   p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
@@ -164,10 +222,14 @@ void declare_textures(Program& p, RenderArguments& a) {
   p.option("--color", a.look.color, "R,G,B", "factor of the colours, 0 to 1").range(0, 1);
   p.option("--background", a.look.background, "R,G,B", "0 to 1").range(0, 1);
   p.option("--uv", a.words.uv, "MAP",
-           "auto (the mesh's coordinates, else box), box, sphere, cylinder")
-      .one_of({"auto", "box", "sphere", "cylinder"});
-  p.option("--uv-scale", a.mapping.edge, "MM", "edge of the texture for box, else half the mesh")
+           "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
+      .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
+  p.option("--uv-scale", a.mapping.edge, "MM",
+           "edge of the texture for box and triplanar, else half the mesh")
       .positive();
+  p.option("--uv-sharpness", a.words.uv_sharpness, "P",
+           "of triplanar: the power that blends its projections, else 4")
+      .range(1, 64);
 }
 
 void declare_camera(Program& p, RenderArguments& a) {

@@ -17,13 +17,17 @@ Image load(const RenderLayer& layer, const Context& context) {
 /// The look with its textures; one that was not asked for is not read.
 Look look_of(const RenderArguments& a, const Context& context) {
   Look look = a.look;
-  if (!a.base.path.empty())
+  look.solid_base = a.base.solid;
+  look.solid_detail = a.detail.solid;
+  look.solid_structure = a.structure.solid;
+  const auto is_file = [](const RenderLayer& layer) { return !layer.path.empty() && !layer.solid; };
+  if (is_file(a.base))
     look.base = texture_from(load(a.base, context), a.base.options);
-  if (!a.detail.path.empty())
+  if (is_file(a.detail))
     look.detail = texture_from(load(a.detail, context), a.detail.options);
-  if (!a.reflection.path.empty())
+  if (is_file(a.reflection))
     look.reflection = texture_from(load(a.reflection, context), a.reflection.options);
-  if (!a.structure.path.empty())
+  if (is_file(a.structure))
     look.structure = texture_from(luminance(load(a.structure, context)), a.structure.options);
   return look;
 }
@@ -60,6 +64,8 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   if (a.offset_texels && look_.structure)
     drawing_.offset = {*a.offset_texels / look_.structure->width(),
                        *a.offset_texels / look_.structure->height()};
+  if (drawing_.rest)
+    place_at_rest(look_, rest_box(surfaces), a.mapping.edge);
   run_.timed("start", [&] {
     for (const PictureOptions& options : options_)
       modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});

@@ -49,6 +49,37 @@ std::array<float, 3> in_floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
+bool is_moved(const Surface& surface) {
+  return !surface.rest.empty() && surface.rest != surface.mesh.points;
+}
+
+void append_rest(Drawing& drawing, const Surface& surface, std::span<const std::uint32_t> point,
+                 const DrawingOptions& options) {
+  const TriangleMesh& mesh = surface.mesh;
+  const std::vector<Vec3>& rest = surface.rest.empty() ? mesh.points : surface.rest;
+  std::vector<Vec3> rest_normals, normals;
+  if (options.rest_normals)
+    rest_normals = is_moved(surface) ? area_normals(rest, mesh.triangles) : render_normals(mesh);
+  std::vector<DrawTurn> turns;
+  if (options.rest_light && is_moved(surface))
+    turns = rest_turns(rest, rest_normals, mesh.points, area_normals(mesh.points, mesh.triangles),
+                       mesh.triangles);
+  const std::size_t base = drawing.rests.size();
+  drawing.rests.resize(base + point.size());
+  for (std::size_t v = 0; v < point.size(); ++v) {
+    DrawRest& out = drawing.rests[base + v];
+    out.place = in_floats((rest[point[v]] - drawing.rest_origin) / drawing.rest_scale);
+    if (options.rest_normals)
+      out.normal = in_floats(rest_normals[point[v]]);
+  }
+  if (!turns.empty())
+    drawing.turns.resize(base);
+  for (std::size_t v = 0; v < point.size() && !turns.empty(); ++v)
+    drawing.turns.push_back(turns[point[v]]);
+  if (!drawing.turns.empty())
+    drawing.turns.resize(drawing.rests.size());
+}
+
 void append(Drawing& drawing, const Surface& surface, const DrawingOptions& options,
             const Context& context) {
   const TriangleMesh& mesh = surface.mesh;
@@ -100,6 +131,8 @@ void append(Drawing& drawing, const Surface& surface, const DrawingOptions& opti
                                        options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
     }
   });
+  if (options.rest)
+    append_rest(drawing, surface, vertices.point, options);
   for (Triangle t : vertices.triangles) {
     for (std::uint32_t& corner : t)
       corner += static_cast<std::uint32_t>(base);
@@ -129,6 +162,13 @@ Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& op
   drawing.offset = options.offset;
   drawing.camera = options.camera;
   drawing.camera.eye = (options.camera.eye - drawing.origin) / drawing.scale;
+  if (options.rest) {
+    const Box3 box = rest_box(surfaces);
+    drawing.rest_origin = box.min * 0.5 + box.max * 0.5;
+    const double rest_half = box.longest_side() / 2;
+    if (rest_half > 1e-300)
+      drawing.rest_scale = rest_half;
+  }
   for (const Surface& surface : surfaces)
     append(drawing, surface, options, context);
   return drawing;
@@ -139,9 +179,9 @@ double drawing_bytes(std::span<const Surface> surfaces) {
   double points = 0;
   for (const Surface& surface : surfaces)
     points += static_cast<double>(surface.mesh.points.size());
-  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, on
-  // the screen 12; corner lists, faces, indices.
-  return triangles * (3 * (88.0 + 68 + 12 + 16) + 32 + 3 * 12) + points * 64;
+  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, at
+  // rest 48, on the screen 12; corner lists, faces, indices.
+  return triangles * (3 * (88.0 + 68 + 48 + 12 + 16) + 32 + 3 * 12) + points * 160;
 }
 
 std::uint64_t triangle_count(std::span<const Surface> surfaces) {

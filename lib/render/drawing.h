@@ -5,6 +5,7 @@
 #include "base/mesh.h"
 #include "base/vec3.h"
 #include "render/camera.h"
+#include "render/rest.h"
 
 #include <array>
 #include <cstddef>
@@ -36,6 +37,10 @@ struct Drawing {
   double scale = 1; ///< > 0
   std::vector<DrawVertex> vertices;
   std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
+  std::vector<DrawRest> rests;   ///< one per vertex where asked for, else none
+  std::vector<DrawTurn> turns;   ///< likewise, where a point is not at rest
+  Vec3 rest_origin;
+  double rest_scale = 1; ///< > 0
   std::vector<Triangle> triangles;
   // What frames are used with, in coordinates of positions.
   Vec3 light; ///< place, or unit vector to it
@@ -51,11 +56,14 @@ struct Surface {
 };
 
 struct DrawingOptions {
-  bool texcoords = false; ///< a base or a structure texture is there
-  bool structure = false; ///< a structure texture is there: offsets are computed
-  bool sphere = false;    ///< a texture is sphere-mapped
-  bool per_pixel = false; ///< frames instead of offsets and places in sphere maps
-  Vec3 light;             ///< lP, mm, in the space of the mesh; or a vector to it
+  bool texcoords = false;    ///< a base or a structure texture is there
+  bool structure = false;    ///< a structure texture is there: offsets are computed
+  bool sphere = false;       ///< a texture is sphere-mapped
+  bool rest = false;         ///< places at rest: solid textures or three projections
+  bool rest_normals = false; ///< normals at rest: three projections or a solid structure
+  bool rest_light = false;   ///< turns: a structure at rest
+  bool per_pixel = false;    ///< frames instead of offsets and places in sphere maps
+  Vec3 light;                ///< lP, mm, in the space of the mesh; or a vector to it
   bool directional = false;
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1

@@ -70,13 +70,16 @@ public:
   /// Of one unit.
   void use_texcoords(int unit, std::size_t offset, int count) const;
   void use_frames() const; ///< normals; tangent and side as coordinates of unit 1
+  /// Places and normals at rest as coordinates of units 3 and 4, turns of 5 and 6 where there are
+  /// any.
+  void use_rests() const;
   void use_colors() const; ///< those of the vertices, times the look's
   void no_colors() const;
   void draw(const Context& context) const;
 
 private:
   GlNames buffers_;
-  GLuint vertices_ = 0, frames_ = 0, colors_ = 0, indices_ = 0;
+  GLuint vertices_ = 0, frames_ = 0, rests_ = 0, turns_ = 0, colors_ = 0, indices_ = 0;
   std::size_t count_;
   Vec3 color_;
 };

@@ -311,6 +311,10 @@ void GlRenderer::State::draw_shader(const Context& context) {
     geometry->use_frames();
   }
   units = 3;
+  if (!light.rests.empty()) {
+    geometry->use_rests();
+    units = light.turns.empty() ? 5 : 7;
+  }
   geometry->use_colors();
   draw_geometry(context);
   glDisableClientState(GL_NORMAL_ARRAY);
@@ -320,6 +324,9 @@ void GlRenderer::State::draw_shader(const Context& context) {
 GlRenderer::GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std::uint32_t height,
                        const GlOptions& options)
     : state_(std::make_unique<State>(gl, look, width, height, options)) {
+  if (is_at_rest(look) && options.mode != GlMode::shader)
+    throw Error("the fixed functions know neither three projections nor solid textures, expected "
+                "the shader");
   state_->load_textures();
   GLint most = 0;
   glGetIntegerv(GL_MAX_TEXTURE_UNITS, &most);
@@ -342,14 +349,22 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     return;
   s.geometry.emplace(drawing, s.look.color);
   const bool frames = !drawing.frames.empty();
-  if (s.options.mode == GlMode::shader && (!s.shader || frames == s.light.frames.empty()))
-    s.shader.emplace(s.look, frames);
+  const bool turned = !drawing.turns.empty();
+  if (is_at_rest(s.look) && drawing.rests.empty())
+    throw Error("textures on the shape at rest for a drawing without it, expected its places");
+  if (s.options.mode == GlMode::shader &&
+      (!s.shader || frames == s.light.frames.empty() || turned == s.light.turns.empty()))
+    s.shader.emplace(s.look, frames, turned);
   s.light = {};
   s.light.light = drawing.light;
   s.light.directional = drawing.directional;
   s.light.offset = drawing.offset;
   s.light.camera = drawing.camera;
+  s.light.rest_origin = drawing.rest_origin;
+  s.light.rest_scale = drawing.rest_scale;
   s.light.frames.resize(frames ? 1 : 0);
+  s.light.rests.resize(is_at_rest(s.look) ? 1 : 0);
+  s.light.turns.resize(turned ? 1 : 0);
   check_gl();
 }
 

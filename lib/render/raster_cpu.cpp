@@ -2,12 +2,14 @@
 
 #include "base/parallel.h"
 #include "render/raster_kernel_internal.h"
+#include "render/raster_rest_internal.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 // Based on: Sutherland and Hodgman, Reentrant Polygon Clipping, 1974; Molnar, Cox, Ellsworth and
@@ -292,7 +294,7 @@ private:
 };
 
 KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Look& look,
-                     const Textures& textures) {
+                     const Textures& textures, std::optional<RasterRest>& rest) {
   static_assert(sizeof(DrawVertex) == 10 * sizeof(float) && sizeof(DrawFrame) == 7 * sizeof(float));
   static_assert(sizeof(Triangle) == 3 * sizeof(std::uint32_t));
   KernelScene scene{};
@@ -305,6 +307,7 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Loo
   scene.detail = textures.at(1);
   scene.reflection = textures.at(2);
   scene.structure = textures.at(3);
+  rest.emplace(drawing, look, scene);
   for (const KernelTexture* texture : {scene.base, scene.detail, scene.reflection, scene.structure})
     if (texture != nullptr) {
       scene.sphere = scene.sphere || texture->sphere;
@@ -335,7 +338,8 @@ Image render_cpu(const Drawing& drawing, const Projection& projection, const Loo
   const Screen screen = project(drawing, viewport, context);
   const Bins bins = sorted(screen, width, height, samples, context);
   const Textures textures(look);
-  const KernelScene scene = scene_of(drawing, viewport, look, textures);
+  std::optional<RasterRest> rest;
+  const KernelScene scene = scene_of(drawing, viewport, look, textures, rest);
   const KernelScreen kernel_screen{screen.x.data(), screen.y.data(), screen.nearness.data(),
                                    screen.corners.data(), screen.shown.data()};
   const TileKernel draw_tile =
