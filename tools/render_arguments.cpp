@@ -173,8 +173,9 @@ void complete(RenderArguments& a) {
   complete_camera(a);
   complete_volume(a);
   const bool laid_on = a.drawing.texcoords || a.look.rest.triplanar;
-  refuse(!(laid_on || (a.drawing.rest && a.words.uv == "auto")) &&
-             (a.words.uv != "auto" || a.mapping.edge),
+  refuse(!laid_on && a.drawing.rest && a.words.uv != "auto",
+         "--uv for solid textures alone, which need none, expected no --uv");
+  refuse(!laid_on && !a.drawing.rest && (a.words.uv != "auto" || a.mapping.edge),
          "--uv or --uv-scale without texture, expected --texture or --structure");
   refuse(a.words.uv != "auto" && a.words.uv != "box" && !a.drawing.rest && a.mapping.edge,
          "--uv-scale for another mapping, expected --uv box or triplanar");

@@ -86,6 +86,27 @@ assert not png.info, png.info
 END
 }
 
+test_shader_and_cpu_agree_on_textures_at_rest() {
+  has_gl || skip 'no OpenGL'
+  command -v python3 >/dev/null || skip 'no python3'
+  bumps >bumps.pgm
+  cube >in.off
+  local look max many
+  for look in '--uv triplanar --texture bumps.pgm --structure bumps.pgm --uv-scale 1' \
+    '--texture veins:scale=0.7 --structure noise:scale=0.3,octaves=3'; do
+    # shellcheck disable=SC2086 # several options
+    emboss-render --backend gl $look --view iso --size 200x150 --filter linear --to ppm in.off -o gl.ppm
+    # shellcheck disable=SC2086
+    emboss-render --backend cpu $look --view iso --size 200x150 --filter linear --to ppm in.off -o cpu.ppm
+    read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+    ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max, with $look"
+  done
+  # That this can fail: another pattern.
+  emboss-render --backend cpu --texture veins:scale=0.7,seed=2 --view iso --size 200x150 --filter linear --to ppm in.off -o cpu.ppm
+  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+  ((many > 3000)) || fail 'another pattern is not seen'
+}
+
 test_what_is_not_asked_for_is_not_read() {
   cube >in.off
   bumps >bumps.pgm
