@@ -22,10 +22,11 @@ namespace gewebe {
 /// n_k(y) is the gradient noise of octave k at x = 2^k y + d_k, d_k the fractional parts of
 /// k (0.7548776662, 0.5698402910, 0.3247179572): the sum over the corners i of x's cell of
 /// fade(1 - |x - i|) · (gradient(i) · (x - i)), fade(t) = 6 t^5 - 15 t^4 + 10 t^3 along each axis.
-/// Corners count modulo 2^32. With scramble(h) = { h ^= h >> 16; h *= 0x7feb352d; h ^= h >> 15; h *= 0x846ca68b; h ^= h >> 16 } a
-/// corner has h = scramble(0x8da6b343 i_x ^ 0xd8163841 i_y ^ 0xcb1ab31f i_z ^ seed_k), seed_k =
-/// scramble(seed + 0x9e3779b9 k). Its gradient lacks x where h as a signed number is below -2^32/6,
-/// z where it is above 2^32/6, else y; bit 0 is the sign of its first, bit 1 of its second part.
+/// Corners count modulo 2^32. With scramble(h) = { h ^= h >> 16; h *= 0x7feb352d; h ^= h >> 15; h
+/// *= 0x846ca68b; h ^= h >> 16 } a corner has h = scramble(0x8da6b343 i_x ^ 0xd8163841 i_y ^
+/// 0xcb1ab31f i_z ^ seed_k), seed_k = scramble(seed + 0x9e3779b9 k). Its gradient lacks x where h
+/// as a signed number is below -2^32/6, z where it is above 2^32/6, else y; bit 0 is the sign of
+/// its first, bit 1 of its second part.
 ///
 /// Octaves fade under the footprint u, the length in mm at rest that a pixel covers in the longer
 /// one of its two directions: a_k = clamp(1.5 - 2 u_k, 0, 1), u_k = 2^k u / scale; a_k = 1 without

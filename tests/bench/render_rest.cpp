@@ -111,9 +111,9 @@ Times frame_times(const std::function<void()>& draw) {
 void report(const Scene& scene, const std::string& program, int threads, const Times& times,
             const Image& image) {
   const double error = test::compare(image, scene.picture).rms_rounded;
-  std::printf("%s,%s,%zu,%u,%d,%.3f,%.3f,%.3f,%.4g,%.1f\n", scene.name.c_str(), program.c_str(),
-              scene.drawing.triangles.size(), side, threads, times.median, times.fastest,
-              times.slowest, error, scene.covered / 1000 / times.median);
+  std::printf("%s,%s,%zu,%u,%d,%.3f,%.3f,%.3f,%.4g,RMS of 255,%.1f\n", scene.name.c_str(),
+              program.c_str(), scene.drawing.triangles.size(), side, threads, times.median,
+              times.fastest, times.slowest, error, scene.covered / 1000 / times.median);
   std::fflush(stdout);
 }
 
@@ -148,7 +148,7 @@ int main() {
   } catch (const Error& error) {
     std::fprintf(stderr, "bench_render_rest: %s\n", error.what());
   }
-  std::puts("texture,program,triangles,size,threads,median_ms,fastest_ms,slowest_ms,error_rms,"
+  std::puts("stage,program,triangles,size,threads,median_ms,fastest_ms,slowest_ms,error,measure,"
             "mpixel_per_s");
   struct Row {
     const char* name;
