@@ -51,6 +51,12 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
   stats.set("contact_error", still.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);
   stats.set("largest_jump", steps.largest_jump);
+  if (steps.cuts > 0) {
+    stats.set("cuts", steps.cuts);
+    stats.set("cut_corrections", steps.cut_corrections);
+    stats.set("cut_renewals", steps.cut_renewals);
+    stats.set("cut_factors", steps.cut_factors);
+  }
   stats.set("digest", counts.digest);
   if (report.rate > 0) {
     stats.set("rate", report.rate);

@@ -234,6 +234,9 @@ private:
     m.materials = model_.materials;
     const std::size_t count = model_.nodes.size() + copies_.size();
     result_.origin.reserve(count);
+    result_.place.reserve(model_.nodes.size());
+    m.nodes.reserve(count);
+    m.normals.reserve(model_.normals.empty() ? 0 : count);
     for (std::uint32_t i = 0; i < surface_; ++i)
       result_.origin.push_back(i);
     result_.origin.insert(result_.origin.end(), copies_.begin(), copies_.end());
@@ -273,16 +276,15 @@ private:
 
   // ---- springs
 
+  /// Springs that keep their ends keep their order; others are put among them in the end.
   void add(const Spring& from, const Pair& ends, double part) {
     Spring s = from;
     s.i = std::min(ends[0], ends[1]);
     s.j = std::max(ends[0], ends[1]);
     s.stiffness *= part;
     s.damping *= part;
-    const auto is_copy = [&](std::uint32_t i) {
-      return i >= surface_ && i < surface_ + copies_.size();
-    };
-    (is_copy(s.i) || is_copy(s.j) ? fresh_ : result_.model.springs).push_back(s);
+    const bool same = s.i == number(from.i) && s.j == number(from.j);
+    (same ? result_.model.springs : moved_).push_back(s);
   }
 
   /// A spring in parts, whose weights are not negative; it is gone if there is none.
@@ -325,6 +327,10 @@ private:
         bend_spring(spring, *across);
       } else {
         const Pair ends{spring.i, spring.j};
+        if (touched_[spring.i] == 0 && touched_[spring.j] == 0) { // nothing changed beside it
+          add(spring, ends, 1);
+          continue;
+        }
         while (edge < edges_.size() && edges_.ends[edge] < ends)
           ++edge;
         const bool beside = edge < edges_.size() && edges_.ends[edge] == ends;
@@ -332,15 +338,14 @@ private:
           free_spring(spring);
       }
     }
-    // Those without a copy are in order: nodes keep theirs.
     const auto before = [](const Spring& a, const Spring& b) {
       return std::tie(a.kind, a.i, a.j) < std::tie(b.kind, b.i, b.j);
     };
-    std::sort(fresh_.begin(), fresh_.end(), before);
     std::vector<Spring>& all = result_.model.springs;
-    const auto middle = static_cast<std::ptrdiff_t>(all.size());
-    all.insert(all.end(), fresh_.begin(), fresh_.end());
-    std::inplace_merge(all.begin(), all.begin() + middle, all.end(), before);
+    std::sort(moved_.begin(), moved_.end(), before);
+    const auto kept = static_cast<std::ptrdiff_t>(all.size());
+    all.insert(all.end(), moved_.begin(), moved_.end());
+    std::inplace_merge(all.begin(), all.begin() + kept, all.end(), before);
   }
 
   /// The ends of an edge as a triangle beside it has them.
@@ -467,6 +472,8 @@ private:
   // ---- faces
 
   void triangles() {
+    result_.model.triangles.reserve(model_.triangles.size());
+    result_.model.texcoords.reserve(model_.texcoords.size());
     for (std::size_t t = 0; t < model_.triangles.size(); ++t) {
       if (vanished_[t] != 0)
         continue;
@@ -544,7 +551,7 @@ private:
   std::vector<std::uint32_t> node_at_;               ///< by corner: its node now
   std::map<std::uint32_t, std::vector<Piece>> fans_; ///< of doubled nodes, what keeps it first
   std::vector<std::uint32_t> copies_;                ///< of which node
-  std::vector<Spring> fresh_;                        ///< that join copies
+  std::vector<Spring> moved_;                        ///< with ends that they had not before
   CutModel result_;
 };
 
