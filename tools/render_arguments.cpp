@@ -2,6 +2,7 @@
 
 #include "render/color_ramp.h"
 #include "tools/render_camera.h"
+#include "tools/render_layer.h"
 #include "tools/render_materials.h"
 #include "tools/render_volume.h"
 
@@ -73,12 +74,8 @@ void complete_textures(RenderArguments& a) {
   if (a.words.sphere != "none")
     for (const std::string& name : words_of(a.words.sphere))
       layer_of(layers, "--sphere", name).options.sphere = true;
-  a.drawing.structure = !a.structure.path.empty();
-  a.drawing.texcoords = a.drawing.structure;
   for (const auto& [word, layer] : layers)
-    if (!layer->path.empty()) {
-      (layer->options.sphere ? a.drawing.sphere : a.drawing.texcoords) = true;
-    }
+    complete_layer(a, word, *layer);
 }
 
 void complete_modes(RenderArguments& a) {
@@ -92,14 +89,24 @@ void complete_modes(RenderArguments& a) {
          "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
   if (a.words.tbn != "auto")
     a.picture.per_pixel = a.words.tbn == "pixel";
+  refuse(a.words.tbn == "vertex" && a.drawing.rest_light,
+         "--tbn vertex for --uv triplanar or a solid structure, expected pixel or auto");
   refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
          "--tbn pixel for fixed functions, expected --passes shader");
+  constexpr const char* fixed =
+      " for --uv triplanar or a solid texture, expected shader or cpu (--passes shader, --backend "
+      "cpu)";
+  refuse(a.drawing.rest && a.picture.backend == Backend::gl &&
+             a.picture.gl.mode != GlMode::shader && a.words.compare.empty(),
+         "--passes " + a.words.passes + fixed);
   if (a.words.compare.empty())
     return;
   a.compare = words_of(a.words.compare);
   for (const std::string& mode : a.compare)
     refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
+  for (const std::string& mode : a.compare)
+    refuse(a.drawing.rest && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
 }
 
 void complete(RenderArguments& a) {
@@ -108,11 +115,20 @@ void complete(RenderArguments& a) {
   complete_modes(a);
   complete_camera(a);
   complete_volume(a);
-  refuse(!a.drawing.texcoords && (a.words.uv != "auto" || a.mapping.edge),
+  const bool laid_on = a.drawing.texcoords || a.look.rest.triplanar;
+  refuse(!laid_on && a.drawing.rest && a.words.uv != "auto",
+         "--uv for solid textures alone, which need none, expected no --uv");
+  refuse(!laid_on && !a.drawing.rest && (a.words.uv != "auto" || a.mapping.edge),
          "--uv or --uv-scale without texture, expected --texture or --structure");
-  refuse(a.words.uv != "auto" && a.words.uv != "box" && a.mapping.edge,
-         "--uv-scale for another mapping, expected --uv box");
-  if (a.words.uv != "auto")
+  refuse(a.words.uv != "auto" && a.words.uv != "box" && !a.drawing.rest && a.mapping.edge,
+         "--uv-scale for another mapping, expected --uv box or triplanar");
+  refuse(a.words.uv_sharpness && !a.look.rest.triplanar,
+         "--uv-sharpness for another mapping, expected --uv triplanar");
+  if (a.words.uv_sharpness)
+    a.look.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
+  refuse(a.offset_texels && has_solid_structure(a),
+         "--offset-texels for a solid structure, which has none, expected --offset");
+  if (a.words.uv != "auto" && a.words.uv != "triplanar")
     a.mapping.mapping = uv_mapping_from_name(a.words.uv);
   refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
   if (a.words.light_direction) {
@@ -137,14 +153,15 @@ void declare_textures(Program& p, RenderArguments& a) {
   const auto path_of = [&a](RenderLayer RenderMaterial::*layer) {
     return [&a, layer](std::int32_t n) -> std::string& { return (a.materials[n].*layer).path; };
   };
-  p.option("--texture", a.base.path, "[N=]FILE", "colours: PNG or PNM; N=: of material N")
+  p.option("--texture", a.base.path, "[N=]FILE",
+           "colours: PNG or PNM, noise[:key=value,...] or veins[:...]; N=: of material N")
       .numbered(path_of(&RenderMaterial::base));
-  p.option("--detail", a.detail.path, "[N=]FILE", "colours added to them")
+  p.option("--detail", a.detail.path, "[N=]FILE", "colours added to them, likewise")
       .numbered(path_of(&RenderMaterial::detail));
   p.option("--reflection", a.reflection.path, "[N=]FILE", "what a moist surface mirrors, added too")
       .numbered(path_of(&RenderMaterial::reflection));
   p.option("--structure", a.structure.path, "[N=]FILE",
-           "heights to emboss: brightness of a PNG or PNM")
+           "heights to emboss: brightness of a PNG or PNM; noise or veins")
       .numbered(path_of(&RenderMaterial::structure));
   p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
       .one_of(group_by_names());
@@ -162,10 +179,14 @@ void declare_textures(Program& p, RenderArguments& a) {
       .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
   p.option("--background", a.look.background, "R,G,B", "0 to 1").range(0, 1);
   p.option("--uv", a.words.uv, "MAP",
-           "auto (the mesh's coordinates, else box), box, sphere, cylinder")
-      .one_of({"auto", "box", "sphere", "cylinder"});
-  p.option("--uv-scale", a.mapping.edge, "MM", "edge of the texture for box, else half the mesh")
+           "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
+      .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
+  p.option("--uv-scale", a.mapping.edge, "MM",
+           "edge of the texture for box and triplanar, else half the mesh")
       .positive();
+  p.option("--uv-sharpness", a.words.uv_sharpness, "P",
+           "of triplanar: the power that blends its projections, else 4")
+      .range(1, 64);
 }
 
 } // namespace

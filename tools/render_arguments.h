@@ -21,7 +21,8 @@ namespace gewebe::cli {
 
 /// One of the four textures.
 struct RenderLayer {
-  std::string path; ///< "": absent
+  std::string path;                  ///< "": absent
+  std::optional<SolidTexture> solid; ///< instead of a file
   TextureOptions options;
 };
 
@@ -65,6 +66,7 @@ struct RenderArguments {
     std::vector<double> orbit{0, 0};
     std::int64_t supersample = 1, msaa = 1, rgb_scale = 2;
     std::optional<Vec3> light_direction;
+    std::optional<std::int64_t> uv_sharpness;
   } words;
 };
 

@@ -1,7 +1,8 @@
 #include "tools/render_materials.h"
 
-#include "formats/image_file.h"
+#include "tools/render_layer.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -11,6 +12,7 @@ namespace {
 constexpr std::array<RenderLayer RenderMaterial::*, 4> layers{
     &RenderMaterial::base, &RenderMaterial::detail, &RenderMaterial::reflection,
     &RenderMaterial::structure};
+constexpr std::array<const char*, 4> words{"texture", "detail", "reflection", "structure"};
 
 } // namespace
 
@@ -21,16 +23,19 @@ void complete_materials(RenderArguments& a) {
   a.drawing.group_by = group_by_from_name(a.words.by);
   for (auto& [number, material] : a.materials) {
     a.drawing.groups.push_back(number);
-    const std::array<const RenderLayer*, 4> of_all{&a.base, &a.detail, &a.reflection, &a.structure};
+    const RenderLayers of_all{&a.base, &a.detail, &a.reflection, &a.structure};
     for (std::size_t n = 0; n < layers.size(); ++n) {
       RenderLayer& layer = material.*layers[n];
       layer.options = of_all[n]->options;
-      if (!layer.path.empty())
-        (layer.options.sphere ? a.drawing.sphere : a.drawing.texcoords) = true;
+      complete_layer(a, words[n], layer);
     }
-    if (!material.structure.path.empty())
-      a.drawing.structure = a.drawing.texcoords = true;
   }
+}
+
+bool has_solid_structure(const RenderArguments& a) {
+  return a.structure.solid || std::ranges::any_of(a.materials, [](const auto& material) {
+           return material.second.structure.solid.has_value();
+         });
 }
 
 std::vector<std::string> material_paths(const RenderArguments& a) {
@@ -46,19 +51,9 @@ void add_material_looks(Look& look, const RenderArguments& a, const Context& con
   std::vector<Look> others;
   for (const auto& [number, material] : a.materials) {
     Look& own = others.emplace_back(look);
-    const auto read = [&](const RenderLayer& layer, std::optional<Texture>& texture) {
-      if (layer.path.empty())
-        return;
-      Input input(layer.path);
-      texture = texture_from(read_image(input, context), layer.options);
-    };
-    read(material.base, own.base);
-    read(material.detail, own.detail);
-    read(material.reflection, own.reflection);
-    if (!material.structure.path.empty()) {
-      Input input(material.structure.path);
-      own.structure = texture_from(read_heights(input, context), material.structure.options);
-    }
+    take_textures(own,
+                  {&material.base, &material.detail, &material.reflection, &material.structure},
+                  context);
     own.color = material.color.value_or(look.color);
   }
   look.others = std::move(others);

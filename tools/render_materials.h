@@ -12,6 +12,9 @@ namespace gewebe::cli {
 /// \throw UsageError
 void complete_materials(RenderArguments& arguments);
 
+/// Whether the structure of some material, or of all, is solid.
+bool has_solid_structure(const RenderArguments& arguments);
+
 /// Their files.
 std::vector<std::string> material_paths(const RenderArguments& arguments);
 

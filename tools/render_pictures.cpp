@@ -1,8 +1,8 @@
 #include "tools/render_pictures.h"
 
-#include "formats/image_file.h"
 #include "render/angles.h"
 #include "render/style.h"
+#include "tools/render_layer.h"
 #include "tools/render_materials.h"
 
 #include <algorithm>
@@ -12,24 +12,10 @@
 namespace gewebe::cli {
 namespace {
 
-Image load(const RenderLayer& layer, const Context& context) {
-  Input input(layer.path);
-  return read_image(input, context);
-}
-
 /// The look with its textures; one that was not asked for is not read.
 Look look_of(const RenderArguments& a, const Context& context) {
   Look look = a.look;
-  if (!a.base.path.empty())
-    look.base = texture_from(load(a.base, context), a.base.options);
-  if (!a.detail.path.empty())
-    look.detail = texture_from(load(a.detail, context), a.detail.options);
-  if (!a.reflection.path.empty())
-    look.reflection = texture_from(load(a.reflection, context), a.reflection.options);
-  if (!a.structure.path.empty()) {
-    Input input(a.structure.path);
-    look.structure = texture_from(read_heights(input, context), a.structure.options);
-  }
+  take_textures(look, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
   add_material_looks(look, a, context);
   return look;
 }
@@ -78,6 +64,8 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
       a.offset_texels && look.structure)
     drawing_.offset = {*a.offset_texels / look.structure->width(),
                        *a.offset_texels / look.structure->height()};
+  if (drawing_.rest)
+    place_at_rest(look_, box_, a.mapping.edge);
   run_.timed("start", [&] {
     for (const PictureOptions& options : options_)
       modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});
@@ -148,9 +136,10 @@ std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool 
     surfaces_ = styled(std::move(surfaces));
     return DrawingChange::all;
   }
-  if (each([](const Surface& kept, const Surface& now) {
+  if (each([&](const Surface& kept, const Surface& now) {
         return kept.mesh.points == now.mesh.points && kept.mesh.normals == now.mesh.normals &&
-               kept.mesh.triangles == now.mesh.triangles;
+               kept.mesh.triangles == now.mesh.triangles &&
+               (!drawing_.rest || kept.rest == now.rest);
       }))
     return placed ? std::optional(DrawingChange::view) : std::nullopt;
   const bool coordinates = !arguments_.mapping.mapping; // else they are made here

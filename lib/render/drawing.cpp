@@ -50,11 +50,27 @@ std::array<float, 3> in_floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
+bool is_moved(const Surface& surface) {
+  return !surface.rest.empty() && surface.rest != surface.mesh.points;
+}
+
+/// Normals at rest, which stand still while the points move.
+void prepare_rest(DrawingParts& kept, const Surface& surface, const DrawingOptions& options,
+                  DrawingChange change) {
+  const bool moved = is_moved(surface);
+  if (options.rest_normals && !(change == DrawingChange::points && moved && kept.moved))
+    kept.rest_normals =
+        moved ? area_normals(surface.rest, surface.mesh.triangles) : render_normals(surface.mesh);
+  kept.moved = moved;
+}
+
 /// Renews what of `kept` `change` leaves no longer true.
 void prepare(DrawingParts& kept, const Surface& surface, const DrawingOptions& options,
              DrawingChange change, DrawingCounts& counts, const Context& context) {
   if (change == DrawingChange::view)
     return;
+  if (options.rest)
+    prepare_rest(kept, surface, options, change);
   const TriangleMesh& mesh = surface.mesh;
   if (options.structure || options.sphere || options.shade > 0)
     kept.normals = render_normals(mesh);
@@ -116,6 +132,37 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
                                        options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
     }
   });
+}
+
+/// Places and normals at rest of the vertices appended last.
+void append_rests(Drawing& drawing, const Surface& surface, const DrawingParts& parts) {
+  const std::vector<Vec3>& rest = surface.rest.empty() ? surface.mesh.points : surface.rest;
+  const std::vector<std::uint32_t>& point = parts.vertices.point;
+  const std::size_t base = drawing.vertices.size() - point.size();
+  drawing.rests.resize(drawing.vertices.size());
+  for (std::size_t v = 0; v < point.size(); ++v) {
+    const std::uint32_t p = point[v];
+    DrawRest& out = drawing.rests[base + v];
+    out.place = in_floats((rest[p] - drawing.rest_origin) / drawing.rest_scale);
+    if (!parts.rest_normals.empty())
+      out.normal = in_floats(parts.rest_normals[p]);
+  }
+}
+
+/// Their turns, none while no surface has moved.
+void append_turns(Drawing& drawing, const Surface& surface, const DrawingParts& parts) {
+  const TriangleMesh& mesh = surface.mesh;
+  const std::vector<std::uint32_t>& point = parts.vertices.point;
+  if (parts.moved) {
+    const std::vector<DrawTurn> turns =
+        rest_turns(surface.rest, parts.rest_normals, mesh.points,
+                   area_normals(mesh.points, mesh.triangles), mesh.triangles);
+    drawing.turns.resize(drawing.vertices.size() - point.size());
+    for (const std::uint32_t p : point)
+      drawing.turns.push_back(turns[p]);
+  } else if (!drawing.turns.empty()) {
+    drawing.turns.resize(drawing.vertices.size());
+  }
 }
 
 /// Those of the vertices appended last.
@@ -190,6 +237,10 @@ const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const Drawi
     drawing.triangles = std::move(drawing_.triangles);
     drawing.group_start = std::move(drawing_.group_start);
   }
+  if (change == DrawingChange::view) {
+    drawing.rests = std::move(drawing_.rests);
+    drawing.turns = std::move(drawing_.turns);
+  }
   drawing_ = {};
   for (const Surface& surface : surfaces)
     for (const Vec3& p : surface.mesh.points)
@@ -205,11 +256,23 @@ const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const Drawi
   if (half > 1e-300)
     drawing.scale = half;
   set_view(drawing, options);
+  if (options.rest) {
+    const Box3 rest = rest_box(surfaces);
+    drawing.rest_origin = rest.min * 0.5 + rest.max * 0.5;
+    const double rest_half = rest.longest_side() / 2;
+    if (rest_half > 1e-300)
+      drawing.rest_scale = rest_half;
+  }
   parts_.resize(surfaces.size());
   const bool sorted = change != DrawingChange::all;
   for (std::size_t n = 0; n < surfaces.size(); ++n) {
     prepare(parts_[n], surfaces[n], options, change, counts_, context);
     append(drawing, surfaces[n], parts_[n], options, context);
+    if (options.rest && change != DrawingChange::view) {
+      append_rests(drawing, surfaces[n], parts_[n]);
+      if (options.rest_light)
+        append_turns(drawing, surfaces[n], parts_[n]);
+    }
     if (!sorted)
       append_triangles(drawing, parts_[n].vertices);
   }
@@ -244,9 +307,9 @@ double drawing_bytes(std::span<const Surface> surfaces) {
   double points = 0;
   for (const Surface& surface : surfaces)
     points += static_cast<double>(surface.mesh.points.size());
-  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, on
-  // the screen 12; corner lists, faces, groups, indices.
-  return triangles * (3 * (88.0 + 68 + 12 + 16) + 32 + 20 + 3 * 12) + points * 64;
+  // Worst case three vertices a triangle: while split 88 bytes of its frame, drawn 40 and 28, at
+  // rest 48, on the screen 12; corner lists, faces, groups, indices.
+  return triangles * (3 * (88.0 + 68 + 48 + 12 + 16) + 32 + 20 + 3 * 12) + points * 160;
 }
 
 std::uint64_t triangle_count(std::span<const Surface> surfaces) {

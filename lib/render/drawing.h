@@ -5,6 +5,7 @@
 #include "base/mesh.h"
 #include "base/vec3.h"
 #include "render/camera.h"
+#include "render/rest.h"
 #include "render/tangents.h"
 
 #include <array>
@@ -40,6 +41,10 @@ struct Drawing {
   double scale = 1; ///< > 0
   std::vector<DrawVertex> vertices;
   std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
+  std::vector<DrawRest> rests;   ///< one per vertex where asked for, else none
+  std::vector<DrawTurn> turns;   ///< likewise, where a point is not at rest
+  Vec3 rest_origin;
+  double rest_scale = 1; ///< > 0
   std::vector<Triangle> triangles;
   /// Where the triangles of groups 1, 2, … begin, which have looks of their own; group 0 comes
   /// first.
@@ -73,11 +78,14 @@ const std::vector<std::string>& group_by_names();
 GroupBy group_by_from_name(std::string_view name);
 
 struct DrawingOptions {
-  bool texcoords = false; ///< a base or a structure texture is there
-  bool structure = false; ///< a structure texture is there: offsets are computed
-  bool sphere = false;    ///< a texture is sphere-mapped
-  bool per_pixel = false; ///< frames instead of offsets and places in sphere maps
-  Vec3 light;             ///< lP, mm, in the space of the mesh; or a vector to it
+  bool texcoords = false;    ///< a base or a structure texture is there
+  bool structure = false;    ///< a structure texture is there: offsets are computed
+  bool sphere = false;       ///< a texture is sphere-mapped
+  bool rest = false;         ///< places at rest: solid textures or three projections
+  bool rest_normals = false; ///< normals at rest: three projections or a solid structure
+  bool rest_light = false;   ///< turns: a structure at rest
+  bool per_pixel = false;    ///< frames instead of offsets and places in sphere maps
+  Vec3 light;                ///< lP, mm, in the space of the mesh; or a vector to it
   bool directional = false;
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
@@ -114,10 +122,13 @@ struct DrawingCounts {
 struct DrawingParts {
   TexturedVertices vertices;
   std::vector<Vec3> normals;
+  std::vector<Vec3> rest_normals; ///< where places at rest are asked for
+  bool moved = false;             ///< whether its points are not at rest
 };
 
-/// Makes the drawings of a sequence: vertices are split once, frames are renewed where the points
-/// move, and a change of view leaves all that doesn't depend on it.
+/// Makes the drawings of a sequence: vertices are split once and keep their normals at rest, frames
+/// and turns are renewed where the points move, and a change of view leaves all that doesn't depend
+/// on it.
 class DrawingMaker {
 public:
   /// As make_drawing, with the same values. \pre the first call is with DrawingChange::all, later

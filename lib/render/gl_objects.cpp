@@ -181,6 +181,12 @@ GlGeometry::GlGeometry(const Drawing& drawing, const Look& look) : buffers_(dele
   if (!drawing.frames.empty())
     frames_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.frames.data(),
                          drawing.frames.size() * sizeof(DrawFrame));
+  if (!drawing.rests.empty())
+    rests_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.rests.data(),
+                        drawing.rests.size() * sizeof(DrawRest));
+  if (!drawing.turns.empty())
+    turns_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.turns.data(),
+                        drawing.turns.size() * sizeof(DrawTurn));
   if (std::ranges::any_of(drawing.vertices, [](const DrawVertex& v) { return v.shade != 1.0F; }))
     for (std::size_t g = 0; g < group_count(drawing); ++g) {
       const Vec3& color = look_of_group(look, g).color;
@@ -216,6 +222,22 @@ void GlGeometry::use_frames() const {
   glClientActiveTexture(GL_TEXTURE1);
   glEnableClientState(GL_TEXTURE_COORD_ARRAY);
   glTexCoordPointer(4, GL_FLOAT, sizeof(DrawFrame), at(offsetof(DrawFrame, tangent)));
+}
+
+void GlGeometry::use_rests() const {
+  const auto use = [](GLenum unit, GLsizei stride, std::size_t offset) {
+    glClientActiveTexture(GL_TEXTURE0 + unit);
+    glEnableClientState(GL_TEXTURE_COORD_ARRAY);
+    glTexCoordPointer(3, GL_FLOAT, stride, at(offset));
+  };
+  glBindBuffer(GL_ARRAY_BUFFER, rests_);
+  use(3, sizeof(DrawRest), offsetof(DrawRest, place));
+  use(4, sizeof(DrawRest), offsetof(DrawRest, normal));
+  if (turns_ == 0)
+    return;
+  glBindBuffer(GL_ARRAY_BUFFER, turns_);
+  use(5, sizeof(DrawTurn), offsetof(DrawTurn, x));
+  use(6, sizeof(DrawTurn), offsetof(DrawTurn, y));
 }
 
 void GlGeometry::use_colors(const Look& look) const {

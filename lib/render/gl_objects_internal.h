@@ -71,14 +71,17 @@ public:
   GlGeometry(const Drawing& drawing, const Look& look);
   /// Of one unit.
   void use_texcoords(int unit, std::size_t offset, int count) const;
-  void use_frames() const;                 ///< normals; tangent and side as coordinates of unit 1
+  void use_frames() const; ///< normals; tangent and side as coordinates of unit 1
+  /// Places and normals at rest as coordinates of units 3 and 4, turns of 5 and 6 where there are
+  /// any.
+  void use_rests() const;
   void use_colors(const Look& look) const; ///< those of the vertices, times the look's
   void no_colors() const;
   void draw(std::size_t first, std::size_t count, const Context& context) const; ///< triangles
 
 private:
   GlNames buffers_;
-  GLuint vertices_ = 0, frames_ = 0, indices_ = 0;
+  GLuint vertices_ = 0, frames_ = 0, rests_ = 0, turns_ = 0, indices_ = 0;
   std::vector<std::pair<Vec3, GLuint>> colors_; ///< where vertices are shaded, by the look's colour
 };
 

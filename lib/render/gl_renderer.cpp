@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 // Based on: report FZKA 7190, 2006, section 3.2.4, render-pass-3, -2 and -1.
@@ -48,12 +49,12 @@ void combine(GLenum target, GLenum function, std::initializer_list<Source> sourc
   }
 }
 
-/// What GlShader makes a difference of.
-unsigned shader_kind(const Look& look) {
+/// What the program of a GlShader depends on, besides the drawing.
+std::string shader_kind(const Look& look) {
   unsigned kind = 0;
   for (const auto* texture : {&look.base, &look.detail, &look.reflection, &look.structure})
     kind = 4 * kind + (*texture ? ((*texture)->options.sphere ? 3U : 1U) : 0U);
-  return kind;
+  return std::to_string(kind) + (is_at_rest(look) ? rest_definitions(look) : "");
 }
 
 // At most so many passes blend into one group.
@@ -125,10 +126,10 @@ struct GlRenderer::State {
   std::vector<Group> groups;
   const Group* now = nullptr; ///< the group that is drawn
   std::optional<GlGeometry> geometry;
-  std::map<unsigned, GlShader> shaders; ///< by shader_kind
-  Drawing light;                        ///< without its vertices
-  int units = 0;                        ///< in use
-  int blended = 0;                      ///< what the stencil holds where the next pass may blend
+  std::map<std::string, GlShader> shaders; ///< by shader_kind
+  Drawing light;                           ///< without its vertices
+  int units = 0;                           ///< in use
+  int blended = 0;                         ///< what the stencil holds where the next pass may blend
   int passes = 0;
 };
 
@@ -340,7 +341,7 @@ void GlRenderer::State::draw_one(const Context& context) {
 }
 
 void GlRenderer::State::draw_shader(const Context& context) {
-  shaders.at(shader_kind(*now->look)).use(light);
+  shaders.at(shader_kind(*now->look)).use(light, *now->look);
   const auto bind = [&](GlUnit unit, GLuint texture) {
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     glBindTexture(GL_TEXTURE_2D, texture);
@@ -357,6 +358,11 @@ void GlRenderer::State::draw_shader(const Context& context) {
     geometry->use_frames();
   }
   units = 3;
+  units = 3;
+  if (is_at_rest(*now->look)) {
+    geometry->use_rests();
+    units = light.turns.empty() ? 5 : 7;
+  }
   geometry->use_colors(*now->look);
   draw_geometry(context);
   glDisableClientState(GL_NORMAL_ARRAY);
@@ -404,6 +410,10 @@ void GlRenderer::State::draw_group(const Context& context) {
 GlRenderer::GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std::uint32_t height,
                        const GlOptions& options)
     : state_(std::make_unique<State>(gl, look, width, height, options)) {
+  for (std::size_t g = 0; g <= look.others.size(); ++g)
+    if (is_at_rest(look_of_group(look, g)) && options.mode != GlMode::shader)
+      throw Error("the fixed functions know neither three projections nor solid textures, expected "
+                  "the shader");
   state_->load_textures();
   GLint most = 0;
   glGetIntegerv(GL_MAX_TEXTURE_UNITS, &most);
@@ -429,7 +439,8 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     return;
   s.geometry.emplace(drawing, s.look);
   const bool frames = !drawing.frames.empty();
-  if (frames == s.light.frames.empty())
+  const bool turned = !drawing.turns.empty();
+  if (frames == s.light.frames.empty() || turned == s.light.turns.empty())
     s.shaders.clear();
   for (std::size_t g = 0; g < s.groups.size(); ++g) {
     State::Group& group = s.groups[g];
@@ -437,10 +448,17 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     const auto triangles = there ? triangles_of_group(drawing, g) : std::span<const Triangle>{};
     group.first = there ? static_cast<std::size_t>(triangles.data() - drawing.triangles.data()) : 0;
     group.count = triangles.size();
-    if (s.options.mode == GlMode::shader && group.count > 0)
-      s.shaders.try_emplace(shader_kind(*group.look), *group.look, frames);
+    if (group.count == 0)
+      continue;
+    if (is_at_rest(*group.look) && drawing.rests.empty())
+      throw Error("textures on the shape at rest for a drawing without it, expected its places");
+    if (s.options.mode == GlMode::shader)
+      s.shaders.try_emplace(shader_kind(*group.look), *group.look, frames, turned);
   }
   s.light.frames.resize(frames ? 1 : 0);
+  s.light.turns.resize(turned ? 1 : 0);
+  s.light.rest_origin = drawing.rest_origin;
+  s.light.rest_scale = drawing.rest_scale;
   set_light(drawing);
   check_gl();
 }

@@ -19,6 +19,12 @@ varying vec4 tangent;
 #else
 varying vec2 shifted, mirrored;
 #endif
+#ifdef REST
+varying vec3 rest_place, rest_normal, now_place;
+#endif
+#ifdef TURNED
+varying vec3 turned_x, turned_y;
+#endif
 void main() {
   gl_Position = gl_ModelViewProjectionMatrix * gl_Vertex;
   st = gl_MultiTexCoord0.xy;
@@ -31,12 +37,29 @@ void main() {
   shifted = gl_MultiTexCoord1.xy;
   mirrored = gl_MultiTexCoord2.xy;
 #endif
+#ifdef REST
+  rest_place = gl_MultiTexCoord3.xyz;
+  rest_normal = gl_MultiTexCoord4.xyz;
+  now_place = gl_Vertex.xyz;
+#endif
+#ifdef TURNED
+  turned_x = gl_MultiTexCoord5.xyz;
+  turned_y = gl_MultiTexCoord6.xyz;
+#endif
 })";
 
-constexpr const char* fragment_source = R"(
+// Before what textures at rest need.
+constexpr const char* fragment_head = R"(
 uniform sampler2D base, detail, reflection, structure;
 uniform vec4 light; // w: 0 for a direction
 uniform vec2 offset;
+vec3 unit(vec3 v) {
+  float l = length(v);
+  return l > 0.0 ? v / l : vec3(0.0);
+}
+)";
+
+constexpr const char* fragment_source = R"(
 uniform vec3 eye, right, up, back;
 varying vec2 st;
 varying vec4 primary;
@@ -46,10 +69,6 @@ varying vec4 tangent;
 #else
 varying vec2 shifted, mirrored;
 #endif
-vec3 unit(vec3 v) {
-  float l = length(v);
-  return l > 0.0 ? v / l : vec3(0.0);
-}
 void main() {
   vec2 shift = vec2(0.0), around = vec2(0.0);
 #ifdef FRAMES
@@ -71,14 +90,29 @@ void main() {
   around = mirrored;
 #endif
   vec3 c = primary.rgb;
+#ifdef REST
+  find_rest();
+#endif
 #ifdef BASE
   c *= texture2D(base, BASE).rgb;
+#endif
+#ifdef REST_BASE
+  c *= rest_base();
 #endif
 #ifdef DETAIL
   c = min(c + texture2D(detail, DETAIL).rgb, 1.0);
 #endif
+#ifdef REST_DETAIL
+  c = min(c + rest_detail(), 1.0);
+#endif
 #ifdef REFLECTION
   c = min(c + texture2D(reflection, REFLECTION).rgb, 1.0);
+#endif
+#ifdef REST_REFLECTION
+  c = min(c + rest_reflection(), 1.0);
+#endif
+#ifdef REST_STRUCTURE
+  c = min(2.0 * rest_relief() * c, 1.0);
 #endif
 #ifdef STRUCTURE
   float relief = 0.5 + 0.5 * (texture2D(structure, STRUCTURE).r - texture2D(structure, STRUCTURE + shift).r);
@@ -101,7 +135,8 @@ GLuint compiled(GLenum kind, const std::string& source) {
   glDeleteShader(shader);
   std::string line(log.data());
   line.resize(std::min(line.find('\n'), line.size()));
-  throw Error("OpenGL can't compile the shader (" + line + "), expected GLSL 1.20");
+  throw Error("OpenGL can't compile the shader (" + line +
+              "), expected GLSL 1.20, or 1.30 for textures at rest");
 }
 
 void set(GLuint program, const char* name, const Vec3& v) {
@@ -111,11 +146,13 @@ void set(GLuint program, const char* name, const Vec3& v) {
 
 } // namespace
 
-GlShader::GlShader(const Look& look, bool frames) {
-  std::string head = "#version 120\n";
+GlShader::GlShader(const Look& look, bool frames, bool turned) {
+  const bool rest = is_at_rest(look);
+  std::string head = rest ? "#version 130\n" + rest_definitions(look) : "#version 120\n";
+  head += rest && turned ? "#define TURNED\n" : "";
   bool sphere = false;
   const auto define = [&](const std::optional<Texture>& texture, const char* name) {
-    if (!texture)
+    if (!texture || is_triplanar(look, texture))
       return;
     sphere = sphere || texture->options.sphere;
     head += std::string("#define ") + name + (texture->options.sphere ? " around\n" : " st\n");
@@ -126,7 +163,8 @@ GlShader::GlShader(const Look& look, bool frames) {
   define(look.structure, "STRUCTURE");
   head += std::string(sphere ? "#define SPHERE\n" : "") + (frames ? "#define FRAMES\n" : "");
   const GLuint vertex = compiled(GL_VERTEX_SHADER, head + vertex_source);
-  const GLuint fragment = compiled(GL_FRAGMENT_SHADER, head + fragment_source);
+  const GLuint fragment = compiled(
+      GL_FRAGMENT_SHADER, head + fragment_head + (rest ? rest_source(look) : "") + fragment_source);
   program_ = glCreateProgram();
   for (const GLuint shader : {vertex, fragment}) {
     glAttachShader(program_, shader);
@@ -145,7 +183,7 @@ GlShader::~GlShader() {
   glDeleteProgram(program_);
 }
 
-void GlShader::use(const Drawing& drawing) const {
+void GlShader::use(const Drawing& drawing, const Look& look) const {
   glUseProgram(program_);
   int unit = 0;
   for (const char* name : {"base", "detail", "reflection", "structure"})
@@ -159,6 +197,8 @@ void GlShader::use(const Drawing& drawing) const {
   set(program_, "right", drawing.camera.right);
   set(program_, "up", drawing.camera.up);
   set(program_, "back", drawing.camera.back);
+  if (is_at_rest(look))
+    set_rest(program_, look, drawing);
 }
 
 } // namespace gewebe

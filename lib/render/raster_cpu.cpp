@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "render/raster_kernel_internal.h"
+#include "render/raster_rest_internal.h"
 
 #include <algorithm>
 #include <array>
@@ -9,6 +10,7 @@
 #include <cstddef>
 #include <list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -294,7 +296,7 @@ private:
 };
 
 KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Look& look,
-                     const Textures& textures) {
+                     const Textures& textures, std::optional<RasterRest>& rest) {
   static_assert(sizeof(DrawVertex) == 10 * sizeof(float) && sizeof(DrawFrame) == 7 * sizeof(float));
   static_assert(sizeof(Triangle) == 3 * sizeof(std::uint32_t));
   KernelScene scene{};
@@ -307,6 +309,7 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Loo
   scene.detail = textures.at(1);
   scene.reflection = textures.at(2);
   scene.structure = textures.at(3);
+  rest.emplace(drawing, look, scene);
   for (const KernelTexture* texture : {scene.base, scene.detail, scene.reflection, scene.structure})
     if (texture != nullptr) {
       scene.sphere = scene.sphere || texture->sphere;
@@ -334,8 +337,9 @@ std::uint32_t background_of(const Look& look) {
 /// The scene of some triangles, linked to that of the next ones.
 struct LookScene {
   LookScene(const Drawing& drawing, const Viewport& viewport, const Look& look)
-      : textures(look), scene(scene_of(drawing, viewport, look, textures)) {}
+      : textures(look), scene(scene_of(drawing, viewport, look, textures, rest)) {}
   Textures textures;
+  std::optional<RasterRest> rest;
   KernelScene scene;
 };
 

@@ -1,3 +1,4 @@
+#include "render/raster_kernel_rest_lanes_internal.h"
 #include "render/raster_kernel_tile_lanes_internal.h"
 
 namespace gewebe {

@@ -1,6 +1,8 @@
 #pragma once
 // The inner loops of our rasteriser, once per CPU level, with the same bytes on each.
 
+#include "render/solid_plan.h"
+
 #include <cstddef>
 #include <cstdint>
 
@@ -22,6 +24,25 @@ struct KernelTexture {
   int wrap; ///< 0 repeat, 1 clamp, 2 mirror
 };
 
+/// A texture on the shape at rest: an image by three projections, or a solid one, or neither.
+struct KernelRestLayer {
+  const KernelTexture* image;
+  const SolidPlan* solid;
+};
+
+/// What textures on the shape at rest need (see rest.h). Vertices at rest are 6 floats: place,
+/// normal; their turns 6: where the axes x and y went.
+struct KernelRest {
+  const float* vertices;
+  const float* turns; ///< null: nothing moved
+  KernelRestLayer base, detail, reflection, structure;
+  bool normals;         ///< some image or a structure is there
+  bool derivatives;     ///< some texture fades or shrinks
+  float scale, part[3]; ///< q = scale · place + part: coordinates of images
+  int sharpness;
+  float shift; ///< of a solid structure towards the light, in the unit of places
+};
+
 /// What shading needs of the triangles from `first` on; others have another look. Vertices are 10
 /// floats: position, s t, shifted s t, sphere s t, shade; frames 7: normal, tangent, side.
 struct KernelScene {
@@ -39,6 +60,7 @@ struct KernelScene {
   bool clamped;     ///< some texture neither repeats nor is mirrored: whole numbers count
   bool derivatives; ///< some texture shrinks by mipmaps
   float eye[3], right[3], up[3], back[3];
+  const KernelRest* rest;   ///< null where no texture needs it; such ones are absent above
   std::uint32_t background; ///< red, green, blue from the lowest byte
 };
 

@@ -282,6 +282,9 @@ struct Slots {
   alignas(32) float place[3][slot_count], normal[3][slot_count], tangent[3][slot_count];
   alignas(32) float side[slot_count];
   alignas(32) float change[4][slot_count]; ///< ds/dx, dt/dx, ds/dy, dt/dy
+  // Of textures on the shape at rest.
+  alignas(32) float rest[3][slot_count], rest_normal[3][slot_count], turn[6][slot_count];
+  alignas(32) float rest_change[6][slot_count]; ///< d place/dx, d place/dy
   std::uint8_t pixel[slot_count];
   float weight[slot_count];
   std::size_t count = 0;
@@ -365,7 +368,27 @@ struct Row {
   }
 };
 
+// In raster_kernel_rest_lanes_internal.h.
+struct RestColors;
+inline void interpolate_rest(const KernelScene& scene, const Corners& c, const Row& row,
+                             Slots& slots, std::size_t at);
+inline void shade_rest(const KernelScene& scene, const Slots& slots, std::size_t at,
+                       RestColors& colors);
+
+inline bool rest_has(const KernelScene& scene, KernelRestLayer KernelRest::*layer) {
+  return (scene.rest->*layer).image != nullptr || (scene.rest->*layer).solid != nullptr;
+}
+
+/// What textures on the shape at rest say about eight pixels.
+struct RestColors {
+  Floats base[3], detail[3], reflection[3];
+  Floats relief;
+};
+
+// Below, `Rest` is whether there are such textures: without, not even a test is left.
+
 /// Fills eight slots for the pixels from (px, py) to the right, of which the caller keeps some.
+template <bool Rest>
 inline void interpolate(const KernelScene& scene, const Corners& c, std::int32_t px,
                         std::int32_t py, Slots& slots, std::size_t at) {
   const Row row(c, px, py);
@@ -396,6 +419,8 @@ inline void interpolate(const KernelScene& scene, const Corners& c, std::int32_t
     }
   }
   attribute(c.vertex, 9, 0, slots.shade);
+  if constexpr (Rest)
+    interpolate_rest(scene, c, row, slots, at);
   if (scene.frames == nullptr) {
     if (scene.structure != nullptr) {
       attribute(c.vertex, 5, whole[0], slots.s2);
@@ -581,20 +606,8 @@ inline Colors sample_level(const KernelTexture& texture, const Level& level, Flo
   return result;
 }
 
-/// Between level k and k + 1 for a pixel that covers 2^k (1 + part) texels, in its longer direction
-/// of the two along x and y.
-inline Colors sample(const KernelTexture& texture, const Slots& slots, std::size_t at, Floats s,
-                     Floats t) {
-  if (texture.count == 1 || texture.sphere)
-    return sample_level(texture, first_level(texture), s, t);
-  const KernelLevel& l = texture.levels[0];
-  Floats most = splat(0.0F);
-  for (std::size_t a = 0; a < 2; ++a) {
-    const Floats u = load<Floats>(slots.change[2 * a] + at) * splat(static_cast<float>(l.width));
-    const Floats v =
-        load<Floats>(slots.change[2 * a + 1] + at) * splat(static_cast<float>(l.height));
-    most = larger(u * u + v * v, most);
-  }
+/// Between level k and k + 1 for a pixel that covers 2^k (1 + part) texels; `most` is their square.
+inline Colors sample_levels(const KernelTexture& texture, Floats most, Floats s, Floats t) {
   if (!any(most > splat(1.0F)))
     return sample_level(texture, first_level(texture), s, t);
   const Floats texels = larger(smaller(root(most), splat(1e9F)), splat(1.0F));
@@ -611,6 +624,22 @@ inline Colors sample(const KernelTexture& texture, const Slots& slots, std::size
   for (int n = 0; n < 3; ++n)
     result.c[n] = mix(fine.c[n], coarse.c[n], part);
   return result;
+}
+
+/// By the longer direction of the two along x and y.
+inline Colors sample(const KernelTexture& texture, const Slots& slots, std::size_t at, Floats s,
+                     Floats t) {
+  if (texture.count == 1 || texture.sphere)
+    return sample_level(texture, first_level(texture), s, t);
+  const KernelLevel& l = texture.levels[0];
+  Floats most = splat(0.0F);
+  for (std::size_t a = 0; a < 2; ++a) {
+    const Floats u = load<Floats>(slots.change[2 * a] + at) * splat(static_cast<float>(l.width));
+    const Floats v =
+        load<Floats>(slots.change[2 * a + 1] + at) * splat(static_cast<float>(l.height));
+    most = larger(u * u + v * v, most);
+  }
+  return sample_levels(texture, most, s, t);
 }
 
 inline Colors sample_layer(const KernelTexture& texture, const Slots& slots, std::size_t at) {
@@ -636,10 +665,14 @@ inline Floats relief(const KernelScene& scene, const Slots& slots, std::size_t a
 }
 
 /// min(1, 2 r min(1, min(1, base + detail) + reflection)), 0 … 1.
+template <bool Rest>
 inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
   if (scene.frames != nullptr)
     look_around(scene, slots, at);
   const Floats one = splat(1.0F);
+  RestColors rest;
+  if constexpr (Rest)
+    shade_rest(scene, slots, at, rest);
   Colors color;
   for (int n = 0; n < 3; ++n)
     color.c[n] = splat(scene.color[n]) * load<Floats>(slots.shade + at);
@@ -647,18 +680,26 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
     const Colors base = sample_layer(*scene.base, slots, at);
     for (int n = 0; n < 3; ++n)
       color.c[n] *= base.c[n];
-  }
-  const auto add = [&](const KernelTexture* texture) {
-    if (texture == nullptr)
-      return;
-    const Colors more = sample_layer(*texture, slots, at);
+  } else if (Rest && rest_has(scene, &KernelRest::base)) {
     for (int n = 0; n < 3; ++n)
-      color.c[n] = smaller(color.c[n] + more.c[n], one);
+      color.c[n] *= rest.base[n];
+  }
+  const auto add = [&](const KernelTexture* texture, KernelRestLayer KernelRest::*layer,
+                       const Floats(&more_at_rest)[3]) {
+    if (texture != nullptr) {
+      const Colors more = sample_layer(*texture, slots, at);
+      for (int n = 0; n < 3; ++n)
+        color.c[n] = smaller(color.c[n] + more.c[n], one);
+    } else if (Rest && rest_has(scene, layer)) {
+      for (int n = 0; n < 3; ++n)
+        color.c[n] = smaller(color.c[n] + more_at_rest[n], one);
+    }
   };
-  add(scene.detail);
-  add(scene.reflection);
-  if (scene.structure != nullptr) {
-    const Floats r = splat(2.0F) * relief(scene, slots, at);
+  add(scene.detail, &KernelRest::detail, rest.detail);
+  add(scene.reflection, &KernelRest::reflection, rest.reflection);
+  const bool rest_relief = Rest && rest_has(scene, &KernelRest::structure);
+  if (scene.structure != nullptr || rest_relief) {
+    const Floats r = splat(2.0F) * (rest_relief ? rest.relief : relief(scene, slots, at));
     for (Floats& c : color.c)
       c = smaller(c * r, one);
   }

@@ -16,6 +16,7 @@ inline void to_bytes(const float (&rgb)[3], std::uint8_t* out) {
 }
 
 /// Lists the row's pixels in which the scene's triangles are seen, in runs of one triangle.
+template <bool Rest>
 inline void gather(const KernelScene& scene, const KernelTile& tile, std::int32_t row,
                    const std::uint32_t* seen, Corners& corners, Slots& slots) {
   slots.count = 0;
@@ -37,7 +38,7 @@ inline void gather(const KernelScene& scene, const KernelTile& tile, std::int32_
         ++end;
       if (n - scene.first < scene.count) {
         corners.take(scene, n);
-        interpolate(scene, corners, tile.left + x, tile.top + row, slots, slots.count);
+        interpolate<Rest>(scene, corners, tile.left + x, tile.top + row, slots, slots.count);
         for (std::int32_t at = x; at < end; ++at, ++slots.count) {
           slots.pixel[slots.count] = static_cast<std::uint8_t>(at);
           slots.weight[slots.count] = 1;
@@ -57,7 +58,7 @@ inline void gather(const KernelScene& scene, const KernelTile& tile, std::int32_
       for (int other = s; other < tile.samples; ++other)
         sum += first[other * plane + x] == here ? weight : 0;
       corners.take(scene, here);
-      interpolate(scene, corners, tile.left + x, tile.top + row, slots, slots.count);
+      interpolate<Rest>(scene, corners, tile.left + x, tile.top + row, slots, slots.count);
       slots.pixel[slots.count] = static_cast<std::uint8_t>(x);
       slots.weight[slots.count++] = sum;
     }
@@ -68,12 +69,13 @@ inline void gather(const KernelScene& scene, const KernelTile& tile, std::int32_
 using Means = float[raster_tile_width][3]; ///< of a pixel's samples
 
 /// Adds what is seen of one scene: to `mean` with several samples, else to the picture.
+template <bool Rest>
 inline void draw_scene(const KernelScene& scene, const KernelTile& tile, std::int32_t row,
                        const std::uint32_t* seen, Corners& corners, Slots& slots, Means& mean) {
   std::uint8_t* const out = tile.out + static_cast<std::size_t>(row) * tile.row_bytes;
-  gather(scene, tile, row, seen, corners, slots);
+  gather<Rest>(scene, tile, row, seen, corners, slots);
   for (std::size_t at = 0; at < slots.count; at += lanes) {
-    const Colors colors = shade(scene, slots, at);
+    const Colors colors = shade<Rest>(scene, slots, at);
     const std::size_t end = slots.count - at < lanes ? slots.count - at : lanes;
     if (tile.samples == 1) {
       Ints bytes[3];
@@ -108,8 +110,10 @@ inline void draw_row(const KernelScene& scene, const KernelTile& tile, std::int3
         mean[x][n] =
             0.25F * static_cast<float>(empty) * (static_cast<float>(out[3 * x + n]) * (1.0F / 255));
       }
-  for (const KernelScene* each = &scene; each != nullptr; each = each->next)
-    draw_scene(*each, tile, row, seen, corners, slots, mean);
+  for (const KernelScene* each = &scene; each != nullptr; each = each->next) {
+    const auto draw = each->rest != nullptr ? draw_scene<true> : draw_scene<false>;
+    draw(*each, tile, row, seen, corners, slots, mean);
+  }
   if (tile.samples > 1)
     for (std::int32_t x = 0; x < tile.width; ++x)
       to_bytes(mean[x], out + std::size_t{3} * static_cast<std::size_t>(x));

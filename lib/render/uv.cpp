@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "render/angles.h"
+#include "render/rest.h"
 #include "render/tangents.h"
 
 #include <algorithm>
@@ -151,8 +152,7 @@ std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& opt
   UvFrame frame;
   frame.mapping = options.mapping.value_or(UvMapping::box);
   frame.box = rest_box(surfaces);
-  const double half = frame.box.longest_side() / 2;
-  frame.edge = options.edge.value_or(half > 0 ? half : 1);
+  frame.edge = rest_mapping(frame.box, options.edge).edge;
   std::uint64_t mapped = 0;
   for (Surface& surface : surfaces) {
     if (surface.mesh.texcoords.size() == surface.mesh.triangles.size() && !options.mapping)

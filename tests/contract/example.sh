@@ -60,6 +60,20 @@ test_organ_liver_gallbladder_portal() { organ ts_liver_gallbladder_portal.dxf mm
 test_organ_spleen() { organ hubmap_F_spleen_uv.obj m; }
 test_organ_colon() { organ gca90_large_intestine_20k.stl mm; }
 
+# Tissue without coordinates and texture files.
+test_solid_is_lit_from_the_side_of_the_light() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  unset MAKEFLAGS MAKELEVEL
+  mkdir solid lung cholecystectomy
+  cp "$GEWEBE_ROOT"/examples/solid/Makefile solid
+  cp "$GEWEBE_ROOT"/examples/lung/textures.awk lung
+  cp "$GEWEBE_ROOT"/examples/cholecystectomy/liver.particles cholecystectomy
+  make -s -C solid SIZE=64 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  ! cmp -s solid/liver.png solid/left.png || fail 'the light is not to be seen'
+  make -s -C solid clean
+  [[ $(ls solid) == Makefile ]] || fail 'clean left files' "$(ls solid)"
+}
+
 # One organ by every filter, small: fractions keep its volume, pictures differ.
 test_antialias_draws_every_filter() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'

@@ -86,6 +86,27 @@ assert not png.info, png.info
 END
 }
 
+test_shader_and_cpu_agree_on_textures_at_rest() {
+  has_gl || skip 'no OpenGL'
+  command -v python3 >/dev/null || skip 'no python3'
+  bumps >bumps.pgm
+  cube >in.off
+  local look max many
+  for look in '--uv triplanar --texture bumps.pgm --structure bumps.pgm --uv-scale 1' \
+    '--texture veins:scale=0.7 --structure noise:scale=0.3,octaves=3'; do
+    # shellcheck disable=SC2086 # several options
+    emboss-render --backend gl $look --view iso --size 200x150 --filter linear --to ppm in.off -o gl.ppm
+    # shellcheck disable=SC2086
+    emboss-render --backend cpu $look --view iso --size 200x150 --filter linear --to ppm in.off -o cpu.ppm
+    read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+    ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max, with $look"
+  done
+  # That this can fail: another pattern.
+  emboss-render --backend cpu --texture veins:scale=0.7,seed=2 --view iso --size 200x150 --filter linear --to ppm in.off -o cpu.ppm
+  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+  ((many > 3000)) || fail 'another pattern is not seen'
+}
+
 test_what_is_not_asked_for_is_not_read() {
   cube >in.off
   bumps >bumps.pgm
@@ -155,6 +176,56 @@ test_materials_have_their_own_textures() {
   expect_failure 2 emboss-render emboss-render --by part in.ply -o out.png
 }
 
+# Of one material, next to others and to files; and what the shader draws of two is what the rasteriser does.
+test_materials_have_their_own_textures_at_rest() {
+  two_materials >in.ply
+  bumps >bumps.pgm
+  printf 'P3 1 1 255 200 0 0\n' >red.ppm
+  # The rows of the left and of the right square, but for what is near their common edge.
+  halves() {
+    emboss-render --backend cpu --view top --size 40x20 --distance 4 --light 5,9,9 --background 0,0,0 "$@" --to ppm | tail -c 2400 | od -An -v -tu1 -w120 >rows
+    cut -c -228 rows >left
+    cut -c 253- rows >right
+  }
+  local one='--texture veins:scale=0.7 --structure noise:scale=0.4' other='--texture noise:scale=0.5,seed=2' max many
+  # shellcheck disable=SC2086 # several options
+  halves $one in.ply
+  mv left one
+  # shellcheck disable=SC2086
+  halves $other in.ply
+  mv right other
+  ! cmp -s left one || fail 'the two look alike, so that nothing is shown'
+  # shellcheck disable=SC2086
+  halves $other --texture 4=veins:scale=0.7 --structure 4=noise:scale=0.4 in.ply
+  cmp left one
+  cmp right other
+  # shellcheck disable=SC2086
+  halves $one --texture 0=noise:scale=0.5,seed=2 --structure 0=bumps.pgm --offset 0 in.ply
+  cmp right other
+  # A file in the place of a solid one, the other way round, and three projections next to one.
+  halves --texture noise --texture 4=red.ppm in.ply
+  [[ $(tr -s ' ' '\n' <left | sort -u | tr -d '\n') == 0200 ]] || fail 'a file for one material' "$(sort -u left)"
+  halves --uv triplanar --texture bumps.pgm --texture 0=noise:scale=0.5,seed=2 in.ply
+  cmp right other
+  mv left bumpy
+  halves --uv triplanar --texture bumps.pgm in.ply
+  cmp left bumpy
+  expect_failure 2 emboss-render emboss-render --reflection 4=noise in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --structure 4=noise --offset-texels 2 in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --texture 4=noise:scale=0 in.ply -o out.png
+  expect_failure 2 emboss-render emboss-render --backend gl --passes 2 --texture 4=noise in.ply -o out.png
+  has_gl || return 0
+  # Two that differ in nothing but their values, which share a program.
+  both() { emboss-render --backend "$1" --view top --size 200x100 --filter linear --texture noise:scale=0.5,seed=2 --texture "4=noise:scale=0.4,seed=$2" --to ppm in.ply -o "$1.ppm"; }
+  both gl 5
+  both cpu 5
+  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+  ((many < 300)) || fail "$many bytes differ by more than 2, at most by $max"
+  both cpu 2
+  read -r max many <<<"$(difference gl.ppm cpu.ppm)"
+  ((many > 3000)) || fail 'another pattern is not seen'
+}
+
 # The objects of a run, each with its own.
 test_objects_have_their_own_textures() {
   cube >in.off
@@ -212,6 +283,13 @@ test_a_sequence_renews_only_what_changed() {
     cmp one.ppm f$frame.ppm
   done
   ! cmp -s f1.ppm f2.ppm || fail 'nothing moved, so that nothing is shown'
+  # Places at rest stay with the vertices.
+  emboss-render --backend cpu --size 40 --view iso --texture veins:scale=0.7 --structure noise:scale=0.4 --frames all run.h5 -o 'v%d.ppm'
+  for frame in 0 1 2 3; do
+    emboss-render --backend cpu --size 40 --view iso --texture veins:scale=0.7 --structure noise:scale=0.4 --frame $frame run.h5 -o one.ppm
+    cmp one.ppm v$frame.ppm
+  done
+  ! cmp -s v1.ppm v2.ppm || fail 'solid textures, too: nothing moved, so that nothing is shown'
   # Another view: the frames of tangents stay; and a light that turns.
   emboss-render "${look[@]}" --turn 3 --stats=stats.json cube.ela -o 't%d.ppm'
   [[ $(counts) == 3,0,1,1,1 ]] || fail 'a turn' "$(counts)"

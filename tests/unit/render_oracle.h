@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "render/camera.h"
 #include "render/image.h"
+#include "rest_oracle.h"
 
 #include <algorithm>
 #include <array>
@@ -24,6 +25,8 @@ struct OracleScene {
   std::optional<Heights> heights;       ///< a structure of 16 bits instead
   std::optional<Image> detail;          ///< by the mesh's coordinates
   std::optional<Image> reflection;      ///< sphere-mapped
+  std::optional<SolidTexture> solid_base, solid_detail, solid_structure;
+  RestMapping rest; ///< triplanar: of all but the reflection
   Vec3 color{1, 1, 1}, light;
   double offset = 0, shade = 0;
   bool directional = false; ///< `light` is a vector to it
@@ -57,12 +60,14 @@ public:
       return result;
     result.hit = result.interior = true;
     result.value = middle.value;
-    // Continuous: around the pixel's middle the ray hits the same depth and finds the same colour.
+    // Continuous: around the pixel's middle the ray hits the same depth and finds the same colour,
+    // and solid textures fade alike (footprints are those of triangles).
     constexpr double step = 1.0 / 64;
     for (const auto& [dx, dy] : {std::pair{step, 0.0}, {-step, 0.0}, {0.0, step}, {0.0, -step}}) {
       Sample near;
       if (!sample(x + dx, y + dy, near) ||
-          !(std::fabs(near.depth - middle.depth) < 0.01 * middle.depth)) {
+          !(std::fabs(near.depth - middle.depth) < 0.01 * middle.depth) ||
+          !(std::fabs(near.footprint - middle.footprint) <= 0.01 * middle.footprint)) {
         result.interior = false;
         break;
       }
@@ -75,7 +80,7 @@ public:
 
 private:
   struct Sample {
-    double depth = HUGE_VAL;
+    double depth = HUGE_VAL, footprint = 0;
     std::array<double, 3> value{};
   };
   struct Frame {
@@ -299,24 +304,132 @@ private:
         looks_[scene_.mesh.material.empty() ? 0
                                             : static_cast<std::size_t>(scene_.mesh.material[hit])];
     const OracleScene& own = *look.scene;
+    const RestPoint at_rest = rest_point(own, hit, x, y, place, unit(normal));
+    nearest.footprint = at_rest.footprint;
     const auto change = scene_.mipmap ? changes(hit, x, y) : std::array<double, 4>{};
     for (std::size_t c = 0; c < 3; ++c) {
       double base = own.color[static_cast<int>(c)] * shade;
+      const auto image = [&](const Levels& levels) {
+        return scene_.rest.triplanar ? projected(levels, at_rest, c)
+                                     : value(levels, change, s, t, c);
+      };
       if (own.base)
-        base *= value(look.base, change, s, t, c);
+        base *= image(look.base);
+      if (own.solid_base)
+        base *= at_rest.base[c];
       base = std::min(1.0, base);
       if (own.detail)
-        base = std::min(1.0, base + value(look.detail, change, s, t, c));
+        base = std::min(1.0, base + image(look.detail));
+      if (own.solid_detail)
+        base = std::min(1.0, base + at_rest.detail[c]);
       if (own.reflection)
         base = std::min(1.0, base + texel(look.reflection[0], around[0], around[1], c));
-      const double r = own.structure || own.heights
-                           ? 0.5 + 0.5 * (value(look.structure, change, s, t, c) -
-                                          value(look.structure, change, s + ds, t + dt, c))
-                           : 0.5;
+      double r = 0.5;
+      if (own.solid_structure)
+        r = at_rest.relief;
+      else if (own.structure && scene_.rest.triplanar)
+        r = projected_relief(look.structure, at_rest);
+      else if (own.structure || own.heights)
+        r += 0.5 * (value(look.structure, change, s, t, c) -
+                    value(look.structure, change, s + ds, t + dt, c));
       nearest.value[c] =
           scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
     }
     return true;
+  }
+
+  /// What textures at rest see of a point; for surfaces that rest.
+  struct RestPoint {
+    Vec3 place, normal, light;
+    std::array<Vec3, 2> change; ///< of the place along x and y
+    std::array<double, 3> base{}, detail{};
+    double relief = 0.5, footprint = 0;
+  };
+
+  RestPoint rest_point(const OracleScene& own, std::size_t hit, double x, double y,
+                       const Vec3& place, const Vec3& normal) const {
+    RestPoint p{place, normal, to_light(place), {}, {}, {}, 0.5, 0};
+    const bool solid = own.solid_base || own.solid_detail || own.solid_structure;
+    if (!solid && !scene_.rest.triplanar)
+      return p;
+    const auto in_plane = [&](double px, double py) {
+      const Vec3 ray = camera_.right * ((2 * px / width_ - 1) * camera_.tan_x) +
+                       camera_.up * ((1 - 2 * py / height_) * camera_.tan_y) - camera_.back;
+      const Vec3 n = cross(corner(hit, 1) - corner(hit, 0), corner(hit, 2) - corner(hit, 0));
+      return camera_.eye + ray * (dot(corner(hit, 0) - camera_.eye, n) / dot(ray, n));
+    };
+    constexpr double h = 1e-3;
+    p.change = {(in_plane(x + h, y) - in_plane(x - h, y)) / (2 * h),
+                (in_plane(x, y + h) - in_plane(x, y - h)) / (2 * h)};
+    const double footprint = std::max(norm(p.change[0]), norm(p.change[1]));
+    p.footprint = solid ? footprint : 0;
+    const auto colors = [&](const std::optional<SolidTexture>& texture,
+                            std::array<double, 3>& out) {
+      for (int c = 0; texture && c < 3; ++c)
+        out[static_cast<std::size_t>(c)] =
+            texture->ground[c] +
+            solid_oracle(*texture, place, footprint) * (texture->color[c] - texture->ground[c]);
+    };
+    colors(own.solid_base, p.base);
+    colors(own.solid_detail, p.detail);
+    if (own.solid_structure) {
+      const Vec3 flat = p.light - normal * dot(normal, p.light);
+      p.relief +=
+          0.5 * (solid_oracle(*own.solid_structure, place, footprint) -
+                 solid_oracle(*own.solid_structure,
+                              place + flat * (scene_.offset * scene_.rest.edge), footprint));
+    }
+    return p;
+  }
+
+  /// Coordinates along one axis of a point, and of what it changes by, by their table.
+  static std::array<double, 2> projection_of(const Vec3& q, const Vec3& normal, int axis) {
+    if (axis == 0)
+      return {normal.x < 0 ? -q.y : q.y, q.z};
+    if (axis == 1)
+      return {normal.y < 0 ? q.x : -q.x, q.z};
+    return {normal.z < 0 ? -q.x : q.x, q.y};
+  }
+
+  template <class Value>
+  double blended(const RestPoint& p, const Value& value_along) const {
+    std::array<double, 3> weights = triplanar_oracle(p.normal, scene_.rest.sharpness);
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double weight = weights[static_cast<std::size_t>(axis)];
+      if (weight > 0)
+        sum += weight * value_along(axis);
+    }
+    return sum;
+  }
+
+  std::array<double, 4> changes_along(const RestPoint& p, int axis) const {
+    const auto dx = projection_of(p.change[0] / scene_.rest.edge, p.normal, axis);
+    const auto dy = projection_of(p.change[1] / scene_.rest.edge, p.normal, axis);
+    return {dx[0], dx[1], dy[0], dy[1]};
+  }
+
+  double projected(const Levels& levels, const RestPoint& p, std::size_t channel) const {
+    return blended(p, [&](int axis) {
+      const auto st =
+          projection_of((p.place - scene_.rest.start) / scene_.rest.edge, p.normal, axis);
+      return value(levels, changes_along(p, axis), st[0], st[1], channel);
+    });
+  }
+
+  double projected_relief(const Levels& structure, const RestPoint& p) const {
+    return blended(p, [&](int axis) {
+      const auto st =
+          projection_of((p.place - scene_.rest.start) / scene_.rest.edge, p.normal, axis);
+      // T is where s grows while t stands still on the surface: across the axis of t.
+      const Vec3 up = axis == 2 ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
+      const Vec3 along = unit(cross(up, p.normal));
+      const double ds = scene_.offset * dot(p.light, along);
+      const double dt = scene_.offset * dot(p.light, cross(p.normal, along));
+      const auto change = changes_along(p, axis);
+      return 0.5 + 0.5 * (value(structure, change, st[0], st[1], 0) -
+                          value(structure, change, st[0] + ds, st[1] + dt, 0));
+    });
   }
 
   /// ds/dx, dt/dx, ds/dy, dt/dy in the plane of a triangle, by differences.
