@@ -136,7 +136,7 @@ std::optional<CutWay> CutStiffness::cheapest(CutWork& work) const {
   const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
   work.renewal_us = nodes * renewal_node + reach * front_operation;
   // One right-hand side alone takes half of what eight do.
-  const double panels = work.rank <= 1 ? 0.5 : static_cast<double>((work.rank + 7) / 8);
+  const double panels = work.rank <= 1 ? 0.5 : std::ceil(static_cast<double>(work.rank) / 8);
   work.correction_us = nodes * correction_node +
                        panels * 8 * solve_operation * 4 * static_cast<double>(factor_->entries());
   if (work.rank <= most_rank && work.correction_us < work.renewal_us)

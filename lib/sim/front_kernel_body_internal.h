@@ -42,8 +42,8 @@ struct Rows {
 };
 
 /// The square on the diagonal, column after column.
-std::size_t eliminate_square(const FrontArrays& f, std::size_t begin, std::size_t count,
-                             const double* least) {
+inline std::size_t eliminate_square(const FrontArrays& f, std::size_t begin, std::size_t count,
+                                    const double* least) {
   const std::size_t end = begin + count;
   for (std::size_t c = begin; c < end; ++c) {
     double* const column = f.l + c * f.rows;
@@ -63,8 +63,8 @@ std::size_t eliminate_square(const FrontArrays& f, std::size_t begin, std::size_
   return count;
 }
 
-std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_t count,
-                      const double* least, double* packed) {
+inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_t count,
+                             const double* least, double* packed) {
   if (const std::size_t done = eliminate_square(f, begin, count, least); done < count)
     return done;
   // Rows below: X L' = B, a strip of them at a time.
@@ -94,7 +94,7 @@ std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_t count
 
 /// A column behind the eliminated ones, such that its entry in row r (counted from `end` on) is
 /// [r].
-double* column_at(const FrontArrays& f, std::size_t end, std::size_t c) {
+inline double* column_at(const FrontArrays& f, std::size_t end, std::size_t c) {
   const std::size_t column = end + c;
   if (column < f.columns)
     return f.l + column * f.rows + end;
@@ -137,8 +137,8 @@ void take_tile(double* const* columns, std::size_t r, std::size_t c, std::size_t
   }
 }
 
-void take(const FrontArrays& f, std::size_t begin, std::size_t count, const double* packed,
-          std::size_t strip) {
+inline void take(const FrontArrays& f, std::size_t begin, std::size_t count, const double* packed,
+                 std::size_t strip) {
   const std::size_t end = begin + count, rows = f.rows - end;
   const std::size_t first = strip * front_strip;
   constexpr std::size_t size = front_panel * front_strip;

@@ -17,6 +17,7 @@
 #include "tests/unit/random_cuts.h"
 
 #include <algorithm>
+#include <array>
 #include <cholmod.h>
 #include <cmath>
 #include <cstdio>
@@ -168,7 +169,7 @@ void bench_springs(const Model& model, int threads) {
   Updated updated(matrix);
   const std::vector<double> f = load(3 * model.nodes.size());
   std::mt19937 random(1);
-  for (const std::size_t count : {1, 2, 5, 10, 20, 24, 50, 100, 200}) {
+  for (const std::size_t count : std::array<std::size_t, 9>{1, 2, 5, 10, 20, 24, 50, 100, 200}) {
     std::map<std::string, Row> rows;
     for (int round = 0; round < (count > 24 ? 20 : 60); ++round) {
       const Cut cut = test::springs_around(

@@ -9,6 +9,7 @@
 #include "stiffness_models.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
@@ -145,7 +146,7 @@ TEST(FrontalFactor, AllRightHandSidesAlike) {
   const FrontalFactor factor(model, Context{});
   const std::size_t axes = factor.axes();
   const std::vector<double> f = loads(30 * axes, 2), all = solved(factor, f);
-  for (const std::size_t c : {0, 7, 24, 29}) {
+  for (const std::size_t c : std::array<std::size_t, 4>{0, 7, 24, 29}) {
     const auto at = static_cast<std::ptrdiff_t>(c * axes);
     const std::vector<double> one(f.begin() + at,
                                   f.begin() + at + static_cast<std::ptrdiff_t>(axes));
