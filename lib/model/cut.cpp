@@ -1,6 +1,7 @@
 #include "model/cut.h"
 
 #include "base/context.h"
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "model/edges.h"
 
@@ -36,27 +37,6 @@ std::vector<T> joined(const std::vector<T>& a, const std::vector<T>& b) {
   std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
   return all;
 }
-
-/// Sets of corners, joined round a node across edges.
-class CornerSets {
-public:
-  explicit CornerSets(std::size_t count) : parent_(count) {
-    for (std::uint32_t i = 0; i < count; ++i)
-      parent_[i] = i;
-  }
-  std::uint32_t find(std::uint32_t n) {
-    while (parent_[n] != n)
-      n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t x = find(a), y = find(b);
-    parent_[std::max(x, y)] = std::min(x, y);
-  }
-
-private:
-  std::vector<std::uint32_t> parent_;
-};
 
 class Cutter {
 public:
@@ -162,7 +142,7 @@ private:
     node_at_.resize(3 * model_.triangles.size());
     for (std::uint32_t c = 0; c < node_at_.size(); ++c)
       node_at_[c] = node_of(c);
-    CornerSets before(node_at_.size()), after(node_at_.size());
+    DisjointSets before(node_at_.size()), after(node_at_.size());
     for (std::size_t e = 0; e < edges_.size(); ++e)
       for (const std::uint32_t node : edges_.ends[e]) {
         if (touched_[node] == 0)

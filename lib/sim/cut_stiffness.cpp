@@ -110,11 +110,10 @@ void CutStiffness::require_condition() {
   accepted_pivot_ = weakest;
 }
 
-void CutStiffness::prepare() {
-  if (factor_ != nullptr)
-    return;
+/// The factor of now, or none. \throw SingularStiffness naming what moves, and what the work throws
+void CutStiffness::factorise(const std::function<void()>& work) {
   try {
-    factor_ = std::make_shared<FrontalFactor>(*now_, context_);
+    work();
     require_condition();
   } catch (const NotPositiveDefinite&) {
     factor_.reset();
@@ -124,6 +123,12 @@ void CutStiffness::prepare() {
     factor_.reset();
     throw;
   }
+}
+
+void CutStiffness::prepare() {
+  if (factor_ != nullptr)
+    return;
+  factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
   factored_ = now_;
   correction_.reset();
   origin_ = place_ = identity(now_->nodes.size());
@@ -182,18 +187,8 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     }
     correction_.reset();
     if (factor_->work().all_operations < worn_out * fresh_operations_) {
-      try {
-        ++*generation_;
-        work.factor = factor_->renew(*now_, origin_, place_, context_);
-        require_condition();
-      } catch (const NotPositiveDefinite&) {
-        factor_.reset();
-        tell_what_moves(*now_, context_);
-        throw SingularStiffness(nearly_singular);
-      } catch (...) {
-        factor_.reset();
-        throw;
-      }
+      ++*generation_;
+      factorise([&] { work.factor = factor_->renew(*now_, origin_, place_, context_); });
       work.way = CutWay::renewal;
       reached_ = work.factor.operations;
       factored_ = now_;

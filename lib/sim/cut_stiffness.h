@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,6 +58,7 @@ private:
   std::optional<CutWay> cheapest(CutWork& work) const;
   AxesSolve solver() const;
   void require_condition();
+  void factorise(const std::function<void()>& work);
   std::shared_ptr<const Model> first_, factored_, now_;
   std::shared_ptr<const ColumnSource> columns_;
   Context context_;
