@@ -91,15 +91,6 @@ CutObject prepare(cli::Run& run, const std::string& path) {
   return cut;
 }
 
-/// Whether correcting columns, and the solves that it takes before, costs less than solving.
-bool correction_pays(const StiffnessChange& change, const Factor& factor, std::size_t nodes,
-                     bool single) {
-  const double rank = static_cast<double>(change.rank()), columns = 3 * static_cast<double>(nodes),
-               solve = 2 * static_cast<double>(factor.entries()),
-               correct = (rank + 8) * static_cast<double>(change.new_axes);
-  return (single ? 2 : 1) * rank * solve + columns * correct < columns * solve;
-}
-
 AxesSolve solver_of(std::shared_ptr<AxisSolver> solver) {
   return [solver = std::move(solver)](std::span<double> over_axes, std::size_t columns) {
     solver->solve(over_axes, columns);
@@ -134,7 +125,7 @@ void update_object(cli::Run& run, const Model& before, const StiffnessFacts& fac
     solve_before =
         solver_of(std::make_shared<AxisSolver>(stored_axes(before, store.factor(facts))));
   const CorrectedColumns corrected(stored, std::move(change), solver_of(cut.solver), run.context(),
-                                   std::move(solve_before));
+                                   std::move(solve_before), cut.solver->factor.entries());
   const std::vector<std::uint32_t>& nodes = corrected.nodes();
   const std::vector<std::uint32_t> missing =
       run.timed("write", [&] { return writer.begin(now, cut.matrix, cut.solver->factor, nodes); });
@@ -142,7 +133,7 @@ void update_object(cli::Run& run, const Model& before, const StiffnessFacts& fac
     throw Error("columns of the new store stand there already, expected none");
   std::uint64_t made = 3 * nodes.size();
   run.timed("columns", [&] {
-    if (!correction_pays(corrected.change(), cut.solver->factor, nodes.size(), now.single)) {
+    if (!corrected.pays(nodes.size())) {
       made = 0;
       (void)compliance_columns(cut.matrix, cut.solver->factor, cut.check.norm, nodes, run.context(),
                                writer);

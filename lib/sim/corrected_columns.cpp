@@ -57,7 +57,7 @@ bool CorrectedColumns::pays(std::size_t count) const {
   const auto entries = static_cast<double>(solve_entries_);
   const auto rank = static_cast<double>(change_.rank()), columns = 3 * static_cast<double>(count);
   const double respond = prepared_ ? 0 : rank * entries * (solve_before_ ? 2 : 1);
-  const double correct = columns * rank * static_cast<double>(change_.new_axes) / 2;
+  const double correct = columns * (rank + 8) * static_cast<double>(change_.new_axes) / 2;
   return count > 0 && (solve_entries_ == 0 || respond + correct <= columns * entries);
 }
 

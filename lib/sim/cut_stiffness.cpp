@@ -50,7 +50,7 @@ void follow(std::vector<std::uint32_t>& origin, std::vector<std::uint32_t>& plac
   origin = std::move(from);
 }
 
-/// What the two take up: three for each copy, one for each spring that is gone or weaker.
+/// How many nodes are copies.
 std::size_t copies(std::span<const std::uint32_t> origin, std::span<const std::uint32_t> place) {
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < origin.size(); ++i)
@@ -101,7 +101,8 @@ void CutStiffness::require_condition() {
     for (double& value : x)
       value /= size;
     multiply_stiffness(*now_, blocks, x, f);
-    least = std::min(least, dot_product(x, f));
+    const double quotient = dot_product(x, f);
+    least = quotient >= least ? least : quotient; // NaN stays
   }
   for (const SymmetricBlock& block : blocks)
     most = std::max({most, block[0], block[3], block[5]});
@@ -135,18 +136,16 @@ void CutStiffness::prepare() {
   fresh_operations_ = factor_->work().all_operations;
 }
 
-/// By what each would take; none: the factor does not serve.
-std::optional<CutWay> CutStiffness::cheapest(CutWork& work) const {
+/// Correction or renewal, by what each would take.
+CutWay CutStiffness::cheapest(std::size_t rank) const {
   const auto nodes = static_cast<double>(now_->nodes.size());
   const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
-  work.renewal_us = nodes * renewal_node + reach * front_operation;
+  const double renewal = nodes * renewal_node + reach * front_operation;
   // One right-hand side alone takes half of what eight do.
-  const double panels = work.rank <= 1 ? 0.5 : std::ceil(static_cast<double>(work.rank) / 8);
-  work.correction_us = nodes * correction_node +
-                       panels * 8 * solve_operation * 4 * static_cast<double>(factor_->entries());
-  if (work.rank <= most_rank && work.correction_us < work.renewal_us)
-    return CutWay::correction;
-  return CutWay::renewal;
+  const double panels = rank <= 1 ? 0.5 : std::ceil(static_cast<double>(rank) / 8);
+  const double correction = nodes * correction_node + panels * 8 * solve_operation * 4 *
+                                                          static_cast<double>(factor_->entries());
+  return rank <= most_rank && correction < renewal ? CutWay::correction : CutWay::renewal;
 }
 
 CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
@@ -160,13 +159,12 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
-    if (const std::optional<CutWay> guess = way ? way : cheapest(work);
-        guess == CutWay::correction && !some_gone) {
+    if (way.value_or(cheapest(work.rank)) == CutWay::correction && !some_gone) {
       change = stiffness_change(*factored_, *now_, origin_, place_);
       work.rank = change->rank();
     }
     if (!way)
-      way = change ? cheapest(work) : CutWay::renewal;
+      way = change ? cheapest(work.rank) : CutWay::renewal;
     if (way == CutWay::correction && change) {
       try {
         const std::shared_ptr<const FrontalFactor> factor = factor_;

@@ -28,10 +28,8 @@ enum class CutWay : std::uint8_t {
 
 struct CutWork {
   CutWay way = CutWay::fresh;
-  std::size_t rank = 0;     ///< of the correction, all cuts since the factor counted
-  FrontalWork factor;       ///< of renewal and fresh
-  double correction_us = 0; ///< what the model of costs expected of a correction, and of a renewal
-  double renewal_us = 0;
+  std::size_t rank = 0; ///< of the correction, all cuts since the factor counted
+  FrontalWork factor;   ///< of renewal and fresh
 };
 
 class CutStiffness {
@@ -55,7 +53,7 @@ public:
   StiffnessParts parts() const;
 
 private:
-  std::optional<CutWay> cheapest(CutWork& work) const;
+  CutWay cheapest(std::size_t rank) const;
   AxesSolve solver() const;
   void require_condition();
   void factorise(const std::function<void()>& work);

@@ -74,7 +74,7 @@ struct FrontalFactor::State {
   std::vector<std::int64_t> super, pi, s;
   std::vector<const double*> blocks;
   std::vector<std::uint32_t> axis_of_row;
-  std::size_t longest = 1, entries = 0, rest_entries = 0;
+  std::size_t longest = 1, entries = 0;
   double weakest = 1;
 
   // ---- a front
@@ -287,7 +287,7 @@ struct FrontalFactor::State {
     blocks.clear();
     axis_of_row.clear();
     longest = 1;
-    entries = rest_entries = 0;
+    entries = 0;
     weakest = 1;
     std::vector<std::uint32_t> row(graph.axes.size(), none);
     for (const std::uint32_t node : tree.sequence) {
@@ -310,7 +310,6 @@ struct FrontalFactor::State {
       longest = std::max(longest, fronts[f].rows - fronts[f].columns);
       weakest = std::min(weakest, fronts[f].weakest);
       entries += fronts[f].l.size();
-      rest_entries += fronts[f].rest.size();
     }
   }
 
@@ -491,10 +490,6 @@ std::size_t FrontalFactor::axes() const noexcept {
 
 std::size_t FrontalFactor::entries() const noexcept {
   return state_->entries;
-}
-
-std::size_t FrontalFactor::bytes() const noexcept {
-  return 8 * (state_->entries + state_->rest_entries);
 }
 
 const FrontalWork& FrontalFactor::work() const noexcept {

@@ -48,7 +48,6 @@ public:
 
   std::size_t axes() const noexcept;    ///< 3 n
   std::size_t entries() const noexcept; ///< doubles in L
-  std::size_t bytes() const noexcept;   ///< with what is kept of fronts
   const FrontalWork& work() const noexcept;
   /// The least pivot of all, over its diagonal entry of K: the reciprocal bounds the condition of K
   /// from below.

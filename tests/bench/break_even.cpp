@@ -21,6 +21,7 @@
 #include "sim/condition.h"
 #include "sim/simulation.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/random_cuts.h"
 #include "tests/unit/scratch.h"
 
 #include <algorithm>
@@ -153,17 +154,6 @@ std::vector<std::uint32_t> patch(const Model& model) {
   return nodes;
 }
 
-double mean_edge(const Model& model) {
-  double sum = 0;
-  std::size_t count = 0;
-  for (const Spring& s : model.springs)
-    if (s.kind == SpringKind::edge) {
-      sum += norm(model.nodes[s.j].position - model.nodes[s.i].position);
-      ++count;
-    }
-  return sum / static_cast<double>(count);
-}
-
 /// A store of one object, with columns of some nodes.
 class Stored {
 public:
@@ -245,7 +235,7 @@ public:
     }
     if (!left_out[scene.touched]) {
       nodes_ = patch(scene.organs[scene.touched].model);
-      amplitude_ = 0.001 * mean_edge(scene.organs[scene.touched].model);
+      amplitude_ = 0.001 * test::mean_edge(scene.organs[scene.touched].model);
     }
   }
 
@@ -426,7 +416,7 @@ void equal_error(const Organ& organ, const Stored& store) {
   constexpr double near = 1e-3, part_of_edge = 1e-6, longest = 60; // s
   const Model& model = organ.model;
   const std::vector<std::uint32_t> nodes = patch(model);
-  const double size = part_of_edge * mean_edge(model);
+  const double size = part_of_edge * test::mean_edge(model);
   const std::string stage =
       organ.name + "; within 1e-3 of the linear equilibrium over contacts (log)";
   std::vector<std::size_t> contacts;
@@ -521,7 +511,7 @@ void linearisation(const Organ& organ) {
   const std::vector<std::uint32_t> nodes = patch(model);
   const std::string stage = organ.name + "; 5 nodes pulled over pull in edges (log)";
   for (const double part : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
-    const Load load = pull(model, nodes, 5, part * mean_edge(model));
+    const Load load = pull(model, nodes, 5, part * test::mean_edge(model));
     Elastostatic still(model, {}, with_threads(1));
     Elastodynamic moving(model, Integration::implicit);
     std::vector<double> u;

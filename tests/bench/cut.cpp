@@ -15,6 +15,7 @@
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/random_cuts.h"
+#include "tests/unit/relative_difference.h"
 
 #include <algorithm>
 #include <array>
@@ -50,15 +51,6 @@ void print(const char* stage, const std::string& program, std::size_t springs, s
               stage, program.c_str(), springs, nodes, threads, median, row.times.front(),
               row.times[row.times.size() * 99 / 100], row.error);
   std::fflush(stdout);
-}
-
-double difference(std::span<const double> a, std::span<const double> b) {
-  double most = 0, size = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    most = std::max(most, std::abs(a[k] - b[k]));
-    size = std::max(size, std::abs(b[k]));
-  }
-  return most / size;
 }
 
 /// CHOLMOD's simplicial L D L' of a matrix, which rank-k updates change.
@@ -186,7 +178,7 @@ void bench_springs(const Model& model, int threads) {
       std::vector<double> expected, u;
       const auto judge = [&](Row& row) {
         if (round % 10 == 0)
-          row.error = std::max(row.error, difference(u, expected));
+          row.error = std::max(row.error, test::relative_difference(u, expected));
       };
       if (count <= 100) {
         std::optional<WoodburySolver> corrected;
@@ -293,7 +285,7 @@ void bench_opening(const Model& first, int threads) {
         stiffness.parts().solve(u, 1);
         fresh->solve(expected);
         rows["its stiffness"].error =
-            std::max(rows["its stiffness"].error, difference(u, expected));
+            std::max(rows["its stiffness"].error, test::relative_difference(u, expected));
       }
       model = std::move(now);
     }

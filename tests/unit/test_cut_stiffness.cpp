@@ -5,6 +5,7 @@
 #include "mesh_fixtures.h"
 #include "model/cut_select.h"
 #include "random_cuts.h"
+#include "relative_difference.h"
 #include "sim/axis_solver.h"
 #include "sim/condition.h"
 #include "stiffness_models.h"
@@ -22,16 +23,6 @@ namespace {
 
 std::shared_ptr<const Model> round_organ(int rounds) {
   return std::make_shared<const Model>(model_of(sphere_mesh(rounds, 20, {1, 2, 3})));
-}
-
-double difference(std::span<const double> a, std::span<const double> b) {
-  EXPECT_EQ(a.size(), b.size());
-  double most = 0, size = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    most = std::max(most, std::abs(a[k] - b[k]));
-    size = std::max(size, std::abs(b[k]));
-  }
-  return size > 0 ? most / size : HUGE_VAL;
 }
 
 /// One that opens the surface.
@@ -61,7 +52,7 @@ TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
     const std::vector<double> f = random_vector(3 * now->nodes.size(), 1);
     std::vector<double> u = f;
     stiffness.parts().solve(u, 1);
-    EXPECT_LT(difference(u, fresh(*now, f)), 1e-8);
+    EXPECT_LT(relative_difference(u, fresh(*now, f)), 1e-8);
   }
 }
 
@@ -87,7 +78,7 @@ TEST(CutStiffness, ManyCutsInARow) {
     renewed += work.way == CutWay::renewal ? 1 : 0;
     std::vector<double> u = f;
     stiffness.parts().solve(u, 1);
-    ASSERT_LT(difference(u, expected), 1e-8) << done;
+    ASSERT_LT(relative_difference(u, expected), 1e-8) << done;
     model = now;
     ++done;
   }
@@ -112,7 +103,7 @@ TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
     parts.columns->read(k, columns);
     for (std::size_t a = 0; a < 3; ++a)
       right[a * 3 * now->nodes.size() + 3 * std::size_t{parts.columns->nodes()[k]} + a] = 1;
-    EXPECT_LT(difference(columns, fresh(*now, right)), 1e-9) << k;
+    EXPECT_LT(relative_difference(columns, fresh(*now, right)), 1e-9) << k;
   }
   EXPECT_TRUE(parts.columns->pays(1)) << "now that the responses are there";
 }

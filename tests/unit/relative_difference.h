@@ -1,0 +1,25 @@
+#pragma once
+// How far two solutions are apart.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+namespace gewebe::test {
+
+/// max|a - b| / max|b|; 0 if both are 0; infinite where b alone is 0 or sizes differ,
+/// NaN if a number is, so that no bound passes.
+inline double relative_difference(std::span<const double> a, std::span<const double> b) {
+  if (a.size() != b.size())
+    return HUGE_VAL;
+  double most = 0, size = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double difference = std::abs(a[k] - b[k]);
+    most = difference <= most ? most : std::isnan(most) ? most : difference;
+    size = std::max(size, std::abs(b[k]));
+  }
+  return size > 0 ? most / size : most > 0 ? HUGE_VAL : most;
+}
+
+} // namespace gewebe::test
