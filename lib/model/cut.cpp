@@ -1,9 +1,8 @@
 #include "model/cut.h"
 
-#include "base/context.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
-#include "model/edges.h"
+#include "model/surface_part.h"
 
 #include <algorithm>
 #include <cmath>
@@ -41,8 +40,8 @@ std::vector<T> joined(const std::vector<T>& a, const std::vector<T>& b) {
 class Cutter {
 public:
   Cutter(const Model& model, const Cut& cut)
-      : model_(model), cut_(cut), surface_(surface_count(model)),
-        edges_(edge_table(model.triangles, model.nodes.size(), one_thread())) {}
+      : model_(model), cut_(cut), surface_(surface_count(model)), part_(near(model, cut)),
+        edges_(part_.edges) {}
 
   CutModel work() {
     check();
@@ -53,7 +52,6 @@ public:
     springs();
     triangles();
     keep_left();
-    check_model(result_.model);
     return std::move(result_);
   }
 
@@ -64,19 +62,22 @@ private:
     std::vector<std::uint32_t> corners;
   };
 
-  static Context one_thread() {
-    Context context;
-    context.threads = 1;
-    return context;
-  }
+  static constexpr std::size_t no_edge = SurfacePart::no_edge;
 
-  static constexpr std::size_t no_edge = SIZE_MAX;
-
-  std::size_t find_edge(const Pair& ends) const {
-    const auto at = std::lower_bound(edges_.ends.begin(), edges_.ends.end(), ends);
-    return at != edges_.ends.end() && *at == ends
-               ? static_cast<std::size_t>(at - edges_.ends.begin())
-               : no_edge;
+  /// The surface that the cut may change. A node that comes apart is an end of something severed,
+  /// or belongs to a triangle that vanishes; bending springs across edges of its triangles matter.
+  static SurfacePart near(const Model& model, const Cut& cut) {
+    std::vector<std::uint8_t> marked(model.nodes.size());
+    for (const std::size_t s : cut.springs)
+      if (s < model.springs.size() && model.springs[s].kind == SpringKind::edge)
+        marked[model.springs[s].i] = marked[model.springs[s].j] = 1;
+    for (const Pair& ends : cut.edges)
+      for (const std::uint32_t node : ends)
+        if (node < marked.size())
+          marked[node] = 1;
+    mark_neighbours(model, marked);
+    mark_neighbours(model, marked);
+    return surface_part(model, marked);
   }
 
   std::uint32_t node_of(std::uint32_t corner) const {
@@ -98,7 +99,7 @@ private:
       gone_[s] = 1;
     opened_.assign(edges_.size(), 0);
     for (const Pair& ends : cut_.edges) {
-      const std::size_t e = find_edge(ends);
+      const std::size_t e = part_.find(ends);
       if (e == no_edge)
         throw Error("there is no triangle with the edge " + pair_text(ends) +
                     ", expected edges of the surface");
@@ -115,7 +116,7 @@ private:
     vanished_.assign(model_.triangles.size(), 0);
     touched_.assign(model_.nodes.size(), 0);
     area_.resize(model_.triangles.size());
-    for (std::size_t t = 0; t < model_.triangles.size(); ++t) {
+    for (const std::uint32_t t : part_.triangles) {
       const Triangle& c = model_.triangles[t];
       const Vec3& a = model_.nodes[c[0]].position;
       area_[t] = norm(cross(model_.nodes[c[1]].position - a, model_.nodes[c[2]].position - a)) / 2;
@@ -123,7 +124,7 @@ private:
     for (const std::size_t s : cut_.springs) {
       const Spring& spring = model_.springs[s];
       const std::size_t e =
-          spring.kind == SpringKind::edge ? find_edge({spring.i, spring.j}) : no_edge;
+          spring.kind == SpringKind::edge ? part_.find({spring.i, spring.j}) : no_edge;
       if (e == no_edge)
         continue;
       for (const std::uint32_t c : edges_.around(e)) {
@@ -160,13 +161,14 @@ private:
       }
     // By node, fan before, piece: its corners.
     std::map<std::array<std::uint32_t, 3>, Piece> pieces;
-    for (std::uint32_t c = 0; c < node_at_.size(); ++c) {
-      if (touched_[node_at_[c]] == 0 || vanished_[c / 3] != 0)
-        continue;
-      Piece& piece = pieces[{node_at_[c], before.find(c), after.find(c)}];
-      piece.area += area_[c / 3];
-      piece.corners.push_back(c);
-    }
+    for (const std::uint32_t t : part_.triangles)
+      for (std::uint32_t c = 3 * t; vanished_[t] == 0 && c < 3 * t + 3; ++c) {
+        if (touched_[node_at_[c]] == 0)
+          continue;
+        Piece& piece = pieces[{node_at_[c], before.find(c), after.find(c)}];
+        piece.area += area_[t];
+        piece.corners.push_back(c);
+      }
     // The largest piece of each fan keeps the node: all such together, the others one by one.
     for (auto at = pieces.begin(); at != pieces.end();) {
       const std::uint32_t node = at->first[0];
@@ -286,7 +288,10 @@ private:
 
   void springs() {
     result_.model.springs.reserve(model_.springs.size() + 8 * copies_.size());
-    std::optional<std::vector<std::array<std::uint32_t, 3>>> across;
+    const std::vector<std::array<std::uint32_t, 3>> across = crossings();
+    std::vector<std::uint8_t> crossed(touched_); // where springs may be others
+    for (const auto& [i, j, e] : across)
+      crossed[i] = crossed[j] = 1;
     std::size_t edge = 0;
     for (std::size_t s = 0; s < model_.springs.size(); ++s) {
       const Spring& spring = model_.springs[s];
@@ -294,17 +299,14 @@ private:
         ++result_.removed;
         continue;
       }
-      if (touched_[spring.i] == 0 && touched_[spring.j] == 0 &&
-          (spring.kind != SpringKind::bend || copies_.empty())) { // as it was
+      if (crossed[spring.i] == 0 && crossed[spring.j] == 0) { // as it was
         add(spring, {number(spring.i), number(spring.j)}, 1);
         continue;
       }
       if (spring.kind == SpringKind::central) {
         central_spring(spring);
       } else if (spring.kind == SpringKind::bend) {
-        if (!across)
-          across = crossings();
-        bend_spring(spring, *across);
+        bend_spring(spring, across);
       } else {
         const Pair ends{spring.i, spring.j};
         if (touched_[spring.i] == 0 && touched_[spring.j] == 0) { // nothing changed beside it
@@ -522,12 +524,13 @@ private:
   const Model& model_;
   const Cut& cut_;
   std::size_t surface_ = 0;
-  EdgeTable edges_;
+  SurfacePart part_;
+  const EdgeTable& edges_;
   std::vector<std::uint8_t> gone_;                   ///< by spring
   std::vector<std::uint8_t> opened_;                 ///< by edge
   std::vector<std::uint8_t> vanished_;               ///< by triangle
   std::vector<std::uint8_t> touched_;                ///< by node: its fan may fall apart
-  std::vector<double> area_;                         ///< by triangle
+  std::vector<double> area_;                         ///< by triangle of the part
   std::vector<std::uint32_t> node_at_;               ///< by corner: its node now
   std::map<std::uint32_t, std::vector<Piece>> fans_; ///< of doubled nodes, what keeps it first
   std::vector<std::uint32_t> copies_;                ///< of which node

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -65,6 +66,7 @@ struct CutModel {
 /// edge springs. A central spring is shared by area. Any other spring without a triangle goes with
 /// the copy on whose side its other end lies.
 ///
+/// Takes a few passes over the model, whose work beside them is that of the place where it is cut.
 /// The result passes check_model. \pre check_model(model) passes \throw Error if a spring or edge
 /// does not exist
 CutModel cut_model(const Model& model, const Cut& cut);
@@ -80,8 +82,8 @@ struct ModelPart {
 
 /// What came off by a cut.
 struct FreeParts {
-  ModelPart rest;
-  std::vector<ModelPart> parts; ///< by smallest node
+  std::optional<ModelPart> rest; ///< none: all of the cut model stays
+  std::vector<ModelPart> parts;  ///< by smallest node
 };
 
 /// Parts of a cut model, connected by springs and triangles, that hung together with more before
@@ -91,6 +93,6 @@ struct FreeParts {
 FreeParts free_parts(const Model& before, const CutModel& cut);
 
 /// The cut model without the parts that came off, as one step from the model before.
-CutModel without_parts(CutModel cut, ModelPart rest);
+CutModel without_parts(CutModel cut, std::optional<ModelPart> rest);
 
 } // namespace gewebe

@@ -83,7 +83,10 @@ FreeParts free_parts(const Model& before, const CutModel& cut) {
   const Model& model = cut.model;
   const std::size_t surface = surface_count(model);
   std::vector<std::uint32_t> old_set, set;
-  const std::uint32_t olds = connected(before, old_set), count = connected(model, set);
+  const std::uint32_t count = connected(model, set);
+  if (count == 1)
+    return {};
+  const std::uint32_t olds = connected(before, old_set);
   struct Group {
     std::uint32_t old = none, nodes = 0; // of the surface
     bool held = false, stays = false;
@@ -124,15 +127,18 @@ FreeParts free_parts(const Model& before, const CutModel& cut) {
   for (std::size_t i = 0; i < mark.size(); ++i)
     mark[i] = mark_of_set[set[i]];
   FreeParts result;
+  if (std::all_of(mark.begin(), mark.end(), [](std::uint32_t m) { return m == 0; }))
+    return result;
   result.rest = part_of(model, mark, 0);
   for (std::uint32_t k = 1; k < marks; ++k)
     result.parts.push_back(part_of(model, mark, k));
   return result;
 }
 
-CutModel without_parts(CutModel cut, ModelPart rest) {
-  if (rest.model.nodes.size() == cut.model.nodes.size())
+CutModel without_parts(CutModel cut, std::optional<ModelPart> whole) {
+  if (!whole)
     return cut;
+  ModelPart& rest = *whole;
   std::vector<std::uint32_t> place(cut.model.nodes.size(), none);
   for (std::uint32_t i = 0; i < rest.origin.size(); ++i)
     place[rest.origin[i]] = i;

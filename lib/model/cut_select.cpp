@@ -1,9 +1,8 @@
 #include "model/cut_select.h"
 
-#include "base/context.h"
 #include "base/error.h"
 #include "base/number_text.h"
-#include "model/edges.h"
+#include "model/surface_part.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,12 +17,6 @@ namespace gewebe {
 namespace {
 
 constexpr int most_rounds = 8; ///< of tidying the rim of a cut
-
-Context one_thread() {
-  Context context;
-  context.threads = 1;
-  return context;
-}
 
 void put_in_order(Cut& cut) {
   const auto tidy = [](auto& list) {
@@ -47,11 +40,18 @@ std::vector<Vec3> positions(const Model& model, std::span<const double> displace
 
 /// A whole plane, but only near some nodes.
 struct PlaneArea {
+  static constexpr bool bounded = false;
   Vec3 point, normal;
   std::vector<std::uint8_t> nodes; ///< by node; empty: all
 
   double side(const Vec3& p) const { return dot(normal, p - point); }
-  bool near(const Vec3&, const Vec3&) const { return true; }
+  bool near(const Vec3& min, const Vec3& max) const {
+    const Vec3 half = 0.5 * (max - min);
+    double reach = 0;
+    for (int a = 0; a < 3; ++a)
+      reach += std::abs(normal[a]) * half[a];
+    return !(std::abs(side(0.5 * (min + max))) > reach);
+  }
   bool has(std::uint32_t node) const { return nodes.empty() || nodes[node] != 0; }
   bool parts(const Vec3&, const Vec3& a, const Vec3& b) const {
     return (side(a) > 0) != (side(b) > 0);
@@ -62,6 +62,7 @@ struct PlaneArea {
 /// Four-sided pieces.
 class QuadArea {
 public:
+  static constexpr bool bounded = true;
   explicit QuadArea(std::span<const SweptQuad> quads) {
     for (const SweptQuad& q : quads) {
       const Vec3 n = cross(q[2] - q[0], q[3] - q[1]);
@@ -150,19 +151,35 @@ std::vector<std::array<std::uint32_t, 2>> opposite_pairs(const Model& model,
   return pairs;
 }
 
+/// Nodes of all that may come apart. \param far that it may be from the area
+template <class Area>
+std::vector<std::uint8_t> marked_near(const std::vector<Vec3>& at, const Area& area, double far) {
+  const Vec3 grown{far, far, far};
+  std::vector<std::uint8_t> marked(at.size());
+  for (std::uint32_t i = 0; i < at.size(); ++i)
+    marked[i] = area.has(i) && area.near(at[i] - grown, at[i] + grown) ? 1 : 0;
+  return marked;
+}
+
 template <class Area>
 Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) {
   Cut cut;
-  const EdgeTable edges = edge_table(model.triangles, model.nodes.size(), one_thread());
   std::vector<Vec3> middle;
   middle.reserve(model.triangles.size());
-  double reach = 0; // of a triangle from the midpoint of its edge
+  double square = 0;
   for (const Triangle& t : model.triangles) {
     middle.push_back((at[t[0]] + at[t[1]] + at[t[2]]) / 3);
-    for (const std::uint32_t corner : t)
-      reach = std::max(reach, norm(at[corner] - middle.back()));
+    for (const std::uint32_t corner : t) {
+      const Vec3 d = at[corner] - middle.back();
+      square = std::max(square, dot(d, d));
+    }
   }
-  const Vec3 grown{2 * reach, 2 * reach, 2 * reach};
+  const double reach = std::sqrt(square); // of a triangle from the midpoint of its edge
+  // Each round that tidies the rim moves it by a triangle, bending springs reach over two.
+  const double far = (2 * most_rounds + 8) * reach;
+  const EdgeTable edges = surface_part(model, marked_near(at, area, far)).edges;
+  const double around_edge = Area::bounded ? 2 * reach : far;
+  const Vec3 grown{around_edge, around_edge, around_edge};
   std::vector<std::size_t> opened;
   const auto open = [&](std::size_t e) {
     const auto [i, j] = edges.ends[e];
@@ -382,7 +399,10 @@ Cut torn_cut(const Model& model, std::span<const double> displacement, double st
   Cut cut;
   if (torn.empty())
     return cut;
-  const EdgeTable edges = edge_table(model.triangles, model.nodes.size(), one_thread());
+  std::vector<std::uint8_t> ends_of_torn(model.nodes.size());
+  for (const std::size_t s : torn)
+    ends_of_torn[model.springs[s].i] = ends_of_torn[model.springs[s].j] = 1;
+  const EdgeTable edges = surface_part(model, ends_of_torn).edges;
   const CornersOfNodes fans(model);
   for (const std::size_t s : torn) {
     const Spring& spring = model.springs[s];

@@ -276,20 +276,12 @@ void Factor::solve_panel(std::vector<double>& x, std::size_t width) const {
                                      : solve_supernodal_avx2)(l, x.data(), width, work.data());
 }
 
-namespace {
-
-std::size_t panel_for(std::size_t vectors) {
-  return vectors == 1 ? 1 : (vectors + panel_width - 1) / panel_width * panel_width;
-}
-
-} // namespace
-
 void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {
   const std::span<const std::int64_t> permutation = view().permutation;
   const std::size_t n = order();
   std::vector<double> x;
   for (std::size_t first = 0; first < columns;) {
-    const std::size_t count = std::min(most_units, columns - first), width = panel_for(count);
+    const std::size_t count = std::min(most_units, columns - first), width = solve_width(count);
     x.assign(n * width, 0.0);
     for (std::size_t k = 0; k < n; ++k) {
       const double* const from = f.data() + first * n + static_cast<std::size_t>(permutation[k]);
@@ -308,7 +300,7 @@ void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t c
 
 std::size_t Factor::solve_units(std::span<const std::int64_t> places,
                                 std::vector<double>& x) const {
-  const std::size_t width = panel_for(std::max<std::size_t>(places.size(), 1));
+  const std::size_t width = solve_width(std::max<std::size_t>(places.size(), 1));
   x.assign(order() * width, 0.0);
   for (std::size_t c = 0; c < places.size(); ++c)
     x[static_cast<std::size_t>(places[c]) * width + c] = 1;

@@ -508,8 +508,7 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
   std::vector<double> x, work(s.longest * panel_width);
   for (std::size_t first = 0; first < columns;) {
     const std::size_t count = std::min(Factor::most_units, columns - first);
-    const std::size_t width =
-        count == 1 ? 1 : (count + panel_width - 1) / panel_width * panel_width;
+    const std::size_t width = solve_width(count);
     x.assign(order * width, 0.0);
     double* const from = over_axes.data() + first * all;
     for (std::size_t k = 0; k < order; ++k)

@@ -140,16 +140,18 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
   for (std::size_t k = 0; k < free.parts.size(); ++k)
     moves.objects.push_back(objects_.size() + k);
   std::vector<std::pair<std::uint32_t, Moves::To>> ways;
-  const auto add = [&](std::size_t object, const ModelPart& part) {
-    for (std::uint32_t i = 0; i < part.origin.size(); ++i) {
-      const std::uint32_t c = part.origin[i], o = cut.origin[c];
-      ways.push_back({o, {object, i, cut.share[c], cut.place[o] == c}});
-    }
+  ways.reserve(cut.origin.size());
+  const auto add = [&](std::size_t object, std::uint32_t i, std::uint32_t c) {
+    const std::uint32_t o = cut.origin[c];
+    ways.push_back({o, {object, i, cut.share[c], cut.place[o] == c}});
   };
-  add(index, free.rest);
+  const std::size_t stay = free.rest ? free.rest->origin.size() : cut.origin.size();
+  for (std::uint32_t i = 0; i < stay; ++i)
+    add(index, i, free.rest ? free.rest->origin[i] : i);
   for (std::size_t k = 0; k < free.parts.size(); ++k)
-    add(moves.objects[k + 1], free.parts[k]);
-  moves.add(std::move(ways), old.model.nodes.size());
+    for (std::uint32_t i = 0; i < free.parts[k].origin.size(); ++i)
+      add(moves.objects[k + 1], i, free.parts[k].origin[i]);
+  moves.add(ways, old.model.nodes.size());
 
   const std::size_t removed = cut.removed, doubled = cut.doubled;
   CutModel rest = without_parts(std::move(cut), std::move(free.rest));
@@ -219,7 +221,7 @@ void Simulation::restore_now(std::size_t index) {
     const std::uint32_t to = old.first_nodes[i];
     ways.push_back({i, {index, to, 1, old.places[to] == i}});
   }
-  moves.add(std::move(ways), old.model.nodes.size());
+  moves.add(ways, old.model.nodes.size());
   std::vector<std::unique_ptr<Object>> pieces;
   pieces.push_back(renumbered(old, old.first));
   cuttings_.push_back({.kind = Cutting::Kind::restored,

@@ -94,7 +94,8 @@ struct Simulation::Moves {
   std::span<const To> of(std::uint32_t node) const {
     return {all.data() + first[node], all.data() + first[node + std::size_t{1}]};
   }
-  void add(std::vector<std::pair<std::uint32_t, To>> ways, std::size_t nodes);
+  /// \param ways of nodes below `nodes`, in any order; those of a node keep theirs
+  void add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t nodes);
 };
 
 struct Simulation::Instrument {

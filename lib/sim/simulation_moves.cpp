@@ -21,17 +21,16 @@ Vec3 vector_at(std::span<const double> values, std::size_t node) {
 
 } // namespace
 
-void Simulation::Moves::add(std::vector<std::pair<std::uint32_t, To>> ways, std::size_t nodes) {
-  std::stable_sort(ways.begin(), ways.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+void Simulation::Moves::add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t nodes) {
   first.assign(nodes + 1, 0);
-  all.reserve(ways.size());
-  for (const auto& [node, to] : ways) {
+  for (const auto& [node, to] : ways)
     ++first[node + std::size_t{1}];
-    all.push_back(to);
-  }
   for (std::size_t i = 0; i < nodes; ++i)
     first[i + 1] += first[i];
+  all.resize(ways.size());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (const auto& [node, to] : ways)
+    all[next[node]++] = to;
 }
 
 /// An object that goes on in place of the old one, with another model and nothing of its nodes.

@@ -6,6 +6,8 @@ void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t
                                double* work) {
   if (vectors == 1)
     solve<Single>(l, x, 1, work);
+  else if (vectors == 4)
+    solve<Narrow>(l, x, 4, work);
   else
     solve<Wide>(l, x, vectors, work);
 }

@@ -5,6 +5,9 @@
 
 #include "sim/supernodal_solve_internal.h"
 
+#include <type_traits>
+#include <utility>
+
 namespace gewebe {
 namespace {
 
@@ -24,6 +27,11 @@ struct Single {
   static constexpr std::size_t width = 1, registers = 1, rows = 8;
   using Value = double;
   using Stored = double;
+};
+struct Narrow {
+  static constexpr std::size_t width = 4, registers = 4 / lanes, rows = 8 / registers;
+  using Value = Lanes;
+  using Stored = Unaligned;
 };
 struct Wide {
   static constexpr std::size_t width = panel_width, registers = panel_width / lanes, rows = lanes;
@@ -111,6 +119,15 @@ void forward_below(const Supernode& n, std::size_t r, const double* own, double*
     sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * stride);
 }
 
+/// Asks for all of L's block at once: its columns are short streams, which no hardware foresees, and
+/// one miss after the other would cost several times what memory needs to deliver them.
+inline void fetch(const Supernode& n) {
+  constexpr std::size_t line = 64 / sizeof(double);
+  const std::size_t count = n.columns * n.rows;
+  for (std::size_t k = 0; k < count; k += line)
+    __builtin_prefetch(n.l + k);
+}
+
 template <class Of>
 bool all_zero(const double* x, std::size_t count, std::size_t stride) {
   for (std::size_t r = 0; r < count; ++r)
@@ -120,21 +137,31 @@ bool all_zero(const double* x, std::size_t count, std::size_t stride) {
   return true;
 }
 
+/// work(first, N) for all of [0, count) in runs of Of::rows, then what is left as one shorter run: one
+/// by one, each would wait for its own last subtraction.
+template <class Of, class Work>
+void in_runs(std::size_t count, const Work& work) {
+  std::size_t k = 0;
+  for (; k + Of::rows <= count; k += Of::rows)
+    work(k, std::integral_constant<std::size_t, Of::rows>{});
+  [&]<std::size_t... N>(std::index_sequence<N...>) {
+    (void)((count - k == N + 1 && (work(k, std::integral_constant<std::size_t, N + 1>{}), true)) ||
+           ...);
+  }(std::make_index_sequence<Of::rows - 1>{});
+}
+
 template <class Of>
 void forward(const Supernode& n, double* x, std::size_t stride) {
   double* const own = x + n.first * stride;
   if (all_zero<Of>(own, n.columns, stride)) // and so stays everything that only hears from it
     return;
-  std::size_t c = 0;
-  for (; c + Of::rows <= n.columns; c += Of::rows)
-    forward_own<Of, Of::rows>(n, c, own, stride);
-  for (; c < n.columns; ++c)
-    forward_own<Of, 1>(n, c, own, stride);
-  std::size_t r = 0;
-  for (; r + Of::rows <= n.below; r += Of::rows)
-    forward_below<Of, Of::rows>(n, r, own, x, stride);
-  for (; r < n.below; ++r)
-    forward_below<Of, 1>(n, r, own, x, stride);
+  fetch(n);
+  in_runs<Of>(n.columns, [&](std::size_t c, auto run) {
+    forward_own<Of, decltype(run)::value>(n, c, own, stride);
+  });
+  in_runs<Of>(n.below, [&](std::size_t r, auto run) {
+    forward_below<Of, decltype(run)::value>(n, r, own, x, stride);
+  });
 }
 
 /// N own columns from `c` on, once all behind them are solved; `below` are the rows below.
@@ -167,17 +194,17 @@ void backward_own(const Supernode& n, std::size_t c, const double* below, double
 
 template <class Of>
 void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
+  fetch(n);
   for (std::size_t r = 0; r < n.below; ++r) {
     Row<Of> xr;
     xr.load(x + static_cast<std::size_t>(n.row[r]) * stride);
     xr.store(work + r * Of::width);
   }
   double* const own = x + n.first * stride;
-  std::size_t c = n.columns;
-  for (; c >= Of::rows; c -= Of::rows)
-    backward_own<Of, Of::rows>(n, c - Of::rows, work, own, stride);
-  for (; c > 0; --c)
-    backward_own<Of, 1>(n, c - 1, work, own, stride);
+  in_runs<Of>(n.columns, [&](std::size_t done, auto run) { // from the last column on
+    constexpr std::size_t count = decltype(run)::value;
+    backward_own<Of, count>(n, n.columns - done - count, work, own, stride);
+  });
 }
 
 /// `stride` vectors side by side, Of::width of them at a time: a supernode is read once for all.

@@ -224,11 +224,12 @@ TEST(Cut, FromRimToRimTheSheetFallsInTwo) {
   EXPECT_EQ(components(cut.model).count, 2U);
   const FreeParts parts = free_parts(before, cut);
   ASSERT_EQ(parts.parts.size(), 1U); // nothing is held: one stays
-  EXPECT_EQ(parts.rest.model.nodes.size() + parts.parts[0].model.nodes.size(),
+  ASSERT_TRUE(parts.rest.has_value());
+  EXPECT_EQ(parts.rest->model.nodes.size() + parts.parts[0].model.nodes.size(),
             cut.model.nodes.size());
-  EXPECT_NO_THROW(check_model(parts.rest.model));
+  EXPECT_NO_THROW(check_model(parts.rest->model));
   EXPECT_NO_THROW(check_model(parts.parts[0].model));
-  EXPECT_NEAR(total_mass(parts.rest.model) + total_mass(parts.parts[0].model), total_mass(before),
+  EXPECT_NEAR(total_mass(parts.rest->model) + total_mass(parts.parts[0].model), total_mass(before),
               1e-12 * total_mass(before));
 }
 
@@ -374,18 +375,19 @@ TEST(Cut, APartWithoutAHeldNodeComesOff) {
   const CutModel cut = cut_model(before, plane_cut(before, {{100, -50, 41}, {0, 0, 1}}, {}));
   FreeParts parts = free_parts(before, cut);
   ASSERT_EQ(parts.parts.size(), 1U);
+  ASSERT_TRUE(parts.rest.has_value());
   const ModelPart& lobe = parts.parts[0];
   EXPECT_NO_THROW(check_model(lobe.model));
-  EXPECT_NO_THROW(check_model(parts.rest.model));
+  EXPECT_NO_THROW(check_model(parts.rest->model));
   for (const Node& n : lobe.model.nodes)
     EXPECT_EQ(n.fixed, fixed_none);
   for (std::size_t i = 0; i < surface_count(lobe.model); ++i)
     EXPECT_GT(lobe.model.nodes[i].position.z, 36);
-  EXPECT_NEAR(total_mass(parts.rest.model) + total_mass(lobe.model), total_mass(before),
+  EXPECT_NEAR(total_mass(parts.rest->model) + total_mass(lobe.model), total_mass(before),
               1e-12 * total_mass(before));
   EXPECT_EQ(boundary_loops(lobe.model), 1U);
-  EXPECT_EQ(boundary_loops(parts.rest.model), 1U);
-  const std::size_t nodes = parts.rest.model.nodes.size();
+  EXPECT_EQ(boundary_loops(parts.rest->model), 1U);
+  const std::size_t nodes = parts.rest->model.nodes.size();
   const CutModel rest = without_parts(cut, std::move(parts.rest));
   ASSERT_EQ(rest.model.nodes.size(), nodes);
   for (std::uint32_t i = 0; i < rest.place.size(); ++i)

@@ -1,0 +1,242 @@
+// A cut as who drives a scene feels it: from the moment the command is written into the pipe until
+// the forces on the displaced nodes have been answered, by ffe-run on one thread. A patient's colon
+// with bending springs (a ball where there is no shared data), cut at random places, one cut behind
+// the other, while some nodes are held displaced; with and without a store of their columns. The
+// first cut, which makes the factor that others renew, counts apart.
+//
+// Writes CSV to standard output: stage ("… over …": what stands in the third column), program,
+// springs gone and nodes doubled in the mean, nodes, contacts, median, fastest and 99th percentile
+// in ms, a figure and its unit.
+
+#include "formats/ela.h"
+#include "model/build.h"
+#include "tests/bench/timing.h"
+#include "tests/unit/mesh_fixtures.h"
+#include "tests/unit/random_cuts.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <spawn.h>
+#include <string>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+using namespace gewebe;
+using namespace gewebe::timing;
+
+namespace {
+
+constexpr int most_cuts = 120;
+constexpr double picture = 1000.0 / 60; // ms
+
+[[noreturn]] void fail(const std::string& why) {
+  (void)std::fprintf(stderr, "cut_frame: %s\n", why.c_str());
+  std::exit(EXIT_FAILURE);
+}
+
+/// ffe-run --serve at the other ends of two pipes.
+class Served {
+public:
+  Served(const std::string& tools, const std::string& folder) {
+    std::array<int, 2> to{}, from{};
+    if (pipe(to.data()) != 0 || pipe(from.data()) != 0)
+      fail("no pipe");
+    posix_spawn_file_actions_t actions{};
+    (void)posix_spawn_file_actions_init(&actions);
+    (void)posix_spawn_file_actions_adddup2(&actions, to[0], STDIN_FILENO);
+    (void)posix_spawn_file_actions_adddup2(&actions, from[1], STDOUT_FILENO);
+    for (const int end : {to[0], to[1], from[0], from[1]})
+      (void)posix_spawn_file_actions_addclose(&actions, end);
+    const std::string program = tools + "/ffe-run";
+    std::vector<std::string> words{program, "--serve", "-q", "-j1", "--rate", "60"};
+    std::vector<char*> arguments;
+    for (std::string& word : words)
+      arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    std::filesystem::current_path(folder);
+    if (posix_spawn(&child_, program.c_str(), &actions, nullptr, arguments.data(), environ) != 0)
+      fail(program + " can't be started");
+    (void)posix_spawn_file_actions_destroy(&actions);
+    (void)close(to[0]);
+    (void)close(from[1]);
+    to_ = to[1];
+    from_ = fdopen(from[0], "r");
+  }
+  ~Served() {
+    (void)close(to_);
+    (void)std::fclose(from_);
+    (void)waitpid(child_, nullptr, 0);
+  }
+  Served(const Served&) = delete;
+  Served& operator=(const Served&) = delete;
+
+  void say(const std::string& text) const {
+    if (write(to_, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
+      fail("ffe-run does not listen");
+  }
+
+  struct Answer {
+    int gone = 0, doubled = 0;
+    bool refused = false, loose = false;
+  };
+  /// Up to the end of the step.
+  Answer hear() const {
+    Answer answer;
+    std::array<char, 4096> line{};
+    while (std::fgets(line.data(), line.size(), from_) != nullptr) {
+      const std::string text = line.data();
+      (void)std::sscanf(text.c_str(), "cut %*s springs %d doubled %d", &answer.gone,
+                        &answer.doubled);
+      answer.refused = answer.refused || text.starts_with("error");
+      answer.loose = answer.loose || text.starts_with("loose");
+      if (text == "done\n")
+        return answer;
+    }
+    fail("ffe-run has ended");
+  }
+
+private:
+  pid_t child_ = 0;
+  int to_ = -1;
+  FILE* from_ = nullptr;
+};
+
+std::string numbers(std::initializer_list<double> values) {
+  std::string text;
+  for (const double v : values) {
+    std::array<char, 32> one{};
+    (void)std::snprintf(one.data(), one.size(), "%.9g", v);
+    text += (text.empty() ? "" : " ") + std::string(one.data());
+  }
+  return text;
+}
+
+struct Scene {
+  std::string tools, folder;
+  Model model;
+  std::vector<std::uint32_t> free; // nodes of the surface that can move
+};
+
+std::string with_commas(std::string text) {
+  std::replace(text.begin(), text.end(), ' ', ',');
+  return text;
+}
+
+/// Nodes of the surface next to one.
+std::string patch(const Scene& scene, std::uint32_t middle, std::size_t count) {
+  const auto away = [&](std::uint32_t i) {
+    const Vec3 d = scene.model.nodes[i].position - scene.model.nodes[middle].position;
+    return dot(d, d);
+  };
+  std::vector<std::uint32_t> nodes = scene.free;
+  std::ranges::sort(nodes, {}, away);
+  std::string text;
+  for (std::size_t k = 0; k < count; ++k)
+    text += (k == 0 ? "" : ",") + std::to_string(nodes[k]);
+  return text;
+}
+
+/// Cuts of this length, in edges, one behind the other.
+void bench(const Scene& scene, double length, std::size_t contacts, bool stored) {
+  const double edge = test::mean_edge(scene.model);
+  std::mt19937 random(7);
+  const Served run(scene.tools, scene.folder);
+  run.say("object colon colon.ela method=ffe" +
+          std::string(stored ? " store=colon.h5" : "") + "\nemit forces\n");
+  const std::uint32_t held = scene.free[scene.free.size() / 2];
+  run.say("displace colon " + patch(scene, held, contacts) + " 0 0 1\nstep 0.0166\n");
+  (void)run.hear();
+  std::vector<double> times;
+  double first = 0, gone = 0, doubled = 0;
+  int attempts = 0;
+  for (; attempts < 2 * most_cuts && times.size() < most_cuts; ++attempts) {
+    const Vec3 at = scene.model.nodes[scene.free[random() % scene.free.size()]].position;
+    const auto part = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
+    const Vec3 normal{part(), part(), part()};
+    const double shift = 0.3 * edge;
+    const std::string cut = "cut colon plane " +
+                            numbers({at.x + shift, at.y, at.z, normal.x, normal.y, normal.z}) +
+                            " sphere:" + with_commas(numbers({at.x, at.y, at.z, length * edge})) +
+                            "\nstep 0.0166\n";
+    Served::Answer answer;
+    const double time = milliseconds([&] {
+      run.say(cut);
+      answer = run.hear();
+    });
+    if (answer.loose) // what follows would be elastodynamic
+      break;
+    if (answer.refused || answer.gone == 0)
+      continue;
+    if (first == 0) {
+      first = time;
+      continue;
+    }
+    times.push_back(time);
+    gone += answer.gone;
+    doubled += answer.doubled;
+  }
+  if (times.empty())
+    fail("nothing could be cut");
+  std::ranges::sort(times);
+  const auto count = static_cast<double>(times.size());
+  const std::string program = std::string(stored ? "stored columns, " : "no store, ") +
+                              std::to_string(contacts) + (contacts == 1 ? " node" : " nodes");
+  const double slow = times[times.size() * 99 / 100];
+  std::printf("whole cut over springs,%s,%.0f,%.0f,%zu,%zu,%.2f,%.2f,%.2f,%.3g,pictures of 1/60 s "
+              "(99th percentile of %zu cuts)\n",
+              program.c_str(), gone / count, doubled / count, scene.model.nodes.size(), contacts,
+              times[times.size() / 2], times.front(), slow, slow / picture, times.size());
+  std::printf("first cut over springs,%s,%.0f,%.0f,%zu,%zu,%.2f,%.2f,%.2f,%.3g,ms\n",
+              program.c_str(), gone / count, doubled / count, scene.model.nodes.size(), contacts,
+              first, first, first, first);
+  std::fflush(stdout);
+}
+
+} // namespace
+
+int main() {
+  (void)std::signal(SIGPIPE, SIG_IGN);
+  Scene scene;
+  scene.tools = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
+  scene.folder = (std::filesystem::temp_directory_path() / "gewebe-bench-XXXXXX").string();
+  if (mkdtemp(scene.folder.data()) == nullptr)
+    fail("no folder in " + std::filesystem::temp_directory_path().string());
+  TriangleMesh mesh = test::load_test_mesh("gca90_large_intestine_20k.stl");
+  if (mesh.triangles.empty()) {
+    (void)std::fputs("cut_frame: no shared data, a ball instead\n", stderr);
+    mesh = test::sphere_mesh(5, 100, {});
+  }
+  BuildOptions options;
+  options.bend = true;
+  scene.model = build_model(mesh, options, Context{}).model;
+  for (std::uint32_t i = 0; i < surface_count(scene.model); ++i)
+    if (scene.model.nodes[i].fixed == fixed_none)
+      scene.free.push_back(i);
+  {
+    Output output(scene.folder + "/colon.ela", {});
+    write_ela(output, scene.model, Context{});
+    output.commit();
+  }
+  const std::uint32_t held = scene.free[scene.free.size() / 2];
+  const std::string store = "cd '" + scene.folder + "' && '" + scene.tools +
+                            "/ffe-precompute' -q --columns " + patch(scene, held, 40) +
+                            " colon.ela -o colon.h5";
+  if (std::system(store.c_str()) != 0)
+    fail("no store");
+  std::puts("stage,program,springs,doubled,nodes,contacts,median_ms,fastest_ms,p99_ms,figure,unit");
+  for (const double length : {2.0, 3.0, 6.0, 12.0})
+    for (const bool stored : {false, true})
+      for (const std::size_t contacts : {std::size_t{1}, std::size_t{12}})
+        bench(scene, length, contacts, stored);
+  std::filesystem::current_path("/");
+  std::filesystem::remove_all(scene.folder);
+  return EXIT_SUCCESS;
+}
