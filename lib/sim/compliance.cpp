@@ -55,6 +55,23 @@ std::size_t Compliance::entries() const {
   return solver_ ? solver_->factor.entries() : typical_fill * axes();
 }
 
+void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
+  if (parts_.blocks)
+    parts_.blocks->need(nodes);
+  else
+    need(nodes);
+}
+
+ComplianceBlock Compliance::block(std::uint32_t node, std::uint32_t other) const {
+  if (parts_.blocks)
+    return parts_.blocks->block(node, other);
+  ComplianceBlock block{};
+  for (int a = 0; a < 3; ++a)
+    for (std::size_t b = 0; b < 3; ++b)
+      block[static_cast<std::size_t>(a)][b] = entry(node, a, 3 * std::size_t{other} + b);
+  return block;
+}
+
 bool Compliance::stored(std::span<const std::uint32_t> nodes) const {
   return std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) {
     return cache_->resident(node) || cache_->stored(node);

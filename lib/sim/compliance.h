@@ -9,6 +9,7 @@
 #include "sim/column_cache.h"
 #include "sim/load.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -18,6 +19,19 @@
 #include <vector>
 
 namespace gewebe {
+
+/// C at the axes of a node and of another, [axis][axis of the other].
+using ComplianceBlock = std::array<std::array<double, 3>, 3>;
+
+/// Blocks of C between some nodes, for less than their columns cost.
+class BlockSource {
+public:
+  virtual ~BlockSource() = default;
+  /// Prepares blocks between these nodes and all that were needed before; those may be forgotten.
+  virtual void need(std::span<const std::uint32_t> nodes) = 0;
+  /// \pre both nodes were among the last ones needed
+  virtual ComplianceBlock block(std::uint32_t node, std::uint32_t other) const = 0;
+};
 
 /// What was computed beforehand. The factor is asked for once, when first needed; without it, and
 /// without another solver, K is factorised by the constructor. Columns may be absent or of some
@@ -29,6 +43,7 @@ struct StiffnessParts {
   /// reads, in doubles.
   std::function<void(std::span<double> over_axes, std::size_t columns)> solve{};
   std::size_t solve_entries = 0;
+  std::shared_ptr<BlockSource> blocks{}; ///< in place of columns, where only blocks are asked for
 };
 
 class Compliance {
@@ -49,6 +64,12 @@ public:
   std::size_t capacity() const noexcept { return cache_->capacity(); }
   /// Brings columns to memory. \pre at most capacity() nodes \throw Error if they can't be read
   void need(std::span<const std::uint32_t> nodes) { cache_->need(nodes); }
+  /// As need, but of C only blocks between these nodes will be asked for.
+  void need_blocks(std::span<const std::uint32_t> nodes);
+  /// \pre both nodes were among those of the last need_blocks; 0 where an axis is fixed
+  ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
+  /// Whether blocks come without columns, which then are not at hand for sums.
+  bool has_blocks() const noexcept { return parts_.blocks != nullptr; }
   /// C at a row and a node's axis. \pre the node was needed; 0 where the axis is fixed
   double entry(std::uint32_t node, int axis, std::size_t row) const {
     return cache_->entry(node, axis, row);

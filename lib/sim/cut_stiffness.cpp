@@ -5,6 +5,7 @@
 #include "sim/condition.h"
 #include "sim/corrected_columns.h"
 #include "sim/factor.h"
+#include "sim/half_blocks.h"
 #include "sim/stiffness.h"
 
 #include <algorithm>
@@ -200,12 +201,19 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
   return work;
 }
 
-/// Solves for the model of now, and refuses when another cut has changed the factor.
-AxesSolve CutStiffness::solver() const {
-  return [factor = std::shared_ptr<const FrontalFactor>(factor_), correction = correction_,
-          generation = generation_, made = *generation_](std::span<double> f, std::size_t columns) {
+/// Throws when another cut has changed the factor.
+std::function<void()> CutStiffness::still_valid() const {
+  return [generation = generation_, made = *generation_] {
     if (*generation != made)
       throw Error("the object was cut since, expected its new stiffness to be asked");
+  };
+}
+
+/// Solves for the model of now.
+AxesSolve CutStiffness::solver() const {
+  return [factor = std::shared_ptr<const FrontalFactor>(factor_), correction = correction_,
+          check = still_valid()](std::span<double> f, std::size_t columns) {
+    check();
     if (correction != nullptr)
       correction->solve(f, columns);
     else
@@ -217,6 +225,8 @@ StiffnessParts CutStiffness::parts() const {
   StiffnessParts parts;
   parts.solve = solver();
   parts.solve_entries = factor_->entries();
+  if (correction_ == nullptr)
+    parts.blocks = std::make_shared<HalfBlocks>(factor_, still_valid());
   if (correction_ != nullptr)
     parts.solve_entries += correction_->change().rank() * factor_->axes();
   if (columns_ != nullptr)

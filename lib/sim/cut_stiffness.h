@@ -54,6 +54,7 @@ public:
 
 private:
   CutWay cheapest(std::size_t rank) const;
+  std::function<void()> still_valid() const;
   AxesSolve solver() const;
   void require_condition();
   void factorise(const std::function<void()>& work);

@@ -96,6 +96,7 @@ struct Elastostatic::State {
   std::vector<double> question;      // what the contacts have to be moved by, beyond other loads
   std::vector<double> contact_force; // by axis of the block
   bool by_block = false;             // how the present load is met
+  int shapes_of_contacts = 0;        // that were asked for with this set
   ShapeModes modes;                  // of this set: question to shape
 
   // K with these nodes held, and what its springs add to it.
@@ -238,17 +239,22 @@ struct Elastostatic::State {
 
   bool join(std::uint32_t node) {
     Contact contact{node, {}};
+    std::vector<ComplianceBlock> with;
+    with.reserve(contacts.size());
+    for (const Contact& other : contacts)
+      with.push_back(compliance.block(node, other.node));
+    const ComplianceBlock own = compliance.block(node, node);
     std::vector<double> row;
-    for (int a = 0; a < 3; ++a) {
-      if (is_fixed(model, node, a))
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (is_fixed(model, node, static_cast<int>(a)))
         continue;
-      contact.axes.push_back(axis_of(node, a));
+      contact.axes.push_back(axis_of(node, static_cast<int>(a)));
       row.clear();
-      for (const Contact& other : contacts)
-        for (const std::size_t axis : other.axes)
-          row.push_back(compliance.entry(node, a, axis));
+      for (std::size_t k = 0; k < contacts.size(); ++k)
+        for (const std::size_t axis : contacts[k].axes)
+          row.push_back(with[k][a][axis % 3]);
       for (const std::size_t axis : contact.axes)
-        row.push_back(compliance.entry(node, a, axis));
+        row.push_back(own[a][axis % 3]);
       if (!block.append(row)) {
         block.remove(block.size() + 1 - contact.axes.size(), contact.axes.size() - 1);
         return false;
@@ -276,7 +282,8 @@ struct Elastostatic::State {
     modes.clear();
     if (2 * staying < contacts.size() || block_changes > most_increments)
       leave_all();
-    compliance.need(nodes_of(nodes));
+    shapes_of_contacts = 0;
+    compliance.need_blocks(nodes_of(nodes));
     std::size_t row = 0;
     for (std::size_t k = 0; k < contacts.size();) {
       if (nodes.contains(contacts[k].node)) {
@@ -534,7 +541,11 @@ struct Elastostatic::State {
       return;
     }
     if (!shape_by_modes(now)) {
-      std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+      const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+      // One node's columns cost as much as a solve; more of them pay when a second shape comes.
+      if (by_block && compliance.has_blocks() && nodes.size() <= block_solved &&
+          (nodes.size() == 1 || ++shapes_of_contacts > 1))
+        compliance.need(nodes);
       if (outer_known(now) || compliance.columns_pay(nodes)) {
         renew_outer(now);
         u = outer;

@@ -12,7 +12,8 @@ namespace gewebe {
 inline constexpr std::size_t front_panel = 32, front_strip = 8;
 
 /// A front by columns: `columns` of `rows` numbers, and behind them the lower triangle of what is
-/// left, `rows - columns` columns of as many numbers.
+/// left, `rows - columns` columns of as many numbers. Of entries right of the diagonal those within
+/// a strip may be written to, as numbers that mean nothing.
 struct FrontArrays {
   std::size_t rows = 0, columns = 0;
   double* l = nullptr;

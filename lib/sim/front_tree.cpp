@@ -72,7 +72,7 @@ std::vector<std::uint32_t> postorder(std::span<const std::uint32_t> parent) {
 /// Of a run of positions, which are eliminated together.
 struct Run {
   std::uint32_t first = 0, last = 0;
-  std::vector<std::uint32_t> boundary; // positions, in any order
+  std::vector<std::uint32_t> boundary; // positions, in any order; those up to `last` don't count
   std::uint64_t zeros = 0;             // entries of L that are there for nothing
   std::uint64_t rows = 0;              // axes: eliminated, and
   std::uint64_t below = 0;             // in the boundary
@@ -110,22 +110,25 @@ public:
 private:
   std::uint64_t axes(std::uint32_t k) const { return graph_.axes[tree_.sequence[k]]; }
 
+  /// What is marked with a run's number is in its boundary, or eliminated by it; a run that grows
+  /// keeps its marks.
   void add(std::uint32_t k) {
     // The last child ends right before k; what it reaches is most of what k does.
     Run* last = nullptr;
-    mark_[k] = k;
+    std::uint32_t mark = static_cast<std::uint32_t>(runs_.size());
     added_.clear();
     if (child_[k] != none) {
       last = &runs_.back();
-      for (const std::uint32_t b : last->boundary)
-        mark_[b] = k;
+      --mark;
+      mark_[k] = mark;
       for (std::uint32_t c = child_[k]; c != k - 1; c = sibling_[c])
         for (const std::uint32_t b : runs_[run_of_[c]].boundary)
-          reach(b, k);
+          if (b > k)
+            reach(b, mark);
     }
     for (const auto& arm : graph_.of(tree_.sequence[k]))
       if (const std::uint32_t b = tree_.position[arm.node]; b != none && b > k)
-        reach(b, k);
+        reach(b, mark);
     std::uint64_t below = 0;
     for (const std::uint32_t b : added_)
       below += axes(b);
@@ -135,10 +138,12 @@ private:
       const std::uint64_t rows = last->rows + axes(k);
       const std::uint64_t zeros = last->zeros + last->rows * (below + axes(k) - last->below);
       if (may_hold(rows, static_cast<double>(zeros) / static_cast<double>(entries(rows, below)))) {
-        std::erase(last->boundary, k);
         last->boundary.insert(last->boundary.end(), added_.begin(), added_.end());
-        *last = {last->first, k, std::move(last->boundary), zeros, rows, below};
-        run_of_[k] = static_cast<std::uint32_t>(runs_.size() - 1);
+        last->last = k;
+        last->zeros = zeros;
+        last->rows = rows;
+        last->below = below;
+        run_of_[k] = mark;
         return;
       }
     }
@@ -146,16 +151,18 @@ private:
     run.boundary.reserve(added_.size() + (last == nullptr ? 0 : last->boundary.size()));
     if (last != nullptr)
       for (const std::uint32_t b : last->boundary)
-        if (b != k)
+        if (b > k)
           run.boundary.push_back(b);
     run.boundary.insert(run.boundary.end(), added_.begin(), added_.end());
     run_of_[k] = static_cast<std::uint32_t>(runs_.size());
+    for (const std::uint32_t b : run.boundary)
+      mark_[b] = run_of_[k];
     runs_.push_back(std::move(run));
   }
 
-  void reach(std::uint32_t b, std::uint32_t k) {
-    if (mark_[b] != k) {
-      mark_[b] = k;
+  void reach(std::uint32_t b, std::uint32_t mark) {
+    if (mark_[b] != mark) {
+      mark_[b] = mark;
       added_.push_back(b);
     }
   }
@@ -186,24 +193,40 @@ FrontTree front_tree(const SpringGraph& graph, std::span<const std::uint32_t> or
   Runs all(graph, tree, parent);
   std::vector<Run>& runs = all.runs();
   std::vector<std::uint32_t> front_of(parent.size());
-  std::size_t size = 0;
-  for (std::uint32_t f = 0; f < runs.size(); ++f) {
-    std::fill(front_of.begin() + runs[f].first, front_of.begin() + runs[f].last + 1, f);
-    size += runs[f].boundary.size();
-  }
+  // Boundaries ascend when they are filled position by position.
+  std::vector<std::size_t> reached(parent.size() + 1, 0); // how many fronts reach each position
   tree.first.reserve(runs.size() + 1);
   tree.start.reserve(runs.size() + 1);
-  tree.boundary.reserve(size);
   tree.first.push_back(0);
   tree.start.push_back(0);
-  for (Run& run : runs) {
-    std::sort(run.boundary.begin(), run.boundary.end());
+  for (std::uint32_t f = 0; f < runs.size(); ++f) {
+    Run& run = runs[f];
+    std::fill(front_of.begin() + run.first, front_of.begin() + run.last + 1, f);
+    std::erase_if(run.boundary, [&](std::uint32_t b) { return b <= run.last; });
     for (const std::uint32_t b : run.boundary)
-      tree.boundary.push_back(tree.sequence[b]);
+      ++reached[b + std::size_t{1}];
     tree.first.push_back(run.last + 1);
-    tree.start.push_back(tree.boundary.size());
-    tree.parent.push_back(run.boundary.empty() ? none : front_of[run.boundary[0]]);
+    tree.start.push_back(tree.start.back() + run.boundary.size());
   }
+  for (std::size_t b = 0; b < parent.size(); ++b)
+    reached[b + 1] += reached[b];
+  std::vector<std::uint32_t> fronts(tree.start.back()); // that reach each position
+  {
+    std::vector<std::size_t> next(reached.begin(), reached.end() - 1);
+    for (std::uint32_t f = 0; f < runs.size(); ++f)
+      for (const std::uint32_t b : runs[f].boundary)
+        fronts[next[b]++] = f;
+  }
+  tree.boundary.resize(fronts.size());
+  std::vector<std::size_t> next(tree.start.begin(), tree.start.end() - 1);
+  tree.parent.assign(runs.size(), none);
+  for (std::size_t b = 0; b < parent.size(); ++b)
+    for (std::size_t k = reached[b]; k < reached[b + 1]; ++k) {
+      const std::uint32_t f = fronts[k];
+      if (next[f] == tree.start[f])
+        tree.parent[f] = front_of[b];
+      tree.boundary[next[f]++] = tree.sequence[b];
+    }
   return tree;
 }
 

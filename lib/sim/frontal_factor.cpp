@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
+#include <tuple>
 #include <utility>
 
 // Based on: Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
@@ -29,12 +31,18 @@ struct FreeAxes {
   std::uint8_t count = 0;
 };
 
-FreeAxes free_axes(const Model& model, std::uint32_t node) {
-  FreeAxes free;
-  for (std::uint8_t a = 0; a < 3; ++a)
-    if ((model.nodes[node].fixed >> a & 1) == 0)
-      free.axis[free.count++] = a;
-  return free;
+/// By the set of fixed ones.
+constexpr std::array<FreeAxes, 8> all_free_axes = [] {
+  std::array<FreeAxes, 8> all;
+  for (std::uint8_t set = 0; set < 8; ++set)
+    for (std::uint8_t a = 0; a < 3; ++a)
+      if ((set >> a & 1) == 0)
+        all[set].axis[all[set].count++] = a;
+  return all;
+}();
+
+const FreeAxes& free_axes(const Model& model, std::uint32_t node) {
+  return all_free_axes[model.nodes[node].fixed & 7U];
 }
 
 /// 0, 1, 2 …: nothing has moved.
@@ -45,18 +53,53 @@ bool ascend_by_one(std::span<const std::uint32_t> numbers) {
   return true;
 }
 
+void add_to(double* __restrict into, const double* __restrict values, std::size_t count) {
+  for (std::size_t k = 0; k < count; ++k)
+    into[k] += values[k];
+}
+
 double operations_of(double columns, double below) {
   return columns * columns * columns / 3 + columns * columns * below + columns * below * below;
 }
 
 } // namespace
 
+namespace {
+
+/// Columns of a lower triangle, or of its first part; what is right of the diagonal is not there but
+/// for a strip.
+class Trapezoid {
+public:
+  /// All zero. Memory is kept where it is large enough.
+  void clear(std::size_t rows, std::size_t columns) {
+    size_ = rows * columns;
+    if (size_ > capacity_) {
+      capacity_ = size_;
+      data_ = std::make_unique_for_overwrite<double[]>(size_);
+    }
+    for (std::size_t c = 0; c < columns; ++c) {
+      const std::size_t skipped = c - std::min(c, front_strip);
+      std::fill(data_.get() + c * rows + skipped, data_.get() + (c + 1) * rows, 0.0);
+    }
+  }
+  std::size_t size() const noexcept { return size_; }
+  double* data() noexcept { return data_.get(); }
+  const double* data() const noexcept { return data_.get(); }
+  double& operator[](std::size_t k) { return data_[k]; }
+
+private:
+  std::unique_ptr<double[]> data_;
+  std::size_t size_ = 0, capacity_ = 0;
+};
+
+} // namespace
+
 struct FrontalFactor::State {
   struct Front {
     std::size_t rows = 0, columns = 0;
-    std::vector<double> l;    // rows x columns
-    std::vector<double> rest; // what it leaves to its parent, the lower triangle counts
-    double weakest = 1;       // pivot over diagonal entry
+    Trapezoid l;        // rows x columns
+    Trapezoid rest;     // what it leaves to its parent
+    double weakest = 1; // pivot over diagonal entry
   };
 
   FrontTree tree;
@@ -74,6 +117,8 @@ struct FrontalFactor::State {
   std::vector<std::int64_t> super, pi, s;
   std::vector<const double*> blocks;
   std::vector<std::uint32_t> axis_of_row;
+  std::vector<std::uint32_t> row_of_node; // the first of its axes, or none
+  std::vector<std::uint32_t> to_root;     // rows eliminated by a front and all above it
   std::size_t longest = 1, entries = 0;
   double weakest = 1;
 
@@ -96,11 +141,11 @@ struct FrontalFactor::State {
       next += graph.axes[node];
     }
     front.rows = next;
-    front.l.assign(front.rows * front.columns, 0.0);
-    front.rest.assign((front.rows - front.columns) * (front.rows - front.columns), 0.0);
+    front.l.clear(front.rows, front.columns);
+    front.rest.clear(front.rows - front.columns, front.rows - front.columns);
     least.clear();
     for (const std::uint32_t node : own) {
-      const FreeAxes free = free_axes(model, node);
+      const FreeAxes& free = free_axes(model, node);
       SymmetricBlock diagonal{};
       for (const auto& arm : graph.of(node)) {
         const SymmetricBlock block = stiffness_block(model, model.springs[arm.spring]);
@@ -108,7 +153,7 @@ struct FrontalFactor::State {
           diagonal[k] += block[k];
         if (tree.position[arm.node] == none || tree.position[arm.node] < tree.position[node])
           continue;
-        const FreeAxes other = free_axes(model, arm.node);
+        const FreeAxes& other = free_axes(model, arm.node);
         for (std::size_t a = 0; a < free.count; ++a)
           for (std::size_t b = 0; b < other.count; ++b)
             front.l[(row[node] + a) * front.rows + row[arm.node] + b] -=
@@ -123,41 +168,55 @@ struct FrontalFactor::State {
     }
   }
 
+  /// Rows of what a child leaves that stand one behind the other in the parent too.
+  struct Run {
+    std::size_t begin = 0, end = 0;
+    std::size_t to = 0; // where the first stands
+  };
+
   /// What a child leaves comes to where its boundary stands in this front.
-  void take_over(std::size_t f, std::size_t child, const Rows& row,
-                 std::vector<std::uint32_t>& to) {
+  void take_over(std::size_t f, std::size_t child, const Rows& row, std::vector<Run>& runs) {
     Front& front = fronts[f];
     const Front& from = fronts[child];
-    to.clear();
-    for (const std::uint32_t node : tree.boundary_of(child))
-      for (std::uint32_t a = 0; a < graph.axes[node]; ++a)
-        to.push_back(row[node] + a);
-    const std::size_t below = front.rows - front.columns;
-    for (std::size_t c = 0; c < to.size(); ++c) {
-      const double* const column = from.rest.data() + c * to.size();
-      if (to[c] < front.columns) {
-        double* const into = front.l.data() + to[c] * front.rows;
-        for (std::size_t r = c; r < to.size(); ++r)
-          into[to[r]] += column[r];
-      } else {
-        double* const into = front.rest.data() + (to[c] - front.columns) * below;
-        for (std::size_t r = c; r < to.size(); ++r)
-          into[to[r] - front.columns] += column[r];
-      }
+    runs.clear();
+    std::size_t size = 0;
+    for (const std::uint32_t node : tree.boundary_of(child)) {
+      const std::size_t axes = graph.axes[node];
+      // Those of this front's own columns apart, for they stand in another matrix.
+      if (!runs.empty() && runs.back().to + size - runs.back().begin == row[node] &&
+          row[node] != front.columns)
+        runs.back().end += axes;
+      else
+        runs.push_back({size, size + axes, row[node]});
+      size += axes;
     }
+    const std::size_t below = front.rows - front.columns;
+    for (auto run = runs.begin(); run != runs.end(); ++run)
+      for (std::size_t c = run->begin; c < run->end; ++c) {
+        const double* const column = from.rest.data() + c * size;
+        const std::size_t at = run->to + c - run->begin;
+        double* const into = at < front.columns ? front.l.data() + at * front.rows
+                                                : front.rest.data() + (at - front.columns) * below;
+        const std::size_t skipped = at < front.columns ? 0 : front.columns;
+        for (auto rows = run; rows != runs.end(); ++rows) {
+          const std::size_t begin = rows == run ? c : rows->begin;
+          add_to(into + (rows->to + begin - rows->begin - skipped), column + begin,
+                 rows->end - begin);
+        }
+      }
   }
 
   struct Scratch {
     Rows row;
     std::vector<double> least, packed;
-    std::vector<std::uint32_t> to;
+    std::vector<Run> runs;
   };
 
   void compute(const Model& model, std::size_t f, std::span<const std::uint32_t> children,
                Scratch& scratch, const Context& context) {
     assemble(model, f, scratch.row, scratch.least);
     for (const std::uint32_t child : children)
-      take_over(f, child, scratch.row, scratch.to);
+      take_over(f, child, scratch.row, scratch.runs);
     Front& front = fronts[f];
     front.weakest = 1;
     const FrontKernel& kernel =
@@ -288,11 +347,11 @@ struct FrontalFactor::State {
     axis_of_row.clear();
     longest = 1;
     entries = 0;
-    weakest = 1;
-    std::vector<std::uint32_t> row(graph.axes.size(), none);
+    row_of_node.assign(graph.axes.size(), none);
+    std::vector<std::uint32_t>& row = row_of_node;
     for (const std::uint32_t node : tree.sequence) {
       row[node] = static_cast<std::uint32_t>(axis_of_row.size());
-      const FreeAxes free = free_axes(model, node);
+      const FreeAxes& free = free_axes(model, node);
       for (std::size_t a = 0; a < free.count; ++a)
         axis_of_row.push_back(3 * node + free.axis[a]);
     }
@@ -308,9 +367,32 @@ struct FrontalFactor::State {
       pi.push_back(static_cast<std::int64_t>(s.size()));
       blocks.push_back(fronts[f].l.data());
       longest = std::max(longest, fronts[f].rows - fronts[f].columns);
-      weakest = std::min(weakest, fronts[f].weakest);
       entries += fronts[f].l.size();
     }
+    find_weakest();
+    to_root.resize(count);
+    for (std::size_t f = count; f-- > 0;)
+      to_root[f] = static_cast<std::uint32_t>(fronts[f].columns) +
+                   (tree.parent[f] == none ? 0 : to_root[tree.parent[f]]);
+  }
+
+  SupernodalArrays arrays() const {
+    return {super.size() - 1, super.data(), pi.data(),    nullptr,
+            s.data(),         nullptr,      blocks.data()};
+  }
+
+  std::uint32_t front_of_node(std::uint32_t node) const {
+    if (row_of_node[node] == none)
+      return none;
+    const auto above = std::upper_bound(super.begin(), super.end(),
+                                        static_cast<std::int64_t>(row_of_node[node]));
+    return static_cast<std::uint32_t>(above - super.begin() - 1);
+  }
+
+  void find_weakest() {
+    weakest = 1;
+    for (const Front& front : fronts)
+      weakest = std::min(weakest, front.weakest);
   }
 
   void remember(const Model& model) {
@@ -325,22 +407,51 @@ struct FrontalFactor::State {
 
   // ---- changes
 
-  /// Whether a node's row of K is as it was, its neighbours' numbers aside.
-  bool same_row(const Model& model, const SpringGraph& now, std::uint32_t node,
-                std::uint32_t before, std::span<const std::uint32_t> place) const {
-    const auto arms = now.of(node), old = graph.of(before);
-    if (arms.size() != old.size() || model.nodes[node].fixed != fixed[before] ||
-        !(model.nodes[node].position == position[before]))
-      return false;
-    for (std::size_t k = 0; k < arms.size(); ++k) {
-      const std::uint32_t there = place.empty() ? old[k].node : place[old[k].node];
-      if (arms[k].node != there || !(model.nodes[there].position == position[old[k].node]))
-        return false;
-      const Spring &a = model.springs[arms[k].spring], &b = springs[old[k].spring];
-      if (a.stiffness != b.stiffness || a.rest != b.rest)
-        return false;
+  /// By node: whether its row of K is other than it was, its neighbours' numbers aside. Both lists
+  /// of springs ascend alike where nodes keep their order, so one pass finds what differs; in
+  /// another order more of them seem changed than are.
+  std::vector<char> changed_rows(const Model& model, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place) const {
+    const std::size_t n = model.nodes.size();
+    std::vector<char> changed(n, 0), moved(n, 0);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t old = origin.empty() ? i : origin[i];
+      const bool copy = !place.empty() && place[old] != i;
+      moved[i] = !(model.nodes[i].position == position[old]);
+      changed[i] = copy || moved[i] || model.nodes[i].fixed != fixed[old];
     }
-    return true;
+    const auto mark = [&](std::uint32_t node) {
+      if (node != none)
+        changed[node] = 1;
+    };
+    const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
+    std::size_t b = 0;
+    for (const Spring& was : springs) {
+      const std::uint32_t i = placed(was.i), j = placed(was.j);
+      const auto key = std::tuple(was.kind, i, j);
+      for (; b < model.springs.size(); ++b) {
+        const Spring& is = model.springs[b];
+        if (i == none || j == none || !(std::tie(is.kind, is.i, is.j) < key))
+          break;
+        mark(is.i);
+        mark(is.j);
+      }
+      if (i != none && j != none && b < model.springs.size()) {
+        const Spring& is = model.springs[b];
+        if (std::tie(is.kind, is.i, is.j) == key) {
+          ++b;
+          if (is.stiffness == was.stiffness && is.rest == was.rest && !moved[i] && !moved[j])
+            continue;
+        }
+      }
+      mark(i);
+      mark(j);
+    }
+    for (; b < model.springs.size(); ++b) {
+      mark(model.springs[b].i);
+      mark(model.springs[b].j);
+    }
+    return changed;
   }
 
   /// Whether the tree serves this graph too: the same nodes free, and no spring where none was.
@@ -395,12 +506,7 @@ struct FrontalFactor::State {
     const std::size_t n = model.nodes.size();
     if (n == graph.axes.size() && ascend_by_one(origin) && ascend_by_one(place))
       origin = place = {};
-    std::vector<char> changed(n, 1);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t old = origin.empty() ? i : origin[i];
-      if (place.empty() || place[old] == i)
-        changed[i] = !same_row(model, now, i, old, place);
-    }
+    const std::vector<char> changed = changed_rows(model, origin, place);
     std::vector<char> wanted;
     if (still_fits(now, place)) {
       graph = std::move(now);
@@ -412,14 +518,15 @@ struct FrontalFactor::State {
           wanted[tree.parent[f]] = 1;
       }
       factorise(model, wanted, context);
+      find_weakest();
     } else {
       const std::vector<std::uint32_t> order = order_for(now, origin, place);
       graph = std::move(now);
       wanted = grow(order, changed, place);
       require_memory(context, bytes_needed(), "the factor of the stiffness matrix");
       factorise(model, wanted, context);
+      lay_out(model);
     }
-    lay_out(model);
     remember(model);
   }
 
@@ -502,8 +609,7 @@ double FrontalFactor::weakest_pivot() const noexcept {
 
 void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) const {
   const State& s = *state_;
-  const SupernodalArrays l{s.super.size() - 1, s.super.data(), s.pi.data(),    nullptr,
-                           s.s.data(),         nullptr,        s.blocks.data()};
+  const SupernodalArrays l = s.arrays();
   const std::size_t order = s.axis_of_row.size(), all = axes();
   std::vector<double> x, work(s.longest * panel_width);
   for (std::size_t first = 0; first < columns;) {
@@ -522,6 +628,63 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
         from[j * all + s.axis_of_row[k]] = x[k * width + j];
     first += count;
   }
+}
+
+std::vector<FrontalFactor::HalfSolution>
+FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
+  constexpr std::size_t at_once = panel_width;
+  const State& s = *state_;
+  std::vector<HalfSolution> all(nodes.size());
+  std::vector<double> x;
+  std::vector<std::uint32_t> fronts;
+  for (std::size_t first = 0; first < nodes.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, nodes.size() - first);
+    const std::size_t width = solve_width(3 * count);
+    fronts.clear();
+    x.assign(s.axis_of_row.size() * width, 0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
+      all[first + k].front = s.front_of_node(node);
+      for (std::uint32_t f = all[first + k].front; f != none; f = s.tree.parent[f])
+        fronts.push_back(f);
+      for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
+        x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
+    }
+    std::sort(fronts.begin(), fronts.end());
+    fronts.erase(std::unique(fronts.begin(), fronts.end()), fronts.end());
+    (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline
+                                 : forward_supernodal_avx2)(s.arrays(), fronts, x.data(), width);
+    for (std::size_t k = 0; k < count; ++k) {
+      HalfSolution& half = all[first + k];
+      if (half.front != none)
+        half.values.reserve(s.to_root[half.front]);
+      for (std::uint32_t f = half.front; f != none; f = s.tree.parent[f])
+        for (auto row = static_cast<std::size_t>(s.super[f]);
+             row < static_cast<std::size_t>(s.super[f + std::size_t{1}]); ++row) {
+          const double* const values = x.data() + row * width + 3 * k;
+          half.values.push_back({values[0], values[1], values[2]});
+        }
+    }
+  }
+  return all;
+}
+
+std::array<std::array<double, 3>, 3> FrontalFactor::compliance(const HalfSolution& a,
+                                                               const HalfSolution& b) const {
+  std::array<std::array<double, 3>, 3> block{};
+  std::uint32_t f = a.front, g = b.front; // to where both ways meet
+  while (f != g && f != none && g != none)
+    (f < g ? f : g) = state_->tree.parent[std::min(f, g)];
+  if (f != g || f == none)
+    return block; // in different trees, or fixed
+  const std::size_t common = state_->to_root[f];
+  const auto* const p = a.values.data() + (a.values.size() - common);
+  const auto* const q = b.values.data() + (b.values.size() - common);
+  for (std::size_t k = 0; k < common; ++k)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        block[i][j] += p[k][i] * q[k][j];
+  return block;
 }
 
 } // namespace gewebe

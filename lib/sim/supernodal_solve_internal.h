@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace gewebe {
 
@@ -36,8 +37,19 @@ inline std::size_t solve_width(std::size_t vectors) {
 using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, std::size_t vectors,
                                  double* work);
 
+/// The first half alone, x = L⁻¹ x, of right-hand sides that reach these supernodes only, ascending.
+using SupernodalForward = void (*)(const SupernodalArrays& l,
+                                   std::span<const std::uint32_t> supernodes, double* x,
+                                   std::size_t vectors);
+
 void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
                                double* work);
 void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vectors, double* work);
+
+void forward_supernodal_baseline(const SupernodalArrays& l,
+                                 std::span<const std::uint32_t> supernodes, double* x,
+                                 std::size_t vectors);
+void forward_supernodal_avx2(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
+                             double* x, std::size_t vectors);
 
 } // namespace gewebe

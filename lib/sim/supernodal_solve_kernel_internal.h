@@ -207,6 +207,14 @@ void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
   });
 }
 
+template <class Of>
+void forward_some(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes, double* x,
+                  std::size_t stride) {
+  for (const std::uint32_t k : supernodes)
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      forward<Of>(supernode(l, k), x + v, stride);
+}
+
 /// `stride` vectors side by side, Of::width of them at a time: a supernode is read once for all.
 template <class Of>
 void solve(const SupernodalArrays& l, double* x, std::size_t stride, double* work) {
