@@ -543,7 +543,8 @@ struct Elastostatic::State {
     if (!shape_by_modes(now)) {
       const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
       // One node's columns cost as much as a solve; more of them pay when a second shape comes.
-      if (by_block && compliance.has_blocks() && nodes.size() <= block_solved &&
+      if (by_block && compliance.has_blocks() &&
+          (nodes.size() <= block_solved || compliance.stored(nodes)) &&
           (nodes.size() == 1 || ++shapes_of_contacts > 1))
         compliance.need(nodes);
       if (outer_known(now) || compliance.columns_pay(nodes)) {

@@ -63,8 +63,8 @@ inline std::size_t eliminate_square(const FrontArrays& f, std::size_t begin, std
   return count;
 }
 
-/// Rows behind the eliminated columns, in strips that end with the last row; the first one may begin
-/// above `end`.
+/// Rows behind the eliminated columns, in strips that end with the last row; the first one may
+/// begin above `end`.
 struct Strips {
   std::size_t end, count;
   std::ptrdiff_t first; ///< row where the first would begin
@@ -117,8 +117,8 @@ inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_
     double* const to = packed + strip * strip_size;
     const std::size_t missing = strips.missing(strip);
     for (std::size_t c = 0; c < count; ++c) {
-      double* const rows = f.l + (begin + c) * f.rows + strips.start(strip) +
-                           static_cast<std::ptrdiff_t>(missing);
+      double* const rows =
+          f.l + (begin + c) * f.rows + strips.start(strip) + static_cast<std::ptrdiff_t>(missing);
       double* const there = to + c * front_strip + missing;
       if (out) {
         std::fill_n(to + c * front_strip, missing, 0.0);

@@ -66,8 +66,8 @@ double operations_of(double columns, double below) {
 
 namespace {
 
-/// Columns of a lower triangle, or of its first part; what is right of the diagonal is not there but
-/// for a strip.
+/// Columns of a lower triangle, or of its first part; what is right of the diagonal is not there
+/// but for a strip.
 class Trapezoid {
 public:
   /// All zero. Memory is kept where it is large enough.
@@ -377,15 +377,14 @@ struct FrontalFactor::State {
   }
 
   SupernodalArrays arrays() const {
-    return {super.size() - 1, super.data(), pi.data(),    nullptr,
-            s.data(),         nullptr,      blocks.data()};
+    return {super.size() - 1, super.data(), pi.data(), nullptr, s.data(), nullptr, blocks.data()};
   }
 
   std::uint32_t front_of_node(std::uint32_t node) const {
     if (row_of_node[node] == none)
       return none;
-    const auto above = std::upper_bound(super.begin(), super.end(),
-                                        static_cast<std::int64_t>(row_of_node[node]));
+    const auto above =
+        std::upper_bound(super.begin(), super.end(), static_cast<std::int64_t>(row_of_node[node]));
     return static_cast<std::uint32_t>(above - super.begin() - 1);
   }
 

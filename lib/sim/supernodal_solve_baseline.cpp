@@ -12,8 +12,9 @@ void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t
     solve<Wide>(l, x, vectors, work);
 }
 
-void forward_supernodal_baseline(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
-                             double* x, std::size_t vectors) {
+void forward_supernodal_baseline(const SupernodalArrays& l,
+                                 std::span<const std::uint32_t> supernodes, double* x,
+                                 std::size_t vectors) {
   if (vectors == 1)
     forward_some<Single>(l, supernodes, x, 1);
   else if (vectors == 4)

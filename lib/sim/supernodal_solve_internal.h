@@ -24,20 +24,22 @@ struct SupernodalArrays {
 
 inline constexpr std::size_t panel_width = 8;
 
-/// How many right-hand sides to set side by side for so many: one, four (those of a node's axes), or
-/// a multiple of panel_width.
+/// How many right-hand sides to set side by side for so many: one, four (those of a node's axes),
+/// or a multiple of panel_width.
 inline std::size_t solve_width(std::size_t vectors) {
   return vectors == 1   ? 1
          : vectors <= 4 ? 4
                         : (vectors + panel_width - 1) / panel_width * panel_width;
 }
 
-/// x = L⁻ᵀ L⁻¹ x in place, for `vectors` of them side by side, x[row][vector]: solve_width() many. `work` holds panel_width numbers for each row that the longest supernode has
-/// below its own columns.
+/// x = L⁻ᵀ L⁻¹ x in place, for `vectors` of them side by side, x[row][vector]: solve_width() many.
+/// `work` holds panel_width numbers for each row that the longest supernode has below its own
+/// columns.
 using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, std::size_t vectors,
                                  double* work);
 
-/// The first half alone, x = L⁻¹ x, of right-hand sides that reach these supernodes only, ascending.
+/// The first half alone, x = L⁻¹ x, of right-hand sides that reach these supernodes only,
+/// ascending.
 using SupernodalForward = void (*)(const SupernodalArrays& l,
                                    std::span<const std::uint32_t> supernodes, double* x,
                                    std::size_t vectors);

@@ -119,8 +119,8 @@ void forward_below(const Supernode& n, std::size_t r, const double* own, double*
     sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * stride);
 }
 
-/// Asks for all of L's block at once: its columns are short streams, which no hardware foresees, and
-/// one miss after the other would cost several times what memory needs to deliver them.
+/// Asks for all of L's block at once: its columns are short streams, which no hardware foresees,
+/// and one miss after the other would cost several times what memory needs to deliver them.
 inline void fetch(const Supernode& n) {
   constexpr std::size_t line = 64 / sizeof(double);
   const std::size_t count = n.columns * n.rows;
@@ -137,8 +137,8 @@ bool all_zero(const double* x, std::size_t count, std::size_t stride) {
   return true;
 }
 
-/// work(first, N) for all of [0, count) in runs of Of::rows, then what is left as one shorter run: one
-/// by one, each would wait for its own last subtraction.
+/// work(first, N) for all of [0, count) in runs of Of::rows, then what is left as one shorter run:
+/// one by one, each would wait for its own last subtraction.
 template <class Of, class Work>
 void in_runs(std::size_t count, const Work& work) {
   std::size_t k = 0;
