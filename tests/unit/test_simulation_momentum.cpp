@@ -139,17 +139,15 @@ TEST(SimulationMomentum, APartIsAsFastAsItsLoadGrew) {
 }
 
 TEST(SimulationMomentum, WhatStandsStillHasNone) {
-  for (const int steps : {1, 3}) { // the first is no motion, nor is the third
+  for (const bool first : {true, false}) { // its first step is no motion
     Simulation s(one_thread(), {});
     s.add_object("organ", undragged(), Method::ffe);
     const std::vector<std::uint32_t> nodes = pulled_nodes(s.model(0));
     pull_for_a_step(s, nodes, 1);
-    for (int k = 1; k < steps; ++k) {
-      s.apply(SetForce{0, nodes, 1.5 * pull});
+    if (!first) {
+      pull_for_a_step(s, nodes, 1.5);
       s.step(dt);
     }
-    if (steps > 1)
-      s.step(dt);
     s.apply(lobe_off());
     ASSERT_EQ(s.object_count(), 2U);
     EXPECT_EQ(s.state().kinetic_energy, 0);
