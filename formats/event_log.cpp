@@ -173,6 +173,10 @@ void EventLog::object(double time, const std::string& name, const std::string& m
       {.time = time, .what = "object", .object = name, .text = model + " " + method_name(method)}));
 }
 
+void EventLog::model(double time, const std::string& name, const std::string& file) {
+  rows_.push_back(csv({.time = time, .what = "emit", .object = name, .text = "model " + file}));
+}
+
 void EventLog::change(const Simulation& simulation, const Change& change) {
   Describe describe{simulation};
   std::visit(describe, change);

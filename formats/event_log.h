@@ -18,6 +18,8 @@ public:
 
   /// A new object, of this model file.
   void object(double time, const std::string& name, const std::string& model, Method method);
+  /// An object's model was written to this file.
+  void model(double time, const std::string& name, const std::string& file);
   void change(const Simulation& simulation, const Change& change);
   /// What cutting did to an object.
   void cutting(const Simulation& simulation, const Cutting& cutting);

@@ -155,6 +155,8 @@ struct SceneRun::State {
     if (std::find(models.begin(), models.end(), c.file) != models.end())
       throw Error(c.file + " is the model of an object of this scene, expected another file");
     options.files.write_model(c.file, simulation.model(object));
+    if (options.events != nullptr)
+      options.events->model(simulation.time(), c.object, c.file);
   }
 
   void schedule(const Command& command, const Change& change) {

@@ -337,6 +337,9 @@ private:
   template <class Work>
   void at_object(const Object& object, Work&& work) const; ///< names object and time in an Error
   void show(Object& object);
+  void leave_shown(Object& object);
+  bool has_moved(const Object& object) const;
+  std::vector<Vec3> shape_velocity(Object& object, bool afresh);
   void shape(Object& object) const;
   void shape_in_step(Object& object);
   bool may_leave_range(Object& object, double most) const;
@@ -370,7 +373,8 @@ private:
   std::optional<StiffnessParts> cut_parts(Object& object, std::shared_ptr<const Model> next,
                                           const CutModel& cut);
   std::unique_ptr<Object> renumbered(const Object& old, std::shared_ptr<Model> model) const;
-  void move_all(std::size_t index, const Moves& moves, std::vector<std::unique_ptr<Object>> pieces);
+  void move_all(std::size_t index, const Moves& moves, std::vector<std::unique_ptr<Object>> pieces,
+                std::span<const Vec3> velocity = {});
   void move_shown(const Object& old, const Moves& moves,
                   const std::vector<std::unique_ptr<Object>>& pieces) const;
   void move_grips(std::size_t index, const Moves& moves);
@@ -396,6 +400,7 @@ private:
   Vec3 gravity_;
   std::optional<double> timestep_;
   double time_ = 0;
+  double shapes_time_ = 0;    ///< when all objects were last shown
   double sum_ = 0, lost_ = 0; ///< of the steps so far, and what rounding took from it
   bool emit_forces_ = false, emit_shapes_ = false, emit_instruments_ = false;
   SimulationCounts counts_;

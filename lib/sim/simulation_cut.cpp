@@ -35,9 +35,10 @@ auto of_object(const std::string& name, Work&& work) {
 } // namespace
 
 /// The stiffness of an elastostatic object, to follow its cuts; nothing: no solution was asked of
-/// it so far. It goes over to the next object, and is made anew where a cut is taken back.
+/// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
+/// back.
 CutStiffness* Simulation::stiffness_of(Object& object) const {
-  if (object.stiffness || !object.still)
+  if (object.stiffness || (!object.still && !has_moved(object)))
     return object.stiffness.get();
   const std::shared_ptr<const Model> first = object.first ? object.first : object.held;
   StiffnessParts parts;
@@ -153,10 +154,15 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
       add(moves.objects[k + 1], i, free.parts[k].origin[i]);
   moves.add(ways, old.model.nodes.size());
 
+  std::vector<Vec3> velocity = old.came.velocity;
+  if (!free.parts.empty()) // before the stiffness follows the cut
+    velocity = shape_velocity(old, false);
+
   const std::size_t removed = cut.removed, doubled = cut.doubled;
   CutModel rest = without_parts(std::move(cut), std::move(free.rest));
   const auto now = std::make_shared<Model>(std::move(rest.model));
   std::optional<StiffnessParts> prepared;
+  bool loose = !old.came.velocity.empty();
   if (old.method == Method::ffe) {
     if (undo_->open && old.still)
       undo_->updated.insert(&old);
@@ -164,6 +170,9 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
       prepared = cut_parts(old, now, rest);
     } catch (const SingularStiffness&) {
       prepared.reset(); // found when the shape is asked for
+      loose = true;
+      if (velocity.empty()) // the factor may have followed the cut
+        velocity = shape_velocity(old, true);
     }
   }
   std::vector<std::unique_ptr<Object>> pieces;
@@ -172,6 +181,13 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
   next.first = old.first ? old.first : old.held;
   next.prepared = std::move(prepared);
   next.scored = std::move(rest.left);
+  if (loose && !velocity.empty()) {
+    next.came.velocity.resize(next.model.nodes.size());
+    for (std::uint32_t i = 0; i < old.model.nodes.size(); ++i)
+      for (const Moves::To& to : moves.of(i))
+        if (to.object == index)
+          next.came.velocity[to.node] = velocity[i];
+  }
   next.first_nodes.reserve(rest.origin.size());
   for (const std::uint32_t o : rest.origin)
     next.first_nodes.push_back(old.first_nodes.empty() ? o : old.first_nodes[o]);
@@ -205,7 +221,7 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
     pieces.push_back(std::move(part));
   }
   ++counts_.cuts;
-  move_all(index, moves, std::move(pieces));
+  move_all(index, moves, std::move(pieces), velocity);
 }
 
 void Simulation::restore_now(std::size_t index) {
@@ -346,9 +362,12 @@ void Simulation::find_free_motion(std::size_t index) {
   Motions motions;
   std::vector<NodeMotion>& motion = motions[index];
   motion.resize(object.model.nodes.size());
-  for (std::size_t i = 0; i < motion.size(); ++i)
+  for (std::size_t i = 0; i < motion.size(); ++i) {
     motion[i].displacement = {object.displacement[3 * i], object.displacement[3 * i + 1],
                               object.displacement[3 * i + 2]};
+    if (!object.came.velocity.empty())
+      motion[i].velocity = object.came.velocity[i];
+  }
   object.method = Method::ela;
   object.shown = false;
   renew_bodies({index}, motions);

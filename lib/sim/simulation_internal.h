@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -31,6 +32,13 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 } // namespace simulation
 
 struct Simulation::Object {
+  /// Where the shape that ffe shows was one step earlier, see shape_velocity.
+  struct CameFrom {
+    Load load;
+    std::map<std::uint32_t, Vec3> touched; // where nodes stood that instruments pushed
+    double over = 0;                       // s from then to now; 0: there is none
+    std::vector<Vec3> velocity;            // of nodes, where a cut left no stiffness to find it by
+  };
   explicit Object(std::shared_ptr<Model> m = std::make_shared<Model>())
       : held(std::move(m)), model(*held) {}
   std::string name;
@@ -54,8 +62,10 @@ struct Simulation::Object {
   std::vector<NodeVector> forces_before;
   bool shown = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
-  Load shown_load, load_before;
+  Load shown_load;
   double shown_time = 0;
+  bool posed = false; // what is shown is a shape of ffe
+  CameFrom came;
   bool warned_range = false;
   double shortest_edge = 0; // mm; 0: not yet known
   double looked_at = 0;     // largest displacement when the range was last looked at

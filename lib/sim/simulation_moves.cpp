@@ -47,6 +47,10 @@ std::unique_ptr<Simulation::Object> Simulation::renumbered(const Object& old,
   next->load.gravity = old.load.gravity;
   next->shown = false;
   next->shown_time = old.shown_time;
+  next->posed = old.posed;
+  next->shown_load.gravity = old.shown_load.gravity;
+  next->came.load.gravity = old.came.load.gravity;
+  next->came.over = old.came.over;
   next->warned_range = old.warned_range;
   next->warned_stuck = old.warned_stuck;
   next->warned_unsolved = old.warned_unsolved;
@@ -72,22 +76,28 @@ void Simulation::move_shown(const Object& old, const Moves& moves,
     const auto at = std::find(moves.objects.begin(), moves.objects.end(), to.object);
     return *pieces[static_cast<std::size_t>(at - moves.objects.begin())];
   };
-  for (const auto& [node, force] : old.load.force)
-    for (const Moves::To& to : moves.of(node)) {
-      Load& load = piece(to).load;
-      load.force[to.node] += to.share * force;
-      if (const auto p = old.load.force_period.find(node); p != old.load.force_period.end())
-        load.force_period[to.node] = p->second;
-    }
-  const auto follow = [&](const auto& from, auto list) {
+  const auto follow = [&](const auto& from, auto&& list_of) {
     for (const auto& [node, value] : from)
       for (const Moves::To& to : moves.of(node))
-        if (auto& all = piece(to).load.*list; to.main || !all.contains(to.node))
+        if (auto& all = list_of(piece(to)); to.main || !all.contains(to.node))
           all[to.node] = value;
   };
-  follow(old.load.pressure, &Load::pressure);
-  follow(old.load.displacement, &Load::displacement);
-  follow(old.load.travel, &Load::travel);
+  const auto follow_load = [&](const Load& from, auto&& load_of) {
+    for (const auto& [node, force] : from.force)
+      for (const Moves::To& to : moves.of(node)) {
+        Load& load = load_of(piece(to));
+        load.force[to.node] += to.share * force;
+        if (const auto p = from.force_period.find(node); p != from.force_period.end())
+          load.force_period[to.node] = p->second;
+      }
+    follow(from.pressure, [&](Object& o) -> auto& { return load_of(o).pressure; });
+    follow(from.displacement, [&](Object& o) -> auto& { return load_of(o).displacement; });
+    follow(from.travel, [&](Object& o) -> auto& { return load_of(o).travel; });
+  };
+  follow_load(old.load, [](Object& o) -> Load& { return o.load; });
+  follow_load(old.shown_load, [](Object& o) -> Load& { return o.shown_load; });
+  follow_load(old.came.load, [](Object& o) -> Load& { return o.came.load; });
+  follow(old.came.touched, [](Object& o) -> auto& { return o.came.touched; });
   std::map<std::size_t, std::map<std::uint32_t, Vec3>> forces;
   for (const NodeVector& f : old.forces)
     for (const Moves::To& to : moves.of(f.node))
@@ -240,8 +250,10 @@ void Simulation::renew_bodies(const std::vector<std::size_t>& objects, const Mot
 
 /// The object and what came off it take its place; all that names its nodes follows.
 /// \param pieces as moves.objects
+/// \param velocity of the nodes of an elastostatic object; none: it stands still
 void Simulation::move_all(std::size_t index, const Moves& moves,
-                          std::vector<std::unique_ptr<Object>> pieces) {
+                          std::vector<std::unique_ptr<Object>> pieces,
+                          std::span<const Vec3> velocity) {
   Object& old = *objects_[index];
   Object& next = *pieces[0];
   simulation::add_counts(next.spent, old.spent);
@@ -264,7 +276,7 @@ void Simulation::move_all(std::size_t index, const Moves& moves,
     motion = state_of(old);
   } else if (old.method == Method::ffe && moves.objects.size() > 1) {
     for (std::size_t i = 0; i < old.model.nodes.size(); ++i)
-      motion.push_back({vector_at(old.displacement, i), {}});
+      motion.push_back({vector_at(old.displacement, i), velocity.empty() ? Vec3{} : velocity[i]});
   }
   if (!motion.empty())
     for (std::size_t k = old.body != nullptr ? 0 : 1; k < pieces.size(); ++k) {

@@ -101,6 +101,7 @@ void Simulation::advance(double to) {
   }
   if (poses_.size() > 1)
     poses_.erase(poses_.begin(), poses_.end() - 1);
+  shapes_time_ = time_;
   tear();
   ++counts_.steps;
 }
@@ -120,14 +121,13 @@ void Simulation::show(Object& object) {
   undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time] {
     std::swap(object.displacement, object.before);
     std::swap(object.forces, object.forces_before);
-    std::swap(object.shown_load, object.load_before);
     object.shown = shown;
     object.shaped = shaped;
     object.shown_time = time;
   });
   std::swap(object.displacement, object.before);
   std::swap(object.forces, object.forces_before);
-  std::swap(object.shown_load, object.load_before);
+  leave_shown(object);
   object.forces.clear();
   if (meets) {
     object.displacement = object.before;
@@ -151,6 +151,7 @@ void Simulation::show(Object& object) {
       shape(object);
   } else {
     object.displacement.assign(3 * object.model.nodes.size(), 0);
+    object.shown_load = {};
     object.shaped = true;
     if (object.body != nullptr)
       show_motion(object);

@@ -10,10 +10,12 @@ namespace gewebe {
 void Simulation::open_undo() {
   undo_->open = true;
   keep_instruments();
-  undo_->note([this, time = time_, sum = sum_, lost = lost_, gravity = gravity_,
-               timestep = timestep_, forces = emit_forces_, shapes = emit_shapes_, counts = counts_,
-               jumps = jumps_, ties = ties_.size(), cuttings = cuttings_] {
+  undo_->note([this, time = time_, shapes_time = shapes_time_, sum = sum_, lost = lost_,
+               gravity = gravity_, timestep = timestep_, forces = emit_forces_,
+               shapes = emit_shapes_, counts = counts_, jumps = jumps_, ties = ties_.size(),
+               cuttings = cuttings_] {
     time_ = time;
+    shapes_time_ = shapes_time;
     sum_ = sum;
     lost_ = lost;
     gravity_ = gravity;

@@ -1,8 +1,11 @@
 #pragma once
-// Textures and surfaces for pictures.
+// Textures, surfaces and looks for pictures.
 
 #include "base/mesh.h"
 #include "render/image.h"
+#include "render/look.h"
+#include "render/texture.h"
+#include "render_oracle.h"
 
 #include <cmath>
 #include <cstdint>
@@ -55,6 +58,36 @@ inline TriangleMesh torus(std::uint32_t around, std::uint32_t across, bool mirro
       m.texcoords.push_back({s0, t0, s1, t1, s0, t1});
     }
   return m;
+}
+
+/// The look that an oracle's scene has, before black.
+inline Look look_of(const OracleScene& scene) {
+  Look look;
+  TextureOptions filter;
+  filter.filter = scene.mipmap ? TextureFilter::mipmap : TextureFilter::linear;
+  if (scene.base)
+    look.base = texture_from(*scene.base, filter);
+  if (scene.structure)
+    look.structure = texture_from(*scene.structure, filter);
+  if (scene.heights)
+    look.structure = texture_from(*scene.heights, filter);
+  if (scene.detail)
+    look.detail = texture_from(*scene.detail, filter);
+  filter.sphere = true;
+  if (scene.reflection)
+    look.reflection = texture_from(*scene.reflection, filter);
+  look.solid_base = scene.solid_base;
+  look.solid_detail = scene.solid_detail;
+  look.solid_structure = scene.solid_structure;
+  look.rest = scene.rest;
+  look.color = scene.color;
+  look.background = {0, 0, 0};
+  for (OracleScene other : scene.others) {
+    other.rest = scene.rest;
+    other.mipmap = scene.mipmap;
+    look.others.push_back(look_of(other));
+  }
+  return look;
 }
 
 } // namespace gewebe::test

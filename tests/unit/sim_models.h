@@ -1,6 +1,7 @@
 #pragma once
 // Models for the tests of the simulation.
 
+#include "base/context.h"
 #include "model/build.h"
 #include "model_meshes.h"
 #include "sim/spring_force.h"
@@ -10,6 +11,12 @@
 #include <vector>
 
 namespace gewebe::test {
+
+inline Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
 
 /// Two masses on one spring of length 2 along x.
 inline Model two_masses(double mass = 1, double stiffness = 1, double damping = 0,

@@ -10,13 +10,7 @@
 namespace gewebe {
 namespace {
 
-using test::organ, test::two_masses;
-
-Context one_thread() {
-  Context context;
-  context.threads = 1;
-  return context;
-}
+using test::one_thread, test::organ, test::two_masses;
 
 /// Every node displaced and moving at random, except along fixed axes.
 std::vector<NodeMotion> shaken(const Model& model, double size) {

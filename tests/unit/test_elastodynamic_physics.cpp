@@ -15,13 +15,7 @@
 namespace gewebe {
 namespace {
 
-using test::kicked, test::organ, test::random_model, test::two_masses;
-
-Context one_thread() {
-  Context context;
-  context.threads = 1;
-  return context;
-}
+using test::kicked, test::one_thread, test::organ, test::random_model, test::two_masses;
 
 TEST(SpringKernel, AgreesWithTheForceOfASpringAndIsTheSameOnEveryCpu) {
   const Model model = build_model(test::ball(4, 20), {}, Context{}).model; // several blocks

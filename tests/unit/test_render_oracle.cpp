@@ -89,25 +89,6 @@ bool is_there(const Mode& mode) {
   return mode.backend == Backend::cpu || gl_is_there;
 }
 
-Look look_of(const OracleScene& scene, bool mipmap) {
-  Look look;
-  TextureOptions filter;
-  filter.filter = mipmap ? TextureFilter::mipmap : TextureFilter::linear;
-  if (scene.base)
-    look.base = texture_from(*scene.base, filter);
-  if (scene.structure)
-    look.structure = texture_from(*scene.structure, filter);
-  if (scene.heights)
-    look.structure = texture_from(*scene.heights, filter);
-  if (scene.detail)
-    look.detail = texture_from(*scene.detail, filter);
-  filter.sphere = true;
-  if (scene.reflection)
-    look.reflection = texture_from(*scene.reflection, filter);
-  look.color = scene.color;
-  return look;
-}
-
 Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double sign = 1) {
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
@@ -128,10 +109,6 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   options.offset = {sign * c.scene.offset, sign * c.scene.offset};
   options.shade = c.scene.shade;
   options.camera = camera;
-  Look look = look_of(c.scene, c.scene.mipmap);
-  for (const OracleScene& other : c.scene.others)
-    look.others.push_back(look_of(other, c.scene.mipmap));
-  look.background = {0, 0, 0};
   PictureOptions picture;
   picture.backend = mode.backend;
   picture.gl.mode = mode.gl;
@@ -139,7 +116,8 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   picture.samples = c.samples;
   picture.width = c.width;
   picture.height = c.height;
-  return make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
+  return make_picture(make_drawing(surfaces, options, {}), camera, test::look_of(c.scene), picture,
+                      {});
 }
 
 /// `name` names the case within its test: modes share its oracle.

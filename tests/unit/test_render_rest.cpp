@@ -89,29 +89,6 @@ Case veiny(TriangleMesh mesh) {
   return c;
 }
 
-Look look_of(const OracleScene& scene) {
-  Look look;
-  TextureOptions filter;
-  filter.filter = scene.mipmap ? TextureFilter::mipmap : TextureFilter::linear;
-  if (scene.base)
-    look.base = texture_from(*scene.base, filter);
-  if (scene.detail)
-    look.detail = texture_from(*scene.detail, filter);
-  if (scene.structure)
-    look.structure = texture_from(*scene.structure, filter);
-  look.solid_base = scene.solid_base;
-  look.solid_detail = scene.solid_detail;
-  look.solid_structure = scene.solid_structure;
-  look.rest = scene.rest;
-  look.color = scene.color;
-  look.background = {0, 0, 0};
-  for (OracleScene other : scene.others) {
-    other.rest = scene.rest;
-    look.others.push_back(look_of(other));
-  }
-  return look;
-}
-
 DrawingOptions drawing_options(const OracleScene& scene, const Camera& camera) {
   DrawingOptions options;
   options.rest = options.rest_normals = true;
@@ -155,7 +132,7 @@ Image draw(Case& c, Backend backend, Camera& camera, CpuLevel cpu = CpuLevel::av
   Context context;
   context.cpu = std::min(context.cpu, cpu);
   return make_picture(make_drawing(surfaces, drawing_options(c.scene, camera), context), camera,
-                      look_of(c.scene), picture, context);
+                      test::look_of(c.scene), picture, context);
 }
 
 /// Both backends against the formula.

@@ -1,9 +1,7 @@
 // Scenes in which objects are cut: what is kept, what comes off, what is taken back.
 
 #include "base/error.h"
-#include "model/cut_select.h"
-#include "sim/simulation.h"
-#include "sim_models.h"
+#include "simulation_scenes.h"
 
 #include <gtest/gtest.h>
 
@@ -15,53 +13,8 @@
 namespace gewebe {
 namespace {
 
-using test::free_nodes, test::organ;
-
-Context one_thread() {
-  Context context;
-  context.threads = 1;
-  return context;
-}
-
-std::vector<double> shape(const Simulation& s, std::size_t object) {
-  const std::span<const double> u = s.displacement(object);
-  return {u.begin(), u.end()};
-}
-
-/// An organ whose upper part hangs on springs of the surface alone once it is cut.
-Model soft_organ() {
-  Model model = organ(3);
-  for (std::size_t i = surface_count(model); i < model.nodes.size(); ++i)
-    model.nodes[i].fixed = fixed_none;
-  return model;
-}
-
-const CutPlane through_the_top{{100, -50, 41}, {0, 0, 1}};
-CutObject lobe_off(std::size_t object = 0) {
-  return {object, PlaneToCut{through_the_top, {}}};
-}
-
-std::uint32_t highest(const Model& model) {
-  std::uint32_t top = 0;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
-    if (model.nodes[i].position.z > model.nodes[top].position.z)
-      top = i;
-  return top;
-}
-
-std::size_t count(const Simulation& s, Cutting::Kind kind) {
-  return static_cast<std::size_t>(std::count_if(s.cuttings().begin(), s.cuttings().end(),
-                                                [&](const Cutting& c) { return c.kind == kind; }));
-}
-
-/// Nodes in a band over the top: a plane through them is an incision.
-PlaneToCut incision(const Model& model) {
-  PlaneToCut cut{{{100.2, -50, 30}, {1, 0.1, 0}}, std::vector<std::uint32_t>{}};
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
-    if (model.nodes[i].position.z > 40)
-      cut.nodes->push_back(i);
-  return cut;
-}
+using test::count, test::highest, test::incision, test::lobe_off, test::one_thread, test::shape,
+    test::soft_organ, test::free_nodes, test::organ;
 
 TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
   Simulation s(one_thread(), {});
@@ -227,12 +180,7 @@ TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
 }
 
 TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
-  BuildOptions options;
-  options.bend = true;
-  options.centrals = 0;
-  Model model = build_model(test::ball(1, 10), options, Context{}).model;
-  for (Node& n : model.nodes)
-    n.fixed = n.position.z < 0 ? fixed_all : fixed_none;
+  const Model model = test::shell();
   std::vector<std::string> warnings;
   SimulationOptions how;
   how.warn = [&](const std::string& text) { warnings.push_back(text); };
@@ -241,18 +189,7 @@ TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
   s.add_object("organ", model, Method::ffe);
   s.apply(SetGravity{{0, 0, -1}});
   s.step(0.01);
-  // All springs of the topmost node but one are gone.
-  const std::uint32_t top = highest(model);
-  std::vector<std::uint32_t> others;
-  bool kept = false;
-  for (const Spring& spring : model.springs)
-    if (spring.i == top || spring.j == top) {
-      if (kept)
-        others.push_back(spring.i == top ? spring.j : spring.i);
-      kept = true; // an edge, for these come first
-    }
-  std::sort(others.begin(), others.end());
-  s.apply(CutObject{0, SpringsToCut{{top}, others}});
+  s.apply(CutObject{0, test::all_but_one(model, highest(model))});
   s.step(0.01);
   ASSERT_EQ(count(s, Cutting::Kind::loose), 1U);
   EXPECT_EQ(s.method(0), Method::ela);

@@ -1,8 +1,7 @@
 // Objects that are read late, change their method, and steps that are taken back.
 
 #include "base/error.h"
-#include "sim/simulation.h"
-#include "sim_models.h"
+#include "simulation_scenes.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
@@ -12,17 +11,7 @@
 namespace gewebe {
 namespace {
 
-using test::free_nodes, test::organ;
-
-Context one_thread() {
-  Context context;
-  context.threads = 1;
-  return context;
-}
-
-std::vector<double> shape(const Simulation& s, std::size_t object) {
-  return {s.displacement(object).begin(), s.displacement(object).end()};
-}
+using test::free_nodes, test::one_thread, test::organ, test::shape;
 
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   double largest = 0;
