@@ -67,23 +67,29 @@ private:
 } // namespace
 
 double inverse_norm(const Factor& factor) {
-  const std::size_t n = factor.order();
+  return inverse_norm(factor.order(),
+                      [&](std::span<const double> x, std::span<double> y) { factor.solve(x, y); });
+}
+
+double
+inverse_norm(std::size_t n,
+             const std::function<void(std::span<const double> x, std::span<double> y)>& solve) {
   std::vector<double> x(n, 1 / static_cast<double>(n)), y(n), sign(n), z(n);
-  factor.solve(x, y);
+  solve(x, y);
   double estimate = sum_abs(y);
   std::size_t before = n; // no unit vector yet
   const int rounds = 5;
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < n; ++i)
       sign[i] = y[i] < 0 ? -1 : 1;
-    factor.solve(sign, z);
+    solve(sign, z);
     const std::size_t at = index_of_largest(z);
     if (at == before)
       break;
     before = at;
     std::fill(x.begin(), x.end(), 0.0);
     x[at] = 1;
-    factor.solve(x, y);
+    solve(x, y);
     const double sum = sum_abs(y);
     if (!(sum > estimate))
       break;
@@ -92,7 +98,7 @@ double inverse_norm(const Factor& factor) {
   // Higham's safeguard: a vector that no cancellation hides.
   for (std::size_t i = 0; i < n; ++i)
     x[i] = (i % 2 == 0 ? 1 : -1) * (1 + static_cast<double>(i) / static_cast<double>(n));
-  factor.solve(x, y);
+  solve(x, y);
   return std::max(estimate, 2 * sum_abs(y) / (3 * static_cast<double>(n)));
 }
 

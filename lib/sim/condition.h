@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -29,6 +30,10 @@ public:
 /// Estimate of ‖K⁻¹‖₁, a lower bound that is rarely off by more than a factor of 3 (Hager 1984;
 /// Higham 1988, algorithm 2.4).
 double inverse_norm(const Factor& factor);
+/// The same of a symmetric matrix of order n by what solves with it, y = K⁻¹ x.
+double
+inverse_norm(std::size_t n,
+             const std::function<void(std::span<const double> x, std::span<double> y)>& solve);
 
 /// \throw Error if columns of a matrix of this condition mean nothing in that precision: beyond
 /// 1/2^-24 for float32. float64 needs no more than max_condition.

@@ -31,8 +31,9 @@ constexpr std::size_t most_rank = 48;
 constexpr double worn_out = 1.6;
 // Beyond this condition of the small system a renewal is worth its digits.
 constexpr double most_condition = 1e8;
-// Below this the condition may be too large, and is estimated.
-constexpr double weak_pivot = 1e-7;
+// Below this the condition may be too large, and is looked at: by one column of C, or an estimate.
+// What moves freely takes less than ten thousand other axes with it, or else it did before the cut.
+constexpr double weak_pivot = 1e-8, column_margin = 100, estimate_margin = 3;
 
 std::vector<std::uint32_t> identity(std::size_t count) {
   std::vector<std::uint32_t> numbers(count);
@@ -71,11 +72,21 @@ void tell_what_moves(const Model& model, const Context& context) {
   (void)checked_factor(model, matrix, context, check);
 }
 
-double dot_product(std::span<const double> a, std::span<const double> b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    sum += a[k] * b[k];
-  return sum;
+/// A bound of ‖K‖₁. Cuts leave no spring stiffer than it was.
+double stiffness_bound(const Model& model) {
+  std::vector<double> sum(model.nodes.size());
+  double most = 0;
+  for (const Spring& s : model.springs) {
+    const SymmetricBlock b = stiffness_block(model, s);
+    const double largest = std::max({std::abs(b[0]) + std::abs(b[1]) + std::abs(b[2]),
+                                     std::abs(b[1]) + std::abs(b[3]) + std::abs(b[4]),
+                                     std::abs(b[2]) + std::abs(b[4]) + std::abs(b[5])});
+    for (const std::uint32_t i : {s.i, s.j}) {
+      sum[i] += 2 * largest; // on the diagonal and beside it
+      most = sum[i] <= most ? most : sum[i];
+    }
+  }
+  return most;
 }
 
 } // namespace
@@ -87,30 +98,28 @@ CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
   context_.progress = nullptr;
 }
 
-/// \throw SingularStiffness if the condition is too large; a pivot is the first to tell, then
-/// inverse iteration, which costs some solves.
+/// \throw SingularStiffness if the condition is too large. A pivot is the first to tell; what moves
+/// most freely then moves with its axis, whose column of C tells how freely; where that is much,
+/// the norm of C is estimated.
 void CutStiffness::require_condition() {
   const double weakest = factor_->weakest_pivot();
   if (weakest > weak_pivot || weakest > 0.5 * accepted_pivot_)
     return;
-  const std::vector<SymmetricBlock> blocks = stiffness_blocks(*now_);
-  std::vector<double> x(factor_->axes()), f(x.size());
-  double least = HUGE_VAL, most = 0; // Rayleigh quotients
-  for (std::size_t k = 0; k < x.size(); ++k)
-    x[k] = 1 + 0.5 * std::sin(static_cast<double>(k));
-  for (int round = 0; round < 4; ++round) {
-    factor_->solve(x);
-    const double size = std::sqrt(dot_product(x, x));
-    for (double& value : x)
-      value /= size;
-    multiply_stiffness(*now_, blocks, x, f);
-    const double quotient = dot_product(x, f);
-    least = quotient >= least ? least : quotient; // NaN stays
+  const std::size_t axes = factor_->axes();
+  std::vector<double> column(axes);
+  column[factor_->weakest_axis()] = 1;
+  factor_->solve(column);
+  double size = 0;
+  for (const double value : column)
+    size += std::abs(value);
+  if (!(norm_ * size < max_condition / column_margin)) {
+    size = inverse_norm(axes, [&](std::span<const double> x, std::span<double> y) {
+      std::copy(x.begin(), x.end(), y.begin());
+      factor_->solve(y);
+    });
+    if (!(norm_ * size < max_condition / estimate_margin))
+      tell_what_moves(*now_, context_);
   }
-  for (const SymmetricBlock& block : blocks)
-    most = std::max({most, block[0], block[3], block[5]});
-  if (!(least > 10 * most / max_condition))
-    tell_what_moves(*now_, context_);
   accepted_pivot_ = weakest;
 }
 
@@ -132,6 +141,7 @@ void CutStiffness::factorise(const std::function<void()>& work) {
 void CutStiffness::prepare() {
   if (factor_ != nullptr)
     return;
+  norm_ = stiffness_bound(*now_);
   factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
   factored_ = now_;
   correction_.reset();

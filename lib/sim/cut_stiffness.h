@@ -66,6 +66,7 @@ private:
   std::shared_ptr<FrontalFactor> factor_;
   std::shared_ptr<const WoodburySolver> correction_;
   std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_
+  double norm_ = 0;             ///< bound of ‖K‖₁
   double fresh_operations_ = 0; ///< of the last factor with an order of its own
   double reached_ = 0;          ///< operations of the last renewal
   double accepted_pivot_ = 1; ///< the weakest for which the condition was found to be small enough

@@ -100,6 +100,7 @@ struct FrontalFactor::State {
     Trapezoid l;        // rows x columns
     Trapezoid rest;     // what it leaves to its parent
     double weakest = 1; // pivot over diagonal entry
+    std::size_t weakest_column = 0;
   };
 
   FrontTree tree;
@@ -121,6 +122,7 @@ struct FrontalFactor::State {
   std::vector<std::uint32_t> to_root;     // rows eliminated by a front and all above it
   std::size_t longest = 1, entries = 0;
   double weakest = 1;
+  std::size_t weakest_row = 0;
 
   // ---- a front
 
@@ -231,7 +233,11 @@ struct FrontalFactor::State {
         throw NotPositiveDefinite(axis_at(model, f, begin + done));
       for (std::size_t c = begin; c < begin + count; ++c) {
         const double root = front.l[c * front.rows + c];
-        front.weakest = std::min(front.weakest, root * root / (scratch.least[c] * max_condition));
+        if (const double pivot = root * root / (scratch.least[c] * max_condition);
+            pivot < front.weakest) {
+          front.weakest = pivot;
+          front.weakest_column = c;
+        }
       }
       const std::size_t rows = front.rows - begin - count;
       const std::size_t strips = (rows + front_strip - 1) / front_strip;
@@ -390,8 +396,12 @@ struct FrontalFactor::State {
 
   void find_weakest() {
     weakest = 1;
-    for (const Front& front : fronts)
-      weakest = std::min(weakest, front.weakest);
+    weakest_row = 0;
+    for (std::size_t f = 0; f < fronts.size(); ++f)
+      if (fronts[f].weakest < weakest) {
+        weakest = fronts[f].weakest;
+        weakest_row = static_cast<std::size_t>(super[f]) + fronts[f].weakest_column;
+      }
   }
 
   void remember(const Model& model) {
@@ -604,6 +614,10 @@ const FrontalWork& FrontalFactor::work() const noexcept {
 
 double FrontalFactor::weakest_pivot() const noexcept {
   return state_->weakest;
+}
+
+std::size_t FrontalFactor::weakest_axis() const noexcept {
+  return state_->axis_of_row[state_->weakest_row];
 }
 
 void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) const {

@@ -53,6 +53,8 @@ public:
   /// The least pivot of all, over its diagonal entry of K: the reciprocal bounds the condition of K
   /// from below.
   double weakest_pivot() const noexcept;
+  /// The axis, 3 i + a, that it eliminates: if something is nearly free, then this moves with it.
+  std::size_t weakest_axis() const noexcept;
 
   /// In place, for right-hand sides over all axes one behind the other; 0 on fixed ones. Safe from
   /// many threads at once; the bits of each don't depend on the others. \pre over_axes.size() ==

@@ -365,6 +365,7 @@ private:
   void add_touches(Object& object);
   struct Moves;
   void cut_now(const CutObject& change);
+  void find_late_shape(Object& object) const;
   void restore_now(std::size_t index);
   void carry_out(std::size_t index, CutModel cut);
   CutStiffness* stiffness_of(Object& object) const;

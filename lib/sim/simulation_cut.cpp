@@ -133,9 +133,12 @@ void Simulation::cut_now(const CutObject& change) {
 /// \param cut of the object's model
 void Simulation::carry_out(std::size_t index, CutModel cut) {
   Object& old = *objects_[index];
-  if (old.method == Method::ffe)
-    shape_in_step(old); // where parts start, and what grasps refer to
   FreeParts free = free_parts(old.model, cut);
+  // Where parts start, and what instruments refer to. Without them it may never be asked for.
+  const bool late = old.method == Method::ffe && !old.shaped && free.parts.empty() &&
+                    instruments_.empty() && old.known && !old.stages;
+  if (old.method == Method::ffe && !late)
+    shape_in_step(old);
   Moves moves;
   moves.objects = {index};
   for (std::size_t k = 0; k < free.parts.size(); ++k)
@@ -180,6 +183,16 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
   next.stiffness = std::move(old.stiffness);
   next.first = old.first ? old.first : old.held;
   next.prepared = std::move(prepared);
+  if (late) {
+    auto shape = std::make_shared<Object::LateShape>();
+    if (old.late)
+      *shape = *old.late;
+    else
+      *shape = {old.held, old.shown_load, {}};
+    shape->moves.push_back(std::make_shared<const Moves>(moves));
+    next.late = std::move(shape);
+    next.shaped = false;
+  }
   next.scored = std::move(rest.left);
   if (loose && !velocity.empty()) {
     next.came.velocity.resize(next.model.nodes.size());
@@ -222,6 +235,31 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
   }
   ++counts_.cuts;
   move_all(index, moves, std::move(pieces), velocity);
+}
+
+/// Of an object that was cut before its shape was known.
+void Simulation::find_late_shape(Object& object) const {
+  const Object::LateShape& late = *object.late;
+  Elastostatic still(*late.model, StiffnessParts{}, context_);
+  still.update(late.load);
+  const std::span<const double> first = still.displacement();
+  std::vector<double> shape(first.begin(), first.end());
+  for (const auto& moves : late.moves) {
+    std::size_t nodes = 0;
+    for (const Moves::To& to : moves->all)
+      if (to.object == moves->objects[0])
+        nodes = std::max<std::size_t>(nodes, to.node + std::size_t{1});
+    std::vector<double> moved(3 * nodes, 0.0);
+    for (std::uint32_t i = 0; i < shape.size() / 3; ++i)
+      for (const Moves::To& to : moves->of(i))
+        if (to.object == moves->objects[0])
+          std::copy_n(shape.begin() + 3 * static_cast<std::ptrdiff_t>(i), 3,
+                      moved.begin() + 3 * static_cast<std::ptrdiff_t>(to.node));
+    shape = std::move(moved);
+  }
+  object.displacement = std::move(shape);
+  object.late.reset();
+  object.shaped = true;
 }
 
 void Simulation::restore_now(std::size_t index) {
@@ -353,6 +391,8 @@ void Simulation::find_free_motion(std::size_t index) {
   if (options_.warn)
     options_.warn("object " + object.name + " at " + number_text(time_) +
                   " s: it goes on elastodynamic, for behind the cut " + cuttings_.back().text);
+  if (object.late)
+    shape_in_step(object);
   undo_->note([&object, shown = object.shown] {
     object.method = Method::ffe;
     object.shown = shown;

@@ -32,6 +32,13 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 } // namespace simulation
 
 struct Simulation::Object {
+  /// The shape before cuts that nobody has asked for: it is found when somebody does, from the
+  /// model of then.
+  struct LateShape {
+    std::shared_ptr<const Model> model;
+    Load load;
+    std::vector<std::shared_ptr<const Moves>> moves; // since, one cut each
+  };
   /// Where the shape that ffe shows was one step earlier, see shape_velocity.
   struct CameFrom {
     Load load;
@@ -62,6 +69,7 @@ struct Simulation::Object {
   std::vector<NodeVector> forces_before;
   bool shown = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
+  std::shared_ptr<const LateShape> late; // what the displacement is, where it is not shaped
   Load shown_load;
   double shown_time = 0;
   bool posed = false; // what is shown is a shape of ffe

@@ -52,6 +52,9 @@ std::unique_ptr<Simulation::Object> Simulation::renumbered(const Object& old,
   next->came.load.gravity = old.came.load.gravity;
   next->came.over = old.came.over;
   next->warned_range = old.warned_range;
+  next->shortest_edge = old.shortest_edge; // a cut makes none shorter
+  next->looked_at = old.looked_at;
+  next->not_looked = old.not_looked;
   next->warned_stuck = old.warned_stuck;
   next->warned_unsolved = old.warned_unsolved;
   next->warned_stages = old.warned_stages;
@@ -109,7 +112,7 @@ void Simulation::move_shown(const Object& old, const Moves& moves,
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).touches.push_back({to.node, t.instrument, t.force});
-  for (std::uint32_t i = 0; i < old.model.nodes.size(); ++i) {
+  for (std::uint32_t i = 0; old.shaped && i < old.model.nodes.size(); ++i) {
     const Vec3 u = vector_at(old.displacement, i);
     for (const Moves::To& to : moves.of(i))
       if (Object& object = piece(to); to.main || moves.objects.size() > 1 || moves.of(i).size() > 1)

@@ -118,9 +118,11 @@ void Simulation::show(Object& object) {
   }
   if (meets)
     shape_in_step(object); // that it comes from
-  undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time] {
+  undo_->note([&object, shown = object.shown, shaped = object.shaped, time = object.shown_time,
+               late = std::exchange(object.late, nullptr)] {
     std::swap(object.displacement, object.before);
     std::swap(object.forces, object.forces_before);
+    object.late = late;
     object.shown = shown;
     object.shaped = shaped;
     object.shown_time = time;
@@ -193,6 +195,10 @@ void Simulation::update_in_time(Object& object) {
 void Simulation::shape(Object& object) const {
   if (object.shaped)
     return;
+  if (object.late) {
+    at_object(object, [&] { find_late_shape(object); });
+    return;
+  }
   at_object(object, [&] {
     update_stages(object, object.shown_load); // as it is, but where a change of method looked ahead
     const std::span<const double> u = still_shape(object);
@@ -207,7 +213,10 @@ void Simulation::shape(Object& object) const {
 void Simulation::shape_in_step(Object& object) {
   if (undo_->open && !object.shaped) {
     undo_->updated.insert(&object);
-    undo_->note([&object] { object.shaped = false; });
+    undo_->note([&object, late = object.late] {
+      object.shaped = false;
+      object.late = late;
+    });
   }
   shape(object);
 }

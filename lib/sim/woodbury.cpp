@@ -80,7 +80,8 @@ struct WoodburySolver::State {
     if (!s.allFinite())
       throw Error("the capacitance matrix of the cut isn't finite");
     lu.compute(s);
-    condition = 1 / lu.rcond();
+    // Eigen calls any single number well conditioned; ours is small where it should be 0.
+    condition = rank == 1 ? 1 / std::abs(s(0, 0)) : 1 / lu.rcond();
     if (!(condition <= most_condition))
       throw Error("the cut leaves a part that nothing holds, expected one that is determined");
   }
