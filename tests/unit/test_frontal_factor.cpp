@@ -249,3 +249,65 @@ TEST(FrontalFactor, FollowsNodesThatAreGone) {
   const std::vector<double> f = loads(3 * less.nodes.size(), 9);
   EXPECT_LT(relative_difference(solved(factor, f), reference(less, f)), 1e-9);
 }
+
+TEST(FrontalFactor, HalfSolutionsGiveBlocksOfTheCompliance) {
+  Model model = round_organ(4);
+  model.nodes[70].fixed = fixed_y;
+  model.nodes[71].fixed = fixed_all;
+  const std::size_t axes = 3 * model.nodes.size();
+  const std::vector<std::uint32_t> nodes{0,
+                                         5,
+                                         70,
+                                         71,
+                                         300,
+                                         301,
+                                         333,
+                                         500,
+                                         512,
+                                         600,
+                                         static_cast<std::uint32_t>(model.nodes.size() - 1)};
+  for (const CpuLevel cpu : {CpuLevel::baseline, best_cpu_level()}) {
+    const FrontalFactor factor(model, context_of(1, cpu));
+    const auto halves = factor.half_solutions(nodes);
+    ASSERT_EQ(halves.size(), nodes.size());
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      std::vector<double> columns(3 * axes);
+      for (std::size_t a = 0; a < 3; ++a)
+        columns[a * axes + 3 * std::size_t{nodes[k]} + a] = 1;
+      factorise_axes(model, Context{}).solve(columns, 3);
+      double size = 0;
+      for (const double value : columns)
+        size = std::max(size, std::abs(value));
+      // One by one they are the same bits.
+      const std::array<std::uint32_t, 1> one{nodes[k]};
+      EXPECT_EQ(factor.half_solutions(one)[0].values, halves[k].values);
+      for (std::size_t m = 0; m < nodes.size(); ++m) {
+        const auto block = factor.compliance(halves[k], halves[m]);
+        for (std::size_t a = 0; a < 3; ++a)
+          for (std::size_t b = 0; b < 3; ++b) {
+            const double error =
+                std::abs(block[a][b] - columns[a * axes + 3 * std::size_t{nodes[m]} + b]);
+            EXPECT_TRUE(error <= 1e-11 * size) << nodes[k] << " " << nodes[m];
+          }
+      }
+    }
+  }
+}
+
+TEST(FrontalFactor, TheWeakestAxisIsThatOfWhatHangsLoosely) {
+  Model model = round_organ(3);
+  const std::uint32_t loose = 40;
+  for (Spring& s : model.springs)
+    if (s.i == loose || s.j == loose)
+      s.stiffness *= 1e-9;
+  const FrontalFactor factor(model, Context{});
+  EXPECT_LT(factor.weakest_pivot(), 1); // its own diagonal is as weak
+  Model hinge = round_organ(3);
+  int kept = 0;
+  for (Spring& s : hinge.springs)
+    if ((s.i == loose || s.j == loose) && ++kept > 1)
+      s.stiffness *= 1e-8;
+  const FrontalFactor weak(hinge, Context{});
+  EXPECT_LT(weak.weakest_pivot(), 1e-6);
+  EXPECT_EQ(weak.weakest_axis() / 3, loose);
+}

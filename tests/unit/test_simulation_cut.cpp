@@ -394,5 +394,62 @@ TEST(SimulationCut, WhatIsTiedStaysTied) {
   EXPECT_THROW(s.apply(SetMethod{1, Method::ffe}), Error);
 }
 
+TEST(SimulationCut, AShapeThatNobodyAskedForIsThereWhenSomebodyDoes) {
+  // Grasped between a cut and the next step, with the shape emitted before or not.
+  const auto run = [](bool emitted) {
+    Simulation s(one_thread(), {});
+    s.add_object("organ", organ(3), Method::ffe);
+    const std::uint32_t top = highest(s.model(0));
+    s.apply(SetDisplacement{0, {top}, {0, 0, 0.5}});
+    if (emitted)
+      s.apply(Emit{.forces = false, .instruments = false});
+    s.step(0.1);
+    s.apply(CutObject{0, incision(s.model(0))});
+    CutObject more{0, incision(s.model(0))};
+    std::get<PlaneToCut>(more.what).plane.point.x += 4;
+    s.apply(more); // two in a row
+    const std::size_t tool = s.add_instrument("tool");
+    InstrumentShape sphere;
+    sphere.radius = 1;
+    s.apply(SetInstrument{tool, sphere, {{200, 200, 200}, {}}});
+    s.apply(Grasp{0, {free_nodes(s.model(0))[20], free_nodes(s.model(0))[60]}, tool});
+    s.step(0.1);
+    return shape(s, 0);
+  };
+  const std::vector<double> early = run(true), late = run(false);
+  ASSERT_EQ(early.size(), late.size());
+  double largest = 0;
+  for (const double u : early)
+    largest = std::max(largest, std::abs(u));
+  EXPECT_GT(largest, 0.4);
+  for (std::size_t k = 0; k < early.size(); ++k)
+    EXPECT_TRUE(std::abs(early[k] - late[k]) <= 1e-9 * largest) << k;
+}
+
+TEST(SimulationCut, ForcesDoNotDependOnShapesThatWereAskedFor) {
+  const auto run = [](bool shapes) {
+    Simulation s(one_thread(), {});
+    s.add_object("organ", organ(3), Method::ffe);
+    const std::vector<std::uint32_t> nodes = free_nodes(s.model(0));
+    s.apply(SetDisplacement{0, {nodes[10], nodes[11], nodes[40]}, {0, 0.2, 0.5}});
+    std::vector<double> all;
+    for (int k = 0; k < 5; ++k) {
+      if (k == 1)
+        s.apply(CutObject{0, incision(s.model(0))});
+      if (k == 3)
+        s.apply(SetDisplacement{0, {nodes[10]}, {0.1, 0.2, 0.5}});
+      s.step(0.1);
+      if (shapes)
+        (void)shape(s, 0);
+      for (const NodeVector& f : s.contact_forces(0))
+        all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
+    }
+    return all;
+  };
+  const std::vector<double> with = run(true), without = run(false);
+  EXPECT_EQ(with, without); // to the bit
+  EXPECT_GE(with.size(), 45U);
+}
+
 } // namespace
 } // namespace gewebe

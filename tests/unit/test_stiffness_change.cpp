@@ -264,4 +264,26 @@ TEST(StiffnessChange, WoodburyRefusesAPartThatNothingHolds) {
                Error);
 }
 
+TEST(StiffnessChange, WoodburyRefusesWhereOneSpringHeldTheRest) {
+  // A node on three springs that none can miss.
+  Model before;
+  before.materials.emplace_back();
+  for (const Vec3& p : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0.3, 0, 1}, Vec3{0, 0, 0}})
+    before.nodes.push_back({.position = p, .mass = 1, .fixed = fixed_all});
+  before.nodes[3].fixed = fixed_none;
+  for (const std::uint32_t i : {0U, 1U, 2U})
+    before.springs.push_back({i, 3, SpringKind::edge, 1e3 + i, 0,
+                              norm(before.nodes[3].position - before.nodes[i].position)});
+  const std::vector<std::uint32_t> same{0, 1, 2, 3};
+  Model after = before;
+  after.springs[2].stiffness = 1; // the control: a weak spring holds it
+  const StiffnessChange weaker = stiffness_change(before, after, same, same);
+  ASSERT_EQ(weaker.rank(), 1U);
+  EXPECT_NO_THROW(WoodburySolver(weaker, solver(before), Context{}));
+  after.springs.pop_back();
+  const StiffnessChange gone = stiffness_change(before, after, same, same);
+  ASSERT_EQ(gone.rank(), 1U);
+  EXPECT_THROW(WoodburySolver(gone, solver(before), Context{}), Error);
+}
+
 } // namespace
