@@ -135,18 +135,17 @@ FreeParts free_parts(const Model& before, const CutModel& cut) {
   return result;
 }
 
-CutModel without_parts(CutModel cut, std::optional<ModelPart> whole) {
-  if (!whole)
+CutModel without_parts(CutModel cut, std::optional<ModelPart> rest) {
+  if (!rest)
     return cut;
-  ModelPart& rest = *whole;
   std::vector<std::uint32_t> place(cut.model.nodes.size(), none);
-  for (std::uint32_t i = 0; i < rest.origin.size(); ++i)
-    place[rest.origin[i]] = i;
+  for (std::uint32_t i = 0; i < rest->origin.size(); ++i)
+    place[rest->origin[i]] = i;
   for (std::uint32_t& p : cut.place)
     p = p == none ? none : place[p];
   std::vector<std::uint32_t> origin;
   std::vector<double> share;
-  for (const std::uint32_t i : rest.origin) {
+  for (const std::uint32_t i : rest->origin) {
     origin.push_back(cut.origin[i]);
     share.push_back(cut.share[i]);
   }
@@ -166,7 +165,7 @@ CutModel without_parts(CutModel cut, std::optional<ModelPart> whole) {
   cut.left = std::move(left);
   cut.origin = std::move(origin);
   cut.share = std::move(share);
-  cut.model = std::move(rest.model);
+  cut.model = std::move(rest->model);
   return cut;
 }
 

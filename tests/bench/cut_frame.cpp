@@ -43,6 +43,11 @@ constexpr double picture = 1000.0 / 60; // ms
   std::exit(EXIT_FAILURE);
 }
 
+long number_behind(const std::string& text, const std::string& word) {
+  const std::size_t at = text.find(word);
+  return at == std::string::npos ? 0 : std::strtol(text.c_str() + at + word.size(), nullptr, 10);
+}
+
 /// ffe-run --serve at the other ends of two pipes.
 class Served {
 public:
@@ -85,7 +90,7 @@ public:
   }
 
   struct Answer {
-    int gone = 0, doubled = 0;
+    long gone = 0, doubled = 0;
     bool refused = false, free = false;
   };
   /// Up to the end of the step.
@@ -94,8 +99,10 @@ public:
     std::array<char, 4096> line{};
     while (std::fgets(line.data(), line.size(), from_) != nullptr) {
       const std::string text = line.data();
-      (void)std::sscanf(text.c_str(), "cut %*s springs %d doubled %d", &answer.gone,
-                        &answer.doubled);
+      if (text.starts_with("cut")) {
+        answer.gone = number_behind(text, " springs ");
+        answer.doubled = number_behind(text, " doubled ");
+      }
       answer.refused = answer.refused || text.starts_with("error");
       answer.free = answer.free || text.starts_with("loose") || text.starts_with("part");
       if (text == "done\n")
@@ -233,8 +240,8 @@ void bench(const Scene& scene, const Kind& kind, double size, std::size_t contac
         first = false;
         continue;
       }
-      gone += answer.gone;
-      doubled += answer.doubled;
+      gone += static_cast<double>(answer.gone);
+      doubled += static_cast<double>(answer.doubled);
     }
   }
   if (times.empty()) {
