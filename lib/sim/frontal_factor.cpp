@@ -74,8 +74,8 @@ public:
   void clear(std::size_t rows, std::size_t columns) {
     size_ = rows * columns;
     if (size_ > capacity_) {
-      capacity_ = size_;
-      data_ = std::make_unique_for_overwrite<double[]>(size_);
+      capacity_ = size_ + size_ / 4; // copies of nodes come to it; what is not used costs nothing
+      data_ = std::make_unique_for_overwrite<double[]>(capacity_);
     }
     for (std::size_t c = 0; c < columns; ++c) {
       const std::size_t skipped = c - std::min(c, front_strip);
@@ -129,7 +129,8 @@ struct FrontalFactor::State {
   /// Rows of a front by its nodes: where each node's begin. One for each thread.
   using Rows = std::vector<std::uint32_t>;
 
-  void assemble(const Model& model, std::size_t f, Rows& row, std::vector<double>& least) {
+  void assemble(const Model& model, std::size_t f, Rows& row,
+                std::vector<SymmetricBlock>& diagonals, std::vector<double>& least) {
     Front& front = fronts[f];
     const auto own = tree.eliminated(f);
     std::uint32_t next = 0;
@@ -145,22 +146,38 @@ struct FrontalFactor::State {
     front.rows = next;
     front.l.clear(front.rows, front.columns);
     front.rest.clear(front.rows - front.columns, front.rows - front.columns);
-    least.clear();
-    for (const std::uint32_t node : own) {
+    // Each spring between two own nodes comes once.
+    const std::uint32_t first = tree.first[f], last = tree.first[f + 1];
+    diagonals.assign(last - first, {});
+    const auto add_diagonal = [&](std::uint32_t place, const SymmetricBlock& block) {
+      for (std::size_t k = 0; k < 6; ++k)
+        diagonals[place - first][k] += block[k];
+    };
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
       const FreeAxes& free = free_axes(model, node);
-      SymmetricBlock diagonal{};
       for (const auto& arm : graph.of(node)) {
-        const SymmetricBlock block = stiffness_block(model, model.springs[arm.spring]);
-        for (std::size_t k = 0; k < 6; ++k)
-          diagonal[k] += block[k];
-        if (tree.position[arm.node] == none || tree.position[arm.node] < tree.position[node])
+        const std::uint32_t there = tree.position[arm.node];
+        if (there != none && first <= there && there < at)
           continue;
+        const SymmetricBlock block = stiffness_block(model, model.springs[arm.spring]);
+        add_diagonal(at, block);
+        if (there == none || there < first)
+          continue;
+        if (there < last)
+          add_diagonal(there, block);
         const FreeAxes& other = free_axes(model, arm.node);
         for (std::size_t a = 0; a < free.count; ++a)
           for (std::size_t b = 0; b < other.count; ++b)
             front.l[(row[node] + a) * front.rows + row[arm.node] + b] -=
                 block[entry[free.axis[a]][other.axis[b]]];
       }
+    }
+    least.clear();
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
+      const FreeAxes& free = free_axes(model, node);
+      const SymmetricBlock& diagonal = diagonals[at - first];
       for (std::size_t a = 0; a < free.count; ++a) {
         for (std::size_t b = a; b < free.count; ++b)
           front.l[(row[node] + a) * front.rows + row[node] + b] +=
@@ -210,13 +227,14 @@ struct FrontalFactor::State {
 
   struct Scratch {
     Rows row;
+    std::vector<SymmetricBlock> diagonals;
     std::vector<double> least, packed;
     std::vector<Run> runs;
   };
 
   void compute(const Model& model, std::size_t f, std::span<const std::uint32_t> children,
                Scratch& scratch, const Context& context) {
-    assemble(model, f, scratch.row, scratch.least);
+    assemble(model, f, scratch.row, scratch.diagonals, scratch.least);
     for (const std::uint32_t child : children)
       take_over(f, child, scratch.row, scratch.runs);
     Front& front = fronts[f];
