@@ -572,21 +572,29 @@ struct FrontalFactor::State {
       return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                         [&](std::uint32_t x, std::uint32_t y) { return x == placed(y); });
     };
+    // A front is as it was only with the children that it had. Where springs went while the tree
+    // stayed, a child may hang elsewhere now though no row of this front has changed since.
+    std::vector<std::uint32_t> had_children(before.fronts(), 0), kept_children(tree.fronts(), 0);
+    for (const std::uint32_t parent : before.parent)
+      if (parent != none)
+        ++had_children[parent];
     std::vector<char> wanted(tree.fronts(), 0);
     for (std::size_t f = 0; f < tree.fronts(); ++f) {
       const auto own = tree.eliminated(f);
-      const std::uint32_t old = front_of[own[0]];
+      const std::uint32_t old = front_of[own[0]], parent = tree.parent[f];
       if (old != none)
         fronts[f] = std::move(had[old]); // if only for its memory
       const bool kept =
-          !wanted[f] && old != none && same(own, before.eliminated(old)) &&
-          same(tree.boundary_of(f), before.boundary_of(old)) &&
+          !wanted[f] && old != none && kept_children[f] == had_children[old] &&
+          same(own, before.eliminated(old)) && same(tree.boundary_of(f), before.boundary_of(old)) &&
           std::none_of(own.begin(), own.end(), [&](std::uint32_t i) { return changed[i] != 0; });
-      if (kept)
+      wanted[f] = !kept;
+      if (parent == none)
         continue;
-      wanted[f] = 1;
-      if (tree.parent[f] != none)
-        wanted[tree.parent[f]] = 1;
+      const bool stays = kept && before.parent[old] != none &&
+                         before.parent[old] == front_of[tree.eliminated(parent)[0]];
+      kept_children[parent] += stays ? 1 : 0;
+      wanted[parent] = static_cast<char>(wanted[parent] | !stays);
     }
     return wanted;
   }
