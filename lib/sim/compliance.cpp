@@ -84,13 +84,7 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
   // float64, 130 of float32.
   const bool single = parts_.columns && parts_.columns->single();
   const std::size_t even = std::max<std::size_t>(1, (single ? 6 : 5) * entries() / (3 * axes()));
-  if (nodes.size() > std::min(even, capacity()))
-    return false;
-  // Where contacts did not bring columns, a sum alone is no reason to.
-  if (parts_.blocks)
-    return std::all_of(nodes.begin(), nodes.end(),
-                       [&](std::uint32_t node) { return cache_->resident(node); });
-  return stored(nodes);
+  return nodes.size() <= std::min(even, capacity()) && stored(nodes);
 }
 
 void Compliance::add(std::span<const NodeVector> forces, double allowed, std::span<double> u) {

@@ -547,7 +547,13 @@ struct Elastostatic::State {
           (nodes.size() <= block_solved || compliance.stored(nodes)) &&
           (nodes.size() == 1 || ++shapes_of_contacts > 1))
         compliance.need(nodes);
-      if (outer_known(now) || compliance.columns_pay(nodes)) {
+      // Until then their stored columns, which would have to be corrected first, stay where they
+      // are.
+      const bool without = by_block && compliance.has_blocks() &&
+                           !std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) {
+                             return compliance.cache().resident(node);
+                           });
+      if (!without && (outer_known(now) || compliance.columns_pay(nodes))) {
         renew_outer(now);
         u = outer;
         compliance.add(forces, tolerance * least_size(now), u);
