@@ -16,10 +16,16 @@ INSTALL ?= install
 flags_release := -O2 -DNDEBUG
 flags_debug := -O0 -g
 flags_sanitize := -O1 -g1 -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -DGEWEBE_SANITIZE
+flags_thread := -O1 -g1 -fsanitize=thread -DGEWEBE_SANITIZE
 flags_coverage := -O0 -g --coverage
 flags_fuzz := -O1 -g1 -fsanitize=address,fuzzer-no-link -fno-omit-frame-pointer -DGEWEBE_SANITIZE
+# The units of tests/unit are long and run for moments: most of a build would be their code. They are optimised less, and
+# the sanitizers watch the library and not the tests' own code (it is linked behind the library, so that functions of
+# headers are the library's).
+unit_flags_release := -O1 -DNDEBUG
+unit_flags_sanitize := -O1 -g1 -fno-omit-frame-pointer -DGEWEBE_SANITIZE
 ifeq ($(flags_$(config)),)
-$(error config=$(config) is unknown, expected release, debug, sanitize, coverage or fuzz)
+$(error config=$(config) is unknown, expected release, debug, sanitize, thread, coverage or fuzz)
 endif
 
 ifeq ($(origin CXX),default)
@@ -31,7 +37,13 @@ LANGUAGE := -std=c++20 -ffp-contract=off -fPIC
 # The libraries' headers stand in /usr/include, where no warning is shown; Eigen's have a folder of their own.
 INCLUDES := -Ilib -I. $(addprefix -isystem /usr/include/,eigen3 suitesparse hdf5/serial)
 DEFINES := -DGEWEBE_VERSION='"$(VERSION)"'
-ALLFLAGS = $(LANGUAGE) $(flags_$(config)) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
+OPTIMIZE := $(flags_$(config))
+ALLFLAGS = $(LANGUAGE) $(OPTIMIZE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(CXXFLAGS)
+# Where there is ccache, one machine compiles the same text with the same flags once; CCACHE= turns that off.
+CCACHE ?= $(shell command -v ccache)
+ifneq ($(CCACHE),)
+export CCACHE_SLOPPINESS ?= pch_defines,time_macros
+endif
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
 LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash -lgmp
 CHECK_LIBS := -lmpfr
@@ -45,13 +57,18 @@ LIB_SRC := $(wildcard lib/*/*.cpp formats/*.cpp)
 SHARED_SRC := $(patsubst %.h,%.cpp,$(wildcard tools/*.h))
 TOOL_SRC := $(filter-out $(SHARED_SRC),$(wildcard tools/*.cpp))
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
+# Where threads work together; a test unit of each stage is enough for ThreadSanitizer.
+ifeq ($(config),thread)
+UNIT_SRC := tests/unit/mesh_fixtures.cpp $(patsubst %,tests/unit/test_%.cpp,base column_sum csg density elastostatic \
+  frontal_factor marching_cubes render_raster snap_collapse store volume_file voxelize)
+endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
 BENCH_SRC := $(wildcard tests/bench/*.cpp)
 HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*.h))
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
-SCRIPTS := .ci/run tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
+SCRIPTS := .ci/run .ci/sanitize tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -107,14 +124,43 @@ $(BUILD)/obj/lib/render/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(ker
 $(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math
 
 # Holds the command, so that other flags compile everything again.
+COMMAND := $(CXX) $(ALLFLAGS) $(unit_flags_$(config)) $(LDFLAGS)
 $(BUILD)/flags: FORCE | $(FIRST)
 	@mkdir -p $(@D)
-	@printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS) $(LDFLAGS))' | cmp -s - $@ || \
-	  printf '%s\n' '$(subst ','\'',$(CXX) $(ALLFLAGS) $(LDFLAGS))' > $@
+	@printf '%s\n' '$(subst ','\'',$(COMMAND))' | cmp -s - $@ || printf '%s\n' '$(subst ','\'',$(COMMAND))' > $@
 
-$(BUILD)/obj/%.o: %.cpp $(BUILD)/flags | $(FIRST)
+# Headers of the language that most units read (of 3 s for a unit, 2 s were spent in them), compiled once for each kind
+# of unit; what a unit includes it still says itself, as `make lint` sees, which does without. Units with flags of their
+# own do too.
+ifneq ($(filter g++%,$(notdir $(firstword $(CXX)))),)
+PRECOMPILED_lib := algorithm array bit charconv cmath cstddef cstdint cstring functional limits map memory numeric \
+  optional span string string_view tuple utility variant vector
+PRECOMPILED_unit := $(PRECOMPILED_lib) filesystem fstream iostream numbers random set sstream gtest/gtest.h
+# g++ 12 forgets that precompiled headers are the system's and shows its false alarms within std::string.
+precompiled = $(if $(FILE_FLAGS),,-include $(BUILD)/precompiled/$(KIND).h \
+  $(addprefix -Wno-,array-bounds restrict stringop-overflow stringop-overread))
+endif
+KIND := lib
+ifneq ($(unit_flags_$(config)),)
+$(BUILD)/obj/tests/unit/%.o $(BUILD)/precompiled/unit.h.gch: OPTIMIZE := $(unit_flags_$(config))
+endif
+$(BUILD)/obj/tests/unit/%.o: KIND := unit
+
+$(BUILD)/precompiled/%.h: Makefile
 	@mkdir -p $(@D)
-	$(CXX) $(ALLFLAGS) $(FILE_FLAGS) -MMD -MP -c $< -o $@
+	@printf '#include <%s>\n' $(PRECOMPILED_$*) > $@.new && { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+$(BUILD)/precompiled/%.h.gch: $(BUILD)/precompiled/%.h $(BUILD)/flags | $(FIRST)
+	$(CCACHE) $(CXX) $(ALLFLAGS) -x c++-header $< -o $@
+.PRECIOUS: $(BUILD)/precompiled/%.h $(BUILD)/precompiled/%.h.gch
+
+$(BUILD)/obj/tests/unit/%.o: tests/unit/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/unit.h.gch) | $(FIRST)
+	$(compile)
+$(BUILD)/obj/%.o: %.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch) | $(FIRST)
+	$(compile)
+define compile
+@mkdir -p $(@D)
+$(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) -MMD -MP -c $< -o $@
+endef
 
 $(ARCHIVE): $(call obj,$(LIB_SRC))
 $(SHARED): $(call obj,$(SHARED_SRC))
@@ -129,7 +175,8 @@ $(PLUGIN): $(ARCHIVE)
 	$(CXX) $(flags_$(config)) $(LDFLAGS) -shared -o $@ -Wl,-u,gewebe_view_volume $^ -Wl,--as-needed $(LIBS)
 
 $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE) | $(PLUGIN)
-	$(LINK) $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
+	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ -Wl,--whole-archive $(ARCHIVE) -Wl,--no-whole-archive $(filter %.o,$^) \
+	  -Wl,--as-needed $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
 
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS)
@@ -151,7 +198,8 @@ endif
 # --- Tests ------------------------------------------------------------------------------------------
 
 # T=NAME runs the tests of that name (or pattern) alone; SET=fast unit tests, bad input and fuzz corpora.
-check: $(TOOLS) $(ARCHIVE) $(PLUGIN) $(UNIT) $(FUZZ) | $(FIRST)
+# config=thread: unit tests alone.
+check: $(UNIT) $(if $(filter thread,$(config)),,$(TOOLS) $(ARCHIVE) $(PLUGIN) $(FUZZ)) | $(FIRST)
 	@CXX='$(CXX)' MAKE='$(MAKE_COMMAND)' tests/run --config '$(config)' $(if $(SET),--set '$(SET)') $(if $(T),--test '$(T)')
 ifeq ($(config),coverage)
 	@scripts/coverage $(BUILD)
@@ -193,9 +241,9 @@ $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@echo 'clang-format $<'
 	@clang-format-16 --dry-run -Werror $< && touch $@
 
-$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes | $(FIRST)
+$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes scripts/check-nan | $(FIRST)
 	@mkdir -p $(@D)
-	@scripts/check-includes $< && touch $@
+	@scripts/check-includes $< && scripts/check-nan $< && touch $@
 
 $(MAN_STAMPS): $(LINT)/%.mandoc: % | $(FIRST)
 	@mkdir -p $(@D)
@@ -207,13 +255,13 @@ $(SHELL_STAMPS): $(LINT)/%.shellcheck: % | $(FIRST)
 	@echo 'shellcheck $<'
 	@shellcheck -x $< && touch $@
 
-# Writes beside the stamp which of our headers the file reads, so that their change counts too.
+# Writes beside the stamp which of our headers the file reads, so that their change counts too. (What passed in another
+# clone with the same text is known to scripts/tidy.)
 TIDY_FLAGS = $(LANGUAGE) $(WARNINGS) $(INCLUDES) $(DEFINES) $(CPPFLAGS) $(FILE_FLAGS)
 $(LINT)/%_avx2.cpp.tidy: FILE_FLAGS := -mavx2 -mfma
 $(LINT)/%_avx512.cpp.tidy: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma
 $(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy tests/.clang-tidy scripts/tidy | $(FIRST)
 	@mkdir -p $(@D)
-	@echo 'clang-tidy $<'
 	@scripts/tidy $< $@.d $(TIDY_FLAGS) && touch $@
 -include $(TIDY_STAMPS:=.d)
 
@@ -255,10 +303,10 @@ clean:
 	rm -rf build
 
 help:
-	@echo 'make [config=release|debug|sanitize|coverage|fuzz] [TARGET…]'
+	@echo 'make [config=release|debug|sanitize|thread|coverage|fuzz] [TARGET…]'
 	@echo
 	@echo '  all            programs and libgewebe.a in build/CONFIG (the default; config=fuzz: the fuzz targets)'
-	@echo '  deps           install the packages that are missing (SETS="build check lint bench fuzz" says which)'
+	@echo '  deps           install the packages that are missing (SETS="build check lint bench fuzz ci" says which)'
 	@echo '  demo           examples/myoma: from particles to the pictures of a pulled organ'
 	@echo '  check          run the tests; T=NAME only that one, SET=fast unit tests, bad input, fuzz corpora'
 	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'

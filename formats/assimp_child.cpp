@@ -2,7 +2,8 @@
 
 #include "base/error.h"
 #include "formats/child.h"
-#include "surface/triangulate.h"
+#include "formats/file_names.h"
+#include "mesh/triangulate.h"
 
 #include <algorithm>
 #include <array>
@@ -65,8 +66,10 @@ const Format& format_of(Kind kind) {
 constexpr std::string_view input_stem = "gewebe-input.";
 
 std::string one_line(std::string text) {
-  if (text == "std::bad_alloc")
-    text = "out of memory";
+  // Of exceptions that assimp turns into texts.
+  for (const char* const words : {"std::bad_alloc", "max_size()", "vector::", "basic_string::"})
+    if (text.find(words) != std::string::npos)
+      text = "out of memory";
   for (char& c : text)
     if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) > 126)
       c = ' ';
@@ -81,17 +84,18 @@ std::string one_line(std::string text) {
 
 constexpr std::size_t max_side_file = std::size_t{1} << 30;
 
-// The input in memory under a name of its own; beside it whatever regular files lie in its folder.
+// The input in memory under a name of its own; beside it whatever regular files lie in its folder
+// and below. `refused` is the first name that leads elsewhere.
 class InputFiles : public Assimp::IOSystem {
 public:
-  InputFiles(std::string_view bytes, std::string name, bool side_files)
-      : bytes_(bytes), name_(std::move(name)), side_files_(side_files) {}
+  InputFiles(std::string_view bytes, std::string name, std::string folder, std::string& refused)
+      : bytes_(bytes), name_(std::move(name)), folder_(std::move(folder)), refused_(refused) {}
 
   bool Exists(const char* path) const override {
     if (name_ == path)
       return true;
     struct stat status {};
-    return side_files_ && ::stat(path, &status) == 0 && S_ISREG(status.st_mode);
+    return may_read(path) && ::stat(path, &status) == 0 && S_ISREG(status.st_mode);
   }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* path, const char* mode) override {
@@ -100,11 +104,19 @@ public:
     if (name_ == path)
       return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(bytes_.data()),
                                         bytes_.size());
-    return side_files_ ? open_side_file(path) : nullptr;
+    if (may_read(path))
+      return open_side_file(path);
+    if (!folder_.empty() && refused_.empty())
+      refused_ = std::string_view(path).starts_with(folder_) ? path + folder_.size() : path;
+    return nullptr;
   }
   void Close(Assimp::IOStream* stream) override { delete stream; }
 
 private:
+  bool may_read(std::string_view path) const {
+    return !folder_.empty() && path.starts_with(folder_) &&
+           !leaves_folder(path.substr(folder_.size()));
+  }
   static Assimp::IOStream* open_side_file(const char* path) {
     const int fd = ::open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); // a FIFO must not hold us
     if (fd < 0)
@@ -128,8 +140,8 @@ private:
   }
 
   std::string_view bytes_;
-  std::string name_;
-  bool side_files_;
+  std::string name_, folder_; // which ends in /, or nothing is read
+  std::string& refused_;
 };
 
 // ---- scene to mesh
@@ -393,8 +405,11 @@ TriangleMesh import(const AssimpSource& source, AssimpStats& stats) {
   const std::string name = folder + std::string(input_stem) + format.suffix;
   const std::string_view bytes =
       source.kind == Kind::dxf ? without_dxf_comments(source.bytes) : source.bytes;
-  importer.SetIOHandler(new InputFiles(bytes, name, !source.folder.empty()));
+  std::string refused;
+  importer.SetIOHandler(new InputFiles(bytes, name, folder, refused));
   const aiScene* scene = importer.ReadFile(name, 0);
+  if (scene == nullptr && !refused.empty())
+    throw Error("it names '" + refused + "', which is not in its own folder or below");
   if (scene == nullptr)
     throw Error(without(importer.GetErrorString(), name));
   if (!logged.empty())

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fstream>
 #include <new>
+#include <stdexcept>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -147,6 +148,8 @@ int take_over_descriptors(int pipe) {
     reply = work();
     head.good = 1;
   } catch (const std::bad_alloc&) {
+    reply = "out of memory";
+  } catch (const std::length_error&) { // a size that no memory has
     reply = "out of memory";
   } catch (const std::exception& error) {
     reply = error.what();

@@ -40,10 +40,16 @@ std::optional<std::string> text_of(const std::string& line) {
 
 ColumnJournal::ColumnJournal(const std::string& part, std::uint64_t part_bytes)
     : part_(part), path_(part + ".log") {
-  if (part_bytes > 0)
-    read();
-  else
-    (void)::unlink(path_.c_str());
+  read();
+  // It is made before the first byte of the part: what has none is not ours.
+  if (part_bytes > 0 && fd_ < 0)
+    throw Error(part_, "is there without " + path_ +
+                           ", so it is no unfinished store; expected it moved away or removed");
+  if (part_bytes > 0 || fd_ < 0)
+    return;
+  known_.clear();
+  (void)::close(std::exchange(fd_, -1));
+  (void)::unlink(path_.c_str());
 }
 
 ColumnJournal::~ColumnJournal() {
@@ -52,9 +58,15 @@ ColumnJournal::~ColumnJournal() {
 }
 
 void ColumnJournal::read() {
-  fd_ = ::open(path_.c_str(), O_RDWR | O_CLOEXEC);
-  if (fd_ < 0) // killed before anything was finished
+  fd_ = ::open(path_.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (fd_ < 0 && errno == ENOENT)
     return;
+  if (fd_ < 0)
+    throw Error(path_, std::string("cannot read: ") + std::strerror(errno));
+  const auto not_ours = [&] {
+    return Error(path_, "is no journal of an unfinished store, expected '" +
+                            std::string(first_line) + "' in its first line");
+  };
   std::string text;
   std::array<char, 65536> block{};
   for (ssize_t count = 0; (count = ::read(fd_, block.data(), block.size())) != 0;) {
@@ -65,15 +77,16 @@ void ColumnJournal::read() {
     text.append(block.data(), static_cast<std::size_t>(count));
   }
   const std::size_t whole = text.find_last_of('\n') + 1; // 0 where there is none
+  if (whole == 0 && !signed_line(first_line).starts_with(text))
+    throw not_ours();
   std::istringstream lines(text.substr(0, whole));
   std::string line;
   if (std::getline(lines, line)) {
     const std::optional<std::string> head = text_of(line);
     if (head != first_line)
-      throw Error(path_, head && head->starts_with("part ")
-                             ? "is of version " + head->substr(5) + ", expected 1"
-                             : "is no journal of an unfinished store, expected '" +
-                                   std::string(first_line) + "' in its first line");
+      throw head && head->starts_with("part ")
+          ? Error(path_, "is of version " + head->substr(5) + ", expected 1")
+          : not_ours();
   }
   while (std::getline(lines, line))
     read_line(line);
@@ -140,16 +153,20 @@ std::vector<std::optional<ColumnRecord>> ColumnJournal::begin(const Object& obje
   return finished;
 }
 
+void ColumnJournal::make() {
+  if (fd_ >= 0)
+    return;
+  fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (fd_ < 0)
+    throw Error(path_, std::string("cannot be made: ") + std::strerror(errno));
+  write(signed_line(first_line));
+  for (const std::string& line : ahead_)
+    write(line);
+  ahead_.clear();
+}
+
 void ColumnJournal::add(std::size_t k, const ColumnRecord& record) {
-  if (fd_ < 0) {
-    fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (fd_ < 0)
-      throw Error(path_, std::string("cannot be made: ") + std::strerror(errno));
-    write(signed_line(first_line));
-    for (const std::string& line : ahead_)
-      write(line);
-    ahead_.clear();
-  }
+  make();
   std::array<char, 40> residual{};
   (void)std::snprintf(residual.data(), residual.size(), "%a", record.residual);
   write(signed_line("columns " + std::to_string(object_ - 1) + " " + std::to_string(k) + " " +

@@ -9,7 +9,8 @@
 //   on columns INDEX K CRC RESIDUAL         of the object's k-th node; the last one holds
 //
 // A line is written after the bytes it speaks of. It proves nothing by itself: whoever takes
-// columns up compares their checksum.
+// columns up compares their checksum. The file is made before the first byte of the store, so that
+// a FILE.part without it is known to be somebody else's.
 
 #include <cstddef>
 #include <cstdint>
@@ -34,7 +35,8 @@ public:
 
   /// Of the file `part`, whose journal is `part`.log. Takes up the lines that are there if the file
   /// holds anything; else forgets them. Makes no file yet. `part_bytes` is the size of `part`.
-  /// \throw Error, place = path of the journal, if it is of a newer version or damaged
+  /// \throw Error, place = path of the journal, if it is of a newer version, damaged or none of
+  /// ours; place = `part` if that holds something and has no journal
   ColumnJournal(const std::string& part, std::uint64_t part_bytes);
   ~ColumnJournal();
   ColumnJournal(const ColumnJournal&) = delete;
@@ -44,6 +46,8 @@ public:
   /// \throw Error, place = `part`, if what stands there is of another model or other work
   std::vector<std::optional<ColumnRecord>> begin(const Object& object, std::size_t count);
   void add(std::size_t k, const ColumnRecord& record);
+  /// Makes the file if it isn't there. \throw Error, place = path of the journal
+  void make();
   /// Removes the file.
   void remove();
 

@@ -1,6 +1,7 @@
 #include "formats/ela.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "model/check.h"
 
@@ -444,18 +445,14 @@ void emit(const Sink& sink, const Context& context, std::string_view section, st
   }
 }
 
-std::string exact(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
 void emit_model(const Sink& sink, const Model& m, const Context& context) {
   sink("ela_expl 1\nname \"" + m.name + "\"\nmaterials " + std::to_string(m.materials.size()) +
        "\n");
   for (std::size_t i = 0; i < m.materials.size(); ++i) {
     const Material& k = m.materials[i];
-    sink(std::to_string(i) + " \"" + k.name + "\" " + exact(k.density) + " " + exact(k.young) +
-         " " + exact(k.thickness) + " " + exact(k.damping_ratio) + "\n");
+    sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
+         number_text(k.young) + " " + number_text(k.thickness) + " " +
+         number_text(k.damping_ratio) + "\n");
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
     const Node& n = m.nodes[i];
@@ -507,6 +504,15 @@ Model read_ela(Input& input, const Context& context) {
   at(input.name(),
      [&] { require_memory(context, 2 * static_cast<double>(text.size()), what.c_str()); });
   return parse_ela(text, input.name());
+}
+
+Model read_spring_model(Input& input, const Context& context) {
+  Model model = read_ela(input, context);
+  if (!model.tetrahedra.empty())
+    throw Error(input.name(), "the model '" + model.name + "' holds " +
+                                  std::to_string(model.tetrahedra.size()) +
+                                  " tetrahedra, expected springs and triangles alone");
+  return model;
 }
 
 std::string ela_text(const Model& model) {

@@ -1,6 +1,7 @@
 #include "formats/frames_binary.h"
 
 #include "base/error.h"
+#include "base/vector_at.h"
 #include "formats/scene_answer.h"
 
 #include <cmath>
@@ -87,7 +88,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     append_head(bytes, {FrameKind::shapes, i, step, 3 * nodes.size()});
     bytes.reserve(bytes.size() + 12 * nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k)
-      append_single(bytes, nodes[k].position + Vec3{u[3 * k], u[3 * k + 1], u[3 * k + 2]});
+      append_single(bytes, nodes[k].position + vector_at(u, k));
   }
   for (std::uint32_t k = 0; simulation.emits_instruments() && k < simulation.instrument_count();
        ++k) {

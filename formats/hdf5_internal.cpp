@@ -1,6 +1,7 @@
 #include "formats/hdf5_internal.h"
 
 #include "base/error.h"
+#include "formats/file_names.h"
 
 #define H5_USE_110_API // later versions keep its names
 #include <hdf5.h>
@@ -612,6 +613,7 @@ File File::open(const std::string& path) {
     throw Error(path, "is a directory, expected a file");
   if (!S_ISREG(info.st_mode))
     throw Error(path, "is no regular file, expected one, since HDF5 is not read forwards");
+  note_read(path);
   const auto close = [](std::FILE* file) { (void)std::fclose(file); };
   const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
   if (file == nullptr)

@@ -40,6 +40,25 @@ std::string list_names(const std::vector<Kind>& kinds) {
   return text;
 }
 
+/// The suffix of a path that names a kind, though none of ours: a letter, then up to four letters
+/// and digits. Empty for what people call files whose kind is said elsewhere.
+std::string_view foreign_suffix(std::string_view path) {
+  const std::size_t slash = path.find_last_of('/') + 1; // 0 if there is none
+  const std::size_t dot = path.find_last_of('.');
+  if (dot == std::string_view::npos || dot <= slash)
+    return {};
+  const std::string_view suffix = path.substr(dot + 1);
+  const auto is = [](int (*test)(int)) {
+    return [test](char c) { return test(static_cast<unsigned char>(c)) != 0; };
+  };
+  if (suffix.empty() || suffix.size() > 5 || !is(std::isalpha)(suffix[0]) ||
+      !std::ranges::all_of(suffix, is(std::isalnum)))
+    return {};
+  constexpr std::array<std::string_view, 11> plain{"tmp", "part", "new", "old",  "bak", "out",
+                                                   "dat", "bin",  "txt", "mesh", "log"};
+  return std::ranges::find(plain, suffix) == plain.end() ? suffix : std::string_view();
+}
+
 /// The first word of a text, after blank lines and # comments.
 std::string_view first_word(std::string_view text) {
   std::size_t at = 0;
@@ -140,6 +159,9 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
     kind = kind_from_name(to);
   } else if (const Kind suffix = kind_from_suffix(path); suffix != Kind::unknown) {
     kind = suffix;
+  } else if (const std::string_view foreign = foreign_suffix(path); !foreign.empty()) {
+    throw UsageError(std::string(path) + ": cannot write ." + std::string(foreign) +
+                     ", expected --to or a suffix of " + list_names(writable));
   }
   if (std::ranges::find(writable, kind) == writable.end()) {
     const std::string asked = to.empty() ? std::string(kind_name(kind)) : std::string(to);

@@ -1,6 +1,7 @@
 #include "formats/label_volume.h"
 
 #include "base/error.h"
+#include "formats/file_names.h"
 #include "formats/label_volume_internal.h"
 
 #include <algorithm>
@@ -234,8 +235,11 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
   const double words = static_cast<double>(volume.mask.row_words()) * layout.size[1] *
                        static_cast<double>(layout.size[2]);
   at(name, [&] {
-    // Twice, for a vector that grows holds the old content too.
-    require_memory(request.context, 16 * words + 16.0 * layout.size[0] + 1e6,
+    // Twice, for a vector that grows holds the old content too. What comes through here in all
+    // counts as well: it may be a small file that grows without end when it is unpacked.
+    const double bytes = static_cast<double>(bytes_of(layout.type)) * layout.size[0] *
+                         static_cast<double>(layout.size[1]) * layout.size[2];
+    require_memory(request.context, std::max(16 * words + 16.0 * layout.size[0] + 1e6, bytes),
                    ("the label volume of " + size_text(layout.size) + " voxels").c_str());
   });
   Counter counter(request.labels);
@@ -271,8 +275,10 @@ void check_affine(const std::string& place, const GridTransform& transform) {
 }
 
 std::string beside(const std::string& header, std::string_view file) {
-  if (file.starts_with('/'))
-    return std::string(file);
+  if (leaves_folder(file))
+    throw Error(header, "names " + quoted(file) +
+                            " as the file of its voxels, expected one in its "
+                            "own folder or below");
   const std::size_t slash = header.find_last_of('/');
   return (slash == std::string::npos ? std::string() : header.substr(0, slash + 1)) +
          std::string(file);

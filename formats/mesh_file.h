@@ -4,7 +4,7 @@
 #include "base/mesh.h"
 #include "formats/kind.h"
 #include "formats/stream.h"
-#include "surface/weld.h"
+#include "mesh/weld.h"
 
 #include <cstdint>
 #include <optional>

@@ -1,7 +1,7 @@
 #include "base/error.h"
 #include "formats/ply.h"
 #include "formats/ply_source_internal.h"
-#include "surface/triangulate.h"
+#include "mesh/triangulate.h"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 namespace gewebe {
 
 RawFile::RawFile(const std::string& path, std::string name)
-    : fd_(::open(path.c_str(), O_RDWR | O_CLOEXEC)), name_(std::move(name)) {
+    : fd_(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_CLOEXEC)), name_(std::move(name)) {
   if (fd_ < 0)
     fail("cannot open");
 }

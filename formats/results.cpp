@@ -150,6 +150,8 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
   }
   if (group.has("material"))
     result.mesh.material = group.read<std::int32_t>("material", count);
+  if (const hdf5::Group whole = objects.group(object); whole.has("materials"))
+    result.materials = whole.read_texts("materials");
   at(path, [&] { check_mesh(result.mesh); });
   return result;
 }

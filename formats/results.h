@@ -24,9 +24,10 @@ ResultIndex read_result_index(const std::string& path);
 /// Texture coordinates where the model had them. \throw Error, place = path; if there is no such
 /// object or frame, naming what there is
 struct ResultSurface {
-  TriangleMesh mesh;      ///< displaced points
-  std::vector<Vec3> rest; ///< as many
-  bool there = true;      ///< false: a part that came off later, the mesh is empty
+  TriangleMesh mesh;                  ///< displaced points
+  std::vector<Vec3> rest;             ///< as many
+  std::vector<std::string> materials; ///< names, where the file has them
+  bool there = true;                  ///< false: a part that came off later, the mesh is empty
 };
 ResultSurface read_result_surface(const std::string& path, const std::string& object,
                                   std::size_t frame);

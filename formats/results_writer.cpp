@@ -158,6 +158,10 @@ private:
     hdf5::Group group = groups_->create_group(name);
     group.set("order", static_cast<std::uint32_t>(objects_.size()));
     group.set("model", model.name);
+    std::vector<std::string> materials;
+    for (const Material& material : model.materials)
+      materials.push_back(material.name);
+    group.write_texts("materials", materials);
     hdf5::Dataset displacement = add_shape(group, model);
     hdf5::Group forces = group.create_group("forces");
     hdf5::Dataset frame = forces.create_growing("frame", hdf5::Number::uint64, {}, 512);

@@ -1,6 +1,7 @@
 #include "formats/scene.h"
 
 #include "base/error.h"
+#include "base/nearest_word.h"
 
 #include <algorithm>
 #include <array>
@@ -416,8 +417,12 @@ What parse_command(std::vector<std::string> line, bool behind_at) {
       in.end();
       return what;
     }
+  std::vector<std::string> known;
+  for (const Verb& verb : verbs())
+    if (verb.at || !behind_at)
+      known.emplace_back(verb.name);
   throw Error(shown(verb_name) + " is no command" + (behind_at ? " behind at T" : "") +
-              ", expected one of " + verb_list(behind_at));
+              suggestion(verb_name, known) + ", expected one of " + verb_list(behind_at));
 }
 
 } // namespace

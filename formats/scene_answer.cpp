@@ -1,5 +1,6 @@
 #include "formats/scene_answer.h"
 
+#include "base/vector_at.h"
 #include "formats/scene_instrument.h"
 
 #include <algorithm>
@@ -84,7 +85,7 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
     const std::span<const double> u = simulation.displacement(i);
     text += "shapes " + simulation.name(i) + " " + std::to_string(nodes.size()) + "\n";
     for (std::size_t k = 0; k < nodes.size(); ++k)
-      append(text, nodes[k].position + Vec3{u[3 * k], u[3 * k + 1], u[3 * k + 2]}, '\n');
+      append(text, nodes[k].position + vector_at(u, k), '\n');
   }
   if (simulation.emits_instruments())
     text += instrument_reply(simulation);

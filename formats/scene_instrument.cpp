@@ -10,7 +10,7 @@ std::optional<Change> instrument_change(
     const Command& command, Simulation& simulation,
     const std::function<std::vector<std::uint32_t>(std::size_t, const Selector&)>& nodes) {
   if (const auto* const set = std::get_if<InstrumentCommand>(&command.what))
-    return SetInstrument{simulation.add_instrument(set->name), set->shape, set->pose};
+    return SetInstrument{simulation.instrument_place(set->name), set->shape, set->pose, set->name};
   if (const auto* const move = std::get_if<MoveCommand>(&command.what))
     return MoveInstrument{simulation.find_instrument(move->instrument), move->place, move->turn,
                           move->over};

@@ -6,7 +6,6 @@
 #include "model/selector.h"
 
 #include <filesystem>
-#include <unistd.h>
 #include <vector>
 
 namespace gewebe {
@@ -57,14 +56,18 @@ std::string numbered(const std::string& selector, const std::map<std::string, st
 SceneRecord::SceneRecord(const std::string& path, const Output::Options& options,
                          const std::string& scene)
     : output_(path, as_part(options)) {
-  if (output_.part()) {
-    if (::truncate(output_.temporary().c_str(), 0) != 0)
-      throw Error(output_.name(), "cannot be written anew");
+  std::error_code none;
+  if (output_.part() && fs::file_size(output_.temporary(), none) > 0 && !none)
+    throw Error(output_.name(), output_.temporary() + " is there, the record of a run that did not "
+                                                      "end; expected it moved away or removed");
+  if (output_.part())
     output_.keep_part();
-  }
   const fs::path from = folder_of(path), to = folder_of(scene);
   if (from != to)
     prefix_ = (to.lexically_relative(from) / "").generic_string();
+  if (prefix_.find_first_of("\"\n") != std::string::npos)
+    throw Error(output_.name(), "the way from here to the scene's folder holds a quote or a line "
+                                "end, which no scene can name, expected a record beside the scene");
 }
 
 void SceneRecord::write(std::string_view line) {

@@ -14,7 +14,8 @@ class SceneRecord {
 public:
   /// While it grows it is PATH.part, which holds all lines so far whatever ends the program; names
   /// of files count from the record's folder. \param scene the recorded one, as in scene_files
-  /// \throw Error, UsageError as Output
+  /// \throw Error, UsageError as Output; Error if the folder of the scene has a name that no line
+  /// can hold
   SceneRecord(const std::string& path, const Output::Options& options, const std::string& scene);
 
   /// A line that was carried out. \param lists the node lists that it names, and their text: the

@@ -7,6 +7,7 @@
 #include "formats/scene.h"
 #include "formats/scene_answer.h"
 #include "formats/scene_changes.h"
+#include "formats/scene_checks.h"
 #include "formats/scene_record.h"
 #include "formats/step_latency.h"
 
@@ -25,7 +26,8 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t longest_line = 1U << 24U;
+constexpr std::uint64_t longest_line = 1U << 24U; // that is carried out
+constexpr std::uint64_t longest_rest = 1U << 30U; // of one that is not, to be passed over
 constexpr double most_samples = 1e9;
 constexpr double default_step = 1.0 / 60;
 
@@ -79,6 +81,7 @@ struct SceneRun::State {
   std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
   std::uint64_t first_error = 0;
   std::string first_error_text;
+  SceneChecks checks;
   std::vector<std::string> stores; ///< by object; "" where it has none
   std::vector<std::string> models; ///< files that objects were made of
 
@@ -96,14 +99,29 @@ struct SceneRun::State {
                (options.serve && options.measure);
     s.rate = options.rate;
     if (options.warn)
-      s.warn = [this](const std::string& text) {
-        if (options.events != nullptr)
-          options.events->message(simulation.time(), "warning", text);
-        options.warn(text);
-      };
-    if (options.events != nullptr)
-      s.applied = [this](const Change& change) { options.events->change(simulation, change); };
+      s.warn = [this](const std::string& text) { warn(text); };
+    s.distrust = [this](const std::string& text) { distrust(text); };
+    s.applied = [this](const Change& change) {
+      if (const auto* const set = std::get_if<SetInstrument>(&change))
+        checks.instrument(set->instrument, set->shape);
+      if (options.events != nullptr)
+        options.events->change(simulation, change);
+    };
     return s;
+  }
+
+  void warn(const std::string& text) {
+    if (options.events != nullptr)
+      options.events->message(simulation.time(), "warning", text);
+    if (options.warn)
+      options.warn(text);
+  }
+
+  void distrust(const std::string& text) {
+    if (options.events != nullptr)
+      options.events->message(simulation.time(), "warning", text);
+    if (const auto& tell = options.distrust ? options.distrust : options.warn)
+      tell(text);
   }
 
   void add(const ObjectCommand& c) {
@@ -181,24 +199,39 @@ struct SceneRun::State {
                    })) {
       schedule(command, *change);
     } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
-      first_frame();
-      simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
-      answer();
+      go_on([&] {
+        simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
+      });
     } else {
       run(std::get<RunCommand>(command.what));
     }
   }
 
+  /// A step and its answer, behind the first frame. Only when the step is done, so that one that
+  /// fails leaves nothing.
+  template <class Step>
+  void go_on(Step&& step) {
+    require_object();
+    const std::size_t objects = simulation.object_count(); // before parts come off
+    for (std::size_t i = 0;
+         options.result != nullptr && options.result->wants_models() && i < objects; ++i)
+      (void)simulation.first_model(i); // a file that is wrong fails the step
+    step();
+    first_frame(objects);
+    answer();
+  }
+
   void run(const RunCommand& c) {
-    first_frame();
+    require_object();
     const double start = simulation.time(), span = c.until - start;
     const double exact = span / c.every;
     if (!(exact <= most_samples))
       throw Error("over 1e9 steps, expected fewer");
     const auto sample = [&](double time) {
-      simulation.step_to(time);
-      under_way = RunCommand{time, c.every};
-      answer();
+      go_on([&] {
+        simulation.step_to(time);
+        under_way = RunCommand{time, c.every};
+      });
     };
     // A hair more than a whole number of steps is rounding; a last one may be shorter.
     const auto count = static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12)));
@@ -209,10 +242,10 @@ struct SceneRun::State {
   }
 
   /// What the result must know of new objects, and of those that were cut since the last frame.
-  void add_results(bool cut) {
+  void add_results(std::size_t objects, bool cut) {
     static const Model none;
     const bool models_too = options.result->wants_models();
-    for (; in_result < simulation.object_count(); ++in_result) {
+    for (; in_result < objects; ++in_result) {
       const Model& model = models_too ? simulation.first_model(in_result) : none;
       const bool part = std::any_of(
           simulation.cuttings().begin(), simulation.cuttings().end(),
@@ -237,18 +270,21 @@ struct SceneRun::State {
       });
   }
 
-  /// The frame before anything moves, and what the result must know of new objects.
-  void first_frame() {
+  void require_object() const {
     if (simulation.object_count() == 0)
       throw Error("there is no object, expected an object command first");
+  }
+
+  /// What the result must know of these first objects, and the frame before anything moves.
+  void first_frame(std::size_t objects) {
     if (options.result == nullptr)
       return;
-    add_results(false);
+    add_results(objects, false);
     if (counts.frames > 0)
       return;
     std::vector<std::vector<double>> rest;
     std::vector<FrameObject> frame;
-    for (std::size_t i = 0; i < simulation.object_count(); ++i)
+    for (std::size_t i = 0; i < objects; ++i)
       rest.emplace_back(simulation.known(i) ? 3 * simulation.first_model(i).nodes.size() : 0);
     for (const std::vector<double>& one : rest)
       frame.push_back({one, {}});
@@ -258,6 +294,10 @@ struct SceneRun::State {
 
   void answer() {
     ++steps;
+    checks.look(
+        simulation, simulation.emits_shapes() || options.result != nullptr || options.measure,
+        [this](const std::string& text) { warn(text); },
+        [this](const std::string& text) { distrust(text); });
     if (options.reply)
       deliver([&] {
         options.reply(options.binary ? binary_answer(simulation, steps)
@@ -270,10 +310,12 @@ struct SceneRun::State {
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
     if (options.result != nullptr) {
-      add_results(true);
+      add_results(simulation.object_count(), true);
+      const bool shapes = options.result->wants_models();
       std::vector<FrameObject> frame;
       for (std::size_t i = 0; i < simulation.object_count(); ++i)
-        frame.push_back({simulation.displacement(i), simulation.contact_forces(i)});
+        frame.push_back({shapes ? simulation.displacement(i) : std::span<const double>(),
+                         simulation.contact_forces(i)});
       deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }
@@ -390,7 +432,8 @@ void SceneRun::finish() {
       if (s.counts.commands == 0)
         throw first_error().value_or(
             Error("no command, expected object, step or another, see scene(5)"));
-      s.first_frame();
+      s.require_object();
+      s.first_frame(s.simulation.object_count());
     });
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
@@ -437,7 +480,7 @@ void run_scene(Input& input, SceneRun& run) {
   // The stream's buffer hands out what has come so far and waits only for more.
   std::streambuf& bytes = *input.stream().rdbuf();
   std::string line;
-  bool overlong = false;
+  std::uint64_t size = 0; // of the line, also of what is not kept
   for (;;) {
     const bool waits = bytes.in_avail() <= 0;
     const auto c = bytes.sbumpc();
@@ -445,17 +488,18 @@ void run_scene(Input& input, SceneRun& run) {
       run.latency()->line_arrived();
     const bool end = c == std::streambuf::traits_type::eof();
     if (!end && c != '\n') {
-      overlong = overlong || line.size() == longest_line;
-      if (!overlong)
+      if (++size <= longest_line)
         line += static_cast<char>(c);
+      else if (size == longest_line + 1)
+        run.overlong_line(); // now: there may be no end to it
+      else if (size > longest_rest)
+        throw Error(input.name(), "a line of over 1 GiB, expected an end");
       continue;
     }
-    if (overlong)
-      run.overlong_line();
-    else if (!end || !line.empty())
+    if (size <= longest_line && (!end || !line.empty()))
       run.line(line);
     line.clear();
-    overlong = false;
+    size = 0;
     if (end)
       break;
   }

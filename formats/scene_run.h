@@ -47,6 +47,8 @@ struct SceneOptions {
   bool binary = false;                         ///< answers are frames_binary.h's, else text
   bool serve = false; ///< a wrong line is answered, changes nothing, and the run goes on
   std::function<void(const std::string&)> warn;
+  /// Told, once of each object, why its shape is not to be trusted; without it `warn` is.
+  std::function<void(const std::string&)> distrust{};
   double rate = 0;                ///< see SimulationOptions
   ResultWriter* result = nullptr; ///< gets objects and frames; none of these is committed
   EventLog* events = nullptr;

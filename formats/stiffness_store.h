@@ -4,7 +4,7 @@
 
 #include "base/columns.h"
 #include "model/model.h"
-#include "sim/factor.h"
+#include "solve/factor.h"
 
 #include <cstdint>
 #include <memory>

@@ -11,11 +11,16 @@
 #include "sim/compliance_columns.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <unistd.h>
 
 namespace gewebe {
 
@@ -174,6 +179,16 @@ struct Place {
   std::uint64_t offset = 0, bytes = 0;
 };
 
+/// An empty file under a name that nobody has.
+std::string fresh_beside(const std::string& path, const std::string& name) {
+  std::string fresh = path + ".XXXXXX";
+  const int fd = ::mkostemp(fresh.data(), O_CLOEXEC);
+  if (fd < 0)
+    throw Error(name, std::string("cannot create a file in its folder: ") + std::strerror(errno));
+  (void)::close(fd);
+  return fresh;
+}
+
 /// Gives a file the name of nothing: it lives as long as someone has it open.
 RawFile nameless(const std::string& path, const std::string& name) {
   RawFile file(path, name);
@@ -228,13 +243,11 @@ struct StiffnessStoreWriter::State {
   std::vector<float> row;
 
   explicit State(Output& to)
-      : output(to), path(to.part() ? to.temporary() + ".frame" : to.temporary()),
+      : output(to), path(to.part() ? fresh_beside(to.temporary(), to.name()) : to.temporary()),
         file(hdf5::File::create(path, to.name())), data(to.temporary(), to.name()) {
     if (!to.part())
       return;
     frame.emplace(nameless(path, to.name()));
-    if (data.size() > 0)
-      to.keep_part(); // whatever is wrong with it
     journal.emplace(to.temporary(), data.size());
   }
 
@@ -243,11 +256,13 @@ struct StiffnessStoreWriter::State {
   template <class T>
   void write(std::size_t k, std::span<const T> stored, double residual) {
     const std::uint32_t crc = crc32c(stored);
-    data.write(place_of(k), stored.data(), stored.size_bytes());
     if (journal) {
+      journal->make();
       output.keep_part();
-      journal->add(k, {crc, residual});
     }
+    data.write(place_of(k), stored.data(), stored.size_bytes());
+    if (journal)
+      journal->add(k, {crc, residual});
     sums.add(k, stored, crc, residual);
   }
 
@@ -389,8 +404,10 @@ double StiffnessStoreWriter::end(double residual) {
 void StiffnessStoreWriter::close() {
   State& s = *state_;
   s.file.close();
-  if (s.frame)
-    copy_frame(*s.frame, s.data, s.places, s.output.name());
+  if (!s.frame)
+    return;
+  s.journal->make();
+  copy_frame(*s.frame, s.data, s.places, s.output.name());
 }
 
 void StiffnessStoreWriter::remove_journal() {

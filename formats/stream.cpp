@@ -2,6 +2,8 @@
 
 #include "base/bytes.h"
 #include "base/error.h"
+#include "formats/file_names.h"
+#include "formats/program_start.h"
 
 #include <array>
 #include <atomic>
@@ -58,29 +60,9 @@ void forget_temporary(int slot) {
 }
 
 extern "C" void gewebe_remove_temporaries(int signal_number) {
-  for (TemporarySlot& slot : temporary_slots)
-    if (slot.used.load())
-      (void)::unlink(slot.path.data());
+  remove_temporaries();
   (void)std::signal(signal_number, SIG_DFL);
   (void)std::raise(signal_number);
-}
-
-/// Where `path` leads through symlinks, whether or not the last one's target exists.
-std::string follow_links(std::string path) {
-  for (int depth = 0; depth < 40; ++depth) {
-    std::array<char, PATH_MAX> target{};
-    const ssize_t length = ::readlink(path.c_str(), target.data(), target.size() - 1);
-    if (length < 0)
-      return path;
-    std::string link(target.data(), static_cast<std::size_t>(length));
-    if (!link.starts_with('/')) {
-      const std::size_t slash = path.find_last_of('/');
-      if (slash != std::string::npos)
-        link = path.substr(0, slash + 1) + link;
-    }
-    path = std::move(link);
-  }
-  return path;
 }
 
 bool same_bytes(const std::string& a, const std::string& b) {
@@ -203,6 +185,7 @@ Input::Input(const std::string& path, bool binary) : state_(std::make_unique<Sta
     throw UsageError(path + " is a terminal, expected a file or a pipe");
   if (S_ISREG(info.st_mode))
     state.size_hint = static_cast<std::uint64_t>(info.st_size);
+  note_read(state.name, state.fd == 0 ? 0 : -1);
 }
 
 Input::~Input() = default;
@@ -288,8 +271,7 @@ struct Output::State final : std::streambuf {
     sigset_t old{};
     (void)::sigfillset(&all);
     (void)::pthread_sigmask(SIG_SETMASK, &all, &old);
-    fd = options.part ? ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)
-                      : ::mkostemp(path.data(), O_CLOEXEC);
+    fd = options.part ? open_part(path) : ::mkostemp(path.data(), O_CLOEXEC);
     int error = errno;
     if (fd >= 0 && options.part && !lock_part(path)) {
       error = EBUSY; // of another program, so it must not be removed
@@ -298,16 +280,40 @@ struct Output::State final : std::streambuf {
     }
     if (fd >= 0) {
       temporary = path;
-      slot = remember_temporary(path);
+      kept = found;
+      slot = found ? -1 : remember_temporary(path);
     }
     (void)::pthread_sigmask(SIG_SETMASK, &old, nullptr);
     errno = error;
     if (fd < 0 && errno == EBUSY)
       throw Error(name, "is being made by another program: " + path + " is locked");
+    if (fd < 0 && (errno == ELOOP || errno == EEXIST || errno == EISDIR))
+      throw Error(name, path + " is there and no file of ours, expected none or what an unfinished "
+                               "run left");
     if (fd < 0)
       fail("cannot create a file in its folder");
-    if (::fchmod(fd, mode) != 0)
+    if (!found && ::fchmod(fd, mode) != 0)
       fail("cannot set the mode");
+  }
+
+  /// Makes the file, or opens what an earlier run left: never through a link, never what is
+  /// another user's. -1 and errno as open(2); EEXIST if it isn't ours.
+  int open_part(const std::string& path) {
+    const int made = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (made >= 0 || errno != EEXIST)
+      return made;
+    const int there = ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    struct stat info {};
+    if (there < 0)
+      return -1;
+    if (::fstat(there, &info) != 0 || !S_ISREG(info.st_mode) || info.st_nlink > 1 ||
+        info.st_uid != ::geteuid()) {
+      (void)::close(there);
+      errno = EEXIST;
+      return -1;
+    }
+    found = info.st_size > 0;
+    return there;
   }
 
   void write_all(const char* data, std::size_t size) {
@@ -363,6 +369,8 @@ struct Output::State final : std::streambuf {
   int fd = -1, slot = -1;
   mode_t mode = 0;
   bool existed = false, kept = false;
+  bool found = false; ///< the part held something
+  FileUse use;
   std::vector<char> buffer = std::vector<char>(buffer_bytes);
   std::unique_ptr<std::ostream> stream;
 };
@@ -376,6 +384,7 @@ Output::Output(const std::string& path, const Options& options)
     if (options.binary && ::isatty(1) != 0)
       throw UsageError("standard output is a terminal, expected -o FILE or a pipe");
     state.fd = 1;
+    state.use = FileUse("-", 1);
     return;
   }
   struct stat info {};
@@ -399,6 +408,7 @@ Output::Output(const std::string& path, const Options& options)
     state.mode = 0666U & ~mask;
   }
   state.target = follow_links(path);
+  state.use = FileUse(path);
   state.create_temporary();
 }
 
@@ -450,6 +460,8 @@ void Output::commit() {
       state.fail("cannot write");
     return;
   }
+  if (state.found && ::fchmod(state.fd, state.mode) != 0)
+    state.fail("cannot set the mode");
   if (state.options.sync && ::fsync(state.fd) != 0)
     state.fail("cannot write");
   const int fd = state.fd;
@@ -460,6 +472,10 @@ void Output::commit() {
     state.kept = false;
     return; // the destructor removes the temporary file
   }
+  // Something may have been read since that another file has to serve for; a record of a failed
+  // run would destroy it.
+  state.use = FileUse();
+  state.use = FileUse(state.name);
   if (::rename(state.temporary.c_str(), state.target.c_str()) != 0)
     state.fail("cannot rename");
   forget_temporary(state.slot);
@@ -471,7 +487,7 @@ void install_signal_cleanup() {
   action.sa_handler = gewebe_remove_temporaries;
   (void)::sigfillset(&action.sa_mask);
   action.sa_flags = 0;
-  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) {
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU}) {
     struct sigaction old {};
     // What the caller ignores on purpose (nohup) stays ignored; a broken pipe always ends a
     // program.
@@ -480,6 +496,20 @@ void install_signal_cleanup() {
       continue;
     (void)::sigaction(signal_number, &action, nullptr);
   }
+  (void)std::signal(SIGXFSZ, SIG_IGN); // then write(2) says EFBIG
+}
+
+void remove_temporaries() noexcept {
+  for (TemporarySlot& slot : temporary_slots)
+    if (slot.used.load())
+      (void)::unlink(slot.path.data());
+}
+
+void hold_standard_streams() {
+  // Open in the wrong direction, so that whoever reads or writes them is told.
+  for (const int fd : {0, 1, 2})
+    if (::fcntl(fd, F_GETFD) < 0 && errno == EBADF)
+      (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
 }
 
 } // namespace gewebe

@@ -35,7 +35,7 @@ std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& op
     const std::int64_t which = frame < 0 ? frames - 1 : frame;
     ResultSurface read = read_result_surface(path, name, static_cast<std::size_t>(which));
     if (read.there || !options.object.empty())
-      surfaces.push_back({std::move(read.mesh), std::move(read.rest)});
+      surfaces.push_back({std::move(read.mesh), std::move(read.rest), std::move(read.materials)});
   }
   return surfaces;
 }
@@ -109,8 +109,13 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
          "--unit for what is in mm, expected no --unit");
   if (is_result)
     return read_frame(input, options);
-  if (is_model)
-    return one(surface_mesh(read_ela(input, context)));
+  if (is_model) {
+    const Model model = read_spring_model(input, context);
+    std::vector<Surface> surfaces = one(surface_mesh(model));
+    for (const Material& material : model.materials)
+      surfaces[0].materials.push_back(material.name);
+    return surfaces;
+  }
   return one(read_mesh(input, {options.kind, options.unit, std::nullopt, false}));
 }
 

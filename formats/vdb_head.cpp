@@ -54,9 +54,9 @@ void check_vdb_head(std::string_view bytes, const std::string& name) {
   if (reader.number<std::int64_t>("the VDB magic") != 0x56444220)
     throw Error(name, "byte 0: no OpenVDB stream, expected the magic bytes of one");
   const auto version = reader.number<std::uint32_t>("a version");
-  if (version < 222 || version > 1000)
+  if (version < 222 || version > 224)
     throw Error(name, "byte 8: OpenVDB file version " + std::to_string(version) +
-                          ", expected 222 or later");
+                          ", expected 222 to 224");
   (void)reader.take(8, "a library version");
   (void)reader.take(1, "a flag");
   (void)reader.take(36, "a UUID");

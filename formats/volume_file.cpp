@@ -1,4 +1,4 @@
-#include "formats/volume_file.h"
+#include "formats/volume_file_internal.h"
 
 #include "base/digest.h"
 #include "base/error.h"
@@ -9,11 +9,13 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/util/logging.h>
+#include <openvdb/version.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <iostream>
 #include <istream>
 #include <mutex>
 #include <ostream>
@@ -21,6 +23,12 @@
 #include <streambuf>
 
 namespace gewebe {
+
+const StreamWay usual_way =
+    openvdb::OPENVDB_FILE_VERSION == openvdb::OPENVDB_FILE_VERSION_MULTIPASS_IO
+        ? StreamWay::parallel
+        : StreamWay::plain;
+
 namespace {
 
 constexpr std::size_t uuid_begin = 21;
@@ -35,6 +43,58 @@ void initialize_openvdb() {
     openvdb::initialize();
   });
 }
+
+/// What OpenVDB says while it reads: its library logs to standard output, its headers to standard
+/// error, and neither throws. While this object lives, it is kept here instead.
+class Remarks {
+public:
+  Remarks() : cout_(std::cout.rdbuf(&kept_)), cerr_(std::cerr.rdbuf(&kept_)) {}
+  Remarks(const Remarks&) = delete;
+  Remarks& operator=(const Remarks&) = delete;
+  ~Remarks() {
+    (void)std::cout.rdbuf(cout_);
+    (void)std::cerr.rdbuf(cerr_);
+  }
+  /// The first line, without colours and the word before it; empty if nothing was said.
+  std::string first() {
+    std::string text = kept_.text();
+    for (std::size_t begin = 0; (begin = text.find('\033', begin)) != std::string::npos;)
+      text.erase(begin, text.find('m', begin) - begin + 1);
+    const std::size_t colon = text.find(": ");
+    if (colon != std::string::npos && colon < 10)
+      text.erase(0, colon + 2);
+    return text.substr(0, text.find('\n'));
+  }
+
+private:
+  /// Several threads may speak at once.
+  class Kept final : public std::streambuf {
+  public:
+    std::string text() {
+      const std::lock_guard lock(mutex_);
+      return text_;
+    }
+
+  private:
+    int_type overflow(int_type c) override {
+      const std::lock_guard lock(mutex_);
+      if (!traits_type::eq_int_type(c, traits_type::eof()))
+        text_ += traits_type::to_char_type(c);
+      return traits_type::not_eof(c);
+    }
+    std::streamsize xsputn(const char* data, std::streamsize count) override {
+      const std::lock_guard lock(mutex_);
+      text_.append(data, static_cast<std::size_t>(count));
+      return count;
+    }
+    std::mutex mutex_;
+    std::string text_;
+  };
+
+  Kept kept_;
+  std::streambuf* cout_;
+  std::streambuf* cerr_;
+};
 
 /// Bytes in memory as a stream that throws where it ends: OpenVDB takes what a short read left in
 /// its buffers for data.
@@ -370,12 +430,15 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
   return floats[0];
 }
 
-Grid parse_volume(const std::string& bytes, const std::string& name, const Context& context) {
+Grid parse_volume(const std::string& bytes, const std::string& name, const Context& context,
+                  StreamWay way) {
   MemoryBuffer buffer(bytes, name);
   std::istream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
   const auto storage = std::make_shared<LeafStorage>();
-  openvdb::FloatGrid::Ptr native = ReadArchive().read(stream, context, storage);
+  openvdb::FloatGrid::Ptr native;
+  if (way == StreamWay::parallel)
+    native = ReadArchive().read(stream, context, storage);
   openvdb::FloatTree::Ptr tree;
   if (native) {
     tree = native->treePtr();
@@ -407,20 +470,39 @@ Grid read_volume(Input& input, const Context& context) {
 }
 
 Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context) {
+  return volume_from_bytes(std::move(bytes), name, context, usual_way);
+}
+
+Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context,
+                       StreamWay way) {
   initialize_openvdb();
   check_vdb_head(bytes, name);
+  const std::string damaged = "is damaged or of a kind that this program does not read";
+  Remarks remarks;
   try {
-    return at(name, [&] { return parse_volume(bytes, name, context); });
+    Grid grid = at(name, [&] { return parse_volume(bytes, name, context, way); });
+    if (const std::string remark = remarks.first(); !remark.empty())
+      throw Error(name, damaged + " (OpenVDB: " + remark + ")");
+    return grid;
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
-    throw Error(name, "damaged: asks for more memory than there is");
-  } catch (const std::exception& error) {
-    throw Error(name, std::string("damaged or no float volume: ") + error.what());
+    throw Error(name, "is damaged, or there is less memory than it needs");
+  } catch (const openvdb::Exception& error) {
+    const std::string text = error.what(); // begins with the name of its class
+    const std::size_t colon = text.find(": ");
+    throw Error(name, damaged + " (OpenVDB: " +
+                          (colon == std::string::npos ? text : text.substr(colon + 2)) + ")");
+  } catch (const std::exception&) {
+    throw Error(name, damaged);
   }
 }
 
 void write_volume(Output& output, const Grid& grid, const Context& context) {
+  write_volume(output, grid, context, usual_way);
+}
+
+void write_volume(Output& output, const Grid& grid, const Context& context, StreamWay way) {
   initialize_openvdb();
   const GridInfo& info = grid.info();
   const auto native = std::make_shared<WriteGrid>(grid.native()->tree, context);
@@ -437,7 +519,13 @@ void write_volume(Output& output, const Grid& grid, const Context& context) {
   UuidBuffer buffer(*output.stream().rdbuf(), uuid_of(grid.digest()));
   std::ostream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
-  WriteArchive().write_grid(stream, *native);
+  if (way == StreamWay::parallel) {
+    WriteArchive().write_grid(stream, *native);
+    return;
+  }
+  openvdb::io::Stream archive(stream);
+  archive.setCompression(usual_compression);
+  archive.write(openvdb::GridCPtrVec{std::make_shared<openvdb::FloatGrid>(*native)});
 }
 
 } // namespace gewebe

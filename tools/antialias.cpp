@@ -76,9 +76,9 @@ Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& me
     case Antialias::lines:
       return line_coverage(context, mesh, transform, choice.count, on_open, &report);
     case Antialias::jones:
-      return jones_density(context, mesh, transform, on_open, &report);
+      return jones_density(context, mesh, transform, on_open, &report, options.rule);
     case Antialias::sramek:
-      return sramek_density(context, mesh, transform, on_open, &report);
+      return sramek_density(context, mesh, transform, on_open, &report, options.rule);
     default:
       break;
     }

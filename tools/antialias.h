@@ -11,7 +11,7 @@ namespace gewebe {
 enum class Antialias { exact, lines, box, jones, sramek, none };
 
 struct AntialiasChoice {
-  Antialias filter = Antialias::exact;
+  Antialias filter = Antialias::jones;
   int count = 1; ///< N of lines:N and box:N
 };
 

@@ -1,6 +1,10 @@
 #include "tools/cli.h"
 
 #include "base/bytes.h"
+#include "base/nearest_word.h"
+#include "base/number_text.h"
+#include "formats/file_names.h"
+#include "formats/program_start.h"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -8,15 +12,19 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <fstream>
+#include <ios>
 #include <mutex>
+#include <new>
 #include <sys/stat.h>
+#include <system_error>
+#include <typeinfo>
 #include <unistd.h>
 #include <utility>
 
@@ -43,6 +51,37 @@ void print_message(const std::string& tool, const std::string& text) {
   (void)std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
+/// What an exception means that isn't of ours: texts of libraries tell a user nothing.
+std::string foreign_text(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+      dynamic_cast<const std::length_error*>(&error) != nullptr)
+    return "out of memory";
+  if (const auto* const system = dynamic_cast<const std::system_error*>(&error))
+    if (system->code().category() == std::system_category() ||
+        system->code() == std::errc::resource_unavailable_try_again)
+      return system->code() == std::errc::resource_unavailable_try_again
+                 ? "no thread can be started, expected room for more (ulimit -u, ulimit -v)"
+                 : "the system refuses: " + system->code().message();
+  if (dynamic_cast<const std::ios_base::failure*>(&error) != nullptr)
+    return "cannot read or write";
+  return std::string("a fault of this program, please report it: ") + error.what();
+}
+
+/// What nobody can catch: thrown where a library is loaded or a thread of one begins.
+[[noreturn]] void end_suddenly() {
+  remove_temporaries();
+  std::string text = "a fault of this program, please report it";
+  try {
+    if (const std::exception_ptr thrown = std::current_exception())
+      std::rethrow_exception(thrown);
+  } catch (const std::exception& error) {
+    text = foreign_text(error);
+  } catch (...) { // as said above
+  }
+  print_message(program_invocation_short_name, text);
+  ::_exit(1);
+}
+
 template <class Number>
 Number parse_number(const std::string& name, std::string_view word) {
   Number value{};
@@ -56,12 +95,6 @@ Number parse_number(const std::string& name, std::string_view word) {
     if (!std::isfinite(value))
       throw UsageError(name + ": '" + std::string(word) + "' is not finite");
   return value;
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), result.ptr};
 }
 
 /// One option or flag: what CLI11 is told, and what happens to its word afterwards.
@@ -163,6 +196,17 @@ void write_text(const std::string& path, const std::string& text) {
   output.write(text);
   output.commit();
 }
+
+/// Before the first constructor of any library: closed streams, and ends that nobody catches.
+void begin_program(int /*argc*/, char** /*argv*/, char** /*environment*/) {
+  hold_standard_streams();
+  std::set_terminate(end_suddenly);
+}
+
+#ifndef GEWEBE_SANITIZE // sanitizers set themselves up at that moment
+__attribute__((section(".preinit_array"), used)) void (*const early)(int, char**,
+                                                                     char**) = begin_program;
+#endif
 
 } // namespace
 
@@ -303,6 +347,9 @@ struct Program::State {
 };
 
 Program::Program(std::string name, std::string description) : state_(std::make_unique<State>()) {
+#ifdef GEWEBE_SANITIZE
+  begin_program(0, nullptr, nullptr);
+#endif
   state_->name = std::move(name);
   state_->description = std::move(description);
 }
@@ -522,11 +569,68 @@ std::vector<std::string> preprocess(int argc, char** argv, bool& stats) {
   return kept;
 }
 
+/// The long options, for those who mistype one.
+std::vector<std::string> long_options(const std::vector<std::unique_ptr<Spec>>& specs) {
+  std::vector<std::string> known{"--help", "--version"};
+  for (const auto& spec : specs)
+    known.push_back(spec->long_name());
+  return known;
+}
+
+/// A long option behind one dash would be taken for short ones: -voxel for -v -o xel.
+void refuse_one_dash(const std::vector<std::string>& words, const std::vector<std::string>& known,
+                     const std::string& tool) {
+  for (const std::string& word : words) {
+    if (word == "--")
+      return;
+    if (word.size() > 2 && word[0] == '-' && std::ranges::find(known, "-" + word) != known.end())
+      throw UsageError("unexpected argument '" + word + "' (did you mean -" + word + "?), see " +
+                       tool + " --help");
+  }
+}
+
+std::string three_digits(double value) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "%.3g", value);
+  return text.data();
+}
+
+/// What is worth a line to people: numbers and words; not lists, objects and digests.
+std::string figures(const nlohmann::ordered_json& all) {
+  std::string text;
+  for (const auto& [key, value] : all.items())
+    if ((value.is_number() || value.is_boolean() || value.is_string()) && key != "tool" &&
+        key.find("digest") == std::string::npos)
+      text += (text.empty() ? "" : ", ") + key + " " +
+              (value.is_string()         ? value.get<std::string>()
+               : value.is_number_float() ? three_digits(value.get<double>())
+                                         : value.dump());
+  return text;
+}
+
+/// What -v tells at the end: sizes, and what was written.
+void tell_result(Run& run, const nlohmann::ordered_json& all, double seconds) {
+  if (const std::string text = figures(all); !text.empty())
+    run.say(text);
+  for (const auto& [key, value] : all.items())
+    if (value.is_object() && key != "seconds")
+      run.say(key + ": " + figures(value));
+  struct stat info {};
+  const std::string& path = run.output();
+  std::string what = "done";
+  if (path == "-")
+    what = "wrote to standard output";
+  else if (::stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode))
+    what = "wrote " + path + ", " + bytes_text(static_cast<double>(info.st_size));
+  run.say(what + ", " + three_digits(seconds) + " s");
+}
+
 } // namespace
 
 int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
   State& s = *state_;
   install_signal_cleanup();
+  guard_files();
   const double start = now_seconds();
   try {
     option("-o,--output", s.output, "FILE", "where the result goes, - is standard output");
@@ -542,7 +646,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     flag("--keep-unchanged", s.keep_unchanged, "leave FILE alone if its bytes would be equal");
 
     CLI::App app(s.description, s.name);
-    app.set_help_flag("--help", "this text");
+    app.set_help_flag("-h,--help", "this text");
     app.set_version_flag("--version", s.name + " (Gewebe) " GEWEBE_VERSION, "the version");
     app.get_formatter()->column_width(34);
     for (const auto& owned : s.specs) {
@@ -565,6 +669,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
                                 : app.add_option(operand.name, *operand.value, operand.help);
       option->type_name("")->required(operand.at_least > 0);
     }
+    refuse_one_dash({argv + 1, argv + argc}, long_options(s.specs), s.name);
     std::vector<std::string> words = preprocess(argc, argv, s.stats);
     try {
       app.parse(words);
@@ -575,8 +680,10 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       write_text("-", std::string(version.what()) + "\n");
       return 0;
     } catch (const CLI::ExtrasError&) {
-      throw UsageError("unexpected argument '" + app.remaining().front() + "', see " + s.name +
-                       " --help");
+      const std::string wrong = app.remaining().front();
+      throw UsageError("unexpected argument '" + wrong + "'" +
+                       suggestion(wrong.substr(0, wrong.find('=')), long_options(s.specs)) +
+                       ", see " + s.name + " --help");
     } catch (const CLI::ParseError& error) {
       throw UsageError(std::string(error.what()) + ", see " + s.name + " --help");
     }
@@ -601,7 +708,7 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     run.keep_unchanged_ = s.keep_unchanged;
     run.verbose_ = s.verbose;
     run.quiet_ = s.quiet;
-    run.stats_wanted_ = s.stats || !s.stats_file.empty();
+    run.stats_wanted_ = s.stats || s.verbose || !s.stats_file.empty();
     run.context_.threads = static_cast<int>(s.threads);
     if (const char* level = std::getenv("GEWEBE_CPU"); level != nullptr && *level != '\0')
       run.context_.cpu = at("GEWEBE_CPU", [&] { return cpu_level_from_name(level); });
@@ -622,11 +729,17 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
       run.context_.progress = [&bar](double done) { bar->update(done); };
     }
     run.stats_.set("tool", s.name);
+    std::optional<Output> stats_output; // before the work, so that a clash of names ends it
+    if (!s.stats_file.empty())
+      stats_output.emplace(s.stats_file, Output::Options{.binary = false});
     work(run);
     bar.reset();
     run.stats_.seconds("total", now_seconds() - start);
-    if (!s.stats_file.empty()) {
-      write_text(s.stats_file, run.stats_.json() + "\n");
+    if (s.verbose && !run.failure_)
+      tell_result(run, nlohmann::ordered_json::parse(run.stats_.json()), now_seconds() - start);
+    if (stats_output) {
+      stats_output->write(run.stats_.json() + "\n");
+      stats_output->commit();
     } else if (s.stats) {
       const std::string line = run.stats_.json() + "\n";
       if (::write(2, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
@@ -640,10 +753,8 @@ int Program::run(int argc, char** argv, const std::function<void(Run&)>& work) {
     return 2;
   } catch (const Error& error) {
     print_message(s.name, (error.place().empty() ? "" : error.place() + ": ") + error.what());
-  } catch (const std::bad_alloc&) {
-    print_message(s.name, "out of memory");
   } catch (const std::exception& error) {
-    print_message(s.name, error.what());
+    print_message(s.name, foreign_text(error));
   }
   return 1;
 }

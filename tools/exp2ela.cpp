@@ -3,7 +3,9 @@
 #include "formats/ela.h"
 #include "formats/mesh_file.h"
 #include "model/figures.h"
+#include "model/hinge.h"
 #include "tools/cli.h"
+#include "tools/mesh_size.h"
 #include "tools/model_arguments.h"
 
 #include <algorithm>
@@ -57,7 +59,24 @@ void fix(Model& model, const ModelArguments& a) {
     model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
 }
 
-Model source(cli::Run& run, const ModelArguments& a) {
+/// Few central nodes hold a part of few nodes.
+void warn_of_hinges(cli::Run& run, const Model& model) {
+  const std::vector<Hinged> hinged = hinged_components(model);
+  run.stats().set("hinged_components", std::uint64_t{hinged.size()});
+  if (hinged.empty())
+    return;
+  const Hinged& first = hinged.front();
+  run.warn(model.name + ": component " + std::to_string(first.component) + " of " +
+           std::to_string(first.nodes) + " nodes" +
+           (hinged.size() == 1 ? "" : " and " + std::to_string(hinged.size() - 1) + " more") +
+           " can turn about what holds it (" + std::to_string(first.held) +
+           (first.held == 1 ? " node" : " nodes on one line") +
+           "), expected three places or more: mc-opt --components largest leaves small parts "
+           "out, --centrals sets the number");
+}
+
+/// \param to_mesh whether the surface alone is wanted
+Model source(cli::Run& run, const ModelArguments& a, bool to_mesh) {
   if (a.matrix)
     return from_mesh(run, a.primitive, primitive_mesh(*a.matrix), a);
   Input input(a.mesh);
@@ -67,10 +86,14 @@ Model source(cli::Run& run, const ModelArguments& a) {
                                a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
   if (from == Kind::ela)
-    return run.timed("read", [&] { return read_ela(input, run.context()); });
+    return run.timed("read", [&] {
+      return to_mesh ? read_spring_model(input, run.context()) : read_ela(input, run.context());
+    });
   const MeshReadOptions options{from, a.unit, weld_from_name(a.weld)};
-  return from_mesh(run, input.name(), run.timed("read", [&] { return read_mesh(input, options); }),
-                   a);
+  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options); });
+  if (a.unit.empty())
+    cli::warn_of_size(run, input.name(), mesh, {});
+  return from_mesh(run, input.name(), std::move(mesh), a);
 }
 
 void hold_step(cli::Run& run, Model& model, const ModelArguments& a) {
@@ -86,11 +109,13 @@ void work(cli::Run& run, ModelArguments& a) {
     choose_materials(a);
   const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
   Output output(run.output(), run.output_options(is_binary(to)));
-  Model model = source(run, a);
+  Model model = source(run, a, to != Kind::ela);
   if (!a.name.empty())
     model.name = a.name;
   if (a.fixed)
     fix(model, a);
+  if (to == Kind::ela)
+    warn_of_hinges(run, model);
   hold_step(run, model, a);
   run.timed("write", [&] {
     if (to == Kind::ela)

@@ -1,7 +1,13 @@
 // ffe-precompute: model -> stiffness store.
 
+#include "formats/file_names.h"
 #include "tools/store_making.h"
 #include "tools/store_update.h"
+
+#include <array>
+#include <csignal>
+#include <cstring>
+#include <unistd.h>
 
 using namespace gewebe;
 namespace {
@@ -18,11 +24,37 @@ void discard(Output& output, StiffnessStoreWriter& writer) {
   writer.remove_journal();
 }
 
+std::array<char, 4400> interrupted{}; ///< what a signal tells
+std::array<struct sigaction, 64> before{};
+
+extern "C" void gewebe_tell_interrupted(int signal_number) {
+  if (::write(2, interrupted.data(), std::strlen(interrupted.data())) < 0)
+    interrupted[0] = 0;
+  before.at(static_cast<std::size_t>(signal_number)).sa_handler(signal_number);
+}
+
+/// From now on a signal that ends the program tells that nothing was in vain.
+void tell_when_interrupted(const std::string& part) {
+  const std::string text = "ffe-precompute: interrupted, " + part.substr(0, 4096) +
+                           " keeps the columns so far: the same command goes on from there\n";
+  text.copy(interrupted.data(), interrupted.size() - 1);
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction& old = before.at(static_cast<std::size_t>(signal_number));
+    if (::sigaction(signal_number, nullptr, &old) != 0 || old.sa_handler == SIG_IGN ||
+        old.sa_handler == SIG_DFL)
+      continue;
+    struct sigaction action = old;
+    action.sa_handler = gewebe_tell_interrupted;
+    (void)::sigaction(signal_number, &action, nullptr);
+  }
+}
+
 void work(cli::Run& run, const StoreArguments& a) {
   const bool in_place = !a.update.empty() && run.output() == "-";
   const std::string& path = in_place ? a.update : run.output();
   if (path == "-")
     throw UsageError("expected -o FILE, since a store cannot go to standard output");
+  (void)output_kind("", path, Kind::hdf5, {Kind::hdf5});
   Output::Options options = run.output_options(true);
   options.sync = true;
   const std::optional<StiffnessStore> first = first_stages(run, a);
@@ -30,9 +62,13 @@ void work(cli::Run& run, const StoreArguments& a) {
   if (!a.update.empty())
     before_cut.emplace(a.update);
   options.part = a.touched.has_value() && !first;
+  if (in_place || first)
+    allow_in_place(path);
   Output output(path, options);
   // What is no file is refused before the work.
   StiffnessStoreWriter writer(output, first ? first->shard() : a.shard);
+  if (options.part)
+    tell_when_interrupted(output.temporary());
   StoreTotals totals;
   try {
     if (first)

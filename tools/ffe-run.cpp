@@ -6,6 +6,7 @@
 #include "formats/scene_run.h"
 #include "formats/step_latency.h"
 #include "tools/cli.h"
+#include "tools/distrust.h"
 #include "tools/run_report.h"
 
 #include <memory>
@@ -60,6 +61,7 @@ void work(cli::Run& run, const Arguments& in) {
   SceneOptions options;
   options.files = scene_files(input.name(), run.context());
   options.warn = [&](const std::string& text) { run.warn(text); };
+  options.distrust = [&](const std::string& text) { cli::distrust(run, "ffe-run", text); };
   options.serve = in.serve;
   options.binary = in.binary;
   options.rate = in.rate.value_or(0);

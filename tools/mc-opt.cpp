@@ -2,11 +2,13 @@
 
 #include "formats/mesh_file.h"
 #include "formats/volume_file.h"
+#include "mesh/components.h"
 #include "surface/gradient_normals.h"
 #include "surface/marching_cubes.h"
 #include "surface/regularize.h"
 #include "surface/snapping.h"
 #include "tools/cli.h"
+#include "tools/distrust.h"
 #include "tools/surface_choice.h"
 #include "tools/surface_report.h"
 #include "volume/crop.h"
@@ -59,6 +61,27 @@ void refine(cli::Run& run, const Arguments& arguments, const Grid& grid, double 
     }));
 }
 
+/// Of the surface that is asked for, on the volume as it came.
+Topology topology_of(const Context& context, const Grid& grid, const Arguments& arguments) {
+  if (arguments.box.empty())
+    return topology(marching_cubes(context, grid, arguments.isovalue).mesh);
+  const double isovalue = arguments.isovalue.value_or(default_isovalue(grid.info()));
+  const Grid part = crop(context, grid, box_of(arguments.box), isovalue);
+  return topology(marching_cubes(context, part, arguments.isovalue).mesh);
+}
+
+void compare_topology(cli::Run& run, const Topology& before, const Topology& after) {
+  run.stats().set("components_before", before.components);
+  run.stats().set("euler_before", before.euler);
+  if (before == after)
+    return;
+  cli::distrust(run, "mc-opt",
+                "--resample changes the surface from " + std::to_string(before.components) +
+                    (before.components == 1 ? " component" : " components") + " and Euler number " +
+                    std::to_string(before.euler) + " to " + std::to_string(after.components) +
+                    " and " + std::to_string(after.euler) + ", expected the same of finer voxels");
+}
+
 void work(cli::Run& run, const Arguments& arguments) {
   const Kind kind = output_kind(run.to(), run.output(), Kind::ply, writable_mesh_kinds());
   Output output(run.output(), run.output_options(is_binary(kind)));
@@ -66,10 +89,13 @@ void work(cli::Run& run, const Arguments& arguments) {
   const Context& context = run.context();
   Grid grid = run.timed("read", [&] { return read_volume(input, context); });
   const double isovalue = arguments.isovalue.value_or(default_isovalue(grid.info()));
+  std::optional<Topology> before;
   const IsoSurface surface = at(input.name(), [&] {
-    if (arguments.voxel)
+    if (arguments.voxel) {
+      before = run.timed("topology", [&] { return topology_of(context, grid, arguments); });
       grid = run.timed(
           "resample", [&] { return resample(context, grid, uniform_transform(*arguments.voxel)); });
+    }
     if (!arguments.box.empty())
       grid =
           run.timed("crop", [&] { return crop(context, grid, box_of(arguments.box), isovalue); });
@@ -85,7 +111,10 @@ void work(cli::Run& run, const Arguments& arguments) {
   run.say(std::to_string(snapped.report.points_before) + " points, " +
           std::to_string(snapped.report.points_after) + " after snapping");
   if (snapped.mesh.triangles.empty())
-    run.warn("the surface is empty: no value lies across the isovalue from another");
+    cli::distrust(run, "mc-opt",
+                  "the surface is empty: no value lies across the isovalue from another");
+  else if (before)
+    compare_topology(run, *before, topology(snapped.mesh));
   refine(run, arguments, grid, isovalue, snapped.mesh);
   run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
   output.commit();

@@ -1,11 +1,11 @@
 #pragma once
 // The options of exp2ela: how a model is built.
 
+#include "mesh/repair.h"
 #include "model/build.h"
 #include "model/material.h"
 #include "model/primitive.h"
 #include "model/selector.h"
-#include "surface/repair.h"
 #include "tools/cli.h"
 
 #include <optional>

@@ -83,7 +83,6 @@ void complete_modes(RenderArguments& a) {
   a.picture.gl.mode = gl_mode_from_name(a.words.passes);
   a.picture.gl.wide = a.words.target == "float";
   a.picture.gl.rgb_scale = static_cast<int>(a.words.rgb_scale);
-  a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample);
   a.picture.samples = static_cast<int>(a.words.msaa);
   refuse(a.words.msaa != 1 && a.words.msaa != 4,
          "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
@@ -109,7 +108,21 @@ void complete_modes(RenderArguments& a) {
     refuse(a.drawing.rest && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
 }
 
+/// What was not said: a picture to show, or the formula alone.
+void complete_light(RenderArguments& a) {
+  const bool lines = a.style == "wireframe", plain = a.words.plain;
+  a.drawing.shade = a.words.shade.value_or(plain || lines ? 0 : 0.75);
+  a.drawing.fill = a.words.fill.value_or(plain ? 0 : 0.35);
+  a.tissue_colors = !a.words.color && !plain && !lines;
+  const double gray = lines && !plain ? 0.1 : 1;
+  a.look.color = a.words.color.value_or(Vec3{gray, gray, gray});
+  a.look.background = a.words.background.value_or(plain ? Vec3{1, 1, 1} : Vec3{0.8, 0.8, 0.8});
+  const bool smooth = plain || a.words.msaa != 1; // by other means, or not at all
+  a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
+}
+
 void complete(RenderArguments& a) {
+  complete_light(a);
   complete_textures(a);
   complete_materials(a);
   complete_modes(a);
@@ -173,11 +186,17 @@ void declare_textures(Program& p, RenderArguments& a) {
   p.option("--offset-texels", a.offset_texels, "N", "the same in texels of the structure");
   p.option("--light", a.light, "X,Y,Z", "place of the light in mm, else above the camera, left");
   p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
-  p.option("--shade", a.drawing.shade, "K", "share of Lambert's law, 0 to 1").range(0, 1);
-  p.option("--color", a.look.color, "[N=]R,G,B", "factor of the colours, 0 to 1")
+  p.option("--shade", a.words.shade, "K", "share of Lambert's law, 0 to 1 (default 0.75)")
+      .range(0, 1);
+  p.option("--fill", a.words.fill, "F", "of a second light in the shade, 0 to 1 (default 0.35)")
+      .range(0, 1);
+  p.flag("--plain", a.words.plain,
+         "the relief alone: no shade, white on white, a sample a pixel, unless told otherwise");
+  p.option("--color", a.words.color, "[N=]R,G,B",
+           "factor of the colours, 0 to 1, else the material's colour where there is no image")
       .range(0, 1)
       .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
-  p.option("--background", a.look.background, "R,G,B", "0 to 1").range(0, 1);
+  p.option("--background", a.words.background, "R,G,B", "0 to 1 (default 0.8,0.8,0.8)").range(0, 1);
   p.option("--uv", a.words.uv, "MAP",
            "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
       .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
@@ -196,7 +215,7 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
       .one_of({"textured", "flat", "wireframe"});
   declare_camera(p, a);
-  p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl or else cpu")
+  p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
       .one_of(backend_names());
   p.option("--passes", a.words.passes, "N", "with OpenGL: 3, 2, 1, or shader")
       .one_of(gl_mode_names());

@@ -43,7 +43,8 @@ struct RenderArguments {
   std::string surface = "-";
   RenderLayer base, detail, reflection, structure;
   std::map<std::int32_t, RenderMaterial> materials;
-  Look look; ///< colours; its textures are read later
+  Look look;                  ///< colours; its textures are read later
+  bool tissue_colors = false; ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
   double offset = 0.02;
   std::optional<double> offset_texels; ///< of the structure instead
@@ -64,8 +65,11 @@ struct RenderArguments {
                 target = "float", tbn = "auto", filter = "mipmap", wrap = "repeat",
                 sphere = "reflection", by = "material", compare;
     std::vector<double> orbit{0, 0};
-    std::int64_t supersample = 1, msaa = 1, rgb_scale = 2;
-    std::optional<Vec3> light_direction;
+    std::int64_t msaa = 1, rgb_scale = 2;
+    std::optional<Vec3> light_direction, color, background;
+    std::optional<double> shade, fill;
+    std::optional<std::int64_t> supersample; ///< nothing: what is fit for a surface
+    bool plain = false;
     std::optional<std::int64_t> uv_sharpness;
   } words;
 };

@@ -26,7 +26,8 @@ void declare_camera(Program& p, RenderArguments& a) {
   p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
   p.option("--fov", a.camera.fov, "DEG", "angle across the shorter side").range(1, 170);
   p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
-  p.option("--supersample", a.words.supersample, "N", "a pixel is the mean of N x N samples")
+  p.option("--supersample", a.words.supersample, "N",
+           "a pixel is the mean of N x N samples (default 2; volumes, --msaa: 1)")
       .range(1, 8);
   p.option("--msaa", a.words.msaa, "N", "1, or 4 samples along outlines").range(1, 4);
 }

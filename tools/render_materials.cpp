@@ -1,5 +1,6 @@
 #include "tools/render_materials.h"
 
+#include "render/tissue_color.h"
 #include "tools/render_layer.h"
 
 #include <algorithm>
@@ -57,6 +58,78 @@ void add_material_looks(Look& look, const RenderArguments& a, const Context& con
     own.color = material.color.value_or(look.color);
   }
   look.others = std::move(others);
+}
+
+namespace {
+
+Vec3 color_of(const Surface& surface, std::size_t material) {
+  return tissue_color(material < surface.materials.size() ? surface.materials[material] : "",
+                      material);
+}
+
+/// A base from an image has its own colours.
+bool takes_tissue_color(const Look& look) {
+  return !look.base;
+}
+
+} // namespace
+
+TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>& surfaces,
+                           Look& look, DrawingOptions& drawing) {
+  if (!a.tissue_colors || surfaces.empty())
+    return;
+  if (!a.materials.empty()) { // as they are numbered there
+    if (takes_tissue_color(look))
+      look.color = color_of(surfaces.front(), 0);
+    auto own = look.others.begin();
+    for (const auto& [number, material] : a.materials) {
+      const auto n = static_cast<std::size_t>(number);
+      const bool object = a.words.by == "object" && n < surfaces.size();
+      if (!material.color && takes_tissue_color(*own))
+        own->color = object                 ? color_of(surfaces[n], 0)
+                     : a.words.by == "part" ? look.color
+                                            : color_of(surfaces.front(), n);
+      ++own;
+    }
+    return;
+  }
+  if (!takes_tissue_color(look))
+    return;
+  renumbers_ = true;
+  for (const Surface& surface : surfaces) {
+    std::vector<std::int32_t> numbers = surface.mesh.material;
+    if (numbers.empty())
+      numbers.push_back(0);
+    std::ranges::sort(numbers);
+    const auto [first, last] = std::ranges::unique(numbers);
+    numbers.erase(first, last);
+    for (const std::int32_t number : numbers) {
+      const Vec3 color = color_of(surface, static_cast<std::size_t>(number));
+      if (std::ranges::find(colors_, color) == colors_.end())
+        colors_.push_back(color);
+    }
+  }
+  look.color = colors_.front();
+  drawing.group_by = GroupBy::material;
+  for (std::size_t n = 1; n < colors_.size(); ++n) {
+    drawing.groups.push_back(static_cast<std::int32_t>(n));
+    Look& own = look.others.emplace_back(look);
+    own.others.clear();
+    own.color = colors_[n];
+  }
+}
+
+void TissueColors::number_materials(std::vector<Surface>& surfaces) const {
+  if (!renumbers_ || colors_.size() == 1)
+    return;
+  for (Surface& surface : surfaces) {
+    surface.mesh.material.resize(surface.mesh.triangles.size());
+    for (std::int32_t& number : surface.mesh.material) {
+      const auto found =
+          std::ranges::find(colors_, color_of(surface, static_cast<std::size_t>(number)));
+      number = found == colors_.end() ? 0 : static_cast<std::int32_t>(found - colors_.begin());
+    }
+  }
 }
 
 } // namespace gewebe::cli

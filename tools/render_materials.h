@@ -1,6 +1,7 @@
 #pragma once
 // Textures by material, part or object.
 
+#include "render/drawing.h"
 #include "tools/render_arguments.h"
 
 #include <string>
@@ -21,5 +22,20 @@ std::vector<std::string> material_paths(const RenderArguments& arguments);
 /// Reads their textures: the looks of the groups 1, 2, … in `look`, which holds what is for all.
 /// \throw Error with place
 void add_material_looks(Look& look, const RenderArguments& arguments, const Context& context);
+
+/// Colours of the materials for looks that were given neither colour nor image, see tissue_color().
+/// Where no number was given there is a group for each colour, whatever `--by` says: the triangles'
+/// materials are numbered anew.
+class TissueColors {
+public:
+  /// \param surfaces the first ones that are drawn
+  TissueColors(const RenderArguments& arguments, const std::vector<Surface>& surfaces, Look& look,
+               DrawingOptions& drawing);
+  void number_materials(std::vector<Surface>& surfaces) const;
+
+private:
+  bool renumbers_ = false;
+  std::vector<Vec3> colors_; ///< of the groups
+};
 
 } // namespace gewebe::cli

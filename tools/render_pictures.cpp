@@ -64,6 +64,7 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
       a.offset_texels && look.structure)
     drawing_.offset = {*a.offset_texels / look.structure->width(),
                        *a.offset_texels / look.structure->height()};
+  tissue_.emplace(a, surfaces, look_, drawing_);
   if (drawing_.rest)
     place_at_rest(look_, box_, a.mapping.edge);
   run_.timed("start", [&] {
@@ -159,6 +160,7 @@ std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool 
 const Image& Pictures::of(std::vector<Surface> surfaces) {
   if (modes_.empty())
     start(surfaces);
+  tissue_->number_materials(surfaces);
   const bool placed = place(pictures_++);
   const auto change = run_.timed("compare", [&] { return take(std::move(surfaces), placed); });
   kept_last_ = !change;
@@ -191,7 +193,8 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
 
 /// How many triangles have which look; a look that none has is a mistake more likely than not.
 void Pictures::tell_groups(const Drawing& drawing) {
-  if (groups_told_ || drawing.group_start.empty() || drawing.triangles.empty())
+  if (groups_told_ || arguments_.materials.empty() || drawing.group_start.empty() ||
+      drawing.triangles.empty())
     return;
   groups_told_ = true;
   std::vector<std::uint64_t> counts;

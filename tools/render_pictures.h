@@ -5,6 +5,7 @@
 #include "render/picture.h"
 #include "tools/cli.h"
 #include "tools/render_arguments.h"
+#include "tools/render_materials.h"
 
 #include <array>
 #include <cstdint>
@@ -51,6 +52,7 @@ private:
   std::vector<Mode> modes_;
   std::optional<Camera> camera_;
   DrawingOptions drawing_;
+  std::optional<TissueColors> tissue_;
   std::array<DrawingMaker, 2> makers_; ///< without and with frames for each pixel
   std::vector<Surface> surfaces_;      ///< as they are drawn
   std::vector<Drawn> plain_;           ///< surfaces drawn in another style

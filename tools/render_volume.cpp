@@ -91,7 +91,8 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
   refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||
              a.picture.samples != 1,
          input, "--style, --compare, --backend gl or --msaa for a volume, expected none of them");
-  refuse(a.light || a.drawing.shade != 0, input, "a light or --shade for a volume, expected none");
+  refuse(a.light || a.words.shade || a.words.fill || a.words.plain, input,
+         "a light, --shade, --fill or --plain for a volume, expected none");
   refuse(!a.reading.unit.empty() || !a.reading.object.empty() || a.reading.frame ||
              !a.frames.empty(),
          input, "--unit, --object or --frame for a volume, expected none of them");
@@ -101,7 +102,7 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
   const Context& context = run.context();
   const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "gray" : a.volume.ramp, context);
   VolumeViewOptions options = a.volume.view;
-  const std::uint32_t finer = a.picture.supersample;
+  const std::uint32_t finer = static_cast<std::uint32_t>(a.words.supersample.value_or(1));
   options.camera = a.camera;
   options.width = a.picture.width * finer;
   options.height = a.picture.height * finer;

@@ -3,8 +3,8 @@
 #include "formats/ela.h"
 #include "model/selector.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
 #include "sim/relaxation.h"
+#include "solve/condition.h"
 
 #include <algorithm>
 #include <chrono>
@@ -49,7 +49,7 @@ Prepared prepare(const std::string& path, const StoreArguments& a, const Context
   Prepared p;
   p.name = input.name();
   const double start = seconds();
-  p.model = read_ela(input, context);
+  p.model = read_spring_model(input, context);
   p.read = seconds() - start;
   at(p.name, [&] {
     p.nodes = touched_nodes(p.model, a);

@@ -3,9 +3,9 @@
 #include "formats/ela.h"
 #include "model/cut_origin.h"
 #include "sim/axis_solver.h"
-#include "sim/condition.h"
 #include "sim/corrected_columns.h"
 #include "sim/corrected_compliance.h"
+#include "solve/condition.h"
 #include "tools/store_making.h"
 
 #include <memory>
@@ -26,7 +26,7 @@ CutObject prepare(cli::Run& run, const std::string& path) {
   CutObject cut;
   run.timed("read", [&] {
     Input input(path);
-    cut.model = read_ela(input, run.context());
+    cut.model = read_spring_model(input, run.context());
   });
   at(path, [&] {
     run.timed("matrix", [&] { cut.matrix = stiffness_matrix(cut.model); });
@@ -95,7 +95,7 @@ void update_store(cli::Run& run, const StoreArguments& a, const StiffnessStore& 
   if (store.shard().count > 1)
     throw Error(store.path(), "is part of a store, expected a whole one (ffe-precompute --merge)");
   Input input(a.before);
-  const Model before = read_ela(input, run.context());
+  const Model before = read_spring_model(input, run.context());
   const StiffnessFacts facts = store.facts(before);
   if (store.second_stage(facts))
     throw Error(store.path(),

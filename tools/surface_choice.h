@@ -2,7 +2,7 @@
 // Which part of a surface mc-opt keeps.
 
 #include "base/vec3.h"
-#include "surface/components.h"
+#include "mesh/components.h"
 
 #include <string>
 #include <vector>

@@ -1,9 +1,9 @@
 #include "tools/surface_report.h"
 
 #include "base/digest.h"
-#include "surface/mesh_check.h"
-#include "surface/mesh_quality.h"
-#include "surface/self_intersections.h"
+#include "mesh/check.h"
+#include "mesh/quality.h"
+#include "mesh/self_intersections.h"
 
 namespace gewebe::cli {
 namespace {

@@ -6,21 +6,25 @@
 #include "formats/volume_file.h"
 #include "tools/antialias.h"
 #include "tools/cli.h"
+#include "tools/distrust.h"
+#include "tools/mesh_size.h"
 #include "tools/report.h"
 #include "tools/voxelize_labels.h"
 #include "volume/lattice.h"
+
+#include <cmath>
 
 using namespace gewebe;
 
 namespace {
 
 struct Arguments {
-  std::string mesh = "-", like, unit, weld = "auto", antialias, on_open = "error";
+  std::string mesh = "-", like, unit, weld = "auto", antialias = "jones", on_open = "error";
   std::string rule = "parity";
   std::optional<double> voxel;
   std::optional<std::int64_t> dim;
   AntialiasChoice choice;
-  std::vector<double> labels;
+  std::string labels;
   VoxelizeOptions options;
 };
 
@@ -32,7 +36,10 @@ VoxelRule rule_from_text(const std::string& text) {
 
 void complete(Arguments& a) {
   if (!a.labels.empty()) {
-    (void)labels_from_numbers(a.labels);
+    if (a.labels != "list")
+      (void)labels_from_text(a.labels);
+    else if (a.voxel)
+      throw UsageError("--label list makes no volume, expected no --voxel");
     if (a.dim || !a.like.empty())
       throw UsageError("--label: the labels give the lattice, expected --voxel or nothing");
     return;
@@ -41,11 +48,9 @@ void complete(Arguments& a) {
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
   a.options.rule = rule_from_text(a.rule);
-  if (a.antialias.empty())
-    a.antialias = a.options.rule == VoxelRule::parity ? "exact" : "none";
   a.choice = antialias_from_text(a.antialias);
-  if (a.options.rule != VoxelRule::parity && a.choice.filter != Antialias::none &&
-      a.choice.filter != Antialias::box)
+  if (a.options.rule != VoxelRule::parity &&
+      (a.choice.filter == Antialias::exact || a.choice.filter == Antialias::lines))
     throw UsageError("--antialias " + a.antialias + " goes with --rule parity, not with --rule " +
                      a.rule);
   a.options.on_open = a.on_open == "error"  ? OpenMesh::refuse
@@ -104,7 +109,9 @@ void work(cli::Run& run, const Arguments& a) {
     return antialiased(run, input.name(), mesh, transform, a.choice, a.options, counts);
   });
   if (grid.active_voxels() == 0)
-    run.warn(input.name() + ": no voxel centre lies inside the mesh");
+    cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
+  else if (a.unit.empty())
+    cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
   run.timed("write", [&] { write_volume(output, grid, run.context()); });
   output.commit();
   report(run, a, counts);
@@ -121,12 +128,12 @@ int main(int argc, char** argv) {
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
   p.option("--label", a.labels, "L[,L...]",
-           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels");
+           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels; list: which "
+           "there are");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.antialias, "FILTER",
-           "grey values: exact, lines:N, box:N, jones, sramek, none; default exact with --rule "
-           "parity, else none");
+           "grey values: jones (for surfaces), exact (for volumes), sramek, lines:N, box:N, none");
   p.option("--on-open", a.on_open, "WHAT",
            "an open mesh: error, warn (odd rays stay empty), fill (close the holes)")
       .one_of({"error", "warn", "fill"});
@@ -140,7 +147,9 @@ int main(int argc, char** argv) {
   return p.run(argc, argv, [&](cli::Run& run) {
     if (a.labels.empty())
       work(run, a);
+    else if (a.labels == "list")
+      list_labels(run, a.mesh);
     else
-      voxelize_labels(run, a.mesh, labels_from_numbers(a.labels), a.voxel);
+      voxelize_labels(run, a.mesh, labels_from_text(a.labels), a.voxel);
   });
 }

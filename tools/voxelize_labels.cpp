@@ -5,18 +5,50 @@
 #include "tools/report.h"
 #include "volume/label_density.h"
 
-#include <cmath>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <string_view>
 
 namespace gewebe {
 
-std::vector<std::int64_t> labels_from_numbers(const std::vector<double>& numbers) {
+std::vector<std::int64_t> labels_from_text(const std::string& text) {
   std::vector<std::int64_t> labels;
-  for (const double number : numbers) {
-    if (!(std::fabs(number) < 0x1p53) || number != std::trunc(number))
-      throw UsageError("--label: expected whole numbers");
-    labels.push_back(static_cast<std::int64_t>(number));
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', begin), text.size());
+    const std::string_view word = std::string_view(text).substr(begin, comma - begin);
+    const auto [rest, status] =
+        std::from_chars(word.data(), word.data() + word.size(), labels.emplace_back());
+    if (status != std::errc{} || rest != word.data() + word.size())
+      throw UsageError("--label: '" + std::string(word) + "', expected whole numbers, or list");
+    begin = comma + 1;
   }
   return labels;
+}
+
+void list_labels(cli::Run& run, const std::string& path) {
+  if (!run.to().empty())
+    throw UsageError("--to for a list of labels, which is text, expected none");
+  Output output(run.output(), run.output_options(false));
+  Input input(path);
+  const LabelVolume volume =
+      run.timed("read", [&] { return read_label_volume(input, {}, run.context()); });
+  for (const std::string& warning : volume.warnings)
+    run.warn(warning);
+  const Vec3 spacing = volume.mask.transform.voxel_size();
+  std::string text;
+  for (const auto& [label, voxels] : volume.labels) {
+    const double mm3 = static_cast<double>(voxels) * spacing.x * spacing.y * spacing.z;
+    std::array<char, 32> size{};
+    (void)std::snprintf(size.data(), size.size(), "%.6g", mm3);
+    text += std::to_string(label) + " " + std::to_string(voxels) + " " + size.data() + "\n";
+  }
+  output.write(text);
+  output.commit();
+  run.stats().set("format", volume.format);
+  run.stats().set("label_values", volume.labels.size());
+  run.stats().set("spacing", spacing);
 }
 
 void voxelize_labels(cli::Run& run, const std::string& path,

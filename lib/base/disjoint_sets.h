@@ -22,9 +22,13 @@ public:
       n = parent_[n] = parent_[parent_[n]];
     return n;
   }
-  void join(std::uint32_t a, std::uint32_t b) {
+  /// True if a and b were in different sets.
+  bool join(std::uint32_t a, std::uint32_t b) {
     const std::uint32_t x = find(a), y = find(b);
+    if (x == y)
+      return false;
     parent_[std::max(x, y)] = std::min(x, y);
+    return true;
   }
   /// The set of each, numbered by smallest member; returns how many there are.
   std::uint32_t number(std::vector<std::uint32_t>& set) {

@@ -11,7 +11,7 @@
 namespace gewebe {
 
 /// Calls `body(begin, end)` for consecutive blocks [0,grain), [grain,2 grain), … of [0,count), at
-/// most context.threads at a time. Reports progress and honours the cancel callback between blocks.
+/// most context.threads at a time or what the system gives. Reports progress, honours cancelling.
 /// \pre grain > 0; body touches nothing that another block writes.
 /// \throw what the body throws (one of them), Cancelled
 void parallel_blocks(const Context& context, std::size_t count, std::size_t grain,

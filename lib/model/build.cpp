@@ -2,7 +2,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "model/edges.h"
+#include "mesh/edges.h"
+#include "mesh/repeated_faces.h"
 
 #include <algorithm>
 #include <array>
@@ -20,6 +21,10 @@ namespace {
 
 constexpr std::uint32_t unused = UINT32_MAX;
 constexpr double lightest_node = 1e-3; // of the mean mass; lighter ones would rule the time step
+constexpr double nodes_of_reference = 1000; // the net in which a central spring has F of an edge's
+const double regular_net = std::sqrt(3.0) / 2; // ΣA / l² of equilateral triangles
+constexpr std::size_t enough_samples = 8192;   // of a surface, for the places of its central nodes
+constexpr double tiny = 1e-12;
 constexpr double same_place =
     1e-9; // of a cluster's reach: a node there has no direction to its center
 
@@ -31,32 +36,12 @@ struct Surface {
   EdgeTable edges;
 };
 
-/// Marks triangles that have the corners of an earlier one. Such two share the edge of their two
-/// smallest corners and its opposite corner.
-std::vector<bool> duplicates(const Surface& s) {
-  std::vector<bool> marked(s.triangles.size());
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> opposite; // corner, face
-  for (std::size_t e = 0; e < s.edges.size(); ++e) {
-    const auto around = s.edges.around(e);
-    if (around.size() < 2)
-      continue;
-    opposite.clear();
-    for (const std::uint32_t c : around)
-      opposite.emplace_back(s.triangles[c / 3][c % 3], c / 3);
-    std::sort(opposite.begin(), opposite.end());
-    for (std::size_t i = 1; i < opposite.size(); ++i)
-      if (opposite[i].first == opposite[i - 1].first)
-        marked[opposite[i].second] = true;
-  }
-  return marked;
-}
-
 Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Context& context) {
   Surface s;
   std::vector<std::uint32_t> node_of_point(mesh.points.size(), unused);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
     const Triangle& t = mesh.triangles[f];
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
+    if (has_equal_corners(t)) {
       ++report.degenerate_faces;
       continue;
     }
@@ -78,9 +63,8 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
   for (Triangle& t : s.triangles)
     for (std::uint32_t& corner : t)
       corner = node_of_point[corner];
-  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
-
-  const std::vector<bool> twice = duplicates(s);
+  const std::vector<bool> twice =
+      repeated_faces(s.point_of_node.size(), s.triangles, SameFace::corners);
   report.duplicate_faces = static_cast<std::size_t>(std::count(twice.begin(), twice.end(), true));
   if (report.duplicate_faces != 0) {
     std::size_t kept = 0;
@@ -92,8 +76,8 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
     }
     s.triangles.resize(kept);
     s.face_of_triangle.resize(kept);
-    s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
   }
+  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
   for (std::size_t e = 0; e < s.edges.size(); ++e) {
     const std::size_t faces = s.edges.around(e).size();
     report.boundary_edges += faces == 1 ? 1 : 0;
@@ -169,6 +153,8 @@ private:
 
   void surface_nodes() {
     model_.nodes.resize(surface_.point_of_node.size());
+    area_.resize(model_.nodes.size());
+    tension_.resize(model_.nodes.size());
     for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
       model_.nodes[i].position = point(i);
       model_.nodes[i].material = -1;
@@ -176,9 +162,14 @@ private:
     double total = 0;
     for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
       const Material& m = material(material_[t]);
-      const double share = m.density * m.thickness * norm(area_vector_[t]) / 3;
+      const double area = norm(area_vector_[t]) / 3;
+      const double share = m.density * m.thickness * area;
+      const double tension =
+          area * options_.stiffness.value_or(regular_net * m.young * m.thickness);
       total += 3 * share;
       for (const std::uint32_t corner : surface_.triangles[t]) {
+        area_[corner] += area;
+        tension_[corner] += tension;
         Node& n = model_.nodes[corner];
         n.mass += share;
         if (n.material < 0)
@@ -297,20 +288,69 @@ private:
     for (std::uint32_t i = 0; i < surface_nodes; ++i)
       member[fill[parts.of_node[i]]++] = i;
 
+    std::vector<Samples> samples(parts.count);
+    std::vector<double> area(parts.count);
+    for (std::uint32_t i = 0; i < surface_nodes; ++i)
+      area[parts.of_node[i]] += area_[i];
+    for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
+      const std::uint32_t c = parts.of_node[surface_.triangles[t][0]];
+      if (first[c + std::size_t{1}] - first[c] < enough_samples)
+        add_samples(samples[c], t, area[c]);
+    }
     std::vector<double> reach(surface_nodes); // of a node's cluster, squared
-    std::vector<Vec3> points;
+    std::vector<double> stiffness(surface_nodes);
     for (std::size_t c = 0; c < parts.count; ++c) {
-      points.clear();
-      for (std::size_t m = first[c]; m < first[c + 1]; ++m)
-        points.push_back(model_.nodes[member[m]].position);
+      const std::span<const std::uint32_t> nodes{member.data() + first[c], first[c + 1] - first[c]};
+      std::vector<Vec3> points;
+      for (const std::uint32_t i : nodes) {
+        points.push_back(model_.nodes[i].position);
+        // Springs of F times an edge spring's at each node would hold a fine net more firmly than a
+        // coarse one. F holds for a net of 1000 nodes, whose stiffness per area any net gets.
+        if (area[c] > 0)
+          stiffness[i] = options_.central_factor * nodes_of_reference * (tension_[i] / area[c]);
+      }
+      if (samples[c].points.empty())
+        for (const std::uint32_t i : nodes) {
+          samples[c].points.push_back(model_.nodes[i].position);
+          samples[c].weights.push_back(area[c] > 0 ? std::max(area_[i], tiny * area[c]) : 1);
+        }
       // A center with a single node would coincide with it, hence two nodes per center at least.
       const std::size_t most = std::max<std::size_t>(1, points.size() / 2);
       const std::size_t wanted =
           std::min<std::size_t>(static_cast<std::size_t>(options_.centrals), most);
-      add_cluster_nodes(cluster_points(points, wanted, context_), points,
-                        {member.data() + first[c], points.size()}, reach);
+      const Clusters places =
+          cluster_points(samples[c].points, wanted, context_, samples[c].weights);
+      samples[c] = {};
+      add_cluster_nodes(nearest_clusters(points, places.centers, context_), points, nodes, reach);
     }
-    return central_springs(surface_nodes, reach);
+    return central_springs(stiffness, reach);
+  }
+
+  struct Samples {
+    std::vector<Vec3> points;
+    std::vector<double> weights; ///< mm²
+  };
+
+  /// Centroids of parts of a triangle, so small that the surface of its component has thousands:
+  /// the places of central nodes are the same then for few nodes as for many.
+  void add_samples(Samples& samples, std::size_t triangle, double surface) const {
+    const double area = norm(area_vector_[triangle]);
+    if (!(area > 0))
+      return;
+    const int sides = static_cast<int>(
+        std::ceil(std::sqrt(static_cast<double>(enough_samples) * (area / surface))));
+    const Triangle& t = surface_.triangles[triangle];
+    const Vec3 a = point(t[0]), u = (point(t[1]) - a) / sides, v = (point(t[2]) - a) / sides;
+    const auto add = [&](double along, double across) {
+      samples.points.push_back(a + along * u + across * v);
+      samples.weights.push_back(area / (sides * sides));
+    };
+    for (int i = 0; i < sides; ++i)
+      for (int j = 0; i + j < sides; ++j) {
+        add(i + 1.0 / 3, j + 1.0 / 3);
+        if (i + j + 1 < sides)
+          add(i + 2.0 / 3, j + 2.0 / 3);
+      }
   }
 
   void add_cluster_nodes(const Clusters& clusters, const std::vector<Vec3>& points,
@@ -342,24 +382,16 @@ private:
       model_.nodes[c].drag = options_.drag_rate * model_.nodes[c].mass;
   }
 
-  std::vector<Spring> central_springs(std::size_t surface_nodes,
+  std::vector<Spring> central_springs(const std::vector<double>& stiffness,
                                       const std::vector<double>& reach) const {
-    std::vector<double> sum(surface_nodes);
-    std::vector<std::uint32_t> count(surface_nodes);
-    for (const Spring& s : model_.springs)
-      for (const std::uint32_t i : {s.i, s.j}) {
-        sum[i] += s.stiffness;
-        ++count[i];
-      }
     std::vector<Spring> springs;
-    springs.reserve(surface_nodes);
-    for (std::uint32_t i = 0; i < surface_nodes; ++i) {
+    springs.reserve(reach.size());
+    for (std::uint32_t i = 0; i < reach.size(); ++i) {
       const auto center = static_cast<std::uint32_t>(model_.nodes[i].central);
       const Vec3 d = model_.nodes[center].position - model_.nodes[i].position;
       if (!(dot(d, d) > same_place * same_place * reach[i]))
         continue;
-      const double mean = count[i] > 0 ? sum[i] / count[i] : 0;
-      springs.push_back(spring(i, center, SpringKind::central, options_.central_factor * mean));
+      springs.push_back(spring(i, center, SpringKind::central, stiffness[i]));
     }
     return springs;
   }
@@ -396,6 +428,8 @@ private:
   Surface surface_;
   std::vector<Vec3> area_vector_;      ///< per triangle, mm²
   std::vector<std::int32_t> material_; ///< per triangle
+  std::vector<double> area_;           ///< per node, mm²: a third of its faces
+  std::vector<double> tension_; ///< per node: area times an edge's stiffness in a regular net
   Model model_;
   BuildReport report_;
 };

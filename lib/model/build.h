@@ -1,5 +1,5 @@
 #pragma once
-// A deformable model from a triangle mesh (report 3.1.3; DESIGN of exp2ela).
+// A deformable model from a triangle mesh (report FZKA 7190, section 3.1.3; exp2ela(1)).
 
 #include "base/context.h"
 #include "base/mesh.h"
@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,9 @@ struct BuildOptions {
   bool bend = false;               ///< springs across edges
   double bend_factor = 0.1;        ///< their stiffness over that of the edge they cross
   std::int64_t centrals = 4;       ///< central nodes per component, 0 or more
-  double central_factor =
-      0.1; ///< stiffness of a central spring over the mean of its node's edge springs
+  /// Stiffness of a central spring over that of an edge spring, where the node has a thousandth of
+  /// its component's area.
+  double central_factor = 0.1;
   bool centrals_free = false; ///< else they can't move
   bool normals = false;       ///< area-weighted vertex normals
 
@@ -59,21 +61,31 @@ struct BuiltModel {
 /// Nodes are the mesh's points in its order, then central nodes. Edge springs are the mesh's unique
 /// edges with k = E h ΣA / l² summed over their faces (Van Gelder 1998), bending springs join the
 /// corners opposite an edge of two faces where no edge joins them, central springs tie each node to
-/// the nearest central node of its component. Rest lengths are distances. A spring damps with c = 2
-/// ζ √(k μ), μ = m_i m_j / (m_i + m_j), ζ the mean of its nodes' materials. The same result for any
-/// number of threads. \pre check_mesh(mesh) passes   \throw Error if there is no usable triangle or
-/// a result is not finite; Cancelled
+/// the nearest central node of its component: k = 1000 F s A_i / A, where A_i is a third of the
+/// faces at the node, A the component's area and s = √3/2 E h, an edge spring's stiffness in a net
+/// of equilateral triangles, or the stiffness that is given. So a surface is held as firmly per
+/// area by few nodes as by many. Rest lengths are distances. A spring damps with c = 2 ζ √(k μ),
+/// μ = m_i m_j / (m_i + m_j), or the other's mass where one end is fixed along all axes, ζ the mean
+/// of its nodes' materials. The same result for any number of threads. \pre check_mesh(mesh) passes
+/// \throw Error if there is no usable triangle or a result is not finite; Cancelled
 BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
                        const Context& context);
 
 /// Places for at most `count` central nodes for these points, and the nearest of them for each
 /// point: seeds by farthest points, the first the one farthest from the mean, then Lloyd's
-/// iteration until nothing changes or for 100 rounds. Ties go to the lowest index. No place is
-/// without a point.
+/// iteration until nothing changes or for 100 rounds. Seeds as far but for a hundredth of their
+/// distance are chosen by their places, other ties go to the lowest index. No place is without a
+/// point. Means are weighted where `weights` has a number > 0 for each point, so that the places do
+/// not follow the finer part of a net.
 struct Clusters {
   std::vector<Vec3> centers;
   std::vector<std::uint32_t> of_point;
 };
-Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, const Context& context);
+Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, const Context& context,
+                        std::span<const double> weights = {});
+
+/// The nearest of these centers for each point, ties to the lowest; centers that are none's go.
+Clusters nearest_clusters(const std::vector<Vec3>& points, const std::vector<Vec3>& centers,
+                          const Context& context);
 
 } // namespace gewebe

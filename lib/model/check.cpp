@@ -1,8 +1,8 @@
 #include "model/check.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 
-#include <charconv>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -11,25 +11,21 @@ namespace gewebe {
 
 namespace {
 
-std::string text(double value) {
-  char buffer[32];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  return {buffer, end};
-}
-
 void require_not_negative(double value, const char* what) {
   if (!(value >= 0 && std::isfinite(value)))
-    throw Error(std::string(what) + " is " + text(value) + ", expected a finite number, 0 or more");
+    throw Error(std::string(what) + " is " + number_text(value) +
+                ", expected a finite number, 0 or more");
 }
 
 void require_positive(double value, const char* what) {
   if (!(value > 0 && std::isfinite(value)))
-    throw Error(std::string(what) + " is " + text(value) + ", expected a finite number above 0");
+    throw Error(std::string(what) + " is " + number_text(value) +
+                ", expected a finite number above 0");
 }
 
 void require_finite(double value, const char* what) {
   if (!std::isfinite(value))
-    throw Error(std::string(what) + " is " + text(value) + ", expected a finite number");
+    throw Error(std::string(what) + " is " + number_text(value) + ", expected a finite number");
 }
 
 std::string pair(const Spring& s) {

@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 // Based on:
@@ -15,25 +16,44 @@ namespace {
 
 constexpr std::size_t grain = 8192;
 constexpr int most_rounds = 100;
+constexpr double alike = 0.98; // of the largest squared distance: what is as far
 
 double square_distance(const Vec3& a, const Vec3& b) {
   const Vec3 d = a - b;
   return dot(d, d);
 }
 
-Vec3 mean(const std::vector<Vec3>& points) {
-  Vec3 sum;
-  for (const Vec3& p : points)
-    sum += p;
-  return sum / static_cast<double>(points.size());
+double weight(std::span<const double> weights, std::size_t i) {
+  return weights.empty() ? 1 : weights[i];
 }
 
-std::size_t index_of_largest(const std::vector<double>& values) {
-  return static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin());
+Vec3 mean(const std::vector<Vec3>& points, std::span<const double> weights) {
+  Vec3 sum;
+  double total = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    sum += weight(weights, i) * points[i];
+    total += weight(weights, i);
+  }
+  return sum / total;
+}
+
+/// Among the points about as far as the farthest, the one that lies farthest along a direction of
+/// its own: on round bodies, where rounding would choose, fine and coarse nets get the same seeds.
+std::size_t farthest(const std::vector<Vec3>& points, const std::vector<double>& distance,
+                     std::size_t seed) {
+  const double least = alike * *std::max_element(distance.begin(), distance.end());
+  const double turn = 2.4 * static_cast<double>(seed);
+  const Vec3 along{std::cos(turn), std::sin(turn), std::cos(0.5 * turn + 1)};
+  std::size_t best = points.size();
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (distance[i] >= least &&
+        (best == points.size() || dot(points[i], along) > dot(points[best], along)))
+      best = i;
+  return best;
 }
 
 std::vector<Vec3> farthest_points(const std::vector<Vec3>& points, std::size_t count,
-                                  const Context& context) {
+                                  const Context& context, std::span<const double> weights) {
   std::vector<double> distance(points.size());
   const auto lower_to = [&](const Vec3& seed) {
     parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -42,15 +62,15 @@ std::vector<Vec3> farthest_points(const std::vector<Vec3>& points, std::size_t c
     });
   };
   std::fill(distance.begin(), distance.end(), std::numeric_limits<double>::infinity());
-  lower_to(mean(points));
-  std::vector<Vec3> seeds{points[index_of_largest(distance)]};
+  lower_to(mean(points, weights));
+  std::vector<Vec3> seeds{points[farthest(points, distance, 0)]};
   std::fill(distance.begin(), distance.end(), std::numeric_limits<double>::infinity());
   while (seeds.size() < count) {
     lower_to(seeds.back());
-    const std::size_t farthest = index_of_largest(distance);
-    if (!(distance[farthest] > 0))
+    const std::size_t next = farthest(points, distance, seeds.size());
+    if (!(distance[next] > 0))
       break; // all points are taken
-    seeds.push_back(points[farthest]);
+    seeds.push_back(points[next]);
   }
   return seeds;
 }
@@ -78,19 +98,20 @@ bool assign(const std::vector<Vec3>& points, Clusters& clusters, const Context& 
 }
 
 /// Moves each center to the mean of its points; centers without points vanish.
-void move_centers(const std::vector<Vec3>& points, Clusters& clusters) {
+void move_centers(const std::vector<Vec3>& points, Clusters& clusters,
+                  std::span<const double> weights) {
   std::vector<Vec3> sum(clusters.centers.size());
-  std::vector<std::size_t> size(clusters.centers.size());
+  std::vector<double> size(clusters.centers.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    sum[clusters.of_point[i]] += points[i];
-    ++size[clusters.of_point[i]];
+    sum[clusters.of_point[i]] += weight(weights, i) * points[i];
+    size[clusters.of_point[i]] += weight(weights, i);
   }
   std::vector<std::uint32_t> renumbered(size.size());
   std::uint32_t kept = 0;
   for (std::size_t c = 0; c < size.size(); ++c) {
     renumbered[c] = kept;
-    if (size[c] != 0)
-      clusters.centers[kept++] = sum[c] / static_cast<double>(size[c]);
+    if (size[c] > 0)
+      clusters.centers[kept++] = sum[c] / size[c];
   }
   if (kept == size.size())
     return;
@@ -99,22 +120,47 @@ void move_centers(const std::vector<Vec3>& points, Clusters& clusters) {
     c = renumbered[c];
 }
 
+/// Centers without points vanish.
+void drop_empty(Clusters& clusters) {
+  std::vector<std::uint32_t> renumbered(clusters.centers.size());
+  for (const std::uint32_t c : clusters.of_point)
+    renumbered[c] = 1;
+  std::uint32_t kept = 0;
+  for (std::size_t c = 0; c < renumbered.size(); ++c)
+    if (renumbered[c] != 0) {
+      clusters.centers[kept] = clusters.centers[c];
+      renumbered[c] = kept++;
+    }
+  clusters.centers.resize(kept);
+  for (std::uint32_t& c : clusters.of_point)
+    c = renumbered[c];
+}
+
 } // namespace
 
-Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count,
-                        const Context& context) {
+Clusters nearest_clusters(const std::vector<Vec3>& points, const std::vector<Vec3>& centers,
+                          const Context& context) {
+  Clusters clusters{centers, std::vector<std::uint32_t>(points.size())};
+  assign(points, clusters, context);
+  drop_empty(clusters);
+  return clusters;
+}
+
+Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, const Context& context,
+                        std::span<const double> weights) {
   Clusters clusters;
   if (points.empty() || count == 0)
     return clusters;
-  clusters.centers = farthest_points(points, count, context);
+  clusters.centers = farthest_points(points, count, context, weights);
   clusters.of_point.assign(points.size(), 0);
   assign(points, clusters, context);
   for (int round = 0; round < most_rounds; ++round) {
-    move_centers(points, clusters);
+    move_centers(points, clusters, weights);
     if (!assign(points, clusters, context))
       break;
   }
-  move_centers(points, clusters); // after the last round a center may be behind, or without points
+  move_centers(points, clusters,
+               weights); // after the last round a center may be behind, or without points
   return clusters;
 }
 

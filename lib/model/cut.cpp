@@ -62,7 +62,7 @@ private:
     std::vector<std::uint32_t> corners;
   };
 
-  static constexpr std::size_t no_edge = SurfacePart::no_edge;
+  static constexpr std::size_t no_edge = EdgeTable::no_edge;
 
   /// The surface that the cut may change. A node that comes apart is an end of something severed,
   /// or belongs to a triangle that vanishes; bending springs across edges of its triangles matter.
@@ -99,7 +99,7 @@ private:
       gone_[s] = 1;
     opened_.assign(edges_.size(), 0);
     for (const Pair& ends : cut_.edges) {
-      const std::size_t e = part_.find(ends);
+      const std::size_t e = part_.edges.find(ends);
       if (e == no_edge)
         throw Error("there is no triangle with the edge " + pair_text(ends) +
                     ", expected edges of the surface");
@@ -124,7 +124,7 @@ private:
     for (const std::size_t s : cut_.springs) {
       const Spring& spring = model_.springs[s];
       const std::size_t e =
-          spring.kind == SpringKind::edge ? part_.find({spring.i, spring.j}) : no_edge;
+          spring.kind == SpringKind::edge ? part_.edges.find({spring.i, spring.j}) : no_edge;
       if (e == no_edge)
         continue;
       for (const std::uint32_t c : edges_.around(e)) {

@@ -355,8 +355,7 @@ bool open_across(const Model& model, const std::vector<Vec3>& at, const EdgeTabl
     for (std::uint32_t k = 1; k < 3; ++k) {
       const std::uint32_t other = model.triangles[c / 3][(c + k - c / 3 * 3) % 3];
       const std::array<std::uint32_t, 2> ends{std::min(node, other), std::max(node, other)};
-      const auto e = std::lower_bound(edges.ends.begin(), edges.ends.end(), ends);
-      if (edges.around(static_cast<std::size_t>(e - edges.ends.begin())).size() != 2) {
+      if (edges.around(edges.find(ends)).size() != 2) {
         border = true;
         continue;
       }
@@ -406,9 +405,8 @@ Cut torn_cut(const Model& model, std::span<const double> displacement, double st
   const CornersOfNodes fans(model);
   for (const std::size_t s : torn) {
     const Spring& spring = model.springs[s];
-    const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
-    const auto e = std::lower_bound(edges.ends.begin(), edges.ends.end(), ends);
-    const bool beside = spring.kind == SpringKind::edge && e != edges.ends.end() && *e == ends;
+    const bool beside =
+        spring.kind == SpringKind::edge && edges.find({spring.i, spring.j}) != EdgeTable::no_edge;
     const bool i_first = pull[spring.i] >= pull[spring.j];
     const std::uint32_t first = i_first ? spring.i : spring.j,
                         second = i_first ? spring.j : spring.i;

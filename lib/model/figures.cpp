@@ -1,6 +1,6 @@
 #include "model/figures.h"
 
-#include "model/edges.h"
+#include "mesh/edges.h"
 
 namespace gewebe {
 
@@ -10,9 +10,10 @@ std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& mod
   std::uint64_t fixed = 0, boundary = 0;
   for (std::size_t i = 0; i < surface; ++i)
     fixed += model.nodes[i].fixed != fixed_none ? 1 : 0;
-  const EdgeTable edges = edge_table(model.triangles, model.nodes.size(), context);
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    boundary += edges.around(e).size() == 1 ? 1 : 0;
+  EdgeSides(model.nodes.size(), model.triangles, context)
+      .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+        boundary += edge.size() == 1 ? 1 : 0;
+      });
   return {{"nodes", surface},
           {"centrals", model.nodes.size() - surface},
           {"springs_e", spring_count(model, SpringKind::edge)},

@@ -3,10 +3,10 @@
 #include "base/digest.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "base/number_text.h"
 #include "model/check.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
@@ -164,13 +164,8 @@ void require_safe_step(const Model& model, double step) {
   const auto least = std::min_element(steps.begin(), steps.end());
   if (least == steps.end() || *least >= step)
     return;
-  const auto text = [](double value) {
-    std::array<char, 32> digits{};
-    return std::string(digits.data(),
-                       std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
-  };
-  throw Error("a step of " + text(step) + " s is beyond the safe step " + text(*least) +
-              " s of node " + std::to_string(least - steps.begin()) +
+  throw Error("a step of " + number_text(step) + " s is beyond the safe step " +
+              number_text(*least) + " s of node " + std::to_string(least - steps.begin()) +
               ", expected a shorter one or scaled masses");
 }
 

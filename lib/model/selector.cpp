@@ -1,12 +1,14 @@
 #include "model/selector.h"
 
 #include "base/error.h"
-#include "model/edges.h"
+#include "base/number_text.h"
+#include "mesh/border.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 
 namespace gewebe {
 
@@ -438,11 +440,8 @@ private:
 
   Flags boundary() {
     Flags flags(scope_);
-    const EdgeTable edges = edge_table(model_.triangles, model_.nodes.size(), Context{});
-    for (std::size_t e = 0; e < edges.size(); ++e)
-      if (edges.around(e).size() == 1)
-        for (const std::uint32_t node : edges.ends[e])
-          flags[node] = 1;
+    for (const std::uint32_t node : border_points(model_.nodes.size(), model_.triangles))
+      flags[node] = 1;
     return flags;
   }
 
@@ -479,6 +478,36 @@ std::vector<std::string> node_list_names(const Selector& selector) {
   return names;
 }
 
+namespace {
+
+std::string place_text(const Vec3& p) {
+  return number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z);
+}
+
+/// What a near: that misses may have meant: the node next to its point, and where the model is.
+std::string nearest_to(const Model& model, const Selector& selector) {
+  const auto near = std::ranges::find(selector.steps, Selector::Op::near, &Selector::Step::op);
+  if (near == selector.steps.end() || surface_count(model) == 0)
+    return "";
+  const Vec3 point{near->numbers[0], near->numbers[1], near->numbers[2]};
+  std::size_t best = 0;
+  Box3 box;
+  for (std::size_t i = 0; i < surface_count(model); ++i) {
+    const Vec3& p = model.nodes[i].position;
+    box.add(p);
+    if (norm(p - point) < norm(model.nodes[best].position - point))
+      best = i;
+  }
+  const Vec3& nearest = model.nodes[best].position;
+  std::array<char, 32> distance{};
+  (void)std::snprintf(distance.data(), distance.size(), "%.3g", norm(nearest - point));
+  return "; the nearest is node " + std::to_string(best) + " at " + place_text(nearest) + ", " +
+         distance.data() + " mm away, the model's box is " + place_text(box.min) + " to " +
+         place_text(box.max);
+}
+
+} // namespace
+
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
                                         const LoadNodeList& load) {
   std::vector<std::uint32_t> selected;
@@ -490,7 +519,8 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& sele
     throw Error("selector " + quote(selector.text) + ": " + error.what());
   }
   if (selected.empty())
-    throw Error("selector " + quote(selector.text) + " selects no node, expected at least one");
+    throw Error("selector " + quote(selector.text) + " selects no node, expected at least one" +
+                nearest_to(model, selector));
   return selected;
 }
 

@@ -1,9 +1,5 @@
 #include "model/surface_part.h"
 
-#include "base/context.h"
-
-#include <algorithm>
-
 namespace gewebe {
 
 namespace {
@@ -14,12 +10,6 @@ bool has_marked(const Triangle& t, std::span<const std::uint8_t> marked) {
 
 } // namespace
 
-std::size_t SurfacePart::find(const std::array<std::uint32_t, 2>& ends) const {
-  const auto at = std::lower_bound(edges.ends.begin(), edges.ends.end(), ends);
-  return at != edges.ends.end() && *at == ends ? static_cast<std::size_t>(at - edges.ends.begin())
-                                               : no_edge;
-}
-
 SurfacePart surface_part(const Model& model, std::span<const std::uint8_t> marked) {
   SurfacePart part;
   std::vector<Triangle> corners;
@@ -28,9 +18,7 @@ SurfacePart surface_part(const Model& model, std::span<const std::uint8_t> marke
       part.triangles.push_back(t);
       corners.push_back(model.triangles[t]);
     }
-  Context context;
-  context.threads = 1;
-  part.edges = edge_table(corners, model.nodes.size(), context);
+  part.edges = edge_table(corners, model.nodes.size());
   for (std::uint32_t& corner : part.edges.corners)
     corner = 3 * part.triangles[corner / 3] + corner % 3;
   return part;

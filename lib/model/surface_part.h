@@ -1,7 +1,7 @@
 #pragma once
 // A part of a model's surface with its edges, for what happens at one place of a large one.
 
-#include "model/edges.h"
+#include "mesh/edges.h"
 #include "model/model.h"
 
 #include <array>
@@ -16,10 +16,6 @@ struct SurfacePart {
   std::vector<std::uint32_t> triangles; ///< ascending
   /// Of these; corners are numbered as in the model, 3 triangle + k.
   EdgeTable edges;
-
-  static constexpr std::size_t no_edge = SIZE_MAX;
-  /// Index of an edge i < j, or no_edge.
-  std::size_t find(const std::array<std::uint32_t, 2>& ends) const;
 };
 
 /// The triangles with a marked corner, in one pass over all. Edges with a marked end, and those

@@ -91,6 +91,7 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
             const DrawingOptions& options, const Context& context) {
   const TriangleMesh& mesh = surface.mesh;
   const std::vector<Vec3>& normals = parts.normals;
+  const Vec3 fill = fill_direction(options.camera) * options.fill;
   const TexturedVertices& vertices = parts.vertices;
   const std::size_t base = drawing.vertices.size();
   if (base + vertices.point.size() > UINT32_MAX)
@@ -127,9 +128,13 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
         if (options.sphere)
           out.sphere = in_sphere_map(options.camera, p, normal);
       }
-      if (options.shade > 0)
-        out.shade = static_cast<float>(1 - options.shade +
-                                       options.shade * std::clamp(dot(light, normal), 0.0, 1.0));
+      if (options.shade > 0) {
+        // The brightest normal has 1, so that nothing is flat for being too bright.
+        const double brightest = options.fill > 0 ? std::max(norm(light + fill), 1.0) : 1;
+        const double lit = std::max(dot(light, normal), 0.0) + std::max(dot(fill, normal), 0.0);
+        out.shade =
+            static_cast<float>(1 - options.shade + options.shade * std::min(lit / brightest, 1.0));
+      }
     }
   });
 }
@@ -300,6 +305,10 @@ GroupBy group_by_from_name(std::string_view name) {
   if (found == group_by_names().end())
     throw Error("'" + std::string(name) + "' tells no groups apart");
   return static_cast<GroupBy>(found - group_by_names().begin());
+}
+
+Vec3 fill_direction(const Camera& camera) {
+  return direction_to(camera.back + camera.right * 0.9 - camera.up * 0.3, {});
 }
 
 double drawing_bytes(std::span<const Surface> surfaces) {

@@ -65,7 +65,8 @@ std::span<const Triangle> triangles_of_group(const Drawing& drawing, std::size_t
 /// A mesh to draw.
 struct Surface {
   TriangleMesh mesh;
-  std::vector<Vec3> rest; ///< where its points were at rest; empty: where they are
+  std::vector<Vec3> rest;             ///< where its points were at rest; empty: where they are
+  std::vector<std::string> materials; ///< names of its materials, where they are known
 };
 
 /// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
@@ -89,19 +90,20 @@ struct DrawingOptions {
   bool directional = false;
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
-  Camera camera;                            ///< that sees the sphere maps
+  double fill = 0; ///< strength of a second, far light, from the camera's right, 0 … 1
+  Camera camera;   ///< that sees the sphere maps and has the second light
   GroupBy group_by = GroupBy::material;
   std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
 };
 
 /// All surfaces in one, in order within each group. Per vertex (report eq. 3.2)
 ///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
-/// with the frame of tangents.h, and shade = 1 - k + k max(0, L·N) for a share k. L is 0 for a
-/// vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for
-/// the view's mirror image (x, y, z) at the normal, in axes right, up, back, and
-/// m = 2 |(x, y, z + 1)|. Nothing that was not asked for is computed.
-/// \pre check_mesh passes for every mesh; with `texcoords` all meshes have them
-/// \throw Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
+/// with the frame of tangents.h. shade = 1 - k + k (max(0, L·N) + f max(0, F·N)) / max(1, |L + f
+/// F|), F of fill_direction(), for shares k and f. L is 0 for a vertex at the light. Sphere maps
+/// are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for the view's mirror image (x, y, z)
+/// at the normal, in axes right, up, back, and m = 2 |(x, y, z + 1)|. Only what is asked for is
+/// computed. \pre check_mesh passes for every mesh; with `texcoords` all meshes have them \throw
+/// Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
                      const Context& context);
 
@@ -143,6 +145,10 @@ private:
   std::vector<DrawingParts> parts_; ///< by surface
   DrawingCounts counts_;
 };
+
+/// Where the second light comes from: from beside the camera, on the right hand, a little below. A
+/// unit vector.
+Vec3 fill_direction(const Camera& camera);
 
 /// Bytes that make_drawing and a backend need at most, without pictures and textures.
 double drawing_bytes(std::span<const Surface> surfaces);

@@ -179,6 +179,14 @@ void GlContext::make_current() {
 const std::string& GlContext::platform() const {
   return state_->platform;
 }
+bool GlContext::is_software() const {
+  constexpr std::array<std::string_view, 4> names{"llvmpipe", "softpipe", "swrast",
+                                                  "Software Rasterizer"};
+  return std::ranges::any_of(names, [&](std::string_view name) {
+    return state_->renderer.find(name) != std::string::npos;
+  });
+}
+
 const std::string& GlContext::renderer() const {
   return state_->renderer;
 }

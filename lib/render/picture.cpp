@@ -50,6 +50,9 @@ struct Painter::State {
       attempt([&] {
         require_memory(context, render_gl_bytes(width, height, options.samples), "the picture");
         gl.emplace();
+        if (options.backend == Backend::automatic && options.gl.mode == GlMode::shader &&
+            gl->is_software())
+          return gl.reset();
         GlOptions with_samples = options.gl;
         with_samples.samples = options.samples;
         renderer.emplace(*gl, look, width, height, with_samples);

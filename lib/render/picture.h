@@ -19,7 +19,7 @@
 namespace gewebe {
 
 enum class Backend {
-  automatic, ///< OpenGL, or our rasteriser where that fails
+  automatic, ///< OpenGL on a graphics card, else our rasteriser, which is quicker than software
   gl,
   cpu
 };
@@ -44,7 +44,7 @@ struct PictureOptions {
 
 struct PictureReport {
   Backend backend = Backend::cpu;         ///< that drew
-  std::string gl_failure;                 ///< why OpenGL did not, where it was tried
+  std::string gl_failure;                 ///< why OpenGL did not, where it failed
   std::string platform, renderer, target; ///< OpenGL's, see gl_context.h and gl_renderer.h
   int passes = 1;
   std::uint64_t uploads = 0;   ///< drawings that OpenGL was given, until now
@@ -56,7 +56,8 @@ struct PictureReport {
 /// shader, the textures there.
 class Painter {
 public:
-  /// With Backend::automatic OpenGL is tried, and what fails kept for the report.
+  /// With Backend::automatic OpenGL is tried, and what fails kept for the report; one that is
+  /// software counts where the mode is one of its fixed functions alone.
   /// \throw Error if sides times supersample exceed max_picture_side or the estimate the memory,
   /// and, with Backend::gl, where OpenGL fails
   Painter(const Look& look, const PictureOptions& options, const Context& context);

@@ -1,9 +1,9 @@
 #include "sim/axis_solver.h"
 
 #include "base/error.h"
-#include "sim/condition.h"
 #include "sim/load.h"
-#include "sim/stiffness.h"
+#include "solve/condition.h"
+#include "solve/stiffness.h"
 
 #include <string>
 #include <utility>

@@ -3,7 +3,7 @@
 
 #include "base/context.h"
 #include "model/model.h"
-#include "sim/factor.h"
+#include "solve/factor.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -4,8 +4,8 @@
 
 #include "base/columns.h"
 #include "base/context.h"
-#include "sim/factor.h"
-#include "sim/stiffness.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
 
 #include <cstdint>
 #include <span>

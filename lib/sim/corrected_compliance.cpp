@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -6,7 +6,7 @@
 #include "base/context.h"
 #include "sim/axis_solver.h"
 #include "sim/corrected_columns.h"
-#include "sim/stiffness.h"
+#include "solve/stiffness.h"
 
 #include <cstddef>
 

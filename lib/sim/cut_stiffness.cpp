@@ -2,11 +2,11 @@
 
 #include "base/error.h"
 #include "model/cut.h"
-#include "sim/condition.h"
 #include "sim/corrected_columns.h"
-#include "sim/factor.h"
 #include "sim/half_blocks.h"
-#include "sim/stiffness.h"
+#include "solve/condition.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
 
 #include <algorithm>
 #include <cmath>

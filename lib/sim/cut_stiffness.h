@@ -6,8 +6,8 @@
 #include "base/context.h"
 #include "model/model.h"
 #include "sim/compliance.h"
-#include "sim/frontal_factor.h"
 #include "sim/woodbury.h"
+#include "solve/frontal_factor.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -82,12 +82,14 @@ double apart(const Box3& a, const Box3& b) {
 
 DynamicContact::DynamicContact(const Model& model, const SpringLayout& layout)
     : model_(model), layout_(layout), surface_(surface_count(model)),
-      inward_(inward_directions(model)), next_look_(layout.blocks.size()),
-      impulses_(layout.blocks.size()) {}
+      inward_(inward_directions(model)) {
+  state_.next_look.resize(layout.blocks.size());
+  state_.impulses.resize(layout.blocks.size());
+}
 
 void DynamicContact::begin(std::vector<std::optional<MovingInstrument>> instruments) {
-  instruments_ = std::move(instruments);
-  std::fill(next_look_.begin(), next_look_.end(), 0);
+  state_.instruments = std::move(instruments);
+  std::fill(state_.next_look.begin(), state_.next_look.end(), 0);
 }
 
 ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, double time,
@@ -96,10 +98,10 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
   m.h = h;
   m.step = step;
   m.last = step + 1 == steps;
-  for (std::uint32_t k = 0; k < instruments_.size(); ++k) {
-    if (!instruments_[k])
+  for (std::uint32_t k = 0; k < state_.instruments.size(); ++k) {
+    if (!state_.instruments[k])
       continue;
-    const MovingInstrument& i = *instruments_[k];
+    const MovingInstrument& i = *state_.instruments[k];
     ContactMoment::There& t = m.there.emplace_back();
     t.instrument = k;
     t.from = i.way.at(time);
@@ -131,7 +133,7 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
 
 void DynamicContact::keep_out(std::size_t block, const ContactMoment& moment,
                               const NodeTraits* traits, NodeRow* next) {
-  if (moment.there.empty() || (moment.step < next_look_[block] && !moment.last))
+  if (moment.there.empty() || (moment.step < state_.next_look[block] && !moment.last))
     return;
   const SpringBlock& b = layout_.blocks[block];
   Box3 box;
@@ -158,12 +160,12 @@ void DynamicContact::keep_out(std::size_t block, const ContactMoment& moment,
     if (steps < static_cast<double>(unseen))
       unseen = static_cast<std::uint64_t>(steps);
   }
-  next_look_[block] = any ? 0 : moment.step + unseen;
+  state_.next_look[block] = any ? 0 : moment.step + unseen;
   if (!any)
     return;
   for (std::size_t row = b.first; row < b.first + b.count; ++row)
     if (layout_.node_of_row[row] < surface_)
-      push(row, moment, traits[row], next[row], impulses_[block]);
+      push(row, moment, traits[row], next[row], state_.impulses[block]);
 }
 
 void DynamicContact::push(std::size_t row, const ContactMoment& moment, const NodeTraits& traits,
@@ -254,7 +256,7 @@ void DynamicContact::push(std::size_t row, const ContactMoment& moment, const No
 }
 
 bool DynamicContact::still(double start) const {
-  for (const auto& i : instruments_)
+  for (const auto& i : state_.instruments)
     if (i && ((start < i->way.end && i->way.from != i->way.to) || i->before != i->way.at(start)))
       return false;
   return true;
@@ -263,7 +265,7 @@ bool DynamicContact::still(double start) const {
 bool DynamicContact::inside(std::uint32_t node, const Vec3& displacement) const {
   const Vec3 p = model_.nodes[node].position + displacement;
   return node < surface_ &&
-         std::any_of(instruments_.begin(), instruments_.end(), [&](const auto& i) {
+         std::any_of(state_.instruments.begin(), state_.instruments.end(), [&](const auto& i) {
            return i &&
                   PlacedInstrument(i->shape, i->way.to).distance(p) < -on_surface * i->shape.radius;
          });
@@ -275,10 +277,10 @@ Vec3 DynamicContact::left_of(std::uint32_t node, const Vec3& displacement, const
   const Vec3 p = model_.nodes[node].position + displacement;
   if (node >= surface_)
     return left;
-  for (std::uint32_t k = 0; k < instruments_.size(); ++k) {
-    if (!instruments_[k])
+  for (std::uint32_t k = 0; k < state_.instruments.size(); ++k) {
+    if (!state_.instruments[k])
       continue;
-    const PlacedInstrument placed(instruments_[k]->shape, instruments_[k]->way.to);
+    const PlacedInstrument placed(state_.instruments[k]->shape, state_.instruments[k]->way.to);
     if (!(std::abs(placed.distance(p)) < on_surface * placed.radius))
       continue;
     const Vec3 after = after_contact(left, {}, placed.normal(p, inward_[node]), placed.friction);
@@ -290,32 +292,26 @@ Vec3 DynamicContact::left_of(std::uint32_t node, const Vec3& displacement, const
   return left;
 }
 
-void DynamicContact::rest(std::vector<NodeTouch> touches, double duration) {
-  for (NodeTouch& t : touches)
-    t.force *= duration;
-  resting_.insert(resting_.end(), touches.begin(), touches.end());
+void DynamicContact::hold(std::vector<NodeTouch> touches) {
+  for (NodeTouch t : state_.held) {
+    t.force *= state_.held_time;
+    state_.resting.push_back(t);
+  }
+  state_.held_time = 0;
+  state_.held = std::move(touches);
 }
 
 std::vector<NodeTouch> DynamicContact::take() {
-  std::vector<NodeTouch> all = std::exchange(resting_, {});
-  for (std::vector<NodeTouch>& some : impulses_) {
+  hold(std::vector<NodeTouch>(state_.held)); // that it counts
+  std::vector<NodeTouch> all = std::exchange(state_.resting, {});
+  for (std::vector<NodeTouch>& some : state_.impulses) {
     for (NodeTouch t : some) {
       t.node = layout_.node_of_row[t.node];
       all.push_back(t);
     }
     some.clear();
   }
-  std::sort(all.begin(), all.end(), [](const NodeTouch& a, const NodeTouch& b) {
-    return a.node != b.node ? a.node < b.node : a.instrument < b.instrument;
-  });
-  std::size_t count = 0;
-  for (const NodeTouch& t : all)
-    if (count > 0 && all[count - 1].node == t.node && all[count - 1].instrument == t.instrument)
-      all[count - 1].force += t.force;
-    else
-      all[count++] = t;
-  all.resize(count);
-  return all;
+  return sums_of_touches(std::move(all));
 }
 
 } // namespace gewebe

@@ -50,6 +50,18 @@ public:
   /// Keeps references to both.
   DynamicContact(const Model& model, const SpringLayout& layout);
 
+  /// All that changes, to go back to.
+  struct State {
+    std::vector<std::optional<MovingInstrument>> instruments;
+    std::vector<std::uint64_t> next_look;         ///< step, by block
+    std::vector<std::vector<NodeTouch>> impulses; ///< by block: row and instrument ascending
+    std::vector<NodeTouch> held;                  ///< forces
+    double held_time = 0;                         ///< that they acted since the last take
+    std::vector<NodeTouch> resting;               ///< impulses of those before
+  };
+  const State& state() const noexcept { return state_; }
+  void restore(const State& state) { state_ = state; }
+
   /// Instruments during the next advance, by number; an absent one is no element.
   void begin(std::vector<std::optional<MovingInstrument>> instruments);
 
@@ -68,8 +80,13 @@ public:
   /// forces on it join `touches`. \pre still
   Vec3 left_of(std::uint32_t node, const Vec3& displacement, const Vec3& inverse_mass,
                const Vec3& acceleration, std::vector<NodeTouch>& touches) const;
-  /// For `duration` s these forces, by ascending node, acted on nodes at rest.
-  void rest(std::vector<NodeTouch> touches, double duration);
+  /// From now on these forces, by ascending node, act on nodes at rest; none: they move.
+  void hold(std::vector<NodeTouch> touches);
+  /// They did so for `duration` s.
+  void stay(double duration) { state_.held_time += duration; }
+  const std::vector<NodeTouch>& held() const noexcept { return state_.held; }
+  /// For how long since the last take, up to now.
+  double held_time() const noexcept { return state_.held_time; }
   /// The impulses since the last call, in place of forces, by ascending node and instrument.
   std::vector<NodeTouch> take();
 
@@ -80,10 +97,7 @@ private:
   const SpringLayout& layout_;
   std::size_t surface_ = 0;
   std::vector<Vec3> inward_; ///< at rest, by node
-  std::vector<std::optional<MovingInstrument>> instruments_;
-  std::vector<std::uint64_t> next_look_;         ///< step, by block
-  std::vector<std::vector<NodeTouch>> impulses_; ///< by block: row and instrument ascending
-  std::vector<NodeTouch> resting_;               ///< impulses of rest
+  State state_;
 };
 
 } // namespace gewebe

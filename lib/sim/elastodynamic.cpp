@@ -17,7 +17,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr double rest_tolerance = 1e-15;
+constexpr double rest_tolerance = 1e-15, same_duration = 1e-9;
 constexpr double most_steps = 1e9;
 // Springs times steps, and springs, below which a thread costs more than it gains.
 constexpr double pulls_of_a_thread = 2e6;
@@ -75,14 +75,15 @@ Elastodynamic::Elastodynamic(const Model& model, Integration integration)
 }
 
 void Elastodynamic::set_load(const Load& load, double time) {
-  if (load == load_)
+  if (load == *load_)
     return;
-  load_ = load;
+  load_ = std::make_shared<const Load>(load);
   time_ = time;
   apply_load();
 }
 
 void Elastodynamic::apply_load() {
+  loaded_ = time_;
   traits_.assign(layout_.movable, {});
   drives_.clear();
   for (std::size_t row = 0; row < layout_.movable; ++row) {
@@ -91,7 +92,7 @@ void Elastodynamic::apply_load() {
     for (int a = 0; a < 3; ++a)
       traits_[row].inverse_mass[a] = is_fixed(model_, i, a) ? 0 : 1 / node.mass;
     traits_[row].drag = node.drag;
-    put(node.mass * load_.gravity, traits_[row].constant);
+    put(node.mass * load_->gravity, traits_[row].constant);
   }
   const auto drive_of = [&](std::size_t row) -> Drive& {
     drives_.resize(layout_.blocks.size());
@@ -101,21 +102,21 @@ void Elastodynamic::apply_load() {
     return drives_[static_cast<std::size_t>(behind - layout_.blocks.begin()) - 1];
   };
   std::map<std::uint32_t, Driven> driven;
-  for (const auto& [node, force] : load_.force) {
+  for (const auto& [node, force] : load_->force) {
     const std::size_t row = layout_.row_of_node[node];
     if (row >= layout_.movable)
       continue;
-    if (const auto period = load_.force_period.find(node); period != load_.force_period.end()) {
+    if (const auto period = load_->force_period.find(node); period != load_->force_period.end()) {
       driven[node].pulsing = force;
       driven[node].period = period->second;
     } else {
       put(vector_of(traits_[row].constant) + force, traits_[row].constant);
     }
   }
-  for (const auto& [node, pressure] : load_.pressure)
+  for (const auto& [node, pressure] : load_->pressure)
     if (layout_.row_of_node[node] < layout_.movable)
       driven[node].pressure = pressure;
-  if (!load_.pressure.empty())
+  if (!load_->pressure.empty())
     for (const Triangle& t : model_.triangles)
       for (const std::uint32_t corner : t)
         if (const auto d = driven.find(corner);
@@ -127,10 +128,10 @@ void Elastodynamic::apply_load() {
     d.steady = vector_of(traits_[row].constant);
     drive_of(row).driven.push_back(std::move(d));
   }
-  for (const auto& [node, displacement] : load_.displacement) {
+  for (const auto& [node, displacement] : load_->displacement) {
     const std::size_t row = layout_.row_of_node[node];
-    const auto way = load_.travel.find(node);
-    const bool travels = way != load_.travel.end() && time_ < way->second.end;
+    const auto way = load_->travel.find(node);
+    const bool travels = way != load_->travel.end() && time_ < way->second.end;
     if (row < layout_.movable) {
       std::fill(std::begin(traits_[row].inverse_mass), std::end(traits_[row].inverse_mass), 0.0);
       if (travels)
@@ -161,13 +162,30 @@ void Elastodynamic::set_motion(std::span<const NodeMotion> motion) {
   apply_load();
 }
 
+Elastodynamic::State Elastodynamic::state(bool rows) const {
+  return {load_,    time_,
+          loaded_,  rows ? rows_ : std::vector<NodeRow>{},
+          resting_, touch_ ? std::optional(touch_->state()) : std::nullopt};
+}
+
 void Elastodynamic::restore(const State& state) {
+  if (load_ != state.load || loaded_ != state.loaded) {
+    load_ = state.load;
+    time_ = state.loaded; // ways that had ended then were no ways
+    apply_load();
+  }
   time_ = state.time;
+  resting_ = state.resting;
+  if (!state.touch)
+    touch_.reset();
+  else
+    touch_->restore(*state.touch);
+  if (state.rows.empty())
+    return;
   rows_ = state.rows;
   std::copy(rows_.begin() + static_cast<std::ptrdiff_t>(layout_.movable), rows_.end(),
             next_.begin() + static_cast<std::ptrdiff_t>(layout_.movable));
   motion_shown_ = false;
-  resting_ = state.resting;
 }
 
 void Elastodynamic::renew() {
@@ -192,9 +210,9 @@ Vec3 Elastodynamic::outer_force(const Driven& driven, double time, const At& pos
 Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
   const std::size_t row = layout_.row_of_node[node];
   if (row >= layout_.movable) { // pressure and pulses on it are not of interest: it can't move
-    const auto force = load_.force.find(node);
-    return model_.nodes[node].mass * load_.gravity +
-           (force != load_.force.end() ? force->second : Vec3{});
+    const auto force = load_->force.find(node);
+    return model_.nodes[node].mass * load_->gravity +
+           (force != load_->force.end() ? force->second : Vec3{});
   }
   const auto position = [&](std::uint32_t i) {
     return model_.nodes[i].position + vector_of(rows_[layout_.row_of_node[i]].u);
@@ -207,7 +225,7 @@ Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
 }
 
 bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const {
-  if (load_.changes_until() > time || (touch_ && !touch_->still(time)))
+  if (load_->changes_until() > time || (touch_ && !touch_->still(time)))
     return false;
   const double speed = rest_tolerance * size_ / h, acceleration = speed / h;
   for (const NodeRow& row : rows_)
@@ -246,8 +264,10 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
   if (found_at_rest(h, start, touches)) {
     std::sort(touches.begin(), touches.end(),
               [](const NodeTouch& a, const NodeTouch& b) { return a.node < b.node; });
-    if (touch_)
-      touch_->rest(std::move(touches), duration);
+    if (touch_) {
+      touch_->hold(std::move(touches));
+      touch_->stay(duration);
+    }
     for (NodeRow& row : rows_)
       std::fill(std::begin(row.v), std::end(row.v), 0.0);
     motion_shown_ = false;
@@ -256,6 +276,8 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
   }
   const auto steps = static_cast<std::uint64_t>(count);
   motion_shown_ = false;
+  if (touch_)
+    touch_->hold({});
   if (implicit_)
     run_implicit(steps, h, start, context);
   else
@@ -340,8 +362,19 @@ void Elastodynamic::set_instruments(std::vector<std::optional<MovingInstrument>>
     touch_->begin(std::move(instruments));
 }
 
-std::vector<NodeTouch> Elastodynamic::take_touches() {
+void Elastodynamic::rest_on(double duration) {
+  if (touch_)
+    touch_->stay(duration);
+}
+
+std::vector<NodeTouch> Elastodynamic::take_impulses() {
   return touch_ ? touch_->take() : std::vector<NodeTouch>{};
+}
+
+std::optional<std::vector<NodeTouch>> Elastodynamic::held_touches(double duration) const {
+  if (!touch_ || !(touch_->held_time() >= duration * (1 - same_duration)))
+    return std::nullopt;
+  return touch_->held();
 }
 
 void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
@@ -353,7 +386,7 @@ void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
   for (std::uint32_t i = 0; i < n; ++i)
     for (std::size_t a = 0; a < 3; ++a)
       held[3 * std::size_t{i} + a] =
-          is_fixed(model_, i, static_cast<int>(a)) || load_.displacement.contains(i) ? 1 : 0;
+          is_fixed(model_, i, static_cast<int>(a)) || load_->displacement.contains(i) ? 1 : 0;
   for (std::uint64_t s = 0; s < steps; ++s) {
     const double time = start + static_cast<double>(s + 1) * h;
     for (std::uint32_t row = 0; row < layout_.movable; ++row)
@@ -400,9 +433,9 @@ void Elastodynamic::fail(double time, const char* what) const {
 
 std::vector<NodeVector> Elastodynamic::contact_forces() const {
   std::vector<NodeVector> forces;
-  forces.reserve(load_.displacement.size());
+  forces.reserve(load_->displacement.size());
   const std::span<const NodeMotion> now = motion();
-  for (const auto& [node, displacement] : load_.displacement) {
+  for (const auto& [node, displacement] : load_->displacement) {
     Vec3 force = -(spring_force(network_, now, node) + outer_force(node, time_));
     for (int a = 0; a < 3; ++a)
       if (is_fixed(model_, node, a) || force[a] == 0)

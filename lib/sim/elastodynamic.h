@@ -73,15 +73,18 @@ public:
   /// Gives the nodes another state; it wakes. \pre as many as nodes; 0 where the model holds them
   void set_motion(std::span<const NodeMotion> motion);
 
-  /// What decides, with the load, how it goes on, but for what is kept to be quick (see renew).
+  /// All that decides how it goes on, but for what is kept to be quick (see renew).
   struct State {
-    double time = 0;
-    std::vector<NodeRow> rows;
+    std::shared_ptr<const Load> load;
+    double time = 0, loaded = 0;
+    std::vector<NodeRow> rows; ///< none if they did not change since
     bool resting = false;
+    std::optional<DynamicContact::State> touch;
   };
-  State state() const { return {time_, rows_, resting_}; }
-  const Load& load() const noexcept { return load_; }
-  /// Goes back. \pre a state of this object under the present load
+  /// \param rows false: nothing moves it before it goes back to this state, or to another one that
+  /// was asked for behind this one
+  State state(bool rows = true) const;
+  /// Goes back. \pre a state of this object
   void restore(const State& state);
   /// Forgets an implicit step's matrix and factor, which serve for several steps.
   void renew();
@@ -94,9 +97,13 @@ public:
   /// \pre semi-implicit
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments);
   void wake() { resting_ = false; }
+  /// That it rests for `duration` s more, in place of an advance. \pre resting()
+  void rest_on(double duration);
   /// Impulses (forces times s) of the instruments since the last call, by ascending node and
   /// instrument.
-  std::vector<NodeTouch> take_touches();
+  std::vector<NodeTouch> take_impulses();
+  /// The forces of the instruments, if it rested for these last `duration` s, all since that call.
+  std::optional<std::vector<NodeTouch>> held_touches(double duration) const;
 
 private:
   /// A row whose force changes with time or shape.
@@ -130,8 +137,9 @@ private:
   const Model& model_;
   SpringNetwork network_;
   SpringLayout layout_;
-  Load load_;
-  double time_ = 0; ///< of the state
+  std::shared_ptr<const Load> load_ = std::make_shared<const Load>();
+  double time_ = 0;   ///< of the state
+  double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
   std::vector<NodeRow> rows_, next_;
   std::vector<Drive> drives_; ///< by block; empty where nothing changes

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "sim/contact_block.h"
 #include "sim/shape_modes.h"
-#include "sim/stiffness.h"
+#include "solve/stiffness.h"
 
 #include <algorithm>
 #include <cmath>

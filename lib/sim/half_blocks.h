@@ -3,7 +3,7 @@
 // what forces at contacts need, without a column of C.
 
 #include "sim/compliance.h"
-#include "sim/frontal_factor.h"
+#include "solve/frontal_factor.h"
 
 #include <cstdint>
 #include <functional>

@@ -13,8 +13,8 @@
 
 #include "base/context.h"
 #include "model/model.h"
-#include "sim/factor.h"
 #include "sim/spring_force.h"
+#include "solve/factor.h"
 
 #include <cstdint>
 #include <memory>

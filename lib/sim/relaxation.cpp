@@ -2,10 +2,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "sim/condition.h"
 #include "sim/elastodynamic.h"
 #include "sim/spring_kernel.h"
 #include "sim/spring_layout.h"
+#include "solve/condition.h"
 
 #include <algorithm>
 #include <cmath>

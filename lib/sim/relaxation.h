@@ -14,8 +14,8 @@
 #include "base/columns.h"
 #include "base/context.h"
 #include "model/model.h"
-#include "sim/factor.h"
-#include "sim/stiffness.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
 
 #include <cstdint>
 #include <span>

@@ -60,9 +60,10 @@ struct Release { ///< of force, pressure, displacement and grasp
 /// Puts an instrument there, in place of itself, or moves it from where it is; see
 /// add_instrument().
 struct SetInstrument {
-  std::size_t instrument = 0;
-  InstrumentShape shape; ///< radius > 0, friction >= 0
-  Pose pose;             ///< turn of length 1
+  std::size_t instrument = 0; ///< instrument_count(): a new one, from when this is accepted
+  InstrumentShape shape;      ///< radius > 0, friction >= 0
+  Pose pose;                  ///< turn of length 1
+  std::string name{};         ///< of a new one
 };
 struct MoveInstrument {
   std::size_t instrument = 0;
@@ -144,6 +145,8 @@ struct SimulationOptions {
   double tolerance = 0;                           ///< as well
   bool shapes = false;                            ///< shapes are wanted of each step, as if emitted
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
+  /// Told in its place of shapes that are not to be trusted; without it `warn` is.
+  std::function<void(const std::string&)> distrust{};
   /// A step or change that throws leaves the state as it was, which costs a copy of what moves.
   bool guard = false;
   double rate = 0; ///< steps a second that are wanted; 0: any. Too large contact sets are warned of
@@ -240,6 +243,8 @@ public:
   /// An instrument that is in no place until SetInstrument; its number, the old one where there is
   /// one of that name.
   std::size_t add_instrument(const std::string& name);
+  /// The number of the one of that name; instrument_count() where there is none.
+  std::size_t instrument_place(const std::string& name) const noexcept;
   std::size_t instrument_count() const noexcept { return instruments_.size(); }
   const std::string& instrument_name(std::size_t instrument) const;
   /// \throw Error naming those there are
@@ -247,8 +252,9 @@ public:
   InstrumentReport instrument(std::size_t instrument) const;
 
   /// Takes effect now. \pre objects and nodes exist, numbers are finite
-  /// \throw Error if a node should move along an axis that the model holds, or objects can't be
-  /// attached or change their method
+  /// \throw Error if a node should move along an axis that the model holds or by more than a
+  /// million times the size of its model, an instrument should stand where single precision does
+  /// not reach, or objects can't be attached or change their method
   void apply(const Change& change);
   /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier.
   /// \throw Error as apply, and if the time is past
@@ -267,7 +273,9 @@ public:
   bool emits_instruments() const noexcept { return emit_instruments_; }
 
   /// Goes on by dt >= 0, or to `time` (now or later), through the events up to and at its end.
-  /// Times add up without the rounding of each sum. \throw Error "object NAME at T s: …", Cancelled
+  /// Times add up without the rounding of each sum. \throw Error "object NAME at T s: …", among
+  /// others where a node is displaced by more than a million times the size of its model, or a
+  /// force leaves single precision; if there would be over a million repeated events; Cancelled
   void step(double dt);
   void step_to(double time);
 
@@ -307,6 +315,7 @@ private:
     Change change;
     double origin = 0, period = 0; ///< of a repeated one
     double round = 0;
+    bool in_flight = false; ///< takes effect just now
   };
   void insert(std::unique_ptr<Object> object);
   void need_model(Object& object) const;
@@ -334,6 +343,8 @@ private:
   std::unique_ptr<Body> make_body(std::vector<std::size_t> parts, const Motions* motions = nullptr);
   void move_bodies(double to);
   void advance(double to);
+  void take_effect_first();
+  void require_few_events(double to) const;
   template <class Work>
   void at_object(const Object& object, Work&& work) const; ///< names object and time in an Error
   void show(Object& object);
@@ -341,6 +352,10 @@ private:
   bool has_moved(const Object& object) const;
   std::vector<Vec3> shape_velocity(Object& object, bool afresh);
   void shape(Object& object) const;
+  double displacement_limit(Object& object) const;
+  void require_bounded(Object& object, std::span<const double> displacement) const;
+  void require_bounded(Object& object) const;
+  void require_bounded_instruments() const;
   void shape_in_step(Object& object);
   bool may_leave_range(Object& object, double most) const;
   void show_motion(Object& object);
@@ -348,20 +363,23 @@ private:
   void warn_of_range(Object& object) const;
   double integration_step(Body& body);
   void check_instrument(const Change& change) const;
+  void require_instrument(const Change& change) const;
+  void introduce(const Change& change);
+  Instrument& present_instrument(std::size_t instrument) const;
   bool apply_instrument(const Change& change);
   void carry(const Instrument& instrument);
   void drop_grips(std::size_t object, const std::vector<std::uint32_t>& nodes);
   void drop_grips(std::size_t instrument);
   void note_poses();
   void guide(Body& body, double to);
-  void keep_instruments();
   void need_contact(Object& object);
   void end_guiding(double to);
   bool touched_anew(Object& object);
   std::optional<Pose> pose_at(std::size_t moment, std::size_t instrument) const;
   bool instruments_there() const;
   void follow_instruments(Object& object);
-  void take_touches();
+  void take_touches(double duration);
+  void gather_impulses(Body& body);
   void add_touches(Object& object);
   struct Moves;
   void cut_now(const CutObject& change);

@@ -122,6 +122,8 @@ void Simulation::attach(const Attach& tie) {
   if (a.body != b.body)
     parts.insert(parts.end(), b.body->parts.begin(), b.body->parts.end());
   std::sort(parts.begin(), parts.end());
+  for (Body* const body : {a.body, b.body})
+    gather_impulses(*body);
   const Body *const first = a.body, *const second = b.body;
   std::unique_ptr<Body> body;
   std::vector<std::pair<Object*, std::pair<Body*, std::size_t>>> were;
@@ -133,20 +135,25 @@ void Simulation::attach(const Attach& tie) {
     ties_.resize(ties);
     throw;
   }
-  std::vector<std::unique_ptr<Body>> others;
-  for (auto& one : bodies_)
-    if (one.get() != first && one.get() != second)
-      others.push_back(std::move(one));
-    else if (undo_->open)
-      // Shared, for what can be called can be copied.
-      undo_->note([this, were, old = std::make_shared<std::unique_ptr<Body>>(std::move(one))] {
-        for (const auto& [object, place] : were)
-          std::tie(object->body, object->offset) = place;
-        bodies_.push_back(std::move(*old));
-      });
-  others.push_back(std::move(body));
-  bodies_ = std::move(others);
-  undo_->note([this] { bodies_.pop_back(); });
+  // Back in their places, for what was noted before counts on the order.
+  for (const Body* const gone : {first, second}) {
+    const auto at = std::find_if(bodies_.begin(), bodies_.end(),
+                                 [&](const auto& one) { return one.get() == gone; });
+    if (at == bodies_.end())
+      continue; // both are one
+    // Shared, for what can be called can be copied.
+    undo_->note([this, place = at - bodies_.begin(),
+                 old = std::make_shared<std::unique_ptr<Body>>(std::move(*at))] {
+      bodies_.insert(bodies_.begin() + place, std::move(*old));
+    });
+    bodies_.erase(at);
+  }
+  bodies_.push_back(std::move(body));
+  undo_->note([this, were] {
+    bodies_.pop_back();
+    for (const auto& [object, place] : were)
+      std::tie(object->body, object->offset) = place;
+  });
 }
 
 double Simulation::integration_step(Body& body) {
@@ -197,10 +204,14 @@ void Simulation::move_bodies(double to) {
   std::vector<double> step;
   for (const auto& body : bodies_) {
     body->taken = 0;
-    guide(*body, to);
-    if (body->moving->resting())
-      continue;
     keep_body(*body);
+    guide(*body, to);
+    if (body->moving->resting()) {
+      body->moving->rest_on(duration);
+      continue;
+    }
+    keep_body(*body);
+    body->rest_box.reset();
     awake.push_back(body.get());
     step.push_back(integration_step(*body));
   }
@@ -219,8 +230,6 @@ void Simulation::move_bodies(double to) {
     if (body->failure)
       raise(*body);
   end_guiding(to);
-  for (Body* const body : awake)
-    body->touch_time += duration;
   for (const auto& object : objects_)
     counts_.resting += object->method == Method::ela && object->body == nullptr ? 1 : 0;
   for (const auto& body : bodies_) {

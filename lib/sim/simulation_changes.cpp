@@ -3,14 +3,33 @@
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
+#include <cmath>
 #include <variant>
 
 namespace gewebe {
 
 using simulation::number_text;
 
+namespace {
+
+constexpr double least_period = 1e-9; // s
+
+/// Shorter ones are lost in the rounding of the time, sooner or later.
+void require_period(double period) {
+  if (!(period >= least_period))
+    throw Error("a period of " + number_text(period) + " s, expected 1e-9 s or longer");
+}
+
+} // namespace
+
 void Simulation::check(const Change& change) const {
   check_instrument(change);
+  if (const auto* const force = std::get_if<SetForce>(&change);
+      force != nullptr && force->period > 0)
+    require_period(force->period);
+  if (const auto* const press = std::get_if<SetPressure>(&change);
+      press != nullptr && press->pressure.period > 0)
+    require_period(press->pressure.period);
   if (const auto* const tie = std::get_if<Attach>(&change)) {
     const Object &a = *objects_.at(tie->object), &b = *objects_.at(tie->other);
     for (const Object* const o : {&a, &b})
@@ -38,6 +57,12 @@ void Simulation::check(const Change& change) const {
   if (set == nullptr)
     return;
   const Model& model = this->model(set->object);
+  const double most = displacement_limit(*objects_[set->object]);
+  for (int a = 0; a < 3; ++a)
+    if (!(std::abs(set->displacement[a]) <= most))
+      throw Error("a displacement of " + number_text(set->displacement[a]) +
+                  " mm, expected at most a million times the size of the object, " +
+                  number_text(most) + " mm");
   for (const std::uint32_t node : set->nodes)
     for (int a = 0; a < 3; ++a)
       if (is_fixed(model, node, a) && set->displacement[a] != 0)
@@ -47,9 +72,12 @@ void Simulation::check(const Change& change) const {
 
 void Simulation::apply(const Change& change) {
   check(change);
+  require_instrument(change);
+  introduce(change);
   // The others can't fail behind their check.
   if (std::holds_alternative<Attach>(change) || std::holds_alternative<SetMethod>(change) ||
-      std::holds_alternative<CutObject>(change) || std::holds_alternative<Restore>(change))
+      std::holds_alternative<CutObject>(change) || std::holds_alternative<Restore>(change) ||
+      std::holds_alternative<Grasp>(change))
     guarded([&] { apply_now(change); });
   else
     apply_now(change);
@@ -126,6 +154,8 @@ void Simulation::apply_now(const Change& change) {
     object.tear = tearing->strain;
   } else if (const auto* const again = std::get_if<Renew>(&change)) {
     touch(again->object);
+    if (undo_->open)
+      undo_->updated.insert(touched);
     renew(*touched);
   } else if (const auto* const stages = std::get_if<SetTwoStep>(&change)) {
     touch(stages->object);
@@ -168,12 +198,15 @@ void Simulation::schedule(double time, const Change& change) {
     return;
   }
   check(change);
+  introduce(change);
   announce_cuts(change);
   events_.emplace(time, Event{change});
 }
 
 void Simulation::schedule_every(double period, const Change& change) {
+  require_period(period);
   check(change);
+  introduce(change);
   events_.emplace(time_ + period, Event{change, time_, period, 1});
 }
 

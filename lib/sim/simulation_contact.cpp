@@ -1,22 +1,22 @@
 // Instruments: where they go, what they grasp, whom they touch.
 
+#include "base/vector_at.h"
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 #include <utility>
 #include <variant>
 
 namespace gewebe {
 
+using simulation::largest_number;
 using simulation::number_text;
 
 namespace {
 
 constexpr std::size_t most_parts = 256; ///< of an instrument's way in one step
-
-Vec3 vector_at(std::span<const double> values, std::size_t node) {
-  return {values[3 * node], values[3 * node + 1], values[3 * node + 2]};
-}
 
 Box3 joined(Box3 a, const Box3& b) {
   a.add(b.min);
@@ -37,15 +37,36 @@ Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to)
   return joined(box, {box.min - Vec3{reach, reach, reach}, box.max + Vec3{reach, reach, reach}});
 }
 
+/// One touch for each node and instrument, by ascending ones: the sums over `duration`.
+std::vector<NodeTouch> means_of(std::vector<NodeTouch> impulses, double duration) {
+  std::vector<NodeTouch> all = sums_of_touches(std::move(impulses));
+  for (NodeTouch& t : all)
+    t.force = t.force / duration;
+  return all;
+}
+
 } // namespace
 
+std::size_t Simulation::instrument_place(const std::string& name) const noexcept {
+  const auto at = std::find_if(instruments_.begin(), instruments_.end(),
+                               [&](const auto& i) { return i->name == name; });
+  return static_cast<std::size_t>(at - instruments_.begin());
+}
+
 std::size_t Simulation::add_instrument(const std::string& name) {
-  for (std::size_t k = 0; k < instruments_.size(); ++k)
-    if (instruments_[k]->name == name)
-      return k;
-  instruments_.push_back(std::make_unique<Instrument>());
-  instruments_.back()->name = name;
-  return instruments_.size() - 1;
+  const std::size_t place = instrument_place(name);
+  if (place == instruments_.size()) {
+    instruments_.push_back(std::make_unique<Instrument>());
+    instruments_.back()->name = name;
+  }
+  return place;
+}
+
+/// A new instrument is known from when the command that puts it there is accepted, be it for later.
+void Simulation::introduce(const Change& change) {
+  if (const auto* const set = std::get_if<SetInstrument>(&change);
+      set != nullptr && set->instrument == instruments_.size())
+    add_instrument(set->name);
 }
 
 const std::string& Simulation::instrument_name(std::size_t instrument) const {
@@ -89,7 +110,26 @@ InstrumentReport Simulation::instrument(std::size_t instrument) const {
   return report;
 }
 
+Simulation::Instrument& Simulation::present_instrument(std::size_t instrument) const {
+  Instrument& i = *instruments_.at(instrument);
+  if (!i.present)
+    throw Error("the instrument " + i.name +
+                " is not in the scene now, expected an instrument command before");
+  return i;
+}
+
 void Simulation::check_instrument(const Change& change) const {
+  const auto require_single = [](std::initializer_list<Vec3> all, double radius) {
+    for (const Vec3& v : all)
+      radius = std::max({radius, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    if (!(radius <= largest_number))
+      throw Error("an instrument of or at " + number_text(radius) +
+                  " mm, expected numbers within single precision");
+  };
+  if (const auto* const set = std::get_if<SetInstrument>(&change))
+    require_single({set->pose.place, set->shape.axis}, set->shape.radius);
+  if (const auto* const move = std::get_if<MoveInstrument>(&change))
+    require_single({move->place}, 0);
   if (const auto* const grasp = std::get_if<Grasp>(&change)) {
     const Model& model = this->model(grasp->object);
     for (const std::uint32_t node : grasp->nodes)
@@ -99,17 +139,21 @@ void Simulation::check_instrument(const Change& change) const {
   }
 }
 
+/// That a change of an instrument can take effect now.
+void Simulation::require_instrument(const Change& change) const {
+  if (const auto* const move = std::get_if<MoveInstrument>(&change))
+    (void)present_instrument(move->instrument);
+  if (const auto* const withdraw = std::get_if<Withdraw>(&change))
+    (void)present_instrument(withdraw->instrument);
+  const auto* const grasp = std::get_if<Grasp>(&change);
+  if (grasp != nullptr && present_instrument(grasp->instrument).shape.blade)
+    throw Error("the instrument " + instruments_[grasp->instrument]->name +
+                " is a blade, expected one that can hold nodes");
+}
+
 /// \return whether it was a change of instruments, which then has taken effect
 bool Simulation::apply_instrument(const Change& change) {
   note_poses(); // the end of the ways so far
-  const auto there = [&](std::size_t k) -> Instrument& {
-    Instrument& i = *instruments_.at(k);
-    if (!i.present)
-      throw Error("the instrument " + i.name +
-                  " is not in the scene now, expected an instrument "
-                  "command before");
-    return i;
-  };
   if (const auto* const set = std::get_if<SetInstrument>(&change)) {
     Instrument& i = *instruments_.at(set->instrument);
     drop_grips(set->instrument);
@@ -122,14 +166,12 @@ bool Simulation::apply_instrument(const Change& change) {
     i.way = {set->pose, set->pose, time_, time_};
     i.before = set->pose;
   } else if (const auto* const move = std::get_if<MoveInstrument>(&change)) {
-    Instrument& i = there(move->instrument);
+    Instrument& i = *instruments_[move->instrument];
     const Pose from = i.way.at(time_);
     i.way = {from, {move->place, move->turn.value_or(from.turn)}, time_, time_ + move->over};
     carry(i);
   } else if (const auto* const grasp = std::get_if<Grasp>(&change)) {
-    Instrument& i = there(grasp->instrument);
-    if (i.shape.blade)
-      throw Error("the instrument " + i.name + " is a blade, expected one that can hold nodes");
+    Instrument& i = *instruments_[grasp->instrument];
     Object& object = *objects_.at(grasp->object);
     shape_in_step(object); // where the nodes stand
     keep_load(object);
@@ -149,7 +191,7 @@ bool Simulation::apply_instrument(const Change& change) {
     if (time_ < i.way.end)
       carry(i);
   } else if (const auto* const withdraw = std::get_if<Withdraw>(&change)) {
-    Instrument& i = there(withdraw->instrument);
+    Instrument& i = *instruments_[withdraw->instrument];
     drop_grips(withdraw->instrument);
     i.present = false;
     i.changed = i.changed || !i.shape.blade;
@@ -257,34 +299,6 @@ void Simulation::guide(Body& body, double to) {
     body.moving->set_instruments(std::move(all));
 }
 
-/// Where instruments were noted, as it was, if the step is taken back.
-void Simulation::keep_instruments() {
-  if (instruments_.empty())
-    return;
-  std::vector<Instrument> instruments;
-  for (const auto& i : instruments_)
-    instruments.push_back(*i);
-  std::vector<std::vector<NodeTouch>> touches;
-  for (const auto& object : objects_)
-    touches.push_back(object->touches);
-  undo_->note([this, instruments, touches, poses = poses_, emit = emit_instruments_] {
-    for (std::size_t k = 0; k < instruments.size(); ++k)
-      *instruments_[k] = instruments[k];
-    for (std::size_t k = 0; k < touches.size(); ++k)
-      objects_[k]->touches = touches[k];
-    poses_ = poses;
-    emit_instruments_ = emit;
-    for (const auto& body : bodies_) {
-      (void)body->moving->take_touches();
-      body->touch_time = 0;
-      body->rest_box.reset();
-      body->touched = std::any_of(body->parts.begin(), body->parts.end(), [&](std::size_t part) {
-        return !objects_[part]->touches.empty();
-      });
-    }
-  });
-}
-
 void Simulation::end_guiding(double to) {
   for (const auto& i : instruments_) {
     i->before = i->way.at(to);
@@ -292,26 +306,50 @@ void Simulation::end_guiding(double to) {
   }
 }
 
-/// Behind a step: forces of instruments on bodies that moved, means over its time.
-void Simulation::take_touches() {
-  if (instruments_.empty())
+/// What instruments did to a body so far in this step goes to its objects: their nodes are
+/// followed.
+void Simulation::gather_impulses(Body& body) {
+  const std::vector<NodeTouch> all = body.moving->take_impulses();
+  for (const std::size_t part : body.parts) {
+    Object& object = *objects_[part];
+    for (const NodeTouch& t : all)
+      if (t.node >= object.offset && t.node - object.offset < object.model.nodes.size())
+        object.impulses.push_back(
+            {t.node - static_cast<std::uint32_t>(object.offset), t.instrument, t.force});
+  }
+}
+
+/// Behind a step: forces of instruments on elastodynamic objects, means over its time.
+void Simulation::take_touches(double duration) {
+  if (instruments_.empty() || !(duration > 0))
     return;
   for (const auto& body : bodies_) {
-    if (!(body->touch_time > 0))
-      continue;
-    std::vector<NodeTouch> touches = body->moving->take_touches();
-    body->touched = !touches.empty();
+    // As they are at rest, exactly, where it rested all the time.
+    const std::optional<std::vector<NodeTouch>> held = body->moving->held_touches(duration);
+    gather_impulses(*body);
+    body->touched = false;
     for (const std::size_t part : body->parts) {
       Object& object = *objects_[part];
+      std::vector<NodeTouch> touches;
+      const std::size_t end = object.offset + object.model.nodes.size();
+      if (held) {
+        for (const NodeTouch& t : *held)
+          if (t.node >= object.offset && t.node < end)
+            touches.push_back(
+                {t.node - static_cast<std::uint32_t>(object.offset), t.instrument, t.force});
+      } else {
+        touches = means_of(std::move(object.impulses), duration);
+      }
+      object.impulses.clear();
+      body->touched = body->touched || !touches.empty();
+      if (held && touches == object.touches)
+        continue;
       object.shown = object.shown && object.touches.empty() && touches.empty();
-      object.touches.clear();
-      for (const NodeTouch& t : touches)
-        if (t.node >= object.offset && t.node - object.offset < object.model.nodes.size())
-          object.touches.push_back({t.node - static_cast<std::uint32_t>(object.offset),
-                                    t.instrument, t.force / body->touch_time});
+      object.touches = std::move(touches);
     }
-    body->touch_time = 0;
   }
+  for (const auto& object : objects_)
+    object->impulses.clear(); // of those that left their body for good
 }
 
 // ---- elastostatic objects
@@ -359,10 +397,12 @@ std::optional<Pose> Simulation::pose_at(std::size_t moment, std::size_t instrume
 
 /// An elastostatic object's shape behind all the ways that the instruments took since it was shown.
 void Simulation::follow_instruments(Object& object) {
-  if (!object.contact)
-    object.contact = std::make_unique<StaticContact>(object.model, object.displacement);
   if (undo_->open)
     undo_->updated.insert(&object);
+  if (!object.contact) {
+    undo_->note([&object] { object.contact.reset(); });
+    object.contact = std::make_unique<StaticContact>(object.model, object.displacement);
+  }
   const std::size_t count = instruments_.size();
   bool solved = true;
   // An object that nothing ever acted on has no shape to find.

@@ -1,12 +1,13 @@
 // Cuts: what they sever when they take effect, what comes off, what it means for the methods.
 
-#include "sim/condition.h"
 #include "sim/cut_stiffness.h"
 #include "sim/simulation_internal.h"
+#include "solve/condition.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 #include <variant>
@@ -40,6 +41,8 @@ auto of_object(const std::string& name, Work&& work) {
 CutStiffness* Simulation::stiffness_of(Object& object) const {
   if (object.stiffness || (!object.still && !has_moved(object)))
     return object.stiffness.get();
+  if (undo_->open)
+    undo_->updated.insert(&object);
   const std::shared_ptr<const Model> first = object.first ? object.first : object.held;
   StiffnessParts parts;
   if (object.source.stiffness)
@@ -61,7 +64,9 @@ void Simulation::announce_cut(std::size_t index) {
       stiffness->prepare();
   } catch (const Cancelled&) {
     throw;
-  } catch (const Error&) { // told where it is needed
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (...) { // whatever a source throws: told where it is needed
     object.stiffness.reset();
   }
 }
@@ -167,7 +172,7 @@ void Simulation::carry_out(std::size_t index, CutModel cut) {
   std::optional<StiffnessParts> prepared;
   bool loose = !old.came.velocity.empty();
   if (old.method == Method::ffe) {
-    if (undo_->open && old.still)
+    if (undo_->open && (old.still || old.stiffness))
       undo_->updated.insert(&old);
     try {
       prepared = cut_parts(old, now, rest);
@@ -257,6 +262,7 @@ void Simulation::find_late_shape(Object& object) const {
                       moved.begin() + 3 * static_cast<std::ptrdiff_t>(to.node));
     shape = std::move(moved);
   }
+  require_bounded(object, shape);
   object.displacement = std::move(shape);
   object.late.reset();
   object.shaped = true;

@@ -26,6 +26,9 @@ namespace simulation {
 
 using gewebe::number_text;
 
+/// Of what is told in single precision too, with room for sums.
+inline constexpr double largest_number = 1e38;
+
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 
@@ -76,6 +79,7 @@ struct Simulation::Object {
   CameFrom came;
   bool warned_range = false;
   double shortest_edge = 0; // mm; 0: not yet known
+  double size = 0;          // mm, longest side of the box at rest; 0: not yet known
   double looked_at = 0;     // largest displacement when the range was last looked at
   int not_looked = 0;
   int slow = 0;             // updates in a row that took too long for the rate
@@ -84,6 +88,7 @@ struct Simulation::Object {
 
   std::unique_ptr<StaticContact> contact; // of an elastostatic object, once there are instruments
   std::vector<NodeTouch> touches;         // as shown
+  std::vector<NodeTouch> impulses;        // in this step so far, from bodies it has left: 1e-6 N s
   bool warned_stuck = false, warned_unsolved = false, warned_stages = false;
 
   // A cut makes another object that takes this one's place.
@@ -142,7 +147,6 @@ struct Simulation::Body {
   bool warned_step = false;
   bool warned_implicit = false;
   bool touched = false;         // by an instrument, in the last step
-  double touch_time = 0;        // over which impulses were summed
   std::optional<Box3> rest_box; // while at rest
   std::uint64_t taken = 0;      // by the last advance
   std::exception_ptr failure;
@@ -154,6 +158,7 @@ struct Simulation::Undo {
   bool open = false;
   std::vector<std::function<void()>> back; // carried out from the last to the first; must not throw
   std::set<const Body*> kept;              // whose motion was noted
+  std::set<const Body*> kept_resting;      // whose rest was
   std::set<Object*> updated;               // whose elastostatic state moved on
 
   void note(std::function<void()> one) {

@@ -29,6 +29,7 @@ void Simulation::set_method(std::size_t index, Method method) {
   if (object.still || !object.load.empty()) {
     update_still(object, load_at(object.load, object.model, time_));
     still = still_shape(object);
+    require_bounded(object, still);
   }
   if (!object.touches.empty() && object.method == Method::ffe && object.shown && object.shaped)
     still = object.displacement; // instruments among what acts
@@ -47,6 +48,7 @@ void Simulation::set_method(std::size_t index, Method method) {
   } else {
     double jump = 0;
     if (object.body != nullptr) {
+      gather_impulses(*object.body);
       const std::span<const NodeMotion> motion = object.body->moving->motion();
       for (std::size_t i = 0; i < motion.size(); ++i) {
         const Vec3 to =
@@ -84,7 +86,6 @@ void Simulation::renew(Object& object) {
   }
   object.stiffness.reset();
   object.prepared.reset();
-  object.contact.reset();
   if (object.body != nullptr && object.integration == Integration::implicit)
     object.body->moving->renew();
   object.shown = false;

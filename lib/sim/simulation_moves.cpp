@@ -1,6 +1,7 @@
 // When an object's nodes get other numbers, all that names them follows.
 
 #include "base/disjoint_sets.h"
+#include "base/vector_at.h"
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
@@ -15,8 +16,12 @@ namespace gewebe {
 
 namespace {
 
-Vec3 vector_at(std::span<const double> values, std::size_t node) {
-  return {values[3 * node], values[3 * node + 1], values[3 * node + 2]};
+/// Whether a cut between nodes, or through some, names none any more.
+bool nothing_left(const CutObject& cut) {
+  if (const auto* const springs = std::get_if<SpringsToCut>(&cut.what))
+    return springs->from.empty() || springs->to.empty();
+  const auto& nodes = std::get<PlaneToCut>(cut.what).nodes;
+  return nodes && nodes->empty();
 }
 
 } // namespace
@@ -112,6 +117,10 @@ void Simulation::move_shown(const Object& old, const Moves& moves,
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).touches.push_back({to.node, t.instrument, t.force});
+  for (const NodeTouch& t : old.impulses)
+    for (const Moves::To& to : moves.of(t.node))
+      if (to.main)
+        piece(to).impulses.push_back({to.node, t.instrument, t.force});
   for (std::uint32_t i = 0; old.shaped && i < old.model.nodes.size(); ++i) {
     const Vec3 u = vector_at(old.displacement, i);
     for (const Moves::To& to : moves.of(i))
@@ -214,6 +223,8 @@ void Simulation::move_events(std::size_t index, const Moves& moves) {
               } else if (auto& plane = std::get<PlaneToCut>(moved.what); plane.nodes) {
                 plane.nodes = in(index, *plane.nodes, true);
               }
+              if (nothing_left(moved))
+                return; // empty, nodes would stand for all
             }
             keep(time, event, std::move(moved));
           } else {
@@ -262,6 +273,8 @@ void Simulation::move_all(std::size_t index, const Moves& moves,
   simulation::add_counts(next.spent, old.spent);
   if (old.still)
     simulation::add_counts(next.spent, old.still->counts());
+  if (old.body != nullptr)
+    gather_impulses(*old.body);
   move_shown(old, moves, pieces);
 
   // How everybody moves who shares the body.

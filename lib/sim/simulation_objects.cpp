@@ -76,6 +76,8 @@ Elastostatic& Simulation::still_of(Object& object) const {
   need_model(object);
   if (object.still)
     return *object.still;
+  if (undo_->open)
+    undo_->updated.insert(&object);
   StiffnessParts parts;
   if (object.prepared)
     parts = *std::exchange(object.prepared, std::nullopt);

@@ -11,13 +11,16 @@
 
 namespace gewebe {
 
+using simulation::largest_number;
 using simulation::number_text;
 
 namespace {
 
 constexpr double strain_limit = 0.1, turn_limit = 0.2;
-constexpr double same_time = 1e-9; // of a step's length
-constexpr int slow_enough = 10;    // updates in a row, the first ones read and factorise
+constexpr double same_time = 1e-9;  // of a step's length
+constexpr double most_sizes = 1e6;  // of an object, that a node may be displaced by
+constexpr int slow_enough = 10;     // updates in a row, the first ones read and factorise
+constexpr double most_events = 1e6; // repeated ones in a step
 
 std::string percent(double part) {
   return number_text(std::round(1000 * part) / 10) + " %";
@@ -28,6 +31,9 @@ std::string percent(double part) {
 void Simulation::step(double dt) {
   // Neumaier's sum: ten steps of 0.1 s end at 1 s.
   const double sum = sum_ + dt;
+  if (!std::isfinite(sum))
+    throw Error("a step of " + number_text(dt) + " s from " + number_text(time_) +
+                " s, expected an end that is finite");
   const double lost = lost_ + (sum_ >= dt ? (sum_ - sum) + dt : (dt - sum) + sum_);
   guarded([&] { advance(std::max(sum + lost, time_)); });
   sum_ = sum;
@@ -56,6 +62,8 @@ void Simulation::at_object(const Object& object, Work&& work) const {
 }
 
 void Simulation::advance(double to) {
+  require_few_events(to);
+  const double start = time_;
   const double slack = same_time * (to - time_);
   const auto move_to = [&](double time) {
     move_bodies(time);
@@ -68,21 +76,11 @@ void Simulation::advance(double to) {
     });
   while (due()) {
     move_to(std::min(events_.begin()->first, to));
-    Event event = std::move(events_.begin()->second);
-    events_.erase(events_.begin());
-    apply(event.change);
-    if (event.period > 0) {
-      ++event.round;
-      const double next = event.origin + event.round * event.period;
-      if (!(next > time_))
-        throw Error("the period " + number_text(event.period) +
-                    " s is lost in the rounding of the time, expected a longer one");
-      events_.emplace(next, std::move(event));
-    }
+    take_effect_first();
   }
   move_to(to);
   note_poses();
-  take_touches();
+  take_touches(time_ - start);
   sweep_blades();
   for (std::size_t i = 0; i < objects_.size(); ++i)
     at_object(*objects_[i], [&] { find_free_motion(i); });
@@ -102,8 +100,43 @@ void Simulation::advance(double to) {
   if (poses_.size() > 1)
     poses_.erase(poses_.begin(), poses_.end() - 1);
   shapes_time_ = time_;
+  if (emit_instruments_)
+    require_bounded_instruments();
   tear();
   ++counts_.steps;
+}
+
+/// The first event stays among those that wait while it takes effect, so that its nodes are
+/// followed as those of all others; where what it is about comes apart it becomes several.
+void Simulation::take_effect_first() {
+  events_.begin()->second.in_flight = true;
+  const Change change = events_.begin()->second.change;
+  apply(change);
+  while (!events_.empty() && events_.begin()->second.in_flight) {
+    Event event = std::move(events_.begin()->second);
+    events_.erase(events_.begin());
+    event.in_flight = false;
+    if (!(event.period > 0))
+      continue;
+    ++event.round;
+    const double next = event.origin + event.round * event.period;
+    if (!(next > time_))
+      throw Error("the period " + number_text(event.period) +
+                  " s is lost in the rounding of the time, expected a longer one");
+    events_.emplace(next, std::move(event));
+  }
+}
+
+/// A step with more events than anybody waits for is refused before it begins.
+void Simulation::require_few_events(double to) const {
+  double count = 0;
+  for (const auto& [time, event] : events_)
+    if (event.period > 0 && time <= to)
+      count += (to - time) / event.period;
+  if (!(count <= most_events))
+    throw Error("a step to " + number_text(to) + " s holds " + number_text(std::round(count)) +
+                " repeated events, expected at most a million: a shorter step, or at every with a "
+                "longer time");
 }
 
 void Simulation::show(Object& object) {
@@ -159,8 +192,51 @@ void Simulation::show(Object& object) {
       show_motion(object);
   }
   add_touches(object);
+  require_bounded(object);
   object.shown_time = time_;
   object.shown = true;
+}
+
+/// mm that a node may be displaced by: beyond it an object is not bent but has exploded.
+double Simulation::displacement_limit(Object& object) const {
+  if (object.size == 0) {
+    Box3 box;
+    for (const Node& node : object.model.nodes)
+      box.add(node.position);
+    object.size = box.empty() || !(box.longest_side() > 0) ? 1 : box.longest_side();
+  }
+  return std::min(most_sizes * object.size, largest_number);
+}
+
+/// \param displacement 3 n numbers, of a shape that is found now
+void Simulation::require_bounded(Object& object, std::span<const double> displacement) const {
+  const double most = displacement_limit(object);
+  for (std::size_t k = 0; k < displacement.size(); ++k)
+    if (!(std::abs(displacement[k]) <= most))
+      throw Error("node " + std::to_string(k / 3) + " is displaced by over " + number_text(most) +
+                  " mm, a million times the size of the object, expected a smaller load or "
+                  "timestep");
+}
+
+void Simulation::require_bounded_instruments() const {
+  for (std::size_t k = 0; k < instruments_.size(); ++k) {
+    const InstrumentReport report = instrument(k);
+    for (const Vec3& v : {report.force, report.torque})
+      if (!(norm(v) <= largest_number))
+        throw Error("the force on the instrument " + instruments_[k]->name +
+                    " leaves single precision, expected a smaller load or timestep");
+  }
+}
+
+/// What is shown of it.
+void Simulation::require_bounded(Object& object) const {
+  if (object.shaped)
+    require_bounded(object, object.displacement);
+  for (const NodeVector& f : object.forces)
+    for (int a = 0; a < 3; ++a)
+      if (!(std::abs(f.value[a]) <= largest_number))
+        throw Error("the force at node " + std::to_string(f.node) +
+                    " leaves single precision, expected a smaller load or timestep");
 }
 
 void Simulation::show_motion(Object& object) {
@@ -202,6 +278,7 @@ void Simulation::shape(Object& object) const {
   at_object(object, [&] {
     update_stages(object, object.shown_load); // as it is, but where a change of method looked ahead
     const std::span<const double> u = still_shape(object);
+    require_bounded(object, u);
     object.displacement.assign(u.begin(), u.end());
   });
   object.shaped = true;
@@ -245,15 +322,16 @@ void Simulation::warn_of_range(Object& object) const {
   if (!strained && !turned)
     return;
   object.warned_range = true;
-  if (!options_.warn)
+  const auto& tell = options_.distrust ? options_.distrust : options_.warn;
+  if (!tell)
     return;
   const Spring& spring = object.model.springs[strained ? range.strain_spring : range.turn_spring];
-  options_.warn("object " + object.name + " at " + number_text(time_) +
-                " s: beyond the linear range, the edge " + std::to_string(spring.i) + "-" +
-                std::to_string(spring.j) +
-                (strained ? " is strained by " + percent(range.strain)
-                          : " is turned by " + percent(range.turn)) +
-                ", the shape is not to be trusted there");
+  tell("object " + object.name + " at " + number_text(time_) +
+       " s: beyond the linear range, the edge " + std::to_string(spring.i) + "-" +
+       std::to_string(spring.j) +
+       (strained ? " is strained by " + percent(range.strain)
+                 : " is turned by " + percent(range.turn)) +
+       ", the shape is not to be trusted there");
 }
 
 } // namespace gewebe

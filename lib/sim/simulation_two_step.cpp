@@ -11,6 +11,8 @@ namespace gewebe {
 using simulation::number_text;
 
 void Simulation::set_two_step(Object& object, const SetTwoStep& set) {
+  if (undo_->open && object.two_step)
+    undo_->updated.insert(&object);
   undo_->note(
       [&object, stages = object.stages, second = object.second, warned = object.warned_threshold] {
         object.stages = stages;

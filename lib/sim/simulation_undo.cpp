@@ -3,16 +3,39 @@
 #include "sim/simulation_internal.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+#include <vector>
 
 namespace gewebe {
 
+/// Carried out last, when objects and bodies are those of before again.
 void Simulation::open_undo() {
   undo_->open = true;
-  keep_instruments();
-  undo_->note([this, time = time_, shapes_time = shapes_time_, sum = sum_, lost = lost_,
-               gravity = gravity_, timestep = timestep_, forces = emit_forces_,
-               shapes = emit_shapes_, counts = counts_, jumps = jumps_, ties = ties_.size(),
+  struct ObjectNow {
+    bool shown = false, warned_range = false;
+    double looked_at = 0;
+    int not_looked = 0;
+    std::vector<NodeTouch> touches, impulses;
+  };
+  struct BodyNow {
+    bool touched = false;
+    std::optional<Box3> rest_box;
+  };
+  std::vector<ObjectNow> objects;
+  for (const auto& o : objects_)
+    objects.push_back(
+        {o->shown, o->warned_range, o->looked_at, o->not_looked, o->touches, o->impulses});
+  std::vector<BodyNow> bodies;
+  for (const auto& b : bodies_)
+    bodies.push_back({b->touched, b->rest_box});
+  std::vector<Instrument> instruments;
+  for (const auto& i : instruments_)
+    instruments.push_back(*i);
+  undo_->note([this, objects, bodies, instruments, poses = poses_, time = time_,
+               shapes_time = shapes_time_, sum = sum_, lost = lost_, gravity = gravity_,
+               timestep = timestep_, forces = emit_forces_, shapes = emit_shapes_,
+               emits = emit_instruments_, counts = counts_, jumps = jumps_, ties = ties_.size(),
                cuttings = cuttings_] {
     time_ = time;
     shapes_time_ = shapes_time;
@@ -22,10 +45,28 @@ void Simulation::open_undo() {
     timestep_ = timestep;
     emit_forces_ = forces;
     emit_shapes_ = shapes;
+    emit_instruments_ = emits;
     counts_ = counts;
     jumps_ = jumps;
     cuttings_ = cuttings;
     ties_.resize(ties);
+    poses_ = poses;
+    for (std::size_t k = 0; k < instruments.size(); ++k)
+      *instruments_[k] = instruments[k];
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      Object& o = *objects_[k];
+      const ObjectNow& was = objects[k];
+      o.shown = was.shown;
+      o.warned_range = was.warned_range;
+      o.looked_at = was.looked_at;
+      o.not_looked = was.not_looked;
+      o.touches = was.touches;
+      o.impulses = was.impulses;
+    }
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      bodies_[k]->touched = bodies[k].touched;
+      bodies_[k]->rest_box = bodies[k].rest_box;
+    }
   });
 }
 
@@ -42,6 +83,9 @@ void Simulation::take_back() noexcept {
     if (!implicit && !undo_->updated.contains(&object))
       continue;
     renew(object);
+    if (object.contact) // as it was, with what it touched
+      object.contact =
+          std::make_unique<StaticContact>(object.model, object.displacement, object.touches);
     renewed_.push_back(i);
   }
   *undo_ = {};
@@ -59,21 +103,19 @@ void Simulation::keep_load(Object& object) {
     });
 }
 
-/// Of what moves, before it does.
+/// Of a body, before anything of it changes. One that rests keeps its place until it is woken, so
+/// that rows are not copied for nothing.
 void Simulation::keep_body(Body& body) {
-  if (!undo_->open)
+  if (!undo_->open || undo_->kept.contains(&body))
     return;
-  if (undo_->kept.insert(&body).second)
-    undo_->note([this, &body, changed = body.changed, state = body.moving->state()] {
-      body.moving->restore(state);
-      body.changed = changed;
-      body.failure = nullptr;
-      for (const std::size_t part : body.parts)
-        objects_[part]->shown = false;
-    });
-  if (body.changed) // taken back before the motion is
-    undo_->note(
-        [&body, load = body.moving->load(), time = time_] { body.moving->set_load(load, time); });
+  const bool rows = body.changed || !body.moving->resting();
+  if (!(rows ? undo_->kept : undo_->kept_resting).insert(&body).second)
+    return;
+  undo_->note([&body, changed = body.changed, state = body.moving->state(rows)] {
+    body.moving->restore(state);
+    body.changed = changed;
+    body.failure = nullptr;
+  });
 }
 
 } // namespace gewebe

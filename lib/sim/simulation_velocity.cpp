@@ -1,7 +1,8 @@
 // How fast elastostatic objects move: as their load does. What a cut frees of one goes on so.
 
-#include "sim/condition.h"
+#include "base/vector_at.h"
 #include "sim/simulation_internal.h"
+#include "solve/condition.h"
 
 #include <optional>
 #include <span>
@@ -9,14 +10,6 @@
 #include <vector>
 
 namespace gewebe {
-
-namespace {
-
-Vec3 vector_at(std::span<const double> values, std::size_t node) {
-  return {values[3 * node], values[3 * node + 1], values[3 * node + 2]};
-}
-
-} // namespace
 
 /// Before an object is shown anew: what it shows now is where it comes from.
 void Simulation::leave_shown(Object& object) {

@@ -1,5 +1,6 @@
 #include "sim/static_contact.h"
 
+#include "base/vector_at.h"
 #include "sim/contact_solver.h"
 
 #include <Eigen/Core>
@@ -24,10 +25,6 @@ constexpr std::size_t most_new = 256;   ///< nodes that join at once, the deepes
 constexpr double outside = 1e-9;        ///< of the radius: so deep is not inside
 constexpr double immovable = 1e-12;     ///< of the largest compliance
 constexpr double deep = 1e-6;
-
-Vec3 vector_at(std::span<const double> values, std::size_t node) {
-  return {values[3 * node], values[3 * node + 1], values[3 * node + 2]};
-}
 
 /// Speeds up the convergence of directions: the next ones are taken where a linear map with the
 /// last changes would not change them. Any directions are fit for a turn.
@@ -88,6 +85,21 @@ double give(const ContactSpace& space, std::size_t k, const Vec3& n) {
 
 } // namespace
 
+std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches) {
+  std::stable_sort(touches.begin(), touches.end(), [](const NodeTouch& a, const NodeTouch& b) {
+    return a.node != b.node ? a.node < b.node : a.instrument < b.instrument;
+  });
+  std::size_t count = 0;
+  for (const NodeTouch& t : touches)
+    if (count > 0 && touches[count - 1].node == t.node &&
+        touches[count - 1].instrument == t.instrument)
+      touches[count - 1].force += t.force;
+    else
+      touches[count++] = t;
+  touches.resize(count);
+  return touches;
+}
+
 std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t most) {
   double parts = 1;
   for (const MovedInstrument& i : instruments)
@@ -95,8 +107,10 @@ std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size
   return parts < static_cast<double>(most) ? static_cast<std::size_t>(parts) : most;
 }
 
-StaticContact::StaticContact(const Model& model, std::span<const double> shape)
-    : model_(model), blocks_(model), inward_(inward_directions(model)) {
+StaticContact::StaticContact(const Model& model, std::span<const double> shape,
+                             std::vector<NodeTouch> touches)
+    : model_(model), blocks_(model), inward_(inward_directions(model)),
+      touches_(std::move(touches)) {
   blocks_.set_shape(model, shape);
 }
 

@@ -27,7 +27,12 @@ namespace gewebe {
 struct NodeTouch {
   std::uint32_t node = 0, instrument = 0;
   Vec3 force; ///< on the node, 1e-6 N
+
+  bool operator==(const NodeTouch&) const = default;
 };
+
+/// One for each node and instrument, by ascending ones, with the sum of its forces in their order.
+std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches);
 
 /// An instrument's last short way, over which a node is pushed from where it was.
 struct MovedInstrument {
@@ -42,7 +47,9 @@ std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size
 class StaticContact {
 public:
   /// Keeps a reference to the model. \param shape the present one
-  StaticContact(const Model& model, std::span<const double> shape);
+  /// \param touches what is touched in it, by ascending node and instrument
+  StaticContact(const Model& model, std::span<const double> shape,
+                std::vector<NodeTouch> touches = {});
 
   /// Takes the shape of `still` (asked for when needed) on to that under `load` with the
   /// instruments where they are now; `shape` (3 n displacements) is the last one before and the new

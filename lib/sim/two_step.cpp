@@ -13,8 +13,8 @@
 #include <string>
 #include <utility>
 
-// Based on: N. Hansen, FZKA 7190, 2006, 3.3.3; M. Bro-Nielsen, Finite element modeling in surgery
-// simulation, 1998.
+// Based on: H. Çakmak, U. Kühnapfel, G. Bretthauer, report FZKA 7190, 2006, section 3.3.3;
+// M. Bro-Nielsen, Finite element modeling in surgery simulation, 1998.
 
 namespace gewebe {
 

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/huge_pages.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "surface/inside_field_internal.h"
 #include "surface/marching_cubes_table.h"
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -171,12 +171,6 @@ void write_triangles(const SurfaceBlock& block, const PointNumbers& numbers, con
       for (unsigned t = 0; t < plan.triangles; ++t, corner += 3)
         *out++ = {own[corner[0]], own[corner[1]], own[corner[2]]};
     }
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), result.ptr};
 }
 
 void check_input(const GridInfo& info, double isovalue) {

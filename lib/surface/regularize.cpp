@@ -2,7 +2,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "surface/self_intersections.h"
+#include "mesh/edges.h"
+#include "mesh/self_intersections.h"
 #include "volume/field.h"
 
 #include <algorithm>
@@ -12,6 +13,8 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 // Based on: Botsch and Kobbelt, A Remeshing Approach to Multiresolution Modeling, 2004.
@@ -52,31 +55,24 @@ public:
   FlippingMesh(TriangleMesh& mesh, const std::vector<std::uint8_t>& kept)
       : points_(mesh.points), faces_(mesh.triangles), kept_(kept), twin_(3 * faces_.size()),
         outgoing_(points_.size(), 0), valence_(points_.size(), 0) {
-    std::vector<Index> first(points_.size() + 1, 0), by_start(twin_.size());
-    for (Index h = 0; h < twin_.size(); ++h)
-      ++first[start(h) + 1];
-    for (std::size_t p = 0; p < points_.size(); ++p) {
-      valence_[p] = first[p + 1];
-      first[p + 1] += first[p];
-    }
-    std::vector<Index> next(first.begin(), first.end() - 1);
     for (Index h = 0; h < twin_.size(); ++h) {
-      by_start[next[start(h)]++] = h;
       outgoing_[start(h)] = h;
+      ++valence_[start(h)];
     }
-    for (Index h = 0; h < twin_.size(); ++h) {
-      const Index end = start(following(h));
-      const auto begin = by_start.begin() + first[end], stop = by_start.begin() + first[end + 1];
-      const auto back = std::find_if(
-          begin, stop, [&](Index other) { return start(following(other)) == start(h); });
-      if (back == stop)
-        throw Error("the mesh has an open edge, expected a closed one");
-      twin_[h] = *back;
-    }
+    EdgeSides(points_.size(), faces_)
+        .for_each_edge([&](std::uint32_t, std::span<const EdgeSide> edge) {
+          if (edge.size() != 2 || surplus(edge) != 0)
+            throw Error("the mesh has an edge of " + std::to_string(edge.size()) +
+                        (surplus(edge) != 0 ? " faces that do not agree" : " faces") +
+                        ", expected a closed mesh with two at each");
+          const Index h = next_corner(edge[0].corner()), back = next_corner(edge[1].corner());
+          twin_[h] = back;
+          twin_[back] = h;
+        });
   }
 
-  static Index following(Index h) { return h % 3 == 2 ? h - 2 : h + 1; }
-  static Index preceding(Index h) { return h % 3 == 0 ? h + 2 : h - 1; }
+  static Index following(Index h) { return next_corner(h); }
+  static Index preceding(Index h) { return previous_corner(h); }
   Index start(Index h) const { return faces_[h / 3][h % 3]; }
 
   /// Calls visit(h) for each half-edge that leaves p.

@@ -2,8 +2,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "mesh/border.h"
 #include "volume/coverage_internal.h"
-#include "volume/mesh_border.h"
 #include "volume/ray_crossings_internal.h"
 #include "volume/voxelize_internal.h"
 

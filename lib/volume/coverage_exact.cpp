@@ -1,13 +1,13 @@
 #include "volume/coverage.h"
 // Based on: the divergence theorem over a polyhedron clipped to a box, after B. Mirtich, Fast and
 // Accurate Computation of Polyhedral Mass Properties, 1996; sums of signed areas along one axis are
-// how scan-line rasterizers anti-alias in the plane (L. Rosenberg's and D. Turner's of FreeType),
-// here one dimension up: triangles are clipped to columns of voxels, along which the integral of
-// their height is known in closed form. Clipping: I. Sutherland, G. Hodgman, Reentrant Polygon
-// Clipping, 1974.
+// how scan-line rasterizers anti-alias in the plane (R. Levien's of LibArt, after it D. Turner's of
+// FreeType), here one dimension up: triangles are clipped to columns of voxels, along which the
+// integral of their height is known in closed form. Clipping: I. Sutherland, G. Hodgman, Reentrant
+// Polygon Clipping, 1974.
 
+#include "mesh/orient_closed.h"
 #include "volume/coverage_internal.h"
-#include "volume/mesh_orient.h"
 #include "volume/ray_crossings_internal.h"
 #include "volume/voxelize_internal.h"
 

@@ -3,8 +3,8 @@
 // samples along them, as J. Amanatides, Ray Tracing with Cones, 1984, weighs area in the plane.
 
 #include "base/error.h"
+#include "mesh/exact_predicates.h"
 #include "volume/coverage_internal.h"
-#include "volume/exact_predicates.h"
 #include "volume/ray_crossings_internal.h"
 #include "volume/voxelize_internal.h"
 

@@ -1,6 +1,6 @@
 #include "volume/csg.h"
 // Based on: A. Ricci, A Constructive Geometry for Computer Graphics, 1973 (max, min and
-// complement); B. Wyvill, C. McPheeters, G. Wyvill, Data Structure for Soft Objects, 1986 (sums of
+// complement); G. Wyvill, C. McPheeters, B. Wyvill, Data structure for soft objects, 1986 (sums of
 // densities).
 
 #include "base/error.h"

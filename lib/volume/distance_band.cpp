@@ -195,12 +195,10 @@ NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, co
 }
 
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                  OpenMesh on_open, double half_width,
+                  const VoxelizeOptions& options, double half_width,
                   const std::function<RampDistance(const SlabbedMesh&)>& prepare,
                   CoverageReport& report) {
   report = {};
-  VoxelizeOptions options;
-  options.on_open = on_open;
   const InsideScan scan = scan_inside(context, mesh, transform, options, &report.mesh);
   // The band is wider than the surface's leaves by half_width on both sides.
   require_memory(context, 3 * coverage_bytes(mesh, transform), "the voxelized mesh");
@@ -208,7 +206,9 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
   slabbed.points = coverage_points(mesh, transform);
   slabbed.triangles = mesh.triangles;
   VoxelizeReport holes;
-  close_or_refuse(context, mesh, transform, on_open, slabbed.points, slabbed.triangles, holes);
+  const bool refused = options.rule == VoxelRule::parity || options.on_open != OpenMesh::refuse;
+  close_or_refuse(context, mesh, transform, refused ? options.on_open : OpenMesh::skip,
+                  slabbed.points, slabbed.triangles, holes);
   sort_into_slabs(context, slabbed, half_width);
   const RampDistance distance = prepare(slabbed);
 

@@ -26,9 +26,9 @@ using RampDistance =
 
 /// Value ½ ∓ d/(2 half_width) in the band of voxels whose centre is nearer than half_width to the
 /// surface, 0 or 1 elsewhere. `prepare` sees the mesh (index space moved by ½, holes closed where
-/// asked) and gives the function for d.
+/// asked) and gives the function for d. \pre options.samples == 1
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                  OpenMesh on_open, double half_width,
+                  const VoxelizeOptions& options, double half_width,
                   const std::function<RampDistance(const SlabbedMesh&)>& prepare,
                   CoverageReport& report);
 

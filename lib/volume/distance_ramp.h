@@ -3,9 +3,13 @@
 // report names beside its own (FZKA 7190, section 5: [Jon96], [SK99]).
 //
 // Both give ½ at the surface and fall linearly from 1 to 0 across it, from -h inside to +h outside,
-// h in voxels. The distance is known in that band only; beyond it a voxel is 0 or 1 by the parity
-// rule, which gives the sign too. Unlike coverage.h neither keeps the volume of bent surfaces, thin
-// walls or edges.
+// h in voxels. The distance is known in that band only; beyond it a voxel is 0 or 1 by the rule,
+// which gives the sign too. Unlike coverage.h neither keeps the volume of bent surfaces, thin walls
+// or edges; but their values change evenly across the surface, so that its normals come out right.
+//
+// The distance is that to the faces, whatever the rule: near a hole, where winding numbers and
+// depth buffers close the solid without a face, voxels are 0 or 1, and at faces inside a solid that
+// overlaps another values fall to ½, not below. An open mesh is refused under parity alone.
 
 #include "volume/coverage.h"
 
@@ -22,7 +26,8 @@ inline constexpr double sramek_half_width = 1.8;
 /// round about edges and corners. `report.surface_voxels` counts the voxels of the band. \pre,
 /// \throw as scan_inside
 Grid jones_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
-                   OpenMesh on_open, CoverageReport* report = nullptr);
+                   OpenMesh on_open, CoverageReport* report = nullptr,
+                   VoxelRule rule = VoxelRule::parity);
 
 /// The box filter of width 2h, h = sramek_half_width, laid along the surface's normal. For a plane
 /// this is the ramp ½ - d/(2h). A polyhedron is made of planes by intersection (its edge is convex)
@@ -31,6 +36,6 @@ Grid jones_density(const Context& context, const TriangleMesh& mesh, const GridT
 /// that meet there, and edges keep sharp. \pre, \throw as scan_inside
 Grid sramek_density(const Context& context, const TriangleMesh& mesh,
                     const GridTransform& transform, OpenMesh on_open,
-                    CoverageReport* report = nullptr);
+                    CoverageReport* report = nullptr, VoxelRule rule = VoxelRule::parity);
 
 } // namespace gewebe

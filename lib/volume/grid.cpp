@@ -24,6 +24,11 @@ static_assert(Leaf::DIM == leaf_dim && Leaf::SIZE == leaf_voxels);
 
 // OpenVDB has no call that lets a leaf's values lie in memory of ours. An explicit instantiation
 // may name private members, which gives the address of the pointer without any trick on the layout.
+// What else OpenVDB does with that pointer was read in version 10: new[], delete[], and nothing
+// for a null pointer.
+static_assert(OPENVDB_LIBRARY_MAJOR_VERSION_NUMBER == 10,
+              "look at tree/LeafBuffer.h of this OpenVDB: is mData allocated, deleted and left "
+              "alone where it is null as in version 10?");
 float*& values_of(LeafBuffer& buffer);
 template <auto Member>
 struct Reveal {
@@ -49,8 +54,13 @@ struct TreeDeleter {
 
 } // namespace
 
-std::unique_ptr<Leaf> borrowing_leaf(const Coord& origin, float* values) {
-  auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), origin);
+void DeleteBorrowing::operator()(Leaf* leaf) const {
+  give_back(*leaf);
+  delete leaf;
+}
+
+BorrowingLeaf borrowing_leaf(const Coord& origin, float* values) {
+  BorrowingLeaf leaf(new Leaf(openvdb::PartialCreate(), origin));
   values_of(leaf->buffer()) = values;
   leaf->setTransientData(borrowed);
   return leaf;
@@ -289,7 +299,7 @@ std::vector<LeafRef> GridBuilder::add_leaves(const Context& context,
   state_->threads = context.threads;
   auto* const values = reinterpret_cast<float*>(
       state_->storage->pages.emplace_back(origins.size() * leaf_voxels * sizeof(float)).data());
-  std::vector<std::unique_ptr<Leaf>> leaves(origins.size());
+  std::vector<BorrowingLeaf> leaves(origins.size());
   std::vector<LeafRef> refs(origins.size());
   const float background = state_->info.background;
   Context quiet = context;
@@ -305,7 +315,7 @@ std::vector<LeafRef> GridBuilder::add_leaves(const Context& context,
           &const_cast<Leaf::NodeMaskType&>(leaves[i]->getValueMask()).getWord<std::uint64_t>(0)};
     }
   });
-  for (std::unique_ptr<Leaf>& leaf : leaves)
+  for (BorrowingLeaf& leaf : leaves)
     state_->accessor.addLeaf(leaf.release());
   return refs;
 }
@@ -332,7 +342,7 @@ void GridBuilder::share_leaf(const Grid& from, const LeafView& leaf) {
   if (lenders.empty() || lenders.back() != from.native())
     lenders.push_back(from.native());
   // Nobody writes through the pointer: both grids are immutable.
-  std::unique_ptr<Leaf> shared =
+  BorrowingLeaf shared =
       borrowing_leaf(original->origin(), const_cast<float*>(original->buffer().data()));
   shared->setValueMask(original->getValueMask());
   state_->accessor.addLeaf(shared.release());

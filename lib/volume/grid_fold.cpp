@@ -219,7 +219,7 @@ public:
       old->setValueMask(mask);
       return;
     }
-    std::unique_ptr<Leaf> fresh = borrowing_leaf(origin, borrowed);
+    BorrowingLeaf fresh = borrowing_leaf(origin, borrowed);
     fresh->setValueMask(mask);
     accessor_.addLeaf(fresh.release());
   }

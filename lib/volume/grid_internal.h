@@ -44,8 +44,13 @@ Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> 
 
 using FloatLeaf = FloatTree::LeafNodeType;
 
+/// Deletes a borrowing leaf that no tree has taken.
+struct DeleteBorrowing {
+  void operator()(FloatLeaf* leaf) const;
+};
+using BorrowingLeaf = std::unique_ptr<FloatLeaf, DeleteBorrowing>;
 /// A leaf, all voxels inactive, whose values lie at `values`.
-std::unique_ptr<FloatLeaf> borrowing_leaf(const openvdb::Coord& origin, float* values);
+BorrowingLeaf borrowing_leaf(const openvdb::Coord& origin, float* values);
 /// Gives `leaf` these values instead of those that it has.
 void borrow_values(FloatLeaf& leaf, float* values);
 /// A borrowing leaf forgets its values, so that it may be deleted.

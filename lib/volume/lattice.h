@@ -1,5 +1,5 @@
 #pragma once
-// The lattices that --voxel, --dim and --like stand for (DESIGN: "Grids").
+// The lattices that --voxel, --dim and --like stand for (metaball2vol(1), voxelize(1)).
 
 #include "volume/grid.h"
 

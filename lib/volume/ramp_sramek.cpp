@@ -3,8 +3,8 @@
 // Transactions on Visualization and Computer Graphics 5(3), 1999: the oriented box filter, its
 // width, and solids put together from densities by minimum and maximum.
 
+#include "mesh/border.h"
 #include "volume/distance_band_internal.h"
-#include "volume/mesh_border.h"
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +69,8 @@ double oriented_distance(const Surroundings& s, const SlabbedMesh& mesh, const V
 } // namespace
 
 Grid sramek_density(const Context& context, const TriangleMesh& mesh,
-                    const GridTransform& transform, OpenMesh on_open, CoverageReport* report) {
+                    const GridTransform& transform, OpenMesh on_open, CoverageReport* report,
+                    VoxelRule rule) {
   CoverageReport local;
   const auto oriented = [](const SlabbedMesh& m) -> RampDistance {
     return [around = std::make_shared<const Surroundings>(m)](
@@ -77,7 +78,7 @@ Grid sramek_density(const Context& context, const TriangleMesh& mesh,
       return oriented_distance(*around, same, p, triangle);
     };
   };
-  return ramp_density(context, mesh, transform, on_open, sramek_half_width, oriented,
+  return ramp_density(context, mesh, transform, {rule, 1, on_open}, sramek_half_width, oriented,
                       report != nullptr ? *report : local);
 }
 

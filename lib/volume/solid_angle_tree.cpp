@@ -3,11 +3,11 @@
 // Generalized Winding Numbers, 2013; G. Barill et al., Fast Winding Numbers for Soups and Clouds,
 // 2018; A. van Oosterom, J. Strackee, The Solid Angle of a Plane Triangle, 1983.
 
-#include "volume/exact_predicates.h"
+#include "mesh/edges.h"
+#include "mesh/exact_predicates.h"
 
 #include <algorithm>
 #include <cstdlib>
-#include <map>
 
 namespace gewebe {
 namespace {
@@ -81,15 +81,11 @@ SolidAngleTree::SolidAngleTree(std::span<const Vec3> points, std::span<const Tri
   }
   if (triangles_.empty())
     return;
-  std::map<std::array<std::uint32_t, 2>, int> surplus;
-  for (const Triangle& t : triangles)
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::uint32_t from = t[c], to = t[(c + 1) % 3];
-      surplus[{std::min(from, to), std::max(from, to)}] += from < to ? 1 : -1;
-    }
-  for (const auto& [edge, times] : surplus)
-    for (int n = 0; n < std::abs(times); ++n)
-      border_.push_back({points[edge[0]], points[edge[1]]});
+  EdgeSides(points.size(), triangles)
+      .for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
+        for (int n = std::abs(surplus(edge)); n > 0; --n)
+          border_.push_back({points[low], points[edge[0].high()]});
+      });
   nodes_.emplace_back();
   nodes_[0].end = static_cast<std::uint32_t>(triangles_.size());
   build(0);

@@ -2,10 +2,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "mesh/border.h"
+#include "mesh/exact_predicates.h"
 #include "volume/depth_buffers_internal.h"
-#include "volume/exact_predicates.h"
 #include "volume/inside_scan_internal.h"
-#include "volume/mesh_border.h"
 #include "volume/parity_scan_internal.h"
 #include "volume/voxelize_internal.h"
 #include "volume/winding_scan_internal.h"
@@ -192,7 +192,7 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     throw Error("the mesh is open: " + std::to_string(r.boundary_edges) + " boundary edges in " +
                 std::to_string(r.holes) + (r.holes == 1 ? " hole, " : " holes, ") +
                 std::to_string(r.odd_rays) +
-                " odd rays, expected a closed mesh (or --on-open warn|fill)");
+                " odd rays, expected a closed mesh (or --rule winding, or --on-open warn|fill)");
   return scan;
 }
 

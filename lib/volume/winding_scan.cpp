@@ -4,9 +4,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "volume/exact_predicates.h"
+#include "mesh/exact_predicates.h"
+#include "mesh/oriented_surface.h"
 #include "volume/inside_scan_internal.h"
-#include "volume/oriented_surface.h"
 #include "volume/solid_angle_tree_internal.h"
 
 namespace gewebe {

@@ -12,6 +12,7 @@
 #include "formats/mesh_file.h"
 #include "surface/marching_cubes.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "volume/coverage.h"
 #include "volume/distance_band_internal.h"
@@ -168,8 +169,8 @@ Range range_of(const TriangleMesh& mesh, const GridTransform& lattice) {
     const Vec3 p = lattice.to_index(point);
     for (int a = 0; a < 3; ++a) {
       const auto s = static_cast<std::size_t>(a);
-      range.min[s] = std::min(range.min[s], static_cast<std::int32_t>(std::floor(p[a])) - 3);
-      range.max[s] = std::max(range.max[s], static_cast<std::int32_t>(std::ceil(p[a])) + 3);
+      range.min[s] = test::smaller(range.min[s], static_cast<std::int32_t>(std::floor(p[a])) - 3);
+      range.max[s] = test::larger(range.max[s], static_cast<std::int32_t>(std::ceil(p[a])) + 3);
     }
   }
   return range;
@@ -191,7 +192,7 @@ Error2 fraction_error(const Range& range, const std::function<double(const Int3&
         const double difference = std::fabs(tested({i, j, k}) - wanted);
         surface += wanted > 0 && wanted < 1 ? 1 : 0;
         error.mean += difference;
-        error.max = std::fmax(error.max, difference);
+        error.max = test::larger(error.max, difference);
       }
   error.mean /= surface;
   return error;
@@ -227,11 +228,11 @@ public:
     double least = HUGE_VAL;
     if (const auto found = near_.find(cell(p)); found != near_.end())
       for (const std::uint32_t n : found->second)
-        least = std::fmin(least, to(n, p));
+        least = test::smaller(least, to(n, p));
     if (least <= reach)
       return least;
     for (std::uint32_t n = 0; n < triangles_.size(); ++n)
-      least = std::fmin(least, to(n, p));
+      least = test::smaller(least, to(n, p));
     return least;
   }
 
@@ -257,7 +258,7 @@ Error2 position_error(const Distances& distances, const Grid& grid) {
   for (const Vec3& p : surface.mesh.points) {
     const double d = distances.at(p);
     error.mean += d / static_cast<double>(surface.mesh.points.size());
-    error.max = std::fmax(error.max, d);
+    error.max = test::larger(error.max, d);
   }
   return error;
 }

@@ -18,9 +18,10 @@
 #include "formats/stiffness_store_writer.h"
 #include "model/build.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
 #include "sim/simulation.h"
+#include "solve/condition.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/random_cuts.h"
 #include "tests/unit/scratch.h"
 
@@ -299,7 +300,7 @@ void without_load(const Scene& scene) {
     if (k == count)
       alone = last;
     else
-      worst = std::min(worst, rest.fastest / t.fastest);
+      worst = test::smaller(worst, rest.fastest / t.fastest);
     report(stage, "hybrid", share(scene, still), 0, t, last, "cycles/s");
     report(stage, "without its elastostatic organs", share(scene, still), 0, rest,
            1e3 / rest.median, "cycles/s");
@@ -375,7 +376,7 @@ void with_contacts(const Scene& scene, const std::vector<Variant>& variants,
 double least_step(const Scene& scene) {
   double least = HUGE_VAL;
   for (const Organ& organ : scene.organs)
-    least = std::min(least, safe_step_fraction * safe_step(organ.model));
+    least = test::smaller(least, safe_step_fraction * safe_step(organ.model));
   return least;
 }
 
@@ -394,8 +395,8 @@ double difference(std::span<const double> a, std::span<const double> b) {
   double error = 0, size = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double e = std::abs(a[i] - b[i]);
-    error = error >= e || std::isnan(error) ? error : e;
-    size = std::max(size, std::abs(b[i]));
+    error = test::larger(error, e);
+    size = test::larger(size, std::abs(b[i]));
   }
   return error / size;
 }
@@ -449,7 +450,7 @@ void equal_error(const Organ& organ, const Stored& store) {
         u.assign(shape.begin(), shape.end());
         held = still.contact_forces();
       }));
-      error = std::max(error, difference(u, linear));
+      error = test::larger(error, difference(u, linear));
       for (int turn = 1; turn <= 3; ++turn) {
         still.update(pull(model, nodes, m, size, turn));
         (void)still.displacement();
@@ -491,10 +492,10 @@ void equal_error(const Organ& organ, const Stored& store) {
     report(stage, "elastostatic; contacts moved", x, m, still_known, still_known.median, "ms");
     report(stage, off < near ? "elastodynamic to rest" : "elastodynamic; given up after 60 s", x, m,
            {spent, spent, spent}, spent, "ms");
-    if (spent / still_new.median < least) {
-      least = spent / still_new.median;
+    const double ratio = spent / still_new.median;
+    if (!(ratio >= least))
       least_at = m;
-    }
+    least = test::smaller(least, ratio);
     (void)std::fprintf(stderr,
                        "%s, %zu contacts: elastostatic %.3f ms new, %.3f ms moved (off by "
                        "%.1e), elastodynamic %.1f ms for %.3f s\n",

@@ -13,6 +13,7 @@
 #include "sim/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 
 #include <algorithm>
@@ -116,10 +117,10 @@ void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
     const std::span<const double> a = object.displacement(), b = exact.displacement();
     double difference = 0, size = 0;
     for (std::size_t r = 0; r < a.size(); ++r) {
-      difference = std::max(difference, std::abs(a[r] - b[r]));
-      size = std::max(size, std::abs(b[r]));
+      difference = test::larger(difference, std::abs(a[r] - b[r]));
+      size = test::larger(size, std::abs(b[r]));
     }
-    worst = std::max(worst, difference / size);
+    worst = test::larger(worst, difference / size);
   }
   report("contact forces", way.name, n, contacts, way.threads, times_of(forces),
          quantile(forces, 0.99), "ms p99");

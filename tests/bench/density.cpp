@@ -12,6 +12,7 @@
 #include "surface/snapping.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "volume/density_kernel_internal.h"
 
 #include <immintrin.h>
@@ -179,8 +180,7 @@ Measured measure_density(const Particles& particles, double voxel, bool band, in
           sum += (1 - t) * (1 - t) * (1 - 4 * t / 9);
       }
       const double error = std::fabs(sum - static_cast<double>(leaves[n].values[offset]));
-      if (!(error <= result.error))
-        result.error = error;
+      result.error = test::larger(result.error, error);
     }
   }
   result.times = times_of(times);

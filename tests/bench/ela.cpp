@@ -6,6 +6,7 @@
 #include "model/primitive.h"
 #include "peer.h"
 #include "sim/elastodynamic.h"
+#include "tests/unit/larger.h"
 #include "timing.h"
 
 #include <cmath>
@@ -91,8 +92,8 @@ double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double error = 0, size = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double e = norm(a[i] - b[i]);
-    error = error >= e || std::isnan(error) ? error : e;
-    size = std::max(size, norm(b[i]));
+    error = test::larger(error, e);
+    size = test::larger(size, norm(b[i]));
   }
   return error / size;
 }

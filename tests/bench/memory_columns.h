@@ -4,7 +4,7 @@
 #include "base/columns.h"
 #include "sim/compliance.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 
 #include <algorithm>
 #include <memory>

@@ -10,7 +10,7 @@
 #include "model/build.h"
 #include "model/primitive.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/scratch.h"
 

@@ -11,18 +11,19 @@
 // the true surface in voxels. Then: the largest such distance, mean and largest distance of the
 // triangles' centroids, points, smallest angle of all and the one at 1 % of the triangles
 // (degrees), share of triangles below 10 degrees, longest edge over shortest, explicit time step
-// over the voxel edge's square root (mesh_quality.h; comparable between volumes), zero-area faces,
+// over the voxel edge's square root (mesh/quality.h; comparable between volumes), zero-area faces,
 // pairs of triangles that cut each other.
 
 #include "formats/mesh_file.h"
+#include "mesh/check.h"
+#include "mesh/quality.h"
+#include "mesh/self_intersections.h"
 #include "surface/marching_cubes.h"
-#include "surface/mesh_check.h"
-#include "surface/mesh_quality.h"
 #include "surface/regularize.h"
-#include "surface/self_intersections.h"
 #include "surface/snapping.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/coverage.h"
@@ -161,7 +162,7 @@ struct Errors {
   double mean = 0, largest = 0;
   void add(double error) {
     mean += error;
-    largest = error > largest ? error : largest;
+    largest = test::larger(largest, error);
   }
 };
 

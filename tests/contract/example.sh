@@ -86,7 +86,7 @@ test_antialias_draws_every_filter() {
   make DIM=24 >../log 2>&1 || fail 'the example fails:' "$(tail -3 ../log)"
   ! cmp -s none.png exact.png || fail 'grey values are not to be seen'
   # Fractions give the volume at any resolution, box:6 nearly, 0 and 1 do not.
-  metaball2vol --voxel 0.5 ../myoma/organ.particles | mc-opt | voxelize --dim 48 --stats=fine.json - -o fine.vdb
+  metaball2vol --voxel 0.5 ../myoma/organ.particles | mc-opt | voxelize --antialias exact --dim 48 --stats=fine.json - -o fine.vdb
   awk -F, -v whole="$(sed -n 's/.*"volume":\([-+.e0-9]*\).*/\1/p' fine.json)" '
     { error[$1] = $2 / whole - 1; if (error[$1] < 0) error[$1] = -error[$1] }
     END { exit !(error["exact"] < 1e-8 && error["box"] < 1e-3 && error["none"] > 1e-5) }' volumes.csv ||
@@ -234,4 +234,21 @@ test_lung_light_from_the_other_side_swaps_the_rims() {
   same=$(rims flat.ppm left.ppm near.ppm)
   ((same > 50)) || fail "light from the same side: the rims correlate by $same %, expected over 50"
   echo "rims: $opposite % from the other side, $same % from the same side"
+}
+
+# The pictures that the repository shows are those that the examples make: who changes an example makes its pictures again, looks
+# at them, and writes down what belongs together. (That a change of the programs changes a picture, the tests above don't see.)
+test_pictures_belong_to_their_examples() {
+  cp -r "$GEWEBE_ROOT"/examples .
+  cd examples || fail 'no folder'
+  check() { sha256sum --quiet --check pictures.sums 2>&1 && ! unlisted | grep .; }
+  unlisted() { comm -13 <(sed 's/^[^ ]*  //' pictures.sums | sort) <(printf '%s\n' */pictures/* */Makefile | sort); }
+  check || fail 'make the example, look at its pictures, then:' "  cd examples && sha256sum \$(git ls-files '*/*') > pictures.sums"
+  # Another scene is seen, and so is a picture that nobody wrote down.
+  echo '# a comment' >>pull/pull.scene
+  ! check >/dev/null || fail 'an example that changed passes'
+  sed -i '$d' pull/pull.scene
+  check || fail 'the example as it was does not pass'
+  cp lung/pictures/lung.png lung/pictures/another.png
+  ! check >/dev/null || fail 'a picture that nobody wrote down passes'
 }

@@ -1,10 +1,10 @@
-# scripts/check-includes sees each kind of wrong include.
+# scripts/check-includes sees each kind of wrong include, scripts/check-nan each way to lose a NaN.
 # shellcheck shell=bash
 
 check() { # FILE LINE...: complaints about a file with these lines
   mkdir -p "$(dirname "$1")"
   printf '%s\n' "${@:2}" >"$1"
-  CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/check-includes" "$1" 2>&1
+  CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/${script:-check-includes}" "$1" 2>&1
 }
 right() { check "$@" >said.txt || fail "complained about $*:" "$(<said.txt)"; }
 wrong() { ! check "$@" >said.txt || fail "passed: $*"; }
@@ -37,4 +37,24 @@ test_other_rules() {
   wrong lib/volume/a_avx2.cpp '#include <vector>'
   wrong lib/model/a.cpp '#include <fstream>'
   wrong lib/model/a.cpp 'const char* x = std::getenv("X");'
+}
+
+test_no_comparison_lets_a_nan_pass() {
+  local script=check-nan
+  right tests/unit/a.cpp 'worst = test::larger(worst, x);' 'const double b = std::max(c, d);' 'base = 1.0;'
+  right tests/unit/a.cpp 't.i = std::min(i, j);' 'f({.i = std::min(i, j)});' 'for (int k = 0; k < std::min(k, n); ++k)'
+  right tests/unit/a.cpp 'if (!(x <= worst))' '  worst = x;' 'if (p[i] > p[top])' '  top = i;' 'if (worst > 1)' '  y = 2;'
+  right tests/unit/a.cpp '// worst = std::max(worst, x);'
+  wrong tests/unit/a.cpp 'worst = std::max(worst, x);'
+  wrong tests/unit/a.h '  row.least = std::fmin(row.least, x[k]);'
+  wrong tests/bench/a.cpp 'worst = std::max(' '    worst, difference(a, b));'
+  wrong tests/unit/a.cpp 'worst = std::max(std::abs(x), worst);'
+  wrong tests/unit/a.cpp 'most = std::max({most, a, b});'
+  wrong tests/unit/a.cpp 'for (int k = 0; k < 3; ++k)' '  range.max[k] = std::max<double>(range.max[k], p[k]);'
+  wrong tests/stress/a.cpp 'worst = x > worst ? x : worst;'
+  wrong tests/stress/a.cpp 'worst = worst < x ? x : worst;'
+  wrong tests/unit/a.cpp 'if (norm(a[i] - b[i]) > worst)' '  worst = norm(a[i] - b[i]);'
+  wrong tests/unit/a.cpp 'if (worst < x) {' '  worst = x;' '  at = i;' '}'
+  find "$GEWEBE_ROOT/tests" -name '*.cpp' -o -name '*.h' | sed "s|^$GEWEBE_ROOT/||" >files.txt
+  (cd "$GEWEBE_ROOT" && xargs "scripts/$script") <files.txt >said.txt 2>&1 || fail "$(<said.txt)"
 }

@@ -4,6 +4,8 @@
 # shellcheck shell=bash
 
 PATH=$BUILD:$PATH
+# Debian's own Python, whose modules packages.txt lists, before one that stands earlier in the PATH.
+[[ ! -x /usr/bin/python3 ]] || python3() { /usr/bin/python3 "$@"; }
 
 fail() {
   printf '%s\n' "$@"
@@ -13,6 +15,13 @@ skip() {
   printf '%s\n' "$1"
   exit 77
 }
+
+# Says that a part of this test can't be done here, which counts as a skipped test: left_out WHAT IS ABSENT.
+left_out() { printf '%s\n' "$1" >>"$GEWEBE_LEFT_OUT"; }
+# For a part of a test: is there this program, this module of Python? If not, the part is left out.
+has() { command -v "$1" >/dev/null || { left_out "no $1"; return 1; }; }
+has_module() { python3 -c "import $1" 2>/dev/null || { left_out "no $1 for python3"; return 1; }; }
+has_strace() { has strace && { strace -o /dev/null true 2>/dev/null || { left_out 'strace may not trace here'; return 1; }; }; }
 
 # The names of our programs.
 programs() {
@@ -63,7 +72,7 @@ sample() {
       ;;
     voxelize)
       cube >in.off
-      words=(voxelize --voxel 0.25 in.off)
+      words=(voxelize --voxel 0.08 in.off)
       ;;
     csg)
       sample metaball2vol

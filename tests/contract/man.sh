@@ -78,3 +78,61 @@ test_pages_have_their_sections() {
   done
   [[ -f $GEWEBE_ROOT/man/gewebe.7 ]] || fail 'man/gewebe.7 is missing'
 }
+
+# The defaults that --help shows, one `--option value` a line.
+defaults_of_help() { # TOOL
+  "$1" --help | awk '
+    function tell() {
+      if (match(text, /\(default [^;)]*/)) print option, substr(text, RSTART + 9, RLENGTH - 9)
+    }
+    /^ +-/ { tell(); text = ""; match($0, /--[a-z0-9-]+/); option = substr($0, RSTART, RLENGTH) }
+    { line = $0; sub(/^ +/, "", line); text = text " " line }
+    END { tell() }'
+}
+# Those of them that the option's paragraph in the page does not tell behind the word default, or just before it.
+untold_defaults() { # FILE, defaults on standard input
+  local option value
+  while read -r option value; do
+    awk -v option="${option#--}" '
+      /^\.It Fl/ { here = 0; for (i = 2; i < NF; ++i) if ($i == "Fl" && $(i + 1) == "Fl" && $(i + 2) ~ "^" option "(=|$)") here = 1 }
+      /^\.Sh/ { here = 0 }
+      here { sub(/^\.(Cm|Ar|Sq|Pq|Fl) */, ""); print }' "$1" | tr '\n,;()' '     ' >paragraph
+    { grep -q default paragraph && grep -qE -e "(^| )${value//,/ *}\.?( |\$)" paragraph; } || echo "$option ($value)"
+  done
+}
+test_defaults_stand_in_the_page() {
+  local tool untold
+  for tool in $(programs); do
+    defaults_of_help "$tool" >defaults
+    grep -q -e '^--threads 0$' defaults || fail "$tool --help shows no default of --threads" "$(<defaults)"
+    untold=$(untold_defaults "$GEWEBE_ROOT/man/$tool.1" <defaults)
+    [[ -z $untold ]] || fail "man/$tool.1 does not tell the default of $untold"
+  done
+  # Another one is seen.
+  printf '%s\n' '.It Fl Fl voxel Ar S' 'Edge; the default is 2.' '.It Fl Fl dim Ar N' 'The default is 1.' >page.1
+  [[ ! $(echo '--voxel 2' | untold_defaults page.1) && $(echo '--voxel 1' | untold_defaults page.1) ]] ||
+    fail 'a default that differs passes'
+}
+
+# What a page refers to stands under SEE ALSO too, all pages under that of gewebe(7), and it under theirs.
+test_see_also_is_complete() {
+  local page missing=''
+  also() { sed -n '/^\.Sh SEE ALSO/,$ { s/^\.Xr \([^ ]*\) \([0-9]\).*/\1.\2/p; }' "$1" | sort -u; }
+  for page in "$GEWEBE_ROOT"/man/*.[1-9]; do
+    missing+=$(comm -13 <(also "$page") <({
+      sed '/^\.Sh SEE ALSO/,$d' "$page" | sed -n 's/^\.\(.* \)\?Xr \([^ ]*\) \([0-9]\).*/\2.\3/p'
+      [[ $page == */gewebe.7 ]] && (cd "$GEWEBE_ROOT"/man && printf '%s\n' ./*.[1-9] | sed 's|^./||')
+      echo gewebe.7
+    } | grep -vxF "${page##*/}" | sort -u) | sed "s|^|${page##*/}: |")
+    grep -qx '.Os Gewebe' "$page" || missing+="${page##*/}: .Os Gewebe"
+  done
+  [[ -z $missing ]] || fail 'SEE ALSO lacks' "$missing"
+}
+
+test_readme_names_every_example() {
+  local folder
+  for folder in "$GEWEBE_ROOT"/examples/*/; do
+    folder=$(basename "$folder")
+    grep -qF "(examples/$folder)" "$GEWEBE_ROOT/README.md" || fail "README.md does not name examples/$folder"
+  done
+}

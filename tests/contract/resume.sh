@@ -49,6 +49,7 @@ test_killed_at_any_moment_it_continues() {
   ball env 2>message
   [[ ! -s message ]] || fail "$(<message)"
   cmp whole.h5 ball.h5 || fail 'another store than that of an undisturbed run'
+  rm -f ball.h5.part.?????? # of a kill between making a file and taking its name away
   nothing_left
   # What was kept is said, and is most of it.
   killed_at 900
@@ -69,6 +70,21 @@ test_an_interrupt_keeps_what_is_finished() {
   ball env
   cmp whole.h5 ball.h5 || fail 'another store after interrupts'
   nothing_left
+}
+
+test_an_interrupt_says_that_the_next_run_goes_on() {
+  ball_model
+  local pid
+  ffe-precompute -j1 --columns all ball.ela -o ball.h5 2>message &
+  pid=$!
+  while [[ ! -e ball.h5.part.log || $(wc -l <ball.h5.part.log) -lt 30 ]]; do
+    kill -0 "$pid" 2>/dev/null || fail 'it ended before it was interrupted'
+  done
+  kill -TERM "$pid"
+  wait "$pid" 2>/dev/null || true
+  [[ $(<message) == 'ffe-precompute: interrupted, '*ball.h5.part' keeps the columns so far: the same command goes on from there' ]] ||
+    fail "$(<message)"
+  [[ -e ball.h5.part ]] || fail 'nothing is kept'
 }
 
 test_damage_in_what_is_kept_is_found() {

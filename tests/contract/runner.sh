@@ -54,6 +54,9 @@ test_answers_that_depend_on_threads_or_processor_fail() {
   must_fail 'GEWEBE_CPU=baseline' 'e | 0 | text | test "${GEWEBE_CPU-}" = baseline && echo yes || echo no' no
   must_fail 'GEWEBE_CPU=avx2' 'f | 0 | text | test "${GEWEBE_CPU-}" = avx2 && echo yes || echo no' no
   must_fail 'GEWEBE_CPU=avx512' 'g | 0 | text | test "${GEWEBE_CPU-}" = avx512 && echo yes || echo no' no
+  must_fail 'OPENBLAS_CORETYPE=Prescott' 'i | 0 | text | test "${OPENBLAS_CORETYPE-}" = Prescott && echo yes || echo no' no
+  ! grep -q ' avx2 ' /proc/cpuinfo ||
+    must_fail 'OPENBLAS_CORETYPE=Haswell' 'j | 0 | text | test "${OPENBLAS_CORETYPE-}" = Haswell && echo yes || echo no' no
   must_fail 'with' 'h | 0 | text | test "${GEWEBE_CPU-}" && echo 1 > out || echo 2 > out; echo hello' hello
 }
 
@@ -82,6 +85,44 @@ test_nothing_to_run_is_a_failure() {
   ! "$GEWEBE_ROOT/tests/run" --config no-such-build --test no-such-test >said.txt 2>&1 || fail 'no tests passed'
   [[ $(tail -1 said.txt) == '0 passed, 0 failed, 0 skipped' ]] || fail "$(<said.txt)"
   rm -rf "$GEWEBE_ROOT/build/no-such-build"
+}
+
+# A copy of the runner with tests of its own; the build holds no programs.
+runner_of_its_own() {
+  mkdir -p repo/tests/contract repo/tests/golden repo/build/release
+  cp "$GEWEBE_ROOT/tests/run" repo/tests/
+  cp "$GEWEBE_ROOT/tests/golden/run" repo/tests/golden/
+  cp "$GEWEBE_ROOT/tests/contract/lib.bash" repo/tests/contract/
+  : >repo/tests/golden/cases
+  printf '%s\n' "$@" >repo/tests/contract/own.sh
+}
+own_run() { env -u GEWEBE_CHECK -u GEWEBE_UNIT_FILTER repo/tests/run --jobs 2 "$@" >said.txt 2>&1; }
+
+test_skips_are_counted_and_can_be_run_alone() {
+  runner_of_its_own 'test_whole() { :; }' 'test_part() { has no_such_program || true; }' \
+    'test_data() { [[ -e $GEWEBE_SHARED/data ]] || skip "no data"; }'
+  GEWEBE_SHARED=$PWD/none own_run || fail "$(<said.txt)"
+  [[ $(tail -1 said.txt) == '2 passed, 0 failed, 2 skipped' ]] || fail "$(<said.txt)"
+  grep -qxF 'skipped: contract own/part (in part): no no_such_program' said.txt || fail "$(<said.txt)"
+  grep -qE '^  +[0-9.]+ s  contract own/whole$' said.txt || fail 'no seconds:' "$(<said.txt)"
+  mkdir -p here/data
+  GEWEBE_SHARED=$PWD/here own_run --skipped || fail "$(<said.txt)"
+  [[ $(tail -1 said.txt) == '2 passed, 0 failed, 1 skipped' ]] || fail "$(<said.txt)"
+  grep -q 'own/whole' said.txt && fail 'ran what had passed' "$(<said.txt)"
+  own_run --test whole || fail "$(<said.txt)"
+  own_run --skipped || fail "$(<said.txt)"
+  [[ $(tail -1 said.txt) == '0 passed, 0 failed, 0 skipped' ]] || fail "$(<said.txt)"
+}
+
+test_two_runs_wait_for_each_other() {
+  # shellcheck disable=SC2016 # the inner shell expands it
+  runner_of_its_own 'test_alone() { mkdir "$GEWEBE_ROOT/running" || fail "two at once"; sleep 1; rmdir "$GEWEBE_ROOT/running"; }'
+  env -u GEWEBE_CHECK repo/tests/run >first.txt 2>&1 &
+  local first=$!
+  sleep 0.3
+  own_run || fail "$(<said.txt)"
+  wait $first || fail "$(<first.txt)"
+  cat first.txt said.txt | grep -q 'waits for another run' || fail 'nobody waited'
 }
 
 test_no_expected_file_is_left_over() {

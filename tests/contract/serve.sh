@@ -17,6 +17,23 @@ organ() {
 
 digest() { grep -o '"digest":"[0-9a-f]*"' "$1"; }
 
+test_devices_are_no_models() {
+  need ffe-run exp2ela
+  organ
+  mkfifo endless
+  local status=0
+  printf '%s\n' 'object a /dev/zero' 'object b /dev/null' 'object o organ.ela' 'displace o 6 0 0 0.01' 'step 0.01' |
+    ffe-run --serve >answers 2>stderr.txt || status=$?
+  [[ $status == 1 && $(grep -c '^error [12]: /dev/[a-z]*: is a device, expected a file or a pipe$' answers) == 2 &&
+    $(grep -c '^step 1 0.01$' answers) == 1 ]] || fail "status $status" "$(<answers)"
+  # A pipe is read, as long as it has an end.
+  cat organ.ela >endless &
+  printf '%s\n' 'object o endless' 'displace o 6 0 0 0.01' 'step 0.01' >piped.scene
+  ffe-run piped.scene >piped
+  wait
+  tail -2 answers | cmp - piped
+}
+
 test_ten_thousand_steps_in_lockstep_and_again_from_the_record() {
   need ffe-run exp2ela ffe-precompute python3
   organ
@@ -133,7 +150,7 @@ test_only_what_is_touched_is_read() {
   ffe-run --stats=out.json in.scene -o forces.csv >answers
   grep -q '"objects":20,"models_read":1,"stores_opened":1,' out.json || fail 'more was read:' "$(<out.json)"
   [[ $(wc -l <forces.csv) == 3 ]] || fail "$(<forces.csv)"
-  if command -v strace >/dev/null && strace -o trace -e trace=open,openat,openat2 true 2>/dev/null; then
+  if has_strace; then
     strace -f -o trace -e trace=open,openat,openat2 ffe-run in.scene >answers
     [[ $(grep -oE '"(m|s)[0-9]+\.(ela|h5)"' trace | sort -u) == $'"m5.ela"\n"s5.h5"' ]] || fail 'other files were opened:' "$(<trace)"
     rm trace
@@ -213,6 +230,7 @@ test_a_killed_run_leaves_its_record() {
   wait "$pid" 2>/dev/null || true
   [[ ! -e run.scene && -s run.scene.part ]] || fail 'no part:' "$(ls -A)"
   [[ $(ffe-run run.scene.part | grep -c '^step') -ge 2 ]] || fail 'the part is no scene' "$(<run.scene.part)"
+  mv run.scene.part kept.scene # no other run takes its name before
   # The next run begins anew.
   printf '%s\n' 'object o organ.ela' 'step' | ffe-run --record run.scene >answers
   [[ $(<run.scene) == $'object o organ.ela\nstep' && ! -e run.scene.part ]] || fail "$(<run.scene)"

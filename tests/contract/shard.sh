@@ -19,7 +19,7 @@ test_parts_merged_are_the_whole() {
     (($(stat -c %s 2.h5) < $(stat -c %s whole.h5) / 2)) || fail 'a part is no part'
     ffe-precompute --merge --verify 3.h5 1.h5 2.h5 -o merged.h5
     cmp whole.h5 merged.h5 || fail "parts of $precision make other bytes"
-    if command -v h5diff >/dev/null; then
+    if has h5diff; then
       h5diff whole.h5 merged.h5 || fail 'h5diff sees a difference'
     fi
   done
@@ -50,6 +50,31 @@ test_parts_that_do_not_belong_together_are_refused() {
   [[ ! -e out.h5 ]] || fail 'something was written'
 }
 
+# Twice the same node is no sum of parts, even where the columns agree.
+test_parts_that_overlap_are_refused() {
+  two_models
+  ffe-precompute --columns all --shard 1/2 a.ela -o 1.h5
+  ffe-precompute --columns 0-223 --shard 2/2 a.ela -o 2.h5
+  ffe-precompute --merge 1.h5 2.h5 -o out.h5 2>message && fail 'parts that overlap are joined'
+  grep -q "^ffe-precompute: 2.h5: 'a' has columns of node [0-9]* that another part has, too" message || fail "$(<message)"
+  [[ $(wc -l <message) == 1 && ! -e out.h5 ]] || fail 'something was written' "$(<message)"
+}
+
+# Each column of either precision is checked when it is read.
+test_a_wrong_byte_in_a_column_is_found() {
+  exp2ela --primitive sphere:24x12 --name a -o a.ela
+  local precision bytes
+  for precision in float64 float32; do
+    ffe-precompute --columns all --precision $precision a.ela -o store.h5
+    bytes=$(stat -c %s store.h5)
+    # The columns are most of the file; the lowest byte of a number in the middle.
+    printf '\125' | dd of=store.h5 bs=1 seek=$((bytes / 2 / 8 * 8)) conv=notrunc 2>/dev/null
+    printf '\252' | dd of=store.h5 bs=1 seek=$((bytes / 2 / 8 * 8 + 8)) conv=notrunc 2>/dev/null
+    ffe-precompute --info --verify store.h5 >info 2>message && fail "a wrong $precision column is good"
+    grep -q 'checksum' message || fail "$(<message)"
+  done
+}
+
 test_a_second_stage_is_added() {
   two_models
   ffe-precompute --columns all a.ela b.ela -o store.h5
@@ -61,7 +86,7 @@ test_a_second_stage_is_added() {
   ffe-precompute --info --verify store.h5 >info.txt
   [[ $(grep -c '^object' info.txt) == 3 ]] || fail "$(<info.txt)"
   grep -qx 'object a stage 2' info.txt || fail "$(<info.txt)"
-  if command -v h5diff >/dev/null; then
+  if has h5diff; then
     h5diff -q before.h5 store.h5 /b /b || fail 'b has changed'
     h5diff -q before.h5 store.h5 /a/K /a/K || fail 'the first stage has changed'
     h5diff -q before.h5 store.h5 /a/columns /a/columns || fail 'the first stage has changed'

@@ -84,18 +84,19 @@ test_a_read_only_folder() {
 }
 
 test_an_interrupt_leaves_no_litter() {
+  ulimit -c 0 # SIGQUIT
   local tool signal pid status
   for tool in $(programs); do
     sample "$tool"
     # The last operand is a pipe that never ends: the program waits in the midst of its work.
     words[-1]=-
     mkdir folder
-    for signal in INT TERM HUP; do
+    for signal in INT TERM HUP QUIT XCPU; do
       mkfifo never
       sleep 60 >never &
       local holder=$!
       # Background jobs of a script ignore SIGINT; env gives its default back.
-      env --default-signal=INT "${words[@]}" -o "folder/$(target "$tool")" <never 2>stderr.txt &
+      env --default-signal=INT,QUIT "${words[@]}" -o "folder/$(target "$tool")" <never 2>stderr.txt &
       pid=$!
       sleep 0.3
       kill -"$signal" "$pid"

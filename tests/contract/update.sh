@@ -23,7 +23,7 @@ test_corrected_columns_are_those_made_afresh() {
   cmp new.h5 two.h5 || fail 'other bytes on other threads'
   GEWEBE_CPU=baseline ffe-precompute --update ball.h5 --before ball.ela cut.ela -o two.h5
   cmp new.h5 two.h5 || fail 'other bytes on another CPU'
-  if command -v h5diff >/dev/null; then
+  if has h5diff; then
     h5diff -q afresh.h5 new.h5 /ball/K /ball/K || fail 'another matrix'
     h5diff -q -p 1e-6 afresh.h5 new.h5 /ball/columns/values /ball/columns/values ||
       h5diff -q -d 1e-12 afresh.h5 new.h5 /ball/columns/values /ball/columns/values || fail 'other columns'
@@ -56,7 +56,7 @@ test_other_objects_are_copied() {
   cp ball.h5 old.h5
   ffe-precompute --update ball.h5 --before ball.ela cut.ela
   [[ $(ffe-precompute --info ball.h5 | grep -c '^object') == 2 ]] || fail "$(ffe-precompute --info ball.h5)"
-  if command -v h5diff >/dev/null; then
+  if has h5diff; then
     h5diff -q old.h5 ball.h5 /other /other || fail 'the other object has changed'
     ! h5diff -q old.h5 ball.h5 /ball/K /ball/K || fail 'the object has not changed'
   fi

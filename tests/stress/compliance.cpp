@@ -5,7 +5,8 @@
 
 #include "model/build.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 
 #include <algorithm>
@@ -19,11 +20,6 @@
 namespace {
 
 using namespace gewebe;
-
-/// The larger one; NaN if either is.
-double larger(double a, double b) {
-  return a >= b || std::isnan(a) ? a : b;
-}
 
 class Checked final : public ColumnSink {
 public:
@@ -43,7 +39,7 @@ public:
       const auto row = static_cast<std::size_t>(of);
       for (std::size_t r = 0; r < x_.size(); ++r)
         x_[r] = columns[a * axes + static_cast<std::size_t>(matrix_.axis_of_row[r])];
-      defect = larger(defect, defect_of(row));
+      defect = test::larger(defect, defect_of(row));
       for (std::size_t s = 0; s < sample_.size(); ++s)
         kept_[s * x_.size() + row] = x_[sample_[s]];
       if (++count == 1) { // the negative control
@@ -62,8 +58,8 @@ public:
         const double a = kept_[s * x_.size() + sample_[t]], b = kept_[t * x_.size() + sample_[s]];
         if (a == 0 || b == 0) // a column that wasn't asked for
           continue;
-        difference = larger(difference, std::abs(a - b));
-        largest = larger(largest, std::abs(a));
+        difference = test::larger(difference, std::abs(a - b));
+        largest = test::larger(largest, std::abs(a));
       }
     return difference / largest;
   }
@@ -77,7 +73,7 @@ private:
     y_[row] -= 1;
     double worst = 0;
     for (const double y : y_)
-      worst = larger(worst, std::abs(y));
+      worst = test::larger(worst, std::abs(y));
     return worst;
   }
 

@@ -5,11 +5,12 @@
 
 #include "model/build.h"
 #include "sim/axis_solver.h"
-#include "sim/condition.h"
 #include "sim/cut_stiffness.h"
 #include "sim/elastostatic.h"
-#include "sim/stiffness.h"
+#include "solve/condition.h"
+#include "solve/stiffness.h"
 #include "tests/bench/memory_columns.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/random_cuts.h"
 #include "tests/unit/relative_difference.h"
@@ -101,7 +102,7 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
       check(refuses, std::string(name) + ": a singular stiffness was not told");
       continue;
     }
-    worst_condition = std::max(worst_condition, condition);
+    worst_condition = test::larger(worst_condition, condition);
     // Each fourth cut by correction, which on so few nodes is never the cheapest.
     const CutWork work =
         stiffness.cut(now, next->origin, next->place,
@@ -113,8 +114,8 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     parts.solve(u, 1);
     fresh->solve(expected);
     const double error = test::relative_difference(u, expected), back = residual(*now, u, f);
-    worst = std::max(worst, error);
-    worst_residual = std::max(worst_residual, back);
+    worst = test::larger(worst, error);
+    worst_residual = test::larger(worst_residual, back);
     const std::string which = std::string(name) + ", cut " + std::to_string(done);
     check(error < most_error, which + ": error " + std::to_string(error));
     check(back < most_residual, which + ": residual " + std::to_string(back));
@@ -127,14 +128,14 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
         right[a * 3 * now->nodes.size() + 3 * std::size_t{node} + a] = 1;
       fresh->solve(right, 3);
       const double wrong = test::relative_difference(columns, right);
-      worst_column = std::max(worst_column, wrong);
+      worst_column = test::larger(worst_column, wrong);
       check(wrong < most_error, which + ": a column's error " + std::to_string(wrong));
     }
     if (now->nodes.size() == model->nodes.size()) {
       // A solver of before must not pass.
       std::vector<double> old = f;
       factorise_axes(*model, context).solve(old);
-      control = std::min(control, test::relative_difference(old, expected));
+      control = test::smaller(control, test::relative_difference(old, expected));
     }
     model = std::move(now);
     ++done;

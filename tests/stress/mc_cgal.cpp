@@ -1,7 +1,7 @@
 // Hunts for volumes whose mesh marching cubes or snapping would break. Each scene is meshed,
 // snapped at seven epsilons, and every mesh must be closed, manifold and oriented with the Euler
 // number and the components of the unsnapped one, as our own checker and CGAL see it. Argument:
-// number of scenes (default 2000); `make check` runs a tenth.
+// number of scenes (default 2000); `make check` runs a few.
 
 #include "base/parallel.h"
 #include "tests/unit/surface_stress.h"

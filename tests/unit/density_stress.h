@@ -3,6 +3,7 @@
 // run them small, tests/stress/density.cpp large.
 
 #include "tests/unit/density_scenes.h"
+#include "tests/unit/larger.h"
 #include "volume/density.h"
 
 #include <algorithm>
@@ -78,8 +79,7 @@ inline StressResult stress_many(int count, double reach_count, int samples) {
     const long double exact = exact_density(
         particles, grid.info().transform.to_world({1.0 * ijk[0], 1.0 * ijk[1], 1.0 * ijk[2]}));
     const auto here = static_cast<double>(std::fabs(static_cast<long double>(value) - exact));
-    if (!(here <= error))
-      error = here;
+    error = test::larger(error, here);
     never_negative = never_negative && value >= 0;
   }
   return {std::to_string(count) + " particles, " + std::to_string(std::lround(reach_count)) +
@@ -120,8 +120,7 @@ inline StressResult stress_edge(int count) {
     const Particles particles{{center, norm(x - center) / std::sqrt(t), 1}};
     const Grid grid = density_grid(particles, 1);
     const auto value = static_cast<double>(GridAccessor(grid).value(ijk));
-    if (!(value <= result.error))
-      result.error = value;
+    result.error = test::larger(result.error, value);
     for (const LeafView& leaf : grid.leaves())
       for (int m = 0; m < leaf_voxels; ++m)
         result.never_negative = result.never_negative && leaf.values[m] >= 0;

@@ -1,6 +1,6 @@
 #include "mesh_fixtures.h"
 
-#include "surface/weld.h"
+#include "mesh/weld.h"
 
 #include <cstring>
 #include <iterator>

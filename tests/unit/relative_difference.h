@@ -1,7 +1,8 @@
 #pragma once
 // How far two solutions are apart.
 
-#include <algorithm>
+#include "tests/unit/larger.h"
+
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -15,9 +16,8 @@ inline double relative_difference(std::span<const double> a, std::span<const dou
     return HUGE_VAL;
   double most = 0, size = 0;
   for (std::size_t k = 0; k < a.size(); ++k) {
-    const double difference = std::abs(a[k] - b[k]);
-    most = difference <= most ? most : std::isnan(most) ? most : difference;
-    size = std::max(size, std::abs(b[k]));
+    most = larger(most, std::abs(a[k] - b[k]));
+    size = larger(size, std::abs(b[k]));
   }
   return size > 0 ? most / size : most > 0 ? HUGE_VAL : most;
 }

@@ -4,6 +4,7 @@
 
 #include "base/mesh.h"
 #include "base/parallel.h"
+#include "larger.h"
 #include "render/camera.h"
 #include "render/image.h"
 #include "rest_oracle.h"
@@ -317,13 +318,13 @@ private:
         base *= image(look.base);
       if (own.solid_base)
         base *= at_rest.base[c];
-      base = std::min(1.0, base);
+      base = test::smaller(base, 1.0);
       if (own.detail)
-        base = std::min(1.0, base + image(look.detail));
+        base = test::smaller(base + image(look.detail), 1.0);
       if (own.solid_detail)
-        base = std::min(1.0, base + at_rest.detail[c]);
+        base = test::smaller(base + at_rest.detail[c], 1.0);
       if (own.reflection)
-        base = std::min(1.0, base + texel(look.reflection[0], around[0], around[1], c));
+        base = test::smaller(base + texel(look.reflection[0], around[0], around[1], c), 1.0);
       double r = 0.5;
       if (own.solid_structure)
         r = at_rest.relief;
@@ -535,7 +536,7 @@ inline OracleComparison compare(const Image& picture, const OraclePicture& oracl
       const double value = 255 * oracle[at].value[c];
       const double error = std::fabs(picture.values[3 * at + c] - value);
       const double steps = picture.values[3 * at + c] - std::floor(value + 0.5);
-      result.max = std::max(result.max, error);
+      result.max = test::larger(result.max, error);
       squares += error * error;
       rounded += steps * steps;
     }

@@ -6,7 +6,7 @@
 #include "formats/mesh_file.h"
 #include "model/build.h"
 #include "model_meshes.h"
-#include "sim/stiffness.h"
+#include "solve/stiffness.h"
 
 #include <cstdlib>
 #include <filesystem>

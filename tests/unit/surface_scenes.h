@@ -2,8 +2,8 @@
 // Volumes and helpers for the tests of the surface stage.
 
 #include "base/parallel.h"
+#include "mesh/check.h"
 #include "surface/marching_cubes.h"
-#include "surface/mesh_check.h"
 #include "surface/snapping.h"
 #include "volume/grid.h"
 

@@ -9,7 +9,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <numeric>
+#include <thread>
 
 using namespace gewebe;
 
@@ -51,6 +53,25 @@ TEST(Parallel, BlocksDependOnTheGrainAlone) {
     EXPECT_EQ(ends[3], 400U);
   }
   parallel_blocks({}, 0, 8, [](std::size_t, std::size_t) { FAIL(); });
+}
+
+TEST(Parallel, ProgressIsToldByOneThreadAtATime) {
+  Context context;
+  context.threads = 4;
+  std::atomic<int> inside{0};
+  std::atomic<bool> together{false};
+  std::vector<double> told;
+  context.progress = [&](double done) {
+    together = together || ++inside > 1;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1)); // time for another to come in
+    told.push_back(done);
+    --inside;
+  };
+  parallel_blocks(context, 64, 1, [](std::size_t, std::size_t) {});
+  EXPECT_FALSE(together);
+  ASSERT_EQ(told.size(), 64U);
+  for (std::size_t n = 0; n < told.size(); ++n)
+    EXPECT_EQ(told[n], static_cast<double>(n + 1) / 64);
 }
 
 TEST(Parallel, ErrorsAndCancellingComeThrough) {

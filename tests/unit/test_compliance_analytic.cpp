@@ -2,9 +2,10 @@
 
 #include "sim/compliance_columns.h"
 
+#include "larger.h"
 #include "mesh_fixtures.h"
-#include "sim/condition.h"
 #include "sim/relaxation.h"
+#include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <cmath>
@@ -161,11 +162,11 @@ double difference(const Kept& a, const Kept& b) {
   for (std::size_t k = 0; k < a.nodes.size(); ++k) {
     double most = 0, differ = 0;
     for (std::size_t i = 0; i < a.nodes[k].size(); ++i) {
-      most = std::max(most, std::abs(b.nodes[k][i]));
-      differ = std::max(differ, std::abs(a.nodes[k][i] - b.nodes[k][i]));
+      most = test::larger(most, std::abs(b.nodes[k][i]));
+      differ = test::larger(differ, std::abs(a.nodes[k][i] - b.nodes[k][i]));
     }
     if (most > 0)
-      worst = std::max(worst, differ / most);
+      worst = test::larger(worst, differ / most);
   }
   return worst;
 }

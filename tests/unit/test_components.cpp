@@ -1,6 +1,6 @@
-#include "surface/components.h"
+#include "mesh/components.h"
 
-#include "surface/mesh_check.h"
+#include "mesh/check.h"
 #include "tests/unit/mesh_fixtures.h"
 
 #include <gtest/gtest.h>

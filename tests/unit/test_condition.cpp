@@ -1,6 +1,6 @@
 // Condition estimates against known spectra; what moves freely is named rightly.
 
-#include "sim/condition.h"
+#include "solve/condition.h"
 
 #include "stiffness_models.h"
 

@@ -1,3 +1,4 @@
+#include "larger.h"
 #include "sim/dynamic_contact.h"
 #include "sim/elastodynamic.h"
 #include "sim/elastostatic.h"
@@ -20,7 +21,7 @@ Vec3 place(const Model& model, std::span<const double> u, std::size_t i) {
 double depth(const Model& model, std::span<const double> u, const PlacedInstrument& placed) {
   double least = HUGE_VAL;
   for (const std::uint32_t i : test::free_nodes(model))
-    least = std::min(least, placed.distance(place(model, u, i)));
+    least = test::smaller(least, placed.distance(place(model, u, i)));
   return -least / placed.radius;
 }
 
@@ -76,7 +77,7 @@ TEST(DynamicContact, KeepsMovingNodesOutAndBalancesThemAtRest) {
     moving.advance(0.01, h, Context{}, time);
     before = way.at(time + 0.01);
     EXPECT_LT(depth(model, displacement(), PlacedInstrument(shape, before)), 1e-6) << k;
-    for (const NodeTouch& t : moving.take_touches()) {
+    for (const NodeTouch& t : moving.take_impulses()) {
       const Vec3 at = model.nodes[t.node].position + moving.motion()[t.node].displacement;
       EXPECT_GT(dot(t.force, at - before.place), 0); // never pulls
     }
@@ -84,10 +85,10 @@ TEST(DynamicContact, KeepsMovingNodesOutAndBalancesThemAtRest) {
   // At rest the instrument's force is what the springs hold against.
   moving.set_instruments({MovingInstrument{shape, before, way}});
   moving.advance(20, h, Context{}, 0.4);
-  (void)moving.take_touches();
+  (void)moving.take_impulses();
   moving.advance(0.5, h, Context{}, 20.4);
   const SpringNetwork network = spring_network(model);
-  const std::vector<NodeTouch> touches = moving.take_touches();
+  const std::vector<NodeTouch> touches = moving.take_impulses();
   EXPECT_FALSE(touches.empty());
   for (const NodeTouch& t : touches) {
     const Vec3 pull = spring_force(network, moving.motion(), t.node);

@@ -4,10 +4,11 @@
 
 #include "base/error.h"
 #include "cut_models.h"
+#include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 
 #include <gtest/gtest.h>
 
@@ -111,7 +112,7 @@ TEST(CorrectedCompliance, AllColumnsAreCorrectedAndChecked) {
   EXPECT_LT(c.error(columns, kept), 1e-9);
   double most = 0;
   for (const double residual : kept.residuals())
-    most = std::max(most, residual);
+    most = test::larger(most, residual);
   EXPECT_EQ(made.residual, most);
   EXPECT_GT(most, 0);
   EXPECT_LE(most, max_backward_error);

@@ -1,12 +1,12 @@
 // Volume fractions of voxels: analytic cases, sums, ties, overlaps, comparison with samples.
 
 #include "base/error.h"
+#include "mesh/border.h"
+#include "mesh/orient_closed.h"
 #include "mesh_fixtures.h"
 #include "tests/unit/larger.h"
 #include "volume/coverage.h"
 #include "volume/lattice.h"
-#include "volume/mesh_border.h"
-#include "volume/mesh_orient.h"
 #include "volume/volume_stats.h"
 
 #include <gtest/gtest.h>
@@ -50,8 +50,7 @@ double box_error(const Grid& grid, const Vec3& low, const Vec3& high) {
         const double wanted = length_in_voxel(low.x, high.x, i) *
                               length_in_voxel(low.y, high.y, j) * length_in_voxel(low.z, high.z, k);
         const double error = std::fabs(static_cast<double>(value.value({i, j, k})) - wanted);
-        if (!(error <= worst))
-          worst = error;
+        worst = test::larger(worst, error);
       }
   return worst;
 }

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "csg_grids.h"
+#include "larger.h"
 #include "mesh_fixtures.h"
 #include "volume/lattice.h"
 
@@ -25,7 +26,7 @@ Grid ball(double radius, const Vec3& center, int samples = 1) {
                   {.samples = samples});
 }
 
-/// DESIGN 4.3, once more and without cleverness.
+/// What csg(1) says of a voxel, once more and without cleverness.
 float expected_value(Op operation, const std::vector<float>& v) {
   const auto clamp = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
   const bool sum = operation == Op::add || operation == Op::subtract;
@@ -40,13 +41,13 @@ float expected_value(Op operation, const std::vector<float>& v) {
       a = a - v[n];
       break;
     case Op::unite:
-      a = std::max(a, b);
+      a = test::larger(a, b);
       break;
     case Op::intersect:
-      a = std::min(a, b);
+      a = test::smaller(a, b);
       break;
     case Op::difference:
-      a = std::min(a, 1 - b);
+      a = test::smaller(a, 1 - b);
       break;
     case Op::exclusive_or:
       a = std::max(std::min(a, 1 - b), std::min(1 - a, b));

@@ -1,14 +1,15 @@
 // Cuts of models: what must be kept, whatever is cut.
 
 #include "base/error.h"
+#include "larger.h"
+#include "mesh/check.h"
 #include "model/build.h"
 #include "model/cut.h"
 #include "model/cut_select.h"
 #include "model_meshes.h"
-#include "sim/stiffness.h"
 #include "sim_models.h"
+#include "solve/stiffness.h"
 #include "stiffness_models.h"
-#include "surface/mesh_check.h"
 
 #include <gtest/gtest.h>
 
@@ -138,7 +139,7 @@ void expect_closed_answers_as_before(const Model& before, const CutModel& cut) {
   for (std::size_t i = 0; i < y.size(); ++i)
     sum[3 * std::size_t{cut.origin[i / 3]} + i % 3] += g[i];
   for (const double value : f)
-    largest = std::max(largest, std::abs(value));
+    largest = test::larger(largest, std::abs(value));
   for (std::size_t i = 0; i < f.size(); ++i)
     ASSERT_NEAR(sum[i], f[i], 1e-13 * largest);
 }

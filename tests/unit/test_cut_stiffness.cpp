@@ -7,7 +7,7 @@
 #include "random_cuts.h"
 #include "relative_difference.h"
 #include "sim/axis_solver.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 #include "stiffness_models.h"
 #include "tests/bench/memory_columns.h"
 

@@ -1,7 +1,11 @@
 // Grey values by distance: planes, edges, corners, the band against a search over all triangles.
 
 #include "base/error.h"
+#include "larger.h"
 #include "mesh_fixtures.h"
+#include "surface/gradient_normals.h"
+#include "surface/marching_cubes.h"
+#include "volume/coverage.h"
 #include "volume/distance_band_internal.h"
 #include "volume/distance_ramp.h"
 #include "volume/volume_stats.h"
@@ -42,8 +46,8 @@ TEST(NearestPoint, IsTheMinimumOverTheTriangle) {
     double least = 1e9;
     for (int u = 0; u <= steps; ++u)
       for (int v = 0; u + v <= steps; ++v)
-        least = std::fmin(least,
-                          norm(p - a - (b - a) * (u / 1.0 / steps) - (c - a) * (v / 1.0 / steps)));
+        least = test::smaller(
+            least, norm(p - a - (b - a) * (u / 1.0 / steps) - (c - a) * (v / 1.0 / steps)));
     EXPECT_LE(distance, least + 1e-12);
     EXPECT_GE(distance, least - 0.1);
     // It lies in the triangle: inside all three edges' half-planes.
@@ -75,7 +79,7 @@ TEST(DistanceRamp, FacesAreLinearAndEdgesAsPromised) {
         double outside = 0, largest = -1e9;
         for (int a = 0; a < 3; ++a) {
           const double d = std::fmax(low[a] - p[a], p[a] - high[a]);
-          largest = std::fmax(largest, d);
+          largest = test::larger(largest, d);
           outside += d > 0 ? d * d : 0;
         }
         const double euclidean = largest > 0 ? std::sqrt(outside) : largest;
@@ -106,7 +110,7 @@ TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
         const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
         double least = 1e9;
         for (const auto& [a, b, c] : mesh.triangles)
-          least = std::fmin(
+          least = test::smaller(
               least,
               norm(p -
                    nearest_on_triangle(p, mesh.points[a], mesh.points[b], mesh.points[c]).point));
@@ -158,6 +162,79 @@ TEST(DistanceRamp, SurfaceStaysWhereItIs) {
           }
         }
   }
+}
+
+TEST(DistanceRamp, NormalsOfASphereForEachFilter) {
+  // What voxelize(1) says of its filters: angles between the normals of a ball's surface of 20
+  // voxels and its radii, in degrees.
+  const Vec3 center{0.3, -0.2, 0.1};
+  const TriangleMesh mesh = sphere_mesh(5, 20, center);
+  struct Case {
+    const char* filter;
+    Grid grid;
+    double mean, p99;
+  };
+  VoxelizeOptions box;
+  box.samples = 4;
+  const auto refuse = OpenMesh::refuse;
+  std::vector<Case> cases;
+  cases.push_back({"jones", jones_density(with(1), mesh, unit_lattice, refuse), 1.4, 5.5});
+  cases.push_back({"sramek", sramek_density(with(1), mesh, unit_lattice, refuse), 0.05, 0.12});
+  cases.push_back({"exact", *exact_coverage(with(1), mesh, unit_lattice, refuse), 7.5, 17});
+  cases.push_back({"box:4", voxelize(with(1), mesh, unit_lattice, box), 7.6, 18});
+  cases.push_back({"none", voxelize(with(1), mesh, unit_lattice, {}), 15, 42});
+  cases.push_back({"winding",
+                   jones_density(with(1), mesh, unit_lattice, refuse, nullptr, VoxelRule::winding),
+                   1.4, 5.5});
+  cases.push_back({"zbuffer",
+                   jones_density(with(1), mesh, unit_lattice, refuse, nullptr, VoxelRule::zbuffer),
+                   1.4, 5.5});
+  for (const Case& c : cases) {
+    TriangleMesh surface = marching_cubes(with(1), c.grid).mesh;
+    gradient_normals(with(1), c.grid, surface);
+    std::vector<double> angles;
+    double sum = 0;
+    for (std::size_t i = 0; i < surface.points.size(); ++i) {
+      const Vec3 out = surface.points[i] - center;
+      const auto [x, y, z] = surface.normals[i];
+      const Vec3 normal{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+      const double turned = norm(cross(normal, out)) / norm(out);
+      angles.push_back(std::asin(std::fmin(1, turned)) * 180 / M_PI);
+      sum += angles.back();
+    }
+    std::ranges::sort(angles);
+    const double mean = sum / static_cast<double>(angles.size()),
+                 p99 = angles[angles.size() * 99 / 100];
+    EXPECT_TRUE(mean <= c.mean && mean >= c.mean / 2) << c.filter << ' ' << mean;
+    EXPECT_TRUE(p99 <= c.p99 && p99 >= c.p99 / 2) << c.filter << ' ' << p99;
+  }
+}
+
+TEST(DistanceRamp, OtherRulesGiveTheSign) {
+  // An open box is one to the winding rule; beside its hole, where no face is, it is as by parity.
+  TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 1.3, 5.5});
+  const Grid whole = jones_density(with(1), open, unit_lattice, OpenMesh::refuse);
+  open.triangles.erase(open.triangles.begin());
+  EXPECT_THROW(jones_density(with(1), open, unit_lattice, OpenMesh::refuse), Error);
+  CoverageReport report;
+  const Grid film =
+      jones_density(with(1), open, unit_lattice, OpenMesh::refuse, &report, VoxelRule::winding);
+  EXPECT_EQ(report.mesh.boundary_edges, 3u);
+  GridAccessor a(film), b(whole);
+  for (std::int32_t i = -1; i < 12; ++i)
+    for (std::int32_t j = -1; j < 12; ++j)
+      for (std::int32_t k = 3; k < 12; ++k)
+        EXPECT_EQ(at(a, {i, j, k}), at(b, {i, j, k})) << i << ' ' << j << ' ' << k;
+  // Solids that overlap are one: no value of it falls below ½ inside.
+  TriangleMesh two = sphere_mesh(3, 8, {0.3, 0, 0});
+  append(two, sphere_mesh(3, 8, {6.3, 0, 0}));
+  const Grid one =
+      jones_density(with(1), two, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
+  GridAccessor value(one);
+  for (std::int32_t i = -5; i <= 11; ++i)
+    EXPECT_GE(at(value, {i, 0, 0}), 0.5);
+  const Grid hollow = jones_density(with(1), two, unit_lattice, OpenMesh::refuse);
+  EXPECT_EQ(GridAccessor(hollow).value({3, 0, 0}), 0.0f); // parity leaves the common part out
 }
 
 TEST(DistanceRamp, SameBytesForAnyThreads) {

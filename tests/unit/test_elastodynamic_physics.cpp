@@ -4,8 +4,8 @@
 #include "larger.h"
 #include "random_nets.h"
 #include "sim/elastodynamic.h"
-#include "sim/factor.h"
 #include "sim_models.h"
+#include "solve/factor.h"
 
 #include <cmath>
 #include <cstdio>

@@ -1,8 +1,9 @@
 #include "base/error.h"
+#include "larger.h"
 #include "sim/elastodynamic.h"
 #include "sim/elastostatic.h"
-#include "sim/stiffness.h"
 #include "sim_models.h"
+#include "solve/stiffness.h"
 
 #include <Eigen/Dense>
 
@@ -189,7 +190,7 @@ TEST(Elastostatic, BothWaysOfContactEqualADenseSolve) {
     ASSERT_EQ(block.contact_forces().size(), load.displacement.size());
     double scale = 0;
     for (const NodeVector& f : block.contact_forces())
-      scale = std::max(scale, norm(f.value));
+      scale = test::larger(scale, norm(f.value));
     for (std::size_t k = 0; k < block.contact_forces().size(); ++k) {
       const NodeVector &a = block.contact_forces()[k], &b = constrained.contact_forces()[k];
       EXPECT_EQ(a.node, b.node);
@@ -461,8 +462,8 @@ TEST(Elastostatic, ContactSpaceIsWhatForcesDo) {
       for (std::size_t k = 0; k < touched.size(); ++k)
         for (int a = 0; a < 3; ++a) {
           const auto row = static_cast<Eigen::Index>(3 * k) + a;
-          most = std::max(most, std::abs(u[row] - expected[3 * Eigen::Index{touched[k]} + a]));
-          moved = std::max(moved, std::abs(u[row] - space.free[static_cast<std::size_t>(row)]));
+          most = test::larger(most, std::abs(u[row] - expected[3 * Eigen::Index{touched[k]} + a]));
+          moved = test::larger(moved, std::abs(u[row] - space.free[static_cast<std::size_t>(row)]));
         }
       EXPECT_LT(most, tolerance * size) << limit << " " << displaced;
       EXPECT_GT(moved, 1e-4 * size); // the forces matter
@@ -513,7 +514,7 @@ TEST(Elastostatic, WhatTheToleranceLeavesOutStaysBelowIt) {
       }
       shape_of(exact, load);
       shape_of(loose, load);
-      worst = std::max(
+      worst = test::larger(
           worst, difference(as_vector(loose.displacement()), as_vector(exact.displacement())));
       EXPECT_EQ(exact.contact_forces().size(), loose.contact_forces().size());
     }

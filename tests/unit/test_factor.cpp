@@ -1,9 +1,11 @@
 // The factor: C = K⁻¹ to rounding, from any thread, taken apart and put together again.
 
-#include "sim/factor.h"
+#include "solve/factor.h"
 
+#include "larger.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
+#include "solve/fused_internal.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
@@ -12,6 +14,7 @@
 #include <cstring>
 #include <functional>
 #include <gtest/gtest.h>
+#include <random>
 
 using namespace gewebe;
 using namespace gewebe::test;
@@ -67,7 +70,7 @@ double identity_error(const Model& model, std::uint32_t step) {
       multiply_stiffness(model, u, f);
       for (std::size_t i = 0; i < f.size(); ++i)
         if (k.row_of_axis[i] >= 0)
-          worst = std::max(worst, std::abs(f[i] - (i == axis ? 1 : 0)));
+          worst = test::larger(worst, std::abs(f[i] - (i == axis ? 1 : 0)));
     }
   return worst;
 }
@@ -120,6 +123,124 @@ TEST(Factor, SolvesTheSameBitsWhateverIsBesideIt) {
     EXPECT_TRUE(std::equal(again.begin() + static_cast<std::ptrdiff_t>(c * n),
                            again.begin() + static_cast<std::ptrdiff_t>((c + 1) * n),
                            all.begin() + static_cast<std::ptrdiff_t>(c % count * n)));
+}
+
+/// A block of material: nodes on a lattice, coupled as the corners of tetrahedra are. Its fronts
+/// are as large as those of solids.
+Model block_of_material(std::size_t side) {
+  Model model;
+  const auto number = [&](std::size_t x, std::size_t y, std::size_t z) {
+    return static_cast<std::uint32_t>((x * side + y) * side + z);
+  };
+  std::mt19937 random(1);
+  for (std::size_t k = 0; k < side * side * side; ++k) {
+    const auto off = [&] { return 1e-10 * static_cast<double>(random()); };
+    const std::size_t x = k / (side * side), y = k / side % side, z = k % side;
+    Node node;
+    node.position = {static_cast<double>(x) + off(), static_cast<double>(y) + off(),
+                     static_cast<double>(z) + off()};
+    node.fixed = z == 0 ? 7 : static_cast<std::uint8_t>(k % 97 == 1 ? 2 : 0);
+    model.nodes.push_back(node);
+  }
+  for (std::size_t x = 0; x < side; ++x)
+    for (std::size_t y = 0; y < side; ++y)
+      for (std::size_t z = 0; z < side; ++z)
+        for (std::size_t way = 1; way < 8; ++way) {
+          const std::size_t a = x + way % 2, b = y + way / 2 % 2, c = z + way / 4;
+          if (std::max({a, b, c}) == side)
+            continue;
+          Spring spring;
+          spring.i = std::min(number(x, y, z), number(a, b, c));
+          spring.j = std::max(number(x, y, z), number(a, b, c));
+          spring.stiffness = 1 + 1e-10 * static_cast<double>(random());
+          spring.rest = norm(model.nodes[spring.j].position - model.nodes[spring.i].position);
+          model.springs.push_back(spring);
+        }
+  return model;
+}
+
+bool same_numbers(const Factor& a, const Factor& b) {
+  return a.entries() == b.entries() &&
+         std::memcmp(a.view().x.data(), b.view().x.data(), 8 * a.entries()) == 0;
+}
+
+TEST(Factor, SolvesForABlockOfMaterialAndAShiftedOne) {
+  const StiffnessMatrix k = stiffness_matrix(block_of_material(13));
+  Factor factor(k, {});
+  const FactorView l = factor.view();
+  std::int64_t widest = 0;
+  for (std::size_t f = 0; f + 1 < l.super.size(); ++f)
+    widest = test::larger(widest, l.super[f + 1] - l.super[f]);
+  EXPECT_GT(widest, 300); // more than one block of columns
+  const std::vector<double> f = random_vector(k.order(), 4);
+  std::vector<double> u(f.size());
+  factor.solve(f, u);
+  EXPECT_LE(backward_error(k, stiffness_norm(k), u, f), 1e-15);
+  StiffnessMatrix shifted = k;
+  for (std::size_t c = 0; c < k.order(); ++c)
+    shifted.value[static_cast<std::size_t>(k.column_start[c])] += 0.01 * static_cast<double>(c % 5);
+  factor.renew(shifted, {});
+  factor.solve(f, u);
+  EXPECT_LE(backward_error(shifted, stiffness_norm(shifted), u, f), 1e-15);
+  EXPECT_FALSE(backward_error(k, stiffness_norm(k), u, f) <= 1e-12);
+  EXPECT_TRUE(same_numbers(factor, Factor(shifted, {})));
+  shifted.value[static_cast<std::size_t>(k.column_start[1000])] = -1;
+  try {
+    factor.renew(shifted, {});
+    ADD_FAILURE();
+  } catch (const NotPositiveDefinite& error) {
+    EXPECT_LT(error.row(), k.order());
+  }
+}
+
+TEST(Factor, IsTheSameOnAnyThreadsAndProcessors) {
+  const StiffnessMatrix k = stiffness_matrix(block_of_material(11));
+  Context one = threads(1);
+  const Factor factor(k, one);
+  for (const int count : {2, 3, 7})
+    EXPECT_TRUE(same_numbers(factor, Factor(k, threads(count)))) << count;
+  const StiffnessMatrix small = stiffness_matrix(block_of_material(8));
+  Context baseline;
+  baseline.cpu = CpuLevel::baseline;
+  EXPECT_TRUE(same_numbers(Factor(small, {}), Factor(small, baseline)));
+}
+
+TEST(Factor, RoundsOnceWhereTheProcessorRoundsTwice) {
+  std::mt19937_64 random(3);
+  const auto number = [&](std::int64_t range) {
+    std::uint64_t digits = random() >> 12;
+    switch (random() % 4) { // few digits, all digits, many ones
+    case 0:
+      digits &= ~std::uint64_t{0} << random() % 52;
+      break;
+    case 1:
+      digits |= ~std::uint64_t{0} >> 12 >> random() % 52;
+      break;
+    default:
+      break;
+    }
+    const auto exponent = static_cast<int>(random() % (2 * static_cast<std::uint64_t>(range) + 1));
+    const double value =
+        std::ldexp(1 + static_cast<double>(digits) * 0x1p-52, exponent - static_cast<int>(range));
+    return random() % 32 == 0 ? 0.0 : random() % 2 == 0 ? value : -value;
+  };
+  std::size_t different = 0;
+  for (const std::int64_t range : {0, 2, 30, 60, 1020})
+    for (int round = 0; round < 100000; ++round) {
+      const Pair a{number(range), number(range)}, b{number(range), number(range)};
+      Pair sum{number(range), number(range)};
+      if (round % 2 == 0) // much is cancelled, or little is missing to half a digit
+        sum = Pair{std::ldexp(a[0] * b[0], round % 108 - 54), std::nextafter(a[1] * b[1], 0)};
+      const Pair fused = lose_fused(sum, a, b);
+      for (std::size_t lane = 0; lane < 2; ++lane) {
+        const double expected = std::fma(-a[lane], b[lane], sum[lane]), got = fused[lane];
+        different += std::memcmp(&expected, &got, sizeof got) != 0 &&
+                             !(std::isnan(expected) && std::isnan(got))
+                         ? 1
+                         : 0;
+      }
+    }
+  EXPECT_EQ(different, 0u);
 }
 
 TEST(Factor, KeepsTheBackwardErrorAndItsMeasureCanFail) {

@@ -1,5 +1,6 @@
 #include "surface/gradient_normals.h"
 
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/field.h"
 
@@ -42,7 +43,7 @@ double worst_angle(const TriangleMesh& mesh) {
     EXPECT_NEAR(norm(normal), 1, 1e-6);
     const double cosine = dot(normal, mesh.points[p]) / norm(mesh.points[p]);
     const double angle = std::acos(std::min(1.0, cosine)) * 57.29577951308232;
-    worst = !(angle <= worst) ? angle : worst;
+    worst = test::larger(worst, angle);
   }
   return worst;
 }

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/zero_pages.h"
+#include "tests/unit/larger.h"
 #include "volume/grid.h"
 #include "volume/volume_stats.h"
 
@@ -207,8 +208,8 @@ TEST(VolumeStats, AgreesWithPlainSums) {
         sum += static_cast<double>(v) * static_cast<double>(times);
         const auto wide = static_cast<double>(v);
         inside += (level_set ? wide < isovalue : wide > isovalue) ? times : 0;
-        min = std::min(min, v);
-        max = std::max(max, v);
+        min = test::smaller(min, v);
+        max = test::larger(max, v);
       };
       for (const LeafRef& leaf : builder.add_leaves({}, origins))
         for (int n = 0; n < leaf_voxels; ++n) {

@@ -1,6 +1,7 @@
 // Cells whose isosurface is hard to get right: what the fixed rule makes of them, and how that
 // differs from the trilinear interpolant.
 
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/field.h"
 
@@ -25,7 +26,7 @@ Grid padded(const Cell& cell) {
   GridInfo info;
   double largest = 0;
   for (const double value : cell)
-    largest = std::max(largest, std::abs(value));
+    largest = test::larger(largest, std::abs(value));
   info.background = -static_cast<float>(largest);
   info.isovalue = 0;
   return sample(info, {7, 7, 7}, {8, 8, 8}, [&](int i, int j, int k) {

@@ -1,8 +1,8 @@
 // Densities of labels: planes, boxes and balls on all kinds of lattices.
 
 #include "base/error.h"
+#include "mesh/check.h"
 #include "surface/marching_cubes.h"
-#include "surface/mesh_check.h"
 #include "tests/unit/larger.h"
 #include "volume/label_density.h"
 

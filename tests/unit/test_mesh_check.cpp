@@ -1,6 +1,6 @@
 // Each property of the mesh report, with a mesh that has it and one that doesn't.
 
-#include "surface/mesh_check.h"
+#include "mesh/check.h"
 
 #include <gtest/gtest.h>
 

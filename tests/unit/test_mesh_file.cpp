@@ -508,15 +508,6 @@ TEST(MeshData, OrgansWeldAsCounted) {
   EXPECT_EQ(read(shared("hubmap_F_spleen_uv.obj"), options).points.size(), 4564u);
 }
 
-TEST(MeshData, UnionWeldsAsCounted) {
-  const std::string path = shared("ts_hepatobiliary_union.stl");
-  if (!fs::exists(path))
-    GTEST_SKIP() << "no " << path;
-  if (get(path).starts_with("00000000: ")) // a listing by xxd, of the colon's bytes
-    GTEST_SKIP() << path << " is a hexadecimal listing of another file";
-  expect_target({"ts_hepatobiliary_union.stl", std::nullopt, 14512, 43536, 29024, 1});
-}
-
 TEST(MeshData, MalformedFilesAreErrorsOrMeshes) {
   if (!fs::exists(shared("")))
     GTEST_SKIP() << "no " << shared("");

@@ -1,4 +1,4 @@
-#include "surface/mesh_quality.h"
+#include "mesh/quality.h"
 
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"

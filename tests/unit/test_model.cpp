@@ -1,16 +1,17 @@
 #include "base/error.h"
+#include "larger.h"
+#include "mesh_fixtures.h"
 #include "model/build.h"
-#include "model/edges.h"
 #include "model/material.h"
 #include "model/model.h"
 #include "model_meshes.h"
+#include "sim/elastostatic.h"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <gtest/gtest.h>
-#include <numeric>
 #include <random>
 #include <set>
 #include <sstream>
@@ -54,38 +55,6 @@ TEST(ModelBuild, ClosedSurfaceHasThreeHalvesEdgesPerFace) {
   EXPECT_EQ(built.report.boundary_edges, 3U);
 }
 
-TEST(ModelBuild, EdgesEqualASetOfAllPairs) {
-  std::mt19937 random(7);
-  for (int round = 0; round < 50; ++round) {
-    std::vector<Triangle> triangles;
-    std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
-    for (int t = 0; t < 40; ++t) {
-      std::array<std::uint32_t, 15> nodes{};
-      std::iota(nodes.begin(), nodes.end(), 0U);
-      std::shuffle(nodes.begin(), nodes.end(), random);
-      triangles.push_back({nodes[0], nodes[1], nodes[2]});
-      for (int k = 0; k < 3; ++k)
-        pairs.insert(std::minmax(nodes[static_cast<std::size_t>(k)],
-                                 nodes[static_cast<std::size_t>((k + 1) % 3)]));
-    }
-    const EdgeTable table = edge_table(triangles, 15, Context{});
-    ASSERT_EQ(table.size(), pairs.size());
-    std::size_t e = 0, corners = 0;
-    for (const auto& [i, j] : pairs) {
-      EXPECT_EQ(table.ends[e][0], i);
-      EXPECT_EQ(table.ends[e][1], j);
-      for (const std::uint32_t c : table.around(e)) {
-        const Triangle& t = triangles[c / 3];
-        EXPECT_NE(t[c % 3], i);
-        EXPECT_NE(t[c % 3], j);
-        ++corners;
-      }
-      ++e;
-    }
-    EXPECT_EQ(corners, 3 * triangles.size());
-  }
-}
-
 TEST(ModelBuild, MassIsDensityTimesThicknessTimesArea) {
   BuildOptions options;
   options.material = parse_material_choice("liver");
@@ -116,8 +85,9 @@ TEST(ModelBuild, StiffnessIsVanGelders) {
   }
   options.stiffness = 77;
   const Model constant = build(octahedron(), options).model;
+  // Central springs share 1000 F k by the nodes' areas: here six alike.
   for (const Spring& s : constant.springs)
-    EXPECT_EQ(s.stiffness, s.kind == SpringKind::central ? 77 * 0.1 : 77);
+    EXPECT_NEAR(s.stiffness, s.kind == SpringKind::central ? 77 * 0.1 * 1000 / 6 : 77, 1e-9 * 77);
   // Independent of the unit of length: k of a similar mesh is the same.
   options.stiffness.reset();
   const Model large = build(ball(0, 1e6), options).model;
@@ -134,7 +104,128 @@ TEST(ModelBuild, DampingRatioIsThatOfTwoMasses) {
   // Critical for the relative motion: c = 2 √(k μ), μ = m/2 between equal masses, m against a fixed
   // one.
   EXPECT_DOUBLE_EQ(model.springs.front().damping, 2 * std::sqrt(8.0 * 2));
-  EXPECT_DOUBLE_EQ(model.springs.back().damping, 2 * std::sqrt(0.8 * 4));
+  EXPECT_DOUBLE_EQ(model.springs.back().damping, 2 * std::sqrt(0.8 * 1000 / 6 * 4));
+}
+
+TEST(ModelBuild, DampingRatioOfASpringIsTheMeanOfItsEnds) {
+  // A strip of two faces of two materials: of its nodes 0, 1 and 2 have the first one's, 3 the
+  // other.
+  TriangleMesh strip;
+  strip.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  strip.triangles = {{0, 1, 2}, {1, 3, 2}};
+  strip.part = {0, 1};
+  BuildOptions options;
+  options.material.materials.assign(2, material_presets()[0]);
+  options.material.of_part = {0, 1};
+  options.material.materials[0].damping_ratio = 0.2;
+  options.material.materials[1].damping_ratio = 0.8;
+  options.stiffness = 8;
+  options.mass = 4;
+  options.centrals = 0;
+  for (const Spring& s : build(strip, options).model.springs)
+    EXPECT_DOUBLE_EQ(s.damping, 2 * (s.j == 3 ? 0.5 : 0.2) * std::sqrt(8.0 * 2)) << s.i << s.j;
+}
+
+/// Mean displacement, weighted by the load, under a total load of 1 that falls off from `place` to
+/// `reach`, by area.
+double response(const Model& model, Elastostatic& solver, const Vec3& place, double reach,
+                const Vec3& along) {
+  std::vector<double> area(model.nodes.size());
+  const auto at = [&](std::uint32_t i) { return model.nodes[i].position; };
+  for (const Triangle& t : model.triangles)
+    for (const std::uint32_t corner : t)
+      area[corner] += norm(cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0]))) / 6;
+  Load load;
+  double total = 0;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (const double far = norm(at(i) - place) / reach; far < 1) {
+      const double weight = (1 - far * far) * (1 - far * far) * area[i];
+      load.force[i] = weight * along;
+      total += weight;
+    }
+  solver.update(load);
+  const std::span<const double> u = solver.displacement();
+  double sum = 0;
+  for (const auto& [i, force] : load.force)
+    for (std::size_t a = 0; a < 3; ++a)
+      sum += force[static_cast<int>(a)] * u[3 * std::size_t{i} + a];
+  return sum / (total * total);
+}
+
+/// The mean over some places, of loads across the surface and along it.
+double mean_response(const Model& model, double radius) {
+  Elastostatic solver(model, {}, Context{});
+  double sum = 0;
+  for (const Vec3& out :
+       {Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0.6, 0.64, 0.48}, Vec3{-0.6, 0.48, -0.64}}) {
+    const Vec3 along = cross(out, {0.36, 0.48, 0.8});
+    sum += response(model, solver, radius * out, radius / 2, out);
+    sum += response(model, solver, radius * out, radius / 2, along / norm(along));
+  }
+  return sum / 8;
+}
+
+/// Central springs as they once were: F times the mean of the node's edge springs.
+void weight_by_node(Model& model) {
+  std::vector<double> sum(model.nodes.size()), count(model.nodes.size());
+  for (const Spring& s : model.springs)
+    if (s.kind == SpringKind::edge)
+      for (const std::uint32_t i : {s.i, s.j}) {
+        sum[i] += s.stiffness;
+        count[i] += 1;
+      }
+  for (Spring& s : model.springs)
+    if (s.kind == SpringKind::central)
+      s.stiffness = 0.1 * sum[s.i] / count[s.i];
+}
+
+TEST(ModelBuild, ResponseDoesNotDependOnTheResolution) {
+  for (const bool bend : {false, true}) {
+    BuildOptions options;
+    options.bend = bend;
+    std::vector<double> by_area, by_node;
+    for (const int levels : {3, 4, 5}) { // 642, 2,562 and 10,242 nodes
+      Model model = build(test::sphere_mesh(levels, 30, {}), options).model;
+      by_area.push_back(mean_response(model, 30));
+      weight_by_node(model);
+      by_node.push_back(mean_response(model, 30));
+    }
+    const auto spread = [](const std::vector<double>& values) {
+      const auto [least, most] = std::minmax_element(values.begin(), values.end());
+      return *most / *least;
+    };
+    EXPECT_TRUE(spread(by_area) <= 1.1) << by_area[0] << ' ' << by_area[1] << ' ' << by_area[2];
+    EXPECT_GT(spread(by_node), 2); // negative control
+  }
+}
+
+TEST(ModelBuild, CentralPlacesFollowTheShapeNotTheNet) {
+  // One half of the net four times as fine as the other.
+  TriangleMesh even = test::sphere_mesh(4, 30, {}), uneven = test::sphere_mesh(3, 30, {});
+  for (Vec3& p : even.points) // no ball, so that the places are determined
+    p = {1.6 * p.x, 1.2 * p.y + 0.01 * p.x * p.x, p.z};
+  std::vector<Triangle> split;
+  for (const Triangle& t : uneven.triangles) {
+    const Vec3 a = uneven.points[t[0]], b = uneven.points[t[1]], c = uneven.points[t[2]];
+    if (a.x + b.x + c.x < 0) {
+      split.push_back(t);
+      continue;
+    }
+    const auto hub = static_cast<std::uint32_t>(uneven.points.size());
+    uneven.points.push_back((a + b + c) / 3);
+    split.insert(split.end(), {{t[0], t[1], hub}, {t[1], t[2], hub}, {t[2], t[0], hub}});
+  }
+  uneven.triangles = split;
+  for (Vec3& p : uneven.points)
+    p = {1.6 * p.x, 1.2 * p.y + 0.01 * p.x * p.x, p.z};
+  const Model a = build(even).model, b = build(uneven).model;
+  for (std::size_t c = 0; c < 4; ++c) {
+    double nearest = HUGE_VAL;
+    for (std::size_t d = 0; d < 4; ++d)
+      nearest = test::smaller(nearest, norm(a.nodes[surface_count(a) + c].position -
+                                            b.nodes[surface_count(b) + d].position));
+    EXPECT_TRUE(nearest <= 6) << c << ' ' << nearest; // of 96 mm
+  }
 }
 
 TEST(ModelBuild, BendingSpringsCrossInnerEdges) {
@@ -189,7 +280,8 @@ TEST(ModelBuild, CentralNodesTieEveryNodeToItsOwnComponent) {
   for (std::size_t c = surface; c < model.nodes.size(); ++c) {
     EXPECT_EQ(model.nodes[c].fixed, fixed_all);
     EXPECT_EQ(parts.of_node[c], c < surface + 4 ? 0U : 1U); // component by component
-    EXPECT_LE(norm(mean[c] / size[c] - model.nodes[c].position), 1e-12);
+    // The mean of the surface that is nearest to it, which its nodes tell but roughly.
+    EXPECT_LE(norm(mean[c] / size[c] - model.nodes[c].position), 0.2);
   }
   BuildOptions options;
   options.centrals_free = true;
@@ -229,6 +321,13 @@ TEST(ModelBuild, ClustersAreStationaryAndTheSameForAnyThreads) {
   EXPECT_EQ(std::set<std::uint32_t>(a.of_point.begin(), a.of_point.end()).size(), 7U);
 
   EXPECT_EQ(build_model(mesh, {}, one).model, build_model(mesh, {}, two).model);
+  // Weights pull the means.
+  const std::vector<Vec3> row{{0, 0, 0}, {3, 0, 0}};
+  EXPECT_EQ(cluster_points(row, 1, one, std::vector<double>{1, 2}).centers[0], (Vec3{2, 0, 0}));
+  const Clusters near = nearest_clusters(row, {{-9, 0, 0}, {1, 0, 0}, {2, 0, 0}}, one);
+  EXPECT_EQ(near.of_point, (std::vector<std::uint32_t>{0, 1}));
+  ASSERT_EQ(near.centers.size(), 2U); // the one that is nobody's nearest is gone
+  EXPECT_EQ(near.centers[0], (Vec3{1, 0, 0}));
   // More places than points, and points that coincide.
   EXPECT_EQ(cluster_points({{0, 0, 0}, {0, 0, 0}, {1, 0, 0}}, 5, one).centers.size(), 2U);
 }

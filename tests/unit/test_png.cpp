@@ -77,6 +77,9 @@ TEST(Png, RoundTripAndSameBytesTwice) {
 TEST(Png, EveryKindGivesItsStoredValues) {
   EXPECT_EQ(read_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 0, 128, 127, 255, 255}}), "x"),
             (Image{3, 1, 1, {0, 128, 255}})); // 32895 / 257 = 127.996
+  // The nearest, not the upper byte: 255 / 257 = 0.99, 65024 / 257 = 253.01, 128 / 257 = 0.498.
+  EXPECT_EQ(read_png(make_png(3, 1, {16, PNG_COLOR_TYPE_GRAY}, {{0, 255, 254, 0, 0, 128}}), "x"),
+            (Image{3, 1, 1, {1, 253, 0}}));
   EXPECT_EQ(read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_GRAY}, {{0b00011011}}), "x"),
             (Image{4, 1, 1, {0, 85, 170, 255}}));
   EXPECT_EQ(read_png(make_png(4, 1, {2, PNG_COLOR_TYPE_PALETTE}, {{0b00011011}}), "x"),
@@ -176,6 +179,7 @@ TEST(Pnm, AllFourKinds) {
   EXPECT_EQ(read_pnm("P2#c\n3#c\n1 5 # x\n0 1\t5", "x"), (Image{3, 1, 1, {0, 51, 255}}));
   EXPECT_EQ(read_pnm("P3 1 2 65535 0 65535 32768 1 2 3", "x"),
             (Image{1, 2, 3, {0, 255, 128, 0, 0, 0}}));
+  EXPECT_EQ(read_pnm("P2 4 1 65535 128 129 65406 65407", "x"), (Image{4, 1, 1, {0, 1, 254, 255}}));
   EXPECT_EQ(read_pnm("P5 2 1 255\n#a", "x"), (Image{2, 1, 1, {'#', 'a'}}));
   EXPECT_EQ(read_pnm(std::string("P5 1 1 65535\n\xff\0", 15), "x"), (Image{1, 1, 1, {254}}));
   EXPECT_EQ(read_pnm("P6 1 1 255\nabc", "x"), (Image{1, 1, 3, {'a', 'b', 'c'}}));

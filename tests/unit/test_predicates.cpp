@@ -1,6 +1,6 @@
 // The exact predicates against rational arithmetic.
 
-#include "volume/exact_predicates.h"
+#include "mesh/exact_predicates.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

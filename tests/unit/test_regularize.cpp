@@ -1,8 +1,9 @@
 #include "surface/regularize.h"
 
 #include "base/error.h"
-#include "surface/mesh_quality.h"
-#include "surface/self_intersections.h"
+#include "mesh/quality.h"
+#include "mesh/self_intersections.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/field.h"
 
@@ -20,7 +21,7 @@ double worst_offset(const Grid& grid, const TriangleMesh& mesh, double isovalue)
   for (const Vec3& p : mesh.points) {
     const Vec3 index = grid.info().transform.to_index(p);
     const double offset = std::abs(field.value(index) - isovalue) / norm(field.gradient(index));
-    worst = !(offset <= worst) ? offset : worst;
+    worst = test::larger(worst, offset);
   }
   return worst;
 }

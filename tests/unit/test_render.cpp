@@ -1,6 +1,7 @@
 // The parts of rendering: camera, coordinates, tangents, images.
 
 #include "base/error.h"
+#include "larger.h"
 #include "mesh_fixtures.h"
 #include "model_meshes.h"
 #include "render/angles.h"
@@ -64,7 +65,8 @@ TEST(RenderCamera, EveryViewShowsTheWholeBoxAndFillsThePicture) {
         const auto clip = clip_of(projection, (p - Vec3{1, 2, 3}) / 7);
         EXPECT_GT(clip[3], projection.near);
         EXPECT_LE(std::fabs(clip[2]), clip[3]) << view;
-        most = std::max({most, std::fabs(clip[0]) / clip[3], std::fabs(clip[1]) / clip[3]});
+        for (int a = 0; a < 2; ++a)
+          most = test::larger(most, std::fabs(clip[a]) / clip[3]);
       }
       EXPECT_LT(most, 1);
       EXPECT_GT(most, 0.9) << view;
@@ -118,8 +120,8 @@ TEST(RenderUv, SphereFollowsLongitudeAndLatitudeWithoutATear) {
     for (std::size_t c = 0; c < 3; ++c) {
       const Vec3 p = ball.points[ball.triangles[t][c]] - Vec3{1, 2, 3};
       const double s = texcoords[t][2 * c];
-      low = std::min(low, s);
-      high = std::max(high, s);
+      low = test::smaller(low, s);
+      high = test::larger(high, s);
       if (std::hypot(p.x, p.y) > 1e-6) {
         const double expected = std::atan2(p.y, p.x) / (2 * pi);
         EXPECT_NEAR(std::remainder(s - expected, 1.0), 0, 1e-6);

@@ -1,6 +1,7 @@
 // The rasteriser's rules, which no picture of an organ shows.
 
 #include "base/error.h"
+#include "larger.h"
 #include "mesh_fixtures.h"
 #include "model_meshes.h"
 #include "render/picture.h"
@@ -219,8 +220,9 @@ TEST(RenderRaster, WrapsAndFiltersAreThoseOfTheTexture) {
                              static_cast<std::uint32_t>(4 * inside(t)));
             }
             for (std::size_t c = 0; c < 3; ++c)
-              most = std::max(most, std::fabs(picture.values[3 * (std::size_t{200} * y + x) + c] -
-                                              255 * wanted[c]));
+              most =
+                  test::larger(most, std::fabs(picture.values[3 * (std::size_t{200} * y + x) + c] -
+                                               255 * wanted[c]));
           }
         EXPECT_LE(most, 0.502) << static_cast<int>(wrap) << static_cast<int>(filter);
       }

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "formats/mesh_file.h"
+#include "larger.h"
 #include "mesh_fixtures.h"
 #include "render/gl_context.h"
 #include "render/gl_renderer.h"
@@ -130,7 +131,7 @@ Image draw(Case& c, Backend backend, Camera& camera, CpuLevel cpu = CpuLevel::av
   picture.width = c.width;
   picture.height = c.height;
   Context context;
-  context.cpu = std::min(context.cpu, cpu);
+  context.cpu = test::smaller(context.cpu, cpu);
   return make_picture(make_drawing(surfaces, drawing_options(c.scene, camera), context), camera,
                       test::look_of(c.scene), picture, context);
 }
@@ -360,7 +361,7 @@ TEST(RenderRest, TriplanarOfAPlaneIsTheBoxMapping) {
           make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
       int most = 0;
       for (std::size_t n = 0; n < box.values.size(); ++n)
-        most = std::max(most, std::abs(box.values[n] - three.values[n]));
+        most = test::larger(most, std::abs(box.values[n] - three.values[n]));
       EXPECT_LE(most, 1) << axis << flip;
       EXPECT_GT(*std::max_element(box.values.begin(), box.values.end()), 100);
     }
@@ -455,7 +456,7 @@ TEST(RenderRest, NoiseHasTheMomentsThatAreStated) {
     const double value = test::noise_oracle(p, 2, 5);
     sum += value;
     squares += value * value;
-    most = std::max(most, std::fabs(value));
+    most = test::larger(most, std::fabs(value));
     veins += test::solid_oracle(sharp, p, 0) / count;
     mean += test::solid_oracle(faded, p, 5) / count;
   }

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "formats/volume_file.h"
 #include "formats/volume_plugin.h"
+#include "larger.h"
 #include "render/color_ramp.h"
 #include "render/volume_view.h"
 #include "scratch.h"
@@ -108,8 +109,8 @@ TEST(RenderVolume, SlicesAreTheFieldAtThePixels) {
   double worst = 0;
   for (std::size_t y = 0; y < 64; ++y)
     for (std::size_t x = 0; x < 64; ++x)
-      worst = std::max(worst, std::abs(static_cast<double>(view.values[y * 64 + x]) -
-                                       f(place(view, x, y) - view.camera.back * 1.5)));
+      worst = test::larger(worst, std::abs(static_cast<double>(view.values[y * 64 + x]) -
+                                           f(place(view, x, y) - view.camera.back * 1.5)));
   EXPECT_LT(worst, 4e-6);
 }
 
@@ -127,8 +128,8 @@ double sampled_maximum(const Grid& grid, const Vec3& from, const Vec3& along) {
   double best = static_cast<double>(grid.info().background);
   for (std::size_t n = 0; n + 1 < planes.size(); ++n)
     for (int m = 0; m <= 64; ++m)
-      best =
-          std::max(best, field.value(p + d * (planes[n] + (planes[n + 1] - planes[n]) * m / 64)));
+      best = test::larger(best,
+                          field.value(p + d * (planes[n] + (planes[n + 1] - planes[n]) * m / 64)));
   return best;
 }
 

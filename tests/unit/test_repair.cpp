@@ -1,9 +1,9 @@
-#include "surface/repair.h"
+#include "mesh/repair.h"
 
 #include "base/error.h"
+#include "mesh/check.h"
+#include "mesh/weld.h"
 #include "mesh_fixtures.h"
-#include "surface/mesh_check.h"
-#include "surface/weld.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 #include "volume/resample.h"
 
 #include "base/error.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 
 #include <gtest/gtest.h>
@@ -108,15 +109,15 @@ TEST(Resample, AThinSheetKeepsItsMassWhereverItLies) {
       const Grid sheet =
           sample({}, {-20, -20, offset}, {20, 20, offset}, [](int, int, int) { return 1.0; });
       const double kept = mass(resample({}, sheet, uniform_transform(size))) / mass(sheet);
-      least = std::min(least, kept);
-      most = std::max(most, kept);
+      least = test::smaller(least, kept);
+      most = test::larger(most, kept);
       // The negative control: the values at the new centres alone.
       GridAccessor values(sheet);
       double points = 0;
       for (int k = -9; k < 9; ++k)
         points += static_cast<double>(values.value({0, 0, static_cast<int>(k * size)})) * size;
-      least_points = std::min(least_points, points);
-      most_points = std::max(most_points, points);
+      least_points = test::smaller(least_points, points);
+      most_points = test::larger(most_points, points);
     }
     // Exact at whole ratios; else the weights of a centre, divided by their sum, err a little.
     const double tolerance = size == std::floor(size) ? 1e-6 : 0.03;

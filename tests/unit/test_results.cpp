@@ -7,6 +7,7 @@
 #include "sim_models.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include <functional>
 #include <gtest/gtest.h>
 #include <iterator>
+#include <sstream>
 #include <string>
 
 namespace gewebe {
@@ -320,6 +322,55 @@ TEST(Results, ShapesThatCutsChangeAreReadAsTheyWere) {
   EXPECT_EQ(cuts.groups(), (std::vector<std::string>{"1", "2"}));
   EXPECT_EQ(cuts.group("2").read<std::uint32_t>("origin", run.again.nodes.size()),
             run.origin(run.again));
+}
+
+/// What stands between two texts, from `at` on, which goes behind it; empty if they don't follow.
+std::string between(const std::string& text, const std::string& open, const std::string& close,
+                    std::size_t& at) {
+  const std::size_t begin = text.find(open, at), end = text.find(close, begin + open.size());
+  if (begin == std::string::npos || end == std::string::npos)
+    return {};
+  at = end;
+  return text.substr(begin + open.size(), end - begin - open.size());
+}
+
+// Row, size and place of each frame's displacements name the numbers of that frame.
+TEST(Results, TheXdmfOfACutObjectNamesTheRowsOfEachFrame) {
+  const ScratchFolder folder;
+  const CutRun run;
+  run.write(Kind::hdf5, folder / "run.h5");
+  const hdf5::File file = hdf5::File::open(folder / "run.h5");
+  const std::string text = bytes_of(folder / "run.xdmf");
+  std::vector<std::pair<std::string, double>> told; // object, its displacement
+  std::size_t at = 0;
+  for (std::string slab;
+       !(slab = between(text, "Dimensions=\"3 3\">", "</DataItem>", at)).empty();) {
+    std::istringstream numbers(slab);
+    std::uint64_t row = 0, n = 0;
+    std::array<std::uint64_t, 8> rest{};
+    numbers >> row;
+    for (std::uint64_t& number : rest)
+      numbers >> number;
+    n = rest[6];
+    EXPECT_EQ(rest, (std::array<std::uint64_t, 8>{0, 0, 1, 1, 1, 1, n, 3})) << slab;
+    std::istringstream shape(between(text, "Dimensions=\"", "\"", at));
+    std::vector<std::uint64_t> dimensions{std::istream_iterator<std::uint64_t>(shape), {}};
+    const std::string path = between(text, ":/objects/", "/displacement<", at);
+    hdf5::Group group = file.root().group("objects");
+    std::istringstream parts(path);
+    for (std::string part; std::getline(parts, part, '/');)
+      group = group.group(part);
+    const hdf5::Dataset set = group.dataset("displacement", hdf5::Number::float32);
+    ASSERT_NO_THROW(set.require_shape(dimensions)) << path;
+    ASSERT_EQ(dimensions[1], n);
+    ASSERT_LT(row, dimensions[0]);
+    std::vector<float> values(3 * n);
+    set.read_rows(row, std::span<float>(values));
+    EXPECT_EQ(values.front(), values.back());
+    told.emplace_back(path.substr(0, path.find('/')), static_cast<double>(values.front()));
+  }
+  EXPECT_EQ(told, (std::vector<std::pair<std::string, double>>{
+                      {"o", 0}, {"o", 1}, {"o", 2}, {"o", 3}, {"o.1", -3}, {"o", 4}, {"o.1", -4}}));
 }
 
 TEST(Results, EachShapeOfASeriesHasItsOwnTriangles) {

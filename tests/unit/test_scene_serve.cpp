@@ -1,13 +1,14 @@
 // Scenes that are driven: wrong lines, records, events, latencies, series of shapes.
 
-#include "base/digest.h"
 #include "base/error.h"
 #include "formats/event_log.h"
 #include "formats/frames_binary.h"
 #include "formats/results_mesh.h"
+#include "formats/scene.h"
 #include "formats/scene_record.h"
 #include "formats/scene_run.h"
 #include "formats/step_latency.h"
+#include "fuzzed_scenes.h"
 #include "scratch.h"
 #include "sim_models.h"
 
@@ -201,10 +202,147 @@ TEST(SceneServe, ARunThatFailsHalfWayKeepsWhatWasAnswered) {
   const Served live =
       serve({"object a two", "at 0.0251 force a 0 1e308 0 0", "run 1 every 0.01"}, record.path());
   EXPECT_EQ(live.errors, 1U);
-  EXPECT_NE(live.replies.find("step 3 0.03\ndone\nerror 3: object a at "), std::string::npos)
+  EXPECT_NE(live.replies.find("step 2 0.02\ndone\nerror 3: object a at "), std::string::npos)
       << live.replies;
   EXPECT_EQ(lines_of(content(record.path())).back().substr(0, 4), "run ");
   EXPECT_EQ(serve(lines_of(content(record.path()))).replies, without_errors(live.replies));
+}
+
+TEST(SceneServe, RefusedInstrumentsAreNotKnown) {
+  const ScratchFile record(".scene");
+  const Served live =
+      serve({"object o two", "step 0.1", "at 0.05 instrument p sphere 1 0 0 20", "at 1 withdraw p",
+             "instrument p sphere 1e300 0 0 20", "instrument p sphere 1 0 0 2e38", "withdraw p",
+             "at 0.2 instrument p sphere 1 0 0 20", "at 0.3 withdraw p", "step 1"},
+            record.path());
+  EXPECT_EQ(live.errors, 5U);
+  EXPECT_NE(live.replies.find("error 4: there is no instrument 'p'"), std::string::npos);
+  const Served again = serve(lines_of(content(record.path())), "", "", false);
+  EXPECT_EQ(again.error, "");
+  EXPECT_EQ(again.replies, without_errors(live.replies));
+}
+
+TEST(SceneServe, ResultsHoldWhatWasAnsweredAlone) {
+  // A first step that fails, then a cut that frees a part: no frame before the part.
+  const auto run = [](const std::vector<std::string>& lines) {
+    return test::run_fuzzed(lines, true, 1, "");
+  };
+  const std::vector<std::string> before{"object o ball method=ela", "displace o 4 0 0 1"},
+      after{"cut o plane 100 -50 41 0 0 1", "step 0.001"};
+  std::vector<std::string> right = before, failing = before;
+  right.insert(right.end(), after.begin(), after.end());
+  for (const char* line : {"force o 6 1e300 0 0", "step 0.001", "release o 6"})
+    failing.emplace_back(line);
+  failing.insert(failing.end(), after.begin(), after.end());
+  const test::FuzzedRun calm = run(right), served = run(failing);
+  EXPECT_EQ(calm.fault + served.fault, "");
+  EXPECT_EQ(calm.errors, 0U) << calm.replies;
+  EXPECT_EQ(served.errors, 1U) << served.replies;
+  EXPECT_EQ(served.result, calm.result);
+  EXPECT_EQ(served.digest, calm.digest);
+}
+
+TEST(SceneServe, ARecordNamesFilesAsAScenesWordsCan) {
+  const ScratchFile record(".scene");
+  for (const char* folder : {"a\"b/", "a\nb/"}) {
+    EXPECT_THROW(SceneRecord(record.path(), Output::Options{},
+                             std::string("/nowhere/") + folder + "s.scene"),
+                 Error)
+        << folder;
+  }
+  SceneRecord named(record.path(), Output::Options{}, "/nowhere/a b#c/s.scene");
+  const std::string line = "object o \"my m.ela\" store=\"s t.h5\"";
+  named.line(line, *parse_scene_line(line), {});
+  named.commit();
+  const std::string kept = lines_of(content(record.path())).at(0);
+  const auto command = parse_scene_line(kept);
+  const auto& object = std::get<ObjectCommand>(command->what);
+  EXPECT_TRUE(object.model.ends_with("/nowhere/a b#c/my m.ela")) << kept;
+  EXPECT_TRUE(object.store.ends_with("/nowhere/a b#c/s t.h5")) << kept;
+}
+
+TEST(SceneServe, ALineWithoutEndIsRefusedAtOnce) {
+  const ScratchFile file(".scene");
+  std::ofstream(file.path(), std::ios::binary)
+      << "object o two\n"
+      << std::string((1U << 24U) + 5, '#') << "\nstep 0.1\n";
+  for (const bool serving : {false, true}) {
+    std::string replies;
+    SceneOptions options;
+    options.files.model = [](const std::string&) { return test::two_masses(); };
+    options.reply = [&](std::string_view text) { replies += text; };
+    options.serve = serving;
+    SceneRun run("s", Context{}, options);
+    Input input(file.path(), false);
+    if (serving) {
+      run_scene(input, run);
+      EXPECT_EQ(run.counts().errors, 1U);
+      EXPECT_NE(replies.find("step 1 0.1"), std::string::npos);
+    } else {
+      EXPECT_THROW(run_scene(input, run), Error);
+    }
+  }
+}
+
+TEST(SceneServe, AnyScenePlaysAgainToTheLastByte) {
+  test::FuzzedCounts seen;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed)
+    EXPECT_EQ(test::fault_of_scene(test::FuzzedScene(seed).lines(), seen), "")
+        << "seed " << seed << " of stress_scenes";
+  EXPECT_GT(seen.steps, 200U); // or nothing was tried
+  EXPECT_LT(seen.slow, 3U);
+}
+
+TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> scenes{
+      {"an instrument that a failed step brought pushes a body that moves",
+       {"object a free store=free method=ela", "object b sheet method=ffe", "step 0.002",
+        "step 0.001", "force a \"8 or not (x<-9.797958971132712)\" 21070 -29620 29710",
+        "run 0.0095 every 0.001", "at every 0.004 instrument p sphere 8.976 4.697 8.696 -3.166",
+        "step 0.005", "step 0.001"}},
+      {"as well, where the step fails by a file",
+       {"object b free", "step 0.002", "force b x>8.48528137423857 -41370 22110 23920",
+        "step 0.005", "step 0.001",
+        "at 0.0085 instrument q capsule 12.188 14.328 4.907 16.352 2.687999999999999 "
+        "-3.9019999999999992 5.182",
+        "object d sheet store=sheet method=ffe", "at every 0.002 method d ela",
+        "run 0.018000000000000002 every 0.0015", "step 0.002"}},
+      {"parts that a failed step restored and that instruments touch",
+       {"object a free store=free method=ela",
+        "instrument q capsule 4.7712 -7.62755439013544 -1.2152011883810774 3.705 "
+        "-18.74755439013544 -5.113201188381078 -4.08 friction 0.7756",
+        "tear a 0.05415", "step 0.0025", "step 0.005", "at every 0.0015 restore a", "step 0.005",
+        "move q 12.36628137423857 9.35038137423857 -0.7874 turn -0.8838 -0.3818 0.008695 74.19 "
+        "over 0.001",
+        "step 0.001"}},
+      {"a way that ends in a failed step",
+       {"object b tube store=tube method=ela", "at 0.01 pressure b 17-48 1e300 period 0.002",
+        "displace b 18 -7.579 -5.89 -4.997 over 0.01", "step 0.002", "step 0.002", "step 0.0025",
+        "step 0.005", "step 0.002"}},
+      {"a way that had ended before one",
+       {"object a shell method=ela", "step 0.0025",
+        "displace a sphere:-7.071067811865475,0,7.071067811865475,7.2540000000000004 1.287 0.3945 "
+        "-0 over 0.0015",
+        "step 0.0025", "at 0.015 force a x>0 1e38 -14990 45240", "step 0.001", "step 0.005",
+        "step 0.005", "step 0.001"}},
+      {"an instrument that comes while a factor can't be had",
+       {"object a free store=free method=ffe", "emit instruments",
+        "cut a plane 0 -11.08655439013544 4.592201188381077 -1.831 -1.183 -0.4173", "step 0.005",
+        "cut a plane 4.898979485566356 -9.797958971132712 4.898979485566356 -0.3091 0.6292 1.435",
+        "step 0.001", "instrument k blade 4.111 -4.85 -5.27 11.982 -15.129999999999999 -22.2",
+        "step 0.001"}},
+      {"two steps of stiffness, told again in a failed step",
+       {"object b sheet method=ela", "object c tube store=tube method=ffe", "at 0.012 restore b",
+        "force c 21-48 35350 -33940 15980", "step 0.005", "at every 0.0015 two-step c 9399",
+        "step 0.0025", "force c 22,17 -14320 -1268 28030", "step 0.005", "step 0"}},
+      {"what a failed step emits",
+       {"object o two", "at 0.05 emit instruments", "at 0.06 force o 0 1e308 0 0", "step 0.1",
+        "step 0.01"}}};
+  for (const auto& [what, lines] : scenes) {
+    test::FuzzedCounts seen;
+    EXPECT_EQ(test::fault_of_scene(lines, seen), "") << what;
+    EXPECT_GT(seen.errors + (lines[1].starts_with("emit") ? 1 : 0), 0U) << what; // or none failed
+  }
 }
 
 TEST(SceneServe, NodeListsAreInTheRecordByNumber) {

@@ -1,6 +1,6 @@
 // Self-intersections as we find them, and as CGAL does.
 
-#include "surface/self_intersections.h"
+#include "mesh/self_intersections.h"
 
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"

@@ -1,10 +1,13 @@
 #include "base/error.h"
+#include "larger.h"
 #include "sim/simulation.h"
 #include "sim_models.h"
 
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <utility>
+#include <vector>
 
 namespace gewebe {
 namespace {
@@ -199,7 +202,7 @@ TEST(Simulation, AttachedObjectsPullEachOtherAndTheOthersSleep) {
   const std::size_t n = tied.size() / 3;
   double moved = 0;
   for (std::size_t i = n; i < 2 * n; ++i) {
-    moved = std::max(moved, std::abs(tied[i]));
+    moved = test::larger(moved, std::abs(tied[i]));
     EXPECT_EQ(loose[i], 0);
   }
   EXPECT_GT(moved, 1e-4);
@@ -283,6 +286,70 @@ TEST(Simulation, ElastostaticObjectsFollowPulsesAndTravel) {
   s.apply(SetPressure{0, free_nodes(s.model(0)), {100, 0}});
   s.step(1);
   EXPECT_NE(moved(s, 0, node), Vec3{});
+}
+
+TEST(Simulation, APressureOnAnElastostaticObjectPulsesWithItsPeriod) {
+  const std::vector<std::uint32_t> nodes = free_nodes(organ());
+  Simulation steady(threads(1), {}), pulsing(threads(1), {});
+  for (Simulation* s : {&steady, &pulsing})
+    s->add_object("a", organ(), Method::ffe);
+  steady.apply(SetPressure{0, nodes, {100, 0}});
+  steady.step(1);
+  pulsing.apply(SetPressure{0, nodes, {100, 0.8}});
+  // Share of the whole: 3x² - 2x³ of the way to the midst of a period.
+  const std::vector<std::pair<double, double>> shares{
+      {0.2, 0.5}, {0.4, 1}, {0.7, 0.15625}, {0.8, 0}, {0.9, 0.15625}, {1.2, 1}, {1.4, 0.5}};
+  for (const auto& [time, share] : shares) {
+    pulsing.step_to(time);
+    for (const std::uint32_t node : nodes) {
+      const Vec3 whole = moved(steady, 0, node);
+      EXPECT_LE(norm(moved(pulsing, 0, node) - share * whole), 1e-9 * norm(whole)) << time;
+    }
+  }
+}
+
+TEST(Simulation, AMillionRepeatedEventsAreRefused) {
+  SimulationOptions how;
+  how.guard = true;
+  Simulation s(threads(1), how);
+  s.add_object("a", organ(), Method::ffe);
+  const std::uint32_t node = free_nodes(s.model(0))[3];
+  EXPECT_THROW(s.schedule_every(1e-300, Release{0, {node}}), Error);
+  EXPECT_THROW(s.apply(SetForce{0, {node}, {1, 0, 0}, 1e-300}), Error);
+  EXPECT_THROW(s.apply(SetPressure{0, {node}, {1, 1e-10}}), Error);
+  s.schedule_every(1e-8, Release{0, {node}});
+  EXPECT_THROW(s.step(1), Error);
+  EXPECT_EQ(s.time(), 0);
+  s.step(1e-6);
+  EXPECT_EQ(s.time(), 1e-6);
+  EXPECT_THROW(s.step(1.7e308 + 1e307), Error);
+}
+
+TEST(Simulation, AnExplosionIsAFailedStepAndTheResultGoesOn) {
+  SimulationOptions how;
+  how.guard = true;
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const double force : {1e18, 1e40, 1e300}) {
+      Simulation s(threads(1), how);
+      s.add_object("a", organ(), method);
+      s.apply(Emit{});
+      const std::uint32_t node = free_nodes(s.model(0))[3];
+      s.apply(SetForce{0, {node}, {1, 0, 0}});
+      s.step(0.01);
+      const std::vector<double> before(s.displacement(0).begin(), s.displacement(0).end());
+      s.apply(SetForce{0, {node}, {force, 0, 0}});
+      EXPECT_THROW(s.step(0.01), Error) << method_name(method) << force;
+      EXPECT_EQ(s.time(), 0.01);
+      EXPECT_EQ(std::vector<double>(s.displacement(0).begin(), s.displacement(0).end()), before);
+      s.apply(SetForce{0, {node}, {1, 0, 0}});
+      s.step(0.01);
+      // No such place is asked for, either.
+      EXPECT_THROW(s.apply(SetDisplacement{0, {node}, {1e300, 0, 0}}), Error);
+      EXPECT_THROW(s.schedule(1, SetDisplacement{0, {node}, {0, 1e9, 0}}), Error);
+      EXPECT_THROW(s.apply(SetInstrument{0, {0, {1, 0, 0}, 0, true}, {{1e300, 0, 0}, {}}, "k"}),
+                   Error);
+      EXPECT_EQ(s.instrument_count(), 0U);
+    }
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 // Objects that are read late, change their method, and steps that are taken back.
 
 #include "base/error.h"
+#include "larger.h"
 #include "simulation_scenes.h"
 
 #include <cmath>
@@ -16,7 +17,8 @@ using test::free_nodes, test::one_thread, test::organ, test::shape;
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.size(); i += 3)
-    largest = std::max(largest, norm(Vec3{a[i] - b[i], a[i + 1] - b[i + 1], a[i + 2] - b[i + 2]}));
+    largest =
+        test::larger(largest, norm(Vec3{a[i] - b[i], a[i + 1] - b[i + 1], a[i + 2] - b[i + 2]}));
   return largest;
 }
 

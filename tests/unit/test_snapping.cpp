@@ -1,6 +1,7 @@
 #include "surface/snapping.h"
 
 #include "base/error.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 
 #include <gtest/gtest.h>
@@ -112,7 +113,7 @@ TEST(Snapping, PointsStayNear) {
   const auto worst = [&](const SnapOptions& options) {
     double largest = 0;
     for (const Vec3& p : snap({}, surface, options).mesh.points)
-      largest = std::max(largest, std::abs(density(balls, p) - 0.5));
+      largest = test::larger(largest, std::abs(density(balls, p) - 0.5));
     return largest;
   };
   const double unsnapped = worst({.epsilon = 0});

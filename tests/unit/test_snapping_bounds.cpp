@@ -1,8 +1,8 @@
 // What snapping at epsilon 0.5 costs in error and gives in quality, as the manual promises.
 
 #include "formats/mesh_file.h"
-#include "surface/mesh_quality.h"
-#include "surface/self_intersections.h"
+#include "mesh/quality.h"
+#include "mesh/self_intersections.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/coverage.h"

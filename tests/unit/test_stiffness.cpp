@@ -1,8 +1,9 @@
 // K, and what follows from it: symmetry, springs' forces, reactions.
 
-#include "sim/stiffness.h"
+#include "solve/stiffness.h"
 
 #include "base/digest.h"
+#include "larger.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
@@ -36,7 +37,7 @@ std::vector<double> spring_forces(const Model& model, const std::vector<double>&
 double largest(const std::vector<double>& x) {
   double most = 0;
   for (const double value : x)
-    most = std::max(most, std::abs(value));
+    most = test::larger(most, std::abs(value));
   return most;
 }
 
@@ -53,7 +54,7 @@ double difference_error(const Model& model) {
   const std::vector<double> fp = spring_forces(model, plus), fm = spring_forces(model, minus);
   double error = 0;
   for (std::size_t i = 0; i < u.size(); ++i)
-    error = std::max(error, std::abs(-(fp[i] - fm[i]) / (2 * h) - ku[i]));
+    error = test::larger(error, std::abs(-(fp[i] - fm[i]) / (2 * h) - ku[i]));
   return error / largest(ku);
 }
 
@@ -73,7 +74,7 @@ TEST(Stiffness, EqualsDifferencesOfTheForces) {
   multiply_stiffness(other, random_vector(a.size(), 5), b);
   double apart = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
-    apart = std::max(apart, std::abs(a[i] - b[i]));
+    apart = test::larger(apart, std::abs(a[i] - b[i]));
   EXPECT_GE(apart, 1e-3 * largest(a));
 }
 

@@ -3,12 +3,13 @@
 #include "sim/stiffness_change.h"
 
 #include "cut_models.h"
+#include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
 #include "sim/corrected_columns.h"
 #include "sim/woodbury.h"
+#include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +33,7 @@ void expect_identity(const Model& before, const HandCut& cut, const StiffnessCha
   multiply_stiffness(cut.model, wide, pull);
   double size = 0;
   for (const double x : pull)
-    size = std::max(size, std::abs(x));
+    size = test::larger(size, std::abs(x));
   for (std::size_t i = 0; i < before.nodes.size(); ++i)
     for (std::size_t a = 0; a < 3; ++a)
       pull[3 * std::size_t{change.place[i]} + a] -= f[3 * i + a];
@@ -86,7 +87,7 @@ TEST(StiffnessChange, TouchedNodesAreThoseWhoseRowsDiffer) {
     const std::size_t p = cut.place[i];
     double most = 0;
     for (std::size_t a = 0; a < 3; ++a)
-      most = std::max(most, std::abs(f[3 * i + a] - g[3 * p + a]));
+      most = test::larger(most, std::abs(f[3 * i + a] - g[3 * p + a]));
     EXPECT_EQ(most > 1e-9, touched[p] != 0) << i;
     changed += touched[p];
   }
@@ -186,7 +187,7 @@ TEST(StiffnessChange, ColumnsOfFloat32StayAsExactAsTheyWere) {
     exact.read(k, a);
     EXPECT_LT(relative_difference(a, b), 6e-8);
     rough.read(k, a);
-    most = std::max(most, relative_difference(a, b));
+    most = test::larger(most, relative_difference(a, b));
   }
   EXPECT_LT(most, 6e-8 * rough.error_gain());
   RecordProperty("gain", std::to_string(rough.error_gain()));

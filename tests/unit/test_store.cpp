@@ -5,9 +5,10 @@
 #include "base/crc32c.h"
 #include "formats/hdf5_internal.h"
 #include "formats/stiffness_store_writer.h"
+#include "larger.h"
 #include "scratch.h"
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
@@ -202,7 +203,7 @@ TEST(Store, BoundsAreNeverBelowTheColumns) {
     for (std::size_t k = 0; k < blocks; ++k) {
       double most = 0;
       for (std::size_t i = k * 768; i < std::min(k * 768 + 768, 3 * n); ++i)
-        most = std::max(most, std::abs(x[c * 3 * n + i]));
+        most = test::larger(most, std::abs(x[c * 3 * n + i]));
       EXPECT_GE(b[c * blocks + k], most);
       EXPECT_LE(b[c * blocks + k], most * (1 + 1e-6));
     }

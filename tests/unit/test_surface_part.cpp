@@ -27,15 +27,15 @@ TEST(SurfacePart, EdgesAtMarkedNodesHaveAllTheirFaces) {
   std::size_t complete = 0;
   for (std::size_t e = 0; e < whole.size(); ++e) {
     const auto [i, j] = whole.ends[e];
-    const std::size_t here = part.find({i, j});
+    const std::size_t here = part.edges.find({i, j});
     if (marked[i] == 0 && marked[j] == 0)
       continue;
-    ASSERT_NE(here, SurfacePart::no_edge) << i << " " << j;
+    ASSERT_NE(here, EdgeTable::no_edge) << i << " " << j;
     EXPECT_TRUE(std::ranges::equal(part.edges.around(here), whole.around(e))) << i << " " << j;
     ++complete;
   }
   EXPECT_GE(complete, 15U);
-  EXPECT_EQ(part.find({3, 4000}), SurfacePart::no_edge);
+  EXPECT_EQ(part.edges.find({3, 4000}), EdgeTable::no_edge);
   EXPECT_TRUE(surface_part(model, std::vector<std::uint8_t>(model.nodes.size())).triangles.empty());
 }
 

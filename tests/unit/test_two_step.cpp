@@ -1,4 +1,5 @@
 #include "base/error.h"
+#include "larger.h"
 #include "sim/simulation.h"
 #include "sim/two_step.h"
 #include "sim_models.h"
@@ -60,8 +61,8 @@ double difference(const std::vector<double>& a, const std::vector<double>& b) {
   EXPECT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double e = std::abs(a[i] - b[i]);
-    error = std::isnan(e) ? e : std::max(error, e);
-    size = std::max(size, std::abs(b[i]));
+    error = test::larger(error, e);
+    size = test::larger(size, std::abs(b[i]));
   }
   return error / size;
 }
@@ -186,7 +187,7 @@ TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
       double error = 0;
       ASSERT_EQ(s.two.contact_forces().size(), force.size());
       for (const NodeVector& f : s.two.contact_forces()) {
-        error = std::max(error, norm(f.value - force.at(f.node)));
+        error = test::larger(error, norm(f.value - force.at(f.node)));
         EXPECT_EQ(at(again, f.node), held.displacement.at(f.node));
       }
       EXPECT_LT(error, 1e-10 * size * f0) << series << " " << size;

@@ -3,7 +3,7 @@
 #include "sim/verify.h"
 
 #include "sim/compliance_columns.h"
-#include "sim/condition.h"
+#include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Volumes on disk: round trip, equal bytes, every truncated prefix, damaged heads.
 
 #include "base/error.h"
-#include "formats/volume_file.h"
+#include "formats/volume_file_internal.h"
 #include "tests/unit/scratch.h"
 #include "volume/grid.h"
 
@@ -31,10 +31,10 @@ Grid sample_grid(float value = 0.75F) {
   return builder.finish();
 }
 
-std::string bytes_of(const Grid& grid) {
+std::string bytes_of(const Grid& grid, StreamWay way = usual_way) {
   const ScratchFile file(".vdb");
   Output output(file.path(), {});
-  write_volume(output, grid, {});
+  write_volume(output, grid, {}, way);
   output.commit();
   Input input(file.path());
   return input.read_all();
@@ -59,6 +59,23 @@ TEST(VolumeFile, RoundTripKeepsEverything) {
   EXPECT_EQ(accessor.value({100, 300, 100}), 0.5F);
   EXPECT_EQ(accessor.value({0, 0, 3}), 0.75F * 3 / 512);
   EXPECT_EQ(accessor.value({1000, 0, 0}), 0.0F);
+}
+
+// Streams of another OpenVDB are left to it: what it writes and reads is what we do.
+TEST(VolumeFile, OpenvdbsOwnReaderAndWriterGiveTheSame) {
+  EXPECT_EQ(usual_way, StreamWay::parallel);
+  const Grid grid = sample_grid();
+  const std::string ours = bytes_of(grid, StreamWay::parallel);
+  const std::string theirs = bytes_of(grid, StreamWay::plain);
+  EXPECT_EQ(theirs, bytes_of(grid, StreamWay::plain));
+  for (const std::string& bytes : {ours, theirs})
+    for (const StreamWay way : {StreamWay::parallel, StreamWay::plain}) {
+      const Grid back = volume_from_bytes(bytes, "test.vdb", {}, way);
+      EXPECT_EQ(back.digest(), grid.digest());
+      EXPECT_EQ(back.active_voxels(), grid.active_voxels());
+    }
+  // The leaves, with which a stream ends, are packed to the same bytes.
+  EXPECT_EQ(ours.substr(ours.size() - 2000), theirs.substr(theirs.size() - 2000));
 }
 
 TEST(VolumeFile, RotatedTransformSurvivesExactly) {

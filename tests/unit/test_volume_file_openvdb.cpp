@@ -2,8 +2,8 @@
 
 #include "base/error.h"
 #include "formats/volume_file.h"
+#include "mesh/check.h"
 #include "surface/marching_cubes.h"
-#include "surface/mesh_check.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>

@@ -1,9 +1,9 @@
 // Voxelization: analytic cases, ties, partitions, open meshes, supersampling.
 
 #include "base/error.h"
+#include "mesh/border.h"
 #include "mesh_fixtures.h"
 #include "volume/lattice.h"
-#include "volume/mesh_border.h"
 #include "volume/voxelize.h"
 
 #include <gtest/gtest.h>

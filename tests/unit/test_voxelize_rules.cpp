@@ -1,11 +1,11 @@
 // The rules winding and zbuffer against brute-force statements of them.
 
 #include "base/error.h"
+#include "mesh/exact_predicates.h"
+#include "mesh/oriented_surface.h"
 #include "mesh_fixtures.h"
 #include "tests/unit/larger.h"
-#include "volume/exact_predicates.h"
 #include "volume/lattice.h"
-#include "volume/oriented_surface.h"
 #include "volume/solid_angle_tree_internal.h"
 #include "volume/voxelize.h"
 

@@ -1,7 +1,7 @@
 #include "base/error.h"
 #include "base/mesh.h"
-#include "surface/triangulate.h"
-#include "surface/weld.h"
+#include "mesh/triangulate.h"
+#include "mesh/weld.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,369 @@
+#include "mesh/edges.h"
+#include "mesh/repair_internal.h"
+
+#define CGAL_HOLE_FILLING_DO_NOT_USE_CDT2 // off by default, and dear to compile
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/border.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+namespace gewebe::repair {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Surface = CGAL::Surface_mesh<Kernel::Point_3>;
+using Vertex = Surface::Vertex_index;
+using Face = Surface::Face_index;
+using Edge = Surface::Edge_index;
+using Halfedge = Surface::Halfedge_index;
+namespace pmp = CGAL::Polygon_mesh_processing;
+
+constexpr std::uint32_t none = UINT32_MAX;
+
+/// What CGAL did to make sheets of a soup: which point a copy is of, which faces run backward.
+struct Sheets {
+  std::vector<std::uint32_t> origin;
+  std::vector<char> backward;
+};
+struct SheetsVisitor : pmp::Default_orientation_visitor {
+  explicit SheetsVisitor(Sheets& sheets) : sheets_(&sheets) {}
+  void duplicated_vertex(std::size_t from, std::size_t to) {
+    sheets_->origin.resize(std::max(sheets_->origin.size(), to + 1), none);
+    sheets_->origin[to] = sheets_->origin[from];
+  }
+  void polygon_orientation_reversed(std::size_t face) { sheets_->backward[face] ^= 1; }
+
+private:
+  Sheets* sheets_;
+};
+
+using TextureCoordinates = std::array<float, 2>;
+
+class Repair {
+public:
+  Repair(TriangleMesh& mesh, RepairReport& report) : mesh_(mesh), report_(report) {}
+
+  void run(const RepairOptions& options) {
+    cut_into_sheets();
+    if (options.degenerate)
+      remove_flat_faces();
+    if (options.holes)
+      fill_holes(*options.holes);
+    write_back(!options.degenerate);
+  }
+
+private:
+  /// Makes the mesh, but for faces with equal corners, sheets that agree: copies points where more
+  /// than two faces meet in an edge. These copies are undone in write_back().
+  void cut_into_sheets() {
+    std::vector<Kernel::Point_3> points;
+    for (const Vec3& p : mesh_.points)
+      points.emplace_back(p.x, p.y, p.z);
+    std::vector<std::array<std::size_t, 3>> faces;
+    std::vector<std::uint32_t> source;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const auto& [a, b, c] = mesh_.triangles[t];
+      if (has_equal_corners(mesh_.triangles[t]))
+        continue;
+      faces.push_back({a, b, c});
+      source.push_back(t);
+    }
+    edges_ = edge_table(mesh_.triangles, points.size());
+    sheets_.origin.resize(points.size());
+    for (std::uint32_t p = 0; p < points.size(); ++p)
+      sheets_.origin[p] = p;
+    sheets_.backward.assign(faces.size(), 0);
+    pmp::orient_polygon_soup(points, faces, CGAL::parameters::visitor(SheetsVisitor(sheets_)));
+
+    origin_ = surface_.add_property_map<Vertex, std::uint32_t>("v:origin", none).first;
+    for (std::size_t p = 0; p < points.size(); ++p)
+      origin_[surface_.add_vertex(points[p])] = sheets_.origin[p];
+    source_ = surface_.add_property_map<Face, std::uint32_t>("f:source", none).first;
+    backward_ = surface_.add_property_map<Face, char>("f:backward", 0).first;
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+      const Face face =
+          surface_.add_face(vertex(faces[f][0]), vertex(faces[f][1]), vertex(faces[f][2]));
+      if (face == Surface::null_face()) { // can't be; the face must not be lost in any case
+        unplaced_.push_back(source[f]);
+        continue;
+      }
+      source_[face] = source[f];
+      backward_[face] = sheets_.backward[f];
+    }
+  }
+
+  static Vertex vertex(std::size_t index) { return Vertex(static_cast<Surface::size_type>(index)); }
+
+  /// Whether sheets meet in a border edge, which is no border then.
+  bool is_seam(Halfedge h) const {
+    const auto [low, high] = std::minmax(origin_[surface_.source(h)], origin_[surface_.target(h)]);
+    const std::size_t edge = edges_.find({low, high});
+    return edge != EdgeTable::no_edge && edges_.around(edge).size() > 1;
+  }
+
+  std::uint64_t flat_faces() const {
+    const double cap = std::cos(repair_cap * M_PI / 180);
+    std::uint64_t count = 0;
+    for (const Face f : surface_.faces()) {
+      const bool flat =
+          pmp::is_needle_triangle_face(f, surface_, repair_needle) != Surface::null_halfedge() ||
+          pmp::is_cap_triangle_face(f, surface_, cap) != Surface::null_halfedge();
+      count += flat ? 1 : 0;
+    }
+    return count;
+  }
+
+  void remove_flat_faces() {
+    const std::uint64_t before = flat_faces();
+    report_.degenerate_faces = mesh_.triangles.size() - surface_.number_of_faces() -
+                               unplaced_.size(); // those with equal corners
+    if (before == 0)
+      return;
+    auto seam = surface_.add_property_map<Edge, bool>("e:seam", false).first;
+    for (const Halfedge h : surface_.halfedges())
+      if (surface_.is_border(h) && is_seam(h))
+        seam[surface_.edge(h)] = true;
+    (void)pmp::experimental::remove_almost_degenerate_faces(
+        surface_.faces(), surface_, std::cos(repair_cap * M_PI / 180), repair_needle, 0,
+        CGAL::parameters::edge_is_constrained_map(seam));
+    report_.degenerate_left = flat_faces();
+    report_.degenerate_faces += before - std::min(before, report_.degenerate_left);
+  }
+
+  /// How many edges of the border are no seams.
+  std::uint64_t open_edges(const std::vector<Halfedge>& border) const {
+    std::uint64_t open = 0;
+    for (const Halfedge h : border)
+      open += is_seam(h) ? 0 : 1;
+    return open;
+  }
+  bool meets_itself(const std::vector<Halfedge>& border) const {
+    std::vector<std::uint32_t> points;
+    for (const Halfedge h : border)
+      points.push_back(origin_[surface_.target(h)]);
+    std::sort(points.begin(), points.end());
+    return std::adjacent_find(points.begin(), points.end()) != points.end();
+  }
+
+  /// Whether one face has the whole border, so that its back is all that could fill it.
+  bool is_lone_face(const std::vector<Halfedge>& border) const {
+    return std::all_of(border.begin(), border.end(), [&](Halfedge h) {
+      return surface_.face(surface_.opposite(h)) == surface_.face(surface_.opposite(border[0]));
+    });
+  }
+
+  void fill_holes(std::uint64_t most_edges) {
+    std::vector<Halfedge> starts;
+    pmp::extract_boundary_cycles(surface_, std::back_inserter(starts));
+    for (const Halfedge start : starts) {
+      std::vector<Halfedge> border;
+      for (const Halfedge h : CGAL::halfedges_around_face(start, surface_))
+        border.push_back(h);
+      const std::uint64_t open = open_edges(border);
+      if (open == 0)
+        continue; // where sheets meet
+      std::vector<Face> faces;
+      std::vector<Vertex> points;
+      if (open == border.size() && open <= most_edges && !meets_itself(border) &&
+          !is_lone_face(border))
+        pmp::triangulate_and_refine_hole(surface_, start, std::back_inserter(faces),
+                                         std::back_inserter(points));
+      if (faces.empty()) {
+        ++report_.holes_left;
+        continue;
+      }
+      ++report_.holes;
+      report_.hole_points += points.size();
+      hole_of_.resize(surface_.number_of_vertices() + surface_.number_of_removed_vertices(), none);
+      for (const Vertex v : points)
+        hole_of_[v.idx()] = static_cast<std::uint32_t>(borders_.size());
+      borders_.emplace_back();
+      for (const Halfedge h : border)
+        borders_.back().push_back(origin_[surface_.target(h)]);
+    }
+  }
+
+  /// What faces that are new inherit: from a neighbour that is old or has inherited.
+  void inherit(std::vector<std::uint32_t>& heir) {
+    heir.assign(surface_.number_of_faces() + surface_.number_of_removed_faces(), none);
+    std::vector<Face> waiting;
+    for (const Face f : surface_.faces()) {
+      heir[f.idx()] = source_[f];
+      if (source_[f] == none)
+        waiting.push_back(f);
+    }
+    report_.hole_faces = waiting.size();
+    while (!waiting.empty()) {
+      std::vector<Face> later;
+      for (const Face f : waiting) {
+        for (const Face next : CGAL::faces_around_face(surface_.halfedge(f), surface_))
+          if (next != Surface::null_face() && heir[next.idx()] != none) {
+            heir[f.idx()] = heir[next.idx()];
+            backward_[f] = backward_[next];
+            break;
+          }
+        if (heir[f.idx()] == none)
+          later.push_back(f);
+      }
+      if (later.size() == waiting.size())
+        break; // new faces alone: a patch has a border, so that there are none
+      waiting = std::move(later);
+    }
+    for (std::uint32_t& from : heir)
+      from = from == none ? 0 : from;
+  }
+
+  /// Texture coordinates of the first corner at each point, and of new points the mean round their
+  /// hole.
+  std::vector<TextureCoordinates> point_coordinates(std::size_t old_points) const {
+    std::vector<TextureCoordinates> st(mesh_.points.size());
+    if (mesh_.texcoords.empty())
+      return st;
+    for (std::size_t t = mesh_.triangles.size(); t-- > 0;)
+      for (std::size_t k = 0; k < 3; ++k)
+        st[mesh_.triangles[t][k]] = {mesh_.texcoords[t][2 * k], mesh_.texcoords[t][2 * k + 1]};
+    for (std::size_t n = old_points; n < st.size(); ++n) {
+      const std::vector<std::uint32_t>& border = borders_[hole_of_point_[n - old_points]];
+      std::array<double, 2> sum{};
+      for (const std::uint32_t p : border)
+        for (std::size_t a = 0; a < 2; ++a)
+          sum[a] += static_cast<double>(st[p][a]);
+      for (std::size_t a = 0; a < 2; ++a)
+        st[n][a] = static_cast<float>(sum[a] / static_cast<double>(border.size()));
+    }
+    return st;
+  }
+
+  void write_back(bool keep_collapsed) {
+    const std::size_t old_points = mesh_.points.size();
+    std::vector<char> was_used(old_points, 0);
+    for (const Triangle& t : mesh_.triangles)
+      for (const std::uint32_t corner : t)
+        was_used[corner] = 1;
+    std::vector<std::uint32_t> heir;
+    inherit(heir);
+    std::vector<std::uint32_t> id(
+        surface_.number_of_vertices() + surface_.number_of_removed_vertices(), none);
+    for (const Vertex v : surface_.vertices()) {
+      id[v.idx()] = origin_[v];
+      if (id[v.idx()] != none)
+        continue;
+      id[v.idx()] = static_cast<std::uint32_t>(mesh_.points.size());
+      const Kernel::Point_3& p = surface_.point(v);
+      mesh_.points.push_back({p.x(), p.y(), p.z()});
+      hole_of_point_.push_back(hole_of_[v.idx()]);
+    }
+
+    // Faces in the order of the mesh, new ones last.
+    struct Out {
+      std::uint32_t source, heir;
+      Triangle corners;
+    };
+    std::vector<Out> out;
+    for (const Face f : surface_.faces()) {
+      Triangle t{};
+      std::size_t k = 0;
+      for (const Vertex v : CGAL::vertices_around_face(surface_.halfedge(f), surface_))
+        t[k++] = id[v.idx()];
+      if (backward_[f] != 0)
+        std::swap(t[1], t[2]);
+      out.push_back({source_[f], heir[f.idx()], t});
+    }
+    for (const std::uint32_t t : unplaced_)
+      out.push_back({t, t, mesh_.triangles[t]});
+    if (keep_collapsed)
+      for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+        if (has_equal_corners(mesh_.triangles[t]))
+          out.push_back({t, t, mesh_.triangles[t]});
+      }
+    std::stable_sort(out.begin(), out.end(),
+                     [](const Out& a, const Out& b) { return a.source < b.source; });
+
+    const std::vector<TextureCoordinates> st = point_coordinates(old_points);
+    const TriangleMesh from = std::exchange(mesh_, {});
+    for (Out& o : out) {
+      if (o.source != none)
+        first_corner_first(o.corners, from.triangles[o.source]);
+      mesh_.triangles.push_back(o.corners);
+      if (!from.part.empty())
+        mesh_.part.push_back(from.part[o.heir]);
+      if (!from.material.empty())
+        mesh_.material.push_back(from.material[o.heir]);
+      if (from.texcoords.empty())
+        continue;
+      std::array<float, 6> own{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        TextureCoordinates at = st[o.corners[k]];
+        for (std::size_t m = 0; o.source != none && m < 3; ++m)
+          if (from.triangles[o.source][m] == o.corners[k])
+            at = {from.texcoords[o.source][2 * m], from.texcoords[o.source][2 * m + 1]};
+        own[2 * k] = at[0];
+        own[2 * k + 1] = at[1];
+      }
+      mesh_.texcoords.push_back(own);
+    }
+    drop_points(from, was_used);
+  }
+
+  /// CGAL may name another corner first.
+  static void first_corner_first(Triangle& t, const Triangle& as) {
+    const auto first = std::find(t.begin(), t.end(), as[0]);
+    if (first != t.end())
+      std::rotate(t.begin(), first, t.end());
+  }
+
+  /// Points that faces used and use no more go.
+  void drop_points(const TriangleMesh& from, std::vector<char>& was_used) {
+    std::vector<char> used(from.points.size(), 0);
+    for (const Triangle& t : mesh_.triangles)
+      for (const std::uint32_t corner : t)
+        used[corner] = 1;
+    was_used.resize(from.points.size(), 1);
+    std::vector<std::uint32_t> number(from.points.size(), none);
+    for (std::size_t p = 0; p < from.points.size(); ++p)
+      if (used[p] != 0 || was_used[p] == 0) {
+        number[p] = static_cast<std::uint32_t>(mesh_.points.size());
+        mesh_.points.push_back(from.points[p]);
+        if (p < from.normals.size())
+          mesh_.normals.push_back(from.normals[p]);
+      }
+    for (Triangle& t : mesh_.triangles)
+      for (std::uint32_t& corner : t)
+        corner = number[corner];
+    if (mesh_.normals.size() != mesh_.points.size())
+      mesh_.normals.clear();
+  }
+
+  TriangleMesh& mesh_;
+  RepairReport& report_;
+  EdgeTable edges_; ///< of the mesh
+  Sheets sheets_;
+  Surface surface_;
+  Surface::Property_map<Vertex, std::uint32_t> origin_; ///< point of the mesh, or none
+  Surface::Property_map<Face, std::uint32_t> source_;   ///< face of the mesh, or none
+  Surface::Property_map<Face, char> backward_;          ///< it runs the other way in the mesh
+  std::vector<std::uint32_t> unplaced_;                 ///< faces of the mesh
+  std::vector<std::vector<std::uint32_t>> borders_;     ///< of filled holes, points of the mesh
+  std::vector<std::uint32_t> hole_of_;                  ///< of each new vertex
+  std::vector<std::uint32_t> hole_of_point_;            ///< of each new point
+};
+
+} // namespace
+
+void with_cgal(TriangleMesh& mesh, const RepairOptions& options, RepairReport& report) {
+  Repair(mesh, report).run(options);
+}
+
+} // namespace gewebe::repair

@@ -1,0 +1,64 @@
+#pragma once
+// The dense part of a front: Cholesky of what it eliminates, and its update matrix. Once per CPU
+// level. Every level gives the same bits, whatever the blocks: each entry loses its products one by
+// one in the order of elimination, each rounded once (fused).
+
+#include <cstddef>
+
+namespace gewebe {
+
+/// Columns that are eliminated together, at most.
+inline constexpr std::size_t front_block = 128;
+
+/// A front by columns: `columns` of `rows` numbers, and the lower triangle of the update matrix of
+/// `below` = rows - columns, packed: a column begins at its diagonal, right behind the one before.
+/// What is above the diagonal in `l` is not written to.
+struct FrontArrays {
+  std::size_t rows = 0, columns = 0;
+  double* l = nullptr;
+  double* update = nullptr;
+
+  std::size_t below() const { return rows - columns; }
+  /// Column c such that [r] is its entry in row r of the front, r >= c.
+  double* column(std::size_t c) const {
+    if (c < columns)
+      return l + c * rows;
+    // The packed column k begins k (k - 1) / 2 numbers before where that of a square would.
+    const std::size_t k = c - columns;
+    return update + (k * below() - k * (k + 1) / 2) - columns;
+  }
+};
+
+/// What a block of columns needs beside the front: its square on the diagonal with the reciprocals
+/// of its pivots, and copies of the rows below, by strips that end with the last row.
+struct FrontScratch {
+  double* square = nullptr; ///< square_size(front_block) numbers
+  double* strips = nullptr; ///< strips_size(rows of the front, count)
+};
+
+struct FrontKernel {
+  std::size_t strip; ///< rows of one
+  std::size_t (*square_size)(std::size_t count);
+  /// Cholesky of the square of columns [begin, begin + count), count <= front_block, on the
+  /// diagonal. Pivots must exceed `least[column]`. \return how many columns were eliminated: fewer
+  /// than count, and nothing is to be used, where a pivot did not
+  std::size_t (*eliminate)(const FrontArrays& front, std::size_t begin, std::size_t count,
+                           const double* least, const FrontScratch& scratch);
+  /// L of the rows below it, strips [first, last) of strips(rows - begin - count).
+  void (*solve)(const FrontArrays& front, std::size_t begin, std::size_t count,
+                const FrontScratch& scratch, std::size_t first, std::size_t last);
+  /// Takes the products of these columns from those behind them, columns of strips [first, last),
+  /// on and below the diagonal. Different strips may be done at once.
+  void (*update)(const FrontArrays& front, std::size_t begin, std::size_t count,
+                 const FrontScratch& scratch, std::size_t first, std::size_t last);
+
+  std::size_t strips(std::size_t rows) const { return (rows + strip - 1) / strip; }
+  std::size_t strips_size(std::size_t rows, std::size_t count) const {
+    return (rows + strip) * count;
+  }
+};
+
+extern const FrontKernel front_kernel_baseline;
+extern const FrontKernel front_kernel_avx2;
+
+} // namespace gewebe

@@ -1,0 +1,516 @@
+#include "solve/frontal_factor.h"
+
+#include "base/parallel.h"
+#include "solve/condition.h"
+#include "solve/factor.h"
+#include "solve/front_tree.h"
+#include "solve/ordering.h"
+#include "solve/spring_graph.h"
+#include "solve/stiffness.h"
+#include "solve/supernodal_solve_internal.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <memory>
+#include <tuple>
+#include <utility>
+
+// Based on: Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::uint32_t none = FrontTree::none;
+constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
+
+/// The free axes of a node.
+struct FreeAxes {
+  std::array<std::uint8_t, 3> axis{};
+  std::uint8_t count = 0;
+};
+
+/// By the set of fixed ones.
+constexpr std::array<FreeAxes, 8> all_free_axes = [] {
+  std::array<FreeAxes, 8> all;
+  for (std::uint8_t set = 0; set < 8; ++set)
+    for (std::uint8_t a = 0; a < 3; ++a)
+      if ((set >> a & 1) == 0)
+        all[set].axis[all[set].count++] = a;
+  return all;
+}();
+
+const FreeAxes& free_axes(const Model& model, std::uint32_t node) {
+  return all_free_axes[model.nodes[node].fixed & 7U];
+}
+
+/// 0, 1, 2 …: nothing has moved.
+bool ascend_by_one(std::span<const std::uint32_t> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    if (numbers[i] != i)
+      return false;
+  return true;
+}
+
+} // namespace
+
+struct FrontalFactor::State {
+  FrontTree tree;
+  std::vector<Front> fronts;
+  std::vector<FrontMemory> memory; // of L of each front
+  FrontalWork work;
+  CpuLevel cpu = CpuLevel::baseline;
+
+  // Of the model as it was factorised, to tell what changed.
+  SpringGraph graph;
+  std::vector<Spring> springs;
+  std::vector<Vec3> position;
+  std::vector<std::uint8_t> fixed;
+
+  // L as the solver wants it.
+  std::vector<std::int64_t> super, pi, s;
+  std::vector<const double*> blocks;
+  std::vector<std::uint32_t> axis_of_row;
+  std::vector<std::uint32_t> row_of_node; // the first of its axes, or none
+  std::vector<std::uint32_t> to_root;     // rows eliminated by a front and all above it
+  std::size_t longest = 1, entries = 0;
+  double weakest = 1;
+  std::size_t weakest_row = 0;
+
+  /// Springs of the nodes that a front eliminates; each spring between two of them comes once.
+  void assemble(const Model& model, const FrontAssembly& to) const {
+    const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
+    std::vector<SymmetricBlock> diagonals(last - first);
+    const auto add_diagonal = [&](std::uint32_t place, const SymmetricBlock& block) {
+      for (std::size_t k = 0; k < 6; ++k)
+        diagonals[place - first][k] += block[k];
+    };
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
+      const FreeAxes& free = free_axes(model, node);
+      for (std::size_t arm = graph.start[node]; arm < graph.start[node + std::size_t{1}]; ++arm) {
+        const std::uint32_t end = graph.node[arm], there = tree.position[end];
+        if (there != none && first <= there && there < at)
+          continue;
+        const SymmetricBlock block = stiffness_block(model, model.springs[graph.spring[arm]]);
+        add_diagonal(at, block);
+        if (there == none || there < first)
+          continue;
+        if (there < last)
+          add_diagonal(there, block);
+        const FreeAxes& other = free_axes(model, end);
+        for (std::size_t a = 0; a < free.count; ++a)
+          for (std::size_t b = 0; b < other.count; ++b)
+            to.l[(to.row[node] + a) * to.rows + to.row[end] + b] -=
+                block[entry[free.axis[a]][other.axis[b]]];
+      }
+    }
+    to.least.clear();
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
+      const FreeAxes& free = free_axes(model, node);
+      const SymmetricBlock& diagonal = diagonals[at - first];
+      for (std::size_t a = 0; a < free.count; ++a) {
+        for (std::size_t b = a; b < free.count; ++b)
+          to.l[(to.row[node] + a) * to.rows + to.row[node] + b] +=
+              diagonal[entry[free.axis[a]][free.axis[b]]];
+        to.least.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
+      }
+    }
+  }
+
+  std::size_t axis_at(const Model& model, std::size_t f, std::size_t row) const {
+    for (const std::uint32_t node : tree.eliminated(f)) {
+      if (row < graph.axes[node])
+        return 3 * std::size_t{node} + free_axes(model, node).axis[row];
+      row -= graph.axes[node];
+    }
+    return 0;
+  }
+
+  /// Computes the fronts that are wanted (all, where that is empty).
+  void factorise(const Model& model, std::span<const char> wanted, const Context& context) {
+    const std::size_t size = measure_fronts(tree, graph.axes, fronts);
+    require_memory(context,
+                   8 * static_cast<double>(size) +
+                       update_bytes(tree, fronts, true, thread_count(context)),
+                   "the factor of the stiffness matrix");
+    memory.resize(tree.fronts());
+    for (std::size_t f = 0; f < tree.fronts(); ++f)
+      fronts[f].l = memory[f].reserve(fronts[f].rows * fronts[f].columns, true);
+    try {
+      work = gewebe::factorise(
+          {tree, graph.axes, fronts, [&](const FrontAssembly& to) { assemble(model, to); }, true},
+          wanted, context);
+    } catch (const PivotTooSmall& pivot) {
+      throw NotPositiveDefinite(axis_at(model, pivot.front, pivot.column));
+    }
+  }
+
+  void lay_out(const Model& model) {
+    const std::size_t count = tree.fronts();
+    super.assign(1, 0);
+    pi.assign(1, 0);
+    s.clear();
+    blocks.clear();
+    axis_of_row.clear();
+    longest = 1;
+    entries = 0;
+    row_of_node.assign(graph.axes.size(), none);
+    std::vector<std::uint32_t>& row = row_of_node;
+    for (const std::uint32_t node : tree.sequence) {
+      row[node] = static_cast<std::uint32_t>(axis_of_row.size());
+      const FreeAxes& free = free_axes(model, node);
+      for (std::size_t a = 0; a < free.count; ++a)
+        axis_of_row.push_back(3 * node + free.axis[a]);
+    }
+    for (std::size_t f = 0; f < count; ++f) {
+      const auto add = [&](std::span<const std::uint32_t> nodes) {
+        for (const std::uint32_t node : nodes)
+          for (std::uint32_t a = 0; a < graph.axes[node]; ++a)
+            s.push_back(row[node] + a);
+      };
+      add(tree.eliminated(f));
+      super.push_back(super.back() + static_cast<std::int64_t>(fronts[f].columns));
+      add(tree.boundary_of(f));
+      pi.push_back(static_cast<std::int64_t>(s.size()));
+      blocks.push_back(fronts[f].l);
+      longest = std::max(longest, fronts[f].below());
+      entries += fronts[f].rows * fronts[f].columns;
+    }
+    find_weakest();
+    to_root.resize(count);
+    for (std::size_t f = count; f-- > 0;)
+      to_root[f] = static_cast<std::uint32_t>(fronts[f].columns) +
+                   (tree.parent[f] == none ? 0 : to_root[tree.parent[f]]);
+  }
+
+  SupernodalArrays arrays() const {
+    return {super.size() - 1, super.data(), pi.data(), nullptr, s.data(), nullptr, blocks.data()};
+  }
+
+  std::uint32_t front_of_node(std::uint32_t node) const {
+    if (row_of_node[node] == none)
+      return none;
+    const auto above =
+        std::upper_bound(super.begin(), super.end(), static_cast<std::int64_t>(row_of_node[node]));
+    return static_cast<std::uint32_t>(above - super.begin() - 1);
+  }
+
+  void find_weakest() {
+    weakest = 1;
+    weakest_row = 0;
+    for (std::size_t f = 0; f < fronts.size(); ++f)
+      if (const double pivot = fronts[f].weakest / max_condition; pivot < weakest) {
+        weakest = pivot;
+        weakest_row = static_cast<std::size_t>(super[f]) + fronts[f].weakest_column;
+      }
+  }
+
+  void remember(const Model& model) {
+    springs = model.springs;
+    position.resize(model.nodes.size());
+    fixed.resize(model.nodes.size());
+    for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+      position[i] = model.nodes[i].position;
+      fixed[i] = model.nodes[i].fixed;
+    }
+  }
+
+  // ---- changes
+
+  /// By node: whether its row of K is other than it was, its neighbours' numbers aside. Both lists
+  /// of springs ascend alike where nodes keep their order, so one pass finds what differs; in
+  /// another order more of them seem changed than are.
+  std::vector<char> changed_rows(const Model& model, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place) const {
+    const std::size_t n = model.nodes.size();
+    std::vector<char> changed(n, 0), moved(n, 0);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t old = origin.empty() ? i : origin[i];
+      const bool copy = !place.empty() && place[old] != i;
+      moved[i] = !(model.nodes[i].position == position[old]);
+      changed[i] = copy || moved[i] || model.nodes[i].fixed != fixed[old];
+    }
+    const auto mark = [&](std::uint32_t node) {
+      if (node != none)
+        changed[node] = 1;
+    };
+    const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
+    std::size_t b = 0;
+    for (const Spring& was : springs) {
+      const std::uint32_t i = placed(was.i), j = placed(was.j);
+      const auto key = std::tuple(was.kind, i, j);
+      for (; b < model.springs.size(); ++b) {
+        const Spring& is = model.springs[b];
+        if (i == none || j == none || !(std::tie(is.kind, is.i, is.j) < key))
+          break;
+        mark(is.i);
+        mark(is.j);
+      }
+      if (i != none && j != none && b < model.springs.size()) {
+        const Spring& is = model.springs[b];
+        if (std::tie(is.kind, is.i, is.j) == key) {
+          ++b;
+          if (is.stiffness == was.stiffness && is.rest == was.rest && !moved[i] && !moved[j])
+            continue;
+        }
+      }
+      mark(i);
+      mark(j);
+    }
+    for (; b < model.springs.size(); ++b) {
+      mark(model.springs[b].i);
+      mark(model.springs[b].j);
+    }
+    return changed;
+  }
+
+  /// Whether the tree serves this graph too: the same nodes free, and no spring where none was.
+  bool still_fits(const SpringGraph& now, std::span<const std::uint32_t> place) const {
+    if (!place.empty() || now.axes != graph.axes)
+      return false;
+    std::vector<std::uint32_t> mark(now.axes.size(), none);
+    for (std::uint32_t i = 0; i < now.axes.size(); ++i) {
+      for (const std::uint32_t other : graph.view().of(i))
+        mark[other] = i;
+      for (const std::uint32_t other : now.view().of(i))
+        if (mark[other] != i)
+          return false;
+    }
+    return true;
+  }
+
+  /// The order of elimination before, with what came since. A copy is eliminated right behind what
+  /// it is a copy of, so that it fills as that does.
+  std::vector<std::uint32_t> order_for(const SpringGraph& now,
+                                       std::span<const std::uint32_t> origin,
+                                       std::span<const std::uint32_t> place) const {
+    const std::size_t n = now.axes.size();
+    std::vector<std::uint32_t> copy(graph.axes.size(), none), next(n, none); // lists of copies
+    for (std::size_t i = origin.size(); i-- > 0;)
+      if (place[origin[i]] != i)
+        next[i] = std::exchange(copy[origin[i]], static_cast<std::uint32_t>(i));
+    std::vector<std::uint32_t> order;
+    order.reserve(n);
+    std::vector<char> ordered(n, 0);
+    const auto put = [&](std::uint32_t node) {
+      if (node == none || ordered[node])
+        return;
+      if (now.axes[node] > 0)
+        order.push_back(node);
+      ordered[node] = 1;
+    };
+    for (const std::uint32_t old : tree.sequence) {
+      put(place.empty() ? old : place[old]);
+      for (std::uint32_t c = copy[old]; c != none; c = next[c])
+        put(c);
+    }
+    for (std::uint32_t i = 0; i < n; ++i) // what was not free before
+      put(i);
+    return order;
+  }
+
+  void renew(const Model& model, std::span<const std::uint32_t> origin,
+             std::span<const std::uint32_t> place, const Context& context) {
+    cpu = context.cpu;
+    SpringGraph now = spring_graph(model);
+    const std::size_t n = model.nodes.size();
+    if (n == graph.axes.size() && ascend_by_one(origin) && ascend_by_one(place))
+      origin = place = {};
+    const std::vector<char> changed = changed_rows(model, origin, place);
+    std::vector<char> wanted;
+    if (still_fits(now, place)) {
+      graph = std::move(now);
+      wanted.assign(tree.fronts(), 0);
+      for (std::size_t f = 0; f < tree.fronts(); ++f) {
+        for (const std::uint32_t node : tree.eliminated(f))
+          wanted[f] = static_cast<char>(wanted[f] | changed[node]);
+        if (wanted[f] && tree.parent[f] != none)
+          wanted[tree.parent[f]] = 1;
+      }
+      factorise(model, wanted, context);
+      find_weakest();
+    } else {
+      const std::vector<std::uint32_t> order = order_for(now, origin, place);
+      graph = std::move(now);
+      wanted = grow(order, changed, place);
+      factorise(model, wanted, context);
+      lay_out(model);
+    }
+    remember(model);
+  }
+
+  /// The tree of this order, with the fronts that are as they were. \return which are not
+  std::vector<char> grow(std::span<const std::uint32_t> order, const std::vector<char>& changed,
+                         std::span<const std::uint32_t> place) {
+    const FrontTree before = std::exchange(tree, front_tree(graph.view(), order));
+    std::vector<Front> had = std::exchange(fronts, std::vector<Front>(tree.fronts()));
+    std::vector<FrontMemory> held = std::exchange(memory, std::vector<FrontMemory>(tree.fronts()));
+    const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
+    // Old fronts by the first node that they eliminated.
+    std::vector<std::uint32_t> front_of(graph.axes.size(), none);
+    for (std::uint32_t f = 0; f < before.fronts(); ++f)
+      if (const std::uint32_t node = placed(before.eliminated(f)[0]); node != none)
+        front_of[node] = f;
+    const auto same = [&](std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
+      return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                        [&](std::uint32_t x, std::uint32_t y) { return x == placed(y); });
+    };
+    // A front is as it was only with the children that it had. Where springs went while the tree
+    // stayed, a child may hang elsewhere now though no row of this front has changed since.
+    std::vector<std::uint32_t> had_children(before.fronts(), 0), kept_children(tree.fronts(), 0);
+    for (const std::uint32_t parent : before.parent)
+      if (parent != none)
+        ++had_children[parent];
+    std::vector<char> wanted(tree.fronts(), 0);
+    for (std::size_t f = 0; f < tree.fronts(); ++f) {
+      const auto own = tree.eliminated(f);
+      const std::uint32_t old = front_of[own[0]], parent = tree.parent[f];
+      if (old != none) { // if only for its memory
+        fronts[f] = std::move(had[old]);
+        memory[f] = std::move(held[old]);
+      }
+      const bool kept =
+          !wanted[f] && old != none && kept_children[f] == had_children[old] &&
+          same(own, before.eliminated(old)) && same(tree.boundary_of(f), before.boundary_of(old)) &&
+          std::none_of(own.begin(), own.end(), [&](std::uint32_t i) { return changed[i] != 0; });
+      wanted[f] = !kept;
+      if (parent == none)
+        continue;
+      const bool stays = kept && before.parent[old] != none &&
+                         before.parent[old] == front_of[tree.eliminated(parent)[0]];
+      kept_children[parent] += stays ? 1 : 0;
+      wanted[parent] = static_cast<char>(wanted[parent] | !stays);
+    }
+    return wanted;
+  }
+};
+
+FrontalFactor::FrontalFactor(const Model& model, const Context& context)
+    : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.cpu = context.cpu;
+  s.graph = spring_graph(model);
+  const std::vector<std::uint32_t> order = elimination_order(s.graph.view());
+  if (order.empty())
+    throw Error("every node is fixed along every axis, expected a node that can move");
+  s.tree = front_tree(s.graph.view(), order);
+  s.fronts.resize(s.tree.fronts());
+  s.factorise(model, {}, context);
+  s.lay_out(model);
+  s.remember(model);
+}
+
+FrontalFactor::~FrontalFactor() = default;
+FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
+FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
+
+FrontalWork FrontalFactor::renew(const Model& model, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place, const Context& context) {
+  state_->renew(model, origin, place, context);
+  return state_->work;
+}
+
+std::size_t FrontalFactor::axes() const noexcept {
+  return 3 * state_->graph.axes.size();
+}
+
+std::size_t FrontalFactor::entries() const noexcept {
+  return state_->entries;
+}
+
+const FrontalWork& FrontalFactor::work() const noexcept {
+  return state_->work;
+}
+
+double FrontalFactor::weakest_pivot() const noexcept {
+  return state_->weakest;
+}
+
+std::size_t FrontalFactor::weakest_axis() const noexcept {
+  return state_->axis_of_row[state_->weakest_row];
+}
+
+void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) const {
+  const State& s = *state_;
+  const SupernodalArrays l = s.arrays();
+  const std::size_t order = s.axis_of_row.size(), all = axes();
+  std::vector<double> x, work(s.longest * panel_width);
+  for (std::size_t first = 0; first < columns;) {
+    const std::size_t count = std::min(Factor::most_units, columns - first);
+    const std::size_t width = solve_width(count);
+    x.assign(order * width, 0.0);
+    double* const from = over_axes.data() + first * all;
+    for (std::size_t k = 0; k < order; ++k)
+      for (std::size_t j = 0; j < count; ++j)
+        x[k * width + j] = from[j * all + s.axis_of_row[k]] + 0.0; // no -0
+    (s.cpu == CpuLevel::baseline ? solve_supernodal_baseline
+                                 : solve_supernodal_avx2)(l, x.data(), width, work.data());
+    std::fill_n(from, count * all, 0.0);
+    for (std::size_t k = 0; k < order; ++k)
+      for (std::size_t j = 0; j < count; ++j)
+        from[j * all + s.axis_of_row[k]] = x[k * width + j];
+    first += count;
+  }
+}
+
+std::vector<FrontalFactor::HalfSolution>
+FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
+  constexpr std::size_t at_once = panel_width;
+  const State& s = *state_;
+  std::vector<HalfSolution> all(nodes.size());
+  std::vector<double> x;
+  std::vector<std::uint32_t> fronts;
+  for (std::size_t first = 0; first < nodes.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, nodes.size() - first);
+    const std::size_t width = solve_width(3 * count);
+    fronts.clear();
+    x.assign(s.axis_of_row.size() * width, 0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
+      all[first + k].front = s.front_of_node(node);
+      for (std::uint32_t f = all[first + k].front; f != none; f = s.tree.parent[f])
+        fronts.push_back(f);
+      for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
+        x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
+    }
+    std::sort(fronts.begin(), fronts.end());
+    fronts.erase(std::unique(fronts.begin(), fronts.end()), fronts.end());
+    (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline
+                                 : forward_supernodal_avx2)(s.arrays(), fronts, x.data(), width);
+    for (std::size_t k = 0; k < count; ++k) {
+      HalfSolution& half = all[first + k];
+      if (half.front != none)
+        half.values.reserve(s.to_root[half.front]);
+      for (std::uint32_t f = half.front; f != none; f = s.tree.parent[f])
+        for (auto row = static_cast<std::size_t>(s.super[f]);
+             row < static_cast<std::size_t>(s.super[f + std::size_t{1}]); ++row) {
+          const double* const values = x.data() + row * width + 3 * k;
+          half.values.push_back({values[0], values[1], values[2]});
+        }
+    }
+  }
+  return all;
+}
+
+std::array<std::array<double, 3>, 3> FrontalFactor::compliance(const HalfSolution& a,
+                                                               const HalfSolution& b) const {
+  std::array<std::array<double, 3>, 3> block{};
+  std::uint32_t f = a.front, g = b.front; // to where both ways meet
+  while (f != g && f != none && g != none)
+    (f < g ? f : g) = state_->tree.parent[std::min(f, g)];
+  if (f != g || f == none)
+    return block; // in different trees, or fixed
+  const std::size_t common = state_->to_root[f];
+  const auto* const p = a.values.data() + (a.values.size() - common);
+  const auto* const q = b.values.data() + (b.values.size() - common);
+  for (std::size_t k = 0; k < common; ++k)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        block[i][j] += p[k][i] * q[k][j];
+  return block;
+}
+
+} // namespace gewebe

@@ -1,0 +1,495 @@
+#pragma once
+// Random scenes on small models, and what must hold for any of them: served, none ends the session
+// or tells a number that is none; its record, run again with two threads, gives the same answers,
+// results and digest to the last byte.
+
+#include "base/digest.h"
+#include "base/error.h"
+#include "base/number_text.h"
+#include "formats/event_log.h"
+#include "formats/scene_record.h"
+#include "formats/scene_run.h"
+#include "model/build.h"
+#include "model/primitive.h"
+#include "solve/condition.h"
+#include "tests/bench/memory_columns.h"
+#include "tests/unit/scratch.h"
+#include "tests/unit/simulation_scenes.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe::test {
+
+/// The models by name: held balls, a sheet, a tube, a ball that nothing holds, a shell, two masses.
+inline const std::map<std::string, Model>& fuzzed_models() {
+  static const std::map<std::string, Model> models = [] {
+    std::map<std::string, Model> all;
+    const auto built = [](const TriangleMesh& mesh, std::int32_t centrals) {
+      BuildOptions options;
+      options.bend = true;
+      options.centrals = centrals;
+      return build_model(mesh, options, Context{}).model;
+    };
+    all["organ"] = organ(1);
+    all["ball"] = organ(2);
+    all["shell"] = shell();
+    all["two"] = two_masses();
+    all["free"] = built(ball(2, 12), 0);
+    Model& sheet_model = all["sheet"] = built(sheet(5, 4, 6), 0);
+    for (Node& n : sheet_model.nodes)
+      n.fixed = n.position.x < 1 ? fixed_all : fixed_none;
+    Model& tube = all["tube"] = built(primitive_mesh({PrimitiveShape::tube, 8, 6, 10, 40}), 1);
+    for (Node& n : tube.nodes)
+      if (n.position.z < 1 || n.position.z > 39)
+        n.fixed = fixed_all;
+    for (auto& [name, model] : all)
+      model.name = name;
+    return all;
+  }();
+  return models;
+}
+
+/// The lines of a random scene; the same for the same seed.
+class FuzzedScene {
+public:
+  explicit FuzzedScene(std::uint64_t seed) : random_(seed) {
+    const std::size_t count = 1 + below(3);
+    for (std::size_t k = 0; k < count; ++k)
+      add_object();
+    for (const char* what : {"shapes", "forces", "instruments"})
+      if (one_in(2))
+        line(std::string("emit ") + what);
+    const std::size_t rounds = 4 + below(10);
+    for (std::size_t round = 0; round < rounds; ++round) {
+      for (std::size_t k = below(4); k > 0; --k)
+        command();
+      go_on();
+    }
+  }
+  const std::vector<std::string>& lines() const { return lines_; }
+
+private:
+  std::size_t below(std::size_t end) { return static_cast<std::size_t>(random_() % end); }
+  bool one_in(std::size_t n) { return below(n) == 0; }
+  /// Of four digits, as people type them.
+  double real(double low, double high) {
+    const double share = static_cast<double>(random_() >> 11U) / 9007199254740992.0;
+    const double x = low + (high - low) * share;
+    const double digits = std::pow(10, 3 - std::floor(std::log10(std::max(std::abs(x), 1e-9))));
+    return std::round(x * digits) / digits;
+  }
+  template <class T>
+  const T& of(const std::vector<T>& all) {
+    return all[below(all.size())];
+  }
+  void line(const std::string& text) { lines_.push_back(text); }
+
+  static std::string numbers(const Vec3& v) {
+    return number_text(v.x) + " " + number_text(v.y) + " " + number_text(v.z);
+  }
+  Vec3 vector(double size) { return {real(-size, size), real(-size, size), real(-size, size)}; }
+  /// Seldom what no scene should hold.
+  std::string number(double size) {
+    static const std::vector<std::string> odd{"1e300",  "-1e300", "1e38", "1e30",
+                                              "1e-300", "0",      "-0"};
+    return one_in(40) ? of(odd) : number_text(real(-size, size));
+  }
+  std::string triple(double size) {
+    const std::string x = number(size), y = number(size);
+    return x + " " + y + " " + number(size);
+  }
+  std::string time() {
+    static const std::vector<double> usual{0.001, 0.002, 0.004, 0.01, 0.0015};
+    return one_in(60) ? number(1) : number_text(of(usual));
+  }
+
+  void add_object() {
+    std::vector<std::string> names;
+    for (const auto& [name, model] : fuzzed_models())
+      names.push_back(name);
+    const std::string model = of(names), name(1, static_cast<char>('a' + objects_.size()));
+    std::string text = "object " + name + " " + model;
+    if (one_in(3))
+      text += " store=" + model;
+    text += one_in(3) ? " method=ffe" : one_in(3) ? " method=ela" : "";
+    text += one_in(6) ? " integration=implicit" : "";
+    objects_.push_back({name, &fuzzed_models().at(model)});
+    line(text);
+  }
+
+  struct Known {
+    std::string name;
+    const Model* model = nullptr;
+  };
+  /// Seldom the name of what has come off.
+  Known object() {
+    Known one = of(objects_);
+    if (one_in(12))
+      one.name += ".1";
+    return one;
+  }
+  Vec3 place(const Model& model) { return of(model.nodes).position; }
+  static double size_of(const Model& model) {
+    Box3 box;
+    for (const Node& n : model.nodes)
+      box.add(n.position);
+    return box.longest_side();
+  }
+
+  std::string nodes(const Model& model) {
+    const auto node = [&] { return std::to_string(below(model.nodes.size())); };
+    const Vec3 p = place(model);
+    const double size = size_of(model);
+    switch (below(10)) {
+    case 0:
+      return "surface";
+    case 1:
+      return one_in(2) ? "all" : "@list";
+    case 2:
+      return std::string(1, "xyz"[below(3)]) + (one_in(2) ? "<" : ">") +
+             number_text(p[static_cast<int>(below(3))]);
+    case 3:
+      return "sphere:" + number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z) + "," +
+             number_text(real(0.05, 0.5) * size);
+    case 4:
+      return "\"" + node() + " or not (x<" + number_text(p.x) + ")\"";
+    case 5:
+      return node() + "-" + std::to_string(model.nodes.size() - 1);
+    case 6:
+      return node() + "," + node();
+    default:
+      return node();
+    }
+  }
+
+  std::string instrument() {
+    static const std::vector<std::string> names{"p", "q", "k"};
+    return of(names);
+  }
+  std::string put_instrument() {
+    const Known o = object();
+    const double size = size_of(*o.model);
+    const Vec3 at = place(*o.model) + vector(0.3 * size);
+    if (one_in(3))
+      return "instrument k blade " + (one_in(20) ? triple(1e300) : numbers(at)) + " " +
+             numbers(at + vector(size));
+    const std::string friction = one_in(2) ? " friction " + number_text(real(0, 1.5)) : "";
+    const std::string radius = one_in(30) ? number(1e3) : number_text(real(0.05, 0.4) * size);
+    if (one_in(2))
+      return "instrument q capsule " + radius + " " + numbers(at) + " " +
+             numbers(at + vector(0.5 * size)) + friction;
+    return "instrument p sphere " + radius + " " + numbers(at) + friction;
+  }
+  std::string move_instrument() {
+    const Known o = object();
+    const std::string to = one_in(30) ? triple(1e9) : numbers(place(*o.model) + vector(5));
+    std::string text = "move " + instrument() + " " + to;
+    if (one_in(3))
+      text += " turn " + numbers(vector(1)) + " " + number(180);
+    return text + (one_in(2) ? " over " + time() : "");
+  }
+  std::string load() {
+    const Known o = object();
+    const std::string whom = o.name + " " + nodes(*o.model) + " ";
+    const std::string period = one_in(4) ? " period " + time() : "";
+    switch (below(6)) {
+    case 0:
+      return "pressure " + whom + number(5000) + period;
+    case 1:
+    case 2:
+      return "force " + whom + triple(5e4) + (one_in(3) ? " total" : "") + period;
+    case 3:
+      return "release " + whom;
+    default:
+      return "displace " + whom + triple(0.2 * size_of(*o.model)) +
+             (one_in(2) ? " over " + time() : "");
+    }
+  }
+  std::string cut() {
+    const Known o = object();
+    if (one_in(3))
+      return "restore " + o.name;
+    if (one_in(4))
+      return "tear " + o.name + " " + number_text(real(0, 0.3));
+    if (one_in(3))
+      return "cut " + o.name + " springs " + nodes(*o.model) +
+             (one_in(2) ? " " + nodes(*o.model) : "");
+    return "cut " + o.name + " plane " + numbers(place(*o.model)) + " " + numbers(vector(2)) +
+           (one_in(3) ? " " + nodes(*o.model) : "");
+  }
+  std::string change() {
+    const Known o = object(), other = object();
+    switch (below(14)) {
+    case 0:
+    case 1:
+      return put_instrument();
+    case 2:
+      return move_instrument();
+    case 3:
+      return one_in(2) ? "withdraw " + instrument()
+                       : "grasp " + o.name + " " + nodes(*o.model) + " " + instrument();
+    case 4:
+    case 5:
+      return cut();
+    case 6:
+      return "method " + o.name + (one_in(2) ? " ffe" : " ela");
+    case 7:
+      return "attach " + o.name + " " + nodes(*o.model) + " " + other.name + " " +
+             nodes(*other.model) + " " + number_text(real(10, 5e4));
+    case 8:
+      return one_in(3)   ? "gravity " + triple(1e4)
+             : one_in(4) ? "timestep " + number_text(of(std::vector{1e-3, 2e-4, 1e-300}))
+                         : "two-step " + o.name + " " + number_text(real(1, 1e4)) +
+                               (one_in(2) ? " series" : "");
+    default:
+      return load();
+    }
+  }
+  void command() {
+    if (one_in(40)) {
+      line("emit " + of(std::vector<std::string>{"shapes", "forces", "instruments", "all"}));
+    } else if (one_in(60)) {
+      line("renew " + object().name);
+    } else if (one_in(50) && objects_.size() < 5) {
+      add_object();
+    } else if (one_in(5)) {
+      line("at " + number_text(now_ + of(std::vector{0.001, 0.003, 0.0005, 0.01, -0.002})) + " " +
+           change());
+    } else if (one_in(8)) {
+      line("at every " + time() + " " + change());
+    } else {
+      line(change());
+    }
+  }
+  void go_on() {
+    static const std::vector<double> usual{0.001, 0.002, 0.0025, 0.005, 0};
+    if (one_in(12)) {
+      now_ += 0.004;
+      line("run " + number_text(now_) + " every " + number_text(of(std::vector{0.001, 0.0015})));
+    } else if (one_in(40)) {
+      line("step " + number(1e-3));
+    } else {
+      const double dt = of(usual);
+      now_ += dt;
+      line("step " + number_text(dt));
+    }
+  }
+
+  std::mt19937_64 random_;
+  std::vector<Known> objects_;
+  std::vector<std::string> lines_;
+  double now_ = 0;
+};
+
+/// Digests what a result is told, and notes what no result may be told.
+class CheckedResult final : public ResultWriter {
+public:
+  void add_object(const std::string& name, const Model& model) override {
+    add(name, model, "object");
+  }
+  void add_part(const std::string& name, const Model& model) override { add(name, model, "part"); }
+  void change_object(std::size_t object, const Model& model,
+                     std::span<const std::uint32_t> origin) override {
+    nodes_.at(object) = model.nodes.size();
+    digest_.add_bytes(origin.data(), origin.size_bytes());
+  }
+  void add_frame(double time, std::span<const FrameObject> objects) override {
+    digest_.add(time);
+    if (objects.size() != nodes_.size())
+      fault = "a frame of " + std::to_string(objects.size()) + " objects";
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      if (objects[i].displacement.size() != 3 * nodes_.at(i))
+        fault = "a frame with another number of nodes";
+      digest_.add(objects[i].displacement);
+      for (const double u : objects[i].displacement)
+        if (!std::isfinite(static_cast<float>(u)))
+          fault = "a displacement of " + number_text(u);
+      for (const NodeVector& f : objects[i].forces) {
+        digest_.add(std::uint64_t{f.node});
+        digest_.add_bytes(&f.value, sizeof f.value);
+        if (f.node >= nodes_[i] || !std::isfinite(static_cast<float>(norm(f.value))))
+          fault = "a force of " + number_text(norm(f.value)) + " at " + std::to_string(f.node);
+      }
+    }
+    ++frames;
+  }
+  void commit() override {}
+  std::string hex() { return digest_.hex(); }
+
+  std::string fault;
+  std::size_t frames = 0;
+
+private:
+  void add(const std::string& name, const Model& model, std::string_view what) {
+    nodes_.push_back(model.nodes.size());
+    digest_.add_bytes(name.data(), name.size());
+    digest_.add_bytes(what.data(), what.size());
+    digest_.add(std::uint64_t{frames});
+  }
+  Digest digest_;
+  std::vector<std::size_t> nodes_;
+};
+
+/// Stores of the models, and of a second stage four times as stiff.
+inline StiffnessParts fuzzed_store(const std::string& name, double stiffer) {
+  struct Kept {
+    StiffnessMatrix matrix;
+    FactorData data;
+    std::vector<std::uint32_t> surface;
+  };
+  static std::map<std::pair<std::string, double>, std::shared_ptr<Kept>> all;
+  std::shared_ptr<Kept>& kept = all[{name, stiffer}];
+  if (!kept) {
+    Model model = fuzzed_models().at(name);
+    for (Spring& s : model.springs)
+      s.stiffness *= stiffer;
+    auto made = std::make_shared<Kept>();
+    made->matrix = stiffness_matrix(model);
+    made->data = Factor(made->matrix, Context{}).data();
+    for (std::uint32_t i = 0; i < surface_count(model); i += 2)
+      made->surface.push_back(i);
+    kept = std::move(made);
+  }
+  return timing::memory_parts(kept->matrix, kept->data, kept->surface, false);
+}
+
+struct FuzzedRun {
+  std::string replies, fault, digest, result;
+  std::uint64_t errors = 0, steps = 0;
+  bool slow = false; ///< it took too long and was ended
+};
+
+/// \param record written if it is not empty
+inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
+                            const std::string& record, double seconds = 20) {
+  FuzzedRun out;
+  const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
+  CheckedResult result;
+  SceneOptions options;
+  options.files.model = [&](const std::string& name) { return fuzzed_models().at(base(name)); };
+  options.files.store = [&](const std::string& name, const Model&) {
+    return fuzzed_store(base(name), 1);
+  };
+  options.files.second_stage = [&](const std::string& name, const Model&) {
+    return [file = base(name)] { return fuzzed_store(file, 4); };
+  };
+  options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
+  options.reply = [&](std::string_view text) { out.replies += text; };
+  options.serve = serve;
+  options.measure = true;
+  options.result = &result;
+  options.warn = [](const std::string&) {};
+  std::optional<SceneRecord> log;
+  if (!record.empty())
+    options.record = &log.emplace(record, Output::Options{}, "-");
+  const ScratchFile table(".csv");
+  EventLog events(table.path(), Output::Options{.binary = false});
+  options.events = &events;
+  Context context;
+  context.threads = threads;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  context.cancelled = [end] { return std::chrono::steady_clock::now() > end; };
+  SceneRun run("fuzz", context, options);
+  try {
+    for (const std::string& line : lines)
+      run.line(line);
+    run.finish();
+  } catch (const Cancelled&) {
+    out.slow = true;
+  } catch (const std::exception& error) {
+    out.fault = std::string("it ended: ") + error.what();
+  }
+  if (log)
+    log->commit();
+  if (out.fault.empty())
+    out.fault = result.fault;
+  out.errors = run.counts().errors;
+  out.steps = run.simulation().counts().steps;
+  out.digest = run.counts().digest;
+  out.result = result.hex() + " " + std::to_string(result.frames);
+  return out;
+}
+
+inline std::vector<std::string> lines_in(std::istream& text) {
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);)
+    lines.push_back(line);
+  return lines;
+}
+
+/// Answers without those to wrong lines; `fault` gets what no line may say.
+inline std::string answers_of(const std::string& replies, std::string& fault) {
+  std::istringstream text(replies);
+  std::string answers;
+  for (const std::string& line : lines_in(text)) {
+    for (const char* word : {"nan", "inf ", "basic_ios", "max_size", "std::", "bad_alloc"})
+      if ((" " + line + " ").find(std::string(line.starts_with("error ") ? "" : " ") + word) !=
+          std::string::npos)
+        fault = "it says: " + line;
+    if (!line.starts_with("error "))
+      answers += line + "\n";
+  }
+  return answers;
+}
+
+/// The first line that differs.
+inline std::string first_difference(const std::string& right, const std::string& other) {
+  std::istringstream a(right), b(other);
+  std::string in_a, in_b;
+  for (std::size_t number = 1;; ++number) {
+    const bool more_a = static_cast<bool>(std::getline(a, in_a)),
+               more_b = static_cast<bool>(std::getline(b, in_b));
+    if (!more_a && !more_b)
+      return "nowhere";
+    if (more_a != more_b || in_a != in_b)
+      return "line " + std::to_string(number) + " '" + (more_a ? in_a : "") + "', then '" +
+             (more_b ? in_b : "") + "'";
+  }
+}
+
+/// What is wrong with how this scene runs; empty: nothing. \param seen counts steps, errors and
+/// scenes that were too slow
+struct FuzzedCounts {
+  std::uint64_t steps = 0, errors = 0, slow = 0;
+};
+inline std::string fault_of_scene(const std::vector<std::string>& lines, FuzzedCounts& seen) {
+  const ScratchFile record(".scene");
+  const FuzzedRun live = run_fuzzed(lines, true, 1, record.path());
+  seen.steps += live.steps;
+  seen.errors += live.errors;
+  if (live.slow) {
+    ++seen.slow;
+    return "";
+  }
+  std::string fault = live.fault;
+  const std::string answers = answers_of(live.replies, fault);
+  if (!fault.empty())
+    return fault;
+  std::ifstream file(record.path());
+  const std::vector<std::string> again = lines_in(file);
+  if (again.empty())
+    return "";
+  const FuzzedRun replay = run_fuzzed(again, false, 2, "", 60);
+  if (!replay.fault.empty() || replay.slow)
+    return "the record does not run: " + replay.fault;
+  if (replay.replies != answers)
+    return "the record answers otherwise: " + first_difference(answers, replay.replies);
+  if (replay.digest != live.digest || replay.result != live.result)
+    return "the record gives another result";
+  return "";
+}
+
+} // namespace gewebe::test
