@@ -52,10 +52,10 @@ LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-
 
 # --- What there is ----------------------------------------------------------------------------------
 
-LIB_SRC := $(wildcard lib/*/*.cpp formats/*.cpp)
-# A file of tools/ with a header is shared by the programs; each of the others is one.
-SHARED_SRC := $(patsubst %.h,%.cpp,$(wildcard tools/*.h))
-TOOL_SRC := $(filter-out $(SHARED_SRC),$(wildcard tools/*.cpp))
+LIB_SRC := $(wildcard lib/*/*.cpp formats/*/*.cpp)
+# Each file of tools/ is a program; what they share or need beside their main stands in folders.
+SHARED_SRC := $(wildcard tools/*/*.cpp)
+TOOL_SRC := $(wildcard tools/*.cpp)
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
 # Where threads work together; a test unit of each stage is enough for ThreadSanitizer.
 ifeq ($(config),thread)
@@ -65,7 +65,7 @@ endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
 BENCH_SRC := $(wildcard tests/bench/*.cpp)
-HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*.h))
+HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*/*.h))
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
 SCRIPTS := .ci/run .ci/sanitize tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
@@ -77,7 +77,7 @@ FUZZ := $(FUZZ_SRC:tests/fuzz/%.cpp=$(BUILD)/%)
 BENCH := $(BENCH_SRC:tests/bench/%.cpp=$(BUILD)/bench_%)
 ARCHIVE := $(BUILD)/libgewebe.a
 SHARED := $(BUILD)/obj/tools/shared.a
-# What reads volumes, for a program that seldom does: loaded when one comes (formats/volume_plugin.h).
+# What reads volumes, for a program that seldom does: loaded when one comes (formats/volume/volume_plugin.h).
 PLUGIN := $(BUILD)/gewebe-volume.so
 PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 
@@ -117,9 +117,9 @@ deps:
 kernel = $(if $(filter release,$(config)),-O3) -fno-math-errno -fno-trapping-math
 $(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
 $(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
-$(BUILD)/obj/lib/volume/coverage_exact.o: FILE_FLAGS := $(kernel)
+$(BUILD)/obj/lib/voxelize/coverage_exact.o: FILE_FLAGS := $(kernel)
 # Eight lanes on four: its vectors cross no call that is not inlined.
-$(BUILD)/obj/lib/render/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
+$(BUILD)/obj/lib/raster/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
 # CGAL's interval arithmetic changes the rounding mode.
 $(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math
 
@@ -174,22 +174,22 @@ $(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(SHARED) $(ARCHIVE)
 $(PLUGIN): $(ARCHIVE)
 	$(CXX) $(flags_$(config)) $(LDFLAGS) -shared -o $@ -Wl,-u,gewebe_view_volume $^ -Wl,--as-needed $(LIBS)
 
-$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(ARCHIVE) | $(PLUGIN)
-	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ -Wl,--whole-archive $(ARCHIVE) -Wl,--no-whole-archive $(filter %.o,$^) \
+$(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(SHARED) $(ARCHIVE) | $(PLUGIN)
+	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ -Wl,--whole-archive $(ARCHIVE) -Wl,--no-whole-archive $(filter %.o,$^) $(SHARED) \
 	  -Wl,--as-needed $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
 
-$(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
+$(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS)
 
-$(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(ARCHIVE)
+$(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS) $(BENCH_LIBS)
 
 # libFuzzer brings its own main; elsewhere replay.cpp runs the files of the corpus.
 ifeq ($(config),fuzz)
-$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(ARCHIVE)
+$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(SHARED) $(ARCHIVE)
 	$(LINK) -fsanitize=fuzzer $(LIBS)
 else
-$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/obj/tests/fuzz/replay.o $(ARCHIVE)
+$(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/obj/tests/fuzz/replay.o $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 endif
 
@@ -226,8 +226,8 @@ demo: $(TOOLS) | $(FIRST)
 # --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
 
 LINT := build/lint
-LINT_CXX := $(wildcard lib/*/*.cpp formats/*.cpp tools/*.cpp tests/*/*.cpp)
-LINT_HEADERS := $(wildcard lib/*/*.h formats/*.h tools/*.h tests/*/*.h)
+LINT_CXX := $(wildcard lib/*/*.cpp formats/*/*.cpp tools/*.cpp tools/*/*.cpp tests/*/*.cpp)
+LINT_HEADERS := $(wildcard lib/*/*.h formats/*/*.h tools/*/*.h tests/*/*.h)
 FORMAT_STAMPS := $(patsubst %,$(LINT)/%.format,$(LINT_CXX) $(LINT_HEADERS))
 TIDY_STAMPS := $(LINT_CXX:%=$(LINT)/%.tidy)
 MAN_STAMPS := $(MAN:%=$(LINT)/%.mandoc)

@@ -1,9 +1,9 @@
 // csg: volumes -> volume.
 
 #include "volume/csg.h"
-#include "formats/volume_file.h"
-#include "tools/cli.h"
-#include "tools/report.h"
+#include "formats/volume/volume_file.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/report.h"
 
 using namespace gewebe;
 

@@ -1,12 +1,12 @@
 // emboss-render: mesh, model, result or volume -> picture.
 
 #include "base/digest.h"
-#include "formats/image_file.h"
-#include "formats/surface_file.h"
-#include "tools/cli.h"
-#include "tools/render_arguments.h"
-#include "tools/render_pictures.h"
-#include "tools/render_volume.h"
+#include "formats/image/image_file.h"
+#include "tools/render/render_arguments.h"
+#include "tools/render/render_pictures.h"
+#include "tools/render/render_volume.h"
+#include "tools/render/surface_file.h"
+#include "tools/shared/cli.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,12 +1,12 @@
 // exp2ela: mesh or primitive -> deformable model; model -> model or mesh.
 
-#include "formats/ela.h"
-#include "formats/mesh_file.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/model/ela.h"
 #include "model/figures.h"
 #include "model/hinge.h"
-#include "tools/cli.h"
-#include "tools/mesh_size.h"
-#include "tools/model_arguments.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/mesh_size.h"
+#include "tools/shared/model_arguments.h"
 
 #include <algorithm>
 #include <string>

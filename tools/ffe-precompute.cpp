@@ -1,8 +1,8 @@
 // ffe-precompute: model -> stiffness store.
 
-#include "formats/file_names.h"
-#include "tools/store_making.h"
-#include "tools/store_update.h"
+#include "formats/stream/file_names.h"
+#include "tools/store/store_making.h"
+#include "tools/store/store_update.h"
 
 #include <array>
 #include <csignal>

@@ -1,13 +1,13 @@
 // ffe-run: scene -> replies, shapes, forces.
 
-#include "formats/event_log.h"
-#include "formats/results_writer.h"
-#include "formats/scene_record.h"
-#include "formats/scene_run.h"
-#include "formats/step_latency.h"
-#include "tools/cli.h"
-#include "tools/distrust.h"
-#include "tools/run_report.h"
+#include "formats/results/results_writer.h"
+#include "tools/run/event_log.h"
+#include "tools/run/run_report.h"
+#include "tools/run/scene_record.h"
+#include "tools/run/scene_run.h"
+#include "tools/run/step_latency.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/distrust.h"
 
 #include <memory>
 #include <optional>

@@ -1,16 +1,16 @@
 // mc-opt: volume -> triangle mesh of its isosurface.
 
-#include "formats/mesh_file.h"
-#include "formats/volume_file.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/volume/volume_file.h"
 #include "mesh/components.h"
 #include "surface/gradient_normals.h"
 #include "surface/marching_cubes.h"
 #include "surface/regularize.h"
 #include "surface/snapping.h"
-#include "tools/cli.h"
-#include "tools/distrust.h"
-#include "tools/surface_choice.h"
-#include "tools/surface_report.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/distrust.h"
+#include "tools/shared/surface_choice.h"
+#include "tools/shared/surface_report.h"
 #include "volume/crop.h"
 #include "volume/resample.h"
 

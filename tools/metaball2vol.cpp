@@ -1,11 +1,11 @@
 // metaball2vol: particles -> density volume.
 
 #include "base/bytes.h"
-#include "formats/particles_file.h"
-#include "formats/volume_file.h"
-#include "tools/cli.h"
-#include "tools/report.h"
-#include "volume/density.h"
+#include "density/density.h"
+#include "formats/mesh/particles_file.h"
+#include "formats/volume/volume_file.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/report.h"
 #include "volume/lattice.h"
 
 #include <array>

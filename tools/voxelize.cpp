@@ -1,15 +1,15 @@
 // voxelize: closed mesh or labels -> volume.
 
-#include "volume/voxelize.h"
-#include "formats/label_volume.h"
-#include "formats/mesh_file.h"
-#include "formats/volume_file.h"
-#include "tools/antialias.h"
-#include "tools/cli.h"
-#include "tools/distrust.h"
-#include "tools/mesh_size.h"
-#include "tools/report.h"
-#include "tools/voxelize_labels.h"
+#include "voxelize/voxelize.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/volume/label_volume.h"
+#include "formats/volume/volume_file.h"
+#include "tools/shared/antialias.h"
+#include "tools/shared/cli.h"
+#include "tools/shared/distrust.h"
+#include "tools/shared/mesh_size.h"
+#include "tools/shared/report.h"
+#include "tools/shared/voxelize_labels.h"
 #include "volume/lattice.h"
 
 #include <cmath>

@@ -1,6 +1,7 @@
 #pragma once
 // Dense columns of a compliance matrix C = K⁻¹, node by node: who makes them and who keeps them
-// know nothing of each other. formats/ implements both interfaces over HDF5, sim/ uses them.
+// know nothing of each other. formats/store implements both interfaces over HDF5, lib/compliance
+// uses them.
 //
 // The columns of a node are three rows of 3n doubles: entry [axis][3 i + a] is the displacement
 // (mm) of node i along a under a unit force (1e-6 N) along `axis` at that node; 0 where either axis

@@ -1,8 +1,8 @@
 #include "render/picture.h"
 
 #include "base/error.h"
-#include "render/gl_context.h"
-#include "render/raster_cpu.h"
+#include "gl/gl_context.h"
+#include "raster/raster_cpu.h"
 
 #include <algorithm>
 #include <charconv>

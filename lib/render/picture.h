@@ -2,11 +2,11 @@
 // A picture by whichever backend is wanted or there.
 
 #include "base/context.h"
-#include "render/camera.h"
-#include "render/drawing.h"
-#include "render/gl_renderer.h"
-#include "render/image.h"
-#include "render/look.h"
+#include "gl/gl_renderer.h"
+#include "shading/camera.h"
+#include "shading/drawing.h"
+#include "shading/image.h"
+#include "shading/look.h"
 
 #include <cstdint>
 #include <memory>

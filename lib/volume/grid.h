@@ -1,7 +1,7 @@
 #pragma once
 // A sparse volume of float values: our narrow view of an OpenVDB float grid. Everything that
 // computes on volumes goes through this header, so that OpenVDB is compiled in three units only
-// (volume/grid.cpp, volume/grid_fold.cpp and formats/volume_file.cpp).
+// (volume/grid.cpp, volume/grid_fold.cpp and formats/volume/volume_file.cpp).
 //
 // Voxel (i,j,k) has its centre at world T(i,j,k) and covers ±½ in index space. Values live in
 // leaves of 8×8×8 voxels whose origin is a multiple of 8; offset of a voxel in its leaf: (i&7)*64 +

@@ -1,6 +1,6 @@
 #pragma once
-// The OpenVDB grid behind a Grid; for volume/grid.cpp, grid_fold.cpp and formats/volume_file.cpp
-// only.
+// The OpenVDB grid behind a Grid; for volume/grid.cpp, grid_fold.cpp and
+// formats/volume/volume_file.cpp only.
 
 #include "base/zero_pages.h"
 #include "volume/grid.h"

@@ -8,18 +8,18 @@
 //
 // Meshes are the liver and the colon of $GEWEBE_SHARED/data where they are, else made ones.
 
-#include "formats/image_file.h"
-#include "formats/mesh_file.h"
+#include "formats/image/image_file.h"
+#include "formats/mesh/mesh_file.h"
 #include "surface/marching_cubes.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
-#include "volume/coverage.h"
-#include "volume/distance_band_internal.h"
-#include "volume/distance_ramp.h"
 #include "volume/lattice.h"
 #include "volume/volume_stats.h"
-#include "volume/voxelize.h"
+#include "voxelize/coverage.h"
+#include "voxelize/distance_band_internal.h"
+#include "voxelize/distance_ramp.h"
+#include "voxelize/voxelize.h"
 
 #include <algorithm>
 #include <cmath>

@@ -13,12 +13,12 @@
 // slowest time in ms, a figure and its unit; and to standard error what follows from it.
 
 #include "base/error.h"
-#include "formats/ela.h"
-#include "formats/mesh_file.h"
-#include "formats/stiffness_store_writer.h"
+#include "compliance/compliance_columns.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/model/ela.h"
+#include "formats/store/stiffness_store_writer.h"
 #include "model/build.h"
-#include "sim/compliance_columns.h"
-#include "sim/simulation.h"
+#include "scene/simulation.h"
 #include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -8,9 +8,9 @@
 
 #include "base/huge_pages.h"
 #include "base/parallel.h"
+#include "compliance/column_sum.h"
 #include "model/build.h"
-#include "sim/column_sum.h"
-#include "sim/elastostatic.h"
+#include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -6,11 +6,11 @@
 // Writes CSV to standard output: stage, program, springs, nodes, threads, median, fastest and 99th
 // percentile in ms, a figure and its unit.
 
+#include "compliance/axis_solver.h"
+#include "compliance/cut_stiffness.h"
+#include "compliance/stiffness_change.h"
+#include "compliance/woodbury.h"
 #include "model/build.h"
-#include "sim/axis_solver.h"
-#include "sim/cut_stiffness.h"
-#include "sim/stiffness_change.h"
-#include "sim/woodbury.h"
 #include "solve/stiffness.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -9,7 +9,7 @@
 // springs gone and nodes doubled in the mean, nodes, contacts, median, fastest and 99th percentile
 // in ms, a figure and its unit.
 
-#include "formats/ela.h"
+#include "formats/model/ela.h"
 #include "model/build.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"

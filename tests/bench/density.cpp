@@ -7,13 +7,13 @@
 // work follows), threads, median and spread of the times, and a figure whose meaning stands in the
 // column `measure`.
 
-#include "volume/density.h"
+#include "density/density.h"
+#include "density/density_kernel_internal.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"
-#include "volume/density_kernel_internal.h"
 
 #include <immintrin.h>
 

@@ -2,10 +2,10 @@
 // precision where $PYTHON (python3) has it, and the speed of the springs against a plain loop over
 // an edge list and against what root and division alone allow.
 
+#include "dynamics/elastodynamic.h"
 #include "model/build.h"
 #include "model/primitive.h"
 #include "peer.h"
-#include "sim/elastodynamic.h"
 #include "tests/unit/larger.h"
 #include "timing.h"
 

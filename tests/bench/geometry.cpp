@@ -2,10 +2,10 @@
 // run. Writes CSV to standard output: stage, program, voxel (mm), size (what the work follows),
 // threads, median and spread of the times, error (what it means stands in the column `measure`).
 
+#include "density/density.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
 #include "tests/bench/timing.h"
-#include "volume/density.h"
 #include "volume/grid_internal.h"
 
 #include <openvdb/tools/VolumeToMesh.h>

@@ -2,8 +2,8 @@
 // Columns of a compliance that stay in memory, as a store would give them, for the benchmarks.
 
 #include "base/columns.h"
-#include "sim/compliance.h"
-#include "sim/compliance_columns.h"
+#include "compliance/compliance.h"
+#include "compliance/compliance_columns.h"
 #include "solve/condition.h"
 
 #include <algorithm>

@@ -11,9 +11,9 @@
 // Writes CSV to standard output. Stage "scaling" holds frames/s over triangles for the figure.
 
 #include "base/error.h"
-#include "render/gl_context.h"
-#include "render/gl_renderer.h"
-#include "render/raster_cpu.h"
+#include "gl/gl_context.h"
+#include "gl/gl_renderer.h"
+#include "raster/raster_cpu.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/render_oracle.h"
 #include "tests/unit/render_scenes.h"

@@ -7,9 +7,9 @@
 // Writes CSV to standard output: stage, program, nodes, columns solved, threads, median, fastest
 // and slowest time in ms, a figure and its unit.
 
+#include "compliance/compliance_columns.h"
+#include "dynamics/relaxation.h"
 #include "model/build.h"
-#include "sim/compliance_columns.h"
-#include "sim/relaxation.h"
 #include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

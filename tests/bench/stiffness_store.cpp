@@ -6,10 +6,10 @@
 // Writes CSV to standard output: stage, program, nodes (of the whole scene), columns, threads,
 // median, fastest and slowest time in ms, a figure and its unit.
 
-#include "formats/stiffness_store_writer.h"
+#include "compliance/compliance_columns.h"
+#include "formats/store/stiffness_store_writer.h"
 #include "model/build.h"
 #include "model/primitive.h"
-#include "sim/compliance_columns.h"
 #include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/scratch.h"

@@ -9,11 +9,11 @@
 // column `measure`.
 
 #include "base/parallel.h"
+#include "density/density.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
-#include "volume/density.h"
 #include "volume/grid_internal.h"
 
 #include <openvdb/tools/VolumeToMesh.h>

@@ -14,7 +14,7 @@
 // over the voxel edge's square root (mesh/quality.h; comparable between volumes), zero-area faces,
 // pairs of triangles that cut each other.
 
-#include "formats/mesh_file.h"
+#include "formats/mesh/mesh_file.h"
 #include "mesh/check.h"
 #include "mesh/quality.h"
 #include "mesh/self_intersections.h"
@@ -26,8 +26,8 @@
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
-#include "volume/coverage.h"
 #include "volume/lattice.h"
+#include "voxelize/coverage.h"
 
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>

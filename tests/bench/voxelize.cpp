@@ -6,8 +6,8 @@
 // Writes CSV to standard output as geometry.cpp does, and the peak of memory that one call adds to
 // the process, in MiB (0: not measured).
 
-#include "volume/voxelize.h"
-#include "formats/mesh_file.h"
+#include "voxelize/voxelize.h"
+#include "formats/mesh/mesh_file.h"
 #include "tests/bench/peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"

@@ -8,9 +8,9 @@
 // program, nodes, pulled nodes, threads, median, fastest and slowest time in ms, a figure and its
 // unit.
 
+#include "dynamics/elastodynamic.h"
 #include "model/build.h"
-#include "sim/elastodynamic.h"
-#include "sim/elastostatic.h"
+#include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -10,29 +10,36 @@ right() { check "$@" >said.txt || fail "complained about $*:" "$(<said.txt)"; }
 wrong() { ! check "$@" >said.txt || fail "passed: $*"; }
 
 test_directions() {
-  right tools/a.cpp '#include "formats/stream.h"' '#include "surface/x.h"' '#include "tools/cli.h"'
-  right formats/a.cpp '#include "volume/grid.h"' '#include <openvdb/openvdb.h>'
-  right lib/model/a.cpp '#include "surface/x.h"' '#include "base/x.h"' '#include <cmath>'
+  right tools/a.cpp '#include "formats/stream/stream.h"' '#include "surface/x.h"' '#include "tools/shared/cli.h"' '#include "tools/run/x.h"'
+  right tools/run/a.cpp '#include "formats/scene/x.h"' '#include "tools/shared/cli.h"'
+  right formats/volume/a.cpp '#include "volume/grid.h"' '#include <openvdb/openvdb.h>'
+  right lib/surface/a.cpp '#include "mesh/x.h"' '#include "base/x.h"' '#include "surface/x.h"' '#include <cmath>'
+  right tests/unit/a.cpp '#include "mesh_fixtures.h"' '#include "scene/x.h"' '#include "tools/run/x.h"'
   wrong lib/volume/a.cpp '#include "surface/x.h"'
+  wrong lib/model/a.cpp '#include "surface/x.h"'
   wrong lib/base/a.cpp '  #  include "volume/x.h"'
-  wrong lib/model/a.cpp '#include "formats/stream.h"'
-  wrong formats/a.cpp '#include "tools/cli.h"'
+  wrong lib/model/a.cpp '#include "formats/stream/stream.h"'
+  wrong formats/mesh/a.cpp '#include "formats/store/x.h"'
+  wrong formats/mesh/a.cpp '#include "tools/shared/cli.h"'
+  wrong tools/shared/a.cpp '#include "tools/run/x.h"'
   wrong lib/model/a.cpp '#include "x.h"'
   wrong lib/model/a.cpp '#include "tests/x.h"'
+  wrong lib/another/a.cpp '#include "base/x.h"'
+  wrong formats/a.cpp '#include "base/x.h"'
 }
 
 test_public_headers() {
   right lib/base/a.h '#pragma once' '#include <vector>' '#include "base/vec3.h"'
   right lib/volume/a_internal.h '#pragma once' '#include <openvdb/openvdb.h>'
   wrong lib/base/a.h '#pragma once' '#include <openvdb/openvdb.h>'
-  wrong formats/a.h '#pragma once' '#include <nlohmann/json.hpp>'
+  wrong formats/mesh/a.h '#pragma once' '#include <nlohmann/json.hpp>'
   wrong lib/volume/a.h '#pragma once' '#include "volume/b_internal.h"'
   wrong lib/base/a.h '#include <vector>'
 }
 
 test_other_rules() {
   wrong tools/a.cpp '#include <CLI/App.hpp>'
-  right tools/cli.cpp '#include <CLI/App.hpp>'
+  right tools/shared/cli.cpp '#include <CLI/App.hpp>'
   wrong lib/volume/a_avx2.cpp '#include <openvdb/openvdb.h>'
   wrong lib/volume/a_avx2.cpp '#include <vector>'
   wrong lib/model/a.cpp '#include <fstream>'

@@ -13,7 +13,7 @@ test_installed_library_compiles_and_links() {
   cat >small.cpp <<'END'
 #include "base/error.h"
 #include "base/particles.h"
-#include "formats/kind.h"
+#include "formats/stream/kind.h"
 #include "volume/lattice.h"
 #include <cstdio>
 int main() {

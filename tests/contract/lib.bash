@@ -25,10 +25,7 @@ has_strace() { has strace && { strace -o /dev/null true 2>/dev/null || { left_ou
 
 # The names of our programs.
 programs() {
-  local file
-  for file in "$GEWEBE_ROOT"/tools/*.cpp; do
-    [[ -e ${file%.cpp}.h ]] || basename "$file" .cpp
-  done
+  basename -s .cpp "$GEWEBE_ROOT"/tools/*.cpp
 }
 
 # Those whose result is a stream; the others write files by name (ffe-run's standard output is its replies).

@@ -1,7 +1,7 @@
 // Any bytes as ELA_EXPL: an Error, or a model that is written and read back exactly.
 
 #include "base/error.h"
-#include "formats/ela.h"
+#include "formats/model/ela.h"
 #include "model/figures.h"
 
 #include <cstddef>

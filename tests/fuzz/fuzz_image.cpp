@@ -1,8 +1,8 @@
 // Any bytes are an image or an Error, by both readers, and an image survives being written and
 // read.
 #include "base/error.h"
-#include "formats/png.h"
-#include "formats/pnm.h"
+#include "formats/image/png.h"
+#include "formats/image/pnm.h"
 
 #include <cstdlib>
 #include <string_view>

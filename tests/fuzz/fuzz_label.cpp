@@ -2,8 +2,8 @@
 // small ones become a density too.
 
 #include "base/error.h"
-#include "formats/label_volume.h"
-#include "volume/label_density.h"
+#include "formats/volume/label_volume.h"
+#include "labels/label_density.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // Any text as particles: an Error, or particles that are written and read back exactly.
 
 #include "base/error.h"
-#include "formats/particles_file.h"
+#include "formats/mesh/particles_file.h"
 
 #include <cstddef>
 #include <cstdint>

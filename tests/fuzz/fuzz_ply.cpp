@@ -1,6 +1,6 @@
 // Any bytes are a mesh or an Error, and a mesh survives being written and read.
 #include "base/error.h"
-#include "formats/ply.h"
+#include "formats/mesh/ply.h"
 
 #include <cstdlib>
 #include <string_view>

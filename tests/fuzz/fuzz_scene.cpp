@@ -2,9 +2,9 @@
 // each line that is refused is answered and takes no time; in binary the frames follow one another.
 
 #include "base/error.h"
-#include "formats/frames_binary.h"
-#include "formats/scene_run.h"
+#include "formats/scene/frames_binary.h"
 #include "model/model.h"
+#include "tools/run/scene_run.h"
 
 #include <cstddef>
 #include <cstdint>

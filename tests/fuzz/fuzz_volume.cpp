@@ -2,7 +2,7 @@
 // again.
 
 #include "base/error.h"
-#include "formats/volume_file.h"
+#include "formats/volume/volume_file.h"
 
 #include <cstddef>
 #include <cstdint>

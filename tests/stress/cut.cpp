@@ -3,12 +3,12 @@
 // colon and a liver, or balls where there is no shared data. The negative control solves with what
 // held before the cut. Argument: how many cuts (default 200).
 
+#include "compliance/axis_solver.h"
+#include "compliance/cut_stiffness.h"
 #include "model/build.h"
-#include "sim/axis_solver.h"
-#include "sim/cut_stiffness.h"
-#include "sim/elastostatic.h"
 #include "solve/condition.h"
 #include "solve/stiffness.h"
+#include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"

@@ -2,9 +2,9 @@
 // Scenes that strain the density's accuracy, each with its error against long double. Unit tests
 // run them small, tests/stress/density.cpp large.
 
+#include "density/density.h"
 #include "tests/unit/density_scenes.h"
 #include "tests/unit/larger.h"
-#include "volume/density.h"
 
 #include <algorithm>
 #include <string>

@@ -6,15 +6,15 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "base/number_text.h"
-#include "formats/event_log.h"
-#include "formats/scene_record.h"
-#include "formats/scene_run.h"
 #include "model/build.h"
 #include "model/primitive.h"
 #include "solve/condition.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/scratch.h"
 #include "tests/unit/simulation_scenes.h"
+#include "tools/run/event_log.h"
+#include "tools/run/scene_record.h"
+#include "tools/run/scene_run.h"
 
 #include <algorithm>
 #include <chrono>

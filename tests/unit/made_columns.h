@@ -2,8 +2,8 @@
 // Columns of a compliance matrix that are kept in memory, and models for them.
 
 #include "base/columns.h"
-#include "sim/axis_solver.h"
-#include "sim/compliance.h"
+#include "compliance/axis_solver.h"
+#include "compliance/compliance.h"
 #include "stiffness_models.h"
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 
 #include "base/mesh.h"
 #include "volume/grid.h"
-#include "volume/voxelize.h"
+#include "voxelize/voxelize.h"
 
 #include <cstdlib>
 #include <fstream>

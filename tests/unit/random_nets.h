@@ -1,7 +1,7 @@
 #pragma once
 // Nets that strain an integrator: sixteen kinds of bad, by seed.
 
-#include "sim/elastodynamic.h"
+#include "dynamics/elastodynamic.h"
 #include "sim_models.h"
 
 #include <array>

@@ -1,13 +1,13 @@
 #pragma once
 // The formula of the report, pixel by pixel, with one ray for each: slow, in double, and with
-// nothing of lib/render but the plain data that it is asked about.
+// nothing of the library but the plain data that it is asked about.
 
 #include "base/mesh.h"
 #include "base/parallel.h"
 #include "larger.h"
-#include "render/camera.h"
-#include "render/image.h"
 #include "rest_oracle.h"
+#include "shading/camera.h"
+#include "shading/image.h"
 
 #include <algorithm>
 #include <array>

@@ -2,10 +2,10 @@
 // Textures, surfaces and looks for pictures.
 
 #include "base/mesh.h"
-#include "render/image.h"
-#include "render/look.h"
-#include "render/texture.h"
 #include "render_oracle.h"
+#include "shading/image.h"
+#include "shading/look.h"
+#include "shading/texture.h"
 
 #include <cmath>
 #include <cstdint>

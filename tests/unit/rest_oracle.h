@@ -1,9 +1,9 @@
 #pragma once
 // Textures on the shape at rest by their formulas (rest.h, solid_texture.h), in double and one
-// point at a time; nothing of lib/render but the plain data that they are asked about.
+// point at a time; nothing of the library but the plain data that they are asked about.
 
-#include "render/rest.h"
-#include "render/solid_texture.h"
+#include "shading/rest.h"
+#include "shading/solid_texture.h"
 
 #include <algorithm>
 #include <array>

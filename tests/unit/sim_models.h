@@ -2,9 +2,9 @@
 // Models for the tests of the simulation.
 
 #include "base/context.h"
+#include "dynamics/spring_force.h"
 #include "model/build.h"
 #include "model_meshes.h"
-#include "sim/spring_force.h"
 
 #include <cstddef>
 #include <cstdint>

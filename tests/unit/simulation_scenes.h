@@ -2,7 +2,7 @@
 // What the tests of scenes have in common: shapes as vectors, and cuts of an organ.
 
 #include "model/cut_select.h"
-#include "sim/simulation.h"
+#include "scene/simulation.h"
 #include "sim_models.h"
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "formats/mesh_file.h"
+#include "formats/mesh/mesh_file.h"
 #include "model/build.h"
 #include "model_meshes.h"
 #include "solve/stiffness.h"

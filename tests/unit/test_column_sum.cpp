@@ -1,5 +1,5 @@
 #include "base/cpu.h"
-#include "sim/column_sum.h"
+#include "compliance/column_sum.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

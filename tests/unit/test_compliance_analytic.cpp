@@ -1,10 +1,10 @@
 // Compliance of springs whose answer is known by hand: a chain, a truss, a net.
 
-#include "sim/compliance_columns.h"
+#include "compliance/compliance_columns.h"
 
+#include "dynamics/relaxation.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
-#include "sim/relaxation.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

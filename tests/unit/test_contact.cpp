@@ -1,9 +1,9 @@
+#include "dynamics/dynamic_contact.h"
+#include "dynamics/elastodynamic.h"
 #include "larger.h"
-#include "sim/dynamic_contact.h"
-#include "sim/elastodynamic.h"
-#include "sim/elastostatic.h"
-#include "sim/static_contact.h"
 #include "sim_models.h"
+#include "statics/elastostatic.h"
+#include "statics/static_contact.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

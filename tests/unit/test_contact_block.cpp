@@ -1,4 +1,4 @@
-#include "sim/contact_block.h"
+#include "statics/contact_block.h"
 
 #include <Eigen/Dense>
 

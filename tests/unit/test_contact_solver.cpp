@@ -1,10 +1,10 @@
-#include "sim/contact_solver.h"
+#include "contact/contact_solver.h"
 
 #include "larger.h"
-#include "sim/elastostatic.h"
 #include "sim_models.h"
 #include "solve/factor.h"
 #include "solve/stiffness.h"
+#include "statics/elastostatic.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

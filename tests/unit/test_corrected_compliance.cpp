@@ -1,13 +1,13 @@
 // The columns that a cut model takes over, as they go to a store.
 
-#include "sim/corrected_compliance.h"
+#include "compliance/corrected_compliance.h"
 
 #include "base/error.h"
+#include "compliance/compliance_columns.h"
 #include "cut_models.h"
 #include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
-#include "sim/compliance_columns.h"
 #include "solve/condition.h"
 
 #include <gtest/gtest.h>

@@ -5,9 +5,9 @@
 #include "mesh/orient_closed.h"
 #include "mesh_fixtures.h"
 #include "tests/unit/larger.h"
-#include "volume/coverage.h"
 #include "volume/lattice.h"
 #include "volume/volume_stats.h"
+#include "voxelize/coverage.h"
 
 #include <gtest/gtest.h>
 

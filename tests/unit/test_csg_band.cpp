@@ -1,8 +1,8 @@
 // CSG of band volumes: what a band leaves away must not change the side of any voxel.
 
 #include "csg_grids.h"
+#include "density/density.h"
 #include "density_scenes.h"
-#include "volume/density.h"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 #include "model/cut_origin.h"
 
 #include "base/error.h"
+#include "compliance/stiffness_change.h"
 #include "model/cut.h"
-#include "sim/stiffness_change.h"
 #include "stiffness_models.h"
 
 #include <gtest/gtest.h>

@@ -1,12 +1,12 @@
 // The stiffness of an object that is cut: whichever way it is followed, equal to a fresh one.
 
-#include "sim/cut_stiffness.h"
+#include "compliance/cut_stiffness.h"
 
+#include "compliance/axis_solver.h"
 #include "mesh_fixtures.h"
 #include "model/cut_select.h"
 #include "random_cuts.h"
 #include "relative_difference.h"
-#include "sim/axis_solver.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 #include "tests/bench/memory_columns.h"

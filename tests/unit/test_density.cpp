@@ -1,10 +1,10 @@
 // Density: against the expanded polynomial in long double, at the right places.
 
 #include "base/error.h"
+#include "density/density.h"
+#include "density/density_kernel_internal.h"
 #include "tests/unit/density_stress.h"
 #include "tests/unit/larger.h"
-#include "volume/density.h"
-#include "volume/density_kernel_internal.h"
 
 #include <gtest/gtest.h>
 

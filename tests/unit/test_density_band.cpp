@@ -1,12 +1,12 @@
 // The band volume: exactly the leaves that an isosurface crosses, with the bits of the plain one.
 
 #include "base/error.h"
+#include "density/density.h"
+#include "density/density_kernel_internal.h"
 #include "surface/marching_cubes.h"
 #include "surface/snapping.h"
 #include "tests/unit/density_scenes.h"
 #include "volume/csg.h"
-#include "volume/density.h"
-#include "volume/density_kernel_internal.h"
 
 #include <gtest/gtest.h>
 

@@ -5,10 +5,10 @@
 #include "mesh_fixtures.h"
 #include "surface/gradient_normals.h"
 #include "surface/marching_cubes.h"
-#include "volume/coverage.h"
-#include "volume/distance_band_internal.h"
-#include "volume/distance_ramp.h"
 #include "volume/volume_stats.h"
+#include "voxelize/coverage.h"
+#include "voxelize/distance_band_internal.h"
+#include "voxelize/distance_ramp.h"
 
 #include <gtest/gtest.h>
 

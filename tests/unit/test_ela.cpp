@@ -1,5 +1,5 @@
 #include "base/error.h"
-#include "formats/ela.h"
+#include "formats/model/ela.h"
 #include "larger.h"
 #include "model/build.h"
 #include "model_meshes.h"

@@ -1,6 +1,6 @@
 #include "base/error.h"
+#include "dynamics/elastodynamic.h"
 #include "larger.h"
-#include "sim/elastodynamic.h"
 #include "sim_models.h"
 
 #include <cmath>

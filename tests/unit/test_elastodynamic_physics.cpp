@@ -1,9 +1,9 @@
 // What the motion must agree with: analytic solutions, conservation, the static solution, other
 // CPUs.
 
+#include "dynamics/elastodynamic.h"
 #include "larger.h"
 #include "random_nets.h"
-#include "sim/elastodynamic.h"
 #include "sim_models.h"
 #include "solve/factor.h"
 

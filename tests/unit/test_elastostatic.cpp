@@ -1,9 +1,9 @@
 #include "base/error.h"
+#include "dynamics/elastodynamic.h"
 #include "larger.h"
-#include "sim/elastodynamic.h"
-#include "sim/elastostatic.h"
 #include "sim_models.h"
 #include "solve/stiffness.h"
+#include "statics/elastostatic.h"
 
 #include <Eigen/Dense>
 

@@ -2,8 +2,8 @@
 
 #include "solve/factor.h"
 
+#include "compliance/compliance_columns.h"
 #include "larger.h"
-#include "sim/compliance_columns.h"
 #include "solve/condition.h"
 #include "solve/fused_internal.h"
 #include "stiffness_models.h"

@@ -3,10 +3,10 @@
 
 #include "solve/frontal_factor.h"
 
+#include "compliance/axis_solver.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
 #include "relative_difference.h"
-#include "sim/axis_solver.h"
 #include "solve/factor.h"
 #include "stiffness_models.h"
 

@@ -1,7 +1,7 @@
-#include "sim/instrument.h"
+#include "contact/instrument.h"
 
-#include "sim/load.h"
-#include "sim/surface_blocks.h"
+#include "contact/load.h"
+#include "contact/surface_blocks.h"
 #include "sim_models.h"
 
 #include <cmath>

@@ -1,10 +1,10 @@
 // Densities of labels: planes, boxes and balls on all kinds of lattices.
 
 #include "base/error.h"
+#include "labels/label_density.h"
 #include "mesh/check.h"
 #include "surface/marching_cubes.h"
 #include "tests/unit/larger.h"
-#include "volume/label_density.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Readers of label volumes: the three formats say the same, damage is refused.
 
 #include "base/error.h"
-#include "formats/label_volume.h"
+#include "formats/volume/label_volume.h"
 #include "tests/unit/scratch.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 #include "base/error.h"
-#include "formats/assimp_child.h"
-#include "formats/child.h"
-#include "formats/mesh_file.h"
-#include "formats/ply.h"
+#include "formats/mesh/assimp_child.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/mesh/ply.h"
+#include "formats/stream/child.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include "model/material.h"
 #include "model/model.h"
 #include "model_meshes.h"
-#include "sim/elastostatic.h"
+#include "statics/elastostatic.h"
 
 #include <algorithm>
 #include <charconv>

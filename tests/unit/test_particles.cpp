@@ -1,8 +1,8 @@
 // Particles as text, and the kinds of data.
 
 #include "base/error.h"
-#include "formats/kind.h"
-#include "formats/particles_file.h"
+#include "formats/mesh/particles_file.h"
+#include "formats/stream/kind.h"
 
 #include <gtest/gtest.h>
 

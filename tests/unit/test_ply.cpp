@@ -1,5 +1,5 @@
 #include "base/error.h"
-#include "formats/ply.h"
+#include "formats/mesh/ply.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // CGAL reads the PLY that we write: the same points bit for bit, the same faces, a closed mesh.
 
-#include "formats/ply.h"
+#include "formats/mesh/ply.h"
 #include "tests/unit/mesh_fixtures.h"
 
 #include <CGAL/IO/PLY.h>

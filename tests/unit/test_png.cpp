@@ -1,9 +1,9 @@
 // Images from and to files.
 
 #include "base/error.h"
-#include "formats/image_file.h"
-#include "formats/png.h"
-#include "formats/pnm.h"
+#include "formats/image/image_file.h"
+#include "formats/image/png.h"
+#include "formats/image/pnm.h"
 #include "scratch.h"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
 #include "base/error.h"
+#include "dynamics/elastodynamic.h"
 #include "larger.h"
 #include "model/build.h"
 #include "model/figures.h"
 #include "model/primitive.h"
-#include "sim/elastodynamic.h"
 #include "sim_models.h"
 
 #include <cmath>

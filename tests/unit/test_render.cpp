@@ -4,15 +4,15 @@
 #include "larger.h"
 #include "mesh_fixtures.h"
 #include "model_meshes.h"
-#include "render/angles.h"
-#include "render/camera.h"
-#include "render/drawing.h"
-#include "render/image.h"
 #include "render/picture.h"
-#include "render/style.h"
-#include "render/tangents.h"
-#include "render/texture.h"
-#include "render/uv.h"
+#include "shading/angles.h"
+#include "shading/camera.h"
+#include "shading/drawing.h"
+#include "shading/image.h"
+#include "shading/style.h"
+#include "shading/tangents.h"
+#include "shading/texture.h"
+#include "shading/uv.h"
 
 #include <gtest/gtest.h>
 

@@ -1,16 +1,16 @@
 // Both backends against the formula of the report.
 
 #include "base/error.h"
-#include "formats/mesh_file.h"
-#include "formats/png.h"
+#include "formats/image/png.h"
+#include "formats/mesh/mesh_file.h"
+#include "gl/gl_context.h"
+#include "gl/gl_renderer.h"
 #include "mesh_fixtures.h"
-#include "render/gl_context.h"
-#include "render/gl_renderer.h"
+#include "raster/raster_cpu.h"
 #include "render/picture.h"
-#include "render/raster_cpu.h"
-#include "render/uv.h"
 #include "render_oracle.h"
 #include "render_scenes.h"
+#include "shading/uv.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include "larger.h"
 #include "mesh_fixtures.h"
 #include "model_meshes.h"
+#include "raster/raster_cpu.h"
 #include "render/picture.h"
-#include "render/raster_cpu.h"
 
 #include <gtest/gtest.h>
 

@@ -2,17 +2,17 @@
 // their formulas, and what must hold for them anywhere.
 
 #include "base/error.h"
-#include "formats/mesh_file.h"
+#include "formats/mesh/mesh_file.h"
+#include "gl/gl_context.h"
+#include "gl/gl_renderer.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
-#include "render/gl_context.h"
-#include "render/gl_renderer.h"
 #include "render/picture.h"
-#include "render/rest.h"
-#include "render/tangents.h"
-#include "render/uv.h"
 #include "render_oracle.h"
 #include "render_scenes.h"
+#include "shading/rest.h"
+#include "shading/tangents.h"
+#include "shading/uv.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // What can be drawn: meshes, models, frames of a run.
 
 #include "base/error.h"
-#include "formats/ela.h"
-#include "formats/results_writer.h"
-#include "formats/surface_file.h"
+#include "formats/model/ela.h"
+#include "formats/results/results_writer.h"
 #include "model/build.h"
 #include "model_meshes.h"
 #include "scratch.h"
+#include "tools/render/surface_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // Slices and projections of volumes against fields whose pictures are known.
 
 #include "base/error.h"
-#include "formats/volume_file.h"
-#include "formats/volume_plugin.h"
+#include "formats/volume/volume_file.h"
+#include "formats/volume/volume_plugin.h"
 #include "larger.h"
-#include "render/color_ramp.h"
-#include "render/volume_view.h"
 #include "scratch.h"
+#include "shading/color_ramp.h"
+#include "shading/volume_view.h"
 #include "volume/field.h"
 
 #include <gtest/gtest.h>

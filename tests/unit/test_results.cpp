@@ -1,8 +1,8 @@
 #include "base/error.h"
-#include "formats/hdf5_internal.h"
-#include "formats/ply.h"
-#include "formats/results.h"
-#include "formats/results_writer.h"
+#include "formats/mesh/ply.h"
+#include "formats/results/results.h"
+#include "formats/results/results_writer.h"
+#include "formats/store/hdf5_internal.h"
 #include "scratch.h"
 #include "sim_models.h"
 

@@ -1,9 +1,9 @@
 #include "base/error.h"
-#include "formats/ela.h"
-#include "formats/scene.h"
-#include "formats/scene_run.h"
+#include "formats/model/ela.h"
+#include "formats/scene/scene.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "tools/run/scene_run.h"
 
 #include <fstream>
 #include <gtest/gtest.h>

@@ -1,16 +1,16 @@
 // Scenes that are driven: wrong lines, records, events, latencies, series of shapes.
 
 #include "base/error.h"
-#include "formats/event_log.h"
-#include "formats/frames_binary.h"
-#include "formats/results_mesh.h"
-#include "formats/scene.h"
-#include "formats/scene_record.h"
-#include "formats/scene_run.h"
-#include "formats/step_latency.h"
+#include "formats/results/results_mesh.h"
+#include "formats/scene/frames_binary.h"
+#include "formats/scene/scene.h"
 #include "fuzzed_scenes.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "tools/run/event_log.h"
+#include "tools/run/scene_record.h"
+#include "tools/run/scene_run.h"
+#include "tools/run/step_latency.h"
 
 #include <algorithm>
 #include <cstring>

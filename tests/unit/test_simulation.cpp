@@ -1,6 +1,6 @@
 #include "base/error.h"
 #include "larger.h"
-#include "sim/simulation.h"
+#include "scene/simulation.h"
 #include "sim_models.h"
 
 #include <cmath>

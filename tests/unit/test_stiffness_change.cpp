@@ -1,14 +1,14 @@
 // What a cut changes: against matrices, factors and columns made afresh.
 
-#include "sim/stiffness_change.h"
+#include "compliance/stiffness_change.h"
 
+#include "compliance/compliance_columns.h"
+#include "compliance/corrected_columns.h"
+#include "compliance/woodbury.h"
 #include "cut_models.h"
 #include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
-#include "sim/compliance_columns.h"
-#include "sim/corrected_columns.h"
-#include "sim/woodbury.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

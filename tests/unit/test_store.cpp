@@ -1,13 +1,13 @@
 // The stiffness store: what is read is what was written, and damage is found.
 
-#include "formats/stiffness_store.h"
+#include "formats/store/stiffness_store.h"
 
 #include "base/crc32c.h"
-#include "formats/hdf5_internal.h"
-#include "formats/stiffness_store_writer.h"
+#include "compliance/compliance_columns.h"
+#include "formats/store/hdf5_internal.h"
+#include "formats/store/stiffness_store_writer.h"
 #include "larger.h"
 #include "scratch.h"
-#include "sim/compliance_columns.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

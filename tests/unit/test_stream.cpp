@@ -1,7 +1,7 @@
 // Files, pipes and atomic output.
 
 #include "base/error.h"
-#include "formats/stream.h"
+#include "formats/stream/stream.h"
 #include "tests/unit/scratch.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 #include "base/error.h"
 #include "larger.h"
-#include "sim/simulation.h"
-#include "sim/two_step.h"
+#include "scene/simulation.h"
 #include "sim_models.h"
+#include "statics/two_step.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

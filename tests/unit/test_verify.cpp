@@ -1,8 +1,8 @@
 // The second opinion: it agrees with what is right and finds what is wrong.
 
-#include "sim/verify.h"
+#include "compliance/verify.h"
 
-#include "sim/compliance_columns.h"
+#include "compliance/compliance_columns.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

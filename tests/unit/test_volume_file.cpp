@@ -1,7 +1,7 @@
 // Volumes on disk: round trip, equal bytes, every truncated prefix, damaged heads.
 
 #include "base/error.h"
-#include "formats/volume_file_internal.h"
+#include "formats/volume/volume_file_internal.h"
 #include "tests/unit/scratch.h"
 #include "volume/grid.h"
 

@@ -1,7 +1,7 @@
 // Streams that OpenVDB itself writes: grids of other types, several grids, cut streams.
 
 #include "base/error.h"
-#include "formats/volume_file.h"
+#include "formats/volume/volume_file.h"
 #include "mesh/check.h"
 #include "surface/marching_cubes.h"
 

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "cgal_side.h"
 #include "volume/lattice.h"
-#include "volume/ray_crossings_internal.h"
+#include "voxelize/ray_crossings_internal.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include "mesh_fixtures.h"
 #include "tests/unit/larger.h"
 #include "volume/lattice.h"
-#include "volume/solid_angle_tree_internal.h"
-#include "volume/voxelize.h"
+#include "voxelize/solid_angle_tree_internal.h"
+#include "voxelize/voxelize.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,188 @@
+#include "formats/mesh/mesh_file.h"
+
+#include "base/error.h"
+#include "formats/mesh/assimp_child.h"
+#include "formats/mesh/obj_stl.h"
+#include "formats/mesh/ply.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+bool states_its_unit(Kind kind) {
+  return kind == Kind::gltf || kind == Kind::glb || kind == Kind::dae;
+}
+
+std::string list(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words)
+    text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string list(const std::vector<Kind>& kinds) {
+  std::vector<std::string> words;
+  for (const Kind kind : kinds)
+    words.emplace_back(kind_name(kind));
+  return list(words);
+}
+
+bool contains(const std::vector<Kind>& kinds, Kind kind) {
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
+void check_readable(const Input& input, const MeshReadOptions& options) {
+  if (!contains(readable_mesh_kinds(), options.kind))
+    throw Error(input.name(), (options.kind == Kind::unknown
+                                   ? std::string("the format is not known")
+                                   : std::string(kind_name(options.kind)) + " is no mesh") +
+                                  ", expected one of " + list(readable_mesh_kinds()) +
+                                  " by content, suffix or --format");
+  if (!options.unit.empty()) {
+    millimetres_per(options.unit);
+    if (states_its_unit(options.kind))
+      throw UsageError(input.name(), "--unit " + options.unit + " for " +
+                                         std::string(kind_name(options.kind)) +
+                                         ", which states its own unit, expected no --unit");
+  }
+}
+
+// Where side files lie; "" for a pipe.
+std::string folder_of(const std::string& name) {
+  if (name.empty() || name == "-")
+    return "";
+  const std::size_t slash = name.rfind('/');
+  if (slash == std::string::npos)
+    return ".";
+  return slash == 0 ? "/" : name.substr(0, slash);
+}
+
+double scale_of(const MeshReadOptions& options) {
+  return options.unit.empty() ? 1 : millimetres_per(options.unit);
+}
+
+TriangleMesh read_unwelded(Input& input, const MeshReadOptions& options, MeshReadStats& stats) {
+  const std::string bytes = input.read_all();
+  if (options.kind == Kind::ply) {
+    PlyStats counts;
+    TriangleMesh mesh = read_ply(bytes, input.name(), &counts);
+    stats.polygons = counts.polygons;
+    stats.skipped_elements = counts.skipped_elements;
+    stats.skipped_properties = counts.skipped_properties;
+    return mesh;
+  }
+  AssimpSource source;
+  source.bytes = bytes;
+  source.kind = options.kind;
+  source.folder = folder_of(input.name());
+  AssimpStats counts;
+  TriangleMesh mesh = read_by_assimp(source, &counts);
+  stats.polygons = counts.polygons;
+  stats.skipped_primitives = counts.skipped_primitives;
+  return mesh;
+}
+
+void scale_points(TriangleMesh& mesh, double scale) {
+  if (scale == 1)
+    return;
+  for (std::size_t p = 0; p < mesh.points.size(); ++p) {
+    mesh.points[p] *= scale;
+    if (!is_finite(mesh.points[p]))
+      throw Error("point " + std::to_string(p) + " is not finite in mm, expected less");
+  }
+}
+
+std::uint64_t count_parts(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty())
+    return 0;
+  if (mesh.part.empty())
+    return 1;
+  std::vector<std::int32_t> parts = mesh.part;
+  std::sort(parts.begin(), parts.end());
+  return static_cast<std::uint64_t>(std::unique(parts.begin(), parts.end()) - parts.begin());
+}
+
+} // namespace
+
+const std::vector<Kind>& readable_mesh_kinds() {
+  static const std::vector<Kind> kinds{Kind::ply,  Kind::obj, Kind::stl,      Kind::off, Kind::dxf,
+                                       Kind::gltf, Kind::glb, Kind::three_ds, Kind::dae};
+  return kinds;
+}
+
+const std::vector<Kind>& writable_mesh_kinds() {
+  static const std::vector<Kind> kinds{Kind::ply, Kind::obj,      Kind::stl,
+                                       Kind::glb, Kind::three_ds, Kind::dae};
+  return kinds;
+}
+
+const std::vector<std::string>& mesh_unit_names() {
+  static const std::vector<std::string> names{"m", "cm", "mm"};
+  return names;
+}
+
+double millimetres_per(std::string_view unit) {
+  if (unit == "m")
+    return 1000;
+  if (unit == "cm")
+    return 10;
+  if (unit == "mm")
+    return 1;
+  throw UsageError("unit " + std::string(unit) + ", expected one of " + list(mesh_unit_names()));
+}
+
+const std::vector<std::string>& weld_names() {
+  static const std::vector<std::string> names{"auto", "all", "part", "none"};
+  return names;
+}
+
+std::optional<Weld> weld_from_name(std::string_view word) {
+  if (word.empty() || word == "auto")
+    return std::nullopt;
+  if (word == "all")
+    return Weld::all;
+  if (word == "part")
+    return Weld::part;
+  if (word == "none")
+    return Weld::none;
+  throw UsageError("welding " + std::string(word) + ", expected one of " + list(weld_names()));
+}
+
+TriangleMesh read_mesh(Input& input, const MeshReadOptions& options, MeshReadStats* stats) {
+  check_readable(input, options);
+  return at(input.name(), [&] {
+    MeshReadStats counts;
+    TriangleMesh mesh = read_unwelded(input, options, counts);
+    scale_points(mesh, scale_of(options));
+    WeldOptions welding;
+    welding.mode = options.weld.value_or(options.kind == Kind::ply ? Weld::none : Weld::borders);
+    welding.drop_unused = options.drop_unused;
+    counts.weld = weld(mesh, welding);
+    counts.parts = count_parts(mesh);
+    if (stats != nullptr)
+      *stats = counts;
+    return mesh;
+  });
+}
+
+void write_mesh(Output& output, const TriangleMesh& mesh, Kind kind) {
+  if (!contains(writable_mesh_kinds(), kind))
+    throw UsageError(output.name(), std::string(kind_name(kind)) +
+                                        " is not written, expected one of " +
+                                        list(writable_mesh_kinds()));
+  const auto sink = [&](std::string_view piece) { output.write(piece); };
+  at(output.name(), [&] {
+    if (kind == Kind::ply)
+      write_ply(mesh, sink);
+    else if (kind == Kind::obj)
+      write_obj(mesh, sink);
+    else if (kind == Kind::stl)
+      write_stl(mesh, sink);
+    else
+      sink(write_by_assimp(mesh, kind));
+  });
+}
+
+} // namespace gewebe

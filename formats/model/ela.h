@@ -1,0 +1,33 @@
+#pragma once
+// ELA_EXPL, the text form of the deformable model; the grammar is in ela_expl(5).
+
+#include "base/context.h"
+#include "formats/stream/stream.h"
+#include "model/model.h"
+
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+
+/// The model that `text` holds; all invariants of model.h hold for it.
+/// \throw Error, place "NAME:LINE", for anything that the grammar or an invariant forbids. Takes no
+/// more memory than a small multiple of the text's size, whatever counts it claims.
+Model parse_ela(std::string_view text, const std::string& name);
+
+/// Reads all of the input. \throw as parse_ela, what Input throws, and where text and model exceed
+/// context.max_memory
+Model read_ela(Input& input, const Context& context);
+
+/// The same for what knows springs alone. \throw Error too if the model holds tetrahedra, which
+/// would be left out of its answer
+Model read_spring_model(Input& input, const Context& context);
+
+/// The text of a model. Numbers are the shortest that read back exactly, so parse_ela(ela_text(m))
+/// == m. \pre the invariants of model.h hold
+std::string ela_text(const Model& model);
+
+/// Writes the same bytes, piece by piece. \throw what Output throws
+void write_ela(Output& output, const Model& model, const Context& context);
+
+} // namespace gewebe

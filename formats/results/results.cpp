@@ -1,0 +1,159 @@
+#include "formats/results/results.h"
+
+#include "base/error.h"
+#include "formats/store/hdf5_internal.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+hdf5::File open_checked(const std::string& path) {
+  hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group& root = file.root();
+  if (!root.has_attribute("format") || root.text("format") != "gewebe_results")
+    throw Error(path, "holds no results, expected a file that ffe-run made");
+  const auto version = root.number<std::uint32_t>("version");
+  if (version != 1)
+    throw Error(path, "is of version " + std::to_string(version) + ", expected 1");
+  return file;
+}
+
+std::vector<std::string> object_names(const hdf5::Group& objects) {
+  std::vector<std::pair<std::uint32_t, std::string>> ordered;
+  for (const std::string& name : objects.groups())
+    ordered.emplace_back(objects.group(name).number<std::uint32_t>("order"), name);
+  std::sort(ordered.begin(), ordered.end());
+  std::vector<std::string> names;
+  for (auto& [order, name] : ordered)
+    names.push_back(std::move(name));
+  return names;
+}
+
+/// Rows of an array n × 3.
+std::uint64_t rows_of_three(const hdf5::Dataset& dataset) {
+  if (dataset.shape().size() != 2 || dataset.shape()[1] != 3)
+    dataset.fail("has another shape, expected rows of 3 numbers");
+  return dataset.rows();
+}
+
+/// The group that holds the shape of an object in a frame, and the first frame that it holds.
+struct ShapeGroup {
+  hdf5::Group group;
+  std::uint64_t first = 0;
+};
+
+/// Nothing where the object comes later.
+std::optional<ShapeGroup> shape_in_frame(const hdf5::Group& objects, const std::string& name,
+                                         std::uint64_t frame) {
+  ShapeGroup found{objects.group(name)};
+  const hdf5::Group object = objects.group(name);
+  if (object.has_attribute("first_frame"))
+    found.first = object.number<std::uint64_t>("first_frame");
+  if (frame < found.first)
+    return std::nullopt;
+  if (!object.has("cuts"))
+    return found;
+  const hdf5::Group cuts = object.group("cuts");
+  for (std::uint64_t k = 1; cuts.has(std::to_string(k)); ++k) {
+    hdf5::Group cut = cuts.group(std::to_string(k));
+    const auto first = cut.number<std::uint64_t>("first_frame");
+    if (first < found.first)
+      cut.fail("begins in frame " + std::to_string(first) + ", expected none before " +
+               std::to_string(found.first));
+    if (first > frame)
+      break;
+    found = {std::move(cut), first};
+  }
+  return found;
+}
+
+} // namespace
+
+ResultIndex read_result_index(const std::string& path) {
+  const hdf5::File file = open_checked(path);
+  const hdf5::Dataset time = file.root().dataset("time", hdf5::Number::float64);
+  time.require_shape({time.rows()});
+  ResultIndex index;
+  index.times.resize(time.rows());
+  time.read_rows(0, std::span<double>(index.times));
+  index.objects = object_names(file.root().group("objects"));
+  return index;
+}
+
+ResultSurface read_result_surface(const std::string& path, const std::string& object,
+                                  std::size_t frame) {
+  const hdf5::File file = open_checked(path);
+  const hdf5::Group objects = file.root().group("objects");
+  if (!objects.has(object)) {
+    std::string list;
+    for (const std::string& name : object_names(objects))
+      list += (list.empty() ? "" : ", ") + name;
+    throw Error(path, "there is no object '" + object + "', expected " +
+                          (list.empty() ? "one, but there is none" : "one of " + list));
+  }
+  const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
+  if (!shape) {
+    ResultSurface none;
+    none.there = false;
+    return none;
+  }
+  const hdf5::Group& group = shape->group;
+  const std::uint64_t begin = shape->first;
+  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
+  const std::uint64_t n = rows_of_three(points);
+  const auto surface = group.number<std::uint64_t>("surface_nodes");
+  if (surface > n)
+    group.fail("has " + std::to_string(surface) + " nodes on the surface, expected at most " +
+               std::to_string(n));
+  const hdf5::Dataset displacement = group.dataset("displacement", hdf5::Number::float32);
+  displacement.require_shape({displacement.rows(), n, 3});
+  if (frame - begin >= displacement.rows())
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(begin + displacement.rows() - 1));
+
+  std::vector<double> rest(3 * n);
+  std::vector<float> moved(3 * n);
+  points.read_rows(0, std::span<double>(rest));
+  displacement.read_rows(frame - begin, std::span<float>(moved));
+  ResultSurface result;
+  result.rest.reserve(surface);
+  result.mesh.points.reserve(surface);
+  for (std::size_t i = 0; i < surface; ++i) {
+    const double* const p = &rest[3 * i];
+    const float* const u = &moved[3 * i];
+    result.rest.push_back({p[0], p[1], p[2]});
+    result.mesh.points.push_back({p[0] + static_cast<double>(u[0]),
+                                  p[1] + static_cast<double>(u[1]),
+                                  p[2] + static_cast<double>(u[2])});
+  }
+
+  const hdf5::Dataset triangles = group.dataset("triangles", hdf5::Number::uint32);
+  const std::uint64_t count = rows_of_three(triangles);
+  std::vector<std::uint32_t> corners(3 * count);
+  triangles.read_rows(0, std::span<std::uint32_t>(corners));
+  result.mesh.triangles.reserve(count);
+  for (std::size_t t = 0; t < count; ++t)
+    result.mesh.triangles.push_back({corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]});
+
+  if (group.has("texcoords")) {
+    const hdf5::Dataset texcoords = group.dataset("texcoords", hdf5::Number::float32);
+    texcoords.require_shape({count, 3, 2});
+    std::vector<float> st(6 * count);
+    texcoords.read_rows(0, std::span<float>(st));
+    result.mesh.texcoords.resize(count);
+    for (std::size_t t = 0; t < count; ++t)
+      std::copy_n(&st[6 * t], 6, result.mesh.texcoords[t].begin());
+  }
+  if (group.has("material"))
+    result.mesh.material = group.read<std::int32_t>("material", count);
+  if (const hdf5::Group whole = objects.group(object); whole.has("materials"))
+    result.materials = whole.read_texts("materials");
+  at(path, [&] { check_mesh(result.mesh); });
+  return result;
+}
+
+} // namespace gewebe

@@ -1,0 +1,162 @@
+#include "formats/results/results_mesh.h"
+
+#include "base/error.h"
+#include "formats/mesh/obj_stl.h"
+#include "formats/mesh/ply.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+/// The place of a number in the names of a series.
+struct Pattern {
+  std::string before, after;
+  std::size_t width = 0; ///< filled up with zeros
+
+  std::string name(std::uint64_t frame) const {
+    const std::string number = std::to_string(frame);
+    return before + std::string(width > number.size() ? width - number.size() : 0, '0') + number +
+           after;
+  }
+};
+
+/// \throw UsageError for anything but one %d, %0Nd in the file's name
+std::optional<Pattern> pattern_in(const std::string& path) {
+  const std::size_t name = path.find_last_of('/') + 1; // 0 if there is none
+  const std::size_t sign = path.find('%', name);
+  if (sign == std::string::npos)
+    return std::nullopt;
+  std::size_t end = sign + 1;
+  Pattern pattern;
+  if (end < path.size() && path[end] == '0') // then the width, one digit
+    for (++end; end < path.size() && path[end] >= '1' && path[end] <= '9' && pattern.width == 0;
+         ++end)
+      pattern.width = static_cast<std::size_t>(path[end] - '0');
+  const bool good = end < path.size() && path[end] == 'd' &&
+                    (pattern.width > 0 || end == sign + 1) &&
+                    path.find('%', end) == std::string::npos;
+  if (!good)
+    throw UsageError(path + ": no pattern of a series, expected one %d or %0Nd with N from 1 to 9");
+  pattern.before = path.substr(0, sign);
+  pattern.after = path.substr(end + 1);
+  return pattern;
+}
+
+/// All surfaces in one mesh; each is a part where there are several.
+class Shapes {
+public:
+  void add(const Model& model) {
+    surfaces_.push_back(surface_mesh(model));
+    last_.emplace_back(3 * model.nodes.size());
+  }
+  void change(std::size_t object, const Model& model) {
+    surfaces_.at(object) = surface_mesh(model);
+    last_[object].assign(3 * model.nodes.size(), 0);
+  }
+  void set(std::span<const FrameObject> objects) {
+    for (std::size_t i = 0; i < objects.size(); ++i)
+      last_[i].assign(objects[i].displacement.begin(), objects[i].displacement.end());
+  }
+  void write(Kind kind, Output& output) const {
+    const TriangleMesh mesh = joined();
+    const auto sink = [&](std::string_view bytes) { output.write(bytes); };
+    at(output.name(), [&] {
+      check_mesh(mesh);
+      if (kind == Kind::ply)
+        write_ply(mesh, sink);
+      else
+        write_obj(mesh, sink);
+    });
+    output.commit();
+  }
+
+private:
+  TriangleMesh joined() const {
+    TriangleMesh all;
+    bool textured = false;
+    for (const TriangleMesh& surface : surfaces_)
+      textured = textured || !surface.texcoords.empty();
+    for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+      TriangleMesh mesh = surfaces_[k];
+      const auto shift = static_cast<std::uint32_t>(all.points.size());
+      if (all.points.size() + mesh.points.size() > UINT32_MAX)
+        throw Error("the objects have over 2^32 nodes, expected fewer");
+      for (std::size_t i = 0; i < mesh.points.size(); ++i)
+        all.points.push_back(mesh.points[i] +
+                             Vec3{last_[k][3 * i], last_[k][3 * i + 1], last_[k][3 * i + 2]});
+      for (const Triangle& t : mesh.triangles)
+        all.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+      mesh.texcoords.resize(textured ? mesh.triangles.size() : 0);
+      all.texcoords.insert(all.texcoords.end(), mesh.texcoords.begin(), mesh.texcoords.end());
+      if (surfaces_.size() > 1)
+        all.part.insert(all.part.end(), mesh.triangles.size(), static_cast<std::int32_t>(k));
+      else
+        all.material = std::move(mesh.material);
+    }
+    return all;
+  }
+
+  std::vector<TriangleMesh> surfaces_;
+  std::vector<std::vector<double>> last_;
+};
+
+class LastShape final : public ResultWriter {
+public:
+  LastShape(Kind kind, const std::string& path, const Output::Options& options)
+      : kind_(kind), output_(path, options) {}
+
+  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
+  void change_object(std::size_t object, const Model& model,
+                     std::span<const std::uint32_t> /*origin*/) override {
+    shapes_.change(object, model);
+  }
+  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
+    shapes_.set(objects);
+  }
+  void commit() override { shapes_.write(kind_, output_); }
+
+private:
+  Kind kind_;
+  Output output_;
+  Shapes shapes_;
+};
+
+class ShapeSeries final : public ResultWriter {
+public:
+  ShapeSeries(Kind kind, Pattern pattern, const Output::Options& options)
+      : kind_(kind), pattern_(std::move(pattern)), options_(options) {}
+
+  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
+  void change_object(std::size_t object, const Model& model,
+                     std::span<const std::uint32_t> /*origin*/) override {
+    shapes_.change(object, model);
+  }
+  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
+    shapes_.set(objects);
+    Output output(pattern_.name(frame_++), options_);
+    shapes_.write(kind_, output);
+  }
+  void commit() override {}
+
+private:
+  Kind kind_;
+  Pattern pattern_;
+  Output::Options options_;
+  Shapes shapes_;
+  std::uint64_t frame_ = 0;
+};
+
+} // namespace
+
+std::unique_ptr<ResultWriter> open_mesh_result(Kind kind, const std::string& path,
+                                               const Output::Options& options) {
+  if (std::optional<Pattern> pattern = pattern_in(path))
+    return std::make_unique<ShapeSeries>(kind, std::move(*pattern), options);
+  return std::make_unique<LastShape>(kind, path, options);
+}
+
+} // namespace gewebe

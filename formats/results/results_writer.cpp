@@ -1,0 +1,337 @@
+#include "formats/results/results_writer.h"
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "formats/results/results_mesh.h"
+#include "formats/store/hdf5_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+namespace gewebe {
+
+namespace {
+
+// ---- HDF5 and XDMF
+
+std::string xdmf_path(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/') + 1; // 0 if there is none
+  const std::size_t dot = path.find_last_of('.');
+  return (dot == std::string::npos || dot <= slash ? path : path.substr(0, dot)) + ".xdmf";
+}
+
+std::string base_name(const std::string& path) {
+  return path.substr(path.find_last_of('/') + 1);
+}
+
+std::string xml_text(const std::string& text) {
+  std::string result;
+  for (const char c : text)
+    switch (c) {
+    case '&':
+      result += "&amp;";
+      break;
+    case '<':
+      result += "&lt;";
+      break;
+    case '>':
+      result += "&gt;";
+      break;
+    default:
+      result += c;
+    }
+  return result;
+}
+
+std::vector<float> in_single(std::span<const double> values) {
+  std::vector<float> result(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    result[i] = static_cast<float>(values[i]);
+    if (!std::isfinite(result[i]))
+      throw Error("a displacement of " + number_text(values[i]) +
+                  " mm does not fit single precision, expected a smaller one");
+  }
+  return result;
+}
+
+class Hdf5Result final : public ResultWriter {
+public:
+  Hdf5Result(const std::string& path, Output::Options options)
+      : output_(path, with_sync(options)), name_(base_name(path)) {
+    (void)output_.temporary(); // refuses what is no file, before anything is made beside it
+    xdmf_.emplace(xdmf_path(path), text(options));
+    in_place([&] {
+      file_.emplace(hdf5::File::create(output_.temporary()));
+      hdf5::Group& root = file_->root();
+      root.set("format", "gewebe_results");
+      root.set("version", std::uint32_t{1});
+      root.set("units", "mm g s");
+      time_.emplace(root.create_growing("time", hdf5::Number::float64, {}, 256));
+      groups_.emplace(root.create_group("objects"));
+    });
+  }
+
+  void add_object(const std::string& name, const Model& model) override {
+    in_place([&] {
+      Object& object = begin(name, model, 0);
+      const std::vector<float> rest(3 * model.nodes.size());
+      for (std::uint64_t f = 0; f < frames_; ++f)
+        object.displacement.append(std::span<const float>(rest));
+    });
+  }
+
+  void add_part(const std::string& name, const Model& model) override {
+    in_place([&] { begin(name, model, frames_).group.set("first_frame", frames_); });
+  }
+
+  void change_object(std::size_t index, const Model& model,
+                     std::span<const std::uint32_t> origin) override {
+    in_place([&] {
+      Object& object = objects_.at(index);
+      if (!object.cuts)
+        object.cuts.emplace(object.group.create_group("cuts"));
+      const std::string number = std::to_string(object.shapes.size());
+      hdf5::Group cut = object.cuts->create_group(number);
+      cut.set("first_frame", frames_);
+      std::vector<std::uint32_t> from(origin.begin(), origin.end());
+      if (from.empty()) {
+        from.resize(model.nodes.size());
+        std::iota(from.begin(), from.end(), 0U);
+      }
+      cut.write("origin", from);
+      object.displacement = add_shape(cut, model);
+      object.shapes.push_back({"/objects/" + object.name + "/cuts/" + number, model.nodes.size(),
+                               model.triangles.size(), frames_});
+    });
+  }
+
+  void add_frame(double time, std::span<const FrameObject> objects) override {
+    in_place([&] {
+      time_->append(std::span<const double>(&time, 1));
+      times_.push_back(time);
+      for (std::size_t i = 0; i < objects.size(); ++i) {
+        Object& to = objects_.at(i);
+        const std::vector<float> u = in_single(objects[i].displacement);
+        to.displacement.append(std::span<const float>(u));
+        const std::span<const NodeVector> forces = objects[i].forces;
+        if (forces.empty())
+          continue;
+        std::vector<std::uint64_t> frame(forces.size(), frames_);
+        std::vector<std::uint32_t> node;
+        std::vector<double> force;
+        for (const NodeVector& f : forces) {
+          node.push_back(f.node);
+          force.insert(force.end(), {f.value.x, f.value.y, f.value.z});
+        }
+        to.frame.append(std::span<const std::uint64_t>(frame));
+        to.node.append(std::span<const std::uint32_t>(node));
+        to.force.append(std::span<const double>(force));
+      }
+      ++frames_;
+    });
+  }
+
+  void commit() override {
+    in_place([&] { file_->close(); });
+    output_.commit();
+    write_xdmf();
+    xdmf_->commit();
+  }
+
+private:
+  /// Triangles and displacements of an object in some frames.
+  struct Shape {
+    std::string path;
+    std::uint64_t nodes = 0, triangles = 0, first = 0; ///< frame
+  };
+  struct Object {
+    std::string name;
+    hdf5::Group group;
+    hdf5::Dataset displacement, frame, node, force;
+    std::vector<Shape> shapes;
+    std::optional<hdf5::Group> cuts;
+  };
+
+  Object& begin(const std::string& name, const Model& model, std::uint64_t first) {
+    hdf5::Group group = groups_->create_group(name);
+    group.set("order", static_cast<std::uint32_t>(objects_.size()));
+    group.set("model", model.name);
+    std::vector<std::string> materials;
+    for (const Material& material : model.materials)
+      materials.push_back(material.name);
+    group.write_texts("materials", materials);
+    hdf5::Dataset displacement = add_shape(group, model);
+    hdf5::Group forces = group.create_group("forces");
+    hdf5::Dataset frame = forces.create_growing("frame", hdf5::Number::uint64, {}, 512);
+    hdf5::Dataset node = forces.create_growing("node", hdf5::Number::uint32, {}, 512);
+    hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
+    objects_.push_back({name,
+                        std::move(group),
+                        std::move(displacement),
+                        std::move(frame),
+                        std::move(node),
+                        std::move(force),
+                        {{"/objects/" + name, model.nodes.size(), model.triangles.size(), first}},
+                        std::nullopt});
+    return objects_.back();
+  }
+
+  /// What stands in a group of a model at rest; the displacements to come.
+  static hdf5::Dataset add_shape(hdf5::Group& group, const Model& model) {
+    const std::uint64_t n = model.nodes.size();
+    group.set("surface_nodes", static_cast<std::uint64_t>(surface_count(model)));
+    std::vector<double> points;
+    points.reserve(3 * n);
+    for (const Node& node : model.nodes)
+      points.insert(points.end(), {node.position.x, node.position.y, node.position.z});
+    group.write("points", std::span<const double>(points), {n, 3});
+    const TriangleMesh mesh = surface_mesh(model);
+    std::vector<std::uint32_t> corners;
+    corners.reserve(3 * mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles)
+      corners.insert(corners.end(), t.begin(), t.end());
+    group.write("triangles", std::span<const std::uint32_t>(corners), {mesh.triangles.size(), 3});
+    if (!mesh.texcoords.empty()) {
+      std::vector<float> st;
+      st.reserve(6 * mesh.texcoords.size());
+      for (const auto& t : mesh.texcoords)
+        st.insert(st.end(), t.begin(), t.end());
+      group.write("texcoords", std::span<const float>(st), {mesh.texcoords.size(), 3, 2});
+    }
+    if (!mesh.material.empty())
+      group.write("material", mesh.material);
+    const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
+    return group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
+  }
+
+  static Output::Options with_sync(Output::Options options) {
+    options.sync = true;
+    return options;
+  }
+  static Output::Options text(Output::Options options) {
+    options.sync = true;
+    options.binary = false;
+    return options;
+  }
+
+  /// Errors name the file that is asked for, not the temporary one.
+  template <class Work>
+  void in_place(Work&& work) {
+    try {
+      work();
+    } catch (const Error& error) {
+      throw Error(output_.name(), error.what());
+    }
+  }
+
+  void write_xdmf() {
+    xdmf_->write("<?xml version=\"1.0\" ?>\n<Xdmf Version=\"2.0\">\n<Domain>\n"
+                 "<Grid Name=\"run\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
+    for (std::uint64_t f = 0; f < frames_; ++f) {
+      xdmf_->write("<Grid Name=\"scene\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
+                   "<Time Value=\"" +
+                   number_text(times_[f]) + "\"/>\n");
+      for (const Object& object : objects_)
+        if (object.shapes.front().first <= f)
+          xdmf_->write(grid(object, f));
+      xdmf_->write("</Grid>\n");
+    }
+    xdmf_->write("</Grid>\n</Domain>\n</Xdmf>\n");
+  }
+
+  std::string array(const std::string& path, const std::string& dimensions, const char* type) {
+    return "<DataItem Format=\"HDF\" Dimensions=\"" + dimensions + "\" " + type + ">" +
+           xml_text(name_) + ":" + path + "</DataItem>\n";
+  }
+
+  std::string grid(const Object& object, std::uint64_t frame) {
+    std::size_t which = 0;
+    while (which + 1 < object.shapes.size() && object.shapes[which + 1].first <= frame)
+      ++which;
+    const Shape& shape = object.shapes[which];
+    const std::uint64_t end =
+        which + 1 < object.shapes.size() ? object.shapes[which + 1].first : frames_;
+    const std::string& group = shape.path;
+    const std::string n = std::to_string(shape.nodes), t = std::to_string(shape.triangles);
+    std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
+    if (shape.triangles > 0)
+      text += "<Topology TopologyType=\"Triangle\" NumberOfElements=\"" + t + "\">\n" +
+              array(group + "/triangles", t + " 3", R"(NumberType="UInt" Precision="4")") +
+              "</Topology>\n";
+    else
+      text += "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"" + n + "\"/>\n";
+    text += "<Geometry GeometryType=\"XYZ\">\n" +
+            array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
+            "</Geometry>\n<Attribute Name=\"displacement\" AttributeType=\"Vector\" "
+            "Center=\"Node\">\n<DataItem ItemType=\"HyperSlab\" Dimensions=\"" +
+            n + " 3\">\n<DataItem Format=\"XML\" Dimensions=\"3 3\">" +
+            std::to_string(frame - shape.first) + " 0 0 1 1 1 1 " + n + " 3</DataItem>\n" +
+            array(group + "/displacement", std::to_string(end - shape.first) + " " + n + " 3",
+                  R"(NumberType="Float" Precision="4")") +
+            "</DataItem>\n</Attribute>\n</Grid>\n";
+    return text;
+  }
+
+  Output output_;
+  std::optional<Output> xdmf_;
+  std::string name_;
+  std::optional<hdf5::File> file_;
+  std::optional<hdf5::Dataset> time_;
+  std::optional<hdf5::Group> groups_;
+  std::vector<Object> objects_;
+  std::vector<double> times_;
+  std::uint64_t frames_ = 0;
+};
+
+// ---- forces
+
+class ForceTable final : public ResultWriter {
+public:
+  ForceTable(const std::string& path, const Output::Options& options) : output_(path, options) {
+    output_.write("time,object,node,fx,fy,fz\n");
+  }
+
+  bool wants_models() const override { return false; }
+
+  void add_object(const std::string& name, const Model& /*model*/) override {
+    names_.push_back(name);
+  }
+
+  void add_frame(double time, std::span<const FrameObject> objects) override {
+    const std::string start = number_text(time) + ",";
+    for (std::size_t i = 0; i < objects.size(); ++i)
+      for (const NodeVector& f : objects[i].forces)
+        output_.write(start + names_[i] + "," + std::to_string(f.node) + "," +
+                      number_text(f.value.x) + "," + number_text(f.value.y) + "," +
+                      number_text(f.value.z) + "\n");
+  }
+
+  void commit() override { output_.commit(); }
+
+private:
+  Output output_;
+  std::vector<std::string> names_;
+};
+
+} // namespace
+
+const std::vector<Kind>& result_kinds() {
+  static const std::vector<Kind> kinds{Kind::hdf5, Kind::ply, Kind::obj, Kind::csv};
+  return kinds;
+}
+
+std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
+                                          const Output::Options& options) {
+  switch (kind) {
+  case Kind::hdf5:
+    return std::make_unique<Hdf5Result>(path, options);
+  case Kind::csv:
+    return std::make_unique<ForceTable>(path, options);
+  default:
+    return open_mesh_result(kind, path, options);
+  }
+}
+
+} // namespace gewebe

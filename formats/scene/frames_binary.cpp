@@ -1,0 +1,116 @@
+#include "formats/scene/frames_binary.h"
+
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "formats/scene/scene_answer.h"
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+namespace gewebe {
+
+namespace {
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void append_head(std::string& bytes, const FrameHead& head) {
+  append(bytes, frame_magic);
+  append(bytes, static_cast<std::uint32_t>(head.kind));
+  append(bytes, head.object);
+  append(bytes, head.step);
+  append(bytes, head.count);
+}
+
+void append_single(std::string& bytes, double value) {
+  const auto single = static_cast<float>(value);
+  if (!std::isfinite(single))
+    throw Error("a position or force is too large for single precision, expected a smaller one");
+  append(bytes, single);
+}
+
+void append_single(std::string& bytes, const Vec3& v) {
+  for (int a = 0; a < 3; ++a)
+    append_single(bytes, v[a]);
+}
+
+void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
+  const auto frame = [&](FrameKind kind, std::size_t object, auto... values) {
+    append_head(bytes, {kind, static_cast<std::uint32_t>(object), step, sizeof...(values)});
+    (append(bytes, static_cast<std::uint32_t>(values)), ...);
+  };
+  switch (c.kind) {
+  case Cutting::Kind::cut:
+    return frame(FrameKind::cut, c.object, c.springs, c.doubled, c.nodes);
+  case Cutting::Kind::part:
+    return frame(FrameKind::part, c.part, c.object, c.nodes);
+  case Cutting::Kind::loose:
+    return frame(FrameKind::loose, c.object, c.nodes);
+  case Cutting::Kind::restored:
+    return frame(FrameKind::restored, c.object, c.nodes);
+  }
+}
+
+} // namespace
+
+std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
+  std::string bytes;
+  for (const MethodJump& jump : simulation.jumps()) {
+    append_head(bytes, {FrameKind::jump, static_cast<std::uint32_t>(jump.object), step, 1});
+    append_single(bytes, jump.size);
+  }
+  const auto objects = static_cast<std::uint32_t>(simulation.object_count());
+  for (const Cutting& c : simulation.cuttings())
+    append_cutting(bytes, c, step);
+  for (std::uint32_t i = 0; simulation.emits_shapes() && i < objects; ++i) {
+    if (!topology_changed(simulation, i))
+      continue;
+    const std::vector<Triangle>& triangles = simulation.model(i).triangles;
+    append_head(bytes, {FrameKind::triangles, i, step, 3 * triangles.size()});
+    for (const Triangle& t : triangles)
+      append(bytes, t);
+  }
+  for (std::uint32_t i = 0; simulation.emits_forces() && i < objects; ++i) {
+    const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+    append_head(bytes, {FrameKind::nodes, i, step, forces.size()});
+    for (const NodeVector& f : forces)
+      append(bytes, f.node);
+    append_head(bytes, {FrameKind::forces, i, step, 3 * forces.size()});
+    for (const NodeVector& f : forces)
+      append_single(bytes, f.value);
+  }
+  for (std::uint32_t i = 0; simulation.emits_shapes() && i < objects; ++i) {
+    const std::vector<Node>& nodes = simulation.model(i).nodes;
+    const std::span<const double> u = simulation.displacement(i);
+    append_head(bytes, {FrameKind::shapes, i, step, 3 * nodes.size()});
+    bytes.reserve(bytes.size() + 12 * nodes.size());
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      append_single(bytes, nodes[k].position + vector_at(u, k));
+  }
+  for (std::uint32_t k = 0; simulation.emits_instruments() && k < simulation.instrument_count();
+       ++k) {
+    const InstrumentReport report = simulation.instrument(k);
+    if (!report.present)
+      continue;
+    append_head(bytes, {FrameKind::instrument, k, step, 9});
+    for (const Vec3& v : {report.pose.place, report.force, report.torque})
+      append_single(bytes, v);
+  }
+  append_head(bytes, {FrameKind::done, 0, step, 2});
+  append(bytes, simulation.time());
+  return bytes;
+}
+
+std::string binary_error(std::uint64_t step, std::string_view text) {
+  const std::size_t words = (text.size() + 3) / 4;
+  std::string bytes;
+  append_head(bytes, {FrameKind::error, 0, step, words});
+  bytes += text;
+  bytes.resize(28 + 4 * words, '\0');
+  return bytes;
+}
+
+} // namespace gewebe

@@ -1,0 +1,489 @@
+#include "formats/scene/scene.h"
+
+#include "base/error.h"
+#include "base/nearest_word.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r';
+}
+
+/// A word as a message may show it: short, printable.
+std::string shown(std::string_view word) {
+  std::string text = "'";
+  for (const char c : word.substr(0, 40))
+    text += static_cast<unsigned char>(c) >= 0x20 && c != 0x7f ? c : '?';
+  return text + (word.size() > 40 ? "…'" : "'");
+}
+
+/// Takes the words of a line one by one; the complaints name what the command looks like.
+class Words {
+public:
+  Words(std::vector<std::string> words, const char* usage)
+      : words_(std::move(words)), usage_(usage) {}
+
+  bool done() const { return at_ == words_.size(); }
+
+  const std::string& word(const char* what) {
+    if (done())
+      fail(std::string("no ") + what);
+    return words_[at_++];
+  }
+
+  /// Takes the next word if it is this one.
+  bool take(std::string_view word) {
+    const bool same = !done() && words_[at_] == word;
+    at_ += same ? 1 : 0;
+    return same;
+  }
+
+  double number(const char* what) {
+    const std::string& text = word(what);
+    const char* const end = text.data() + text.size();
+    const char* const begin = text.data() + (text.starts_with('+') && text.size() > 1 ? 1 : 0);
+    double value = 0;
+    const auto [rest, status] = std::from_chars(begin, end, value);
+    if (status != std::errc{} || rest != end)
+      fail(shown(text) + " is no " + what);
+    if (!std::isfinite(value))
+      fail(shown(text) + " is not finite");
+    return value;
+  }
+
+  Vec3 vector(const char* what) {
+    Vec3 v;
+    for (int a = 0; a < 3; ++a)
+      v[a] = number(what);
+    return v;
+  }
+
+  std::string name() {
+    const std::string& text = word("NAME");
+    const auto allowed = [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+             c == '_' || c == '-' || c == '.';
+    };
+    if (text.empty() || text.size() > 100 || text[0] == '.' ||
+        !std::all_of(text.begin(), text.end(), allowed))
+      throw Error(shown(text) + " is no name, expected up to 100 letters, digits, '_', '-', '.'");
+    return text;
+  }
+
+  /// The number behind `word`, which may be absent: 0.
+  double time_after(std::string_view word) {
+    if (!take(word))
+      return 0;
+    const double time = number("time");
+    if (!(time > 0))
+      fail("a time that is not positive");
+    return time;
+  }
+
+  Selector nodes() { return parse_selector(word("NODES")); }
+
+  void end() const {
+    if (!done())
+      fail("surplus word " + shown(words_[at_]));
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(what + ", expected " + usage_);
+  }
+
+  Words rest(const char* usage) const {
+    return {{words_.begin() + static_cast<std::ptrdiff_t>(at_), words_.end()}, usage};
+  }
+
+private:
+  std::vector<std::string> words_;
+  const char* usage_;
+  std::size_t at_ = 0;
+};
+
+using What = decltype(Command::what);
+
+What parse_object(Words& in) {
+  ObjectCommand c;
+  c.name = in.name();
+  c.model = in.word("model");
+  if (c.model.empty())
+    in.fail("an empty file name");
+  std::optional<Method> method;
+  while (!in.done()) {
+    const std::string word = in.word("");
+    if (word.starts_with("store=") && word.size() > 6 && c.store.empty())
+      c.store = word.substr(6);
+    else if (word == "integration=implicit" && !c.implicit)
+      c.implicit = true;
+    else if ((word == "method=ffe" || word == "method=ela") && !method)
+      method = word == "method=ffe" ? Method::ffe : Method::ela;
+    else
+      in.fail(shown(word) + " is no use here");
+  }
+  c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
+  return c;
+}
+
+What parse_force(Words& in) {
+  ForceCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.force = in.vector("number");
+  c.total = in.take("total");
+  c.period = in.time_after("period");
+  return c;
+}
+
+What parse_pressure(Words& in) {
+  PressureCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.pressure = in.number("number");
+  c.period = in.time_after("period");
+  return c;
+}
+
+What parse_attach(Words& in) {
+  AttachCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.other = in.name();
+  c.others = in.nodes();
+  c.stiffness = in.number("stiffness");
+  if (!(c.stiffness > 0))
+    in.fail("a stiffness that is not positive");
+  return c;
+}
+
+What parse_displace(Words& in) {
+  DisplaceCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.displacement = in.vector("number");
+  c.over = in.time_after("over");
+  return c;
+}
+
+What parse_release(Words& in) {
+  ReleaseCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  return c;
+}
+
+What parse_instrument(Words& in) {
+  InstrumentCommand c;
+  c.name = in.name();
+  const std::string& kind = in.word("shape");
+  if (kind == "blade") {
+    c.shape.blade = true;
+    c.shape.radius = 0;
+    c.pose.place = in.vector("number");
+    c.shape.axis = in.vector("number") - c.pose.place;
+    if (c.shape.axis == Vec3{})
+      in.fail("an edge without length");
+    return c;
+  }
+  if (kind != "sphere" && kind != "capsule")
+    in.fail(shown(kind) + " is no shape");
+  const bool capsule = kind == "capsule";
+  c.shape.radius = in.number("radius");
+  if (!(c.shape.radius > 0))
+    in.fail("a radius that is not positive");
+  c.pose.place = in.vector("number");
+  if (capsule)
+    c.shape.axis = in.vector("number") - c.pose.place;
+  if (in.take("friction"))
+    c.shape.friction = in.number("friction");
+  if (!(c.shape.friction >= 0))
+    in.fail("a negative friction");
+  return c;
+}
+
+/// A quaternion, or the degrees of a turn about an axis.
+std::optional<Quaternion> parse_turn(Words& in) {
+  if (in.take("turn")) {
+    const Vec3 axis = in.vector("number");
+    const double degrees = in.number("angle");
+    if (axis == Vec3{})
+      in.fail("an axis without direction");
+    return turn_about(axis, degrees);
+  }
+  if (!in.take("quaternion"))
+    return std::nullopt;
+  Quaternion q;
+  for (double* const part : {&q.w, &q.x, &q.y, &q.z})
+    *part = in.number("number");
+  if (q == Quaternion{0, 0, 0, 0})
+    in.fail("a quaternion of length 0");
+  return unit(q);
+}
+
+What parse_move(Words& in) {
+  MoveCommand c;
+  c.instrument = in.name();
+  c.place = in.vector("number");
+  c.turn = parse_turn(in);
+  c.over = in.time_after("over");
+  return c;
+}
+
+What parse_grasp(Words& in) {
+  GraspCommand c;
+  c.object = in.name();
+  c.nodes = in.nodes();
+  c.instrument = in.name();
+  return c;
+}
+
+What parse_withdraw(Words& in) {
+  return WithdrawCommand{in.name()};
+}
+
+What parse_gravity(Words& in) {
+  return GravityCommand{in.vector("number")};
+}
+
+What parse_timestep(Words& in) {
+  const TimestepCommand c{in.number("time")};
+  if (!(c.dt > 0))
+    in.fail("a timestep that is not positive");
+  return c;
+}
+
+What parse_two_step(Words& in) {
+  TwoStepCommand c;
+  c.object = in.name();
+  c.threshold = in.number("force");
+  if (!(c.threshold > 0))
+    in.fail("a threshold that is not positive");
+  c.series = in.take("series");
+  return c;
+}
+
+What parse_emit(Words& in) {
+  const std::string& word = in.word("word");
+  if (word == "model") {
+    EmitModelCommand c;
+    c.object = in.name();
+    c.file = in.word("FILE");
+    if (c.file.empty())
+      in.fail("an empty name of a file");
+    return c;
+  }
+  if (word != "shapes" && word != "forces" && word != "instruments")
+    in.fail(shown(word) + " can't be emitted");
+  return EmitCommand{word == "forces", word == "instruments"};
+}
+
+What parse_step(Words& in) {
+  StepCommand c;
+  if (in.done())
+    return c;
+  c.dt = in.number("time");
+  if (!(*c.dt >= 0))
+    in.fail("a step back in time");
+  return c;
+}
+
+What parse_run(Words& in) {
+  RunCommand c;
+  c.until = in.number("time");
+  if (!in.take("every"))
+    in.fail(in.done() ? "no 'every'" : shown(in.word("")) + " is not 'every'");
+  c.every = in.number("time");
+  if (!(c.every > 0))
+    in.fail("DT is not positive");
+  return c;
+}
+
+What parse_method(Words& in) {
+  MethodCommand c;
+  c.object = in.name();
+  const std::string& word = in.word("method");
+  if (word != "ffe" && word != "ela")
+    in.fail(shown(word) + " is no method");
+  c.method = word == "ffe" ? Method::ffe : Method::ela;
+  return c;
+}
+
+What parse_cut(Words& in) {
+  CutCommand c;
+  c.object = in.name();
+  const std::string& kind = in.word("'springs' or 'plane'");
+  if (kind == "plane") {
+    CutPlane& plane = c.plane.emplace();
+    plane.point = in.vector("number");
+    plane.normal = in.vector("number");
+    const double size = norm(plane.normal);
+    if (!(size > 0 && std::isfinite(size)))
+      in.fail("a normal without direction");
+    if (!in.done())
+      c.nodes = in.nodes();
+  } else if (kind == "springs") {
+    c.nodes = in.nodes();
+    if (!in.done())
+      c.others = in.nodes();
+  } else {
+    in.fail(shown(kind) + " can't be cut");
+  }
+  return c;
+}
+
+What parse_tear(Words& in) {
+  TearCommand c;
+  c.object = in.name();
+  c.strain = in.number("strain");
+  if (!(c.strain >= 0))
+    in.fail("a negative strain");
+  return c;
+}
+
+What parse_restore(Words& in) {
+  return RestoreCommand{in.name()};
+}
+
+What parse_renew(Words& in) {
+  return RenewCommand{in.name()};
+}
+
+struct Verb {
+  std::string_view name;
+  const char* usage;
+  bool at; ///< may stand behind `at T`
+  std::function<What(Words&)> parse;
+};
+
+const std::array<Verb, 21>& verbs() {
+  static const std::array<Verb, 21> all{{
+      {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
+       false, parse_object},
+      {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
+      {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},
+      {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
+      {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
+      {"release", "release NAME NODES", true, parse_release},
+      {"instrument",
+       "instrument NAME sphere R x y z [friction MU], instrument NAME capsule R x y z x y z "
+       "[friction MU] or instrument NAME blade x y z x y z",
+       true, parse_instrument},
+      {"move", "move NAME x y z [turn ax ay az DEGREES|quaternion w x y z] [over T]", true,
+       parse_move},
+      {"grasp", "grasp NAME NODES INSTRUMENT", true, parse_grasp},
+      {"withdraw", "withdraw NAME", true, parse_withdraw},
+      {"cut", "cut NAME springs NODES [NODES] or cut NAME plane px py pz nx ny nz [NODES]", true,
+       parse_cut},
+      {"tear", "tear NAME STRAIN, 0 or more", true, parse_tear},
+      {"restore", "restore NAME", true, parse_restore},
+      {"gravity", "gravity gx gy gz", true, parse_gravity},
+      {"method", "method NAME ffe|ela", true, parse_method},
+      {"timestep", "timestep dt", true, parse_timestep},
+      {"two-step", "two-step NAME f0 [series], f0 positive", true, parse_two_step},
+      {"emit", "emit shapes|forces|instruments, or emit model NAME FILE", true, parse_emit},
+      {"step", "step [dt], dt 0 or more", false, parse_step},
+      {"run", "run UNTIL every DT", false, parse_run},
+      {"renew", "renew NAME", false, parse_renew},
+  }};
+  return all;
+}
+
+std::string verb_list(bool at_only) {
+  std::string list;
+  for (const Verb& verb : verbs())
+    if (verb.at || !at_only)
+      list += (list.empty() ? "" : ", ") + std::string(verb.name);
+  return at_only ? list : list + ", at";
+}
+
+/// \param line all words, the command's own first
+What parse_command(std::vector<std::string> line, bool behind_at) {
+  const std::string verb_name = line[0];
+  for (const Verb& verb : verbs())
+    if (verb.name == verb_name && (verb.at || !behind_at)) {
+      line.erase(line.begin());
+      Words in(std::move(line), verb.usage);
+      What what = verb.parse(in);
+      in.end();
+      return what;
+    }
+  std::vector<std::string> known;
+  for (const Verb& verb : verbs())
+    if (verb.at || !behind_at)
+      known.emplace_back(verb.name);
+  throw Error(shown(verb_name) + " is no command" + (behind_at ? " behind at T" : "") +
+              suggestion(verb_name, known) + ", expected one of " + verb_list(behind_at));
+}
+
+} // namespace
+
+std::vector<std::string> scene_words(std::string_view line) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < line.size();) {
+    if (is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    if (line[at] == '#')
+      break;
+    std::string& word = words.emplace_back();
+    while (at < line.size() && !is_blank(line[at]) && line[at] != '#') {
+      if (line[at] != '"') {
+        word += line[at++];
+        continue;
+      }
+      const std::size_t close = line.find('"', at + 1);
+      if (close == std::string_view::npos)
+        throw Error("a quote without an end, expected one more '\"'");
+      word += line.substr(at + 1, close - at - 1);
+      at = close + 1;
+    }
+    if (word.find('\0') != std::string::npos)
+      throw Error("a zero byte, expected text");
+  }
+  return words;
+}
+
+std::string scene_line(const std::vector<std::string>& words) {
+  std::string line;
+  for (const std::string& word : words) {
+    const bool quoted = word.empty() || std::any_of(word.begin(), word.end(),
+                                                    [](char c) { return is_blank(c) || c == '#'; });
+    line += (line.empty() ? "" : " ") + (quoted ? '"' + word + '"' : word);
+  }
+  return line;
+}
+
+std::optional<Command> parse_scene_line(std::string_view line) {
+  std::vector<std::string> words = scene_words(line);
+  if (words.empty())
+    return std::nullopt;
+  Command command;
+  if (words[0] == "at") {
+    words.erase(words.begin());
+    Words in(words, "at [every] T COMMAND...");
+    command.every = in.take("every");
+    command.at = in.number("time");
+    if (command.every && !(*command.at > 0))
+      in.fail("a period that is not positive");
+    if (in.done())
+      in.fail("no command");
+    words.erase(words.begin(), words.begin() + (command.every ? 2 : 1));
+  }
+  command.what = parse_command(std::move(words), command.at.has_value());
+  if (command.at && std::holds_alternative<EmitModelCommand>(command.what))
+    throw Error("emit model behind at T, expected it between steps");
+  return command;
+}
+
+} // namespace gewebe

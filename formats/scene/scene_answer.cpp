@@ -1,0 +1,102 @@
+#include "formats/scene/scene_answer.h"
+
+#include "base/vector_at.h"
+#include "formats/scene/scene_instrument.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <span>
+
+namespace gewebe {
+
+namespace {
+
+void append(std::string& text, double value) {
+  std::array<char, 32> number{};
+  text.append(number.data(),
+              std::to_chars(number.data(), number.data() + number.size(), value).ptr);
+}
+
+void append(std::string& text, const Vec3& v, char end) {
+  append(text, v.x);
+  text += ' ';
+  append(text, v.y);
+  text += ' ';
+  append(text, v.z);
+  text += end;
+}
+
+} // namespace
+
+std::string cutting_line(const Simulation& simulation, const Cutting& c) {
+  const std::string& name = simulation.name(c.object);
+  const std::string nodes = " nodes " + std::to_string(c.nodes);
+  switch (c.kind) {
+  case Cutting::Kind::cut:
+    return "cut " + name + " springs " + std::to_string(c.springs) + " doubled " +
+           std::to_string(c.doubled) + nodes;
+  case Cutting::Kind::part:
+    return "part " + name + " " + simulation.name(c.part) + nodes;
+  case Cutting::Kind::loose:
+    return "loose " + name + nodes;
+  default:
+    return "restored " + name + nodes;
+  }
+}
+
+bool topology_changed(const Simulation& simulation, std::size_t object) {
+  const std::vector<Cutting>& all = simulation.cuttings();
+  return std::any_of(all.begin(), all.end(), [&](const Cutting& c) {
+    return c.kind != Cutting::Kind::loose &&
+           (c.kind == Cutting::Kind::part ? c.part : c.object) == object;
+  });
+}
+
+std::string text_answer(const Simulation& simulation, std::uint64_t step) {
+  std::string text = "step " + std::to_string(step) + " ";
+  append(text, simulation.time());
+  text += '\n';
+  for (const MethodJump& jump : simulation.jumps()) {
+    text += "jump " + simulation.name(jump.object) + " ";
+    append(text, jump.size);
+    text += '\n';
+  }
+  for (const Cutting& c : simulation.cuttings())
+    text += cutting_line(simulation, c) + "\n";
+  for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
+    if (!topology_changed(simulation, i))
+      continue;
+    const std::vector<Triangle>& triangles = simulation.model(i).triangles;
+    text += "triangles " + simulation.name(i) + " " + std::to_string(triangles.size()) + "\n";
+    for (const Triangle& t : triangles)
+      text += std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
+  }
+  for (std::size_t i = 0; simulation.emits_forces() && i < simulation.object_count(); ++i) {
+    const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+    text += "forces " + simulation.name(i) + " " + std::to_string(forces.size()) + "\n";
+    for (const NodeVector& f : forces) {
+      text += std::to_string(f.node) + " ";
+      append(text, f.value, '\n');
+    }
+  }
+  for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
+    const std::vector<Node>& nodes = simulation.model(i).nodes;
+    const std::span<const double> u = simulation.displacement(i);
+    text += "shapes " + simulation.name(i) + " " + std::to_string(nodes.size()) + "\n";
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      append(text, nodes[k].position + vector_at(u, k), '\n');
+  }
+  if (simulation.emits_instruments())
+    text += instrument_reply(simulation);
+  return text + "done\n";
+}
+
+std::string text_error(std::uint64_t line, std::string_view text) {
+  std::string answer = "error " + std::to_string(line) + ": ";
+  for (const char c : text)
+    answer += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+  return answer + "\n";
+}
+
+} // namespace gewebe

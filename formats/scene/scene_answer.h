@@ -1,0 +1,26 @@
+#pragma once
+// What a scene answers to a step, as text: scene(5).
+
+#include "scene/simulation.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+
+/// "cut NAME springs S doubled D nodes N", or what else cutting did.
+std::string cutting_line(const Simulation& simulation, const Cutting& cutting);
+/// Whether its triangles are others since the last answer.
+bool topology_changed(const Simulation& simulation, std::size_t object);
+
+/// The answer to a step, from "step K T" to "done": jumps of objects that changed their method,
+/// what cutting did, forces and shapes as far as the scene emits them. \pre the models of all
+/// objects are known where shapes are emitted
+std::string text_answer(const Simulation& simulation, std::uint64_t step);
+
+/// "error LINE: TEXT", one line whatever the text holds.
+std::string text_error(std::uint64_t line, std::string_view text);
+
+} // namespace gewebe

@@ -1,0 +1,68 @@
+#pragma once
+// Makes a stiffness store; stiffness_store(5).
+
+#include "base/columns.h"
+#include "formats/store/stiffness_store.h"
+#include "formats/stream/stream.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// Bytes of a store: what its arrays take. `nodes` columns are wanted.
+double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
+                             bool single);
+
+/// Writes a store, object by object: matrix and factor at once, columns as they come.
+///
+/// Where the output is a part (Output::Options::part) finished columns are kept whatever ends the
+/// program: they stand in FILE.part at the places that they will have in the store, and
+/// FILE.part.log says which. A writer that meets them takes up those whose checksums hold; all else
+/// is made anew in a nameless file beside, and copied to FILE.part by `close`, so that a store made
+/// in several goes has the bytes of one made in one.
+class StiffnessStoreWriter final : public ColumnSink {
+public:
+  /// `output`, which must outlive this, is committed by the caller after `close`.
+  /// \throw Error, place = name of the output, if that is no file or can't be written; place = its
+  /// journal if that is damaged
+  explicit StiffnessStoreWriter(Output& output, const StoreShard& shard = {});
+  ~StiffnessStoreWriter() override;
+
+  /// Begins an object. `facts.group` may be empty: it follows from the name. `nodes`, ascending,
+  /// are those that shall have columns; none makes an object without columns. Returns those of them
+  /// whose columns are still to come: all, or what FILE.part doesn't hold. \throw Error too if the
+  /// disk has no room, the group is there already, or FILE.part is of another model or was begun
+  /// with other options
+  std::vector<std::uint32_t> begin(const StiffnessFacts& facts, const StiffnessMatrix& matrix,
+                                   const Factor& factor, std::span<const std::uint32_t> nodes);
+  /// k counts what begin() returned. \throw Error too if a number doesn't fit float32
+  void write(std::size_t k, std::span<const double> columns, double residual) override;
+  /// After an object's last column; `residual` is the largest backward error of all other checks
+  /// made. Returns the largest of all.
+  double end(double residual);
+  /// After the last object.
+  void close();
+  /// After the output was committed.
+  void remove_journal();
+
+  /// Nodes whose columns were taken up, of all objects so far; and those of the object last begun
+  /// whose columns stood there but were damaged.
+  std::uint64_t kept() const;
+  const std::vector<std::uint32_t>& damaged() const;
+
+  /// XXH3-64 of K, L and the digests of each node's columns of all objects, decoded, in order; and
+  /// of the K alone, which are the same on any machine.
+  std::uint64_t digest() const;
+  std::uint64_t matrix_digest() const;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace gewebe

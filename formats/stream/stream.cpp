@@ -1,0 +1,515 @@
+#include "formats/stream/stream.h"
+
+#include "base/bytes.h"
+#include "base/error.h"
+#include "formats/stream/file_names.h"
+#include "formats/stream/program_start.h"
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <climits>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <istream>
+#include <ostream>
+#include <streambuf>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+constexpr std::size_t buffer_bytes = 1U << 20U;
+
+bool is_pipe_name(const std::string& path) {
+  return path.empty() || path == "-";
+}
+
+std::string error_text(int error) {
+  return std::strerror(error);
+}
+
+// Temporary files that a signal handler must remove: fixed slots, because a handler may not
+// allocate.
+struct TemporarySlot {
+  std::atomic<bool> used{false};
+  std::array<char, PATH_MAX> path{};
+};
+std::array<TemporarySlot, 8> temporary_slots;
+
+int remember_temporary(const std::string& path) {
+  for (std::size_t i = 0; i < temporary_slots.size(); ++i) {
+    TemporarySlot& slot = temporary_slots.at(i);
+    if (slot.used.load() || path.size() >= slot.path.size())
+      continue;
+    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
+    slot.used.store(true);
+    return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void forget_temporary(int slot) {
+  if (slot >= 0)
+    temporary_slots.at(static_cast<std::size_t>(slot)).used.store(false);
+}
+
+extern "C" void gewebe_remove_temporaries(int signal_number) {
+  remove_temporaries();
+  (void)std::signal(signal_number, SIG_DFL);
+  (void)std::raise(signal_number);
+}
+
+bool same_bytes(const std::string& a, const std::string& b) {
+  struct File {
+    explicit File(const std::string& path) : handle(std::fopen(path.c_str(), "rb")) {}
+    ~File() {
+      if (handle != nullptr)
+        (void)std::fclose(handle);
+    }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    std::FILE* handle;
+  };
+  const File file_a(a);
+  const File file_b(b);
+  if (file_a.handle == nullptr || file_b.handle == nullptr)
+    return false;
+  std::vector<char> block_a(buffer_bytes);
+  std::vector<char> block_b(buffer_bytes);
+  for (;;) {
+    const std::size_t count_a = std::fread(block_a.data(), 1, block_a.size(), file_a.handle);
+    const std::size_t count_b = std::fread(block_b.data(), 1, block_b.size(), file_b.handle);
+    if (count_a != count_b || std::memcmp(block_a.data(), block_b.data(), count_a) != 0)
+      return false;
+    if (count_a == 0)
+      return true;
+  }
+}
+
+} // namespace
+
+// ---- Input
+
+struct Input::State final : std::streambuf {
+  ~State() override {
+    if (fd > 0)
+      (void)::close(fd);
+  }
+
+  /// Reads at least one byte more into the buffer; false at the end.
+  bool fill() {
+    if (gptr() == egptr()) {
+      start = 0;
+      end = 0;
+    }
+    if (end == buffer.size())
+      return false;
+    ssize_t count = 0;
+    do {
+      count = ::read(fd, buffer.data() + end, buffer.size() - end);
+    } while (count < 0 && errno == EINTR);
+    if (count < 0)
+      throw Error(name, "cannot read: " + error_text(errno));
+    if (count == 0)
+      return false;
+    end += static_cast<std::size_t>(count);
+    total += static_cast<std::uint64_t>(count);
+    setg(buffer.data(), buffer.data() + start, buffer.data() + end);
+    return true;
+  }
+
+  /// Consumes what is buffered.
+  std::string_view take() {
+    const std::string_view bytes(gptr(), static_cast<std::size_t>(egptr() - gptr()));
+    setg(eback(), egptr(), egptr());
+    return bytes;
+  }
+
+  int_type underflow() override {
+    if (gptr() < egptr())
+      return traits_type::to_int_type(*gptr());
+    if (!fill())
+      return traits_type::eof();
+    return traits_type::to_int_type(*gptr());
+  }
+
+  std::streamsize xsgetn(char* target, std::streamsize wanted) override {
+    std::streamsize got = 0;
+    while (got < wanted) {
+      const std::streamsize ready = egptr() - gptr();
+      if (ready > 0) {
+        const std::streamsize part = std::min(ready, wanted - got);
+        std::memcpy(target + got, gptr(), static_cast<std::size_t>(part));
+        setg(eback(), gptr() + part, egptr());
+        got += part;
+      } else if (!fill()) {
+        break;
+      }
+    }
+    return got;
+  }
+
+  int fd = -1;
+  std::string name;
+  std::vector<char> buffer = std::vector<char>(buffer_bytes);
+  std::size_t start = 0, end = 0;
+  std::uint64_t total = 0;
+  std::uint64_t size_hint = 0;
+  std::unique_ptr<std::istream> stream;
+};
+
+Input::Input(const std::string& path, bool binary) : state_(std::make_unique<State>()) {
+  State& state = *state_;
+  state.name = is_pipe_name(path) ? "-" : path;
+  if (is_pipe_name(path)) {
+    if (binary && ::isatty(0) != 0)
+      throw UsageError("standard input is a terminal, expected a file or a pipe");
+    state.fd = 0;
+  } else {
+    state.fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (state.fd < 0)
+      throw Error(path, "cannot open: " + error_text(errno));
+  }
+  struct stat info {};
+  if (::fstat(state.fd, &info) != 0)
+    throw Error(state.name, "cannot open: " + error_text(errno));
+  if (S_ISDIR(info.st_mode))
+    throw Error(state.name, "is a directory, expected a file");
+  if (binary && !is_pipe_name(path) && ::isatty(state.fd) != 0)
+    throw UsageError(path + " is a terminal, expected a file or a pipe");
+  if (S_ISREG(info.st_mode))
+    state.size_hint = static_cast<std::uint64_t>(info.st_size);
+  note_read(state.name, state.fd == 0 ? 0 : -1);
+}
+
+Input::~Input() = default;
+Input::Input(Input&&) noexcept = default;
+
+const std::string& Input::name() const {
+  return state_->name;
+}
+
+std::string_view Input::peek(std::size_t count) {
+  State& state = *state_;
+  while (state.end - state.start < count && state.fill()) {
+  }
+  if (state.total == 0)
+    throw Error(state.name, "is empty");
+  return std::string_view(state.buffer.data() + state.start,
+                          std::min(count, state.end - state.start));
+}
+
+std::string Input::read_all(std::uint64_t max_bytes) {
+  State& state = *state_;
+  (void)peek(1);
+  std::string bytes(state.take());
+  if (state.size_hint <= max_bytes)
+    bytes.reserve(state.size_hint + 1);
+  while (bytes.size() <= max_bytes && state.fill()) {
+    bytes.append(state.take());
+  }
+  if (bytes.size() > max_bytes)
+    throw Error(state.name, "is larger than the limit of " +
+                                bytes_text(static_cast<double>(max_bytes)) + " (--max-memory)");
+  return bytes;
+}
+
+std::istream& Input::stream() {
+  if (!state_->stream)
+    state_->stream = std::make_unique<std::istream>(state_.get());
+  return *state_->stream;
+}
+
+// ---- Output
+
+struct Output::State final : std::streambuf {
+  State() { setp(buffer.data(), buffer.data() + buffer.size()); }
+  ~State() override {
+    if (fd > 1)
+      (void)::close(fd);
+    if (!temporary.empty() && !kept) {
+      (void)::unlink(temporary.c_str());
+      forget_temporary(slot);
+    }
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(name, what + ": " + error_text(errno));
+  }
+
+  void open_direct() {
+    fd = ::open(name.c_str(), O_WRONLY | O_CLOEXEC);
+    if (fd < 0)
+      fail("cannot open for writing");
+    if (options.binary && ::isatty(fd) != 0)
+      throw UsageError(name + " is a terminal, expected a file or a pipe");
+  }
+
+  /// False where another program has it, or had it and gave it its name just now.
+  bool lock_part(const std::string& path) const {
+    struct stat opened {
+    }, named{};
+    return ::flock(fd, LOCK_EX | LOCK_NB) == 0 && ::fstat(fd, &opened) == 0 &&
+           ::stat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino &&
+           opened.st_dev == named.st_dev;
+  }
+
+  void create_temporary() {
+    const std::size_t slash = target.find_last_of('/');
+    const std::string folder = slash == std::string::npos ? "" : target.substr(0, slash + 1);
+    const std::string base = slash == std::string::npos ? target : target.substr(slash + 1);
+    std::string path =
+        options.part ? target + ".part" : folder + "." + base.substr(0, 200) + ".XXXXXX";
+    // Blocked until the slot is filled, so that no signal can leave the file behind.
+    sigset_t all{};
+    sigset_t old{};
+    (void)::sigfillset(&all);
+    (void)::pthread_sigmask(SIG_SETMASK, &all, &old);
+    fd = options.part ? open_part(path) : ::mkostemp(path.data(), O_CLOEXEC);
+    int error = errno;
+    if (fd >= 0 && options.part && !lock_part(path)) {
+      error = EBUSY; // of another program, so it must not be removed
+      (void)::close(fd);
+      fd = -1;
+    }
+    if (fd >= 0) {
+      temporary = path;
+      kept = found;
+      slot = found ? -1 : remember_temporary(path);
+    }
+    (void)::pthread_sigmask(SIG_SETMASK, &old, nullptr);
+    errno = error;
+    if (fd < 0 && errno == EBUSY)
+      throw Error(name, "is being made by another program: " + path + " is locked");
+    if (fd < 0 && (errno == ELOOP || errno == EEXIST || errno == EISDIR))
+      throw Error(name, path + " is there and no file of ours, expected none or what an unfinished "
+                               "run left");
+    if (fd < 0)
+      fail("cannot create a file in its folder");
+    if (!found && ::fchmod(fd, mode) != 0)
+      fail("cannot set the mode");
+  }
+
+  /// Makes the file, or opens what an earlier run left: never through a link, never what is
+  /// another user's. -1 and errno as open(2); EEXIST if it isn't ours.
+  int open_part(const std::string& path) {
+    const int made = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (made >= 0 || errno != EEXIST)
+      return made;
+    const int there = ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    struct stat info {};
+    if (there < 0)
+      return -1;
+    if (::fstat(there, &info) != 0 || !S_ISREG(info.st_mode) || info.st_nlink > 1 ||
+        info.st_uid != ::geteuid()) {
+      (void)::close(there);
+      errno = EEXIST;
+      return -1;
+    }
+    found = info.st_size > 0;
+    return there;
+  }
+
+  void write_all(const char* data, std::size_t size) {
+    if (fd < 0)
+      open_direct();
+    while (size > 0) {
+      const ssize_t count = ::write(fd, data, size);
+      if (count < 0) {
+        if (errno == EINTR)
+          continue;
+        fail("cannot write");
+      }
+      data += count;
+      size -= static_cast<std::size_t>(count);
+    }
+  }
+
+  void flush_buffer() {
+    const std::size_t size = static_cast<std::size_t>(pptr() - pbase());
+    setp(buffer.data(), buffer.data() + buffer.size());
+    if (size > 0)
+      write_all(buffer.data(), size);
+  }
+
+  int_type overflow(int_type c) override {
+    flush_buffer();
+    if (!traits_type::eq_int_type(c, traits_type::eof())) {
+      *pptr() = traits_type::to_char_type(c);
+      pbump(1);
+    }
+    return traits_type::not_eof(c);
+  }
+
+  std::streamsize xsputn(const char* data, std::streamsize size) override {
+    if (size > epptr() - pptr())
+      flush_buffer();
+    if (size >= static_cast<std::streamsize>(buffer.size())) {
+      write_all(data, static_cast<std::size_t>(size));
+    } else {
+      std::memcpy(pptr(), data, static_cast<std::size_t>(size));
+      pbump(static_cast<int>(size));
+    }
+    return size;
+  }
+
+  int sync() override {
+    flush_buffer();
+    return 0;
+  }
+
+  std::string name, target, temporary;
+  Options options;
+  int fd = -1, slot = -1;
+  mode_t mode = 0;
+  bool existed = false, kept = false;
+  bool found = false; ///< the part held something
+  FileUse use;
+  std::vector<char> buffer = std::vector<char>(buffer_bytes);
+  std::unique_ptr<std::ostream> stream;
+};
+
+Output::Output(const std::string& path, const Options& options)
+    : state_(std::make_unique<State>()) {
+  State& state = *state_;
+  state.options = options;
+  state.name = is_pipe_name(path) ? "-" : path;
+  if (is_pipe_name(path)) {
+    if (options.binary && ::isatty(1) != 0)
+      throw UsageError("standard output is a terminal, expected -o FILE or a pipe");
+    state.fd = 1;
+    state.use = FileUse("-", 1);
+    return;
+  }
+  struct stat info {};
+  state.existed = ::stat(path.c_str(), &info) == 0;
+  if (state.existed && S_ISDIR(info.st_mode))
+    throw Error(path, "is a directory, expected a file");
+  if (!state.existed && errno != ENOENT)
+    state.fail("cannot open for writing");
+  if (state.existed && !S_ISREG(info.st_mode)) {
+    if (options.binary && S_ISCHR(info.st_mode) && path.starts_with("/dev/tty"))
+      throw UsageError(path + " is a terminal, expected a file or a pipe");
+    return; // opened at the first write: a FIFO's reader may come late
+  }
+  if (state.existed) {
+    if (::access(path.c_str(), W_OK) != 0)
+      state.fail("cannot open for writing");
+    state.mode = info.st_mode & 07777U;
+  } else {
+    const mode_t mask = ::umask(0);
+    (void)::umask(mask);
+    state.mode = 0666U & ~mask;
+  }
+  state.target = follow_links(path);
+  state.use = FileUse(path);
+  state.create_temporary();
+}
+
+Output::~Output() = default;
+Output::Output(Output&&) noexcept = default;
+
+const std::string& Output::name() const {
+  return state_->name;
+}
+
+void Output::write(const void* data, std::size_t size) {
+  (void)state_->sputn(static_cast<const char*>(data), static_cast<std::streamsize>(size));
+}
+
+std::ostream& Output::stream() {
+  if (!state_->stream) {
+    state_->stream = std::make_unique<std::ostream>(state_.get());
+    state_->stream->exceptions(std::ios::badbit | std::ios::failbit);
+  }
+  return *state_->stream;
+}
+
+const std::string& Output::temporary() const {
+  if (state_->temporary.empty())
+    throw Error(state_->name,
+                "is no regular file, but this kind can't be written to a pipe or a device");
+  return state_->temporary;
+}
+
+void Output::keep_part(bool keep) {
+  state_->kept = keep;
+  forget_temporary(state_->slot);
+  state_->slot = -1;
+}
+
+bool Output::part() const {
+  return state_->options.part && !state_->temporary.empty();
+}
+
+void Output::commit() {
+  State& state = *state_;
+  state.flush_buffer();
+  if (state.fd < 0)
+    state.open_direct(); // nothing was written, but the reader of a FIFO waits
+  if (state.temporary.empty()) {
+    const int fd = state.fd;
+    state.fd = -1;
+    if (::close(fd) != 0)
+      state.fail("cannot write");
+    return;
+  }
+  if (state.found && ::fchmod(state.fd, state.mode) != 0)
+    state.fail("cannot set the mode");
+  if (state.options.sync && ::fsync(state.fd) != 0)
+    state.fail("cannot write");
+  const int fd = state.fd;
+  state.fd = -1;
+  if (::close(fd) != 0)
+    state.fail("cannot write");
+  if (state.options.keep_unchanged && state.existed && same_bytes(state.temporary, state.target)) {
+    state.kept = false;
+    return; // the destructor removes the temporary file
+  }
+  // Something may have been read since that another file has to serve for; a record of a failed
+  // run would destroy it.
+  state.use = FileUse();
+  state.use = FileUse(state.name);
+  if (::rename(state.temporary.c_str(), state.target.c_str()) != 0)
+    state.fail("cannot rename");
+  forget_temporary(state.slot);
+  state.temporary.clear();
+}
+
+void install_signal_cleanup() {
+  struct sigaction action {};
+  action.sa_handler = gewebe_remove_temporaries;
+  (void)::sigfillset(&action.sa_mask);
+  action.sa_flags = 0;
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU}) {
+    struct sigaction old {};
+    // What the caller ignores on purpose (nohup) stays ignored; a broken pipe always ends a
+    // program.
+    if (signal_number != SIGPIPE && ::sigaction(signal_number, nullptr, &old) == 0 &&
+        old.sa_handler == SIG_IGN)
+      continue;
+    (void)::sigaction(signal_number, &action, nullptr);
+  }
+  (void)std::signal(SIGXFSZ, SIG_IGN); // then write(2) says EFBIG
+}
+
+void remove_temporaries() noexcept {
+  for (TemporarySlot& slot : temporary_slots)
+    if (slot.used.load())
+      (void)::unlink(slot.path.data());
+}
+
+void hold_standard_streams() {
+  // Open in the wrong direction, so that whoever reads or writes them is told.
+  for (const int fd : {0, 1, 2})
+    if (::fcntl(fd, F_GETFD) < 0 && errno == EBADF)
+      (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
+}
+
+} // namespace gewebe

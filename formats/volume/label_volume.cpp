@@ -1,0 +1,364 @@
+#include "formats/volume/label_volume.h"
+
+#include "base/error.h"
+#include "formats/stream/file_names.h"
+#include "formats/volume/label_volume_internal.h"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <unordered_map>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+constexpr std::int32_t largest_size = 1 << 20;
+
+std::string size_text(const Int3& size) {
+  return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
+         std::to_string(size[2]);
+}
+
+template <class T>
+T swapped(T value) {
+  std::array<char, sizeof(T)> bytes{};
+  std::memcpy(bytes.data(), &value, sizeof(T));
+  std::reverse(bytes.begin(), bytes.end());
+  std::memcpy(&value, bytes.data(), sizeof(T));
+  return value;
+}
+
+/// Counts labels and says which are wanted: small ones from a table, others by hashing.
+class Counter {
+public:
+  explicit Counter(const std::vector<std::int64_t>& labels) : labels_(labels) {
+    std::sort(labels_.begin(), labels_.end());
+    for (const std::int64_t label : labels_)
+      if (label >= 0 && label < table_size)
+        wanted_[static_cast<std::size_t>(label)] = 1;
+  }
+
+  bool count(std::int64_t label) {
+    if (label >= 0 && label < table_size) {
+      ++counts_[static_cast<std::size_t>(label)];
+      return wanted_[static_cast<std::size_t>(label)] != 0;
+    }
+    std::uint64_t& number = others_[label];
+    if (++number == 1 && others_.size() > 100000)
+      throw Error("more than 100000 different values, expected labels");
+    return std::binary_search(labels_.begin(), labels_.end(), label);
+  }
+
+  std::vector<std::pair<std::int64_t, std::uint64_t>> result() const {
+    std::vector<std::pair<std::int64_t, std::uint64_t>> all(others_.begin(), others_.end());
+    for (std::int64_t label = 0; label < table_size; ++label)
+      if (const std::uint64_t n = counts_[static_cast<std::size_t>(label)]; n > 0)
+        all.emplace_back(label, n);
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+private:
+  static constexpr std::int64_t table_size = 65536;
+  std::vector<std::int64_t> labels_;
+  std::vector<char> wanted_ = std::vector<char>(table_size);
+  std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(table_size);
+  std::unordered_map<std::int64_t, std::uint64_t> others_;
+};
+
+/// The label that a stored number means; nothing if it is no whole number.
+template <class T>
+std::optional<std::int64_t> label_of(T stored, const VoxelLayout& layout) {
+  if constexpr (std::is_integral_v<T>)
+    if (layout.slope == 1 && layout.intercept == 0 && std::in_range<std::int64_t>(stored))
+      return static_cast<std::int64_t>(stored);
+  const double value = layout.slope * static_cast<double>(stored) + layout.intercept;
+  if (!(std::fabs(value) < 0x1p53) || value != std::trunc(value))
+    return std::nullopt;
+  return static_cast<std::int64_t>(value);
+}
+
+template <class T>
+std::string value_text(T stored, const VoxelLayout& layout) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "%.9g",
+                      layout.slope * static_cast<double>(stored) + layout.intercept);
+  return text.data();
+}
+
+/// Rows of voxels of type T to bits.
+template <class T>
+std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                      const Context& context, Counter& counter, LabelMask& mask) {
+  const std::size_t length = static_cast<std::size_t>(layout.size[0]);
+  const std::size_t rows =
+      static_cast<std::size_t>(layout.size[1]) * static_cast<std::size_t>(layout.size[2]);
+  std::vector<T> row(length);
+  std::uint64_t set = 0;
+  for (std::size_t r = 0; r < rows; ++r) {
+    if (r % 1024 == 0 && context.cancelled && context.cancelled())
+      throw Cancelled();
+    const std::size_t got = data.read(reinterpret_cast<char*>(row.data()), length * sizeof(T));
+    if (got < length * sizeof(T))
+      throw Error(name, "ends after " + std::to_string(r * length * sizeof(T) + got) + " of " +
+                            std::to_string(rows * length * sizeof(T)) + " bytes of voxels (" +
+                            size_text(layout.size) + ")");
+    // Grows as the bytes come, so that a header's claim alone takes no memory.
+    mask.bits.resize(mask.bits.size() + mask.row_words());
+    std::uint64_t* const words = mask.bits.data() + (mask.bits.size() - mask.row_words());
+    for (std::size_t i = 0; i < length; ++i) {
+      const T stored =
+          layout.big_endian != (std::endian::native == std::endian::big) ? swapped(row[i]) : row[i];
+      const std::optional<std::int64_t> label = label_of(stored, layout);
+      if (!label)
+        throw Error(name, "voxel (" + std::to_string(i) + ", " +
+                              std::to_string(r % static_cast<std::size_t>(layout.size[1])) + ", " +
+                              std::to_string(r / static_cast<std::size_t>(layout.size[1])) +
+                              ") is " + value_text(stored, layout) + ", expected whole numbers");
+      const bool wanted = at(name, [&] { return counter.count(*label); });
+      set += wanted ? 1 : 0;
+      words[i >> 6] |= static_cast<std::uint64_t>(wanted) << (i & 63);
+    }
+  }
+  return set;
+}
+
+std::uint64_t convert_any(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                          const Context& context, Counter& counter, LabelMask& mask) {
+  const auto as = [&]<class T>(T) {
+    return convert<T>(data, name, layout, context, counter, mask);
+  };
+  switch (layout.type) {
+  case ScalarType::i8:
+    return as(std::int8_t{});
+  case ScalarType::u8:
+    return as(std::uint8_t{});
+  case ScalarType::i16:
+    return as(std::int16_t{});
+  case ScalarType::u16:
+    return as(std::uint16_t{});
+  case ScalarType::i32:
+    return as(std::int32_t{});
+  case ScalarType::u32:
+    return as(std::uint32_t{});
+  case ScalarType::i64:
+    return as(std::int64_t{});
+  case ScalarType::u64:
+    return as(std::uint64_t{});
+  case ScalarType::f32:
+    return as(float{});
+  case ScalarType::f64:
+    return as(double{});
+  }
+  return 0;
+}
+
+/// "0 to 4, 7, 9 to 12", of long lists the beginning.
+std::string list_of(const std::vector<std::pair<std::int64_t, std::uint64_t>>& labels) {
+  std::string text;
+  std::size_t parts = 0;
+  for (std::size_t n = 0; n < labels.size();) {
+    std::size_t last = n;
+    while (last + 1 < labels.size() && labels[last + 1].first == labels[last].first + 1)
+      ++last;
+    text += (text.empty() ? "" : ", ") + std::to_string(labels[n].first);
+    if (last > n)
+      text += " to " + std::to_string(labels[last].first);
+    n = last + 1;
+    if (++parts == 20 && n < labels.size())
+      return text + ", …";
+  }
+  return text;
+}
+
+LabelVolume read_any(ByteSource& source, const std::string& name, const LabelRequest& request) {
+  BufferedBytes raw(source, name);
+  std::optional<InflatedBytes> inflated;
+  std::optional<BufferedBytes> unpacked;
+  BufferedBytes* bytes = &raw;
+  if (is_gzip(raw.peek(2))) {
+    inflated.emplace(raw, name);
+    bytes = &unpacked.emplace(*inflated, name);
+  }
+  const std::string_view first = bytes->peek(4096);
+  LabelVolume volume;
+  if (is_nifti(first))
+    volume = read_nifti(*bytes, request);
+  else if (is_nrrd(first))
+    volume = read_nrrd(*bytes, request);
+  else if (is_meta_image(first))
+    volume = read_meta_image(*bytes, request);
+  else
+    throw Error(name, "is no label volume, expected NIfTI, NRRD or MetaImage");
+  for (const std::int64_t label : request.labels)
+    if (!std::binary_search(volume.labels.begin(), volume.labels.end(),
+                            std::pair<std::int64_t, std::uint64_t>(label, 0),
+                            [](const auto& a, const auto& b) { return a.first < b.first; }))
+      throw Error(name, "has no label " + std::to_string(label) + ", expected some of " +
+                            list_of(volume.labels));
+  return volume;
+}
+
+} // namespace
+
+// ---- what the formats share
+
+std::size_t bytes_of(ScalarType type) {
+  switch (type) {
+  case ScalarType::i8:
+  case ScalarType::u8:
+    return 1;
+  case ScalarType::i16:
+  case ScalarType::u16:
+    return 2;
+  case ScalarType::i32:
+  case ScalarType::u32:
+  case ScalarType::f32:
+    return 4;
+  case ScalarType::i64:
+  case ScalarType::u64:
+  case ScalarType::f64:
+    return 8;
+  }
+  return 8;
+}
+
+LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                        const LabelRequest& request) {
+  LabelVolume volume;
+  volume.mask.size = layout.size;
+  volume.mask.transform = layout.transform;
+  const double words = static_cast<double>(volume.mask.row_words()) * layout.size[1] *
+                       static_cast<double>(layout.size[2]);
+  at(name, [&] {
+    // Twice, for a vector that grows holds the old content too. What comes through here in all
+    // counts as well: it may be a small file that grows without end when it is unpacked.
+    const double bytes = static_cast<double>(bytes_of(layout.type)) * layout.size[0] *
+                         static_cast<double>(layout.size[1]) * layout.size[2];
+    require_memory(request.context, std::max(16 * words + 16.0 * layout.size[0] + 1e6, bytes),
+                   ("the label volume of " + size_text(layout.size) + " voxels").c_str());
+  });
+  Counter counter(request.labels);
+  volume.voxels = convert_any(data, name, layout, request.context, counter, volume.mask);
+  char more = 0;
+  if (data.read(&more, 1) != 0)
+    throw Error(name, "goes on after its " + size_text(layout.size) + " voxels, expected its end");
+  volume.labels = counter.result();
+  return volume;
+}
+
+Int3 checked_size(const std::string& place, const std::array<std::int64_t, 3>& size) {
+  Int3 checked{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (size[a] < 1 || size[a] > largest_size)
+      throw Error(place, std::to_string(size[a]) + " voxels along axis " + std::to_string(a + 1) +
+                             ", expected 1 to 2^20");
+    checked[a] = static_cast<std::int32_t>(size[a]);
+  }
+  return checked;
+}
+
+void check_affine(const std::string& place, const GridTransform& transform) {
+  for (const double number : transform.m)
+    if (!(std::fabs(number) <= 1e12))
+      throw Error(place, "the transform to the world has a number that is not finite or beyond "
+                         "1e12, expected mm");
+  const Vec3 size = transform.voxel_size();
+  if (!(size.x >= 1e-12 && size.y >= 1e-12 && size.z >= 1e-12))
+    throw Error(place, "a voxel has no extent along an axis, expected a positive spacing");
+  if (!(std::fabs(transform.determinant()) > 1e-6 * size.x * size.y * size.z))
+    throw Error(place, "the transform to the world is singular, expected three independent axes");
+}
+
+std::string beside(const std::string& header, std::string_view file) {
+  if (leaves_folder(file))
+    throw Error(header, "names " + quoted(file) +
+                            " as the file of its voxels, expected one in its "
+                            "own folder or below");
+  const std::size_t slash = header.find_last_of('/');
+  return (slash == std::string::npos ? std::string() : header.substr(0, slash + 1)) +
+         std::string(file);
+}
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r\n\f\v";
+  const std::size_t begin = text.find_first_not_of(blanks);
+  if (begin == std::string_view::npos)
+    return {};
+  return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
+}
+
+std::vector<std::string_view> words_of(std::string_view text) {
+  std::vector<std::string_view> words;
+  for (text = trimmed(text); !text.empty(); text = trimmed(text)) {
+    const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
+    words.push_back(text.substr(0, end));
+    text.remove_prefix(end);
+  }
+  return words;
+}
+
+std::string quoted(std::string_view text) {
+  std::string shown;
+  for (const char c : text.substr(0, 40))
+    shown += c >= ' ' && c <= '~' ? c : '?';
+  return "'" + shown + (text.size() > 40 ? "…'" : "'");
+}
+
+double number_of(const std::string& place, std::string_view word) {
+  double value = 0;
+  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+  const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
+    throw Error(place, quoted(word) + ", expected a finite number");
+  return value;
+}
+
+std::int64_t whole_of(const std::string& place, std::string_view word) {
+  std::int64_t value = 0;
+  const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (status != std::errc{} || rest != word.data() + word.size())
+    throw Error(place, quoted(word) + ", expected a whole number");
+  return value;
+}
+
+// ---- the readers
+
+LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
+                              const Context& context) {
+  (void)input.peek(1); // says that it is empty
+  StreamBytes source(input.stream(), input.name());
+  return read_any(source, input.name(), {labels, context, input.name() != "-"});
+}
+
+LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
+                                    const std::vector<std::int64_t>& labels,
+                                    const Context& context) {
+  MemoryBytes source(bytes);
+  return read_any(source, name, {labels, context, false});
+}
+
+bool is_label_volume(std::string_view first_bytes) {
+  std::string unpacked;
+  if (is_gzip(first_bytes)) {
+    MemoryBytes memory(first_bytes);
+    BufferedBytes packed(memory, "");
+    InflatedBytes inflated(packed, "");
+    unpacked.resize(4096);
+    std::size_t size = 0;
+    try {
+      while (size < unpacked.size() && inflated.read(unpacked.data() + size, 1) == 1)
+        ++size;
+    } catch (const Error&) { // it is cut off after 4096 bytes
+    }
+    unpacked.resize(size);
+    first_bytes = unpacked;
+  }
+  return is_nifti(first_bytes) || is_nrrd(first_bytes) || is_meta_image(first_bytes);
+}
+
+} // namespace gewebe

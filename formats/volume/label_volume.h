@@ -1,0 +1,58 @@
+#pragma once
+// Label volumes of radiology: NIfTI-1 and -2 (.nii, .nii.gz, pairs .hdr/.img), NRRD (.nrrd, .nhdr;
+// raw and gzip) and MetaImage (.mha, .mhd; raw and zlib). What is read is which voxels have one of
+// the wanted labels, one bit a voxel, and where they lie in the world: mm, RAS.
+//
+// A reader of our own on zlib. Debian 12 has three libraries. nifticlib 3 (1.8 MB) opens files by
+// name alone, so no pipe; it warns on standard error and reads a file that is cut off as zeros, and
+// for a header that claims 32000³ voxels asks for 1.6 GB, for its product overflows. teem (3.3 MB)
+// reads NRRD only. ITK (126 MB, 38 packages) reads all three. All hold the whole volume in its own
+// type, eight to sixty-four times the bits that are needed here. The headers are a page of code
+// each; streamed through zlib (which libpng and HDF5 need anyway) a volume takes one bit a voxel,
+// and no byte is believed before it is checked.
+//
+// Frames: NIfTI is RAS; its affine is chosen as by nibabel (sform where sform_code > 0, else qform
+// where qform_code > 0, else the voxel sizes about the middle with x from right to left, and a
+// warning), its unit (m, mm, µm) applied. NRRD spaces RAS, LAS and LPS are converted by negating
+// axes; one without anatomical meaning is taken as RAS with a warning. MetaImage is LPS.
+
+#include "base/context.h"
+#include "formats/stream/stream.h"
+#include "labels/label_mask.h"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+
+struct LabelVolume {
+  LabelMask mask;           ///< of the wanted labels
+  std::uint64_t voxels = 0; ///< that are set in it
+  std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage"
+  std::vector<std::pair<std::int64_t, std::uint64_t>>
+      labels; ///< all values that the file holds, ascending, and how often
+  std::vector<std::string> warnings;
+};
+
+/// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
+/// Compression is told by its bytes. Values must be whole numbers, in whatever type they are kept.
+/// \throw Error with the place if it is none of the three, is cut off or goes on beyond its end, if
+/// a value is no whole number, if the affine is singular, if one of `labels` doesn't occur (the
+/// message names those that do), or if the mask would need more than context.max_memory
+LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
+                              const Context& context);
+
+/// The same for bytes that are there already; `name` is for messages. Files of two parts are
+/// refused.
+LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
+                                    const std::vector<std::int64_t>& labels,
+                                    const Context& context);
+
+/// Are these first bytes (the more the better, up to 4096) those of a label volume, compressed or
+/// not?
+bool is_label_volume(std::string_view first_bytes);
+
+} // namespace gewebe

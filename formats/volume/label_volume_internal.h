@@ -1,0 +1,135 @@
+#pragma once
+// What the readers of label volumes share: bytes that come forwards, numbers out of them, voxels.
+
+#include "formats/volume/label_volume.h"
+
+#include <cstddef>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+/// Bytes that come forwards.
+class ByteSource {
+public:
+  ByteSource() = default;
+  virtual ~ByteSource() = default;
+  ByteSource(const ByteSource&) = delete;
+  ByteSource& operator=(const ByteSource&) = delete;
+  /// Up to `count` bytes; fewer only at the end. \throw Error
+  virtual std::size_t read(char* to, std::size_t count) = 0;
+};
+
+class MemoryBytes final : public ByteSource {
+public:
+  explicit MemoryBytes(std::string_view bytes) : rest_(bytes) {}
+  std::size_t read(char* to, std::size_t count) override;
+
+private:
+  std::string_view rest_;
+};
+
+class StreamBytes final : public ByteSource {
+public:
+  StreamBytes(std::istream& stream, std::string name) : stream_(stream), name_(std::move(name)) {}
+  std::size_t read(char* to, std::size_t count) override;
+
+private:
+  std::istream& stream_;
+  std::string name_;
+};
+
+/// Looks ahead and cuts lines.
+class BufferedBytes final : public ByteSource {
+public:
+  BufferedBytes(ByteSource& from, std::string name) : from_(from), name_(std::move(name)) {}
+  const std::string& name() const { return name_; }
+  std::size_t read(char* to, std::size_t count) override;
+  /// The next bytes, fewer than `count` only at the end. \pre count <= 4096
+  std::string_view peek(std::size_t count);
+  /// The next line without its end, or nothing at the end of all. \throw Error if it is longer than
+  /// 65536 bytes
+  std::optional<std::string> line();
+  /// \throw Error if there are fewer
+  void skip(std::uint64_t count);
+
+private:
+  bool fill();
+  ByteSource& from_;
+  std::string name_, buffer_;
+  std::size_t next_ = 0;
+};
+
+/// gzip (all members) or zlib, each to its checksum. \throw Error (place = name) if the data is
+/// damaged, cut off or followed by something else
+class InflatedBytes final : public ByteSource {
+public:
+  InflatedBytes(BufferedBytes& from, std::string name);
+  ~InflatedBytes() override;
+  std::size_t read(char* to, std::size_t count) override;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Does this begin like gzip?
+inline bool is_gzip(std::string_view bytes) {
+  return bytes.starts_with("\x1f\x8b");
+}
+
+/// Types of voxels, and how the bytes mean numbers.
+enum class ScalarType { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
+std::size_t bytes_of(ScalarType type);
+
+struct VoxelLayout {
+  Int3 size{};
+  GridTransform transform; ///< RAS, mm
+  ScalarType type = ScalarType::u8;
+  bool big_endian = false;
+  double slope = 1, intercept = 0; ///< label = slope · stored + intercept
+};
+
+/// What a reader is asked.
+struct LabelRequest {
+  const std::vector<std::int64_t>& labels;
+  const Context& context;
+  bool side_files; ///< whether the name is that of a file, beside which others may be opened
+};
+
+/// Reads the voxels to the end of `data`, which is called `name`. Fills all but format and
+/// warnings.
+LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                        const LabelRequest& request);
+
+/// Sizes as a header claims them. \throw Error unless each is 1 … 2^20
+Int3 checked_size(const std::string& place, const std::array<std::int64_t, 3>& size);
+/// \throw Error unless finite and far enough from singular
+void check_affine(const std::string& place, const GridTransform& transform);
+
+/// `file` as seen from the folder of `header`.
+std::string beside(const std::string& header, std::string_view file);
+
+/// Words of a header's value, split at blanks.
+std::vector<std::string_view> words_of(std::string_view text);
+std::string_view trimmed(std::string_view text);
+/// "'text'", shortened.
+std::string quoted(std::string_view text);
+/// \throw Error (place) unless the whole word is a finite number, a whole number
+double number_of(const std::string& place, std::string_view word);
+std::int64_t whole_of(const std::string& place, std::string_view word);
+
+LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request);
+LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request);
+LabelVolume read_meta_image(BufferedBytes& bytes, const LabelRequest& request);
+
+/// By the first bytes, uncompressed.
+bool is_nifti(std::string_view bytes);
+bool is_nrrd(std::string_view bytes);
+bool is_meta_image(std::string_view bytes);
+
+} // namespace gewebe

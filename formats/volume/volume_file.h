@@ -1,0 +1,28 @@
+#pragma once
+// Volumes as OpenVDB streams (gewebe_volume(5)): one float grid, on a pipe as in a file. The same
+// content gives the same bytes: the UUID of the stream is derived from the content.
+
+#include "formats/stream/stream.h"
+#include "volume/grid.h"
+
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+
+/// Reads the grid `density`, or the only float grid if none has that name.
+/// \throw Error with the place for anything that is not a whole, finite, affine float grid
+Grid read_volume(Input& input, const Context& context);
+
+/// The same for bytes that are there already.
+Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context = {});
+
+/// Writes one grid; blosc with active mask.
+void write_volume(Output& output, const Grid& grid, const Context& context);
+
+/// What the head of an OpenVDB stream says, checked without OpenVDB: it believes every size it
+/// reads. Walks magic, version, file metadata and the first grid's descriptor and metadata. \throw
+/// Error (place = name, "byte N: …") if that much is not there or not sane
+void check_vdb_head(std::string_view bytes, const std::string& name);
+
+} // namespace gewebe

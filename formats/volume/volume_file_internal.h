@@ -1,0 +1,21 @@
+#pragma once
+// The two ways to OpenVDB's streams; for formats/volume/volume_file.cpp and its tests.
+
+#include "formats/volume/volume_file.h"
+
+namespace gewebe {
+
+/// Who knows how leaves stand in a stream.
+enum class StreamWay {
+  parallel, ///< we: leaves are packed and unpacked by all threads (format 224, of OpenVDB 10)
+  plain     ///< OpenVDB's own reader and writer, whatever their format is
+};
+
+/// The way that the others take: parallel, unless OpenVDB writes a format that we don't know.
+extern const StreamWay usual_way;
+
+Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context,
+                       StreamWay way);
+void write_volume(Output& output, const Grid& grid, const Context& context, StreamWay way);
+
+} // namespace gewebe

@@ -1,0 +1,52 @@
+#include "formats/volume/volume_plugin.h"
+
+#include "base/error.h"
+#include "formats/volume/volume_plugin_internal.h"
+
+#include <dlfcn.h>
+#include <filesystem>
+#include <string_view>
+
+namespace gewebe {
+namespace {
+
+constexpr const char* library_name = "gewebe-volume.so";
+
+void* load() {
+  std::error_code failure;
+  const std::filesystem::path here =
+      std::filesystem::read_symlink("/proc/self/exe", failure).parent_path();
+  for (const std::filesystem::path& path :
+       {here / library_name, here / "../lib/gewebe" / library_name}) {
+    if (!std::filesystem::exists(path, failure))
+      continue;
+    if (void* library = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL))
+      return library;
+    const char* why = ::dlerror();
+    throw Error(std::string("cannot load ") + library_name + ": " + (why != nullptr ? why : ""));
+  }
+  throw Error(std::string(library_name) +
+              " is missing, expected beside the program or in ../lib/gewebe");
+}
+
+} // namespace
+
+VolumeView view_volume_bytes(std::string bytes, const std::string& name,
+                             const VolumeViewOptions& options, const Context& context) {
+  return at(name, [&] {
+    static void* const library = load();
+    const auto* version =
+        static_cast<const char* const*>(::dlsym(library, "gewebe_volume_version"));
+    // POSIX: a function's address comes as an object's.
+    const auto view_function =
+        reinterpret_cast<decltype(&gewebe_view_volume)>(::dlsym(library, "gewebe_view_volume"));
+    if (version == nullptr || view_function == nullptr ||
+        std::string_view(*version) != GEWEBE_VERSION)
+      throw Error(std::string(library_name) + " is of another version, expected " GEWEBE_VERSION);
+    VolumeView view;
+    view_function(&bytes, &name, &options, &context, &view);
+    return view;
+  });
+}
+
+} // namespace gewebe

@@ -1,0 +1,79 @@
+#pragma once
+// Columns of the compliance matrix C = K⁻¹ in memory, as many as fit, and sums of them.
+
+#include "base/columns.h"
+#include "base/context.h"
+#include "compliance/slot_pool.h"
+#include "contact/load.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace gewebe {
+
+/// Computes the columns of one to eight nodes: 9 n numbers each, one node behind the other.
+using ColumnSolve =
+    std::function<void(std::span<const std::uint32_t> nodes, std::span<double> columns)>;
+
+class ColumnCache {
+public:
+  /// For a model of `nodes` nodes. \param source of those that are stored, or null; kept by
+  /// reference \param bytes that columns in memory may take, but two nodes' at least \param bounded
+  /// whether sums may skip what a tolerance allows
+  ColumnCache(std::size_t nodes, const ColumnSource* source, ColumnSolve solve, double bytes,
+              bool bounded);
+
+  /// How many nodes' columns fit in memory.
+  std::size_t capacity() const noexcept { return capacity_; }
+  bool stored(std::uint32_t node) const;
+  bool resident(std::uint32_t node) const { return kept_.contains(node); }
+  std::uint64_t columns_read() const noexcept { return read_; }
+
+  /// Brings these to memory; those used longest ago leave it where there is no room.
+  /// \pre at most capacity() of them   \throw Error if they can't be read or solved
+  void need(std::span<const std::uint32_t> nodes);
+
+  /// Entry of a row (axis 3 i + a) in the column of a node's axis. \pre the node is resident
+  double entry(std::uint32_t node, int axis, std::size_t row) const;
+
+  /// sum += C f for forces at resident nodes, in their order; the same bytes for any number of
+  /// threads. Of each block of rows, the contributions whose bounds add up to `allowed` (mm) or
+  /// less are left out. \return largest sum of bounds left out of a row \pre sum.size() == 3 n;
+  /// allowed is 0 unless bounded
+  double add(std::span<const NodeVector> forces, double allowed, const Context& context,
+             std::span<double> sum) const;
+
+  /// Contributions of a node's column to a block of rows that a sum took and skipped, so far.
+  std::uint64_t taken() const noexcept { return taken_; }
+  std::uint64_t skipped() const noexcept { return skipped_; }
+
+private:
+  struct Columns { ///< of a node, [axis][3 n]; one of both
+    double* wide = nullptr;
+    float* narrow = nullptr;
+    std::vector<float> bound; ///< [axis][block], rounded up
+    std::uint64_t used = 0;
+  };
+  struct Term;
+  Columns& fresh(std::uint32_t node, bool single);
+  void drop(std::uint32_t node);
+  void bound(Columns& columns) const;
+  void make_room(std::size_t count);
+
+  std::size_t axes_ = 0; ///< 3 n
+  const ColumnSource* source_ = nullptr;
+  ColumnSolve solve_;
+  bool bounded_ = false;
+  std::size_t capacity_ = 0;
+  SlotPool<double> wide_;
+  SlotPool<float> narrow_;
+  std::unordered_map<std::uint32_t, Columns> kept_;
+  std::uint64_t clock_ = 0, read_ = 0;
+  mutable std::uint64_t taken_ = 0, skipped_ = 0;
+};
+
+} // namespace gewebe

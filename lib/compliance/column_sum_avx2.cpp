@@ -1,0 +1,15 @@
+#include "compliance/column_sum_body_internal.h"
+
+namespace gewebe {
+
+void column_sum_avx2(const double* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+void column_sum_avx2(const float* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+} // namespace gewebe

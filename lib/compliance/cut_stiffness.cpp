@@ -1,0 +1,252 @@
+#include "compliance/cut_stiffness.h"
+
+#include "base/error.h"
+#include "compliance/corrected_columns.h"
+#include "compliance/half_blocks.h"
+#include "model/cut.h"
+#include "solve/condition.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+// Microseconds, measured on 10,004 nodes: an operation of a front, and of a solve with eight
+// right-hand sides at a time; what a renewal and a correction do for each node, whatever is cut.
+constexpr double front_operation = 0.6e-4, solve_operation = 0.6e-4;
+constexpr double renewal_node = 0.3, correction_node = 0.3;
+// Behind a correction contacts need columns, behind a renewal half solutions do.
+constexpr double contact_panels = 1;
+// Of all operations, what a cut reaches as long as none has told.
+constexpr double usual_reach = 0.3;
+// Each solution takes a pass over the corrections; beyond so many it costs as much again.
+constexpr std::size_t most_rank = 48;
+// The order of elimination is found anew when following has made it so much worse.
+constexpr double worn_out = 1.6;
+// Beyond this condition of the small system a renewal is worth its digits.
+constexpr double most_condition = 1e8;
+// Below this the condition may be too large, and is looked at: by one column of C, or an estimate.
+// What moves freely takes less than ten thousand other axes with it, or else it did before the cut.
+constexpr double weak_pivot = 1e-8, column_margin = 100, estimate_margin = 3;
+
+std::vector<std::uint32_t> identity(std::size_t count) {
+  std::vector<std::uint32_t> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0U);
+  return numbers;
+}
+
+/// Two steps as one.
+void follow(std::vector<std::uint32_t>& origin, std::vector<std::uint32_t>& place,
+            std::span<const std::uint32_t> next_origin, std::span<const std::uint32_t> next_place) {
+  std::vector<std::uint32_t> from;
+  from.reserve(next_origin.size());
+  for (const std::uint32_t node : next_origin)
+    from.push_back(origin[node]);
+  for (std::uint32_t& node : place)
+    if (node != CutModel::gone)
+      node = next_place[node];
+  origin = std::move(from);
+}
+
+/// How many nodes are copies.
+std::size_t copies(std::span<const std::uint32_t> origin, std::span<const std::uint32_t> place) {
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < origin.size(); ++i)
+    count += place[origin[i]] != i ? 1 : 0;
+  return count;
+}
+
+constexpr const char* nearly_singular =
+    "the stiffness matrix is nearly singular, expected more that holds the object";
+
+/// \throw SingularStiffness if K is, naming what moves
+void tell_what_moves(const Model& model, const Context& context) {
+  const StiffnessMatrix matrix = stiffness_matrix(model);
+  StiffnessCheck check;
+  (void)checked_factor(model, matrix, context, check);
+}
+
+/// A bound of ‖K‖₁. Cuts leave no spring stiffer than it was.
+double stiffness_bound(const Model& model) {
+  std::vector<double> sum(model.nodes.size());
+  double most = 0;
+  for (const Spring& s : model.springs) {
+    const SymmetricBlock b = stiffness_block(model, s);
+    const double largest = std::max({std::abs(b[0]) + std::abs(b[1]) + std::abs(b[2]),
+                                     std::abs(b[1]) + std::abs(b[3]) + std::abs(b[4]),
+                                     std::abs(b[2]) + std::abs(b[4]) + std::abs(b[5])});
+    for (const std::uint32_t i : {s.i, s.j}) {
+      sum[i] += 2 * largest; // on the diagonal and beside it
+      most = sum[i] <= most ? most : sum[i];
+    }
+  }
+  return most;
+}
+
+} // namespace
+
+CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
+                           std::shared_ptr<const ColumnSource> columns, const Context& context)
+    : first_(std::move(first)), now_(first_), columns_(std::move(columns)), context_(context),
+      first_origin_(identity(first_->nodes.size())), first_place_(first_origin_) {
+  context_.progress = nullptr;
+}
+
+/// \throw SingularStiffness if the condition is too large. A pivot is the first to tell; what moves
+/// most freely then moves with its axis, whose column of C tells how freely; where that is much,
+/// the norm of C is estimated.
+void CutStiffness::require_condition() {
+  const double weakest = factor_->weakest_pivot();
+  if (weakest > weak_pivot || weakest > 0.5 * accepted_pivot_)
+    return;
+  const std::size_t axes = factor_->axes();
+  std::vector<double> column(axes);
+  column[factor_->weakest_axis()] = 1;
+  factor_->solve(column);
+  double size = 0;
+  for (const double value : column)
+    size += std::abs(value);
+  if (!(norm_ * size < max_condition / column_margin)) {
+    size = inverse_norm(axes, [&](std::span<const double> x, std::span<double> y) {
+      std::copy(x.begin(), x.end(), y.begin());
+      factor_->solve(y);
+    });
+    if (!(norm_ * size < max_condition / estimate_margin))
+      tell_what_moves(*now_, context_);
+  }
+  accepted_pivot_ = weakest;
+}
+
+/// The factor of now, or none. \throw SingularStiffness naming what moves, and what the work throws
+void CutStiffness::factorise(const std::function<void()>& work) {
+  try {
+    work();
+    require_condition();
+  } catch (const NotPositiveDefinite&) {
+    factor_.reset();
+    tell_what_moves(*now_, context_);
+    throw SingularStiffness(nearly_singular);
+  } catch (...) {
+    factor_.reset();
+    throw;
+  }
+}
+
+void CutStiffness::prepare() {
+  if (factor_ != nullptr)
+    return;
+  norm_ = stiffness_bound(*now_);
+  factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
+  factored_ = now_;
+  correction_.reset();
+  origin_ = place_ = identity(now_->nodes.size());
+  fresh_operations_ = factor_->work().all_operations;
+}
+
+/// Correction or renewal, by what each would take.
+CutWay CutStiffness::cheapest(std::size_t rank) const {
+  const auto nodes = static_cast<double>(now_->nodes.size());
+  const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
+  const double renewal = nodes * renewal_node + reach * front_operation;
+  // One right-hand side alone takes half of what eight do.
+  const double panels = rank <= 1 ? 0.5 : std::ceil(static_cast<double>(rank) / 8);
+  const double correction = nodes * correction_node + (panels + contact_panels) * 8 *
+                                                          solve_operation * 4 *
+                                                          static_cast<double>(factor_->entries());
+  return rank <= most_rank && correction < renewal ? CutWay::correction : CutWay::renewal;
+}
+
+CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
+                          std::span<const std::uint32_t> place, std::optional<CutWay> way) {
+  CutWork work;
+  prepare(); // whether it was announced or not, the same way is gone
+  follow(first_origin_, first_place_, origin, place);
+  now_ = std::move(next);
+  if (way != CutWay::fresh) {
+    follow(origin_, place_, origin, place);
+    const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
+    work.rank = 3 * copies(origin_, place_);
+    std::optional<StiffnessChange> change;
+    if (way.value_or(cheapest(work.rank)) == CutWay::correction && !some_gone) {
+      change = stiffness_change(*factored_, *now_, origin_, place_);
+      work.rank = change->rank();
+    }
+    if (!way)
+      way = change ? cheapest(work.rank) : CutWay::renewal;
+    if (way == CutWay::correction && change) {
+      try {
+        const std::shared_ptr<const FrontalFactor> factor = factor_;
+        auto correction = std::make_shared<const WoodburySolver>(
+            std::move(*change),
+            [factor](std::span<double> f, std::size_t columns) { factor->solve(f, columns); },
+            context_);
+        if (correction->condition() < most_condition) {
+          correction_ = std::move(correction);
+          work.way = CutWay::correction;
+          return work;
+        }
+      } catch (const Cancelled&) {
+        throw;
+      } catch (const Error&) {
+        // Singular, or nearly: a renewal tells.
+      }
+    }
+    correction_.reset();
+    if (factor_->work().all_operations < worn_out * fresh_operations_) {
+      ++*generation_;
+      factorise([&] { work.factor = factor_->renew(*now_, origin_, place_, context_); });
+      work.way = CutWay::renewal;
+      reached_ = work.factor.operations;
+      factored_ = now_;
+      origin_ = place_ = identity(now_->nodes.size());
+      return work;
+    }
+  }
+  factor_.reset();
+  prepare();
+  work.factor = factor_->work();
+  return work;
+}
+
+/// Throws when another cut has changed the factor.
+std::function<void()> CutStiffness::still_valid() const {
+  return [generation = generation_, made = *generation_] {
+    if (*generation != made)
+      throw Error("the object was cut since, expected its new stiffness to be asked");
+  };
+}
+
+/// Solves for the model of now.
+AxesSolve CutStiffness::solver() const {
+  return [factor = std::shared_ptr<const FrontalFactor>(factor_), correction = correction_,
+          check = still_valid()](std::span<double> f, std::size_t columns) {
+    check();
+    if (correction != nullptr)
+      correction->solve(f, columns);
+    else
+      factor->solve(f, columns);
+  };
+}
+
+StiffnessParts CutStiffness::parts() const {
+  StiffnessParts parts;
+  parts.solve = solver();
+  parts.solve_entries = factor_->entries();
+  if (correction_ == nullptr)
+    parts.blocks = std::make_shared<HalfBlocks>(factor_, still_valid());
+  if (correction_ != nullptr)
+    parts.solve_entries += correction_->change().rank() * factor_->axes();
+  if (columns_ != nullptr)
+    parts.columns = std::make_unique<CorrectedColumns>(
+        columns_, stiffness_change(*first_, *now_, first_origin_, first_place_), parts.solve,
+        context_, AxesSolve{}, parts.solve_entries);
+  return parts;
+}
+
+} // namespace gewebe

@@ -1,0 +1,31 @@
+#pragma once
+// Blocks of the compliance between a few nodes from half solutions of a factor that follows cuts:
+// what forces at contacts need, without a column of C.
+
+#include "compliance/compliance.h"
+#include "solve/frontal_factor.h"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace gewebe {
+
+class HalfBlocks final : public BlockSource {
+public:
+  /// \param check called before the factor is read; throws where it is no longer that of the model
+  HalfBlocks(std::shared_ptr<const FrontalFactor> factor, std::function<void()> check);
+
+  void need(std::span<const std::uint32_t> nodes) override;
+  ComplianceBlock block(std::uint32_t node, std::uint32_t other) const override;
+
+private:
+  std::shared_ptr<const FrontalFactor> factor_;
+  std::function<void()> check_;
+  std::unordered_map<std::uint32_t, FrontalFactor::HalfSolution> half_;
+};
+
+} // namespace gewebe

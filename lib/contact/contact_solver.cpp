@@ -1,0 +1,358 @@
+#include "contact/contact_solver.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+// Based on: J. Júdice, F. Pires, A block principal pivoting algorithm for large-scale strictly
+// monotone linear complementarity problems, 1994; P. Alart, A. Curnier, A mixed formulation for
+// frictional contact problems prone to Newton like solution methods, 1991.
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Of the largest diagonal entry: keeps contacts of one node that say the same solvable.
+constexpr double regular = 1e-13;
+
+using Block = Eigen::Matrix3d;
+
+/// The problem in the coordinates of its contacts: n, t1, t2 of each.
+struct Local {
+  std::vector<Block> frame; ///< rows n, t1, t2
+  MatrixXd w;
+  VectorXd q; ///< gap, slip
+};
+
+Eigen::Vector3d eigen(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+Block frame_of(const Vec3& n) {
+  const Vec3 helper = std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  Vec3 t = cross(n, helper);
+  t = t / norm(t);
+  Block f;
+  f.row(0) = eigen(n);
+  f.row(1) = eigen(t);
+  f.row(2) = eigen(cross(n, t));
+  return f;
+}
+
+using Compliance = Eigen::Map<const MatrixXd>;
+
+Compliance matrix(std::span<const double> compliance, std::size_t m) {
+  return {compliance.data(), static_cast<Index>(3 * m), static_cast<Index>(3 * m)};
+}
+
+Block block(const Compliance& w, const Contact& a, const Contact& b) {
+  return w.block<3, 3>(3 * static_cast<Index>(a.node), 3 * static_cast<Index>(b.node));
+}
+
+Local local(const Compliance& w, std::span<const Contact> contacts) {
+  const auto count = static_cast<Index>(contacts.size());
+  Local l;
+  l.w.resize(3 * count, 3 * count);
+  l.q.resize(3 * count);
+  for (const Contact& c : contacts)
+    l.frame.push_back(frame_of(c.normal));
+  for (Index i = 0; i < count; ++i) {
+    const auto ci = static_cast<std::size_t>(i);
+    l.q.segment<3>(3 * i) = l.frame[ci] * eigen(contacts[ci].slip);
+    l.q[3 * i] = contacts[ci].gap;
+    for (Index j = 0; j < count; ++j) {
+      const auto cj = static_cast<std::size_t>(j);
+      l.w.block<3, 3>(3 * i, 3 * j) =
+          l.frame[ci] * block(w, contacts[ci], contacts[cj]) * l.frame[cj].transpose();
+    }
+  }
+  const double largest = l.w.size() > 0 ? l.w.diagonal().maxCoeff() : 0;
+  l.w.diagonal().array() += regular * largest;
+  return l;
+}
+
+/// The force in 1 contact whose gap and slip are b without it.
+Eigen::Vector3d alone(const Block& w, const Eigen::Vector3d& b, double friction) {
+  if (b[0] >= 0)
+    return Eigen::Vector3d::Zero();
+  if (friction == 0)
+    return {-b[0] / w(0, 0), 0, 0};
+  const Eigen::Vector3d stick = -w.ldlt().solve(b);
+  if (stick[0] >= 0 && stick.tail<2>().norm() <= friction * stick[0])
+    return stick;
+  // Slipping: with g = 0 the tangential part is (S + α) f_t = -c, and |f_t| - μ f_n falls from
+  // above 0 at α = 0 to below 0 at infinity.
+  const Eigen::Matrix2d s =
+      w.bottomRightCorner<2, 2>() - w.bottomLeftCorner<2, 1>() * w.topRightCorner<1, 2>() / w(0, 0);
+  const Eigen::Vector2d c = b.tail<2>() - w.bottomLeftCorner<2, 1>() * (b[0] / w(0, 0));
+  const auto at = [&](double alpha) {
+    const double xx = s(0, 0) + alpha, yy = s(1, 1) + alpha, xy = s(0, 1);
+    const double det = xx * yy - xy * xy;
+    Eigen::Vector3d f;
+    f[1] = -(yy * c[0] - xy * c[1]) / det;
+    f[2] = -(xx * c[1] - xy * c[0]) / det;
+    f[0] = -(b[0] + w.topRightCorner<1, 2>().dot(f.tail<2>())) / w(0, 0);
+    return f;
+  };
+  const auto excess = [&](const Eigen::Vector3d& f) {
+    return f.tail<2>().norm() - friction * f[0];
+  };
+  double low = 0, high = std::max(s.trace(), 1e-300);
+  while (excess(at(high)) > 0 && std::isfinite(high))
+    high *= 4;
+  for (int k = 0; k < 200; ++k) {
+    // Halved by its logarithm while the ends differ by much.
+    const double middle = low > 0 && high > 4 * low              ? std::sqrt(low * high)
+                          : low == 0 && high > 1e-12 * s.trace() ? high / 16
+                                                                 : (low + high) / 2;
+    if (!(middle > low && middle < high))
+      break;
+    (excess(at(middle)) > 0 ? low : high) = middle;
+  }
+  return at(high);
+}
+
+struct Residual {
+  VectorXd value;
+  double size = 0; ///< largest, over the largest force
+};
+
+/// Alart and Curnier's equations, in forces: f - P(f - ρ r).
+Residual equations(const Local& l, std::span<const Contact> contacts, const VectorXd& f) {
+  const VectorXd r = l.q + l.w * f;
+  Residual e;
+  e.value.resize(f.size());
+  double scale = 0, miss = 0;
+  for (Index i = 0; 3 * i < f.size(); ++i) {
+    const double friction = contacts[static_cast<std::size_t>(i)].friction;
+    const Block w = l.w.block<3, 3>(3 * i, 3 * i);
+    const double rho_n = 1 / w(0, 0), rho_t = 2 / (w(1, 1) + w(2, 2));
+    const Eigen::Vector3d fi = f.segment<3>(3 * i), ri = r.segment<3>(3 * i);
+    const double push = std::max(0.0, fi[0] - rho_n * ri[0]);
+    e.value[3 * i] = fi[0] - push;
+    Eigen::Vector2d drag = fi.tail<2>() - rho_t * ri.tail<2>();
+    const double size = drag.norm();
+    if (size > friction * push)
+      drag *= friction * push / size;
+    e.value.segment<2>(3 * i + 1) = fi.tail<2>() - drag;
+    scale = std::max({scale, fi.norm(), push});
+    const double here = e.value.segment<3>(3 * i).norm();
+    miss = std::isnan(here) ? here : std::max(miss, here);
+  }
+  e.size = scale > 0 ? miss / scale : miss;
+  return e;
+}
+
+/// One Newton step from f; false where it leads nowhere.
+bool newton(const Local& l, std::span<const Contact> contacts, VectorXd& f, Residual& e) {
+  const VectorXd r = l.q + l.w * f;
+  std::vector<Index> on; // contacts that push; the others' forces become 0
+  VectorXd base = f;
+  for (Index i = 0; 3 * i < f.size(); ++i)
+    if (f[3 * i] - r[3 * i] / l.w(3 * i, 3 * i) > 0)
+      on.push_back(i);
+    else
+      base.segment<3>(3 * i).setZero();
+  const VectorXd rb = l.q + l.w * base;
+  const auto size = static_cast<Index>(3 * on.size());
+  MatrixXd jacobian(size, size);
+  VectorXd rhs(size);
+  for (std::size_t a = 0; a < on.size(); ++a) {
+    const Index i = on[a], row = static_cast<Index>(3 * a);
+    const double friction = contacts[static_cast<std::size_t>(i)].friction;
+    const Block w = l.w.block<3, 3>(3 * i, 3 * i);
+    const double rho_n = 1 / w(0, 0), rho_t = 2 / (w(1, 1) + w(2, 2));
+    const double push = base[3 * i] - rho_n * rb[3 * i];
+    const Eigen::Vector2d z = base.segment<2>(3 * i + 1) - rho_t * rb.segment<2>(3 * i + 1);
+    const double length = z.norm();
+    // Rows of r, then of f, in each of the three equations.
+    Block of_r = Block::Zero(), of_f = Block::Zero();
+    Eigen::Vector3d value;
+    of_r(0, 0) = rho_n;
+    value[0] = base[3 * i] - push;
+    if (length <= friction * std::max(0.0, push)) {
+      of_r(1, 1) = of_r(2, 2) = rho_t;
+      value.tail<2>() = rho_t * rb.segment<2>(3 * i + 1);
+    } else {
+      const double bound = friction * std::max(0.0, push);
+      const Eigen::Vector2d t = length > 0 ? Eigen::Vector2d(z / length) : Eigen::Vector2d::Zero();
+      const Eigen::Matrix2d d = bound / length * (Eigen::Matrix2d::Identity() - t * t.transpose());
+      of_f.bottomRightCorner<2, 2>() = Eigen::Matrix2d::Identity() - d;
+      of_r.bottomRightCorner<2, 2>() = rho_t * d;
+      of_f.bottomLeftCorner<2, 1>() = -friction * t;
+      of_r.bottomLeftCorner<2, 1>() = friction * rho_n * t;
+      value.tail<2>() = base.segment<2>(3 * i + 1) - bound * t;
+    }
+    for (std::size_t b = 0; b < on.size(); ++b)
+      jacobian.block<3, 3>(row, static_cast<Index>(3 * b)) =
+          of_r * l.w.block<3, 3>(3 * i, 3 * on[b]);
+    jacobian.block<3, 3>(row, row) += of_f;
+    rhs.segment<3>(row) = -value;
+  }
+  const VectorXd by = jacobian.partialPivLu().solve(rhs);
+  if (!by.allFinite())
+    return false;
+  for (const double part : {1.0, 0.5, 0.25, 0.125}) {
+    VectorXd g = base;
+    for (std::size_t a = 0; a < on.size(); ++a)
+      g.segment<3>(3 * on[a]) += part * by.segment<3>(static_cast<Index>(3 * a));
+    Residual there = equations(l, contacts, g);
+    if (there.size < e.size) {
+      f = g;
+      e = std::move(there);
+      return true;
+    }
+  }
+  return false;
+}
+
+void sweep(const Local& l, std::span<const Contact> contacts, VectorXd& f) {
+  for (Index i = 0; 3 * i < f.size(); ++i) {
+    const Block w = l.w.block<3, 3>(3 * i, 3 * i);
+    const Eigen::Vector3d old = f.segment<3>(3 * i);
+    const Eigen::Vector3d b = l.q.segment<3>(3 * i) + l.w.middleRows<3>(3 * i) * f - w * old;
+    f.segment<3>(3 * i) = alone(w, b, contacts[static_cast<std::size_t>(i)].friction);
+  }
+}
+
+/// λ >= 0, g = b + A λ >= 0, λ g = 0. \param on in: a guess of where λ > 0
+std::optional<VectorXd> pivot(const MatrixXd& a, const VectorXd& b, std::vector<bool> on) {
+  const Index count = b.size();
+  const double slack = 1e-14 * b.cwiseAbs().maxCoeff();
+  VectorXd lambda = VectorXd::Zero(count);
+  Index best = count + 1;
+  int patience = 3;
+  for (Index round = 0; round < 10 * count + 100; ++round) {
+    std::vector<Index> set;
+    for (Index i = 0; i < count; ++i)
+      if (on[static_cast<std::size_t>(i)])
+        set.push_back(i);
+    lambda.setZero();
+    if (!set.empty()) {
+      const MatrixXd within = a(set, set);
+      const Eigen::LLT<MatrixXd> factor(within);
+      if (factor.info() != Eigen::Success)
+        return std::nullopt;
+      const VectorXd rhs = -b(set), part = factor.solve(rhs);
+      lambda(set) = part;
+    }
+    const VectorXd g = b + a * lambda;
+    Index wrong = 0, last = -1;
+    for (Index i = 0; i < count; ++i)
+      if (on[static_cast<std::size_t>(i)] ? lambda[i] < 0 : g[i] < -slack) {
+        ++wrong;
+        last = i;
+      }
+    if (wrong == 0)
+      return lambda;
+    if (!lambda.allFinite())
+      return std::nullopt;
+    // All that are wrong change sides while that helps, else the last one (which must end).
+    if (wrong < best) {
+      best = wrong;
+      patience = 3;
+    } else {
+      --patience;
+    }
+    for (Index i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if ((patience > 0 || i == last) && (on[k] ? lambda[i] < 0 : g[i] < -slack))
+        on[k] = !on[k];
+    }
+  }
+  return std::nullopt;
+}
+
+/// The normal forces under given tangential ones. \return whether they were found
+bool push_out(const Local& l, VectorXd& f) {
+  const Index count = f.size() / 3;
+  MatrixXd a(count, count);
+  VectorXd b(count);
+  VectorXd drag = f;
+  std::vector<bool> on;
+  for (Index i = 0; i < count; ++i)
+    drag[3 * i] = 0;
+  const VectorXd r = l.q + l.w * drag;
+  for (Index i = 0; i < count; ++i) {
+    b[i] = r[3 * i];
+    on.push_back(f[3 * i] > 0);
+    for (Index j = 0; j < count; ++j)
+      a(i, j) = l.w(3 * i, 3 * j);
+  }
+  if (std::none_of(on.begin(), on.end(), [](bool o) { return o; }))
+    for (Index i = 0; i < count; ++i)
+      on[static_cast<std::size_t>(i)] = b[i] < 0;
+  const std::optional<VectorXd> lambda = pivot(a, b, on);
+  if (!lambda)
+    return false;
+  for (Index i = 0; i < count; ++i)
+    f[3 * i] = (*lambda)[i];
+  return true;
+}
+
+} // namespace
+
+ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
+                             std::span<const Contact> contacts, std::span<const Vec3> start) {
+  ContactForces result;
+  if (contacts.empty()) {
+    result.solved = true;
+    return result;
+  }
+  const Local l = local(matrix(compliance, m), contacts);
+  VectorXd f = VectorXd::Zero(l.q.size());
+  bool rough = false;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const auto row = static_cast<Index>(3 * i);
+    if (!start.empty()) {
+      f.segment<3>(row) = l.frame[i] * eigen(start[i]);
+      f[row] = std::max(0.0, f[row]);
+      if (contacts[i].friction == 0)
+        f.segment<2>(row + 1).setZero();
+    }
+    rough = rough || contacts[i].friction > 0;
+  }
+  if (!push_out(l, f))
+    for (int k = 0; k < 1000; ++k)
+      sweep(l, contacts, f);
+  Residual e = equations(l, contacts, f);
+  for (int round = 0; rough && round < 60 && !(e.size <= contact_solver_tolerance); ++round) {
+    bool on = true;
+    for (int k = 0; on && k < 12 && !(e.size <= contact_solver_tolerance); ++k)
+      on = newton(l, contacts, f, e);
+    if (e.size <= contact_solver_tolerance)
+      break;
+    for (int k = 0; k < 10; ++k)
+      sweep(l, contacts, f);
+    e = equations(l, contacts, f);
+  }
+  // Whatever friction does, nothing stays inside.
+  if (rough && !(e.size <= contact_solver_tolerance) && push_out(l, f))
+    e = equations(l, contacts, f);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Eigen::Vector3d g = l.frame[i].transpose() * f.segment<3>(static_cast<Index>(3 * i));
+    result.force.push_back({g[0], g[1], g[2]});
+  }
+  result.residual = e.size;
+  result.solved = e.size <= contact_solver_tolerance;
+  return result;
+}
+
+double contact_residual(std::span<const double> compliance, std::size_t m,
+                        std::span<const Contact> contacts, std::span<const Vec3> force) {
+  const Local l = local(matrix(compliance, m), contacts);
+  VectorXd f(l.q.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    f.segment<3>(static_cast<Index>(3 * i)) = l.frame[i] * eigen(force[i]);
+  return equations(l, contacts, f).size;
+}
+
+} // namespace gewebe

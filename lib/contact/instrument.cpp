@@ -1,0 +1,119 @@
+#include "contact/instrument.h"
+
+#include "contact/load.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gewebe {
+
+namespace {
+
+Quaternion operator*(const Quaternion& p, const Quaternion& q) {
+  return {
+      p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z, p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+      p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x, p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
+}
+
+Vec3 turned_by(double w, const Vec3& v, const Vec3& p) {
+  const Vec3 t = 2 * cross(v, p);
+  return p + w * t + cross(v, t);
+}
+
+/// Some vector across v that is not small.
+Vec3 across(const Vec3& v) {
+  const Vec3 size{std::abs(v.x), std::abs(v.y), std::abs(v.z)};
+  return size.x <= size.y && size.x <= size.z ? cross(v, {1, 0, 0})
+         : size.y <= size.z                   ? cross(v, {0, 1, 0})
+                                              : cross(v, {0, 0, 1});
+}
+
+} // namespace
+
+double length(const Quaternion& q) {
+  return std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+}
+
+Quaternion unit(const Quaternion& q) {
+  const double large =
+      std::max({std::abs(q.w), std::abs(q.x), std::abs(q.y), std::abs(q.z)}); // no overflow
+  const Quaternion p{q.w / large, q.x / large, q.y / large, q.z / large};
+  const double size = length(p);
+  return {p.w / size, p.x / size, p.y / size, p.z / size};
+}
+
+Quaternion turn_about(const Vec3& axis, double degrees) {
+  const double half = degrees * (3.14159265358979323846 / 360), s = std::sin(half);
+  const Quaternion along = unit({0, axis.x, axis.y, axis.z});
+  return unit({std::cos(half), s * along.x, s * along.y, s * along.z});
+}
+
+Vec3 turned(const Quaternion& q, const Vec3& v) {
+  return turned_by(q.w, {q.x, q.y, q.z}, v);
+}
+
+Vec3 turned_back(const Quaternion& q, const Vec3& v) {
+  return turned_by(q.w, {-q.x, -q.y, -q.z}, v);
+}
+
+Pose between(const Pose& a, const Pose& b, double x) {
+  if (x <= 0)
+    return a;
+  if (x >= 1)
+    return b;
+  const Quaternion &p = a.turn, &q = b.turn;
+  const double same = p.w * q.w + p.x * q.x + p.y * q.y + p.z * q.z;
+  const double y = same < 0 ? -x : x; // q and -q turn alike
+  const Quaternion mean{(1 - x) * p.w + y * q.w, (1 - x) * p.x + y * q.x, (1 - x) * p.y + y * q.y,
+                        (1 - x) * p.z + y * q.z};
+  return {a.place + x * (b.place - a.place), p == q ? p : unit(mean)};
+}
+
+Pose PoseWay::at(double time) const {
+  if (!(time < end))
+    return to;
+  return between(from, to, time > start ? smooth_step((time - start) / (end - start)) : 0);
+}
+
+PlacedInstrument::PlacedInstrument(const InstrumentShape& shape, const Pose& pose)
+    : a(pose.place), ab(turned(pose.turn, shape.axis)), radius(shape.radius),
+      friction(shape.friction) {
+  const double square = dot(ab, ab);
+  inverse_square = square > 0 && std::isfinite(1 / square) ? 1 / square : 0;
+}
+
+Vec3 PlacedInstrument::nearest(const Vec3& p) const {
+  return a + std::clamp(dot(p - a, ab) * inverse_square, 0.0, 1.0) * ab;
+}
+
+Vec3 PlacedInstrument::normal(const Vec3& p, const Vec3& wish) const {
+  const Vec3 out = p - nearest(p);
+  const double size = norm(out);
+  if (size > 1e-9 * radius)
+    return out / size;
+  Vec3 n = wish - dot(wish, ab) * inverse_square * ab;
+  if (!(norm(n) > 1e-6 * norm(wish)))
+    n = inverse_square > 0 ? across(ab) : Vec3{0, 0, 1};
+  return n / norm(n);
+}
+
+Box3 PlacedInstrument::box() const {
+  const Vec3 r{radius, radius, radius};
+  Box3 b;
+  for (const Vec3& end : {a, a + ab}) {
+    b.add(end - r);
+    b.add(end + r);
+  }
+  return b;
+}
+
+double travel(const InstrumentShape& shape, const Pose& from, const Pose& to) {
+  // A turn by q from p moves a point at distance r along an arc of at most r times the angle, which
+  // is 2 asin of what follows, at most π times it.
+  const Quaternion back{from.turn.w, -from.turn.x, -from.turn.y, -from.turn.z};
+  const Quaternion by = from.turn == to.turn ? Quaternion{} : back * to.turn;
+  const double sine = std::sqrt(by.x * by.x + by.y * by.y + by.z * by.z);
+  return norm(to.place - from.place) + 3.2 * sine * norm(shape.axis);
+}
+
+} // namespace gewebe

@@ -1,0 +1,37 @@
+#pragma once
+// A model's springs in the order in which they are fastest to sum: nodes that are near each other
+// in space lie near each other in memory, in blocks that fit the nearest cache. A spring within a
+// block is computed once, one between blocks once for either end, so that blocks can be stepped in
+// any order, by any number of threads, with the same bytes.
+
+#include "dynamics/spring_kernel.h"
+#include "model/model.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+struct SpringLayout {
+  std::vector<std::uint32_t> node_of_row; ///< movable nodes, block by block, then the others
+  std::vector<std::uint32_t> row_of_node;
+  std::vector<NodeRest> rest; ///< by row
+  std::size_t movable = 0;    ///< rows that can move along an axis or more
+  std::vector<SpringGroup> groups;
+  std::vector<SpringBlock> blocks; ///< point into groups: the layout is not copied
+
+  SpringLayout() = default;
+  SpringLayout(SpringLayout&&) = default;
+  SpringLayout& operator=(SpringLayout&&) = default;
+  SpringLayout(const SpringLayout&) = delete;
+  SpringLayout& operator=(const SpringLayout&) = delete;
+
+  std::uint64_t pulls() const; ///< forces of springs that a step computes
+};
+
+/// Blocks by recursive bisection of the rest positions along the longest side. The same result on
+/// every machine. \pre check_model(model) passes
+SpringLayout spring_layout(const Model& model);
+
+} // namespace gewebe

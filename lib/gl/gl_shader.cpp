@@ -1,0 +1,204 @@
+#include "gl/gl_shader_internal.h"
+
+#include "base/error.h"
+
+#include <array>
+#include <string>
+
+// Based on: report FZKA 7190, 2006, section 3.2.3, with the frame of eq. 3.2 at each pixel.
+
+namespace gewebe {
+namespace {
+
+constexpr const char* vertex_source = R"(
+varying vec2 st;
+varying vec4 primary;
+#ifdef FRAMES
+varying vec3 place, normal;
+varying vec4 tangent;
+#else
+varying vec2 shifted, mirrored;
+#endif
+#ifdef REST
+varying vec3 rest_place, rest_normal, now_place;
+#endif
+#ifdef TURNED
+varying vec3 turned_x, turned_y;
+#endif
+void main() {
+  gl_Position = gl_ModelViewProjectionMatrix * gl_Vertex;
+  st = gl_MultiTexCoord0.xy;
+  primary = gl_Color;
+#ifdef FRAMES
+  place = gl_Vertex.xyz;
+  normal = gl_Normal;
+  tangent = gl_MultiTexCoord1;
+#else
+  shifted = gl_MultiTexCoord1.xy;
+  mirrored = gl_MultiTexCoord2.xy;
+#endif
+#ifdef REST
+  rest_place = gl_MultiTexCoord3.xyz;
+  rest_normal = gl_MultiTexCoord4.xyz;
+  now_place = gl_Vertex.xyz;
+#endif
+#ifdef TURNED
+  turned_x = gl_MultiTexCoord5.xyz;
+  turned_y = gl_MultiTexCoord6.xyz;
+#endif
+})";
+
+// Before what textures at rest need.
+constexpr const char* fragment_head = R"(
+uniform sampler2D base, detail, reflection, structure;
+uniform vec4 light; // w: 0 for a direction
+uniform vec2 offset;
+vec3 unit(vec3 v) {
+  float l = length(v);
+  return l > 0.0 ? v / l : vec3(0.0);
+}
+)";
+
+constexpr const char* fragment_source = R"(
+uniform vec3 eye, right, up, back;
+varying vec2 st;
+varying vec4 primary;
+#ifdef FRAMES
+varying vec3 place, normal;
+varying vec4 tangent;
+#else
+varying vec2 shifted, mirrored;
+#endif
+void main() {
+  vec2 shift = vec2(0.0), around = vec2(0.0);
+#ifdef FRAMES
+  vec3 n = unit(normal);
+#ifdef STRUCTURE
+  vec3 t = unit(tangent.xyz - n * dot(n, tangent.xyz));
+  vec3 l = light.w > 0.0 ? unit(light.xyz - place) : light.xyz;
+  shift = offset * vec2(dot(l, t), tangent.w * dot(l, cross(n, t)));
+#endif
+#ifdef SPHERE
+  vec3 v = unit(place - eye);
+  vec3 r = v - 2.0 * dot(n, v) * n;
+  vec3 m = vec3(dot(r, right), dot(r, up), dot(r, back) + 1.0);
+  float len = length(m);
+  around = len > 0.0 ? m.xy * (0.5 / len) + 0.5 : vec2(0.5);
+#endif
+#else
+  shift = shifted - st;
+  around = mirrored;
+#endif
+  vec3 c = primary.rgb;
+#ifdef REST
+  find_rest();
+#endif
+#ifdef BASE
+  c *= texture2D(base, BASE).rgb;
+#endif
+#ifdef REST_BASE
+  c *= rest_base();
+#endif
+#ifdef DETAIL
+  c = min(c + texture2D(detail, DETAIL).rgb, 1.0);
+#endif
+#ifdef REST_DETAIL
+  c = min(c + rest_detail(), 1.0);
+#endif
+#ifdef REFLECTION
+  c = min(c + texture2D(reflection, REFLECTION).rgb, 1.0);
+#endif
+#ifdef REST_REFLECTION
+  c = min(c + rest_reflection(), 1.0);
+#endif
+#ifdef REST_STRUCTURE
+  c = min(2.0 * rest_relief() * c, 1.0);
+#endif
+#ifdef STRUCTURE
+  float relief = 0.5 + 0.5 * (texture2D(structure, STRUCTURE).r - texture2D(structure, STRUCTURE + shift).r);
+  c = min(2.0 * relief * c, 1.0);
+#endif
+  gl_FragColor = vec4(c, 1.0);
+})";
+
+GLuint compiled(GLenum kind, const std::string& source) {
+  const GLuint shader = glCreateShader(kind);
+  const char* const text = source.c_str();
+  glShaderSource(shader, 1, &text, nullptr);
+  glCompileShader(shader);
+  GLint ok = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+  if (ok == GL_TRUE)
+    return shader;
+  std::array<char, 200> log{};
+  glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
+  glDeleteShader(shader);
+  std::string line(log.data());
+  line.resize(std::min(line.find('\n'), line.size()));
+  throw Error("OpenGL can't compile the shader (" + line +
+              "), expected GLSL 1.20, or 1.30 for textures at rest");
+}
+
+void set(GLuint program, const char* name, const Vec3& v) {
+  glUniform3f(glGetUniformLocation(program, name), static_cast<float>(v.x), static_cast<float>(v.y),
+              static_cast<float>(v.z));
+}
+
+} // namespace
+
+GlShader::GlShader(const Look& look, bool frames, bool turned) {
+  const bool rest = is_at_rest(look);
+  std::string head = rest ? "#version 130\n" + rest_definitions(look) : "#version 120\n";
+  head += rest && turned ? "#define TURNED\n" : "";
+  bool sphere = false;
+  const auto define = [&](const std::optional<Texture>& texture, const char* name) {
+    if (!texture || is_triplanar(look, texture))
+      return;
+    sphere = sphere || texture->options.sphere;
+    head += std::string("#define ") + name + (texture->options.sphere ? " around\n" : " st\n");
+  };
+  define(look.base, "BASE");
+  define(look.detail, "DETAIL");
+  define(look.reflection, "REFLECTION");
+  define(look.structure, "STRUCTURE");
+  head += std::string(sphere ? "#define SPHERE\n" : "") + (frames ? "#define FRAMES\n" : "");
+  const GLuint vertex = compiled(GL_VERTEX_SHADER, head + vertex_source);
+  const GLuint fragment = compiled(
+      GL_FRAGMENT_SHADER, head + fragment_head + (rest ? rest_source(look) : "") + fragment_source);
+  program_ = glCreateProgram();
+  for (const GLuint shader : {vertex, fragment}) {
+    glAttachShader(program_, shader);
+    glDeleteShader(shader);
+  }
+  glLinkProgram(program_);
+  GLint ok = GL_FALSE;
+  glGetProgramiv(program_, GL_LINK_STATUS, &ok);
+  if (ok != GL_TRUE) {
+    glDeleteProgram(program_);
+    throw Error("OpenGL can't link the shader, expected GLSL 1.20");
+  }
+}
+
+GlShader::~GlShader() {
+  glDeleteProgram(program_);
+}
+
+void GlShader::use(const Drawing& drawing, const Look& look) const {
+  glUseProgram(program_);
+  int unit = 0;
+  for (const char* name : {"base", "detail", "reflection", "structure"})
+    glUniform1i(glGetUniformLocation(program_, name), unit++);
+  glUniform4f(glGetUniformLocation(program_, "light"), static_cast<float>(drawing.light.x),
+              static_cast<float>(drawing.light.y), static_cast<float>(drawing.light.z),
+              drawing.directional ? 0.0F : 1.0F);
+  glUniform2f(glGetUniformLocation(program_, "offset"), static_cast<float>(drawing.offset[0]),
+              static_cast<float>(drawing.offset[1]));
+  set(program_, "eye", drawing.camera.eye);
+  set(program_, "right", drawing.camera.right);
+  set(program_, "up", drawing.camera.up);
+  set(program_, "back", drawing.camera.back);
+  if (is_at_rest(look))
+    set_rest(program_, look, drawing);
+}
+
+} // namespace gewebe

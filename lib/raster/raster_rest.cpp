@@ -1,0 +1,50 @@
+#include "raster/raster_rest_internal.h"
+
+#include "base/error.h"
+
+namespace gewebe {
+
+RasterRest::RasterRest(const Drawing& drawing, const Look& look, KernelScene& scene) {
+  if (!is_at_rest(look) || drawing.vertices.empty())
+    return;
+  static_assert(sizeof(DrawRest) == 6 * sizeof(float) && sizeof(DrawTurn) == 6 * sizeof(float));
+  if (drawing.rests.size() != drawing.vertices.size())
+    throw Error("textures on the shape at rest for a drawing without it, expected its places");
+  rest_.vertices = reinterpret_cast<const float*>(drawing.rests.data());
+  if (!drawing.turns.empty())
+    rest_.turns = reinterpret_cast<const float*>(drawing.turns.data());
+  const auto image = [&](const std::optional<Texture>& texture, const KernelTexture*& there,
+                         KernelRestLayer& layer) {
+    if (!is_triplanar(look, texture))
+      return;
+    layer.image = there;
+    rest_.normals = true;
+    rest_.derivatives = rest_.derivatives || there->count > 1;
+    there = nullptr;
+  };
+  image(look.base, scene.base, rest_.base);
+  image(look.detail, scene.detail, rest_.detail);
+  image(look.reflection, scene.reflection, rest_.reflection);
+  image(look.structure, scene.structure, rest_.structure);
+  const auto solid = [&](const std::optional<SolidTexture>& texture, std::optional<SolidPlan>& plan,
+                         KernelRestLayer& layer) {
+    if (!texture)
+      return;
+    plan = solid_plan(*texture, drawing.rest_origin, drawing.rest_scale);
+    layer.solid = &*plan;
+    rest_.derivatives = rest_.derivatives || texture->filtered;
+  };
+  solid(look.solid_base, base_, rest_.base);
+  solid(look.solid_detail, detail_, rest_.detail);
+  solid(look.solid_structure, structure_, rest_.structure);
+  rest_.normals = rest_.normals || look.solid_structure;
+  rest_.scale = static_cast<float>(drawing.rest_scale / look.rest.edge);
+  const Vec3 part = (drawing.rest_origin - look.rest.start) / look.rest.edge;
+  for (int a = 0; a < 3; ++a)
+    rest_.part[a] = static_cast<float>(part[a]);
+  rest_.sharpness = look.rest.sharpness;
+  rest_.shift = static_cast<float>(drawing.offset[0] * look.rest.edge / drawing.rest_scale);
+  scene.rest = &rest_;
+}
+
+} // namespace gewebe

@@ -1,0 +1,24 @@
+#pragma once
+// What our rasteriser's kernels are told of textures on the shape at rest.
+
+#include "raster/raster_kernel_internal.h"
+#include "shading/drawing.h"
+#include "shading/look.h"
+
+#include <optional>
+
+namespace gewebe {
+
+class RasterRest {
+public:
+  /// Takes the images that lie on the shape at rest out of `scene`.
+  RasterRest(const Drawing& drawing, const Look& look, KernelScene& scene);
+  RasterRest(const RasterRest&) = delete;
+  RasterRest& operator=(const RasterRest&) = delete;
+
+private:
+  KernelRest rest_{};
+  std::optional<SolidPlan> base_, detail_, structure_;
+};
+
+} // namespace gewebe

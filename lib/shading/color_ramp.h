@@ -1,0 +1,33 @@
+#pragma once
+// Colours for values.
+
+#include "shading/image.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+/// Colours at equal distances from the least value to the greatest, linear between them.
+struct ColorRamp {
+  std::vector<std::array<std::uint8_t, 3>> colors; ///< one at least
+};
+
+/// "gray" (black to white), "heat" (black, red, yellow, white), "rainbow" (blue, cyan, green,
+/// yellow, red).
+const std::vector<std::string>& color_ramp_names();
+/// \throw Error if there is no such ramp
+ColorRamp color_ramp_from_name(std::string_view name);
+/// The pixels of the middle row, from left to right. \throw Error if the image has none
+ColorRamp color_ramp_from_image(const Image& image);
+
+/// The colour of each value: the ramp's first one up to `least`, its last one from `greatest` on.
+/// \pre least < greatest, values.size() == width · height
+Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height,
+              double least, double greatest, const ColorRamp& ramp);
+
+} // namespace gewebe

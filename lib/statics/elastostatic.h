@@ -1,0 +1,94 @@
+#pragma once
+// The elastostatic method (fast finite elements; Bro-Nielsen 1998, report 3.3.2, 3.3.3): the shape
+// follows the load at once, u = C f with C = K⁻¹ of the model linearised at rest.
+//
+// Prescribed displacements d of m nodes: the block C_cc on their free axes gives the forces
+// f_c = C_cc⁻¹ (d - u_c of all other loads); its factor follows the set as nodes join and leave.
+// Where columns are not at hand and nodes are many: K with these axes held, K_ff u_f = f - K_fc d,
+// f_c = K_cf u_f + K_cc d. Both are exact; which is cheaper decides. Displaced nodes then stand at
+// exactly d.
+//
+// Forces come first, the shape when it is asked for. What was asked before is not asked again: a
+// grasp that moves rigidly costs as much for a hundred nodes as for twelve.
+
+#include "base/context.h"
+#include "compliance/compliance.h"
+#include "contact/load.h"
+#include "model/model.h"
+#include "statics/linear_range.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// How an elastostatic object came to its shapes.
+struct ElastostaticCounts {
+  std::uint64_t updates = 0, unchanged = 0; ///< asked for; answered without work
+  std::uint64_t shapes = 0;                 ///< computed
+  std::uint64_t solves = 0;                 ///< right-hand sides solved with a factor
+  std::uint64_t columns_read = 0;           ///< nodes whose columns were read
+  std::uint64_t factors = 0;                ///< factorised or loaded
+  std::uint64_t terms = 0, skipped = 0;     ///< of columns and blocks of rows: added, left out
+  double backward_error = 0; ///< largest ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖) seen, where it was asked for
+  double contact_error = 0; ///< largest miss of a prescribed displacement, over the largest one
+  double shape_error = 0; ///< largest effect of the tolerance on an entry, over the largest entry,
+                          ///< where errors were asked for
+};
+
+struct ElastostaticOptions {
+  bool measure_error = false; ///< backward error, and effect of the tolerance, of every new shape
+  /// Displaced nodes up to which the block C_cc is used; by default what is cheaper.
+  std::size_t block_limit = SIZE_MAX;
+  /// How much of the largest displacement an entry of a shape may be wrong by, so that blocks of
+  /// rows need not be computed: the sum of what was left out of each row is bounded, not each part
+  /// alone. Forces and displaced nodes are exact.
+  double tolerance = 0;
+};
+
+/// What one must know to find forces at some nodes that have to meet conditions: u = free +
+/// compliance f.
+struct ContactSpace {
+  std::vector<std::uint32_t> nodes;
+  std::vector<double> compliance; ///< (3 m)², by columns; row 3 k + a is axis a of nodes[k]
+  std::vector<double> free;       ///< 3 m
+};
+
+class Elastostatic {
+public:
+  /// Keeps a reference to the model. \pre check_model(model) passes; parts belong to it
+  /// \throw Error as the factor: K singular, memory
+  Elastostatic(const Model& model, StiffnessParts parts, const Context& context,
+               const ElastostaticOptions& options = {});
+  ~Elastostatic();
+  Elastostatic(Elastostatic&&) noexcept;
+
+  /// The forces under `load`; nothing is done if it is the last one. Only what changed is computed
+  /// again. \pre nodes exist, no displacement along an axis that the model holds
+  /// \throw Error if columns can't be read, memory does not suffice, forces are not finite, or
+  /// displacements are not met within 1e-6 of the largest; the load is the one before then
+  void update(const Load& load);
+
+  /// The shape: 3 n numbers, mm; exactly the prescribed ones at displaced nodes. Computed by the
+  /// first call behind an update. \throw Error as update, or if the shape is not finite
+  std::span<const double> displacement();
+
+  /// What holds the displaced nodes, as Elastodynamic::contact_forces.
+  const std::vector<NodeVector>& contact_forces() const noexcept;
+
+  /// What contact at these nodes needs: under `load`, its prescribed displacements held, u at
+  /// `nodes` is free + compliance f for forces f there. \pre as update; nodes ascending, none of
+  /// them displaced by the load   \throw Error as update, and if memory does not hold their columns
+  ContactSpace contact_space(const Load& load, std::span<const std::uint32_t> nodes);
+
+  ElastostaticCounts counts() const noexcept;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace gewebe

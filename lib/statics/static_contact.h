@@ -1,0 +1,96 @@
+#pragma once
+// Instruments against an elastostatic object: the shape under a load and the forces that keep its
+// nodes out of the instruments, unilateral and with Coulomb friction.
+//
+// In turn: each touched node is kept beyond the plane that supports the instrument where the node
+// was last (contact_solver.h solves for the forces), then the planes are taken anew. What is beyond
+// such a plane is outside, so no node is inside in any turn; and without friction the energy falls
+// from turn to turn to a minimum, where each force is normal to the surface. Nodes found inside the
+// whole shape join, and it begins again.
+
+#include "contact/instrument.h"
+#include "contact/load.h"
+#include "contact/surface_blocks.h"
+#include "model/model.h"
+#include "statics/elastostatic.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// A node that an instrument pushes.
+struct NodeTouch {
+  std::uint32_t node = 0, instrument = 0;
+  Vec3 force; ///< on the node, 1e-6 N
+
+  bool operator==(const NodeTouch&) const = default;
+};
+
+/// One for each node and instrument, by ascending ones, with the sum of its forces in their order.
+std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches);
+
+/// An instrument's last short way, over which a node is pushed from where it was.
+struct MovedInstrument {
+  InstrumentShape shape;
+  Pose before, now;
+};
+
+/// The way in parts in which no instrument moves further than half its radius. \return how many, at
+/// most `most`
+std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t most);
+
+class StaticContact {
+public:
+  /// Keeps a reference to the model. \param shape the present one
+  /// \param touches what is touched in it, by ascending node and instrument
+  StaticContact(const Model& model, std::span<const double> shape,
+                std::vector<NodeTouch> touches = {});
+
+  /// Takes the shape of `still` (asked for when needed) on to that under `load` with the
+  /// instruments where they are now; `shape` (3 n displacements) is the last one before and the new
+  /// one after. An absent instrument is no element. Where more of the way is to come (not `last`)
+  /// and nothing is touched, nothing is done. \pre as Elastostatic::update   \throw as it
+  void update(const std::function<Elastostatic&()>& still, const Load& load,
+              std::span<const std::optional<MovedInstrument>> instruments,
+              std::vector<double>& shape, bool last = true);
+  /// Of the last shape.
+  const Box3& box() const noexcept { return blocks_.box(); }
+
+  /// By ascending node and instrument; forces that don't vanish.
+  const std::vector<NodeTouch>& touches() const noexcept { return touches_; }
+  /// A node inside an instrument, by more than 1e-6 of its radius, that can't be moved out: it is
+  /// held.
+  std::optional<NodeTouch> stuck() const { return stuck_; }
+  /// Whether the last forces meet the conditions, and their directions the surfaces.
+  bool solved() const noexcept { return solved_; }
+
+private:
+  struct Pair {
+    std::uint32_t place = 0; ///< of the node among the candidates
+    std::uint32_t instrument = 0;
+    Vec3 normal, force;
+  };
+  using Placed = std::vector<std::optional<PlacedInstrument>>;
+  void find(const Placed& placed, const Load& load, std::span<const double> shape, double depth,
+            std::vector<std::uint32_t>& inside);
+  void solve(const ContactSpace& space, const Placed& placed,
+             std::span<const std::optional<MovedInstrument>> moved, std::vector<Pair>& pairs,
+             std::span<const double> before, std::vector<Vec3>& at);
+  void part_pinched(const Placed& placed, std::vector<Pair>& pairs,
+                    std::span<const std::uint32_t> nodes) const;
+  Vec3 rest(std::uint32_t node) const { return model_.nodes[node].position; }
+
+  const Model& model_;
+  SurfaceBlocks blocks_;
+  std::vector<Vec3> inward_; ///< at rest, by node
+  std::vector<NodeTouch> touches_;
+  std::optional<NodeTouch> stuck_;
+  bool solved_ = true;
+};
+
+} // namespace gewebe

@@ -1,0 +1,410 @@
+#include "statics/two_step.h"
+
+#include "base/error.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+// Based on: H. Çakmak, U. Kühnapfel, G. Bretthauer, report FZKA 7190, 2006, section 3.3.3;
+// M. Bro-Nielsen, Finite element modeling in surgery simulation, 1998.
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+using Matrix = Eigen::Map<const MatrixXd>;
+using Vector = Eigen::Map<const VectorXd>;
+
+constexpr double contact_tolerance = 1e-6; // as that of Elastostatic
+constexpr double definite = 1e-12;         // least eigenvalue, of A1's
+constexpr int parts_of_s = 16, most_rounds = 200;
+
+Vector vector(std::span<const double> values) {
+  return {values.data(), static_cast<Index>(values.size())};
+}
+
+double outer_force(const Model& model, const Load& load, std::uint32_t node, int axis) {
+  const auto force = load.force.find(node);
+  return (force == load.force.end() ? 0 : force->second[axis]) +
+         model.nodes[node].mass * load.gravity[axis];
+}
+
+/// Over the free axes, but those of displaced nodes only if asked for.
+double norm_of(const Model& model, const Load& load, bool displaced_too) {
+  double sum = 0;
+  const auto add = [&](std::uint32_t node) {
+    if (!displaced_too && load.displacement.contains(node))
+      return;
+    for (int a = 0; a < 3; ++a)
+      if (!is_fixed(model, node, a)) {
+        const double f = outer_force(model, load, node, a);
+        sum += f * f;
+      }
+  };
+  if (load.gravity == Vec3{})
+    for (const auto& [node, force] : load.force)
+      add(node);
+  else
+    for (std::uint32_t node = 0; node < model.nodes.size(); ++node)
+      add(node);
+  return std::sqrt(sum);
+}
+
+double largest_size(std::span<const double> values) {
+  double size = 0;
+  for (const double value : values)
+    size = std::isnan(value) ? value : std::max(size, std::abs(value));
+  return size;
+}
+
+} // namespace
+
+double load_norm(const Model& model, const Load& load) {
+  return norm_of(model, load, true);
+}
+
+// ---- the contact axes
+
+// With A1 = L Lᵀ and L⁻¹ A2 L⁻ᵀ = Q Θ Qᵀ every A1 - (1-s) B is L Q (1 - (1-s) Φ) Qᵀ Lᵀ, with Φ = Θ,
+// or 1 - Θ in series: for W = L⁻ᵀ Q its inverse is W (1 - (1-s) Φ)⁻¹ Wᵀ.
+struct TwoStepContact::State {
+  bool series = false;
+  MatrixXd first, second, w;
+  VectorXd theta;
+
+  VectorXd denominators(double s) const {
+    return series ? VectorXd(s + (1 - s) * theta.array())
+                  : VectorXd((1 - theta.array()) + s * theta.array());
+  }
+  VectorXd product(double s, const VectorXd& force) const { // (A1 - (1-s) B) f
+    if (series)
+      return s * (first * force) + (1 - s) * (second * force);
+    return first * force - (1 - s) * (second * force);
+  }
+};
+
+TwoStepContact::TwoStepContact(std::span<const double> first, std::span<const double> second,
+                               std::size_t size, bool series)
+    : state_(std::make_unique<State>()) {
+  const auto n = static_cast<Index>(size);
+  state_->series = series;
+  state_->first = Matrix(first.data(), n, n);
+  state_->second = Matrix(second.data(), n, n);
+  const Eigen::LLT<MatrixXd> llt(state_->first);
+  if (llt.info() != Eigen::Success)
+    throw Error("the first stage's compliance of the displaced nodes is not positive definite, "
+                "expected fewer nodes or a store with another model");
+  MatrixXd h = llt.matrixL().solve(state_->second);
+  h = llt.matrixL().solve(h.transpose().eval());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (h + h.transpose()));
+  if (eigen.info() != Eigen::Success)
+    throw Error("the two stages' compliances have no common eigenvectors, expected finite ones");
+  state_->theta = eigen.eigenvalues();
+  const double least = state_->theta[0], most = state_->theta[n - 1];
+  if (!(least > 0))
+    throw Error("the second stage's compliance of the displaced nodes is not positive definite, "
+                "expected fewer nodes or a store with another model");
+  if (!series && !(most < 1 - definite))
+    throw Error("beyond the threshold no force gives these displacements, for the second stage is "
+                "not stiffer than the first in every direction (C1 - C2 is not positive definite "
+                "on the displaced nodes), expected a stiffer one or `series`");
+  state_->w = llt.matrixU().solve(eigen.eigenvectors());
+}
+TwoStepContact::~TwoStepContact() = default;
+TwoStepContact::TwoStepContact(TwoStepContact&&) noexcept = default;
+TwoStepContact& TwoStepContact::operator=(TwoStepContact&&) noexcept = default;
+
+std::size_t TwoStepContact::size() const noexcept {
+  return static_cast<std::size_t>(state_->theta.size());
+}
+
+TwoStepContact::Answer TwoStepContact::solve(const Problem& problem) const {
+  const State& state = *state_;
+  const VectorXd start = vector(problem.wanted) - vector(problem.first);
+  const VectorXd change = state.series ? VectorXd(vector(problem.first) - vector(problem.other))
+                                       : vector(problem.other);
+  const auto carried = vector(problem.carried);
+  const VectorXd a = state.w.transpose() * start, b = state.w.transpose() * change;
+
+  const auto force_at = [&](double s) {
+    const VectorXd below = state.denominators(s);
+    VectorXd force = state.w * ((a + (1 - s) * b).array() / below.array()).matrix();
+    // What rounding in W has cost comes back by one residual.
+    const VectorXd missing = start + (1 - s) * change - state.product(s, force);
+    force += state.w * ((state.w.transpose() * missing).array() / below.array()).matrix();
+    return force;
+  };
+  const auto size_of = [&](const VectorXd& force) {
+    return std::hypot((carried + force).norm(), problem.outside);
+  };
+  struct Point {
+    double value = 0, slope = 0; // of s |f| - f0
+    VectorXd force;
+  };
+  const auto at = [&](double s) {
+    Point p;
+    p.force = force_at(s);
+    const double size = size_of(p.force);
+    p.value = s * size - problem.threshold;
+    // d/ds of the force: M' = B, so that M f' = -(w + B f), with 1 - s falling as s grows.
+    const VectorXd below = state.denominators(s);
+    const auto phi = state.series ? VectorXd(1 - state.theta.array()) : state.theta;
+    const VectorXd top = (a + (1 - s) * b).array() * phi.array() / below.array();
+    const VectorXd turn = -(state.w * ((b + top).array() / below.array()).matrix());
+    p.slope = size + s * (carried + p.force).dot(turn) / size;
+    return p;
+  };
+  const auto answer = [&](double s, const VectorXd& force) {
+    return Answer{s, {force.data(), force.data() + force.size()}};
+  };
+
+  double high = 1, low = 0;
+  Point top = at(1);
+  if (!(top.value > 0))
+    return answer(1, top.force);
+  for (int k = parts_of_s - 1; k > 0; --k) {
+    const double s = static_cast<double>(k) / parts_of_s;
+    Point p = at(s);
+    if (p.value > 0) {
+      high = s;
+      top = std::move(p);
+    } else {
+      low = s;
+      break;
+    }
+  }
+  // Newton's steps from above; where one leaves the bracket, its middle. At s = 0 the value is -f0.
+  double s = high;
+  Point p = top;
+  for (int round = 0; round < most_rounds; ++round) {
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    if (std::abs(p.value) <= 2 * epsilon * problem.threshold || high - low <= epsilon * high)
+      break;
+    double next = s - p.value / p.slope;
+    if (!(next > low && next < high))
+      next = low + (high - low) / 2;
+    if (next == s)
+      break;
+    s = next;
+    p = at(s);
+    (p.value > 0 ? high : low) = s;
+  }
+  return answer(problem.threshold / size_of(p.force), p.force);
+}
+
+// ---- an object
+
+struct TwoStep::State {
+  const Model& model;
+  Elastostatic second;
+  double tolerance = 0;
+  TwoStepOptions options;
+
+  std::optional<Load> last;
+  std::vector<NodeVector> forces;
+  double norm = 0, largest = 0;
+  double s = 1;
+  Load total; // beyond the threshold: all forces, those of contact too
+
+  std::vector<double> u;
+  bool shaped = true; // u is that of `last`
+
+  std::vector<std::uint32_t> nodes; // of contact
+  std::vector<std::size_t> axes;    // of them, those that are free: 3 k + a for nodes[k]
+  std::optional<TwoStepContact> contact;
+
+  State(const Model& m, StiffnessParts parts, const Context& context, double t)
+      : model(m), second(m, std::move(parts), context, {.tolerance = t}), tolerance(t),
+        u(3 * m.nodes.size()) {}
+
+  void forget_contact() {
+    contact.reset();
+    nodes.clear();
+  }
+
+  void prepare_contact(const ContactSpace& one, const ContactSpace& two) {
+    if (contact && one.nodes == nodes)
+      return;
+    forget_contact();
+    const std::size_t rows = one.free.size();
+    axes.clear();
+    for (std::size_t r = 0; r < rows; ++r)
+      if (!is_fixed(model, one.nodes[r / 3], static_cast<int>(r % 3)))
+        axes.push_back(r);
+    if (axes.empty())
+      return;
+    std::vector<double> block1, block2;
+    for (const std::size_t j : axes)
+      for (const std::size_t i : axes) {
+        block1.push_back(one.compliance[j * rows + i]);
+        block2.push_back(two.compliance[j * rows + i]);
+      }
+    contact.emplace(block1, block2, axes.size(), options.series);
+    nodes = one.nodes;
+  }
+
+  /// Whether displacements take a load beyond the threshold; if so it is found.
+  bool beyond(Elastostatic& first, const Load& load) {
+    std::vector<std::uint32_t> now;
+    for (const auto& [node, d] : load.displacement)
+      now.push_back(node);
+    Load outer = load;
+    outer.displacement.clear();
+    const ContactSpace one = first.contact_space(outer, now),
+                       two = second.contact_space(outer, now);
+    prepare_contact(one, two);
+    if (!contact)
+      return false;
+    std::vector<double> d, v1, v2, carried;
+    for (const std::size_t axis : axes) {
+      const std::uint32_t node = now[axis / 3];
+      const int a = static_cast<int>(axis % 3);
+      d.push_back(load.displacement.at(node)[a]);
+      v1.push_back(one.free[axis]);
+      v2.push_back(two.free[axis]);
+      carried.push_back(outer_force(model, load, node, a));
+    }
+    const TwoStepContact::Answer answer =
+        contact->solve({d, v1, v2, carried, norm_of(model, load, false), options.threshold});
+    if (!(answer.s < 1))
+      return false;
+    forces.clear();
+    for (const std::uint32_t node : now)
+      forces.push_back({node, {}});
+    for (std::size_t k = 0; k < axes.size(); ++k)
+      forces[axes[k] / 3].value[static_cast<int>(axes[k] % 3)] = answer.force[k];
+    total = std::move(outer);
+    for (const NodeVector& f : forces)
+      total.force[f.node] += f.value;
+    s = answer.s;
+    norm = options.threshold / s;
+    return true;
+  }
+
+  void update(Elastostatic& first, const Load& load) {
+    if (load.displacement.empty()) {
+      norm = load_norm(model, load);
+      s = norm > options.threshold ? options.threshold / norm : 1;
+      if (s < 1)
+        total = load;
+      forces.clear();
+      return;
+    }
+    if (contact && beyond(first, load))
+      return;
+    first.update(load);
+    Load all = load;
+    all.displacement.clear();
+    for (const NodeVector& f : first.contact_forces())
+      all.force[f.node] += f.value;
+    norm = load_norm(model, all);
+    if (norm > options.threshold && beyond(first, load))
+      return;
+    s = 1;
+    forces = first.contact_forces();
+  }
+
+  void shape(Elastostatic& first) {
+    if (!(s < 1)) {
+      first.update(*last);
+      const std::span<const double> u1 = first.displacement();
+      u.assign(u1.begin(), u1.end());
+      return;
+    }
+    first.update(total);
+    second.update(total);
+    const std::span<const double> u1 = first.displacement(), u2 = second.displacement();
+    const double a = options.series ? s : 1, b = options.series ? 1 - s : s - 1;
+    for (std::size_t r = 0; r < u.size(); ++r)
+      u[r] = a * u1[r] + b * u2[r];
+    meet(std::max(largest_size(u1), largest_size(u2)));
+    double sum = 0;
+    for (const double value : u)
+      sum += std::abs(value);
+    if (!std::isfinite(sum))
+      throw Error("the shape is not finite, expected a smaller load");
+  }
+
+  /// The displaced nodes stand exactly where they must.
+  void meet(double size) {
+    double miss = 0;
+    for (const auto& [node, d] : last->displacement)
+      for (int a = 0; a < 3; ++a) {
+        double& value = u[3 * std::size_t{node} + static_cast<std::size_t>(a)];
+        const double error = std::abs(value - d[a]);
+        miss = std::isnan(error) ? error : std::max(miss, error);
+        value = d[a];
+      }
+    if (!(miss <= (contact_tolerance + 2 * tolerance) * size))
+      throw Error("the two-step method misses a displacement by " + std::to_string(miss) +
+                  " mm, expected nodes that are less near to each other");
+  }
+};
+
+TwoStep::TwoStep(const Model& model, StiffnessParts second, const Context& context,
+                 const TwoStepOptions& options, double tolerance) {
+  if (!second.factor)
+    throw Error("the second stage has no factor, expected a store with one");
+  state_ = std::make_unique<State>(model, std::move(second), context, tolerance);
+  set(options);
+}
+TwoStep::~TwoStep() = default;
+TwoStep::TwoStep(TwoStep&&) noexcept = default;
+
+void TwoStep::set(const TwoStepOptions& options) {
+  if (!(options.threshold > 0) || !std::isfinite(options.threshold))
+    throw Error("the threshold of the two-step method is not positive, expected a force");
+  if (options == state_->options)
+    return;
+  state_->options = options;
+  state_->last.reset();
+  state_->forget_contact();
+  state_->largest = 0;
+}
+
+void TwoStep::update(Elastostatic& first, const Load& load) {
+  State& state = *state_;
+  if (state.last == load)
+    return;
+  state.last.reset();
+  state.update(first, load);
+  if (!std::isfinite(state.norm))
+    throw Error("the load is not finite, expected a smaller one");
+  state.largest = std::max(state.largest, state.norm);
+  state.last = load;
+  state.shaped = false;
+}
+
+std::span<const double> TwoStep::displacement(Elastostatic& first) {
+  if (state_->last && !state_->shaped) {
+    state_->shape(first);
+    state_->shaped = true;
+  }
+  return state_->u;
+}
+const std::vector<NodeVector>& TwoStep::contact_forces() const noexcept {
+  return state_->forces;
+}
+double TwoStep::threshold() const noexcept {
+  return state_->options.threshold;
+}
+double TwoStep::load() const noexcept {
+  return state_->norm;
+}
+double TwoStep::largest() const noexcept {
+  return state_->largest;
+}
+ElastostaticCounts TwoStep::second_counts() const noexcept {
+  return state_->second.counts();
+}
+
+} // namespace gewebe

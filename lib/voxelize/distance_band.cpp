@@ -1,0 +1,264 @@
+#include "base/error.h"
+#include "base/parallel.h"
+#include "voxelize/distance_band_internal.h"
+#include "voxelize/ray_crossings_internal.h"
+#include "voxelize/voxelize_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+/// Nearest triangles of a leaf's voxels.
+struct BandLeaf {
+  std::array<double, leaf_voxels> squared;
+  std::array<std::uint32_t, leaf_voxels> triangle;
+};
+
+/// Leaves of the band of one slab, in ascending order.
+using BandLeaves = std::map<LeafPlace, std::unique_ptr<BandLeaf>>;
+
+/// Offers triangle n to all voxels of the slab nearer to it than `reach`.
+void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, double reach,
+           BandLeaves& leaves) {
+  const Triangle& t = mesh.triangles[n];
+  const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+  Int3 low{}, high{}; // of voxels, whose centres are at the index and a half
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [least, most] = std::minmax({a[axis], b[axis], c[axis]});
+    low[static_cast<std::size_t>(axis)] = ceil_int(least - reach - 0.5);
+    high[static_cast<std::size_t>(axis)] = floor_int(most + reach - 0.5);
+  }
+  low[0] = std::max(low[0], first_row);
+  high[0] = std::min(high[0], first_row + leaf_dim - 1);
+  Vec3 normal = cross(b - a, c - a);
+  const double length = norm(normal);
+  // A needle's normal may be rounding alone: then no point is passed over by its plane.
+  const bool flat = length > 1e-9 * norm(b - a) * norm(c - a);
+  normal = flat ? normal / length : Vec3{};
+  const double limit = reach * reach;
+  for (std::int32_t j_leaf = low[1] >> 3; j_leaf <= high[1] >> 3; ++j_leaf)
+    for (std::int32_t k_leaf = low[2] >> 3; k_leaf <= high[2] >> 3; ++k_leaf) {
+      BandLeaf* leaf = nullptr;
+      const std::int32_t j_end = std::min(high[1], 8 * j_leaf + 7);
+      const std::int32_t k_end = std::min(high[2], 8 * k_leaf + 7);
+      for (std::int32_t i = low[0]; i <= high[0]; ++i)
+        for (std::int32_t j = std::max(low[1], 8 * j_leaf); j <= j_end; ++j)
+          for (std::int32_t k = std::max(low[2], 8 * k_leaf); k <= k_end; ++k) {
+            const Vec3 p{i + 0.5, j + 0.5, k + 0.5};
+            const double to_plane = dot(normal, p - a); // no point of the triangle is nearer
+            if (!(to_plane * to_plane < limit))
+              continue;
+            const auto v = static_cast<std::size_t>(leaf_offset({i, j, k}));
+            if (leaf != nullptr && to_plane * to_plane > leaf->squared[v] * (1 + 1e-9))
+              continue;
+            const Vec3 offset = p - nearest_on_triangle(p, a, b, c).point;
+            const double squared = dot(offset, offset);
+            if (!(squared < limit))
+              continue;
+            if (leaf == nullptr) {
+              std::unique_ptr<BandLeaf>& slot = leaves[{j_leaf, k_leaf}];
+              if (slot == nullptr) {
+                slot = std::make_unique<BandLeaf>();
+                slot->squared.fill(HUGE_VAL);
+              }
+              leaf = slot.get();
+            }
+            if (squared < leaf->squared[v]) {
+              leaf->squared[v] = squared;
+              leaf->triangle[v] = n;
+            }
+          }
+    }
+}
+
+/// Bits of the leaves of a scan, mixed or not.
+class InsideBits {
+public:
+  explicit InsideBits(const InsideScan& scan) : scan_(scan) {
+    for (const TileView& tile : scan.tiles)
+      (tile.dim == leaf_dim ? small_ : large_).push_back(tile.origin);
+    std::ranges::sort(small_);
+    std::ranges::sort(large_);
+  }
+  std::array<std::uint64_t, 8> of(const Int3& origin) const {
+    const auto at = std::ranges::lower_bound(scan_.origins, origin);
+    if (at != scan_.origins.end() && *at == origin)
+      return scan_.bits[static_cast<std::size_t>(at - scan_.origins.begin())];
+    std::array<std::uint64_t, 8> bits{};
+    if (std::ranges::binary_search(small_, origin) ||
+        std::ranges::binary_search(large_,
+                                   Int3{origin[0] & ~127, origin[1] & ~127, origin[2] & ~127}))
+      bits.fill(~std::uint64_t{0});
+    return bits;
+  }
+
+private:
+  const InsideScan& scan_;
+  std::vector<Int3> small_, large_;
+};
+
+struct RampLeaf {
+  Int3 origin{};
+  std::array<float, leaf_voxels> values{};
+  std::array<std::uint64_t, 8> active{};
+};
+struct RampSlab {
+  std::vector<RampLeaf> leaves;
+  std::uint64_t band_voxels = 0;
+};
+
+RampLeaf ramp_leaf(const SlabbedMesh& mesh, const BandLeaf* band, const Int3& origin,
+                   const std::array<std::uint64_t, 8>& inside, double half_width,
+                   const RampDistance& distance, std::uint64_t& band_voxels) {
+  RampLeaf leaf;
+  leaf.origin = origin;
+  for (std::size_t v = 0; v < leaf_voxels; ++v) {
+    const bool in = (inside[v >> 6] >> (v & 63) & 1) != 0;
+    double value = in ? 1 : 0;
+    if (band != nullptr && band->squared[v] < HUGE_VAL) {
+      const auto n = static_cast<std::int32_t>(v);
+      const Vec3 p{origin[0] + (n >> 6) + 0.5, origin[1] + (n >> 3 & 7) + 0.5,
+                   origin[2] + (n & 7) + 0.5};
+      const double ramp = std::fmin(0.5, distance(mesh, p, band->triangle[v]) / (2 * half_width));
+      value = in ? 0.5 + ramp : 0.5 - ramp;
+      ++band_voxels;
+    }
+    leaf.values[v] = static_cast<float>(value);
+    leaf.active[v >> 6] |= static_cast<std::uint64_t>(leaf.values[v] > 0) << (v & 63);
+  }
+  return leaf;
+}
+
+/// Adds the tiles of the scan less the leaves of `taken` (ascending); returns how many leaves that
+/// are.
+std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
+                        GridBuilder& builder) {
+  const auto node_of = [](const Int3& o) { return Int3{o[0] & ~127, o[1] & ~127, o[2] & ~127}; };
+  std::vector<Int3> nodes;
+  for (const Int3& origin : taken)
+    nodes.push_back(node_of(origin));
+  std::ranges::sort(nodes);
+  std::uint64_t added = 0;
+  const auto add_small = [&](const Int3& origin) {
+    if (!std::ranges::binary_search(taken, origin)) {
+      builder.add_tile({origin, leaf_dim, 1.0f, true});
+      ++added;
+    }
+  };
+  for (const TileView& tile : scan.tiles) {
+    if (tile.dim == leaf_dim) {
+      add_small(tile.origin);
+    } else if (!std::ranges::binary_search(nodes, tile.origin)) {
+      builder.add_tile(tile);
+      added += 4096;
+    } else {
+      for (std::int32_t i = 0; i < tile.dim; i += leaf_dim)
+        for (std::int32_t j = 0; j < tile.dim; j += leaf_dim)
+          for (std::int32_t k = 0; k < tile.dim; k += leaf_dim)
+            add_small({tile.origin[0] + i, tile.origin[1] + j, tile.origin[2] + k});
+    }
+  }
+  return added;
+}
+
+} // namespace
+
+NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const double d1 = dot(ab, ap), d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0)
+    return {a, 4};
+  const Vec3 bp = p - b;
+  const double d3 = dot(ab, bp), d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3)
+    return {b, 5};
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0)
+    return {a + ab * (d1 / (d1 - d3)), 1};
+  const Vec3 cp = p - c;
+  const double d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6)
+    return {c, 6};
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0)
+    return {a + ac * (d2 / (d2 - d6)), 3};
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+    return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 2};
+  const double sum = va + vb + vc;
+  return {a + ab * (vb / sum) + ac * (vc / sum), 0};
+}
+
+Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
+                  const VoxelizeOptions& options, double half_width,
+                  const std::function<RampDistance(const SlabbedMesh&)>& prepare,
+                  CoverageReport& report) {
+  report = {};
+  const InsideScan scan = scan_inside(context, mesh, transform, options, &report.mesh);
+  // The band is wider than the surface's leaves by half_width on both sides.
+  require_memory(context, 3 * coverage_bytes(mesh, transform), "the voxelized mesh");
+  SlabbedMesh slabbed;
+  slabbed.points = coverage_points(mesh, transform);
+  slabbed.triangles = mesh.triangles;
+  VoxelizeReport holes;
+  const bool refused = options.rule == VoxelRule::parity || options.on_open != OpenMesh::refuse;
+  close_or_refuse(context, mesh, transform, refused ? options.on_open : OpenMesh::skip,
+                  slabbed.points, slabbed.triangles, holes);
+  sort_into_slabs(context, slabbed, half_width);
+  const RampDistance distance = prepare(slabbed);
+
+  const InsideBits bits(scan);
+  std::vector<RampSlab> slabs(slabbed.slab_begin.size() - 1);
+  parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const std::int32_t row = (slabbed.first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
+      BandLeaves band;
+      for (std::size_t n = slabbed.slab_begin[s]; n < slabbed.slab_begin[s + 1]; ++n)
+        offer(slabbed, slabbed.members[n], row, half_width, band);
+      // Mixed leaves lie in the band; only rays that were left empty can make others.
+      for (auto at = std::ranges::lower_bound(scan.origins, Int3{row, INT32_MIN, INT32_MIN});
+           at != scan.origins.end() && (*at)[0] == row; ++at)
+        band.try_emplace({(*at)[1] >> 3, (*at)[2] >> 3});
+      for (const auto& [place, leaf] : band) {
+        const Int3 origin{row, 8 * place.j, 8 * place.k};
+        slabs[s].leaves.push_back(ramp_leaf(slabbed, leaf.get(), origin, bits.of(origin),
+                                            half_width, distance, slabs[s].band_voxels));
+      }
+    }
+  });
+
+  GridInfo info;
+  info.transform = transform;
+  GridBuilder builder(info);
+  std::vector<Int3> origins;
+  std::vector<const RampLeaf*> values;
+  double sum = 0;
+  for (const RampSlab& slab : slabs) {
+    report.surface_voxels += slab.band_voxels;
+    for (const RampLeaf& leaf : slab.leaves) {
+      origins.push_back(leaf.origin);
+      values.push_back(&leaf);
+      double of_leaf = 0;
+      for (const float value : leaf.values)
+        of_leaf += static_cast<double>(value);
+      sum += of_leaf;
+    }
+  }
+  sum += static_cast<double>(add_tiles(scan, origins, builder)) * leaf_voxels;
+  report.volume = sum * std::fabs(transform.determinant());
+  const std::vector<LeafRef> leaves = builder.add_leaves(context, origins);
+  parallel_blocks(context, leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      std::ranges::copy(values[n]->values, leaves[n].values);
+      std::ranges::copy(values[n]->active, leaves[n].active);
+    }
+  });
+  return builder.finish(false);
+}
+
+} // namespace gewebe

@@ -1,0 +1,263 @@
+#include "voxelize/winding_scan_internal.h"
+// Based on: A. Jacobson, L. Kavan, O. Sorkine-Hornung, Robust Inside-Outside Segmentation using
+// Generalized Winding Numbers, 2013.
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "mesh/exact_predicates.h"
+#include "mesh/oriented_surface.h"
+#include "voxelize/inside_scan_internal.h"
+#include "voxelize/solid_angle_tree_internal.h"
+
+namespace gewebe {
+namespace {
+
+constexpr double diagonal = 1.7320508075688774;
+
+/// Leaves in which the cones' winding number may reach 1/2, ascending, in units of leaves.
+std::vector<Int3> leaves_near(const Context& context, const SolidAngleTree& cones) {
+  std::vector<Int3> near;
+  Box3 box = cones.box();
+  if (box.empty())
+    return near;
+  const double reach = cones.reach();
+  Int3 low{};
+  std::int32_t side = 1;
+  for (int a = 0; a < 3; ++a) {
+    low[static_cast<std::size_t>(a)] =
+        static_cast<std::int32_t>(std::floor((box.min[a] - reach) / leaf_dim));
+    while (low[static_cast<std::size_t>(a)] + side < (box.max[a] + reach) / leaf_dim + 1)
+      side *= 2;
+  }
+  struct Cube {
+    Int3 low;
+    std::int32_t side;
+  };
+  std::vector<Cube> cubes{{low, side}};
+  while (!cubes.empty()) {
+    const Cube cube = cubes.back();
+    cubes.pop_back();
+    // Half a cube from the middle of the first to that of the last voxel.
+    const double half = (leaf_dim * static_cast<double>(cube.side) - 1) / 2;
+    const Vec3 middle = Vec3{1.0 * cube.low[0], 1.0 * cube.low[1], 1.0 * cube.low[2]} * leaf_dim +
+                        Vec3{half, half, half};
+    const WindingSum sum = cones.within(middle, half * diagonal);
+    if (std::fabs(sum.value) + sum.error < 0.5)
+      continue;
+    if (cube.side == 1) {
+      near.push_back(cube.low);
+      if (near.size() % 65536 == 0)
+        require_memory(context, 4096.0 * static_cast<double>(near.size()),
+                       "the leaves near the holes of the mesh");
+      continue;
+    }
+    const std::int32_t next = cube.side / 2;
+    for (int c = 0; c < 8; ++c)
+      cubes.push_back(
+          {{cube.low[0] + ((c & 4) != 0 ? next : 0), cube.low[1] + ((c & 2) != 0 ? next : 0),
+            cube.low[2] + ((c & 1) != 0 ? next : 0)},
+           next});
+  }
+  std::sort(near.begin(), near.end());
+  return near;
+}
+
+/// Is |whole - w(cones)| > 1/2 at p?
+bool winds(const SolidAngleTree& cones, const Vec3& p, std::int32_t whole) {
+  if (const WindingSum sum = cones.quick_at(p);
+      std::fabs(std::fabs(whole - sum.value) - 0.5) > sum.error)
+    return std::fabs(whole - sum.value) > 0.5;
+  return std::fabs(whole - cones.exact_at(p)) > 0.5;
+}
+
+struct Counters {
+  std::uint64_t crossings = 0, exact_tests = 0, summed = 0;
+};
+
+/// Winding numbers of a leaf to bits.
+BitLeaf bits_of(const CountLeaf& leaf) {
+  BitLeaf bits;
+  for (std::size_t v = 0; v < leaf_voxels; ++v)
+    bits.word[v / 64] |= std::uint64_t{leaf.count[v] != 0} << (v % 64);
+  return bits;
+}
+
+/// Decides the samples of a cube of a leaf, together where the cones' winding number varies little
+/// enough in it, else in eight parts down to single samples.
+void decide(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& origin, const Int3& low,
+            std::int32_t side, BitLeaf& bits, std::uint64_t& summed) {
+  const double half = (side - 1) / 2.0;
+  const Vec3 middle{origin[0] + low[0] + half, origin[1] + low[1] + half,
+                    origin[2] + low[2] + half};
+  const auto place = [&](std::int32_t n) { // the samples of the cube
+    return static_cast<std::size_t>(
+        leaf_offset({low[0] + n / (side * side), low[1] + n / side % side, low[2] + n % side}));
+  };
+  const auto whole = [&](std::size_t at) { return static_cast<std::int32_t>(leaf.count[at]); };
+  const auto set = [&](std::size_t at, bool inside) {
+    bits.word[at / 64] |= std::uint64_t{inside} << (at % 64);
+  };
+  if (side == 1) {
+    set(place(0), winds(cones, middle, whole(place(0))));
+    ++summed;
+    return;
+  }
+  const WindingSum sum = cones.within(middle, half * diagonal);
+  bool clear = true;
+  for (std::int32_t n = 0; clear && n < side * side * side; ++n)
+    clear = std::fabs(std::fabs(whole(place(n)) - sum.value) - 0.5) > sum.error;
+  if (clear) {
+    for (std::int32_t n = 0; n < side * side * side; ++n)
+      set(place(n), std::fabs(whole(place(n)) - sum.value) > 0.5);
+    return;
+  }
+  const std::int32_t next = side / 2;
+  for (int c = 0; c < 8; ++c)
+    decide(cones, leaf, origin,
+           {low[0] + ((c & 4) != 0 ? next : 0), low[1] + ((c & 2) != 0 ? next : 0),
+            low[2] + ((c & 1) != 0 ? next : 0)},
+           next, bits, summed);
+}
+
+/// Sums the flips of a slab up along k. `near` are its leaves near the cones.
+Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<const Int3> near,
+                        const SolidAngleTree& cones, Counters& counters) {
+  for (const Int3& leaf : near)
+    (void)map.at({leaf[1], leaf[2]});
+  std::vector<std::uint32_t> order(map.keys.size());
+  for (std::size_t n = 0; n < order.size(); ++n)
+    order[n] = static_cast<std::uint32_t>(n);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return map.keys[a] < map.keys[b]; });
+  Slab<BitLeaf> slab;
+  const auto put = [&](const BitLeaf& leaf, LeafKey from, std::int32_t k_end) {
+    if (leaf.is_constant(0))
+      return;
+    if (leaf.is_constant(BitLeaf::full(1))) {
+      if (!slab.runs.empty() && slab.runs.back().j == from.j && slab.runs.back().k_end == from.k)
+        slab.runs.back().k_end = k_end;
+      else
+        slab.runs.push_back({from.j, from.k, k_end});
+      return;
+    }
+    for (std::int32_t k = from.k; k < k_end; ++k) {
+      slab.keys.push_back({from.j, k});
+      slab.leaves.push_back(leaf);
+    }
+  };
+  CountLeaf::Carry carry{};
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    const LeafKey key = map.keys[order[n]];
+    const LeafKey last = n > 0 ? map.keys[order[n - 1]] : LeafKey{key.j - 1, 0};
+    if (last.j == key.j && last.k + 1 < key.k) {
+      CountLeaf gap;
+      gap.integrate(carry);
+      put(bits_of(gap), {key.j, last.k + 1}, key.k);
+    }
+    CountLeaf& leaf = map.leaves[order[n]];
+    leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
+    if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k})) {
+      BitLeaf bits;
+      decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
+             leaf_dim, bits, counters.summed);
+      put(bits, key, key.k + 1);
+    } else {
+      put(bits_of(leaf), key, key.k + 1);
+    }
+  }
+  return slab;
+}
+
+} // namespace
+
+InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
+                        std::span<const Triangle> triangles, std::span<const std::int32_t> part,
+                        VoxelizeReport& report) {
+  const OrientedSurface surface = orient_surface(points, triangles, part);
+  report.parts = surface.parts;
+  report.parts_turned = surface.parts_turned;
+  report.triangles_turned = surface.triangles_turned;
+  report.triangles_duplicate = surface.triangles_duplicate;
+  const ClosingCones caps = closing_cones(points, surface.triangles);
+  for (Vec3& p : points)
+    p = {predicate_coordinate(p.x), predicate_coordinate(p.y), predicate_coordinate(p.z)};
+  const SolidAngleTree cones(points, caps.cones, caps.pieces, context.cpu);
+  const std::vector<Int3> near = leaves_near(context, cones);
+
+  // Those that a ray upward enters through, and those that it leaves through.
+  std::array<std::vector<Triangle>, 2> facing;
+  for (const std::span<const Triangle> list :
+       {std::span<const Triangle>(surface.triangles), std::span<const Triangle>(caps.cones)})
+    for (const Triangle& t : list) {
+      const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+      const int normal_z = turn_sign(a.x, a.y, b.x, b.y, c.x, c.y, report.exact_tests);
+      if (normal_z == 0)
+        ++report.triangles_skipped; // parallel to the rays
+      else
+        facing[normal_z < 0 ? 0 : 1].push_back(t);
+    }
+  std::array<SampleMesh, 2> meshes;
+  std::array<Chunks, 2> chunks;
+  Range slabs_range{INT32_MAX, INT32_MIN};
+  const auto include = [&](std::int32_t begin, std::int32_t end) {
+    slabs_range = {std::min(slabs_range.begin, begin), std::max(slabs_range.end, end)};
+  };
+  for (std::size_t way = 0; way < 2; ++way) {
+    meshes[way] = {1, points, facing[way], context.cpu};
+    chunks[way] = sort_triangles(context, meshes[way]);
+    for (const Block& block : chunks[way].blocks)
+      report.triangles_skipped += block.skipped;
+    if (chunks[way].count() > 0)
+      include(chunks[way].range.begin * chunks[way].slabs_each,
+              chunks[way].range.end * chunks[way].slabs_each);
+  }
+  if (!near.empty())
+    include(near.front()[0], near.back()[0] + 1);
+  if (slabs_range.begin >= slabs_range.end)
+    return {};
+
+  // The points are the same, so the chunks are.
+  const std::int32_t each = chunks[0].slabs_each;
+  const Range range{
+      slabs_range.begin >= 0 ? slabs_range.begin / each : -((-slabs_range.begin + each - 1) / each),
+      slabs_range.end > 0 ? (slabs_range.end + each - 1) / each : -(-slabs_range.end / each)};
+  const auto count = static_cast<std::size_t>(range.end - range.begin);
+  std::vector<Slab<BitLeaf>> slabs(count * static_cast<std::size_t>(each));
+  std::vector<Counters> counters(count);
+  parallel_blocks(context, count, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      std::array<LeafMap<CountLeaf>, 4> maps;
+      const std::int32_t chunk = range.begin + static_cast<std::int32_t>(n);
+      const std::int32_t first = chunk * each * leaf_dim;
+      for (std::size_t way = 0; way < 2; ++way)
+        for_each_crossing(
+            meshes[way], chunks[way], chunk, {first, first + each * leaf_dim}, TieOrder::xyz,
+            counters[n].exact_tests, [&](std::int32_t i, std::int32_t j, std::int32_t k) {
+              maps[static_cast<std::size_t>((i - first) >> 3)]
+                  .at({j >> 3, k >> 3})
+                  .count[static_cast<std::size_t>((i & 7) << 6 | (j & 7) << 3 | (k & 7))] +=
+                  way == 0 ? 1u : ~0u;
+              ++counters[n].crossings;
+            });
+      for (std::int32_t s = 0; s < each; ++s) {
+        const std::int32_t slab_i = chunk * each + s;
+        const auto of_slab = [&](std::int32_t i) {
+          return std::lower_bound(
+              near.begin(), near.end(), i,
+              [](const Int3& leaf, std::int32_t slab) { return leaf[0] < slab; });
+        };
+        slabs[n * static_cast<std::size_t>(each) + static_cast<std::size_t>(s)] =
+            integrate(maps[static_cast<std::size_t>(s)], slab_i,
+                      {of_slab(slab_i), of_slab(slab_i + 1)}, cones, counters[n]);
+      }
+    }
+  });
+  for (const Counters& c : counters) {
+    report.crossings += c.crossings;
+    report.exact_tests += c.exact_tests;
+    report.samples_summed += c.summed;
+  }
+  return join_slabs(slabs, range.begin * each);
+}
+
+} // namespace gewebe

@@ -1,0 +1,241 @@
+#include "tools/render/render_arguments.h"
+
+#include "shading/color_ramp.h"
+#include "tools/render/render_camera.h"
+#include "tools/render/render_layer.h"
+#include "tools/render/render_materials.h"
+#include "tools/render/render_volume.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gewebe::cli {
+namespace {
+
+void refuse(bool wrong, const std::string& what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+std::vector<std::string> words_of(const std::string& list) {
+  std::vector<std::string> words;
+  for (std::size_t from = 0; from <= list.size();) {
+    const std::size_t end = std::min(list.find(',', from), list.size());
+    words.push_back(list.substr(from, end - from));
+    from = end + 1;
+  }
+  return words;
+}
+
+using Layers = std::array<std::pair<const char*, RenderLayer*>, 4>;
+
+Layers layers_of(RenderArguments& a) {
+  return {{{"texture", &a.base},
+           {"detail", &a.detail},
+           {"reflection", &a.reflection},
+           {"structure", &a.structure}}};
+}
+
+RenderLayer& layer_of(const Layers& layers, const std::string& option, const std::string& name) {
+  for (const auto& [word, layer] : layers)
+    if (name == word)
+      return *layer;
+  throw UsageError(option + ": '" + name +
+                   "' is no texture, expected texture, detail, reflection or structure");
+}
+
+/// A word for all textures, or a list of TEXTURE=WORD.
+template <class Set>
+void for_layers(const Layers& layers, const std::string& option, const std::string& list,
+                const Set& set) {
+  try {
+    for (const std::string& part : words_of(list)) {
+      const std::size_t mid = part.find('=');
+      if (mid != std::string::npos)
+        set(layer_of(layers, option, part.substr(0, mid)).options, part.substr(mid + 1));
+      else
+        for (const auto& [word, layer] : layers)
+          set(layer->options, part);
+    }
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    throw UsageError(option + ": " + error.what());
+  }
+}
+
+void complete_textures(RenderArguments& a) {
+  const Layers layers = layers_of(a);
+  for_layers(layers, "--filter", a.words.filter, [](TextureOptions& o, const std::string& w) {
+    o.filter = texture_filter_from_name(w);
+  });
+  for_layers(layers, "--wrap", a.words.wrap,
+             [](TextureOptions& o, const std::string& w) { o.wrap = texture_wrap_from_name(w); });
+  if (a.words.sphere != "none")
+    for (const std::string& name : words_of(a.words.sphere))
+      layer_of(layers, "--sphere", name).options.sphere = true;
+  for (const auto& [word, layer] : layers)
+    complete_layer(a, word, *layer);
+}
+
+void complete_modes(RenderArguments& a) {
+  a.picture.backend = backend_from_name(a.words.backend);
+  a.picture.gl.mode = gl_mode_from_name(a.words.passes);
+  a.picture.gl.wide = a.words.target == "float";
+  a.picture.gl.rgb_scale = static_cast<int>(a.words.rgb_scale);
+  a.picture.samples = static_cast<int>(a.words.msaa);
+  refuse(a.words.msaa != 1 && a.words.msaa != 4,
+         "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
+  if (a.words.tbn != "auto")
+    a.picture.per_pixel = a.words.tbn == "pixel";
+  refuse(a.words.tbn == "vertex" && a.drawing.rest_light,
+         "--tbn vertex for --uv triplanar or a solid structure, expected pixel or auto");
+  refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
+         "--tbn pixel for fixed functions, expected --passes shader");
+  constexpr const char* fixed =
+      " for --uv triplanar or a solid texture, expected shader or cpu (--passes shader, --backend "
+      "cpu)";
+  refuse(a.drawing.rest && a.picture.backend == Backend::gl &&
+             a.picture.gl.mode != GlMode::shader && a.words.compare.empty(),
+         "--passes " + a.words.passes + fixed);
+  if (a.words.compare.empty())
+    return;
+  a.compare = words_of(a.words.compare);
+  for (const std::string& mode : a.compare)
+    refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
+           "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
+  for (const std::string& mode : a.compare)
+    refuse(a.drawing.rest && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
+}
+
+/// What was not said: a picture to show, or the formula alone.
+void complete_light(RenderArguments& a) {
+  const bool lines = a.style == "wireframe", plain = a.words.plain;
+  a.drawing.shade = a.words.shade.value_or(plain || lines ? 0 : 0.75);
+  a.drawing.fill = a.words.fill.value_or(plain ? 0 : 0.35);
+  a.tissue_colors = !a.words.color && !plain && !lines;
+  const double gray = lines && !plain ? 0.1 : 1;
+  a.look.color = a.words.color.value_or(Vec3{gray, gray, gray});
+  a.look.background = a.words.background.value_or(plain ? Vec3{1, 1, 1} : Vec3{0.8, 0.8, 0.8});
+  const bool smooth = plain || a.words.msaa != 1; // by other means, or not at all
+  a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
+}
+
+void complete(RenderArguments& a) {
+  complete_light(a);
+  complete_textures(a);
+  complete_materials(a);
+  complete_modes(a);
+  complete_camera(a);
+  complete_volume(a);
+  const bool laid_on = a.drawing.texcoords || a.look.rest.triplanar;
+  refuse(!laid_on && a.drawing.rest && a.words.uv != "auto",
+         "--uv for solid textures alone, which need none, expected no --uv");
+  refuse(!laid_on && !a.drawing.rest && (a.words.uv != "auto" || a.mapping.edge),
+         "--uv or --uv-scale without texture, expected --texture or --structure");
+  refuse(a.words.uv != "auto" && a.words.uv != "box" && !a.drawing.rest && a.mapping.edge,
+         "--uv-scale for another mapping, expected --uv box or triplanar");
+  refuse(a.words.uv_sharpness && !a.look.rest.triplanar,
+         "--uv-sharpness for another mapping, expected --uv triplanar");
+  if (a.words.uv_sharpness)
+    a.look.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
+  refuse(a.offset_texels && has_solid_structure(a),
+         "--offset-texels for a solid structure, which has none, expected --offset");
+  if (a.words.uv != "auto" && a.words.uv != "triplanar")
+    a.mapping.mapping = uv_mapping_from_name(a.words.uv);
+  refuse(a.light && a.words.light_direction, "--light and --light-direction, expected one of them");
+  if (a.words.light_direction) {
+    a.light = a.words.light_direction;
+    a.drawing.directional = true;
+    refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
+  }
+  refuse(!a.frames.empty() && a.reading.frame.has_value(),
+         "--frame and --frames, expected one of them");
+  std::vector<std::string> inputs{a.surface};
+  for (const auto& [word, layer] : layers_of(a))
+    if (!layer->path.empty())
+      inputs.push_back(layer->path);
+  for (const std::string& path : material_paths(a))
+    inputs.push_back(path);
+  if (std::ranges::find(color_ramp_names(), a.volume.ramp) == color_ramp_names().end())
+    inputs.push_back(a.volume.ramp);
+  check_one_pipe(inputs);
+}
+
+void declare_textures(Program& p, RenderArguments& a) {
+  const auto path_of = [&a](RenderLayer RenderMaterial::*layer) {
+    return [&a, layer](std::int32_t n) -> std::string& { return (a.materials[n].*layer).path; };
+  };
+  p.option("--texture", a.base.path, "[N=]FILE",
+           "colours: PNG or PNM, noise[:key=value,...] or veins[:...]; N=: of material N")
+      .numbered(path_of(&RenderMaterial::base));
+  p.option("--detail", a.detail.path, "[N=]FILE", "colours added to them, likewise")
+      .numbered(path_of(&RenderMaterial::detail));
+  p.option("--reflection", a.reflection.path, "[N=]FILE", "what a moist surface mirrors, added too")
+      .numbered(path_of(&RenderMaterial::reflection));
+  p.option("--structure", a.structure.path, "[N=]FILE",
+           "heights to emboss: brightness of a PNG or PNM; noise or veins")
+      .numbered(path_of(&RenderMaterial::structure));
+  p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
+      .one_of(group_by_names());
+  p.option("--sphere", a.words.sphere, "LIST",
+           "textures seen as in a mirror: texture, detail, reflection, structure; none");
+  p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
+  p.option("--wrap", a.words.wrap, "WORD", "repeat, clamp, mirror; or TEXTURE=WORD,...");
+  p.option("--offset", a.offset, "D", "shift of the heights in texture coordinates").range(-1, 1);
+  p.option("--offset-texels", a.offset_texels, "N", "the same in texels of the structure");
+  p.option("--light", a.light, "X,Y,Z", "place of the light in mm, else above the camera, left");
+  p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
+  p.option("--shade", a.words.shade, "K", "share of Lambert's law, 0 to 1 (default 0.75)")
+      .range(0, 1);
+  p.option("--fill", a.words.fill, "F", "of a second light in the shade, 0 to 1 (default 0.35)")
+      .range(0, 1);
+  p.flag("--plain", a.words.plain,
+         "the relief alone: no shade, white on white, a sample a pixel, unless told otherwise");
+  p.option("--color", a.words.color, "[N=]R,G,B",
+           "factor of the colours, 0 to 1, else the material's colour where there is no image")
+      .range(0, 1)
+      .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
+  p.option("--background", a.words.background, "R,G,B", "0 to 1 (default 0.8,0.8,0.8)").range(0, 1);
+  p.option("--uv", a.words.uv, "MAP",
+           "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
+      .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
+  p.option("--uv-scale", a.mapping.edge, "MM",
+           "edge of the texture for box and triplanar, else half the mesh")
+      .positive();
+  p.option("--uv-sharpness", a.words.uv_sharpness, "P",
+           "of triplanar: the power that blends its projections, else 4")
+      .range(1, 64);
+}
+
+} // namespace
+
+void declare(Program& p, RenderArguments& a) {
+  declare_textures(p, a);
+  p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
+      .one_of({"textured", "flat", "wireframe"});
+  declare_camera(p, a);
+  p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
+      .one_of(backend_names());
+  p.option("--passes", a.words.passes, "N", "with OpenGL: 3, 2, 1, or shader")
+      .one_of(gl_mode_names());
+  p.option("--gl-target", a.words.target, "KIND", "of OpenGL's colours: float, 8bit")
+      .one_of({"float", "8bit"});
+  p.option("--rgb-scale", a.words.rgb_scale, "S", "of --passes 1: 2, or 1 (darker)").range(1, 2);
+  p.option("--tbn", a.words.tbn, "WHERE",
+           "frame of the light: vertex, pixel; auto: as the mode can")
+      .one_of({"auto", "vertex", "pixel"});
+  p.option("--compare", a.words.compare, "MODES", "side by side, such as 3,2,1,shader,cpu");
+  p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
+  p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
+      .range(-1, 1e15);
+  p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
+  p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
+  p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
+      .range(1, 100000);
+  p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
+  declare_volume(p, a);
+  p.check([&a] { complete(a); });
+}
+
+} // namespace gewebe::cli

@@ -1,0 +1,80 @@
+#pragma once
+// What emboss-render is told.
+
+#include "render/picture.h"
+#include "shading/camera.h"
+#include "shading/drawing.h"
+#include "shading/look.h"
+#include "shading/uv.h"
+#include "shading/volume_view.h"
+#include "tools/render/surface_file.h"
+#include "tools/shared/cli.h"
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gewebe::cli {
+
+/// One of the four textures.
+struct RenderLayer {
+  std::string path;                  ///< "": absent
+  std::optional<SolidTexture> solid; ///< instead of a file
+  TextureOptions options;
+};
+
+/// What a material, a part or an object has for itself; the rest is as for all.
+struct RenderMaterial {
+  RenderLayer base, detail, reflection, structure;
+  std::optional<Vec3> color;
+};
+
+/// What a volume alone is asked for, as words and as what they mean.
+struct RenderVolume {
+  std::string slice, maximum, ramp;
+  std::vector<double> range;
+  VolumeViewOptions view; ///< its mode, axis and place
+};
+
+struct RenderArguments {
+  std::string surface = "-";
+  RenderLayer base, detail, reflection, structure;
+  std::map<std::int32_t, RenderMaterial> materials;
+  Look look;                  ///< colours; its textures are read later
+  bool tissue_colors = false; ///< what has neither colour nor texture has that of its material
+  std::optional<Vec3> light;
+  double offset = 0.02;
+  std::optional<double> offset_texels; ///< of the structure instead
+  std::string style = "textured";
+  std::vector<std::string> compare; ///< modes side by side
+  SurfaceReadOptions reading;
+  std::string frames;                           ///< of a result, "": one
+  std::optional<std::int64_t> turn, turn_light; ///< pictures in one turn
+  CameraOptions camera;
+  DrawingOptions drawing;
+  UvOptions mapping;
+  PictureOptions picture;
+  RenderVolume volume;
+
+  // Words that declare() turns into the above.
+  struct Words {
+    std::string size = "512", backend = "auto", uv = "auto", view, passes = "shader",
+                target = "float", tbn = "auto", filter = "mipmap", wrap = "repeat",
+                sphere = "reflection", by = "material", compare;
+    std::vector<double> orbit{0, 0};
+    std::int64_t msaa = 1, rgb_scale = 2;
+    std::optional<Vec3> light_direction, color, background;
+    std::optional<double> shade, fill;
+    std::optional<std::int64_t> supersample; ///< nothing: what is fit for a surface
+    bool plain = false;
+    std::optional<std::int64_t> uv_sharpness;
+  } words;
+};
+
+/// Declares the options and the checks that hold them against each other.
+void declare(Program& program, RenderArguments& arguments);
+
+} // namespace gewebe::cli

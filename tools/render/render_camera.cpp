@@ -1,0 +1,51 @@
+#include "tools/render/render_camera.h"
+
+#include <cmath>
+#include <tuple>
+
+namespace gewebe::cli {
+namespace {
+
+void refuse(bool wrong, const std::string& what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+} // namespace
+
+void declare_camera(Program& p, RenderArguments& a) {
+  p.option("--view", a.words.view, "SIDE",
+           "front (if no --eye), back, left, right, top, bottom, iso")
+      .one_of(view_names());
+  p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
+      .count(2);
+  p.option("--distance", a.camera.distance, "MM", "of the eye, else so that all is seen")
+      .positive();
+  p.option("--eye", a.camera.eye, "X,Y,Z", "place of the camera in mm");
+  p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
+  p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
+  p.option("--fov", a.camera.fov, "DEG", "angle across the shorter side").range(1, 170);
+  p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
+  p.option("--supersample", a.words.supersample, "N",
+           "a pixel is the mean of N x N samples (default 2; volumes, --msaa: 1)")
+      .range(1, 8);
+  p.option("--msaa", a.words.msaa, "N", "1, or 4 samples along outlines").range(1, 4);
+}
+
+void complete_camera(RenderArguments& a) {
+  refuse(a.camera.eye && (!a.words.view.empty() || a.camera.distance),
+         "--eye with --view or --distance, expected one way to place the camera");
+  if (!a.words.view.empty())
+    a.camera.view = a.words.view;
+  a.camera.azimuth = a.words.orbit[0];
+  a.camera.elevation = a.words.orbit[1];
+  refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),
+         "--orbit: expected an azimuth up to 3600 and an elevation from -90 to 90 degrees");
+  try {
+    std::tie(a.picture.width, a.picture.height) = picture_size_from_text(a.words.size);
+  } catch (const Error& error) {
+    throw UsageError(std::string("--size: ") + error.what());
+  }
+}
+
+} // namespace gewebe::cli

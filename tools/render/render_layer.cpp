@@ -1,0 +1,82 @@
+#include "tools/render/render_layer.h"
+
+#include "formats/image/image_file.h"
+
+namespace gewebe::cli {
+namespace {
+
+void refuse(bool wrong, const std::string& what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+/// "noise" and "veins", which are no files.
+void complete_solid(const std::string& word, RenderLayer& layer) {
+  if (!is_solid_texture(layer.path))
+    return;
+  const std::string option = "--" + word;
+  refuse(option == "--reflection",
+         "--reflection: '" + layer.path + "' is no picture of the surroundings, expected a file");
+  refuse(layer.options.sphere, "--sphere: " + word + " is solid, expected a texture from a file");
+  try {
+    layer.solid = solid_texture_from_text(layer.path);
+  } catch (const Error& error) {
+    throw UsageError(option + ": " + error.what());
+  }
+  refuse(option == "--structure" && (layer.path.find("ground=") != std::string::npos ||
+                                     layer.path.find("color=") != std::string::npos),
+         "--structure: heights have no colour, expected neither ground nor color");
+  layer.solid->filtered = layer.options.filter == TextureFilter::mipmap;
+}
+
+void take(std::optional<Texture>& image, std::optional<SolidTexture>& solid,
+          const RenderLayer& layer, const Context& context) {
+  if (layer.path.empty())
+    return;
+  image.reset();
+  solid = layer.solid;
+  if (solid)
+    return;
+  Input input(layer.path);
+  image = texture_from(read_image(input, context), layer.options);
+}
+
+} // namespace
+
+void complete_layer(RenderArguments& a, const std::string& word, RenderLayer& layer) {
+  if (layer.path.empty())
+    return;
+  complete_solid(word, layer);
+  DrawingOptions& drawing = a.drawing;
+  const bool structure = word == "structure";
+  if (layer.solid || (a.words.uv == "triplanar" && !layer.options.sphere)) {
+    drawing.rest = true;
+    drawing.rest_normals = drawing.rest_normals || !layer.solid || structure;
+    drawing.rest_light = drawing.rest_light || structure;
+    a.look.rest.triplanar = a.look.rest.triplanar || !layer.solid;
+    return;
+  }
+  (layer.options.sphere ? drawing.sphere : drawing.texcoords) = true;
+  drawing.structure = drawing.structure || structure;
+  drawing.texcoords = drawing.texcoords || structure;
+}
+
+void take_textures(Look& look, const RenderLayers& layers, const Context& context) {
+  const auto& [base, detail, reflection, structure] = layers;
+  take(look.base, look.solid_base, *base, context);
+  take(look.detail, look.solid_detail, *detail, context);
+  if (!reflection->path.empty()) {
+    Input input(reflection->path);
+    look.reflection = texture_from(read_image(input, context), reflection->options);
+  }
+  if (structure->path.empty())
+    return;
+  look.structure.reset();
+  look.solid_structure = structure->solid;
+  if (look.solid_structure)
+    return;
+  Input input(structure->path);
+  look.structure = texture_from(read_heights(input, context), structure->options);
+}
+
+} // namespace gewebe::cli

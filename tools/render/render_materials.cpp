@@ -1,0 +1,135 @@
+#include "tools/render/render_materials.h"
+
+#include "shading/tissue_color.h"
+#include "tools/render/render_layer.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace gewebe::cli {
+namespace {
+
+constexpr std::array<RenderLayer RenderMaterial::*, 4> layers{
+    &RenderMaterial::base, &RenderMaterial::detail, &RenderMaterial::reflection,
+    &RenderMaterial::structure};
+constexpr std::array<const char*, 4> words{"texture", "detail", "reflection", "structure"};
+
+} // namespace
+
+void complete_materials(RenderArguments& a) {
+  if (a.materials.empty() && a.words.by != "material")
+    throw UsageError("--by without a number before a texture or colour, expected such as "
+                     "--texture 1=FILE");
+  a.drawing.group_by = group_by_from_name(a.words.by);
+  for (auto& [number, material] : a.materials) {
+    a.drawing.groups.push_back(number);
+    const RenderLayers of_all{&a.base, &a.detail, &a.reflection, &a.structure};
+    for (std::size_t n = 0; n < layers.size(); ++n) {
+      RenderLayer& layer = material.*layers[n];
+      layer.options = of_all[n]->options;
+      complete_layer(a, words[n], layer);
+    }
+  }
+}
+
+bool has_solid_structure(const RenderArguments& a) {
+  return a.structure.solid || std::ranges::any_of(a.materials, [](const auto& material) {
+           return material.second.structure.solid.has_value();
+         });
+}
+
+std::vector<std::string> material_paths(const RenderArguments& a) {
+  std::vector<std::string> paths;
+  for (const auto& [number, material] : a.materials)
+    for (const auto layer : layers)
+      if (!(material.*layer).path.empty())
+        paths.push_back((material.*layer).path);
+  return paths;
+}
+
+void add_material_looks(Look& look, const RenderArguments& a, const Context& context) {
+  std::vector<Look> others;
+  for (const auto& [number, material] : a.materials) {
+    Look& own = others.emplace_back(look);
+    take_textures(own,
+                  {&material.base, &material.detail, &material.reflection, &material.structure},
+                  context);
+    own.color = material.color.value_or(look.color);
+  }
+  look.others = std::move(others);
+}
+
+namespace {
+
+Vec3 color_of(const Surface& surface, std::size_t material) {
+  return tissue_color(material < surface.materials.size() ? surface.materials[material] : "",
+                      material);
+}
+
+/// A base from an image has its own colours.
+bool takes_tissue_color(const Look& look) {
+  return !look.base;
+}
+
+} // namespace
+
+TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>& surfaces,
+                           Look& look, DrawingOptions& drawing) {
+  if (!a.tissue_colors || surfaces.empty())
+    return;
+  if (!a.materials.empty()) { // as they are numbered there
+    if (takes_tissue_color(look))
+      look.color = color_of(surfaces.front(), 0);
+    auto own = look.others.begin();
+    for (const auto& [number, material] : a.materials) {
+      const auto n = static_cast<std::size_t>(number);
+      const bool object = a.words.by == "object" && n < surfaces.size();
+      if (!material.color && takes_tissue_color(*own))
+        own->color = object                 ? color_of(surfaces[n], 0)
+                     : a.words.by == "part" ? look.color
+                                            : color_of(surfaces.front(), n);
+      ++own;
+    }
+    return;
+  }
+  if (!takes_tissue_color(look))
+    return;
+  renumbers_ = true;
+  for (const Surface& surface : surfaces) {
+    std::vector<std::int32_t> numbers = surface.mesh.material;
+    if (numbers.empty())
+      numbers.push_back(0);
+    std::ranges::sort(numbers);
+    const auto [first, last] = std::ranges::unique(numbers);
+    numbers.erase(first, last);
+    for (const std::int32_t number : numbers) {
+      const Vec3 color = color_of(surface, static_cast<std::size_t>(number));
+      if (std::ranges::find(colors_, color) == colors_.end())
+        colors_.push_back(color);
+    }
+  }
+  look.color = colors_.front();
+  drawing.group_by = GroupBy::material;
+  for (std::size_t n = 1; n < colors_.size(); ++n) {
+    drawing.groups.push_back(static_cast<std::int32_t>(n));
+    Look& own = look.others.emplace_back(look);
+    own.others.clear();
+    own.color = colors_[n];
+  }
+}
+
+void TissueColors::number_materials(std::vector<Surface>& surfaces) const {
+  if (!renumbers_ || colors_.size() == 1)
+    return;
+  for (Surface& surface : surfaces) {
+    surface.mesh.material.resize(surface.mesh.triangles.size());
+    for (std::int32_t& number : surface.mesh.material) {
+      const auto found =
+          std::ranges::find(colors_, color_of(surface, static_cast<std::size_t>(number)));
+      number = found == colors_.end() ? 0 : static_cast<std::int32_t>(found - colors_.begin());
+    }
+  }
+}
+
+} // namespace gewebe::cli

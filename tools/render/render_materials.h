@@ -1,0 +1,41 @@
+#pragma once
+// Textures by material, part or object.
+
+#include "shading/drawing.h"
+#include "tools/render/render_arguments.h"
+
+#include <string>
+#include <vector>
+
+namespace gewebe::cli {
+
+/// Gives the textures of materials the options of those of all, and the drawing what they need.
+/// \throw UsageError
+void complete_materials(RenderArguments& arguments);
+
+/// Whether the structure of some material, or of all, is solid.
+bool has_solid_structure(const RenderArguments& arguments);
+
+/// Their files.
+std::vector<std::string> material_paths(const RenderArguments& arguments);
+
+/// Reads their textures: the looks of the groups 1, 2, … in `look`, which holds what is for all.
+/// \throw Error with place
+void add_material_looks(Look& look, const RenderArguments& arguments, const Context& context);
+
+/// Colours of the materials for looks that were given neither colour nor image, see tissue_color().
+/// Where no number was given there is a group for each colour, whatever `--by` says: the triangles'
+/// materials are numbered anew.
+class TissueColors {
+public:
+  /// \param surfaces the first ones that are drawn
+  TissueColors(const RenderArguments& arguments, const std::vector<Surface>& surfaces, Look& look,
+               DrawingOptions& drawing);
+  void number_materials(std::vector<Surface>& surfaces) const;
+
+private:
+  bool renumbers_ = false;
+  std::vector<Vec3> colors_; ///< of the groups
+};
+
+} // namespace gewebe::cli

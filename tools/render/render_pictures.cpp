@@ -1,0 +1,244 @@
+#include "tools/render/render_pictures.h"
+
+#include "shading/angles.h"
+#include "shading/style.h"
+#include "tools/render/render_layer.h"
+#include "tools/render/render_materials.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace gewebe::cli {
+namespace {
+
+/// The look with its textures; one that was not asked for is not read.
+Look look_of(const RenderArguments& a, const Context& context) {
+  Look look = a.look;
+  take_textures(look, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
+  add_material_looks(look, a, context);
+  return look;
+}
+
+std::vector<PictureOptions> options_of(const RenderArguments& a) {
+  if (a.compare.empty())
+    return {a.picture};
+  std::vector<PictureOptions> all;
+  for (const std::string& mode : a.compare) {
+    PictureOptions options = a.picture;
+    options.backend = mode == "cpu" ? Backend::cpu : Backend::gl;
+    if (mode != "cpu")
+      options.gl.mode = gl_mode_from_name(mode);
+    if (mode != "cpu" && options.gl.mode != GlMode::shader)
+      options.per_pixel.reset();
+    all.push_back(options);
+  }
+  return all;
+}
+
+/// The light walked around the target, about what points up in the picture.
+Vec3 turned_light(const Vec3& light, const Camera& camera, double part, bool directional) {
+  const Vec3 from = directional ? Vec3{} : camera.target, k = camera.up, v = light - from;
+  const Vec3 along = k * dot(k, v), across = v - along;
+  const auto [cosine, sine] = cos_sin(360 * part);
+  return from + along + across * cosine + cross(k, across) * sine;
+}
+
+} // namespace
+
+Pictures::Pictures(Run& run, const RenderArguments& arguments)
+    : run_(run), arguments_(arguments),
+      look_(run.timed("textures", [&] { return look_of(arguments, run.context()); })),
+      options_(options_of(arguments)), drawing_(arguments.drawing) {}
+
+void Pictures::start(const std::vector<Surface>& surfaces) {
+  const RenderArguments& a = arguments_;
+  box_ = rest_box(surfaces);
+  camera_ = camera_of(0);
+  drawing_.light = a.light.value_or(default_light(*camera_));
+  first_light_ = drawing_.light;
+  drawing_.offset = {a.offset, a.offset};
+  const auto structured = std::ranges::find_if(
+      look_.others, [](const Look& look) { return look.structure.has_value(); });
+  if (const Look& look = look_.structure || structured == look_.others.end() ? look_ : *structured;
+      a.offset_texels && look.structure)
+    drawing_.offset = {*a.offset_texels / look.structure->width(),
+                       *a.offset_texels / look.structure->height()};
+  tissue_.emplace(a, surfaces, look_, drawing_);
+  if (drawing_.rest)
+    place_at_rest(look_, box_, a.mapping.edge);
+  run_.timed("start", [&] {
+    for (const PictureOptions& options : options_)
+      modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});
+  });
+}
+
+Camera Pictures::camera_of(std::uint64_t number) const {
+  const RenderArguments& a = arguments_;
+  CameraOptions options = a.camera;
+  if (a.turn)
+    options.azimuth += 360.0 * static_cast<double>(number) / static_cast<double>(*a.turn);
+  return make_camera(options, box_, a.picture.width, a.picture.height);
+}
+
+/// Places camera and light of a picture; whether one of them is elsewhere than before.
+bool Pictures::place(std::uint64_t number) {
+  const RenderArguments& a = arguments_;
+  const Vec3 eye = drawing_.camera.eye, light = drawing_.light;
+  camera_ = camera_of(number);
+  drawing_.camera = *camera_;
+  if (a.turn_light) {
+    const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
+    drawing_.light = turned_light(first_light_, *camera_, part, drawing_.directional);
+  }
+  return drawing_.camera.eye != eye || drawing_.light != light;
+}
+
+std::vector<Surface> Pictures::styled(std::vector<Surface> surfaces) const {
+  for (Surface& surface : surfaces) {
+    if (arguments_.style == "flat")
+      surface = faceted(surface);
+    if (arguments_.style == "wireframe")
+      surface = wireframe(surface, *camera_, 1.25, arguments_.picture.height);
+  }
+  return surfaces;
+}
+
+namespace {
+
+/// Whether two surfaces have the same triangles, coordinates, materials and rest.
+bool same_but_points(const Surface& kept, const Surface& now, bool coordinates) {
+  const TriangleMesh &a = kept.mesh, &b = now.mesh;
+  return a.points.size() == b.points.size() && a.triangles == b.triangles &&
+         (!coordinates || b.texcoords.empty() || a.texcoords == b.texcoords) && a.part == b.part &&
+         a.material == b.material && kept.rest == now.rest && !now.rest.empty();
+}
+
+} // namespace
+
+/// What the surfaces have that those drawn last had not; takes them over.
+std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool placed) {
+  const auto each = [&](const auto& same) {
+    return pictures_ > 1 && surfaces_.size() == surfaces.size() &&
+           std::equal(surfaces_.begin(), surfaces_.end(), surfaces.begin(), same);
+  };
+  if (arguments_.style != "textured") { // made of the points, and of the camera
+    const bool same =
+        pictures_ > 1 && plain_.size() == surfaces.size() &&
+        std::equal(surfaces.begin(), surfaces.end(), plain_.begin(),
+                   [](const Surface& s, const Drawn& drawn) {
+                     return s.mesh.points == drawn.points && s.mesh.triangles == drawn.triangles;
+                   });
+    if (same && !placed)
+      return std::nullopt;
+    plain_.clear();
+    for (const Surface& surface : surfaces)
+      plain_.push_back({surface.mesh.points, surface.mesh.triangles});
+    surfaces_ = styled(std::move(surfaces));
+    return DrawingChange::all;
+  }
+  if (each([&](const Surface& kept, const Surface& now) {
+        return kept.mesh.points == now.mesh.points && kept.mesh.normals == now.mesh.normals &&
+               kept.mesh.triangles == now.mesh.triangles &&
+               (!drawing_.rest || kept.rest == now.rest);
+      }))
+    return placed ? std::optional(DrawingChange::view) : std::nullopt;
+  const bool coordinates = !arguments_.mapping.mapping; // else they are made here
+  if (each([&](const Surface& kept, const Surface& now) {
+        return same_but_points(kept, now, coordinates);
+      })) {
+    for (std::size_t n = 0; n < surfaces.size(); ++n) {
+      surfaces_[n].mesh.points = std::move(surfaces[n].mesh.points);
+      surfaces_[n].mesh.normals = std::move(surfaces[n].mesh.normals);
+    }
+    return DrawingChange::points;
+  }
+  surfaces_ = std::move(surfaces);
+  return DrawingChange::all;
+}
+
+const Image& Pictures::of(std::vector<Surface> surfaces) {
+  if (modes_.empty())
+    start(surfaces);
+  tissue_->number_materials(surfaces);
+  const bool placed = place(pictures_++);
+  const auto change = run_.timed("compare", [&] { return take(std::move(surfaces), placed); });
+  kept_last_ = !change;
+  if (kept_last_) {
+    ++kept_;
+    return last_;
+  }
+  if (*change == DrawingChange::all && drawing_.texcoords)
+    mapped_ = run_.timed(
+        "prepare", [&] { return add_texcoords(surfaces_, arguments_.mapping, run_.context()); });
+  std::vector<Image> images;
+  std::array<const Drawing*, 2> drawings{}; // by what stands at the vertices
+  for (Mode& mode : modes_) {
+    drawing_.per_pixel = mode.painter->per_pixel();
+    const Drawing*& drawing = drawings[drawing_.per_pixel ? 1 : 0];
+    if (drawing == nullptr) {
+      DrawingMaker& maker = makers_[drawing_.per_pixel ? 1 : 0];
+      drawing = run_.timed(
+          "prepare", [&] { return &maker.make(surfaces_, drawing_, *change, run_.context()); });
+      tell_groups(*drawing);
+    }
+    images.push_back(
+        run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
+    if (pictures_ == 1 && !mode.report.gl_failure.empty())
+      run_.warn(mode.report.gl_failure + "; drawn without OpenGL (--backend cpu)");
+  }
+  last_ = images.size() == 1 ? std::move(images.front()) : side_by_side(images);
+  return last_;
+}
+
+/// How many triangles have which look; a look that none has is a mistake more likely than not.
+void Pictures::tell_groups(const Drawing& drawing) {
+  if (groups_told_ || arguments_.materials.empty() || drawing.group_start.empty() ||
+      drawing.triangles.empty())
+    return;
+  groups_told_ = true;
+  std::vector<std::uint64_t> counts;
+  for (std::size_t g = 0; g < group_count(drawing); ++g)
+    counts.push_back(triangles_of_group(drawing, g).size());
+  run_.stats().set("triangles_by_look", counts);
+  for (std::size_t g = 1; g < counts.size(); ++g)
+    if (counts[g] == 0)
+      run_.warn("no triangle is of " + arguments_.words.by + " " +
+                std::to_string(drawing_.groups[g - 1]));
+}
+
+void Pictures::tell(Stats& stats, const Image& last) const {
+  if (drawing_.texcoords)
+    stats.set("surfaces_mapped", mapped_);
+  stats.set("eye", camera_->eye);
+  stats.set("looks_at", camera_->target);
+  stats.set("light", drawing_.light);
+  stats.set("pictures", pictures_);
+  stats.set("pictures_kept", kept_);
+  DrawingCounts counts;
+  for (const DrawingMaker& maker : makers_) {
+    counts.splits += maker.counts().splits;
+    counts.frames += maker.counts().frames;
+    counts.vertices += maker.counts().vertices;
+  }
+  stats.set("vertex_splits", counts.splits);
+  stats.set("frames_made", counts.frames);
+  stats.set("vertices_made", counts.vertices);
+  const PictureReport& told = modes_.back().report;
+  stats.set("backend", backend_names()[static_cast<std::size_t>(told.backend)]);
+  if (told.backend == Backend::gl) {
+    stats.set("platform", told.platform);
+    stats.set("renderer", told.renderer);
+    stats.set("target", told.target);
+  }
+  stats.set("passes", told.passes);
+  if (told.backend == Backend::gl)
+    stats.set("uploads", told.uploads);
+  stats.set("triangles_drawn", told.triangles);
+  if (told.backend == Backend::cpu)
+    stats.set("samples_covered", told.covered);
+  stats.set("width", std::uint64_t{last.width});
+  stats.set("height", std::uint64_t{last.height});
+}
+
+} // namespace gewebe::cli

@@ -1,0 +1,67 @@
+#pragma once
+// Pictures of surfaces as emboss-render was told to make them.
+
+#include "render/picture.h"
+#include "shading/image.h"
+#include "tools/render/render_arguments.h"
+#include "tools/render/render_materials.h"
+#include "tools/shared/cli.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace gewebe::cli {
+
+/// Camera and light stand where the first surfaces at rest place them, and turn as they were told.
+/// What a sequence keeps is kept: textures; coordinates and vertices as they are split while the
+/// triangles are the same; frames of tangents while no point moves; the picture while camera and
+/// light stand still too.
+class Pictures {
+public:
+  /// Reads the textures. \throw Error with place
+  Pictures(Run& run, const RenderArguments& arguments);
+  const Image& of(std::vector<Surface> surfaces);
+  /// Whether the last picture is that before it.
+  bool kept() const { return kept_last_; }
+  /// What is known at the end.
+  void tell(Stats& stats, const Image& last) const;
+
+private:
+  struct Drawn {
+    std::vector<Vec3> points;
+    std::vector<Triangle> triangles;
+  };
+  struct Mode {
+    std::unique_ptr<Painter> painter;
+    PictureReport report;
+  };
+  void start(const std::vector<Surface>& surfaces);
+  Camera camera_of(std::uint64_t number) const;
+  bool place(std::uint64_t number);
+  std::optional<DrawingChange> take(std::vector<Surface> surfaces, bool placed);
+  void tell_groups(const Drawing& drawing);
+  std::vector<Surface> styled(std::vector<Surface> surfaces) const;
+
+  Run& run_;
+  const RenderArguments& arguments_;
+  Look look_;
+  std::vector<PictureOptions> options_; ///< of the modes to compare, or one
+  std::vector<Mode> modes_;
+  std::optional<Camera> camera_;
+  DrawingOptions drawing_;
+  std::optional<TissueColors> tissue_;
+  std::array<DrawingMaker, 2> makers_; ///< without and with frames for each pixel
+  std::vector<Surface> surfaces_;      ///< as they are drawn
+  std::vector<Drawn> plain_;           ///< surfaces drawn in another style
+  Box3 box_;                           ///< at rest
+  Vec3 first_light_;
+  Image last_;
+  bool kept_last_ = false;
+  bool groups_told_ = false;
+  std::uint64_t pictures_ = 0, kept_ = 0, mapped_ = 0;
+};
+
+} // namespace gewebe::cli

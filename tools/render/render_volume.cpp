@@ -1,0 +1,137 @@
+#include "tools/render/render_volume.h"
+
+#include "formats/image/image_file.h"
+#include "formats/volume/volume_plugin.h"
+#include "raster/raster_cpu.h"
+#include "shading/color_ramp.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+namespace gewebe::cli {
+namespace {
+
+bool is_ramp_name(const std::string& word) {
+  return std::ranges::find(color_ramp_names(), word) != color_ramp_names().end();
+}
+
+VolumeAxis axis_of(const std::string& option, const std::string& word) {
+  const std::vector<std::string> names{"x", "y", "z", "view"};
+  const auto found = std::ranges::find(names, word);
+  if (found == names.end())
+    throw UsageError(option + ": '" + word + "' is no axis, expected x, y, z or view");
+  return static_cast<VolumeAxis>(found - names.begin());
+}
+
+double place_of(const std::string& word) {
+  double place = 0;
+  const char* const end = word.data() + word.size();
+  const auto [stop, failure] = std::from_chars(word.data(), end, place);
+  if (failure != std::errc() || stop != end || !std::isfinite(place))
+    throw UsageError("--slice: '" + word + "' is no place, expected a number of mm");
+  return place;
+}
+
+ColorRamp ramp_of(const std::string& word, const Context& context) {
+  if (is_ramp_name(word))
+    return color_ramp_from_name(word);
+  Input input(word);
+  const Image image = read_image(input, context);
+  return at(input.name(), [&] { return color_ramp_from_image(image); });
+}
+
+void refuse(bool wrong, const Input& input, const std::string& what) {
+  if (wrong)
+    throw UsageError(input.name(), what);
+}
+
+} // namespace
+
+void declare_volume(Program& p, RenderArguments& a) {
+  p.option("--slice", a.volume.slice, "AXIS=MM",
+           "of a volume: across x, y, z or view, at a place or in the middle");
+  p.option("--maximum", a.volume.maximum, "AXIS",
+           "of a volume: the greatest values along x, y, z, or view (the default)");
+  p.option("--ramp", a.volume.ramp, "RAMP",
+           "colours of its values: gray, heat, rainbow, or an image");
+  p.option("--range", a.volume.range, "A,B", "values with the first and last colour, else all")
+      .count(2);
+}
+
+void complete_volume(RenderArguments& a) {
+  RenderVolume& v = a.volume;
+  if (!v.slice.empty() && !v.maximum.empty())
+    throw UsageError("--slice and --maximum, expected one of them");
+  if (!v.slice.empty()) {
+    v.view.mode = VolumeMode::slice;
+    const std::size_t mid = v.slice.find('=');
+    v.view.axis = axis_of("--slice", v.slice.substr(0, mid));
+    if (mid != std::string::npos)
+      v.view.place = place_of(v.slice.substr(mid + 1));
+  } else if (!v.maximum.empty()) {
+    v.view.axis = axis_of("--maximum", v.maximum);
+  }
+  if (!v.range.empty() && !(v.range[0] < v.range[1]))
+    throw UsageError("--range: expected two values, the smaller one first");
+  if (v.view.axis != VolumeAxis::view &&
+      (a.camera.eye || !a.words.view.empty() || a.camera.azimuth != 0 || a.camera.elevation != 0))
+    throw UsageError("--view, --orbit or --eye for an axis, expected the axis view");
+}
+
+void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
+  const RenderVolume& v = a.volume;
+  if (kind != Kind::vdb)
+    return refuse(!v.slice.empty() || !v.maximum.empty() || !v.ramp.empty() || !v.range.empty(),
+                  input,
+                  "--slice, --maximum, --ramp or --range for no volume, expected none of them");
+  refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
+         "a texture for a volume, expected --ramp or none");
+  refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||
+             a.picture.samples != 1,
+         input, "--style, --compare, --backend gl or --msaa for a volume, expected none of them");
+  refuse(a.light || a.words.shade || a.words.fill || a.words.plain, input,
+         "a light, --shade, --fill or --plain for a volume, expected none");
+  refuse(!a.reading.unit.empty() || !a.reading.object.empty() || a.reading.frame ||
+             !a.frames.empty(),
+         input, "--unit, --object or --frame for a volume, expected none of them");
+}
+
+Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
+  const Context& context = run.context();
+  const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "gray" : a.volume.ramp, context);
+  VolumeViewOptions options = a.volume.view;
+  const std::uint32_t finer = static_cast<std::uint32_t>(a.words.supersample.value_or(1));
+  options.camera = a.camera;
+  options.width = a.picture.width * finer;
+  options.height = a.picture.height * finer;
+  if (std::max(options.width, options.height) > max_picture_side)
+    throw UsageError("--size times --supersample: expected sides up to " +
+                     std::to_string(max_picture_side));
+  std::string bytes = run.timed("read", [&] { return input.read_all(context.max_memory); });
+  const VolumeView view = run.timed(
+      "draw", [&] { return view_volume_bytes(std::move(bytes), input.name(), options, context); });
+  double least = view.least, greatest = view.greatest;
+  if (!a.volume.range.empty()) {
+    least = a.volume.range[0];
+    greatest = a.volume.range[1];
+  } else if (!(least < greatest)) {
+    run.warn(input.name() + ": all values are equal");
+    greatest = least + 1;
+  }
+  Image image = shrunk(colored(view.values, view.width, view.height, least, greatest, ramp), finer);
+  const auto [low, high] = std::ranges::minmax_element(view.values);
+  Stats& stats = run.stats();
+  stats.set("range", std::vector<double>{least, greatest});
+  stats.set("seen", std::vector<double>{static_cast<double>(*low), static_cast<double>(*high)});
+  stats.set("looks_at", view.camera.target);
+  stats.set("looks_along", view.camera.back * -1.0);
+  stats.set("width_mm", 2 * view.half_width);
+  stats.set("height_mm", 2 * view.half_height);
+  stats.set("width", std::uint64_t{image.width});
+  stats.set("height", std::uint64_t{image.height});
+  return image;
+}
+
+} // namespace gewebe::cli

@@ -1,0 +1,22 @@
+#pragma once
+// emboss-render for volumes.
+
+#include "formats/stream/kind.h"
+#include "formats/stream/stream.h"
+#include "shading/image.h"
+#include "tools/render/render_arguments.h"
+#include "tools/shared/cli.h"
+
+namespace gewebe::cli {
+
+/// Declares the options that only volumes have.
+void declare_volume(Program& program, RenderArguments& arguments);
+/// Checks those options and turns their words into numbers. \throw UsageError
+void complete_volume(RenderArguments& arguments);
+/// \throw UsageError for options that an input of that kind has no use for
+void check_kind(const RenderArguments& arguments, const Input& input, Kind kind);
+
+/// The picture of the volume. \throw Error with place
+Image volume_picture(Run& run, const RenderArguments& arguments, Input& input);
+
+} // namespace gewebe::cli

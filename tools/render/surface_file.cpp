@@ -1,0 +1,122 @@
+#include "tools/render/surface_file.h"
+
+#include "base/error.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/model/ela.h"
+#include "formats/results/results.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+std::vector<Surface> one(TriangleMesh mesh) {
+  std::vector<Surface> surfaces(1);
+  surfaces[0].mesh = std::move(mesh);
+  return surfaces;
+}
+
+std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& options) {
+  const std::string& path = input.name();
+  if (path == "-")
+    throw Error(path, "a result comes by a pipe, expected the name of its file");
+  const ResultIndex index = read_result_index(path);
+  const auto frames = static_cast<std::int64_t>(index.times.size());
+  const std::int64_t frame = options.frame.value_or(-1);
+  if (frame < -1 || frame >= frames || frames == 0)
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(frames - 1));
+  std::vector<Surface> surfaces;
+  const std::vector<std::string> names =
+      options.object.empty() ? index.objects : std::vector<std::string>{options.object};
+  for (const std::string& name : names) {
+    const std::int64_t which = frame < 0 ? frames - 1 : frame;
+    ResultSurface read = read_result_surface(path, name, static_cast<std::size_t>(which));
+    if (read.there || !options.object.empty())
+      surfaces.push_back({std::move(read.mesh), std::move(read.rest), std::move(read.materials)});
+  }
+  return surfaces;
+}
+
+std::int64_t whole_number(const Input& input, const std::string& word, const std::string& part) {
+  std::int64_t value = 0;
+  const auto [rest, status] = std::from_chars(part.data(), part.data() + part.size(), value);
+  if (status != std::errc{} || rest != part.data() + part.size())
+    throw UsageError(input.name(), "--frames: '" + word + "', expected all, K, A:B or A:B:STEP");
+  return value;
+}
+
+void refuse(bool wrong, const Input& input, const char* what) {
+  if (wrong)
+    throw UsageError(input.name(), what);
+}
+
+} // namespace
+
+std::vector<std::int64_t> result_frames(const Input& input, const std::string& word) {
+  if (input.name() == "-")
+    throw Error(input.name(), "a result comes by a pipe, expected the name of its file");
+  const auto count = static_cast<std::int64_t>(read_result_index(input.name()).times.size());
+  std::vector<std::int64_t> parts;
+  if (word == "all")
+    parts = {0, -1};
+  else
+    for (std::size_t from = 0; from <= word.size();) {
+      const std::size_t end = std::min(word.find(':', from), word.size());
+      parts.push_back(whole_number(input, word, word.substr(from, end - from)));
+      from = end + 1;
+    }
+  if (parts.size() > 3 || (parts.size() == 3 && parts[2] < 1))
+    throw UsageError(input.name(),
+                     "--frames: '" + word + "', expected all, K, A:B or A:B:STEP, STEP at least 1");
+  const auto from_start = [&](std::int64_t k) { return k < 0 ? k + count : k; };
+  const std::int64_t first = from_start(parts[0]),
+                     last = from_start(parts.size() > 1 ? parts[1] : parts[0]);
+  if (first < 0 || last >= count || first > last)
+    throw Error(input.name(), "there are no frames " + word + ", expected some of 0 to " +
+                                  std::to_string(count - 1));
+  std::vector<std::int64_t> frames;
+  const std::int64_t step = parts.size() > 2 ? parts[2] : 1;
+  for (std::int64_t k = first;; k += step) {
+    frames.push_back(k);
+    if (last - k < step)
+      return frames;
+  }
+}
+
+const std::vector<Kind>& readable_surface_kinds() {
+  static const std::vector<Kind> kinds = [] {
+    std::vector<Kind> all = readable_mesh_kinds();
+    all.push_back(Kind::ela);
+    all.push_back(Kind::hdf5);
+    return all;
+  }();
+  return kinds;
+}
+
+const std::vector<std::string>& surface_unit_names() {
+  return mesh_unit_names();
+}
+
+std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
+                                   const Context& context) {
+  const bool is_result = options.kind == Kind::hdf5, is_model = options.kind == Kind::ela;
+  refuse(!is_result && (!options.object.empty() || options.frame), input,
+         "--object or --frame for no result of a run, expected neither");
+  refuse((is_result || is_model) && !options.unit.empty(), input,
+         "--unit for what is in mm, expected no --unit");
+  if (is_result)
+    return read_frame(input, options);
+  if (is_model) {
+    const Model model = read_spring_model(input, context);
+    std::vector<Surface> surfaces = one(surface_mesh(model));
+    for (const Material& material : model.materials)
+      surfaces[0].materials.push_back(material.name);
+    return surfaces;
+  }
+  return one(read_mesh(input, {options.kind, options.unit, std::nullopt, false}));
+}
+
+} // namespace gewebe

@@ -1,0 +1,40 @@
+#pragma once
+// Whatever has a surface to draw: a mesh, a model, a frame of a run.
+
+#include "base/context.h"
+#include "formats/stream/kind.h"
+#include "formats/stream/stream.h"
+#include "shading/drawing.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+struct SurfaceReadOptions {
+  Kind kind = Kind::unknown;         ///< of input_kind()
+  std::string unit;                  ///< of a mesh, as in MeshReadOptions
+  std::string object;                ///< of a result, by name; "": all
+  std::optional<std::int64_t> frame; ///< of a result, from 0; -1 is the last one, and the default
+};
+
+/// Mesh kinds, ela and h5.
+const std::vector<Kind>& readable_surface_kinds();
+
+/// The words of --unit.
+const std::vector<std::string>& surface_unit_names();
+
+/// The frames of a result that a word stands for: "all", "K", "A:B" or "A:B:STEP", both ends
+/// included, negative ones counted from the last (-1).
+/// \throw Error with place if there are no such frames; UsageError if it is none of these words
+std::vector<std::int64_t> result_frames(const Input& input, const std::string& word);
+
+/// The surfaces of `input` in mm, in order; those of a result with their points at rest.
+/// \throw Error with place, also if a result comes by a pipe, or has no such object or frame;
+/// UsageError for options that the kind has no use for
+std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
+                                   const Context& context);
+
+} // namespace gewebe

@@ -1,0 +1,43 @@
+#pragma once
+// Who touched what when, as CSV: gewebe_results(5). One row for each change of a scene as it took
+// effect, and for what was refused or warned of.
+
+#include "formats/stream/stream.h"
+#include "scene/simulation.h"
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+class EventLog {
+public:
+  /// \throw Error, UsageError as Output
+  EventLog(const std::string& path, const Output::Options& options);
+
+  /// A new object, of this model file.
+  void object(double time, const std::string& name, const std::string& model, Method method);
+  /// An object's model was written to this file.
+  void model(double time, const std::string& name, const std::string& file);
+  void change(const Simulation& simulation, const Change& change);
+  /// What cutting did to an object.
+  void cutting(const Simulation& simulation, const Cutting& cutting);
+  /// `what` is "error" or "warning".
+  void message(double time, const char* what, std::string_view text);
+
+  /// What was told since the last keep or drop happened, or did not.
+  void keep();
+  void drop() { rows_.clear(); }
+  /// The file appears. \throw Error
+  void commit();
+
+private:
+  Output output_;
+  std::vector<std::string> rows_;
+};
+
+/// Ascending node numbers as ranges: "4 6-9".
+std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator);
+
+} // namespace gewebe

@@ -1,0 +1,84 @@
+#include "tools/run/run_report.h"
+
+#include "base/error.h"
+#include "base/number_text.h"
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+namespace gewebe {
+
+void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& latency,
+                  const SceneReport& report) {
+  const SceneCounts counts = scene.counts();
+  const SimulationCounts steps = scene.simulation().counts();
+  const ElastostaticCounts& still = steps.elastostatic;
+  cli::Stats& stats = run.stats();
+  stats.set("commands", counts.commands);
+  stats.set("errors", counts.errors);
+  stats.set("objects", static_cast<std::uint64_t>(scene.simulation().object_count()));
+  stats.set("models_read", counts.models);
+  stats.set("stores_opened", counts.stores);
+  stats.set("nodes", counts.nodes);
+  stats.set("steps", steps.steps);
+  stats.set("frames", counts.frames);
+  stats.set("time", scene.simulation().time());
+  stats.set("integration_steps", steps.integration);
+  stats.set("skipped_at_rest", steps.resting);
+  const std::uint64_t advances = steps.resting + steps.moving;
+  stats.set("sleeping_share",
+            advances == 0 ? 0.0
+                          : static_cast<double>(steps.resting) / static_cast<double>(advances));
+  const SimulationState state = scene.simulation().state();
+  stats.set("kinetic_energy", state.kinetic_energy);
+  stats.set("elastic_energy", state.elastic_energy);
+  stats.set("largest_strain", state.strain);
+  if (std::isfinite(state.safe_step))
+    stats.set("safe_step", state.safe_step);
+  stats.set("updates", still.updates);
+  stats.set("skipped_unchanged", still.unchanged);
+  stats.set("factors", still.factors);
+  stats.set("solves", still.solves);
+  stats.set("columns_read", still.columns_read);
+  stats.set("shapes", still.shapes);
+  stats.set("terms", still.terms);
+  stats.set("terms_left_out", still.skipped);
+  if (report.errors) {
+    stats.set("backward_error", still.backward_error);
+    stats.set("shape_error", still.shape_error);
+  }
+  stats.set("contact_error", still.contact_error);
+  stats.set("largest_displacement", counts.largest_displacement);
+  stats.set("largest_jump", steps.largest_jump);
+  if (steps.cuts > 0) {
+    stats.set("cuts", steps.cuts);
+    stats.set("cut_corrections", steps.cut_corrections);
+    stats.set("cut_renewals", steps.cut_renewals);
+    stats.set("cut_factors", steps.cut_factors);
+  }
+  stats.set("digest", counts.digest);
+  if (report.rate > 0) {
+    stats.set("rate", report.rate);
+    stats.set("deadline_misses", latency.missed());
+  }
+  stats.seconds("step_p50", latency.quantile(0.5));
+  stats.seconds("step_p99", latency.quantile(0.99));
+  stats.seconds("step_p999", latency.quantile(0.999));
+  stats.seconds("step_largest", latency.largest());
+}
+
+void require_verified(const SceneRun& scene, double tolerance) {
+  const ElastostaticCounts errors = scene.simulation().counts().elastostatic;
+  const auto require = [](const char* what, double error, double most) {
+    if (!(error <= most))
+      throw Error(std::string("the ") + what + " of a shape is " + number_text(error) +
+                  ", expected at most " + number_text(most));
+  };
+  require("error", errors.shape_error, tolerance);
+  // Columns of float32 have one of 1e-7, a wrong solution one of 1.
+  if (tolerance == 0)
+    require("backward error", errors.backward_error, 1e-6);
+}
+
+} // namespace gewebe

@@ -1,0 +1,21 @@
+#pragma once
+// What ffe-run tells of a scene.
+
+#include "tools/run/scene_run.h"
+#include "tools/run/step_latency.h"
+#include "tools/shared/cli.h"
+
+namespace gewebe {
+
+struct SceneReport {
+  double rate = 0;     ///< the one asked for; 0: none
+  bool errors = false; ///< whether they were measured
+};
+void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& latency,
+                  const SceneReport& report);
+
+/// \throw Error unless every shape was within the tolerance, and its backward error that of a
+/// right solution. \pre errors were measured
+void require_verified(const SceneRun& scene, double tolerance);
+
+} // namespace gewebe

@@ -1,0 +1,122 @@
+#include "tools/run/scene_checks.h"
+
+#include "base/number_text.h"
+#include "base/rounded_text.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gewebe {
+
+namespace {
+
+constexpr double most_volume = 0.1, most_strain = 0.5, most_jump = 0.1;
+constexpr double farther = 1.1; // than when it was last looked at
+constexpr int at_least_every = 64;
+
+double largest(std::span<const double> values) {
+  double most = 0;
+  for (const double value : values)
+    most = std::max(most, std::abs(value));
+  return most;
+}
+
+std::string percent(double share) {
+  return number_text(std::round(std::abs(share) * 100)) + " %";
+}
+
+} // namespace
+
+void SceneChecks::instrument(std::size_t number, const InstrumentShape& shape) {
+  if (shape.blade)
+    radius_.erase(number);
+  else
+    radius_[number] = shape.radius;
+}
+
+void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& warn,
+                       const Tell& distrust) {
+  for (const MethodJump& jump : simulation.jumps()) {
+    Object& object = objects_[jump.object];
+    const double most = largest(simulation.displacement(jump.object));
+    if (object.jump || !(jump.size > most_jump * most) || !warn)
+      continue;
+    object.jump = true;
+    warn("object " + simulation.name(jump.object) + " at " + number_text(simulation.time()) +
+         " s: its shape jumped by " + rounded_text(jump.size) +
+         " mm as its method changed, and its forces with it");
+  }
+  for (std::size_t n = 0; n < simulation.object_count(); ++n)
+    if (simulation.known(n))
+      look_at(simulation, n, shapes, warn, distrust);
+}
+
+void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool shapes,
+                          const Tell& warn, const Tell& distrust) {
+  Object& object = objects_[number];
+  const bool wanted = simulation.method(number) == Method::ela || shapes;
+  const bool thin = !radius_.empty() && !object.thin;
+  if ((!wanted || (object.turned && object.volume && object.strain)) && !thin)
+    return;
+  const Model& model = simulation.model(number);
+  if (object.model != &model || object.nodes != model.nodes.size() ||
+      object.triangles != model.triangles.size()) {
+    object.model = &model;
+    object.nodes = model.nodes.size();
+    object.triangles = model.triangles.size();
+    object.check = std::make_unique<ShapeCheck>(model);
+    object.looked_at = 0;
+  }
+  for (const auto& [instrument, radius] : radius_) {
+    if (object.thin || !warn || !(2 * radius < object.check->mean_edge()))
+      continue;
+    const InstrumentReport report = simulation.instrument(instrument);
+    if (!report.present)
+      continue;
+    object.thin = true;
+    warn("object " + simulation.name(number) + ": the instrument " +
+         simulation.instrument_name(instrument) + " is " + number_text(2 * radius) +
+         " mm thick, less than an edge (" + rounded_text(object.check->mean_edge()) +
+         " mm in the mean), it can pass between nodes");
+  }
+  if (wanted)
+    look_at_shape(simulation, number, distrust);
+}
+
+void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number,
+                                const Tell& distrust) {
+  Object& object = objects_[number];
+  const std::span<const double> u = simulation.displacement(number);
+  if (u.size() != 3 * object.nodes)
+    return;
+  const double most = largest(u);
+  // Less turns no triangle over, and what moves no farther than before does so seldom.
+  if (!(4 * most > object.check->shortest_edge() / 10) ||
+      (most <= farther * object.looked_at && ++object.not_looked < at_least_every))
+    return;
+  object.looked_at = most;
+  object.not_looked = 0;
+  const ShapeFaults faults = object.check->look(simulation.model(number), u);
+  const std::string who =
+      "object " + simulation.name(number) + " at " + number_text(simulation.time()) + " s: ";
+  if (faults.turned > 0 && !object.turned && distrust) {
+    object.turned = true;
+    distrust(who + std::to_string(faults.turned) +
+             (faults.turned == 1 ? " triangle is" : " triangles are") + " turned over, the first " +
+             std::to_string(faults.triangle) + ", the shape is not to be trusted there");
+  }
+  if (!(std::abs(faults.volume) <= most_volume) && !object.volume && distrust) {
+    object.volume = true;
+    distrust(who + "its volume has " + (faults.volume > 0 ? "grown" : "shrunk") + " by " +
+             percent(faults.volume) + ", which tissue does not do");
+  }
+  if (!(faults.strain <= most_strain) && !object.strain && distrust &&
+      simulation.method(number) == Method::ela) {
+    object.strain = true;
+    distrust(who + "the edge " + std::to_string(faults.i) + "-" + std::to_string(faults.j) +
+             " is strained by " + percent(faults.strain) +
+             ", beyond the linear range of tissue, its forces are not to be trusted");
+  }
+}
+
+} // namespace gewebe

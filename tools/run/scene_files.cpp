@@ -1,0 +1,110 @@
+// What a scene's names of files stand for.
+
+#include "base/error.h"
+#include "formats/model/ela.h"
+#include "formats/store/stiffness_store.h"
+#include "tools/run/scene_run.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t longest_list = 1U << 26U;    // of node numbers: some six millions
+constexpr std::uint64_t longest_piped = 1U << 30U; // model: some two million nodes
+
+/// A file or a pipe that is there: a device has no end, or nobody knows it.
+struct stat facts_of(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0 || ::access(path.c_str(), R_OK) != 0)
+    throw Error(path, std::string("cannot open: ") + std::strerror(errno));
+  if (S_ISDIR(info.st_mode))
+    throw Error(path, "is a directory, expected a file");
+  if (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode))
+    throw Error(path, "is a device, expected a file or a pipe");
+  return info;
+}
+
+/// Not longer than a list may be, for a device has no end.
+std::string list_text(Input input) {
+  (void)input.peek(1); // something must be there
+  std::string text;
+  for (std::vector<char> chunk(65536); input.stream();) {
+    input.stream().read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+    text.append(chunk.data(), static_cast<std::size_t>(input.stream().gcount()));
+    if (text.size() > longest_list)
+      throw Error(input.name(), "is longer than 64 MiB, expected a list of node numbers");
+  }
+  if (input.stream().bad())
+    throw Error(input.name(), "cannot be read to its end");
+  return text;
+}
+
+} // namespace
+
+SceneFiles scene_files(const std::string& scene, const Context& context) {
+  const std::size_t slash = scene.find_last_of('/');
+  const std::string folder =
+      scene == "-" || slash == std::string::npos ? "" : scene.substr(0, slash + 1);
+  const auto resolve = [folder](const std::string& name) {
+    if (name == "-")
+      return folder + "./-"; // a file, for the pipe may be the scene's
+    return name.starts_with('/') ? name : folder + name;
+  };
+  SceneFiles files;
+  files.check = [resolve](const std::string& name) { (void)facts_of(resolve(name)); };
+  files.model = [resolve, context](const std::string& name) {
+    const std::string path = resolve(name);
+    Context reading = context;
+    if (!S_ISREG(facts_of(path).st_mode)) // it may have no end, and memory has one
+      reading.max_memory = std::min(reading.max_memory, longest_piped);
+    Input input(path, false);
+    return read_spring_model(input, reading);
+  };
+  files.store = [resolve](const std::string& name, const Model& model) {
+    const auto store = std::make_shared<StiffnessStore>(resolve(name));
+    const StiffnessFacts facts = store->facts(model);
+    StiffnessParts parts;
+    parts.columns = store->columns(facts);
+    parts.factor = [store, facts] { return store->factor(facts); };
+    return parts;
+  };
+  files.second_stage = [resolve](const std::string& name, const Model& model) {
+    const auto store = std::make_shared<StiffnessStore>(resolve(name));
+    const std::optional<StiffnessFacts> facts = store->second_stage(store->facts(model));
+    if (!facts)
+      throw Error(resolve(name), "no second stage of this object, expected one, "
+                                 "see --stage of ffe-precompute(1)");
+    return [store, facts] {
+      StiffnessParts parts;
+      parts.columns = store->columns(*facts);
+      parts.factor = [store, facts] { return store->factor(*facts); };
+      return parts;
+    };
+  };
+  files.node_list = [resolve](const std::string& name) {
+    return list_text(Input(resolve(name), false));
+  };
+  files.write_model = [resolve, context](const std::string& name, const Model& model) {
+    Output::Options whole;
+    whole.binary = false;
+    whole.sync = true;
+    Output output(resolve(name), whole);
+    write_ela(output, model, context);
+    output.commit();
+  };
+  return files;
+}
+
+} // namespace gewebe

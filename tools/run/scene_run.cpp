@@ -1,0 +1,509 @@
+#include "tools/run/scene_run.h"
+
+#include "base/digest.h"
+#include "base/error.h"
+#include "formats/scene/frames_binary.h"
+#include "formats/scene/scene.h"
+#include "formats/scene/scene_answer.h"
+#include "formats/scene/scene_changes.h"
+#include "tools/run/event_log.h"
+#include "tools/run/scene_checks.h"
+#include "tools/run/scene_record.h"
+#include "tools/run/step_latency.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <istream>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::uint64_t longest_line = 1U << 24U; // that is carried out
+constexpr std::uint64_t longest_rest = 1U << 30U; // of one that is not, to be passed over
+constexpr double most_samples = 1e9;
+constexpr double default_step = 1.0 / 60;
+
+/// A file that a line names may be wrong in a place of its own: both places count.
+std::string with_place(const Error& error) {
+  return (error.place().empty() ? "" : error.place() + ": ") + error.what();
+}
+
+/// A failure of what takes answers, results and logs is no fault of the line.
+struct Undelivered {
+  std::exception_ptr error;
+};
+
+template <class Work>
+void deliver(Work&& work) {
+  try {
+    work();
+  } catch (const Error&) {
+    throw Undelivered{std::current_exception()};
+  }
+}
+
+/// A file of an object, read late, is the fault of the line that named it.
+struct WrongFile {
+  std::uint64_t line = 0;
+  std::string text;
+};
+
+template <class Work>
+auto of_object(std::uint64_t line, Work&& work) {
+  try {
+    return work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw WrongFile{line, with_place(error)};
+  }
+}
+
+} // namespace
+
+struct SceneRun::State {
+  std::string name;
+  SceneOptions options;
+  Simulation simulation;
+  SceneCounts counts;
+  Digest digest;
+  std::uint64_t line = 0, steps = 0;
+  std::size_t in_result = 0;                // objects that the result knows
+  std::map<std::string, std::string> lists; // node lists that the line named
+  std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
+  std::uint64_t first_error = 0;
+  std::string first_error_text;
+  SceneChecks checks;
+  std::vector<std::string> stores; ///< by object; "" where it has none
+  std::vector<std::string> models; ///< files that objects were made of
+
+  State(std::string n, const Context& context, SceneOptions o)
+      : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
+
+  SimulationOptions simulation_options() {
+    SimulationOptions s;
+    s.measure_error = options.measure_error;
+    s.tolerance = options.tolerance;
+    s.guard = options.serve;
+    // Now, so that one that can't be made is the fault of its step.
+    s.shapes = options.measure_error ||
+               (options.result != nullptr && options.result->wants_models()) ||
+               (options.serve && options.measure);
+    s.rate = options.rate;
+    if (options.warn)
+      s.warn = [this](const std::string& text) { warn(text); };
+    s.distrust = [this](const std::string& text) { distrust(text); };
+    s.applied = [this](const Change& change) {
+      if (const auto* const set = std::get_if<SetInstrument>(&change))
+        checks.instrument(set->instrument, set->shape);
+      if (options.events != nullptr)
+        options.events->change(simulation, change);
+    };
+    return s;
+  }
+
+  void warn(const std::string& text) {
+    if (options.events != nullptr)
+      options.events->message(simulation.time(), "warning", text);
+    if (options.warn)
+      options.warn(text);
+  }
+
+  void distrust(const std::string& text) {
+    if (options.events != nullptr)
+      options.events->message(simulation.time(), "warning", text);
+    if (const auto& tell = options.distrust ? options.distrust : options.warn)
+      tell(text);
+  }
+
+  void add(const ObjectCommand& c) {
+    if (options.files.check) {
+      options.files.check(c.model);
+      if (!c.store.empty())
+        options.files.check(c.store);
+    }
+    ObjectSource source;
+    source.model = [this, file = c.model, at = line] {
+      return of_object(at, [&] {
+        Model model = options.files.model(file);
+        ++counts.models;
+        counts.nodes += model.nodes.size();
+        return model;
+      });
+    };
+    source.stiffness = [this, file = c.store, at = line](const Model& model) {
+      StiffnessParts parts;
+      if (file.empty())
+        return parts;
+      parts = of_object(at, [&] { return options.files.store(file, model); });
+      ++counts.stores;
+      if (parts.factor)
+        parts.factor = [at, factor = parts.factor] { return of_object(at, factor); };
+      return parts;
+    };
+    simulation.add_object(c.name, std::move(source), c.method,
+                          c.implicit ? Integration::implicit : Integration::semi_implicit);
+    stores.resize(simulation.object_count()); // parts that came off have none
+    stores.back() = c.store;
+    models.push_back(c.model);
+    if (options.events != nullptr)
+      options.events->object(simulation.time(), c.name, c.model, c.method);
+  }
+
+  SetTwoStep stages(const TwoStepCommand& c) {
+    SetTwoStep set{simulation.find(c.object), {c.threshold, c.series}, {}};
+    if (set.object >= stores.size() || stores[set.object].empty())
+      throw Error("object " + c.object + " has no store, expected one with a second stage");
+    set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
+    return set;
+  }
+
+  void write(const EmitModelCommand& c) {
+    const std::size_t object = simulation.find(c.object);
+    if (!options.files.write_model)
+      throw Error("models can't be written here");
+    if (std::find(models.begin(), models.end(), c.file) != models.end())
+      throw Error(c.file + " is the model of an object of this scene, expected another file");
+    options.files.write_model(c.file, simulation.model(object));
+    if (options.events != nullptr)
+      options.events->model(simulation.time(), c.object, c.file);
+  }
+
+  void schedule(const Command& command, const Change& change) {
+    if (command.every)
+      simulation.schedule_every(*command.at, change);
+    else if (command.at)
+      simulation.schedule(*command.at, change);
+    else
+      simulation.apply(change);
+  }
+
+  void execute(const Command& command) {
+    if (const auto* const object = std::get_if<ObjectCommand>(&command.what)) {
+      add(*object);
+    } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
+      schedule(command, stages(*two_step));
+    } else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what)) {
+      write(*emit);
+    } else if (const std::optional<Change> change =
+                   scene_change(command, simulation, [&](const std::string& list) {
+                     return lists[list] = options.files.node_list(list);
+                   })) {
+      schedule(command, *change);
+    } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
+      go_on([&] {
+        simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
+      });
+    } else {
+      run(std::get<RunCommand>(command.what));
+    }
+  }
+
+  /// A step and its answer, behind the first frame. Only when the step is done, so that one that
+  /// fails leaves nothing.
+  template <class Step>
+  void go_on(Step&& step) {
+    require_object();
+    const std::size_t objects = simulation.object_count(); // before parts come off
+    for (std::size_t i = 0;
+         options.result != nullptr && options.result->wants_models() && i < objects; ++i)
+      (void)simulation.first_model(i); // a file that is wrong fails the step
+    step();
+    first_frame(objects);
+    answer();
+  }
+
+  void run(const RunCommand& c) {
+    require_object();
+    const double start = simulation.time(), span = c.until - start;
+    const double exact = span / c.every;
+    if (!(exact <= most_samples))
+      throw Error("over 1e9 steps, expected fewer");
+    const auto sample = [&](double time) {
+      go_on([&] {
+        simulation.step_to(time);
+        under_way = RunCommand{time, c.every};
+      });
+    };
+    // A hair more than a whole number of steps is rounding; a last one may be shorter.
+    const auto count = static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12)));
+    for (std::int64_t k = 1; k < count; ++k)
+      sample(start + static_cast<double>(k) * c.every);
+    if (!(span == 0))
+      sample(c.until); // which refuses a past one
+  }
+
+  /// What the result must know of new objects, and of those that were cut since the last frame.
+  void add_results(std::size_t objects, bool cut) {
+    static const Model none;
+    const bool models_too = options.result->wants_models();
+    for (; in_result < objects; ++in_result) {
+      const Model& model = models_too ? simulation.first_model(in_result) : none;
+      const bool part = std::any_of(
+          simulation.cuttings().begin(), simulation.cuttings().end(),
+          [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
+      deliver([&] {
+        if (part)
+          options.result->add_part(simulation.name(in_result), model);
+        else
+          options.result->add_object(simulation.name(in_result), model);
+      });
+    }
+    if (!cut || !models_too)
+      return;
+    std::set<std::size_t> changed;
+    for (const Cutting& c : simulation.cuttings())
+      if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
+        changed.insert(c.object);
+    for (const std::size_t object : changed)
+      deliver([&] {
+        options.result->change_object(object, simulation.model(object),
+                                      simulation.first_nodes(object));
+      });
+  }
+
+  void require_object() const {
+    if (simulation.object_count() == 0)
+      throw Error("there is no object, expected an object command first");
+  }
+
+  /// What the result must know of these first objects, and the frame before anything moves.
+  void first_frame(std::size_t objects) {
+    if (options.result == nullptr)
+      return;
+    add_results(objects, false);
+    if (counts.frames > 0)
+      return;
+    std::vector<std::vector<double>> rest;
+    std::vector<FrameObject> frame;
+    for (std::size_t i = 0; i < objects; ++i)
+      rest.emplace_back(simulation.known(i) ? 3 * simulation.first_model(i).nodes.size() : 0);
+    for (const std::vector<double>& one : rest)
+      frame.push_back({one, {}});
+    deliver([&] { options.result->add_frame(0, frame); });
+    ++counts.frames;
+  }
+
+  void answer() {
+    ++steps;
+    checks.look(
+        simulation, simulation.emits_shapes() || options.result != nullptr || options.measure,
+        [this](const std::string& text) { warn(text); },
+        [this](const std::string& text) { distrust(text); });
+    if (options.reply)
+      deliver([&] {
+        options.reply(options.binary ? binary_answer(simulation, steps)
+                                     : text_answer(simulation, steps));
+      });
+    simulation.take_jumps();
+    if (options.events != nullptr)
+      for (const Cutting& c : simulation.cuttings())
+        options.events->cutting(simulation, c);
+    if (options.latency != nullptr)
+      deliver([&] { options.latency->answered(steps, simulation.time()); });
+    if (options.result != nullptr) {
+      add_results(simulation.object_count(), true);
+      const bool shapes = options.result->wants_models();
+      std::vector<FrameObject> frame;
+      for (std::size_t i = 0; i < simulation.object_count(); ++i)
+        frame.push_back({shapes ? simulation.displacement(i) : std::span<const double>(),
+                         simulation.contact_forces(i)});
+      deliver([&] { options.result->add_frame(simulation.time(), frame); });
+      ++counts.frames;
+    }
+    simulation.take_cuttings();
+    if (options.measure)
+      deliver([&] { measure(); });
+    if (options.events != nullptr)
+      deliver([&] { options.events->keep(); });
+  }
+
+  void measure() {
+    digest.add(simulation.time());
+    for (std::size_t i = 0; i < simulation.object_count(); ++i) {
+      const std::span<const double> u = simulation.displacement(i);
+      const std::vector<NodeVector>& forces = simulation.contact_forces(i);
+      // Whether an object was read must not matter.
+      if (forces.empty() && std::all_of(u.begin(), u.end(), [](double x) { return x == 0; }))
+        continue;
+      digest.add(u);
+      for (std::size_t k = 0; k < u.size(); k += 3)
+        counts.largest_displacement =
+            std::max(counts.largest_displacement, norm({u[k], u[k + 1], u[k + 2]}));
+      for (const NodeVector& f : forces) {
+        digest.add(std::uint64_t{f.node});
+        digest.add_bytes(&f.value, sizeof f.value);
+      }
+    }
+  }
+
+  /// The line was carried out.
+  void accept(std::string_view text, const Command& command) {
+    ++counts.commands;
+    deliver([&] {
+      if (options.record != nullptr)
+        options.record->line(text, command, lists);
+      if (options.events != nullptr)
+        options.events->keep();
+    });
+  }
+
+  /// The line was not carried out, or only in part if it asked for many steps.
+  void refuse(std::uint64_t at, const std::string& text) {
+    ++counts.errors;
+    if (first_error == 0) {
+      first_error = at;
+      first_error_text = text;
+    }
+    deliver([&] {
+      if (options.record != nullptr) {
+        if (under_way)
+          options.record->run(under_way->until, under_way->every);
+        for (const std::size_t object : simulation.take_renewed())
+          options.record->renew(simulation.name(object));
+      }
+      if (options.events != nullptr) {
+        options.events->drop();
+        options.events->message(simulation.time(), "error", std::to_string(at) + ": " + text);
+        options.events->keep();
+      }
+      if (!options.serve)
+        throw Error(name + ":" + std::to_string(at), text);
+      if (options.reply) {
+        const std::string said = at == line ? text : "line " + std::to_string(at) + ": " + text;
+        options.reply(options.binary ? binary_error(steps, text_error(line, said))
+                                     : text_error(line, said));
+      }
+    });
+  }
+};
+
+SceneRun::SceneRun(std::string name, const Context& context, SceneOptions options)
+    : state_(std::make_unique<State>(std::move(name), context, std::move(options))) {}
+SceneRun::~SceneRun() = default;
+
+template <class Work>
+void SceneRun::numbered(Work&& work) {
+  State& s = *state_;
+  ++s.line;
+  s.lists.clear();
+  s.under_way.reset();
+  try {
+    try {
+      work();
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      s.refuse(s.line, with_place(error));
+    } catch (const WrongFile& file) {
+      s.refuse(file.line, file.text);
+    }
+  } catch (const Undelivered& failure) {
+    std::rethrow_exception(failure.error);
+  }
+}
+
+void SceneRun::line(std::string_view text) {
+  numbered([&] {
+    const std::optional<Command> command = parse_scene_line(text);
+    if (!command)
+      return;
+    state_->execute(*command);
+    state_->accept(text, *command);
+  });
+}
+
+void SceneRun::overlong_line() {
+  numbered([] { throw Error("a line of over 16 MiB, expected shorter ones"); });
+}
+
+void SceneRun::finish() {
+  State& s = *state_;
+  try {
+    at(s.name, [&] {
+      if (s.counts.commands == 0)
+        throw first_error().value_or(
+            Error("no command, expected object, step or another, see scene(5)"));
+      s.require_object();
+      s.first_frame(s.simulation.object_count());
+    });
+  } catch (const Undelivered& failure) {
+    std::rethrow_exception(failure.error);
+  } catch (const WrongFile& file) {
+    throw Error(s.name + ":" + std::to_string(file.line), file.text);
+  }
+  s.simulation.warn_of_thresholds();
+  if (!s.options.warn)
+    return;
+  if (s.steps == 0)
+    s.options.warn(s.name + ": no step, so nothing happens");
+  else if (s.simulation.pending() > 0)
+    s.options.warn(s.name + ": " + std::to_string(s.simulation.pending()) +
+                   (s.simulation.pending() == 1 ? " event lies" : " events lie") +
+                   " behind the last step and did not happen");
+}
+
+std::optional<Error> SceneRun::first_error() const {
+  const State& s = *state_;
+  if (s.counts.errors == 0)
+    return std::nullopt;
+  return Error(s.name + ":" + std::to_string(s.first_error),
+               s.first_error_text +
+                   (s.counts.errors == 1
+                        ? ""
+                        : " (the first of " + std::to_string(s.counts.errors) + " errors)"));
+}
+
+const Simulation& SceneRun::simulation() const {
+  return state_->simulation;
+}
+
+SceneCounts SceneRun::counts() const {
+  SceneCounts counts = state_->counts;
+  counts.digest = state_->digest.hex();
+  return counts;
+}
+
+StepLatency* SceneRun::latency() const {
+  return state_->options.latency;
+}
+
+void run_scene(Input& input, SceneRun& run) {
+  // The stream's buffer hands out what has come so far and waits only for more.
+  std::streambuf& bytes = *input.stream().rdbuf();
+  std::string line;
+  std::uint64_t size = 0; // of the line, also of what is not kept
+  for (;;) {
+    const bool waits = bytes.in_avail() <= 0;
+    const auto c = bytes.sbumpc();
+    if (waits && run.latency() != nullptr)
+      run.latency()->line_arrived();
+    const bool end = c == std::streambuf::traits_type::eof();
+    if (!end && c != '\n') {
+      if (++size <= longest_line)
+        line += static_cast<char>(c);
+      else if (size == longest_line + 1)
+        run.overlong_line(); // now: there may be no end to it
+      else if (size > longest_rest)
+        throw Error(input.name(), "a line of over 1 GiB, expected an end");
+      continue;
+    }
+    if (size <= longest_line && (!end || !line.empty()))
+      run.line(line);
+    line.clear();
+    size = 0;
+    if (end)
+      break;
+  }
+  run.finish();
+}
+
+} // namespace gewebe

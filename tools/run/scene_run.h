@@ -1,0 +1,108 @@
+#pragma once
+// Runs a scene line by line: parses, loads files when they are needed, simulates, answers.
+
+#include "base/context.h"
+#include "base/error.h"
+#include "formats/results/results_writer.h"
+#include "formats/stream/stream.h"
+#include "model/selector.h"
+#include "scene/simulation.h"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+
+class EventLog;
+class SceneRecord;
+class StepLatency;
+
+/// How a scene comes to what its file names stand for.
+struct SceneFiles {
+  /// That the file is there and may be read, without doing so. May be absent. \throw Error
+  std::function<void(const std::string& name)> check;
+  std::function<Model(const std::string& name)> model;
+  /// \throw Error, among others if the store is of another model
+  std::function<StiffnessParts(const std::string& name, const Model& model)> store;
+  /// What the store has of the object's second stage, read when asked for.
+  /// \throw Error, among others if it has none
+  std::function<std::function<StiffnessParts()>(const std::string& name, const Model& model)>
+      second_stage;
+  LoadNodeList node_list;
+  /// Writes a model whole or not at all. May be absent. \throw Error
+  std::function<void(const std::string& name, const Model& model)> write_model;
+};
+
+/// From files; relative names count from the folder of `scene`, or from the working folder where
+/// that is "-".
+SceneFiles scene_files(const std::string& scene, const Context& context);
+
+struct SceneOptions {
+  SceneFiles files;
+  std::function<void(std::string_view)> reply; ///< told each answer, whole; none: not answered
+  bool binary = false;                         ///< answers are frames_binary.h's, else text
+  bool serve = false; ///< a wrong line is answered, changes nothing, and the run goes on
+  std::function<void(const std::string&)> warn;
+  /// Told, once of each object, why its shape is not to be trusted; without it `warn` is.
+  std::function<void(const std::string&)> distrust{};
+  double rate = 0;                ///< see SimulationOptions
+  ResultWriter* result = nullptr; ///< gets objects and frames; none of these is committed
+  EventLog* events = nullptr;
+  SceneRecord* record = nullptr;
+  StepLatency* latency = nullptr;
+  bool measure = false;       ///< digest and largest displacement
+  bool measure_error = false; ///< of every shape
+  double tolerance = 0;       ///< see ElastostaticOptions
+};
+
+struct SceneCounts {
+  std::uint64_t commands = 0; ///< carried out
+  std::uint64_t errors = 0;   ///< lines that were refused
+  std::uint64_t frames = 0;   ///< of the result
+  std::uint64_t models = 0;   ///< files that were needed and read
+  std::uint64_t stores = 0;
+  std::uint64_t nodes = 0;         ///< of these models
+  double largest_displacement = 0; ///< mm, of any node in any step
+  /// Of times, displacements and forces of all steps; an object that is not displaced has none.
+  std::string digest;
+};
+
+class SceneRun {
+public:
+  /// `name` is what messages call the scene.
+  SceneRun(std::string name, const Context& context, SceneOptions options);
+  ~SceneRun();
+  SceneRun(const SceneRun&) = delete;
+  SceneRun& operator=(const SceneRun&) = delete;
+
+  /// The next line, without its end. \throw Error, place "NAME:LINE": without `serve` if the line
+  /// is wrong, the line of the object if it is a file of one; Cancelled; what reply, result and the
+  /// logs throw, as it is. The run is over then
+  void line(std::string_view text);
+  /// A line in place of one that is too long to be kept.
+  void overlong_line();
+  /// Behind the last line. \throw Error, place NAME, if there was no command or no object
+  void finish();
+  /// About the lines that were refused under `serve`, naming the first; nothing if there is none.
+  std::optional<Error> first_error() const;
+
+  const Simulation& simulation() const;
+  SceneCounts counts() const;
+  StepLatency* latency() const;
+
+private:
+  struct State;
+  template <class Work>
+  void numbered(Work&& work);
+  std::unique_ptr<State> state_;
+};
+
+/// Feeds every line of the input to the run as soon as it is there, then finishes.
+/// \throw Error as SceneRun, among others for a line of over 16 MiB
+void run_scene(Input& input, SceneRun& run);
+
+} // namespace gewebe

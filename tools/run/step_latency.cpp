@@ -1,0 +1,67 @@
+#include "tools/run/step_latency.h"
+
+#include "base/number_text.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace gewebe {
+
+namespace {
+
+constexpr int least_exponent = -40; // 1 ps
+
+} // namespace
+
+double StepLatency::now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::size_t StepLatency::bin(double seconds) {
+  int exponent = 0;
+  const double half = std::frexp(seconds, &exponent); // 0.5 to 1
+  if (!(seconds > 0) || exponent <= least_exponent)
+    return 0;
+  const auto power = static_cast<std::size_t>(exponent - least_exponent);
+  if (power >= exponents)
+    return exponents * parts - 1;
+  return power * parts + static_cast<std::size_t>((2 * half - 1) * parts);
+}
+
+void StepLatency::log_to(const std::string& path, const Output::Options& options) {
+  log_.emplace(path, options);
+  log_->write("step,time,latency\n");
+}
+
+void StepLatency::answered(std::uint64_t step, double time) {
+  const double end = now();
+  const double latency = end - std::max(arrived_, answered_);
+  answered_ = end;
+  ++steps_;
+  ++counts_[bin(latency)];
+  largest_ = std::max(largest_, latency);
+  missed_ += latency * rate_ > 1 ? 1 : 0;
+  if (log_)
+    log_->write(std::to_string(step) + "," + number_text(time) + "," + number_text(latency) + "\n");
+}
+
+void StepLatency::commit() {
+  if (log_)
+    log_->commit();
+}
+
+double StepLatency::quantile(double part) const {
+  const auto wanted = std::max<std::uint64_t>(
+      1, static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(steps_))));
+  std::uint64_t sum = 0;
+  for (std::size_t b = 0; b < counts_.size(); ++b) {
+    sum += counts_[b];
+    if (sum >= wanted) // the bin's upper end
+      return std::min(largest_, std::ldexp(1 + static_cast<double>(b % parts + 1) / parts,
+                                           static_cast<int>(b / parts) + least_exponent - 1));
+  }
+  return largest_;
+}
+
+} // namespace gewebe

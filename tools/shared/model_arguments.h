@@ -1,0 +1,41 @@
+#pragma once
+// The options of exp2ela: how a model is built.
+
+#include "mesh/repair.h"
+#include "model/build.h"
+#include "model/material.h"
+#include "model/primitive.h"
+#include "model/selector.h"
+#include "tools/shared/cli.h"
+
+#include <optional>
+#include <string>
+
+namespace gewebe {
+
+struct ModelArguments {
+  std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
+              axes = "xyz", primitive, size, repair, materials;
+  MaterialOverrides values;
+  BuildOptions build;
+  RepairOptions repairs;
+  std::optional<Selector> fixed;
+  std::optional<Primitive> matrix;
+  std::optional<double> dt;
+  bool scale_mass = false, list_materials = false;
+};
+
+/// The options of a program, to be told into `a`.
+void declare(cli::Program& p, ModelArguments& a);
+
+/// Checks them against each other and reads their texts. \throw UsageError
+void complete(ModelArguments& a);
+
+/// Chooses among the presets and the materials of --materials. \throw UsageError if there is none
+/// of a name; Error if the table is bad
+void choose_materials(ModelArguments& a);
+
+/// Writes the table of the materials there are.
+void list_materials(cli::Run& run, const ModelArguments& a);
+
+} // namespace gewebe

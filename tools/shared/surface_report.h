@@ -1,0 +1,19 @@
+#pragma once
+// What mc-opt tells of the mesh it made.
+
+#include "base/mesh.h"
+#include "surface/marching_cubes.h"
+#include "surface/snapping.h"
+#include "tools/shared/cli.h"
+#include "volume/grid.h"
+
+namespace gewebe::cli {
+
+/// What was visited and merged.
+void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
+                    const SnapReport& snapped);
+
+/// Topology, size, shape and digest of a mesh, into the stats of the run.
+void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections);
+
+} // namespace gewebe::cli

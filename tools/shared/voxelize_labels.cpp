@@ -1,0 +1,86 @@
+#include "tools/shared/voxelize_labels.h"
+
+#include "formats/volume/label_volume.h"
+#include "formats/volume/volume_file.h"
+#include "labels/label_density.h"
+#include "tools/shared/report.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <string_view>
+
+namespace gewebe {
+
+std::vector<std::int64_t> labels_from_text(const std::string& text) {
+  std::vector<std::int64_t> labels;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', begin), text.size());
+    const std::string_view word = std::string_view(text).substr(begin, comma - begin);
+    const auto [rest, status] =
+        std::from_chars(word.data(), word.data() + word.size(), labels.emplace_back());
+    if (status != std::errc{} || rest != word.data() + word.size())
+      throw UsageError("--label: '" + std::string(word) + "', expected whole numbers, or list");
+    begin = comma + 1;
+  }
+  return labels;
+}
+
+void list_labels(cli::Run& run, const std::string& path) {
+  if (!run.to().empty())
+    throw UsageError("--to for a list of labels, which is text, expected none");
+  Output output(run.output(), run.output_options(false));
+  Input input(path);
+  const LabelVolume volume =
+      run.timed("read", [&] { return read_label_volume(input, {}, run.context()); });
+  for (const std::string& warning : volume.warnings)
+    run.warn(warning);
+  const Vec3 spacing = volume.mask.transform.voxel_size();
+  std::string text;
+  for (const auto& [label, voxels] : volume.labels) {
+    const double mm3 = static_cast<double>(voxels) * spacing.x * spacing.y * spacing.z;
+    std::array<char, 32> size{};
+    (void)std::snprintf(size.data(), size.size(), "%.6g", mm3);
+    text += std::to_string(label) + " " + std::to_string(voxels) + " " + size.data() + "\n";
+  }
+  output.write(text);
+  output.commit();
+  run.stats().set("format", volume.format);
+  run.stats().set("label_values", volume.labels.size());
+  run.stats().set("spacing", spacing);
+}
+
+void voxelize_labels(cli::Run& run, const std::string& path,
+                     const std::vector<std::int64_t>& labels, std::optional<double> voxel) {
+  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
+  Output output(run.output(), run.output_options(true));
+  Input input(path);
+  const LabelVolume volume =
+      run.timed("read", [&] { return read_label_volume(input, labels, run.context()); });
+  for (const std::string& warning : volume.warnings)
+    run.warn(warning);
+  LabelDensityReport report;
+  const Grid grid = run.timed("density", [&] {
+    return at(input.name(),
+              [&] { return label_density(run.context(), volume.mask, {voxel}, &report); });
+  });
+  run.timed("write", [&] { write_volume(output, grid, run.context()); });
+  output.commit();
+
+  cli::Stats& stats = run.stats();
+  stats.set("format", volume.format);
+  stats.set("label_values", volume.labels.size());
+  stats.set("label_voxels", report.voxels);
+  stats.set("label_volume", report.volume);
+  stats.set("spacing", volume.mask.transform.voxel_size());
+  stats.set("shear", report.shear);
+  stats.set("levels", report.levels);
+  stats.set("steps", report.steps);
+  stats.set("last_change", report.last_change);
+  stats.set("band_voxels", report.band_voxels);
+  stats.set("blocks_skipped", report.leaves_skipped);
+  cli::report_volume(run, grid);
+}
+
+} // namespace gewebe

@@ -1,0 +1,35 @@
+#pragma once
+// ffe-precompute --info, --verify and --stats.
+
+#include "formats/store/stiffness_store.h"
+#include "formats/store/stiffness_store_writer.h"
+#include "tools/shared/cli.h"
+
+#include <cstdint>
+#include <string>
+
+namespace gewebe {
+
+/// Writes what a store holds as lines "key value" to the run's output; with `verify`, reads all of
+/// it, compares the checksums and recomputes columns.
+/// \throw Error naming the store and what is wrong with it
+void print_store(cli::Run& run, const std::string& path, bool verify);
+
+/// Reads every object of a store back and recomputes the columns of some nodes, which --stats
+/// tells. \throw Error, place = `name`
+void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name);
+
+/// Says of the object just begun what of an earlier run is kept, and warns of what was damaged.
+void report_kept(cli::Run& run, const StiffnessStoreWriter& writer);
+
+/// Sums over the objects of a store that was made, and the worst of each.
+struct StoreTotals {
+  std::uint64_t objects = 0, nodes = 0, order = 0, matrix = 0, factor = 0, columns = 0;
+  double norm = 0, condition = 0, residual = 0;
+};
+
+/// What --stats says of a store that stands under its name, `path`.
+void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
+                  const StiffnessStoreWriter& writer);
+
+} // namespace gewebe

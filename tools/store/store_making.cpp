@@ -1,0 +1,303 @@
+#include "tools/store/store_making.h"
+
+#include "compliance/compliance_columns.h"
+#include "dynamics/relaxation.h"
+#include "formats/model/ela.h"
+#include "model/selector.h"
+#include "solve/condition.h"
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <future>
+
+namespace gewebe {
+
+namespace {
+
+/// A model whose matrix is known to be sound; nothing is written before.
+struct Prepared {
+  std::string name; ///< of the input
+  Model model;
+  std::vector<std::uint32_t> nodes; ///< that shall have columns
+  StiffnessMatrix matrix;
+  std::optional<Factor> factor;
+  StiffnessCheck check;
+  double read = 0, assemble = 0, factorise = 0; ///< s
+};
+
+double seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<std::uint32_t> touched_nodes(const Model& model, const StoreArguments& a) {
+  if (!a.touched)
+    return {};
+  const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
+  std::vector<std::uint32_t> nodes = select_nodes(model, *a.touched, load);
+  // Whole blocks, so that what is checked together is so in every part.
+  const std::uint64_t blocks = (nodes.size() + compliance_block - 1) / compliance_block;
+  const auto bound = [&](std::uint64_t shard) {
+    const std::uint64_t end = blocks * shard / a.shard.count * compliance_block;
+    return nodes.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(end, nodes.size()));
+  };
+  return {bound(a.shard.index - 1), bound(a.shard.index)};
+}
+
+Prepared prepare(const std::string& path, const StoreArguments& a, const Context& context) {
+  Input input(path);
+  Prepared p;
+  p.name = input.name();
+  const double start = seconds();
+  p.model = read_spring_model(input, context);
+  p.read = seconds() - start;
+  at(p.name, [&] {
+    p.nodes = touched_nodes(p.model, a);
+    p.matrix = stiffness_matrix(p.model);
+    p.assemble = seconds() - start - p.read;
+    p.factor = checked_factor(p.model, p.matrix, context, p.check);
+  });
+  p.factorise = seconds() - start - p.read - p.assemble;
+  return p;
+}
+
+/// Models in their order, some of them prepared ahead.
+class Preparations {
+public:
+  Preparations(const std::vector<std::string>& paths, const StoreArguments& a,
+               const Context& context)
+      : paths_(paths), a_(a), ahead_(static_cast<std::size_t>(a.jobs)), context_(context) {
+    context_.progress = nullptr;
+  }
+
+  bool more() const { return next_ < paths_.size() || !running_.empty(); }
+
+  Prepared next() {
+    // One alone is prepared here.
+    const auto how = ahead_ > 1 ? std::launch::async : std::launch::deferred;
+    while (next_ < paths_.size() && running_.size() < ahead_) {
+      const std::string& path = paths_[next_++];
+      running_.push_back(std::async(how, [&path, this] { return prepare(path, a_, context_); }));
+    }
+    std::future<Prepared> first = std::move(running_.front());
+    running_.pop_front();
+    return first.get();
+  }
+
+private:
+  const std::vector<std::string>& paths_;
+  const StoreArguments& a_;
+  std::size_t ahead_, next_ = 0;
+  Context context_;
+  std::deque<std::future<Prepared>> running_;
+};
+
+StiffnessMethod method_of(const StoreArguments& a) {
+  StiffnessMethod method;
+  method.name = a.method;
+  if (a.method == "direct")
+    return method;
+  method.force = a.force.value_or(0);
+  if (a.method == "relax")
+    method.threshold = a.threshold.value_or(RelaxOptions{}.threshold);
+  else
+    method.steps = static_cast<std::uint64_t>(*a.steps);
+  return method;
+}
+
+StiffnessFacts facts_of(const Prepared& p, const StoreArguments& a) {
+  StiffnessFacts facts;
+  facts.object = p.model.name;
+  facts.hash = stiffness_hash(p.model);
+  facts.rest = rest_hash(p.model);
+  facts.nodes = p.model.nodes.size();
+  facts.order = p.matrix.order();
+  facts.norm = p.check.norm;
+  facts.condition = p.check.condition;
+  facts.single = a.precision == "float32";
+  facts.method = method_of(a);
+  if (a.touched)
+    require_precision(facts.condition, facts.single);
+  return facts;
+}
+
+/// The group of the second stage of the object that the model belongs to.
+std::string second_stage_of(const StiffnessStore& store, const StiffnessFacts& second) {
+  std::string names;
+  for (const std::string& group : store.objects()) {
+    const StiffnessFacts first = store.facts(group);
+    names += (names.empty() ? "'" : ", '") + first.object + "'";
+    if (first.object != second.object)
+      continue;
+    if (first.rest != second.rest || first.order != second.order)
+      throw Error("'" + second.object + "' has other nodes or constraints than in " + store.path() +
+                  ", expected the same but for springs");
+    return second_stage_group(group);
+  }
+  throw Error("no object '" + second.object + "' in " + store.path() + ", which holds " +
+              (names.empty() ? "nothing" : names));
+}
+
+void compute(cli::Run& run, const Prepared& p, const StiffnessMethod& method,
+             const std::vector<std::uint32_t>& nodes, StiffnessStoreWriter& writer) {
+  run.timed("columns", [&] {
+    if (method.name == "direct") {
+      (void)compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, run.context(), writer);
+      return;
+    }
+    const RelaxFigures figures =
+        relaxed_columns(p.model, p.matrix, *p.factor, p.check.norm, nodes,
+                        {method.force, method.threshold, method.steps}, run.context(), writer);
+    run.stats().set("relax_steps", figures.steps);
+    run.stats().set("relax_pulls", figures.pulls);
+  });
+}
+
+} // namespace
+
+void add(StoreTotals& totals, const StiffnessFacts& facts, const StiffnessMatrix& matrix,
+         const Factor& factor, std::size_t nodes, double residual) {
+  totals = {totals.objects + 1,
+            totals.nodes + facts.nodes,
+            totals.order + facts.order,
+            totals.matrix + 2 * matrix.row.size() - matrix.order(),
+            totals.factor + factor.entries(),
+            totals.columns + 3 * nodes,
+            std::max(totals.norm, facts.norm),
+            std::max(totals.condition, facts.condition),
+            std::max(totals.residual, residual)};
+}
+
+void add_models(cli::Run& run, const StoreArguments& a, const StiffnessStore* store,
+                StiffnessStoreWriter& writer, StoreTotals& totals) {
+  // Without columns, shards take turns with the objects.
+  std::vector<std::string> inputs;
+  for (std::size_t i = 0; i < a.inputs.size(); ++i)
+    if (a.touched || i % a.shard.count == a.shard.index - 1)
+      inputs.push_back(a.inputs[i]);
+  Preparations preparations(inputs, a, run.context());
+  while (preparations.more()) {
+    const Prepared p = preparations.next();
+    run.stats().seconds("read", p.read);
+    run.stats().seconds("matrix", p.assemble);
+    run.stats().seconds("factor", p.factorise);
+    at(p.name, [&] {
+      StiffnessFacts facts = facts_of(p, a);
+      if (store != nullptr)
+        facts.group = second_stage_of(*store, facts);
+      const auto missing =
+          run.timed("write", [&] { return writer.begin(facts, p.matrix, *p.factor, p.nodes); });
+      report_kept(run, writer);
+      compute(run, p, facts.method, missing, writer);
+      const double residual = run.timed("write", [&] { return writer.end(p.check.residual); });
+      add(totals, facts, p.matrix, *p.factor, p.nodes.size(), residual);
+    });
+  }
+}
+
+namespace {
+
+/// One object of one or several stores, of which each holds some columns.
+void join_object(const std::vector<const StiffnessStore*>& stores, const std::string& group,
+                 StiffnessStoreWriter& writer, StoreTotals& totals) {
+  std::vector<StiffnessFacts> facts;
+  std::vector<std::unique_ptr<ColumnSource>> sources;
+  std::vector<std::uint32_t> nodes;
+  std::optional<StiffnessMatrix> matrix;
+  std::optional<Factor> factor;
+  for (const StiffnessStore* const store : stores) {
+    const StiffnessFacts f = store->facts(group);
+    StiffnessMatrix k = store->matrix(f);
+    Factor l = store->factor(f);
+    const auto same = [&](const StiffnessFacts& g) {
+      return f.hash == g.hash && f.single == g.single && f.method == g.method && f.norm == g.norm &&
+             f.condition == g.condition && k.value == matrix->value &&
+             std::ranges::equal(l.view().x, factor->view().x);
+    };
+    if (!facts.empty() && !same(facts.front()))
+      throw Error(store->path(), "'" + f.object + "' is of another model than in " +
+                                     stores.front()->path() +
+                                     " or was made with other options, expected the same");
+    facts.push_back(f);
+    if (!matrix) {
+      matrix = std::move(k);
+      factor = std::move(l);
+    }
+    sources.push_back(store->columns(f));
+    if (sources.back() == nullptr)
+      continue;
+    const std::vector<std::uint32_t>& more = sources.back()->nodes();
+    if (!nodes.empty() && !more.empty() && more.front() <= nodes.back())
+      throw Error(store->path(), "'" + f.object + "' has columns of node " +
+                                     std::to_string(more.front()) +
+                                     " that another part has, too, expected others");
+    nodes.insert(nodes.end(), more.begin(), more.end());
+  }
+  double residual = 0;
+  for (const StiffnessFacts& f : facts)
+    residual = std::max(residual, f.residual);
+  const std::vector<std::uint32_t> missing = writer.begin(facts.front(), *matrix, *factor, nodes);
+  std::vector<double> columns(9 * facts.front().nodes);
+  std::size_t k = 0; // of the missing
+  for (const auto& source : sources)
+    for (std::size_t i = 0; source != nullptr && i < source->nodes().size(); ++i)
+      if (k < missing.size() && missing[k] == source->nodes()[i]) {
+        source->read(i, columns);
+        writer.write(k++, columns, residual);
+      }
+  residual = writer.end(residual);
+  add(totals, facts.front(), *matrix, *factor, nodes.size(), residual);
+}
+
+} // namespace
+
+void copy_object(const StiffnessStore& store, const std::string& group,
+                 StiffnessStoreWriter& writer, StoreTotals& totals) {
+  join_object({&store}, group, writer, totals);
+}
+
+void copy_store(const StiffnessStore& store, StiffnessStoreWriter& writer, StoreTotals& totals) {
+  for (const std::string& group : store.objects())
+    copy_object(store, group, writer, totals);
+}
+
+void merge_stores(const std::vector<std::string>& paths, StiffnessStoreWriter& writer,
+                  StoreTotals& totals) {
+  std::vector<StiffnessStore> stores;
+  stores.reserve(paths.size());
+  for (const std::string& path : paths)
+    stores.emplace_back(path);
+  std::ranges::stable_sort(stores, {}, [](const StiffnessStore& s) { return s.shard().index; });
+  std::vector<std::string> groups;
+  for (std::size_t i = 0; i < stores.size(); ++i) {
+    const auto [index, count] = stores[i].shard();
+    const std::uint64_t expected = stores.front().shard().count;
+    if (count != expected || index != i + 1)
+      throw Error(stores[i].path(), "is part " + std::to_string(index) + " of " +
+                                        std::to_string(count) + ", expected part " +
+                                        std::to_string(i + 1) + " of " + std::to_string(expected));
+    for (const std::string& group : stores[i].objects()) {
+      if (stores[i].second_stage(stores[i].facts(group)))
+        throw Error(stores[i].path(),
+                    "'" + group + "' has a second stage, expected --stage 2 after --merge");
+      groups.push_back(group);
+    }
+  }
+  if (stores.size() != stores.front().shard().count)
+    throw Error(stores.back().path(), "is the last of " + std::to_string(stores.size()) +
+                                          " parts, expected all " +
+                                          std::to_string(stores.front().shard().count));
+  std::ranges::sort(groups);
+  groups.erase(std::ranges::unique(groups).begin(), groups.end());
+  for (const std::string& group : groups) {
+    std::vector<const StiffnessStore*> holders;
+    for (const StiffnessStore& store : stores) {
+      const std::vector<std::string> names = store.objects();
+      if (std::ranges::find(names, group) != names.end())
+        holders.push_back(&store);
+    }
+    join_object(holders, group, writer, totals);
+  }
+}
+
+} // namespace gewebe

@@ -1,0 +1,119 @@
+#include "tools/store/store_update.h"
+
+#include "compliance/axis_solver.h"
+#include "compliance/corrected_columns.h"
+#include "compliance/corrected_compliance.h"
+#include "formats/model/ela.h"
+#include "model/cut_origin.h"
+#include "solve/condition.h"
+#include "tools/store/store_making.h"
+
+#include <memory>
+
+namespace gewebe {
+
+namespace {
+
+/// A cut model whose matrix is known to be sound.
+struct CutObject {
+  Model model;
+  StiffnessMatrix matrix;
+  std::shared_ptr<AxisSolver> solver;
+  StiffnessCheck check;
+};
+
+CutObject prepare(cli::Run& run, const std::string& path) {
+  CutObject cut;
+  run.timed("read", [&] {
+    Input input(path);
+    cut.model = read_spring_model(input, run.context());
+  });
+  at(path, [&] {
+    run.timed("matrix", [&] { cut.matrix = stiffness_matrix(cut.model); });
+    run.timed("factor", [&] {
+      Factor factor = checked_factor(cut.model, cut.matrix, run.context(), cut.check);
+      cut.solver =
+          std::make_shared<AxisSolver>(AxisSolver{std::move(factor), cut.matrix.row_of_axis});
+    });
+  });
+  return cut;
+}
+
+AxesSolve solver_of(std::shared_ptr<AxisSolver> solver) {
+  return [solver = std::move(solver)](std::span<double> over_axes, std::size_t columns) {
+    solver->solve(over_axes, columns);
+  };
+}
+
+void update_object(cli::Run& run, const Model& before, const StiffnessFacts& facts,
+                   const CutObject& cut, const StiffnessStore& store, StiffnessStoreWriter& writer,
+                   StoreTotals& totals) {
+  const CutOrigin maps = find_cut_origin(before, cut.model);
+  StiffnessChange change = stiffness_change(before, cut.model, maps.origin, maps.place);
+  run.stats().set("rank", std::uint64_t{change.rank()});
+  StiffnessFacts now;
+  now.object = cut.model.name;
+  now.hash = stiffness_hash(cut.model);
+  now.rest = rest_hash(cut.model);
+  now.nodes = cut.model.nodes.size();
+  now.order = cut.matrix.order();
+  now.norm = cut.check.norm;
+  now.condition = cut.check.condition;
+  now.single = facts.single;
+
+  std::shared_ptr<const ColumnSource> stored = store.columns(facts);
+  if (!stored) {
+    (void)writer.begin(now, cut.matrix, cut.solver->factor, {});
+    add(totals, now, cut.matrix, cut.solver->factor, 0, writer.end(cut.check.residual));
+    return;
+  }
+  require_precision(now.condition, now.single);
+  AxesSolve solve_before;
+  if (now.single)
+    solve_before =
+        solver_of(std::make_shared<AxisSolver>(stored_axes(before, store.factor(facts))));
+  const CorrectedColumns corrected(stored, std::move(change), solver_of(cut.solver), run.context(),
+                                   std::move(solve_before), cut.solver->factor.entries());
+  const std::vector<std::uint32_t>& nodes = corrected.nodes();
+  const std::vector<std::uint32_t> missing =
+      run.timed("write", [&] { return writer.begin(now, cut.matrix, cut.solver->factor, nodes); });
+  if (missing.size() != nodes.size())
+    throw Error("columns of the new store stand there already, expected none");
+  const CorrectedCompliance made = run.timed("columns", [&] {
+    return corrected_compliance(cut.matrix, *cut.solver, cut.check.norm, corrected, run.context(),
+                                writer);
+  });
+  run.stats().set("corrected_columns", std::uint64_t{made.corrected});
+  const double residual = run.timed("write", [&] { return writer.end(cut.check.residual); });
+  add(totals, now, cut.matrix, cut.solver->factor, nodes.size(), residual);
+}
+
+} // namespace
+
+void update_store(cli::Run& run, const StoreArguments& a, const StiffnessStore& store,
+                  StiffnessStoreWriter& writer, StoreTotals& totals) {
+  if (store.shard().count > 1)
+    throw Error(store.path(), "is part of a store, expected a whole one (ffe-precompute --merge)");
+  Input input(a.before);
+  const Model before = read_spring_model(input, run.context());
+  const StiffnessFacts facts = store.facts(before);
+  if (store.second_stage(facts))
+    throw Error(store.path(),
+                "'" + facts.object + "' has a second stage, expected --stage 2 after --update");
+  if (facts.method.name != "direct")
+    throw Error(store.path(), "'" + facts.object + "' has columns of method " + facts.method.name +
+                                  ", expected direct ones");
+  const CutObject cut = prepare(run, a.inputs[0]);
+  for (const std::string& group : store.objects()) {
+    if (group == facts.group) {
+      at(a.inputs[0], [&] { update_object(run, before, facts, cut, store, writer, totals); });
+      continue;
+    }
+    if (store.second_stage(store.facts(group)))
+      throw Error(store.path(),
+                  "'" + group + "' has a second stage, expected --stage 2 after --update");
+    copy_object(store, group, writer, totals);
+  }
+}
+
+} // namespace gewebe
