@@ -290,7 +290,8 @@ uninstall:
 	rm -f '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
 	rm -f $(foreach h,$(HEADERS),'$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)')
 	rm -f $(foreach m,$(MAN),'$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)')
-	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') '$(call to,$(INCLUDEDIR))/gewebe' \
+	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') \
+	  '$(call to,$(INCLUDEDIR))/gewebe/formats' '$(call to,$(INCLUDEDIR))/gewebe' \
 	  '$(call to,$(PLUGINDIR))' '$(call to,$(LIBDIR))/pkgconfig' $(foreach s,1 5 7,'$(call to,$(MANDIR))/man$s'); do \
 	  rmdir "$$folder" 2>/dev/null || true; done
 ifeq ($(system_dir),)
