@@ -64,7 +64,7 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
   }
   for (const Cutting& c : simulation.cuttings())
     text += cutting_line(simulation, c) + "\n";
-  for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.emits().shapes && i < simulation.object_count(); ++i) {
     if (!topology_changed(simulation, i))
       continue;
     const std::vector<Triangle>& triangles = simulation.model(i).triangles;
@@ -72,7 +72,7 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
     for (const Triangle& t : triangles)
       text += std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
   }
-  for (std::size_t i = 0; simulation.emits_forces() && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.emits().forces && i < simulation.object_count(); ++i) {
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
     text += "forces " + simulation.name(i) + " " + std::to_string(forces.size()) + "\n";
     for (const NodeVector& f : forces) {
@@ -80,14 +80,14 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
       append(text, f.value, '\n');
     }
   }
-  for (std::size_t i = 0; simulation.emits_shapes() && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.emits().shapes && i < simulation.object_count(); ++i) {
     const std::vector<Node>& nodes = simulation.model(i).nodes;
     const std::span<const double> u = simulation.displacement(i);
     text += "shapes " + simulation.name(i) + " " + std::to_string(nodes.size()) + "\n";
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append(text, nodes[k].position + vector_at(u, k), '\n');
   }
-  if (simulation.emits_instruments())
+  if (simulation.emits().instruments)
     text += instrument_reply(simulation);
   return text + "done\n";
 }

@@ -59,7 +59,8 @@ std::pair<std::size_t, std::size_t> share(const SpringLayout& layout, int thread
 
 Elastodynamic::Elastodynamic(const Model& model, Integration integration)
     : model_(model), network_(spring_network(model)), layout_(spring_layout(model)),
-      rows_(model.nodes.size()), next_(model.nodes.size()), motion_(model.nodes.size()) {
+      rows_(std::vector<NodeRow>(model.nodes.size())),
+      next_(std::vector<NodeRow>(model.nodes.size())), motion_(model.nodes.size()) {
   Box3 box;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
@@ -137,35 +138,42 @@ void Elastodynamic::apply_load() {
       if (travels)
         drive_of(row).travellers.push_back({node, way->second});
     }
-    rows_[row] = {};
-    put(travels ? way->second.at(time_) : displacement, rows_[row].u);
+    NodeRow& here = rows_.write()[row];
+    here = {};
+    put(travels ? way->second.at(time_) : displacement, here.u);
   }
-  for (std::size_t row = layout_.movable; row < rows_.size(); ++row)
-    next_[row] = rows_[row];
+  copy_held_rows();
   motion_shown_ = false;
   resting_ = false;
 }
 
+/// No step writes rows that can't move, so both sides have them.
+void Elastodynamic::copy_held_rows() {
+  const auto held = static_cast<std::ptrdiff_t>(layout_.movable);
+  std::copy(rows_->begin() + held, rows_->end(), next_.write().begin() + held);
+}
+
 std::span<const NodeMotion> Elastodynamic::motion() const {
+  const std::vector<NodeRow>& rows = *rows_;
   if (!motion_shown_)
-    for (std::size_t row = 0; row < rows_.size(); ++row)
-      motion_[layout_.node_of_row[row]] = {vector_of(rows_[row].u), vector_of(rows_[row].v)};
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      motion_[layout_.node_of_row[row]] = {vector_of(rows[row].u), vector_of(rows[row].v)};
   motion_shown_ = true;
   return motion_;
 }
 
 void Elastodynamic::set_motion(std::span<const NodeMotion> motion) {
-  for (std::size_t row = 0; row < rows_.size(); ++row) {
-    put(motion[layout_.node_of_row[row]].displacement, rows_[row].u);
-    put(motion[layout_.node_of_row[row]].velocity, rows_[row].v);
+  std::vector<NodeRow>& rows = rows_.write();
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    put(motion[layout_.node_of_row[row]].displacement, rows[row].u);
+    put(motion[layout_.node_of_row[row]].velocity, rows[row].v);
   }
   apply_load();
 }
 
-Elastodynamic::State Elastodynamic::state(bool rows) const {
-  return {load_,    time_,
-          loaded_,  rows ? rows_ : std::vector<NodeRow>{},
-          resting_, touch_ ? std::optional(touch_->state()) : std::nullopt};
+Elastodynamic::State Elastodynamic::state() const {
+  return {load_, time_,    loaded_,
+          rows_, resting_, touch_ ? std::optional(touch_->state()) : std::nullopt};
 }
 
 void Elastodynamic::restore(const State& state) {
@@ -180,11 +188,8 @@ void Elastodynamic::restore(const State& state) {
     touch_.reset();
   else
     touch_->restore(*state.touch);
-  if (state.rows.empty())
-    return;
   rows_ = state.rows;
-  std::copy(rows_.begin() + static_cast<std::ptrdiff_t>(layout_.movable), rows_.end(),
-            next_.begin() + static_cast<std::ptrdiff_t>(layout_.movable));
+  copy_held_rows();
   motion_shown_ = false;
 }
 
@@ -215,7 +220,7 @@ Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
            (force != load_->force.end() ? force->second : Vec3{});
   }
   const auto position = [&](std::uint32_t i) {
-    return model_.nodes[i].position + vector_of(rows_[layout_.row_of_node[i]].u);
+    return model_.nodes[i].position + vector_of((*rows_)[layout_.row_of_node[i]].u);
   };
   for (const Drive& drive : drives_)
     for (const Driven& driven : drive.driven)
@@ -228,7 +233,7 @@ bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>&
   if (load_->changes_until() > time || (touch_ && !touch_->still(time)))
     return false;
   const double speed = rest_tolerance * size_ / h, acceleration = speed / h;
-  for (const NodeRow& row : rows_)
+  for (const NodeRow& row : *rows_)
     if (!within(vector_of(row.v), speed))
       return false;
   const std::span<const NodeMotion> now = motion();
@@ -268,7 +273,7 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
       touch_->hold(std::move(touches));
       touch_->stay(duration);
     }
-    for (NodeRow& row : rows_)
+    for (NodeRow& row : rows_.write())
       std::fill(std::begin(row.v), std::end(row.v), 0.0);
     motion_shown_ = false;
     resting_ = true;
@@ -296,12 +301,13 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
                       {static_cast<double>(threads),
                        static_cast<double>(pulls) * static_cast<double>(steps) / pulls_of_a_thread,
                        static_cast<double>(worth)})));
+  NodeRow *const rows = rows_.write().data(), *const others = next_.write().data();
   // Written during one step and read behind its end, while the next may be on: hence two.
   std::array<std::atomic<bool>, 2> odd{}, cancelled{};
   std::uint64_t done = 0;
   in_lockstep(threads, [&](int thread, int all, MeetingPoint& point) {
     const auto [first, last] = share(layout_, thread, all);
-    NodeRow *now = rows_.data(), *next = next_.data();
+    NodeRow *now = rows, *next = others;
     std::uint32_t round = 0;
     std::uint64_t s = 0;
     for (bool stop = false; s < steps && !stop; ++s) {
@@ -406,10 +412,11 @@ void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
     }
     std::uint32_t worst = 0;
     const bool solved = implicit_->step(now, outer, held, h, context, worst);
+    std::vector<NodeRow>& rows = rows_.write();
     for (std::size_t row = 0; row < n; ++row) {
       const NodeMotion& m = now[layout_.node_of_row[row]];
-      put(m.displacement, rows_[row].u);
-      put(m.velocity, rows_[row].v);
+      put(m.displacement, rows[row].u);
+      put(m.velocity, rows[row].v);
     }
     motion_shown_ = false;
     for (const NodeMotion& m : now)

@@ -10,6 +10,7 @@
 // displacement with velocity 0, or is on its way there. The same bytes for any number of threads.
 
 #include "base/context.h"
+#include "base/copy_on_write.h"
 #include "base/error.h"
 #include "contact/load.h"
 #include "dynamics/dynamic_contact.h"
@@ -77,13 +78,12 @@ public:
   struct State {
     std::shared_ptr<const Load> load;
     double time = 0, loaded = 0;
-    std::vector<NodeRow> rows; ///< none if they did not change since
+    CopyOnWrite<std::vector<NodeRow>> rows;
     bool resting = false;
     std::optional<DynamicContact::State> touch;
   };
-  /// \param rows false: nothing moves it before it goes back to this state, or to another one that
-  /// was asked for behind this one
-  State state(bool rows = true) const;
+  /// Rows are shared until a step writes them.
+  State state() const;
   /// Goes back. \pre a state of this object
   void restore(const State& state);
   /// Forgets an implicit step's matrix and factor, which serve for several steps.
@@ -124,6 +124,7 @@ private:
   };
 
   void apply_load();
+  void copy_held_rows();
   bool found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const;
   template <class At>
   Vec3 outer_force(const Driven& driven, double time, const At& position) const;
@@ -141,7 +142,7 @@ private:
   double time_ = 0;   ///< of the state
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
-  std::vector<NodeRow> rows_, next_;
+  CopyOnWrite<std::vector<NodeRow>> rows_, next_;
   std::vector<Drive> drives_; ///< by block; empty where nothing changes
   std::unique_ptr<ImplicitEuler> implicit_;
   std::unique_ptr<DynamicContact> touch_; ///< while there are instruments

@@ -1,94 +1,279 @@
 #include "scene/simulation.h"
 
-#include "base/error.h"
-#include "scene/simulation_internal.h"
+#include "scene/rules_internal.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace gewebe {
 
-using simulation::add_counts;
+using namespace simulation;
 
-void simulation::add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
-  sum.updates += more.updates;
-  sum.unchanged += more.unchanged;
-  sum.shapes += more.shapes;
-  sum.terms += more.terms;
-  sum.skipped += more.skipped;
-  sum.solves += more.solves;
-  sum.columns_read += more.columns_read;
-  sum.factors += more.factors;
-  sum.backward_error = std::max(sum.backward_error, more.backward_error);
-  sum.contact_error = std::max(sum.contact_error, more.contact_error);
-  sum.shape_error = std::max(sum.shape_error, more.shape_error);
+namespace {
+
+/// The place of the one of this name. \throw Error naming those there are
+template <class All, class NameOf>
+std::size_t place_of(const std::string& name, const char* what, const All& all, NameOf&& name_of) {
+  std::string list;
+  std::size_t k = 0;
+  for (const auto& one : all) {
+    if (name_of(one) == name)
+      return k;
+    list += (list.empty() ? "" : ", ") + name_of(one);
+    ++k;
+  }
+  throw Error(std::string("there is no ") + what + " '" + name + "', expected " +
+              (list.empty() ? std::string("an ") + what + " command first" : "one of " + list));
 }
 
+void require_not_past(const World& w, double time) {
+  if (!(time >= w.now.clock.time))
+    throw Error("the time " + number_text(time) + " s is past, expected " +
+                number_text(w.now.clock.time) + " s or later");
+}
+
+} // namespace
+
 Simulation::Simulation(const Context& context, SimulationOptions options)
-    : context_(context), options_(std::move(options)), undo_(std::make_unique<Undo>()) {
-  context_.progress = nullptr;
+    : world_(std::make_unique<World>(World{.context = context, .options = std::move(options)})) {
+  world_->context.progress = nullptr;
 }
 Simulation::~Simulation() = default;
 
+// ---- objects
+
+void Simulation::add_object(const std::string& name, ObjectSource source, Method method,
+                            Integration integration) {
+  Object object;
+  object.matter->name = name;
+  object.matter->source = std::move(source);
+  object.matter->integration = integration;
+  object.method = method;
+  insert(*world_, std::move(object));
+}
+
+void Simulation::add_object(const std::string& name, Model model, Method method,
+                            StiffnessParts parts, Integration integration) {
+  World& w = *world_;
+  Object object;
+  object.matter->name = name;
+  object.matter->source.model = [&] { return std::move(model); };
+  object.matter->integration = integration;
+  object.method = method;
+  need_model(object);
+  object.matter->source = {};
+  if (method == Method::ffe)
+    make_still(w, object, std::move(parts));
+  insert(w, std::move(object));
+  if (method == Method::ffe)
+    return;
+  try {
+    need_body(w, w.now.objects.size() - 1);
+  } catch (...) {
+    w.now.objects.pop_back();
+    throw;
+  }
+}
+
+std::size_t Simulation::object_count() const noexcept {
+  return world_->now.objects.size();
+}
+
 const std::string& Simulation::name(std::size_t object) const {
-  return objects_.at(object)->name;
+  return world_->now.objects.at(object).name();
 }
 
 const Model& Simulation::model(std::size_t object) const {
-  need_model(*objects_.at(object));
-  return objects_[object]->model;
+  need_model(world_->now.objects.at(object));
+  return world_->now.objects[object].model();
 }
 
 const Model& Simulation::first_model(std::size_t object) const {
-  need_model(*objects_.at(object));
-  return objects_[object]->first ? *objects_[object]->first : objects_[object]->model;
+  const Model& now = model(object);
+  const auto& first = world_->now.objects[object].cut.first;
+  return first ? *first : now;
 }
 
 std::span<const std::uint32_t> Simulation::first_nodes(std::size_t object) const {
-  return objects_.at(object)->first_nodes;
+  return *world_->now.objects.at(object).cut.first_nodes;
 }
 
 std::span<const std::uint32_t> Simulation::places(std::size_t object) const {
-  return objects_.at(object)->places;
+  return *world_->now.objects.at(object).cut.places;
 }
 
 bool Simulation::known(std::size_t object) const {
-  return objects_.at(object)->known;
+  return world_->now.objects.at(object).matter->known;
 }
 
 Method Simulation::method(std::size_t object) const {
-  return objects_.at(object)->method;
+  return world_->now.objects.at(object).method;
 }
 
 std::size_t Simulation::find(const std::string& name) const {
-  std::string list;
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
-    if (objects_[i]->name == name)
-      return i;
-    list += (list.empty() ? "" : ", ") + objects_[i]->name;
+  return place_of(name, "object", world_->now.objects, [](const Object& o) { return o.name(); });
+}
+
+// ---- instruments
+
+std::size_t Simulation::add_instrument(const std::string& name) {
+  return simulation::add_instrument(*world_, name);
+}
+
+std::size_t Simulation::instrument_place(const std::string& name) const noexcept {
+  return simulation::instrument_place(*world_, name);
+}
+
+std::size_t Simulation::instrument_count() const noexcept {
+  return world_->now.instruments.size();
+}
+
+const std::string& Simulation::instrument_name(std::size_t instrument) const {
+  return world_->now.instruments.at(instrument).name;
+}
+
+std::size_t Simulation::find_instrument(const std::string& name) const {
+  return place_of(name, "instrument", world_->now.instruments,
+                  [](const Instrument& i) { return i.name; });
+}
+
+InstrumentReport Simulation::instrument(std::size_t instrument) const {
+  return report_of(*world_, instrument);
+}
+
+// ---- changes
+
+void Simulation::apply(const Change& change) {
+  simulation::apply(*world_, change);
+}
+
+ChangeRow Simulation::row_of(const Change& change) const {
+  return simulation::row_of(*world_, change);
+}
+
+void Simulation::schedule(double time, const Change& change) {
+  World& w = *world_;
+  require_not_past(w, time);
+  if (time == w.now.clock.time) {
+    apply(change);
+    return;
   }
-  throw Error("there is no object '" + name + "', expected " +
-              (list.empty() ? "an object command first" : "one of " + list));
+  accept(w, change);
+  announce(w, change);
+  w.now.events.write().emplace(time, Event{change});
+}
+
+void Simulation::schedule_every(double period, const Change& change) {
+  World& w = *world_;
+  require_period(period);
+  accept(w, change);
+  const double now = w.now.clock.time;
+  w.now.events.write().emplace(now + period, Event{change, now, period, 1});
+}
+
+std::size_t Simulation::pending() const noexcept {
+  const auto& events = *world_->now.events;
+  return static_cast<std::size_t>(std::count_if(
+      events.begin(), events.end(), [](const auto& e) { return e.second.period == 0; }));
+}
+
+// ---- time
+
+double Simulation::time() const noexcept {
+  return world_->now.clock.time;
+}
+
+std::optional<double> Simulation::timestep() const noexcept {
+  return world_->now.clock.timestep;
+}
+
+void Simulation::step(double dt) {
+  World& w = *world_;
+  const Clock clock = w.now.clock;
+  // Neumaier's sum: ten steps of 0.1 s end at 1 s.
+  const double sum = clock.sum + dt;
+  if (!std::isfinite(sum))
+    throw Error("a step of " + number_text(dt) + " s from " + number_text(clock.time) +
+                " s, expected an end that is finite");
+  const double lost =
+      clock.lost + (clock.sum >= dt ? (clock.sum - sum) + dt : (dt - sum) + clock.sum);
+  guarded(w, [&] { advance(w, std::max(sum + lost, clock.time)); });
+  w.now.clock.sum = sum;
+  w.now.clock.lost = lost;
+}
+
+void Simulation::step_to(double time) {
+  World& w = *world_;
+  require_not_past(w, time);
+  guarded(w, [&] { advance(w, time); });
+  w.now.clock.sum = time;
+  w.now.clock.lost = 0;
+}
+
+// ---- what is shown and told
+
+const Emits& Simulation::emits() const noexcept {
+  return world_->now.emits;
 }
 
 std::span<const double> Simulation::displacement(std::size_t object) const {
-  shape(*objects_.at(object));
-  return objects_[object]->displacement;
+  shape(*world_, world_->now.objects.at(object));
+  return *world_->now.objects[object].shown.displacement;
 }
 
 const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) const {
-  return objects_.at(object)->forces;
+  return *world_->now.objects.at(object).shown.forces;
+}
+
+const std::vector<MethodJump>& Simulation::jumps() const noexcept {
+  return world_->now.jumps;
+}
+
+void Simulation::take_jumps() noexcept {
+  world_->now.jumps.clear();
+}
+
+std::vector<std::size_t> Simulation::take_renewed() {
+  return std::exchange(world_->renewed, {});
+}
+
+const std::vector<Cutting>& Simulation::cuttings() const noexcept {
+  return world_->now.cuttings;
+}
+
+void Simulation::take_cuttings() noexcept {
+  world_->now.cuttings.clear();
+}
+
+void Simulation::warn_of_thresholds() {
+  const World& w = *world_;
+  for (Object& object : world_->now.objects) {
+    Stages& stages = object.stages;
+    if (!stages.options || stages.warned)
+      continue;
+    const auto& two_step = object.statics->two_step;
+    const double largest = two_step ? two_step->largest() : 0;
+    if (largest > stages.options->threshold)
+      continue;
+    stages.warned = true;
+    if (w.options.warn)
+      w.options.warn("object " + object.name() + ": its load never exceeded the threshold " +
+                     number_text(stages.options->threshold) + " of two-step (" +
+                     number_text(largest) + " at most), so the second stage had no effect");
+  }
 }
 
 SimulationCounts Simulation::counts() const {
-  SimulationCounts all = counts_;
-  for (const auto& object : objects_) {
-    add_counts(all.elastostatic, object->spent);
-    if (object->still)
-      add_counts(all.elastostatic, object->still->counts());
-    if (!object->two_step)
+  SimulationCounts all = world_->now.counts;
+  for (const Object& object : world_->now.objects) {
+    const Statics& statics = *object.statics;
+    add_counts(all.elastostatic, statics.spent);
+    if (statics.still)
+      add_counts(all.elastostatic, statics.still->counts());
+    if (!statics.two_step)
       continue;
-    const ElastostaticCounts second = object->two_step->second_counts();
+    const ElastostaticCounts second = statics.two_step->second_counts();
     all.elastostatic.solves += second.solves;
     all.elastostatic.columns_read += second.columns_read;
     all.elastostatic.factors += second.factors;
@@ -96,24 +281,19 @@ SimulationCounts Simulation::counts() const {
   return all;
 }
 
-std::vector<std::size_t> Simulation::take_renewed() {
-  return std::exchange(renewed_, {});
-}
-
 SimulationState Simulation::state() const {
   SimulationState state;
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
-    const auto& object = objects_[i];
-    if (!object->known)
+  for (std::size_t i = 0; i < object_count(); ++i) {
+    if (!known(i))
       continue;
-    state.strain = std::max(state.strain, linear_range(object->model, displacement(i)).strain);
-    if (object->body == nullptr)
+    state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
+    const Object& object = world_->now.objects[i];
+    if (object.body == nullptr)
       continue;
-    const auto motion =
-        object->body->moving->motion().subspan(object->offset, object->model.nodes.size());
-    state.kinetic_energy += kinetic_energy(object->model, motion);
-    state.elastic_energy += elastic_energy(object->model, motion);
-    state.safe_step = std::min(state.safe_step, object->body->safe);
+    const std::span<const NodeMotion> motion = motion_of(object);
+    state.kinetic_energy += kinetic_energy(object.model(), motion);
+    state.elastic_energy += elastic_energy(object.model(), motion);
+    state.safe_step = std::min(state.safe_step, object.body->safe);
   }
   return state;
 }

@@ -9,7 +9,7 @@
 #include "model/cut.h"
 #include "model/cut_select.h"
 #include "model/model.h"
-#include "scene/command.h"
+#include "scene/change.h"
 #include "statics/elastostatic.h"
 #include "statics/two_step.h"
 
@@ -26,112 +26,6 @@
 #include <vector>
 
 namespace gewebe {
-
-struct SetForce {
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-  Vec3 force;        ///< on each; 0 takes it away
-  double period = 0; ///< s; 0: it does not pulse
-};
-struct SetPressure {
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-  NodePressure pressure; ///< 0 takes it away
-};
-struct SetDisplacement {
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-  Vec3 displacement;
-  double over = 0; ///< s that the way there takes an elastodynamic object's nodes
-};
-/// Ties each of the first object's nodes to the nearest of the second's by a spring, at rest as
-/// they stand.
-struct Attach {
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-  std::size_t other = 0;
-  std::vector<std::uint32_t> others;
-  double stiffness = 0; ///< g/s², of each spring
-};
-struct Release { ///< of force, pressure, displacement and grasp
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-};
-/// Puts an instrument there, in place of itself, or moves it from where it is; see
-/// add_instrument().
-struct SetInstrument {
-  std::size_t instrument = 0; ///< instrument_count(): a new one, from when this is accepted
-  InstrumentShape shape;      ///< radius > 0, friction >= 0
-  Pose pose;                  ///< turn of length 1
-  std::string name{};         ///< of a new one
-};
-struct MoveInstrument {
-  std::size_t instrument = 0;
-  Vec3 place;
-  std::optional<Quaternion> turn; ///< of length 1; none: as it is
-  double over = 0;                ///< s that the way takes
-};
-/// Nodes follow an instrument as parts of it, from where they stand.
-struct Grasp {
-  std::size_t object = 0;
-  std::vector<std::uint32_t> nodes;
-  std::size_t instrument = 0;
-};
-/// Takes an instrument away; what it grasped is released.
-struct Withdraw {
-  std::size_t instrument = 0;
-};
-struct SetGravity {
-  Vec3 gravity;
-};
-struct SetTimestep {
-  double dt = 0;
-};
-/// The two-step method for an elastostatic object from now on.
-struct SetTwoStep {
-  std::size_t object = 0;
-  TwoStepOptions options;
-  std::function<StiffnessParts()> second; ///< asked once for an object
-};
-struct Emit {
-  bool forces = false;      ///< else shapes
-  bool instruments = false; ///< rather
-};
-/// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
-/// no velocity; an elastostatic one takes its own shape at once.
-struct SetMethod {
-  std::size_t object = 0;
-  Method method = Method::ela;
-};
-/// Forgets what is kept to be quick (factors, columns, running sums): the next shape is computed
-/// from the load or the state of motion alone.
-struct Renew {
-  std::size_t object = 0;
-};
-/// What a cut severs: springs between sets of nodes, or what a plane passes, of all nodes or some.
-struct SpringsToCut {
-  std::vector<std::uint32_t> from, to;
-};
-struct PlaneToCut {
-  CutPlane plane;
-  std::optional<std::vector<std::uint32_t>> nodes;
-};
-struct CutObject {
-  std::size_t object = 0;
-  std::variant<SpringsToCut, PlaneToCut> what;
-};
-/// Springs that are stretched beyond this tear from now on; 0: none any more.
-struct SetTear {
-  std::size_t object = 0;
-  double strain = 0;
-};
-/// The model as it came; what has come off stays an object of its own.
-struct Restore {
-  std::size_t object = 0;
-};
-using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
-                            MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
-                            Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
 /// Where what an object consists of comes from: asked for when it is first needed, the stiffness
 /// again after a Renew. What they throw leaves the call that needed it.
@@ -197,6 +91,11 @@ struct InstrumentReport {
   std::size_t nodes = 0; ///< that it touches or grasps
 };
 
+/// What the answer to a step tells.
+struct Emits {
+  bool forces = false, shapes = false, instruments = false;
+};
+
 /// Of the last step.
 struct SimulationState {
   double kinetic_energy = 0, elastic_energy = 0; ///< of elastodynamic objects, 1e-9 J
@@ -204,7 +103,9 @@ struct SimulationState {
   double safe_step = HUGE_VAL;                   ///< least of the elastodynamic objects
 };
 
-class CutStiffness;
+namespace simulation {
+struct World;
+}
 
 class Simulation {
 public:
@@ -223,7 +124,7 @@ public:
   void add_object(const std::string& name, ObjectSource source, Method method,
                   Integration integration = Integration::semi_implicit);
 
-  std::size_t object_count() const noexcept { return objects_.size(); }
+  std::size_t object_count() const noexcept;
   const std::string& name(std::size_t object) const;
   /// Read now if it was not needed before. The first one of an object lives as long as this; a cut
   /// one as long as nothing more is cut. \throw as its source
@@ -245,7 +146,7 @@ public:
   std::size_t add_instrument(const std::string& name);
   /// The number of the one of that name; instrument_count() where there is none.
   std::size_t instrument_place(const std::string& name) const noexcept;
-  std::size_t instrument_count() const noexcept { return instruments_.size(); }
+  std::size_t instrument_count() const noexcept;
   const std::string& instrument_name(std::size_t instrument) const;
   /// \throw Error naming those there are
   std::size_t find_instrument(const std::string& name) const;
@@ -256,6 +157,8 @@ public:
   /// million times the size of its model, an instrument should stand where single precision does
   /// not reach, or objects can't be attached or change their method
   void apply(const Change& change);
+  /// What a log says of a change that has just taken effect.
+  ChangeRow row_of(const Change& change) const;
   /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier.
   /// \throw Error as apply, and if the time is past
   void schedule(double time, const Change& change);
@@ -265,12 +168,10 @@ public:
   /// Events that wait, repeated ones not counted.
   std::size_t pending() const noexcept;
 
-  double time() const noexcept { return time_; }
+  double time() const noexcept;
   /// The integration step asked for by SetTimestep.
-  std::optional<double> timestep() const noexcept { return timestep_; }
-  bool emits_forces() const noexcept { return emit_forces_; }
-  bool emits_shapes() const noexcept { return emit_shapes_; }
-  bool emits_instruments() const noexcept { return emit_instruments_; }
+  std::optional<double> timestep() const noexcept;
+  const Emits& emits() const noexcept;
 
   /// Goes on by dt >= 0, or to `time` (now or later), through the events up to and at its end.
   /// Times add up without the rounding of each sum. \throw Error "object NAME at T s: …", among
@@ -288,12 +189,12 @@ public:
 
   /// Since they were last taken: jumps; and objects for which a call that threw (under guard) did
   /// what Renew does.
-  const std::vector<MethodJump>& jumps() const noexcept { return jumps_; }
-  void take_jumps() noexcept { jumps_.clear(); }
+  const std::vector<MethodJump>& jumps() const noexcept;
+  void take_jumps() noexcept;
   std::vector<std::size_t> take_renewed();
   /// Since they were last taken, in the order in which they happened.
-  const std::vector<Cutting>& cuttings() const noexcept { return cuttings_; }
-  void take_cuttings() noexcept { cuttings_.clear(); }
+  const std::vector<Cutting>& cuttings() const noexcept;
+  void take_cuttings() noexcept;
   /// Behind the last step: warns, once per object, where the threshold of the two-step method was
   /// never reached.
   void warn_of_thresholds();
@@ -302,131 +203,7 @@ public:
   SimulationState state() const;
 
 private:
-  struct Object;
-  struct Body;
-  struct Undo;
-  struct Instrument;
-  struct Tie {
-    std::size_t object = 0, other = 0;
-    std::uint32_t node = 0, other_node = 0;
-    double stiffness = 0, rest = 0;
-  };
-  struct Event {
-    Change change;
-    double origin = 0, period = 0; ///< of a repeated one
-    double round = 0;
-    bool in_flight = false; ///< takes effect just now
-  };
-  void insert(std::unique_ptr<Object> object);
-  void need_model(Object& object) const;
-  void need_body(std::size_t object);
-  Elastostatic& still_of(Object& object) const;
-  void update_still(Object& object, const Load& load);
-  void check(const Change& change) const;
-  void apply_now(const Change& change);
-  void attach(const Attach& tie);
-  void set_method(std::size_t index, Method method);
-  void renew(Object& object);
-  template <class Work>
-  void guarded(Work&& work);
-  void open_undo();
-  void take_back() noexcept;
-  void keep_load(Object& object);
-  void keep_body(Body& body);
-  void displace(Object& object, const SetDisplacement& set);
-  void set_two_step(Object& object, const SetTwoStep& set);
-  void update_stages(Object& object, const Load& load) const;
-  std::span<const double> still_shape(Object& object) const;
-  const std::vector<NodeVector>& still_forces(const Object& object) const;
-  [[noreturn]] void raise(const Body& body) const;
-  using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
-  std::unique_ptr<Body> make_body(std::vector<std::size_t> parts, const Motions* motions = nullptr);
-  void move_bodies(double to);
-  void advance(double to);
-  void take_effect_first();
-  void require_few_events(double to) const;
-  template <class Work>
-  void at_object(const Object& object, Work&& work) const; ///< names object and time in an Error
-  void show(Object& object);
-  void leave_shown(Object& object);
-  bool has_moved(const Object& object) const;
-  std::vector<Vec3> shape_velocity(Object& object, bool afresh);
-  void shape(Object& object) const;
-  double displacement_limit(Object& object) const;
-  void require_bounded(Object& object, std::span<const double> displacement) const;
-  void require_bounded(Object& object) const;
-  void require_bounded_instruments() const;
-  void shape_in_step(Object& object);
-  bool may_leave_range(Object& object, double most) const;
-  void show_motion(Object& object);
-  void update_in_time(Object& object);
-  void warn_of_range(Object& object) const;
-  double integration_step(Body& body);
-  void check_instrument(const Change& change) const;
-  void require_instrument(const Change& change) const;
-  void introduce(const Change& change);
-  Instrument& present_instrument(std::size_t instrument) const;
-  bool apply_instrument(const Change& change);
-  void carry(const Instrument& instrument);
-  void drop_grips(std::size_t object, const std::vector<std::uint32_t>& nodes);
-  void drop_grips(std::size_t instrument);
-  void note_poses();
-  void guide(Body& body, double to);
-  void need_contact(Object& object);
-  void end_guiding(double to);
-  bool touched_anew(Object& object);
-  std::optional<Pose> pose_at(std::size_t moment, std::size_t instrument) const;
-  bool instruments_there() const;
-  void follow_instruments(Object& object);
-  void take_touches(double duration);
-  void gather_impulses(Body& body);
-  void add_touches(Object& object);
-  struct Moves;
-  void cut_now(const CutObject& change);
-  void find_late_shape(Object& object) const;
-  void restore_now(std::size_t index);
-  void carry_out(std::size_t index, CutModel cut);
-  CutStiffness* stiffness_of(Object& object) const;
-  void announce_cut(std::size_t index);
-  void announce_cuts(const Change& change);
-  std::optional<StiffnessParts> cut_parts(Object& object, std::shared_ptr<const Model> next,
-                                          const CutModel& cut);
-  std::unique_ptr<Object> renumbered(const Object& old, std::shared_ptr<Model> model) const;
-  void move_all(std::size_t index, const Moves& moves, std::vector<std::unique_ptr<Object>> pieces,
-                std::span<const Vec3> velocity = {});
-  void move_shown(const Object& old, const Moves& moves,
-                  const std::vector<std::unique_ptr<Object>>& pieces) const;
-  void move_grips(std::size_t index, const Moves& moves);
-  void move_events(std::size_t index, const Moves& moves);
-  void move_ties(std::size_t index, const Moves& moves);
-  void renew_bodies(const std::vector<std::size_t>& objects, const Motions& motions);
-  std::string free_name(const std::string& name) const;
-  std::vector<SweptQuad> swept_areas();
-  void sweep_blades();
-  void tear();
-  bool may_cut(Object& object);
-  void find_free_motion(std::size_t index);
-
-  Context context_;
-  SimulationOptions options_;
-  std::vector<std::unique_ptr<Object>> objects_;
-  std::vector<std::unique_ptr<Body>> bodies_;
-  std::vector<Tie> ties_;
-  std::vector<std::unique_ptr<Instrument>> instruments_;
-  /// In this step: where the instruments stood, one after the other.
-  std::vector<std::vector<std::optional<Pose>>> poses_;
-  std::multimap<double, Event> events_;
-  Vec3 gravity_;
-  std::optional<double> timestep_;
-  double time_ = 0;
-  double shapes_time_ = 0;    ///< when all objects were last shown
-  double sum_ = 0, lost_ = 0; ///< of the steps so far, and what rounding took from it
-  bool emit_forces_ = false, emit_shapes_ = false, emit_instruments_ = false;
-  SimulationCounts counts_;
-  std::vector<MethodJump> jumps_;
-  std::vector<std::size_t> renewed_;
-  std::vector<Cutting> cuttings_;
-  std::unique_ptr<Undo> undo_;
+  std::unique_ptr<simulation::World> world_;
 };
 
 } // namespace gewebe

@@ -166,9 +166,9 @@ TEST(Simulation, RefusesDisplacementAlongFixedAxesAndThePast) {
   EXPECT_THROW(s.step_to(0.5), Error);
   EXPECT_THROW((void)s.find("b"), Error);
   EXPECT_EQ(s.find("a"), 0U);
-  EXPECT_FALSE(s.emits_forces());
+  EXPECT_FALSE(s.emits().forces);
   s.schedule(1, Emit{true}); // now
-  EXPECT_TRUE(s.emits_forces());
+  EXPECT_TRUE(s.emits().forces);
   EXPECT_EQ(s.pending(), 0U);
 }
 

@@ -200,7 +200,7 @@ std::vector<double> disturbed(bool with_failures, std::vector<std::vector<std::s
         all.push_back(f.value.x);
     }
     all.push_back(s.state().kinetic_energy);
-    all.push_back(s.emits_forces() ? 1 : 0);
+    all.push_back(s.emits().forces ? 1 : 0);
     for (const MethodJump& jump : s.jumps())
       all.push_back(jump.size);
     s.take_jumps();
@@ -258,10 +258,10 @@ TEST(SimulationUndo, AnEventThatFailsStaysUntilItCanHappen) {
   s.apply(SetMethod{1, Method::ffe});
   EXPECT_THROW(s.step(0.03), Error);
   EXPECT_EQ(s.pending(), 2U);
-  EXPECT_FALSE(s.emits_forces());
+  EXPECT_FALSE(s.emits().forces);
   EXPECT_EQ(s.time(), 0);
   s.step(0.015);
-  EXPECT_TRUE(s.emits_forces());
+  EXPECT_TRUE(s.emits().forces);
   EXPECT_THROW(s.step(0.015), Error);
   s.apply(SetMethod{1, Method::ela});
   s.step(0.015);

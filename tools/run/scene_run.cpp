@@ -295,7 +295,7 @@ struct SceneRun::State {
   void answer() {
     ++steps;
     checks.look(
-        simulation, simulation.emits_shapes() || options.result != nullptr || options.measure,
+        simulation, simulation.emits().shapes || options.result != nullptr || options.measure,
         [this](const std::string& text) { warn(text); },
         [this](const std::string& text) { distrust(text); });
     if (options.reply)

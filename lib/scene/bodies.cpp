@@ -1,0 +1,299 @@
+// Bodies: what is tied together and moves as one.
+
+#include "base/parallel.h"
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a tenth of a picture
+
+/// All parts as one model, without what ties them. \param offset of each part's nodes
+Model joined(const World& w, const std::vector<std::size_t>& parts,
+             std::vector<std::size_t>& offset) {
+  Model all;
+  for (const std::size_t part : parts) {
+    const Model& from = w.now.objects[part].model();
+    const auto base = static_cast<std::uint32_t>(all.nodes.size());
+    offset.push_back(base);
+    all.nodes.insert(all.nodes.end(), from.nodes.begin(), from.nodes.end());
+    for (Spring s : from.springs) {
+      s.i += base;
+      s.j += base;
+      all.springs.push_back(s);
+    }
+    for (Triangle t : from.triangles) {
+      for (std::uint32_t& corner : t)
+        corner += base;
+      all.triangles.push_back(t);
+    }
+  }
+  return all;
+}
+
+void add_ties(const World& w, const std::vector<std::size_t>& parts,
+              const std::vector<std::size_t>& offset, Model& all) {
+  for (const Tie& tie : w.now.ties) {
+    const auto a = std::find(parts.begin(), parts.end(), tie.object);
+    const auto b = std::find(parts.begin(), parts.end(), tie.other);
+    if (a == parts.end() || b == parts.end())
+      continue;
+    const auto index = [&](auto part, std::uint32_t node) {
+      return static_cast<std::uint32_t>(offset[static_cast<std::size_t>(part - parts.begin())]) +
+             node;
+    };
+    Spring s{
+        index(a, tie.node), index(b, tie.other_node), SpringKind::edge, tie.stiffness, 0, tie.rest};
+    const Node &m = all.nodes[s.i], &n = all.nodes[s.j];
+    const auto ratio = [&](const Object& o, const Node& node) {
+      return o.model().materials[static_cast<std::size_t>(node.material)].damping_ratio;
+    };
+    const double mass = m.fixed == fixed_all   ? n.mass
+                        : n.fixed == fixed_all ? m.mass
+                                               : m.mass * (n.mass / (m.mass + n.mass));
+    s.damping = (ratio(w.now.objects[tie.object], m) + ratio(w.now.objects[tie.other], n)) *
+                std::sqrt(s.stiffness * mass);
+    if (s.i > s.j)
+      std::swap(s.i, s.j);
+    all.springs.push_back(s);
+  }
+}
+
+Integration integration_of(const World& w, const Body& body) {
+  return w.now.objects[body.parts[0]].matter->integration;
+}
+
+double integration_step(World& w, Body& body) {
+  const std::optional<double> wish = w.now.clock.timestep;
+  if (integration_of(w, body) == Integration::implicit)
+    return wish.value_or(implicit_step);
+  const double usual = safe_step_fraction * body.safe;
+  if (!wish)
+    return usual;
+  if (*wish <= body.safe)
+    return *wish;
+  if (!body.warned_step && w.options.warn)
+    w.options.warn("object " + w.now.objects[body.parts[0]].name() + ": the timestep " +
+                   number_text(*wish) + " s is beyond the safe " + number_text(body.safe) +
+                   " s, it takes smaller ones");
+  body.warned_step = true;
+  return usual;
+}
+
+/// What acts on all parts, to their body.
+void load_body(const World& w, Body& body) {
+  Load load;
+  for (const std::size_t part : body.parts) {
+    const Object& object = w.now.objects[part];
+    const auto add = [&](const auto& from, auto& all) {
+      for (const auto& [node, value] : from)
+        all[static_cast<std::uint32_t>(object.offset) + node] = value;
+    };
+    add(object.load->force, load.force);
+    add(object.load->displacement, load.displacement);
+    add(object.load->force_period, load.force_period);
+    add(object.load->pressure, load.pressure);
+    add(object.load->travel, load.travel);
+    load.gravity = object.load->gravity;
+  }
+  body.ahead = true;
+  body.moving->set_load(load, w.now.clock.time);
+  body.changed = false;
+}
+
+/// What ended a body's motion, with its object's name.
+[[noreturn]] void raise(const World& w, const Body& body) {
+  const auto owner = [&](std::uint32_t node) {
+    std::size_t found = body.parts[0];
+    for (const std::size_t part : body.parts)
+      if (w.now.objects[part].offset <= node)
+        found = part;
+    return found;
+  };
+  try {
+    std::rethrow_exception(body.failure);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const MotionError& error) {
+    const Object& object = w.now.objects[owner(error.node())];
+    throw Error("object " + object.name() + " at " + number_text(error.time()) + " s: node " +
+                std::to_string(error.node() - object.offset) + " " + error.what());
+  } catch (const Error& error) {
+    throw Error("object " + w.now.objects[body.parts[0]].name() + " at " +
+                number_text(w.now.clock.time) + " s: " + error.what());
+  }
+}
+
+} // namespace
+
+std::span<const NodeMotion> motion_of(const Object& object) {
+  return object.body->moving->motion().subspan(object.offset, object.model().nodes.size());
+}
+
+/// \param motions of parts, by object; none: as they move now
+std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const Motions* motions) {
+  auto body = std::make_shared<Body>();
+  std::vector<std::size_t> offset;
+  if (parts.size() > 1) {
+    Model all = joined(w, parts, offset);
+    add_ties(w, parts, offset, all);
+    body->model = std::make_shared<const Model>(std::move(all));
+  } else {
+    offset.push_back(0);
+    body->model = w.now.objects[parts[0]].matter->model;
+  }
+  std::vector<NodeMotion> motion;
+  for (const std::size_t part : parts) {
+    const Object& object = w.now.objects[part];
+    if (motions == nullptr && object.body == nullptr) {
+      motion.resize(motion.size() + object.model().nodes.size());
+      continue;
+    }
+    const std::span<const NodeMotion> from =
+        motions != nullptr ? std::span<const NodeMotion>(motions->at(part)) : motion_of(object);
+    motion.insert(motion.end(), from.begin(), from.end());
+  }
+  body->moving.emplace(*body->model, w.now.objects[parts[0]].matter->integration);
+  body->moving->set_motion(motion);
+  body->safe = safe_step(*body->model);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    w.now.objects[parts[k]].body = body;
+    w.now.objects[parts[k]].offset = offset[k];
+  }
+  body->parts = std::move(parts);
+  return body;
+}
+
+/// An elastodynamic object has a body from when something first acts on it.
+void need_body(World& w, std::size_t object) {
+  if (w.now.objects[object].body != nullptr)
+    return;
+  need_model(w.now.objects[object]);
+  w.now.bodies.push_back(make_body(w, {object}));
+}
+
+void drop_body(World& w, const Body* body) {
+  std::erase_if(w.now.bodies, [&](const auto& one) { return one.get() == body; });
+}
+
+void move_bodies(World& w, double to) {
+  const double duration = to - w.now.clock.time;
+  for (std::size_t i = 0; i < w.now.objects.size(); ++i)
+    if (w.now.objects[i].method == Method::ela &&
+        (!w.now.objects[i].load->empty() || instruments_there(w)))
+      need_body(w, i);
+  for (const auto& body : w.now.bodies)
+    if (body->changed)
+      load_body(w, *body);
+  if (!(duration > 0))
+    return;
+  std::vector<Body*> awake;
+  std::vector<double> step;
+  for (const auto& body : w.now.bodies) {
+    body->taken = 0;
+    guide(w, *body, to);
+    if (body->moving->resting()) {
+      body->moving->rest_on(duration);
+      continue;
+    }
+    body->ahead = true;
+    body->rest_box.reset();
+    awake.push_back(body.get());
+    step.push_back(integration_step(w, *body));
+  }
+  // One body has all threads, several have one each.
+  Context context = w.context;
+  if (awake.size() > 1)
+    context.threads = 1;
+  parallel_blocks(w.context, awake.size(), 1, [&](std::size_t k, std::size_t) {
+    try {
+      awake[k]->taken = awake[k]->moving->advance(duration, step[k], context, w.now.clock.time);
+    } catch (...) {
+      awake[k]->failure = std::current_exception();
+    }
+  });
+  for (Body* const body : awake)
+    if (body->failure)
+      raise(w, *body);
+  end_guiding(w, to);
+  SimulationCounts& counts = w.now.counts;
+  for (const Object& object : w.now.objects)
+    counts.resting += object.method == Method::ela && object.body == nullptr ? 1 : 0;
+  for (const auto& body : w.now.bodies) {
+    for (const std::size_t part : body->parts) {
+      counts.integration += body->taken;
+      counts.resting += body->taken == 0 ? 1 : 0;
+      counts.moving += body->taken == 0 ? 0 : 1;
+      Shown& shown = w.now.objects[part].shown;
+      shown.valid = shown.valid && body->taken == 0;
+    }
+  }
+}
+
+// ---- attachments
+
+void Rule<Attach>::check(World& w, const Attach& c) {
+  const Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
+  for (const Object* const o : {&a, &b})
+    if (o->method != Method::ela)
+      throw Error("object " + o->name() +
+                  " is elastostatic (ffe) and has no motion to tie, expected ela objects");
+  if (&a == &b)
+    throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
+  if (a.matter->integration != b.matter->integration)
+    throw Error("one of " + a.name() + " and " + b.name() +
+                " is implicit and the other is not, expected both alike");
+}
+
+void Rule<Attach>::apply(World& w, const Attach& c) {
+  need_body(w, c.object);
+  need_body(w, c.other);
+  Object &a = w.now.objects[c.object], &b = w.now.objects[c.other];
+  const std::size_t ties = w.now.ties.size();
+  const auto position = [](const Object& o, std::uint32_t node) {
+    return o.model().nodes[node].position + motion_of(o)[node].displacement;
+  };
+  for (const std::uint32_t node : c.nodes) {
+    const Vec3 here = position(a, node);
+    std::uint32_t nearest = c.others[0];
+    double least = HUGE_VAL;
+    for (const std::uint32_t other : c.others) {
+      const Vec3 d = position(b, other) - here;
+      if (dot(d, d) < least) {
+        least = dot(d, d);
+        nearest = other;
+      }
+    }
+    w.now.ties.push_back({c.object, c.other, node, nearest, c.stiffness, std::sqrt(least)});
+  }
+  std::vector<std::size_t> parts = a.body->parts;
+  if (a.body != b.body)
+    parts.insert(parts.end(), b.body->parts.begin(), b.body->parts.end());
+  std::sort(parts.begin(), parts.end());
+  const std::shared_ptr<Body> first = a.body, second = b.body;
+  for (const auto& body : {first, second})
+    gather_impulses(w, *body);
+  std::shared_ptr<Body> body;
+  try {
+    body = make_body(w, std::move(parts));
+  } catch (...) {
+    w.now.ties.resize(ties);
+    throw;
+  }
+  drop_body(w, first.get());
+  drop_body(w, second.get());
+  w.now.bodies.push_back(std::move(body));
+}
+
+void Rule<Attach>::log(const World&, const Attach& c, ChangeRow& row) {
+  row.what = "attach";
+  row.value = c.stiffness;
+}
+
+} // namespace gewebe::simulation

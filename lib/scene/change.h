@@ -1,0 +1,139 @@
+#pragma once
+// What can be done to a scene: objects and instruments by number, nodes by number.
+
+#include "compliance/compliance.h"
+#include "contact/instrument.h"
+#include "contact/load.h"
+#include "model/cut_select.h"
+#include "scene/command.h"
+#include "statics/two_step.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace gewebe {
+
+struct SetForce {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  Vec3 force;        ///< on each; 0 takes it away
+  double period = 0; ///< s; 0: it does not pulse
+};
+struct SetPressure {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  NodePressure pressure; ///< 0 takes it away
+};
+struct SetDisplacement {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  Vec3 displacement;
+  double over = 0; ///< s that the way there takes an elastodynamic object's nodes
+};
+/// Ties each of the first object's nodes to the nearest of the second's by a spring, at rest as
+/// they stand.
+struct Attach {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  std::size_t other = 0;
+  std::vector<std::uint32_t> others;
+  double stiffness = 0; ///< g/s², of each spring
+};
+struct Release { ///< of force, pressure, displacement and grasp
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+};
+/// Puts an instrument there, in place of itself, or moves it from where it is; see
+/// add_instrument().
+struct SetInstrument {
+  std::size_t instrument = 0; ///< instrument_count(): a new one, from when this is accepted
+  InstrumentShape shape;      ///< radius > 0, friction >= 0
+  Pose pose;                  ///< turn of length 1
+  std::string name{};         ///< of a new one
+};
+struct MoveInstrument {
+  std::size_t instrument = 0;
+  Vec3 place;
+  std::optional<Quaternion> turn; ///< of length 1; none: as it is
+  double over = 0;                ///< s that the way takes
+};
+/// Nodes follow an instrument as parts of it, from where they stand.
+struct Grasp {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  std::size_t instrument = 0;
+};
+/// Takes an instrument away; what it grasped is released.
+struct Withdraw {
+  std::size_t instrument = 0;
+};
+struct SetGravity {
+  Vec3 gravity;
+};
+struct SetTimestep {
+  double dt = 0;
+};
+/// The two-step method for an elastostatic object from now on.
+struct SetTwoStep {
+  std::size_t object = 0;
+  TwoStepOptions options;
+  std::function<StiffnessParts()> second; ///< asked once for an object
+};
+struct Emit {
+  bool forces = false;      ///< else shapes
+  bool instruments = false; ///< rather
+};
+/// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
+/// no velocity; an elastostatic one takes its own shape at once.
+struct SetMethod {
+  std::size_t object = 0;
+  Method method = Method::ela;
+};
+/// Forgets what is kept to be quick (factors, columns, running sums): the next shape is computed
+/// from the load or the state of motion alone.
+struct Renew {
+  std::size_t object = 0;
+};
+/// What a cut severs: springs between sets of nodes, or what a plane passes, of all nodes or some.
+struct SpringsToCut {
+  std::vector<std::uint32_t> from, to;
+};
+struct PlaneToCut {
+  CutPlane plane;
+  std::optional<std::vector<std::uint32_t>> nodes;
+};
+struct CutObject {
+  std::size_t object = 0;
+  std::variant<SpringsToCut, PlaneToCut> what;
+};
+/// Springs that are stretched beyond this tear from now on; 0: none any more.
+struct SetTear {
+  std::size_t object = 0;
+  double strain = 0;
+};
+/// The model as it came; what has come off stays an object of its own.
+struct Restore {
+  std::size_t object = 0;
+};
+using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
+                            MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
+                            Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
+
+/// What a log says of a change; what does not apply stays empty.
+struct ChangeRow {
+  std::string what, object;
+  std::vector<std::uint32_t> nodes{};
+  std::optional<Vec3> vector{};
+  std::optional<double> value{};
+  double duration = 0; ///< s; 0: none
+  std::string other{}; ///< object or instrument
+  std::vector<std::uint32_t> others{};
+  std::string text{};
+};
+
+} // namespace gewebe

@@ -1,0 +1,224 @@
+// Changes: from the table to one of them, and those of loads and of the scene as a whole.
+
+#include "scene/rules_internal.h"
+
+#include <cmath>
+#include <variant>
+
+namespace gewebe::simulation {
+
+namespace {
+
+/// What all kinds have in common, by what they name.
+template <class Kind>
+void log_names(const World& w, const Kind& c, ChangeRow& row) {
+  if constexpr (requires { c.object; })
+    row.object = w.now.objects.at(c.object).name();
+  if constexpr (requires { c.nodes; })
+    row.nodes = c.nodes;
+  if constexpr (requires { c.instrument; })
+    row.other = w.now.instruments.at(c.instrument).name;
+  if constexpr (requires { c.others; }) {
+    row.other = w.now.objects.at(c.other).name();
+    row.others = c.others;
+  }
+}
+
+void displace(const World& w, Object& object, const SetDisplacement& set) {
+  Load& load = object.load.write();
+  for (const std::uint32_t node : set.nodes) {
+    Vec3 from;
+    if (object.body != nullptr)
+      from = motion_of(object)[node].displacement;
+    else if (const auto old = load.displacement.find(node); old != load.displacement.end())
+      from = old->second;
+    load.displacement[node] = set.displacement;
+    load.travel.erase(node);
+    if (set.over > 0)
+      load.travel[node] = {from, set.displacement, w.now.clock.time, w.now.clock.time + set.over};
+  }
+}
+
+} // namespace
+
+// ---- of any kind
+
+void accept(World& w, const Change& change) {
+  std::visit(
+      [&]<class Kind>(const Kind& c) {
+        Rule<Kind>::check(w, c);
+        Rule<Kind>::enter(w, c);
+      },
+      change);
+}
+
+void announce(World& w, const Change& change) {
+  std::visit([&]<class Kind>(const Kind& c) { Rule<Kind>::announce(w, c); }, change);
+}
+
+void apply(World& w, const Change& change) {
+  accept(w, change);
+  std::visit(
+      [&]<class Kind>(const Kind& c) {
+        Rule<Kind>::require(w, c);
+        const auto work = [&] {
+          note_poses(w); // the end of the ways so far
+          Rule<Kind>::apply(w, c);
+        };
+        if constexpr (Rule<Kind>::may_fail)
+          guarded(w, work);
+        else
+          work();
+        if constexpr (Rule<Kind>::announces_behind)
+          Rule<Kind>::announce(w, c);
+      },
+      change);
+  if (w.options.applied)
+    w.options.applied(change);
+}
+
+ChangeRow row_of(const World& w, const Change& change) {
+  ChangeRow row;
+  std::visit(
+      [&]<class Kind>(const Kind& c) {
+        log_names(w, c, row);
+        Rule<Kind>::log(w, c, row);
+      },
+      change);
+  return row;
+}
+
+void require_period(double period) {
+  constexpr double least = 1e-9; // s
+  if (!(period >= least))
+    throw Error("a period of " + number_text(period) + " s, expected 1e-9 s or longer");
+}
+
+// ---- loads
+
+void Rule<SetForce>::check(World&, const SetForce& c) {
+  if (c.period > 0)
+    require_period(c.period);
+}
+void Rule<SetForce>::apply(World& w, const SetForce& c) {
+  Object& object = w.now.objects.at(c.object);
+  Load& load = object.load.write();
+  for (const std::uint32_t node : c.nodes) {
+    load.force_period.erase(node);
+    if (c.force == Vec3{}) {
+      load.force.erase(node);
+      continue;
+    }
+    load.force[node] = c.force;
+    if (c.period > 0)
+      load.force_period[node] = c.period;
+  }
+  touch(object);
+}
+void Rule<SetForce>::log(const World&, const SetForce& c, ChangeRow& row) {
+  row.what = "force";
+  row.vector = c.force;
+  row.duration = c.period;
+}
+
+void Rule<SetPressure>::check(World&, const SetPressure& c) {
+  if (c.pressure.period > 0)
+    require_period(c.pressure.period);
+}
+void Rule<SetPressure>::apply(World& w, const SetPressure& c) {
+  Object& object = w.now.objects.at(c.object);
+  Load& load = object.load.write();
+  for (const std::uint32_t node : c.nodes)
+    if (c.pressure.pressure == 0)
+      load.pressure.erase(node);
+    else
+      load.pressure[node] = c.pressure;
+  touch(object);
+}
+void Rule<SetPressure>::log(const World&, const SetPressure& c, ChangeRow& row) {
+  row.what = "pressure";
+  row.value = c.pressure.pressure;
+  row.duration = c.pressure.period;
+}
+
+void Rule<SetDisplacement>::check(World& w, const SetDisplacement& c) {
+  Object& object = w.now.objects.at(c.object);
+  need_model(object);
+  const double most = displacement_limit(object);
+  for (int a = 0; a < 3; ++a)
+    if (!(std::abs(c.displacement[a]) <= most))
+      throw Error("a displacement of " + number_text(c.displacement[a]) +
+                  " mm, expected at most a million times the size of the object, " +
+                  number_text(most) + " mm");
+  for (const std::uint32_t node : c.nodes)
+    for (int a = 0; a < 3; ++a)
+      if (is_fixed(object.model(), node, a) && c.displacement[a] != 0)
+        throw Error("node " + std::to_string(node) + " is fixed along " + "xyz"[a] +
+                    ", expected a displacement of 0 there");
+}
+void Rule<SetDisplacement>::apply(World& w, const SetDisplacement& c) {
+  Object& object = w.now.objects.at(c.object);
+  drop_grips(w, c.object, c.nodes);
+  displace(w, object, c);
+  touch(object);
+}
+void Rule<SetDisplacement>::log(const World&, const SetDisplacement& c, ChangeRow& row) {
+  row.what = "displace";
+  row.vector = c.displacement;
+  row.duration = c.over;
+}
+
+void Rule<Release>::apply(World& w, const Release& c) {
+  Object& object = w.now.objects.at(c.object);
+  drop_grips(w, c.object, c.nodes);
+  Load& load = object.load.write();
+  for (const std::uint32_t node : c.nodes) {
+    load.force.erase(node);
+    load.force_period.erase(node);
+    load.pressure.erase(node);
+    load.displacement.erase(node);
+    load.travel.erase(node);
+  }
+  touch(object);
+}
+
+// ---- the scene as a whole
+
+void Rule<SetGravity>::apply(World& w, const SetGravity& c) {
+  w.now.gravity = c.gravity;
+  for (Object& object : w.now.objects) {
+    object.load.write().gravity = c.gravity;
+    touch(object);
+  }
+}
+void Rule<SetGravity>::log(const World&, const SetGravity& c, ChangeRow& row) {
+  row.what = "gravity";
+  row.vector = c.gravity;
+}
+
+void Rule<SetTimestep>::apply(World& w, const SetTimestep& c) {
+  w.now.clock.timestep = c.dt;
+}
+void Rule<SetTimestep>::log(const World&, const SetTimestep& c, ChangeRow& row) {
+  row.what = "timestep";
+  row.value = c.dt;
+}
+
+void Rule<Emit>::apply(World& w, const Emit& c) {
+  (c.instruments ? w.now.emits.instruments
+   : c.forces    ? w.now.emits.forces
+                 : w.now.emits.shapes) = true;
+}
+void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
+  row.what = "emit";
+  row.text = c.instruments ? "instruments" : c.forces ? "forces" : "shapes";
+}
+
+void Rule<Renew>::apply(World& w, const Renew& c) {
+  Object& object = w.now.objects.at(c.object);
+  object.statics->ahead = true;
+  renew(object);
+  touch(object);
+}
+
+} // namespace gewebe::simulation

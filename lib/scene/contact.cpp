@@ -1,0 +1,245 @@
+// Whom instruments touch: elastodynamic objects on their way, elastostatic ones in their shape.
+
+#include "base/vector_at.h"
+#include "scene/world_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr std::size_t most_parts = 256; ///< of an instrument's way in one step
+
+Box3 joined(Box3 a, const Box3& b) {
+  a.add(b.min);
+  a.add(b.max);
+  return a;
+}
+
+Box3 box_at(const InstrumentShape& shape, const Pose& pose) {
+  return PlacedInstrument(shape, pose).box();
+}
+
+/// Of all that the instrument passes between two poses.
+Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to) {
+  Box3 box = joined(box_at(shape, from), box_at(shape, to));
+  if (from.turn == to.turn)
+    return box;
+  const double reach = norm(shape.axis); // an end turns about the place
+  return joined(box, {box.min - Vec3{reach, reach, reach}, box.max + Vec3{reach, reach, reach}});
+}
+
+/// One touch for each node and instrument, by ascending ones: the sums over `duration`.
+std::vector<NodeTouch> means_of(std::vector<NodeTouch> impulses, double duration) {
+  std::vector<NodeTouch> all = sums_of_touches(std::move(impulses));
+  for (NodeTouch& t : all)
+    t.force = t.force / duration;
+  return all;
+}
+
+} // namespace
+
+// ---- elastodynamic objects
+
+/// Tells a body that is to move of the instruments, and wakes it where one comes.
+void guide(World& w, Body& body, double to) {
+  if (!instruments_there(w))
+    return;
+  std::vector<std::optional<MovingInstrument>> all;
+  bool any = false;
+  for (Instrument& i : w.now.instruments) {
+    const bool pushes = i.present && !i.shape.blade;
+    any = any || pushes;
+    all.push_back(pushes ? std::optional(MovingInstrument{i.shape, i.before, i.way})
+                         : std::nullopt);
+  }
+  if (any && w.now.objects[body.parts[0]].matter->integration == Integration::implicit) {
+    if (!body.warned_implicit && w.options.warn)
+      w.options.warn("object " + w.now.objects[body.parts[0]].name() +
+                     " is integrated implicitly: instruments don't touch it");
+    body.warned_implicit = true;
+    return;
+  }
+  if (!body.moving->resting()) {
+    body.rest_box.reset();
+  } else {
+    if (!body.rest_box) {
+      body.rest_box.emplace();
+      for (const std::size_t part : body.parts) {
+        const Object& object = w.now.objects[part];
+        for (std::size_t k = 0; k < surface_count(object.model()); ++k)
+          body.rest_box->add(object.model().nodes[k].position +
+                             body.moving->motion()[object.offset + k].displacement);
+      }
+    }
+    for (Instrument& i : w.now.instruments) {
+      const Pose now = i.way.at(to);
+      if (!i.changed && (i.before == now || i.shape.blade))
+        continue;
+      if (body.touched || (i.present && !i.shape.blade &&
+                           near(box_between(i.shape, i.before, now), *body.rest_box)))
+        body.moving->wake();
+    }
+  }
+  if (!body.moving->resting())
+    body.moving->set_instruments(std::move(all));
+}
+
+void end_guiding(World& w, double to) {
+  for (Instrument& i : w.now.instruments) {
+    i.before = i.way.at(to);
+    i.changed = false;
+  }
+}
+
+/// What instruments did to a body so far in this step goes to its objects: their nodes are
+/// followed.
+void gather_impulses(World& w, Body& body) {
+  const std::vector<NodeTouch> all = body.moving->take_impulses();
+  for (const std::size_t part : body.parts) {
+    Object& object = w.now.objects[part];
+    for (const NodeTouch& t : all)
+      if (t.node >= object.offset && t.node - object.offset < object.model().nodes.size())
+        object.impulses.push_back(
+            {t.node - static_cast<std::uint32_t>(object.offset), t.instrument, t.force});
+  }
+}
+
+/// Behind a step: forces of instruments on elastodynamic objects, means over its time.
+void take_touches(World& w, double duration) {
+  if (w.now.instruments.empty() || !(duration > 0))
+    return;
+  for (const auto& body : w.now.bodies) {
+    // As they are at rest, exactly, where it rested all the time.
+    const std::optional<std::vector<NodeTouch>> held = body->moving->held_touches(duration);
+    gather_impulses(w, *body);
+    body->touched = false;
+    for (const std::size_t part : body->parts) {
+      Object& object = w.now.objects[part];
+      std::vector<NodeTouch> touches;
+      const std::size_t end = object.offset + object.model().nodes.size();
+      if (held) {
+        for (const NodeTouch& t : *held)
+          if (t.node >= object.offset && t.node < end)
+            touches.push_back(
+                {t.node - static_cast<std::uint32_t>(object.offset), t.instrument, t.force});
+      } else {
+        touches = means_of(std::move(object.impulses), duration);
+      }
+      object.impulses.clear();
+      body->touched = body->touched || !touches.empty();
+      if (held && touches == object.shown.touches)
+        continue;
+      object.shown.valid = object.shown.valid && object.shown.touches.empty() && touches.empty();
+      object.shown.touches = std::move(touches);
+    }
+  }
+  for (Object& object : w.now.objects)
+    object.impulses.clear(); // of those that left their body for good
+}
+
+// ---- elastostatic objects
+
+namespace {
+
+void need_contact(Object& object) {
+  if (!object.contact)
+    object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement);
+}
+
+} // namespace
+
+/// Whether instruments moved where this object feels it.
+bool touched_anew(World& w, Object& object) {
+  if (object.method != Method::ffe || object.stages.options || w.now.poses.empty() ||
+      (object.contact && w.now.poses.size() < 2))
+    return false;
+  if (!object.shown.touches.empty())
+    return true;
+  const bool first = !object.contact;
+  if (first && !instruments_there(w))
+    return false;
+  need_model(object);
+  shape_in_step(w, object);
+  need_contact(object);
+  for (std::size_t k = 0; k < w.now.instruments.size(); ++k)
+    for (std::size_t p = first ? 0 : 1; p < w.now.poses.size(); ++p) {
+      const std::optional<Pose> now = pose_at(w, p, k), before = p > 0 ? pose_at(w, p - 1, k) : now;
+      if (now && near(box_between(w.now.instruments[k].shape, before.value_or(*now), *now),
+                      object.contact->box()))
+        return true;
+    }
+  return false;
+}
+
+/// An elastostatic object's shape behind all the ways that the instruments took since it was shown.
+void follow_instruments(World& w, Object& object) {
+  object.statics->ahead = true;
+  need_contact(object);
+  const std::size_t count = w.now.instruments.size();
+  bool solved = true;
+  std::vector<double>& shape = object.shown.displacement.write();
+  // An object that nothing ever acted on has no shape to find.
+  const bool changed = !object.shown.touches.empty() ||
+                       ((object.statics->still || !object.load->empty()) &&
+                        (!object.shown.valid || object.load->changes_until() > object.shown.time));
+  for (std::size_t p = w.now.poses.size() > 1 ? 1 : 0; p < w.now.poses.size(); ++p) {
+    std::vector<MovedInstrument> moved;
+    for (std::size_t k = 0; k < count; ++k)
+      if (const auto now = pose_at(w, p, k))
+        moved.push_back(
+            {w.now.instruments[k].shape, p > 0 ? pose_at(w, p - 1, k).value_or(*now) : *now, *now});
+    const std::size_t parts = parts_of_way(moved, most_parts);
+    for (std::size_t part = 1; part <= parts; ++part) {
+      const auto at = [&](std::size_t n) {
+        return static_cast<double>(n) / static_cast<double>(parts);
+      };
+      std::vector<std::optional<MovedInstrument>> here(count);
+      std::size_t next = 0;
+      for (std::size_t k = 0; k < count; ++k)
+        if (pose_at(w, p, k)) {
+          const MovedInstrument& way = moved[next++];
+          here[k] = MovedInstrument{way.shape, between(way.before, way.now, at(part - 1)),
+                                    between(way.before, way.now, at(part))};
+        }
+      const bool last = changed && p + 1 == w.now.poses.size() && part == parts;
+      object.contact->update([&]() -> Elastostatic& { return still_of(w, object); },
+                             *object.shown.load, here, shape, last);
+      solved = solved && object.contact->solved();
+    }
+  }
+  object.shown.touches = object.contact->touches();
+  if (const auto stuck = object.contact->stuck();
+      stuck && !object.matter->told.stuck && w.options.warn) {
+    object.matter->told.stuck = true;
+    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                   " s: node " + std::to_string(stuck->node) + " is fixed, the instrument " +
+                   w.now.instruments[stuck->instrument].name + " goes through it");
+  }
+  if (!solved && !object.matter->told.unsolved && w.options.warn) {
+    object.matter->told.unsolved = true;
+    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                   " s: the forces of instruments are not exact, expected a slower way");
+  }
+}
+
+/// Among the forces that are shown.
+void add_touches(Object& object) {
+  if (object.shown.touches.empty())
+    return;
+  std::vector<NodeVector>& forces = object.shown.forces.write();
+  for (const NodeTouch& t : object.shown.touches) {
+    const auto at =
+        std::lower_bound(forces.begin(), forces.end(), t.node,
+                         [](const NodeVector& v, std::uint32_t node) { return v.node < node; });
+    if (at != forces.end() && at->node == t.node)
+      at->value += t.force;
+    else
+      forces.insert(at, {t.node, t.force});
+  }
+}
+
+} // namespace gewebe::simulation

@@ -1,0 +1,450 @@
+// Cuts: what they sever when they take effect, what comes off, what it means for the methods.
+
+#include "base/vector_at.h"
+#include "compliance/cut_stiffness.h"
+#include "scene/rules_internal.h"
+#include "solve/condition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <new>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double largest_turn = 0.1; ///< between two edges of a swept area, about its angle
+
+/// An Error of a cut, with the object's name.
+template <class Work>
+auto of_object(const std::string& name, Work&& work) {
+  try {
+    return work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("object " + name + ": " + error.what());
+  }
+}
+
+/// The stiffness of an elastostatic object, to follow its cuts; nothing: no solution was asked of
+/// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
+/// back.
+CutStiffness* stiffness_of(World& w, Object& object) {
+  if (object.statics->stiffness || (!object.statics->still && !has_moved(w, object)))
+    return object.statics->stiffness.get();
+  object.statics->ahead = true;
+  const std::shared_ptr<const Model> first =
+      object.cut.first ? object.cut.first : object.matter->model;
+  StiffnessParts parts;
+  if (object.matter->source.stiffness)
+    parts = object.matter->source.stiffness(*first);
+  auto stiffness = std::make_unique<CutStiffness>(first, std::move(parts.columns), w.context);
+  if (object.cut.first)
+    (void)stiffness->cut(object.matter->model, *object.cut.first_nodes, *object.cut.places);
+  object.statics->stiffness = std::move(stiffness);
+  return object.statics->stiffness.get();
+}
+
+/// Of a cut model, from the object as it was before; nothing: K is factorised when it is needed.
+/// Nodes of the object may be gone with a part (CutModel::place).
+std::optional<StiffnessParts> cut_parts(World& w, Object& object, std::shared_ptr<const Model> next,
+                                        const CutModel& cut) {
+  CutStiffness* const stiffness = stiffness_of(w, object);
+  if (stiffness == nullptr)
+    return std::nullopt;
+  try {
+    const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
+    ++(work.way == CutWay::correction ? w.now.counts.cut_corrections
+       : work.way == CutWay::renewal  ? w.now.counts.cut_renewals
+                                      : w.now.counts.cut_factors);
+    return stiffness->parts();
+  } catch (...) {
+    object.statics->stiffness.reset();
+    throw;
+  }
+}
+
+/// Whether it is known and of one stage; who says otherwise is warned once.
+bool may_cut(World& w, Object& object) {
+  if (object.stages.options && !object.matter->told.cut && w.options.warn) {
+    object.matter->told.cut = true;
+    w.options.warn("object " + object.name() + " follows two steps of stiffness: it is not cut");
+  }
+  return object.matter->known && !object.stages.options;
+}
+
+/// Where all nodes of a cut object go.
+Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const FreeParts& free) {
+  Moves moves;
+  moves.objects = {index};
+  for (std::size_t k = 0; k < free.parts.size(); ++k)
+    moves.objects.push_back(w.now.objects.size() + k);
+  std::vector<std::pair<std::uint32_t, Moves::To>> ways;
+  ways.reserve(cut.origin.size());
+  const auto add = [&](std::size_t object, std::uint32_t i, std::uint32_t c) {
+    const std::uint32_t o = cut.origin[c];
+    ways.push_back({o, {object, i, cut.share[c], cut.place[o] == c}});
+  };
+  const std::size_t stay = free.rest ? free.rest->origin.size() : cut.origin.size();
+  for (std::uint32_t i = 0; i < stay; ++i)
+    add(index, i, free.rest ? free.rest->origin[i] : i);
+  for (std::size_t k = 0; k < free.parts.size(); ++k)
+    for (std::uint32_t i = 0; i < free.parts[k].origin.size(); ++i)
+      add(moves.objects[k + 1], i, free.parts[k].origin[i]);
+  moves.add(ways, w.now.objects[index].model().nodes.size());
+  return moves;
+}
+
+/// What cuts have made of the first model's nodes, with one more cut.
+/// \param origin by node: what it was in the object before
+CutState cut_again(const Object& old, std::vector<std::uint32_t> origin, const Moves& moves) {
+  CutState next{.first = old.cut.first ? old.cut.first : old.matter->model, .tear = old.cut.tear};
+  if (const std::vector<std::uint32_t>& before = *old.cut.first_nodes; !before.empty())
+    for (std::uint32_t& o : origin)
+      o = before[o];
+  next.first_nodes = std::move(origin);
+  std::vector<std::uint32_t> places(next.first->nodes.size(), CutModel::gone);
+  for (std::uint32_t f = 0; f < places.size(); ++f) {
+    const std::uint32_t before = old.cut.places->empty() ? f : (*old.cut.places)[f];
+    if (before == CutModel::gone)
+      continue;
+    for (const Moves::To& to : moves.of(before))
+      if (to.object == moves.objects[0] && (to.main || places[f] == CutModel::gone))
+        places[f] = to.node;
+  }
+  next.places = std::move(places);
+  return next;
+}
+
+/// Its shape is found from that before this cut, when somebody asks.
+void leave_late(const Object& old, const Moves& moves, Object& next) {
+  auto shape = std::make_shared<LateShape>(
+      old.shown.late ? *old.shown.late : LateShape{old.matter->model, *old.shown.load, {}});
+  shape->moves.push_back(std::make_shared<const Moves>(moves));
+  next.shown.late = std::move(shape);
+  next.shown.shaped = false;
+}
+
+/// \param cut of the object's model
+void carry_out(World& w, std::size_t index, CutModel cut) {
+  Object& old = w.now.objects[index];
+  const bool ffe = old.method == Method::ffe;
+  FreeParts free = free_parts(old.model(), cut);
+  // Where parts start, and what instruments refer to. Without them it may never be asked for.
+  const bool late = ffe && !old.shown.shaped && free.parts.empty() && w.now.instruments.empty() &&
+                    old.matter->known && !old.stages.options;
+  if (ffe && !late)
+    shape_in_step(w, old);
+  const Moves moves = moves_of(w, index, cut, free);
+  std::vector<Vec3> velocity = old.came.velocity;
+  if (!free.parts.empty()) // before the stiffness follows the cut
+    velocity = shape_velocity(w, old, false);
+
+  Cutting told{.kind = Cutting::Kind::cut,
+               .object = index,
+               .springs = cut.removed,
+               .doubled = cut.doubled,
+               .time = w.now.clock.time,
+               .text = {}};
+  CutModel rest = without_parts(std::move(cut), std::move(free.rest));
+  const auto now = std::make_shared<const Model>(std::move(rest.model));
+  std::optional<StiffnessParts> prepared;
+  bool loose = !old.came.velocity.empty();
+  if (ffe) {
+    if (old.statics->still || old.statics->stiffness)
+      old.statics->ahead = true;
+    try {
+      prepared = cut_parts(w, old, now, rest);
+    } catch (const SingularStiffness&) {
+      prepared.reset(); // found when the shape is asked for
+      loose = true;
+      if (velocity.empty()) // the factor may have followed the cut
+        velocity = shape_velocity(w, old, true);
+    }
+  }
+  std::deque<Object> pieces;
+  Object& next = pieces.emplace_back(renumbered(old, now));
+  next.statics->stiffness = std::move(old.statics->stiffness);
+  next.statics->prepared = std::move(prepared);
+  next.cut = cut_again(old, rest.origin, moves);
+  next.cut.scored = std::move(rest.left);
+  if (late)
+    leave_late(old, moves, next);
+  if (loose && !velocity.empty()) {
+    next.came.velocity.resize(now->nodes.size());
+    for (std::uint32_t i = 0; i < old.model().nodes.size(); ++i)
+      for (const Moves::To& to : moves.of(i))
+        if (to.object == index)
+          next.came.velocity[to.node] = velocity[i];
+  }
+  told.nodes = now->nodes.size();
+  w.now.cuttings.push_back(told);
+  for (std::size_t k = 0; k < free.parts.size(); ++k) {
+    Object& part = pieces.emplace_back(
+        renumbered(old, std::make_shared<const Model>(std::move(free.parts[k].model))));
+    part.method = Method::ela;
+    part.matter->source = {};
+    w.now.cuttings.push_back({.kind = Cutting::Kind::part,
+                              .object = index,
+                              .part = moves.objects[k + 1],
+                              .nodes = part.model().nodes.size(),
+                              .time = w.now.clock.time,
+                              .text = {}});
+  }
+  ++w.now.counts.cuts;
+  move_all(w, index, moves, std::move(pieces), velocity);
+}
+
+} // namespace
+
+/// That the object will be cut, so that its first cut costs no more than others.
+void announce_cut(World& w, std::size_t index) {
+  Object& object = w.now.objects.at(index);
+  if (object.method != Method::ffe || object.stages.options)
+    return;
+  try {
+    if (CutStiffness* const stiffness = stiffness_of(w, object); stiffness != nullptr)
+      stiffness->prepare();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (...) { // whatever a source throws: told where it is needed
+    object.statics->stiffness.reset();
+  }
+}
+
+/// Of an object that was cut before its shape was known.
+void find_late_shape(World& w, Object& object) {
+  const std::shared_ptr<const LateShape> held = object.shown.late;
+  const LateShape& late = *held;
+  Elastostatic still(*late.model, StiffnessParts{}, w.context);
+  still.update(late.load);
+  const std::span<const double> first = still.displacement();
+  std::vector<double> shape(first.begin(), first.end());
+  for (const auto& moves : late.moves) {
+    std::size_t nodes = 0;
+    for (const Moves::To& to : moves->all)
+      if (to.object == moves->objects[0])
+        nodes = std::max<std::size_t>(nodes, to.node + std::size_t{1});
+    std::vector<double> moved(3 * nodes, 0.0);
+    for (std::uint32_t i = 0; i < shape.size() / 3; ++i)
+      for (const Moves::To& to : moves->of(i))
+        if (to.object == moves->objects[0])
+          std::copy_n(shape.begin() + 3 * static_cast<std::ptrdiff_t>(i), 3,
+                      moved.begin() + 3 * static_cast<std::ptrdiff_t>(to.node));
+    shape = std::move(moved);
+  }
+  require_bounded(object, shape);
+  object.shown.displacement = std::move(shape);
+  object.shown.late.reset();
+  object.shown.shaped = true;
+}
+
+// ---- blades
+
+namespace {
+
+/// What blades passed since the last step, in pieces that are nearly flat.
+std::vector<SweptQuad> swept_areas(World& w) {
+  std::vector<SweptQuad> areas;
+  for (Instrument& i : w.now.instruments) {
+    if (!i.present || !i.shape.blade)
+      continue;
+    for (std::size_t k = 1; k < i.path.size(); ++k) {
+      const Pose &from = i.path[k - 1], &to = i.path[k];
+      const double turn = norm(turned(from.turn, i.shape.axis) - turned(to.turn, i.shape.axis)) /
+                          std::max(norm(i.shape.axis), 1e-300);
+      const auto parts =
+          static_cast<std::size_t>(std::clamp(std::ceil(turn / largest_turn), 1.0, 64.0));
+      Pose last = from;
+      for (std::size_t p = 1; p <= parts; ++p) {
+        const Pose next = between(from, to, static_cast<double>(p) / static_cast<double>(parts));
+        areas.push_back({last.place, last(i.shape.axis), next(i.shape.axis), next.place});
+        last = next;
+      }
+    }
+    if (i.path.size() > 1)
+      i.path.erase(i.path.begin(), i.path.end() - 1);
+  }
+  return areas;
+}
+
+} // namespace
+
+void sweep_blades(World& w) {
+  const std::vector<SweptQuad> areas = swept_areas(w);
+  if (areas.empty())
+    return;
+  const std::uint64_t cuts = w.now.counts.cuts;
+  const std::size_t count = w.now.objects.size();
+  for (std::size_t index = 0; index < count; ++index) {
+    Object& object = w.now.objects[index];
+    need_model(object);
+    if (object.method == Method::ffe)
+      shape_in_step(w, object);
+    std::vector<double> moved;
+    std::span<const double> shape = *object.shown.displacement;
+    if (object.body != nullptr) {
+      for (const NodeMotion& m : motion_of(object))
+        moved.insert(moved.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
+      shape = moved;
+    }
+    const Cut swept = swept_cut(object.model(), shape, areas);
+    if ((swept.empty() && swept.sides.empty()) || !may_cut(w, object))
+      continue;
+    of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
+      CutModel cut = cut_model(object.model(), merged(swept, object.cut.scored));
+      if (cut.changed()) {
+        carry_out(w, index, std::move(cut));
+        return;
+      }
+      object.cut.scored = std::move(cut.left);
+    });
+  }
+  if (w.now.counts.cuts != cuts)
+    move_bodies(w, w.now.clock.time); // that new bodies know their loads
+}
+
+// ---- tearing
+
+void tear(World& w) {
+  const std::size_t count = w.now.objects.size();
+  for (std::size_t index = 0; index < count; ++index) {
+    Object& object = w.now.objects[index];
+    if (!(object.cut.tear > 0) || !may_cut(w, object))
+      continue;
+    shape_in_step(w, object);
+    const Cut torn = torn_cut(object.model(), *object.shown.displacement, object.cut.tear);
+    if (torn.empty())
+      continue;
+    of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
+      CutModel cut = cut_model(object.model(), merged(torn, object.cut.scored));
+      if (cut.changed())
+        carry_out(w, index, std::move(cut));
+    });
+  }
+}
+
+// ---- what hangs together but can move freely
+
+/// A cut object that an elastostatic shape is asked of may have none: then it goes on
+/// elastodynamic.
+void find_free_motion(World& w, std::size_t index) {
+  Object& object = w.now.objects[index];
+  if (!object.cut.first || object.method != Method::ffe || object.statics->still ||
+      (object.load->empty() && !instruments_there(w)))
+    return;
+  try {
+    (void)still_of(w, object);
+    return;
+  } catch (const SingularStiffness& error) {
+    w.now.cuttings.push_back({.kind = Cutting::Kind::loose,
+                              .object = index,
+                              .nodes = object.model().nodes.size(),
+                              .time = w.now.clock.time,
+                              .text = error.what()});
+  }
+  if (w.options.warn)
+    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                   " s: it goes on elastodynamic, for behind the cut " +
+                   w.now.cuttings.back().text);
+  if (object.shown.late)
+    shape_in_step(w, object);
+  object.contact = nullptr;
+  Motions motions;
+  std::vector<NodeMotion>& motion = motions[index];
+  motion.resize(object.model().nodes.size());
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    motion[i].displacement = vector_at(*object.shown.displacement, i);
+    if (!object.came.velocity.empty())
+      motion[i].velocity = object.came.velocity[i];
+  }
+  object.method = Method::ela;
+  object.shown.valid = false;
+  renew_bodies(w, motions);
+  move_bodies(w, w.now.clock.time);
+}
+
+// ---- changes
+
+void Rule<CutObject>::apply(World& w, const CutObject& c) {
+  Object& object = w.now.objects.at(c.object);
+  need_model(object);
+  if (object.stages.options)
+    throw Error("object " + object.name() +
+                " follows two steps of stiffness, expected one without two-step");
+  CutModel cut = of_object(object.name(), [&] {
+    Cut what;
+    if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
+      what = springs_between(object.model(), springs->from, springs->to);
+    } else {
+      const auto& plane = std::get<PlaneToCut>(c.what);
+      what = plane_cut(object.model(), plane.plane,
+                       plane.nodes ? std::span<const std::uint32_t>(*plane.nodes)
+                                   : std::span<const std::uint32_t>());
+    }
+    CutModel result = cut_model(object.model(), merged(what, object.cut.scored));
+    if (!result.changed())
+      throw Error("nothing comes apart, expected edges that meet, or springs without a triangle");
+    require_held(object.model(), result);
+    return result;
+  });
+  carry_out(w, c.object, std::move(cut));
+}
+
+void Rule<CutObject>::log(const World&, const CutObject& c, ChangeRow& row) {
+  row.what = "cut";
+  if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
+    row.nodes = springs->from;
+    row.others = springs->to;
+    row.text = "springs";
+    return;
+  }
+  const auto& plane = std::get<PlaneToCut>(c.what);
+  row.nodes = plane.nodes.value_or(std::vector<std::uint32_t>{});
+  row.vector = plane.plane.point;
+  const Vec3& n = plane.plane.normal;
+  row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z);
+}
+
+void Rule<SetTear>::apply(World& w, const SetTear& c) {
+  w.now.objects.at(c.object).cut.tear = c.strain;
+}
+void Rule<SetTear>::log(const World&, const SetTear& c, ChangeRow& row) {
+  row.what = "tear";
+  row.value = c.strain;
+}
+
+void Rule<Restore>::apply(World& w, const Restore& c) {
+  Object& old = w.now.objects.at(c.object);
+  if (!old.cut.first)
+    throw Error("object " + old.name() + " is as it came, expected one that was cut");
+  if (old.method == Method::ffe)
+    shape_in_step(w, old);
+  Moves moves;
+  moves.objects = {c.object};
+  std::vector<std::pair<std::uint32_t, Moves::To>> ways;
+  const std::vector<std::uint32_t>& first_nodes = *old.cut.first_nodes;
+  for (std::uint32_t i = 0; i < first_nodes.size(); ++i) {
+    const std::uint32_t to = first_nodes[i];
+    ways.push_back({i, {c.object, to, 1, (*old.cut.places)[to] == i}});
+  }
+  moves.add(ways, old.model().nodes.size());
+  std::deque<Object> pieces;
+  pieces.push_back(renumbered(old, old.cut.first));
+  w.now.cuttings.push_back({.kind = Cutting::Kind::restored,
+                            .object = c.object,
+                            .nodes = old.cut.first->nodes.size(),
+                            .time = w.now.clock.time,
+                            .text = {}});
+  move_all(w, c.object, moves, std::move(pieces));
+}
+
+} // namespace gewebe::simulation

@@ -1,0 +1,54 @@
+// A call that fails leaves the scene as it was.
+
+#include "scene/world_internal.h"
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+
+namespace gewebe::simulation {
+
+void Body::restore(const Snapshot& was) {
+  changed = was.changed;
+  touched = was.touched;
+  rest_box = was.rest_box;
+  moving->restore(was.motion);
+  failure = nullptr;
+}
+
+Saved save(World& w) {
+  Saved saved{w.now, {}};
+  for (const Object& object : w.now.objects)
+    object.statics->ahead = false;
+  for (const auto& body : w.now.bodies) {
+    body->ahead = false;
+    saved.bodies.push_back(body->snapshot());
+  }
+  w.saved = true;
+  return saved;
+}
+
+/// What is kept to be quick depends on the shapes that were asked of it, so it is renewed where one
+/// of them is taken back.
+void take_back(World& w, Saved&& saved) noexcept {
+  w.now = std::move(saved.scene);
+  w.saved = false;
+  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
+    w.now.bodies[k]->restore(saved.bodies[k]);
+  for (std::size_t i = 0; i < w.now.objects.size(); ++i) {
+    Object& object = w.now.objects[i];
+    if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
+      object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
+    const bool implicit = object.body != nullptr &&
+                          object.matter->integration == Integration::implicit && object.body->ahead;
+    if (!implicit && !object.statics->ahead)
+      continue;
+    renew(object);
+    if (object.contact) // as it was, with what it touched
+      object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
+                                                       object.shown.touches);
+    w.renewed.push_back(i);
+  }
+}
+
+} // namespace gewebe::simulation

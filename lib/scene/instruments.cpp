@@ -1,0 +1,233 @@
+// Instruments: where they go and what they grasp.
+
+#include "base/vector_at.h"
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+void require_single(std::initializer_list<Vec3> all, double radius) {
+  for (const Vec3& v : all)
+    radius = std::max({radius, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(radius <= largest_number))
+    throw Error("an instrument of or at " + number_text(radius) +
+                " mm, expected numbers within single precision");
+}
+
+Instrument& present_instrument(World& w, std::size_t instrument) {
+  Instrument& i = w.now.instruments.at(instrument);
+  if (!i.present)
+    throw Error("the instrument " + i.name +
+                " is not in the scene now, expected an instrument command before");
+  return i;
+}
+
+/// Gives grasped nodes the way of their instrument.
+void carry(World& w, const Instrument& instrument) {
+  const double now = w.now.clock.time;
+  for (const Instrument::Grip& grip : instrument.grips) {
+    Object& object = w.now.objects[grip.object];
+    Load& load = object.load.write();
+    const Carrier by{instrument.way, grip.point, object.model().nodes[grip.node].position};
+    const Vec3 to = by.at(instrument.way.end);
+    load.displacement[grip.node] = to;
+    load.travel.erase(grip.node);
+    if (instrument.way.end > now)
+      load.travel[grip.node] = {by.at(now), to, now, instrument.way.end, by};
+    touch(object);
+  }
+}
+
+/// All that it holds.
+void let_go(World& w, std::size_t instrument) {
+  std::map<std::size_t, std::vector<std::uint32_t>> held;
+  for (const Instrument::Grip& grip : w.now.instruments[instrument].grips)
+    held[grip.object].push_back(grip.node);
+  w.now.instruments[instrument].grips.clear();
+  for (const auto& [object, nodes] : held)
+    Rule<Release>::apply(w, {object, nodes});
+}
+
+} // namespace
+
+std::size_t instrument_place(const World& w, const std::string& name) noexcept {
+  const auto at = std::find_if(w.now.instruments.begin(), w.now.instruments.end(),
+                               [&](const Instrument& i) { return i.name == name; });
+  return static_cast<std::size_t>(at - w.now.instruments.begin());
+}
+
+std::size_t add_instrument(World& w, const std::string& name) {
+  const std::size_t place = instrument_place(w, name);
+  if (place == w.now.instruments.size())
+    w.now.instruments.emplace_back().name = name;
+  return place;
+}
+
+InstrumentReport report_of(const World& w, std::size_t instrument) {
+  const Instrument& i = w.now.instruments.at(instrument);
+  InstrumentReport report{
+      .present = i.present, .pose = i.way.at(w.now.clock.time), .force = {}, .torque = {}};
+  if (!i.present)
+    return report;
+  const auto add = [&](const Vec3& at, const Vec3& force) {
+    report.force -= force;
+    report.torque -= cross(at - report.pose.place, force);
+    ++report.nodes;
+  };
+  for (const Object& object : w.now.objects)
+    for (const NodeTouch& t : object.shown.touches)
+      if (t.instrument == instrument)
+        add(object.model().nodes[t.node].position + vector_at(*object.shown.displacement, t.node),
+            t.force);
+  for (const Instrument::Grip& grip : i.grips) {
+    const std::vector<NodeVector>& forces = *w.now.objects[grip.object].shown.forces;
+    const auto f =
+        std::lower_bound(forces.begin(), forces.end(), grip.node,
+                         [](const NodeVector& v, std::uint32_t node) { return v.node < node; });
+    if (f != forces.end() && f->node == grip.node)
+      add(report.pose(grip.point), f->value);
+  }
+  return report;
+}
+
+void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
+  for (Instrument& i : w.now.instruments)
+    if (!i.grips.empty())
+      std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
+        return grip.object == object &&
+               std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
+      });
+}
+
+/// Remembers where the instruments are.
+void note_poses(World& w) {
+  if (w.now.instruments.empty())
+    return;
+  std::vector<std::optional<Pose>> now; // of those that push
+  for (Instrument& i : w.now.instruments) {
+    now.push_back(i.present && !i.shape.blade ? std::optional(i.way.at(w.now.clock.time))
+                                              : std::nullopt);
+    if (!i.present || !i.shape.blade)
+      continue;
+    if (const Pose pose = i.way.at(w.now.clock.time); i.path.empty() || i.path.back() != pose)
+      i.path.push_back(pose);
+  }
+  if (w.now.poses.empty() || w.now.poses.back() != now)
+    w.now.poses.push_back(std::move(now));
+}
+
+/// Whether there are some that push, or have just been.
+bool instruments_there(const World& w) {
+  return std::any_of(w.now.instruments.begin(), w.now.instruments.end(), [](const Instrument& i) {
+    return (i.present && !i.shape.blade) || i.changed;
+  });
+}
+
+std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument) {
+  const std::vector<std::optional<Pose>>& all = w.now.poses[moment];
+  return instrument < all.size() ? all[instrument] : std::nullopt;
+}
+
+// ---- changes
+
+void Rule<SetInstrument>::check(World&, const SetInstrument& c) {
+  require_single({c.pose.place, c.shape.axis}, c.shape.radius);
+}
+void Rule<SetInstrument>::enter(World& w, const SetInstrument& c) {
+  if (c.instrument == w.now.instruments.size())
+    add_instrument(w, c.name);
+}
+void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
+  Instrument& i = w.now.instruments.at(c.instrument);
+  let_go(w, c.instrument);
+  i.changed = i.changed || !c.shape.blade || (i.present && !i.shape.blade);
+  i.present = false;
+  note_poses(w); // it takes no way from where it was
+  i.present = true;
+  i.path.clear();
+  i.shape = c.shape;
+  i.way = {c.pose, c.pose, w.now.clock.time, w.now.clock.time};
+  i.before = c.pose;
+  note_poses(w);
+}
+void Rule<SetInstrument>::announce(World& w, const SetInstrument& c) {
+  if (c.shape.blade)
+    for (std::size_t i = 0; i < w.now.objects.size(); ++i)
+      announce_cut(w, i);
+}
+void Rule<SetInstrument>::log(const World&, const SetInstrument& c, ChangeRow& row) {
+  row.what = "instrument";
+  row.vector = c.pose.place;
+  row.value = c.shape.radius;
+}
+
+void Rule<MoveInstrument>::check(World&, const MoveInstrument& c) {
+  require_single({c.place}, 0);
+}
+void Rule<MoveInstrument>::require(World& w, const MoveInstrument& c) {
+  (void)present_instrument(w, c.instrument);
+}
+void Rule<MoveInstrument>::apply(World& w, const MoveInstrument& c) {
+  Instrument& i = w.now.instruments[c.instrument];
+  const double now = w.now.clock.time;
+  const Pose from = i.way.at(now);
+  i.way = {from, {c.place, c.turn.value_or(from.turn)}, now, now + c.over};
+  carry(w, i);
+  note_poses(w);
+}
+void Rule<MoveInstrument>::log(const World&, const MoveInstrument& c, ChangeRow& row) {
+  row.what = "move";
+  row.vector = c.place;
+  row.duration = c.over;
+}
+
+void Rule<Grasp>::check(World& w, const Grasp& c) {
+  Object& object = w.now.objects.at(c.object);
+  need_model(object);
+  for (const std::uint32_t node : c.nodes)
+    if (object.model().nodes[node].fixed != fixed_none)
+      throw Error("node " + std::to_string(node) +
+                  " is fixed, expected nodes that can follow an instrument");
+}
+void Rule<Grasp>::require(World& w, const Grasp& c) {
+  if (const Instrument& i = present_instrument(w, c.instrument); i.shape.blade)
+    throw Error("the instrument " + i.name + " is a blade, expected one that can hold nodes");
+}
+void Rule<Grasp>::apply(World& w, const Grasp& c) {
+  Instrument& i = w.now.instruments[c.instrument];
+  Object& object = w.now.objects.at(c.object);
+  shape_in_step(w, object); // where the nodes stand
+  drop_grips(w, c.object, c.nodes);
+  const Pose pose = i.way.at(w.now.clock.time);
+  Load& load = object.load.write();
+  for (const std::uint32_t node : c.nodes) {
+    const Vec3 u = object.body != nullptr ? motion_of(object)[node].displacement
+                                          : vector_at(*object.shown.displacement, node);
+    i.grips.push_back({c.object, node, pose.inverse(object.model().nodes[node].position + u)});
+    load.displacement[node] = u;
+    load.travel.erase(node);
+  }
+  touch(object);
+  if (w.now.clock.time < i.way.end)
+    carry(w, i);
+  note_poses(w);
+}
+
+void Rule<Withdraw>::require(World& w, const Withdraw& c) {
+  (void)present_instrument(w, c.instrument);
+}
+void Rule<Withdraw>::apply(World& w, const Withdraw& c) {
+  Instrument& i = w.now.instruments[c.instrument];
+  let_go(w, c.instrument);
+  i.present = false;
+  i.changed = i.changed || !i.shape.blade;
+  note_poses(w);
+}
+
+} // namespace gewebe::simulation

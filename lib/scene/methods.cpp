@@ -1,0 +1,93 @@
+// Objects that change their method while the scene runs.
+
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gewebe::simulation {
+
+namespace {
+
+/// The elastostatic shape under what acts now; empty: nothing ever touched the object.
+std::span<const double> shape_now(World& w, Object& object) {
+  std::span<const double> still;
+  if (object.statics->still || !object.load->empty()) {
+    update_still(w, object, load_at(*object.load, object.model(), w.now.clock.time));
+    still = still_shape(object);
+    require_bounded(object, still);
+  }
+  const Shown& shown = object.shown;
+  if (!shown.touches.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
+    still = *shown.displacement; // instruments among what acts
+  return still;
+}
+
+Vec3 at(std::span<const double> shape, std::size_t i) {
+  return {shape[3 * i], shape[3 * i + 1], shape[3 * i + 2]};
+}
+
+/// Goes on from a shape, at rest; empty: from where it is.
+void set_going(World& w, std::size_t index, std::span<const double> still) {
+  if (still.empty())
+    return;
+  need_body(w, index);
+  Object& object = w.now.objects[index];
+  std::vector<NodeMotion> motion(object.model().nodes.size());
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    motion[i].displacement = at(still, i);
+  object.body->moving->set_motion(motion);
+  object.body->changed = true;
+}
+
+/// Takes its shape at once. \return mm, by which it jumps
+double stop(World& w, Object& object, std::span<const double> still) {
+  double jump = 0;
+  if (object.body == nullptr)
+    return jump;
+  gather_impulses(w, *object.body);
+  const std::span<const NodeMotion> motion = object.body->moving->motion();
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    jump = std::max(jump, norm((still.empty() ? Vec3{} : at(still, i)) - motion[i].displacement));
+  drop_body(w, object.body.get());
+  object.body = nullptr;
+  return jump;
+}
+
+} // namespace
+
+void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
+  Object& object = w.now.objects[c.object];
+  if (object.method == c.method)
+    return;
+  if (object.body != nullptr && object.body->parts.size() > 1) {
+    const std::vector<std::size_t>& parts = object.body->parts;
+    throw Error("object " + object.name() + " is attached to " +
+                w.now.objects[parts[parts[0] == c.object ? 1 : 0]].name() +
+                " and moves with it, expected one that is attached to none");
+  }
+  const std::span<const double> still = shape_now(w, object);
+  object.contact = nullptr;
+  if (c.method == Method::ela) {
+    set_going(w, c.object, still);
+  } else {
+    const double jump = stop(w, object, still);
+    w.now.jumps.push_back({c.object, jump});
+    w.now.counts.largest_jump = std::max(w.now.counts.largest_jump, jump);
+  }
+  object.method = c.method;
+  object.shown.valid = false;
+}
+
+void Rule<SetMethod>::log(const World& w, const SetMethod& c, ChangeRow& row) {
+  row.what = "method";
+  row.text = method_name(c.method);
+  const std::vector<MethodJump>& jumps = w.now.jumps;
+  if (c.method == Method::ffe && !jumps.empty() && jumps.back().object == c.object)
+    row.value = jumps.back().size;
+}
+
+} // namespace gewebe::simulation

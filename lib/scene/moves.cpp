@@ -1,0 +1,340 @@
+// When an object's nodes get other numbers, all that names them follows.
+
+#include "base/disjoint_sets.h"
+#include "base/vector_at.h"
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace gewebe::simulation {
+
+void Moves::add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t nodes) {
+  first.assign(nodes + 1, 0);
+  for (const auto& [node, to] : ways)
+    ++first[node + std::size_t{1}];
+  for (std::size_t i = 0; i < nodes; ++i)
+    first[i + 1] += first[i];
+  all.resize(ways.size());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (const auto& [node, to] : ways)
+    all[next[node]++] = to;
+}
+
+/// An object that goes on in place of the old one, with another model and nothing of its nodes.
+Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
+  const auto gravity_of = [](const Load& load) {
+    Load alone;
+    alone.gravity = load.gravity;
+    return alone;
+  };
+  Object next = old;
+  next.matter = std::make_shared<Matter>(*old.matter);
+  next.matter->model = std::move(model);
+  next.matter->known = true;
+  next.matter->size = 0; // but the shortest edge stays: a cut makes none shorter
+  next.statics = std::make_shared<Statics>();
+  next.load = gravity_of(*old.load);
+  next.body = nullptr;
+  next.offset = 0;
+  next.shown = {.displacement = std::vector<double>(3 * next.model().nodes.size(), 0.0),
+                .valid = false,
+                .load = gravity_of(*old.shown.load),
+                .time = old.shown.time,
+                .posed = old.shown.posed};
+  next.came = {.load = gravity_of(*old.came.load), .over = old.came.over};
+  next.contact = nullptr;
+  next.impulses.clear();
+  next.cut = {.tear = old.cut.tear};
+  return next;
+}
+
+namespace {
+
+std::string free_name(const World& w, const std::string& name) {
+  for (std::size_t k = 1;; ++k) {
+    std::string wish = name + "." + std::to_string(k);
+    if (std::none_of(w.now.objects.begin(), w.now.objects.end(),
+                     [&](const Object& object) { return object.name() == wish; }))
+      return wish;
+  }
+}
+
+/// The objects that take one's place, by the number of where a node goes.
+class Pieces {
+public:
+  Pieces(const Moves& moves, std::deque<Object>& all) : moves_(moves), all_(all) {}
+
+  Object& operator()(const Moves::To& to) const {
+    const auto at = std::find(moves_.objects.begin(), moves_.objects.end(), to.object);
+    return all_[static_cast<std::size_t>(at - moves_.objects.begin())];
+  }
+
+  /// What nodes have, to the lists that `list_of` names.
+  template <class From, class ListOf>
+  void follow(const From& from, ListOf&& list_of) const {
+    for (const auto& [node, value] : from)
+      for (const Moves::To& to : moves_.of(node))
+        if (auto& all = list_of((*this)(to)); to.main || !all.contains(to.node))
+          all[to.node] = value;
+  }
+
+  template <class LoadOf>
+  void follow_load(const Load& from, LoadOf&& load_of) const {
+    for (const auto& [node, force] : from.force)
+      for (const Moves::To& to : moves_.of(node)) {
+        Load& load = load_of((*this)(to));
+        load.force[to.node] += to.share * force;
+        if (const auto p = from.force_period.find(node); p != from.force_period.end())
+          load.force_period[to.node] = p->second;
+      }
+    follow(from.pressure, [&](Object& o) -> auto& { return load_of(o).pressure; });
+    follow(from.displacement, [&](Object& o) -> auto& { return load_of(o).displacement; });
+    follow(from.travel, [&](Object& o) -> auto& { return load_of(o).travel; });
+  }
+
+private:
+  const Moves& moves_;
+  std::deque<Object>& all_;
+};
+
+/// Shape, forces and loads.
+void move_shown(const Object& old, const Moves& moves, std::deque<Object>& pieces) {
+  const Pieces piece(moves, pieces);
+  piece.follow_load(*old.load, [](Object& o) -> Load& { return o.load.write(); });
+  piece.follow_load(*old.shown.load, [](Object& o) -> Load& { return o.shown.load.write(); });
+  piece.follow_load(*old.came.load, [](Object& o) -> Load& { return o.came.load.write(); });
+  piece.follow(old.came.touched, [](Object& o) -> auto& { return o.came.touched; });
+  std::map<std::size_t, std::map<std::uint32_t, Vec3>> forces;
+  for (const NodeVector& f : *old.shown.forces)
+    for (const Moves::To& to : moves.of(f.node))
+      forces[to.object][to.node] += to.share * f.value;
+  for (const auto& [index, all] : forces)
+    for (const auto& [node, value] : all)
+      piece({.object = index}).shown.forces.write().push_back({node, value});
+  for (const NodeTouch& t : old.shown.touches)
+    for (const Moves::To& to : moves.of(t.node))
+      if (to.main)
+        piece(to).shown.touches.push_back({to.node, t.instrument, t.force});
+  for (const NodeTouch& t : old.impulses)
+    for (const Moves::To& to : moves.of(t.node))
+      if (to.main)
+        piece(to).impulses.push_back({to.node, t.instrument, t.force});
+  for (std::uint32_t i = 0; old.shown.shaped && i < old.model().nodes.size(); ++i) {
+    const Vec3 u = vector_at(*old.shown.displacement, i);
+    for (const Moves::To& to : moves.of(i)) {
+      if (!to.main && moves.objects.size() == 1 && moves.of(i).size() == 1)
+        continue;
+      std::vector<double>& moved = piece(to).shown.displacement.write();
+      for (std::size_t a = 0; a < 3; ++a)
+        moved[3 * std::size_t{to.node} + a] = u[static_cast<int>(a)];
+    }
+  }
+}
+
+void move_grips(World& w, std::size_t index, const Moves& moves) {
+  for (Instrument& i : w.now.instruments) {
+    std::vector<Instrument::Grip> grips;
+    for (const Instrument::Grip& grip : i.grips) {
+      if (grip.object != index) {
+        grips.push_back(grip);
+        continue;
+      }
+      for (const Moves::To& to : moves.of(grip.node))
+        if (std::none_of(grips.begin(), grips.end(), [&](const Instrument::Grip& g) {
+              return g.object == to.object && g.node == to.node;
+            }))
+          grips.push_back({to.object, to.node, grip.point});
+    }
+    i.grips = std::move(grips);
+  }
+}
+
+void move_ties(World& w, std::size_t index, const Moves& moves) {
+  const auto follow = [&](std::size_t& object, std::uint32_t& node) {
+    if (object != index)
+      return;
+    const std::span<const Moves::To> ways = moves.of(node);
+    const auto main =
+        std::find_if(ways.begin(), ways.end(), [](const auto& to) { return to.main; });
+    const Moves::To& to = main != ways.end() ? *main : ways[0];
+    object = to.object;
+    node = to.node;
+  };
+  for (Tie& tie : w.now.ties) {
+    follow(tie.object, tie.node);
+    follow(tie.other, tie.other_node);
+  }
+}
+
+// ---- events that wait
+
+using Nodes = std::vector<std::uint32_t>;
+
+/// Of these nodes, those in an object now; of several copies all, or the main one.
+Nodes nodes_in(const Moves& moves, std::size_t object, const Nodes& nodes, bool copies) {
+  Nodes now;
+  for (const std::uint32_t node : nodes)
+    for (const Moves::To& to : moves.of(node))
+      if (to.object == object && (copies || to.main))
+        now.push_back(to.node);
+  std::sort(now.begin(), now.end());
+  now.erase(std::unique(now.begin(), now.end()), now.end());
+  return now;
+}
+
+/// Follows the nodes that a change names, where they are the object's. \return what it becomes:
+/// several where what it is about has come apart, none where nothing is left of it
+template <class Kind>
+std::vector<Change> followed(const Kind& c, std::size_t index, const Moves& moves) {
+  if constexpr (requires { c.others; }) {
+    Kind moved = c;
+    if (c.object == index)
+      moved.nodes = nodes_in(moves, index, c.nodes, Rule<Kind>::copies);
+    if (c.other == index)
+      moved.others = nodes_in(moves, index, c.others, Rule<Kind>::copies);
+    if (moved.nodes.empty() || moved.others.empty())
+      return {};
+    return {moved};
+  } else if constexpr (requires { c.nodes; }) {
+    if (c.object != index)
+      return {c};
+    std::vector<Change> all;
+    for (const std::size_t object : moves.objects) {
+      Kind moved = c;
+      moved.object = object;
+      moved.nodes = nodes_in(moves, object, c.nodes, Rule<Kind>::copies);
+      if (!moved.nodes.empty())
+        all.emplace_back(std::move(moved));
+    }
+    return all;
+  } else {
+    return {c};
+  }
+}
+
+/// Empty, nodes would stand for all.
+std::vector<Change> followed(const CutObject& c, std::size_t index, const Moves& moves) {
+  CutObject moved = c;
+  if (c.object != index)
+    return {moved};
+  if (auto* const springs = std::get_if<SpringsToCut>(&moved.what)) {
+    springs->from = nodes_in(moves, index, springs->from, true);
+    springs->to = nodes_in(moves, index, springs->to, true);
+    if (springs->from.empty() || springs->to.empty())
+      return {};
+  } else if (auto& plane = std::get<PlaneToCut>(moved.what); plane.nodes) {
+    plane.nodes = nodes_in(moves, index, *plane.nodes, true);
+    if (plane.nodes->empty())
+      return {};
+  }
+  return {moved};
+}
+
+/// Those about nodes are about the same nodes still, wherever they have gone.
+void move_events(World& w, std::size_t index, const Moves& moves) {
+  std::multimap<double, Event> events;
+  for (const auto& [time, event] : *w.now.events) {
+    std::vector<Change> changes =
+        std::visit([&](const auto& c) { return followed(c, index, moves); }, event.change);
+    for (Change& change : changes) {
+      Event moved = event;
+      moved.change = std::move(change);
+      events.emplace_hint(events.end(), time, std::move(moved));
+    }
+  }
+  w.now.events = std::move(events);
+}
+
+// ---- motion
+
+/// How the pieces of an object move, and everybody who shared its body.
+Motions motions_of(const World& w, std::size_t index, const Moves& moves,
+                   const std::deque<Object>& pieces, std::span<const Vec3> velocity) {
+  const Object& old = w.now.objects[index];
+  Motions motions;
+  std::vector<NodeMotion> motion;
+  if (old.body != nullptr) {
+    for (const std::size_t part : old.body->parts) {
+      const std::span<const NodeMotion> all = motion_of(w.now.objects[part]);
+      (part != index ? motions[part] : motion).assign(all.begin(), all.end());
+    }
+  } else if (old.method == Method::ffe && moves.objects.size() > 1) {
+    for (std::size_t i = 0; i < old.model().nodes.size(); ++i)
+      motion.push_back(
+          {vector_at(*old.shown.displacement, i), velocity.empty() ? Vec3{} : velocity[i]});
+  }
+  if (motion.empty())
+    return motions;
+  NodeMotion mean; // of nodes that were gone
+  for (const NodeMotion& m : motion) {
+    mean.displacement += m.displacement / static_cast<double>(motion.size());
+    mean.velocity += m.velocity / static_cast<double>(motion.size());
+  }
+  for (std::size_t k = old.body != nullptr ? 0 : 1; k < pieces.size(); ++k) {
+    const Model& model = pieces[k].model();
+    std::vector<NodeMotion>& to = motions[moves.objects[k]];
+    to.resize(model.nodes.size());
+    for (std::size_t i = 0; i < to.size(); ++i)
+      if (model.nodes[i].fixed == fixed_none)
+        to[i] = mean;
+  }
+  for (const bool main : {true, false}) // copies stand where their node does
+    for (std::uint32_t i = 0; i < motion.size(); ++i)
+      for (const Moves::To& to : moves.of(i))
+        if (const auto at = motions.find(to.object);
+            at != motions.end() && to.main == main && (main || moves.of(i).size() > 1))
+          at->second[to.node] = motion[i];
+  return motions;
+}
+
+} // namespace
+
+/// Bodies anew for these objects and those tied to them, with the motions given.
+/// \pre objects that are in a body have a motion
+void renew_bodies(World& w, const Motions& motions) {
+  DisjointSets sets(w.now.objects.size());
+  for (const Tie& tie : w.now.ties)
+    sets.join(static_cast<std::uint32_t>(tie.object), static_cast<std::uint32_t>(tie.other));
+  std::map<std::uint32_t, std::vector<std::size_t>> groups;
+  for (const auto& [object, motion] : motions)
+    groups[sets.find(static_cast<std::uint32_t>(object))].push_back(object);
+  for (const auto& [name, group] : groups)
+    w.now.bodies.push_back(make_body(w, group, &motions));
+}
+
+/// The object and what came off it take its place; all that names its nodes follows.
+/// \param pieces as moves.objects
+/// \param velocity of the nodes of an elastostatic object; none: it stands still
+void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,
+              std::span<const Vec3> velocity) {
+  const Object old = w.now.objects[index];
+  ElastostaticCounts& spent = pieces[0].statics->spent;
+  add_counts(spent, old.statics->spent);
+  if (old.statics->still)
+    add_counts(spent, old.statics->still->counts());
+  if (old.body != nullptr)
+    gather_impulses(w, *old.body);
+  move_shown(w.now.objects[index], moves, pieces);
+  const Motions motions = motions_of(w, index, moves, pieces, velocity);
+  if (old.body != nullptr) {
+    drop_body(w, old.body.get());
+    for (const std::size_t part : old.body->parts)
+      w.now.objects[part].body = nullptr;
+  }
+  w.now.objects[index] = std::move(pieces[0]);
+  for (std::size_t k = 1; k < pieces.size(); ++k) {
+    pieces[k].matter->name = free_name(w, old.name());
+    w.now.objects.push_back(std::move(pieces[k]));
+  }
+  move_grips(w, index, moves);
+  move_ties(w, index, moves);
+  move_events(w, index, moves);
+  renew_bodies(w, motions);
+}
+
+} // namespace gewebe::simulation

@@ -1,0 +1,220 @@
+#pragma once
+// A scene as a value: all that decides how it goes on. A copy costs little, for its large parts are
+// shared until one of both is written; going back to it is an assignment. What is kept to be quick
+// (factors, columns, running sums) stands beside it: see Statics and Body.
+
+#include "base/copy_on_write.h"
+#include "compliance/cut_stiffness.h"
+#include "scene/simulation.h"
+#include "statics/static_contact.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe::simulation {
+
+/// Where the nodes of an object have gone.
+struct Moves {
+  struct To {
+    std::size_t object = 0;
+    std::uint32_t node = 0;
+    double share = 1; // of what the node had
+    bool main = true; // of several: which one goes on as that node
+  };
+  std::vector<std::size_t> objects; // itself, new ones
+  std::vector<std::size_t> first;   // by node, and the end
+  std::vector<To> all;
+
+  std::span<const To> of(std::uint32_t node) const {
+    return {all.data() + first[node], all.data() + first[node + std::size_t{1}]};
+  }
+  /// \param ways of nodes below `nodes`, in any order; those of a node keep theirs
+  void add(std::span<const std::pair<std::uint32_t, To>> ways, std::size_t nodes);
+};
+
+/// Warnings that are told once. A step back does not untell them.
+struct Told {
+  bool stuck = false, unsolved = false, stages = false, cut = false;
+};
+
+/// What an object consists of. What was read stays so when a step is taken back.
+struct Matter {
+  std::string name;
+  ObjectSource source;
+  Integration integration = Integration::semi_implicit;
+  std::shared_ptr<const Model> model = std::make_shared<const Model>(); // empty until it is known
+  bool known = false;
+  double shortest_edge = 0; // mm; 0: not yet known
+  double size = 0;          // mm, longest side of the box at rest; 0: not yet known
+  Told told;
+};
+
+/// What an elastostatic object keeps to be quick. It depends on the shapes that were asked of it,
+/// so it is made anew where one of them is taken back.
+struct Statics {
+  std::optional<Elastostatic> still;
+  std::optional<TwoStep> two_step;         // over `still`, made when needed
+  std::optional<StiffnessParts> prepared;  // of the cut model, by cut_parts
+  std::unique_ptr<CutStiffness> stiffness; // that made them
+  ElastostaticCounts spent;                // of what was renewed
+  int slow = 0;                            // updates in a row that took too long for the rate
+  bool ahead = false;                      // it has moved on since the scene was saved
+};
+
+/// What moves together: one elastodynamic object, or several that are attached to each other.
+struct Body {
+  std::vector<std::size_t> parts;     // objects
+  std::shared_ptr<const Model> model; // of all parts
+  std::optional<Elastodynamic> moving;
+  double safe = 0; // largest stable step
+  bool changed = true;
+  bool touched = false;         // by an instrument, in the last step
+  std::optional<Box3> rest_box; // while at rest
+  bool ahead = false;           // it has moved on since the scene was saved
+  bool warned_step = false, warned_implicit = false;
+  std::uint64_t taken = 0; // by the last advance
+  std::exception_ptr failure;
+
+  struct Snapshot {
+    bool changed = true, touched = false;
+    std::optional<Box3> rest_box;
+    Elastodynamic::State motion;
+  };
+  Snapshot snapshot() const { return {changed, touched, rest_box, moving->state()}; }
+  void restore(const Snapshot& was);
+};
+
+/// What two-step says of an object.
+struct Stages {
+  std::optional<TwoStepOptions> options;
+  std::function<StiffnessParts()> second; // its second stage
+  bool warned = false;                    // of a threshold that was not reached
+};
+
+/// The shape before cuts that nobody has asked for: it is found when somebody does, from the model
+/// of then.
+struct LateShape {
+  std::shared_ptr<const Model> model;
+  Load load;
+  std::vector<std::shared_ptr<const Moves>> moves; // since, one cut each
+};
+
+/// The picture of an object.
+struct Shown {
+  CopyOnWrite<std::vector<double>> displacement{};
+  CopyOnWrite<std::vector<NodeVector>> forces{};
+  std::vector<NodeTouch> touches{};
+  bool valid = true;  // forces are those of the present state, and of ela the displacement
+  bool shaped = true; // of ffe the displacement too, under this load
+  std::shared_ptr<const LateShape> late{}; // what the displacement is, where it is not shaped
+  CopyOnWrite<Load> load{};
+  double time = 0;
+  bool posed = false; // what is shown is a shape of ffe
+};
+
+/// Where the shape that ffe shows was one step earlier, see shape_velocity.
+struct CameFrom {
+  CopyOnWrite<Load> load{};
+  std::map<std::uint32_t, Vec3> touched{}; // where nodes stood that instruments pushed
+  double over = 0;                         // s from then to now; 0: there is none
+  std::vector<Vec3> velocity{};            // of nodes, where a cut left no stiffness to find it by
+};
+
+/// When all edges were last looked at, see warn_of_range.
+struct RangeWatch {
+  bool warned = false;
+  double looked_at = 0; // largest displacement then
+  int not_looked = 0;
+};
+
+/// What cuts have done to an object.
+struct CutState {
+  std::shared_ptr<const Model> first{};                  // the model as it came, of a cut one
+  CopyOnWrite<std::vector<std::uint32_t>> first_nodes{}; // see Simulation
+  CopyOnWrite<std::vector<std::uint32_t>> places{};
+  Cut scored{}; // edges that wait to come apart
+  double tear = 0;
+};
+
+/// An object. A cut makes another one that takes its place.
+struct Object {
+  std::shared_ptr<Matter> matter = std::make_shared<Matter>();
+  std::shared_ptr<Statics> statics = std::make_shared<Statics>();
+  Method method = Method::ela;
+  CopyOnWrite<Load> load{};
+  Stages stages;
+  std::shared_ptr<Body> body; // of an elastodynamic object
+  std::size_t offset = 0;     // of its nodes in the body
+  Shown shown;
+  CameFrom came;
+  RangeWatch range;
+  std::shared_ptr<StaticContact> contact; // of ffe, once there are instruments
+  std::vector<NodeTouch> impulses;        // in this step so far, from bodies it has left: 1e-6 N s
+  CutState cut;
+
+  const Model& model() const { return *matter->model; }
+  const std::string& name() const { return matter->name; }
+};
+
+struct Tie {
+  std::size_t object = 0, other = 0;
+  std::uint32_t node = 0, other_node = 0;
+  double stiffness = 0, rest = 0;
+};
+
+struct Instrument {
+  struct Grip {
+    std::size_t object = 0;
+    std::uint32_t node = 0;
+    Vec3 point; // on the instrument
+  };
+  std::string name;
+  InstrumentShape shape;
+  bool present = false;
+  PoseWay way;
+  std::vector<Grip> grips;
+  std::vector<Pose> path; // of a blade: what it has passed in this step
+  Pose before;            // where elastodynamic objects last met it
+  bool changed = false;   // since then put or withdrawn
+};
+
+struct Event {
+  Change change;
+  double origin = 0, period = 0; // of a repeated one
+  double round = 0;
+  bool in_flight = false; // takes effect just now
+};
+
+struct Clock {
+  double time = 0;
+  double shown = 0;         // when all objects were last shown
+  double sum = 0, lost = 0; // of the steps so far, and what rounding took from it
+  std::optional<double> timestep;
+};
+
+struct Scene {
+  std::deque<Object> objects; // references last while others come
+  std::vector<std::shared_ptr<Body>> bodies;
+  std::vector<Tie> ties;
+  std::vector<Instrument> instruments;
+  /// In this step: where the instruments stood, one after the other.
+  std::vector<std::vector<std::optional<Pose>>> poses;
+  CopyOnWrite<std::multimap<double, Event>> events;
+  Vec3 gravity;
+  Clock clock;
+  Emits emits;
+  SimulationCounts counts;
+  std::vector<MethodJump> jumps;
+  std::vector<Cutting> cuttings;
+};
+
+} // namespace gewebe::simulation

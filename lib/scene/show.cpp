@@ -1,0 +1,205 @@
+// The picture of an object at the end of a step.
+
+#include "scene/world_internal.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double strain_limit = 0.1, turn_limit = 0.2;
+constexpr double most_sizes = 1e6; // of an object, that a node may be displaced by
+constexpr int slow_enough = 10;    // updates in a row, the first ones read and factorise
+
+std::string percent(double part) {
+  return number_text(std::round(1000 * part) / 10) + " %";
+}
+
+/// What is shown of it.
+void require_bounded(Object& object) {
+  if (object.shown.shaped)
+    require_bounded(object, *object.shown.displacement);
+  for (const NodeVector& f : *object.shown.forces)
+    for (int a = 0; a < 3; ++a)
+      if (!(std::abs(f.value[a]) <= largest_number))
+        throw Error("the force at node " + std::to_string(f.node) +
+                    " leaves single precision, expected a smaller load or timestep");
+}
+
+/// Of what stands still, or of a body.
+void show_motion(Object& object) {
+  std::vector<double>& u = object.shown.displacement.replace();
+  u.assign(3 * object.model().nodes.size(), 0);
+  object.shown.load = {};
+  object.shown.shaped = true;
+  if (object.body == nullptr)
+    return;
+  const std::span<const NodeMotion> motion = motion_of(object);
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      u[3 * i + static_cast<std::size_t>(a)] = motion[i].displacement[a];
+  std::vector<NodeVector>& forces = object.shown.forces.write();
+  for (const NodeVector& f : object.body->moving->contact_forces())
+    if (f.node >= object.offset && f.node - object.offset < object.model().nodes.size())
+      forces.push_back({f.node - static_cast<std::uint32_t>(object.offset), f.value});
+}
+
+void update_in_time(World& w, Object& object) {
+  const std::size_t displaced = object.load->displacement.size();
+  const bool watched = w.options.rate > 0 && w.options.warn && displaced > 0;
+  int& slow = object.statics->slow;
+  if (!watched || slow == slow_enough) {
+    update_still(w, object, *object.shown.load);
+    return;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  update_still(w, object, *object.shown.load);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  slow = taken.count() * w.options.rate > 1 ? slow + 1 : 0;
+  if (slow == slow_enough)
+    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) + " s: its " +
+                   std::to_string(displaced) + " displaced nodes are too many for " +
+                   number_text(w.options.rate) + " steps a second, the last step took " +
+                   number_text(std::round(1e6 * taken.count()) / 1e3) + " ms for it");
+}
+
+} // namespace
+
+/// mm that a node may be displaced by: beyond it an object is not bent but has exploded.
+double displacement_limit(Object& object) {
+  if (object.matter->size == 0) {
+    Box3 box;
+    for (const Node& node : object.model().nodes)
+      box.add(node.position);
+    object.matter->size = box.empty() || !(box.longest_side() > 0) ? 1 : box.longest_side();
+  }
+  return std::min(most_sizes * object.matter->size, largest_number);
+}
+
+/// \param displacement 3 n numbers, of a shape that is found now
+void require_bounded(Object& object, std::span<const double> displacement) {
+  const double most = displacement_limit(object);
+  for (std::size_t k = 0; k < displacement.size(); ++k)
+    if (!(std::abs(displacement[k]) <= most))
+      throw Error("node " + std::to_string(k / 3) + " is displaced by over " + number_text(most) +
+                  " mm, a million times the size of the object, expected a smaller load or "
+                  "timestep");
+}
+
+namespace {
+
+/// Whether it is worth to look at all edges where the largest displacement is this (mm).
+bool may_leave_range(Object& object, double most) {
+  if (object.matter->shortest_edge == 0)
+    object.matter->shortest_edge = shortest_edge(object.model());
+  // Ends that move less than this against each other can do no harm; beyond, a look at all edges
+  // would cost as much as the shape, so not every time.
+  return !(2 * std::sqrt(3.0) * most <= strain_limit * object.matter->shortest_edge) &&
+         (!(most <= 1.02 * object.range.looked_at) || ++object.range.not_looked >= 64);
+}
+
+/// Once, where the shape that is shown is not to be trusted.
+void warn_of_range(World& w, Object& object) {
+  if (object.range.warned)
+    return;
+  // The range can be left only where something moves far.
+  double most = 0;
+  for (const double u : *object.shown.displacement)
+    most = std::max(most, std::abs(u));
+  if (!may_leave_range(object, most))
+    return;
+  object.range.looked_at = most;
+  object.range.not_looked = 0;
+  const LinearRange range = linear_range(object.model(), *object.shown.displacement);
+  const bool strained = !(range.strain <= strain_limit), turned = !(range.turn <= turn_limit);
+  if (!strained && !turned)
+    return;
+  object.range.warned = true;
+  const auto& tell = w.options.distrust ? w.options.distrust : w.options.warn;
+  if (!tell)
+    return;
+  const Spring& spring = object.model().springs[strained ? range.strain_spring : range.turn_spring];
+  tell("object " + object.name() + " at " + number_text(w.now.clock.time) +
+       " s: beyond the linear range, the edge " + std::to_string(spring.i) + "-" +
+       std::to_string(spring.j) +
+       (strained ? " is strained by " + percent(range.strain)
+                 : " is turned by " + percent(range.turn)) +
+       ", the shape is not to be trusted there");
+}
+
+} // namespace
+
+void shape(World& w, Object& object) {
+  Shown& shown = object.shown;
+  if (shown.shaped)
+    return;
+  if (shown.late) {
+    at_object(w, object, [&] { find_late_shape(w, object); });
+    return;
+  }
+  at_object(w, object, [&] {
+    update_stages(w, object, *shown.load); // as it is, but where a change of method looked ahead
+    const std::span<const double> u = still_shape(object);
+    require_bounded(object, u);
+    shown.displacement.replace().assign(u.begin(), u.end());
+  });
+  shown.shaped = true;
+  warn_of_range(w, object);
+}
+
+/// During a step, which may be taken back: the shape is then computed anew.
+void shape_in_step(World& w, Object& object) {
+  if (!object.shown.shaped)
+    object.statics->ahead = true;
+  shape(w, object);
+}
+
+void show(World& w, Object& object) {
+  if (object.body != nullptr || !object.load->empty())
+    need_model(object);
+  const bool near = object.method == Method::ffe && (object.contact || instruments_there(w));
+  const bool meets = near && !object.stages.options;
+  if (near && !meets && !object.matter->told.stages && w.options.warn) {
+    object.matter->told.stages = true;
+    w.options.warn("object " + object.name() +
+                   " follows two steps of stiffness: instruments don't touch it");
+  }
+  if (meets)
+    shape_in_step(w, object); // that it comes from
+  Shown& shown = object.shown;
+  shown.late = nullptr;
+  leave_shown(w, object);
+  shown.forces = {};
+  const bool acted_on = object.statics->still || !object.load->empty();
+  if (object.method == Method::ffe && (meets || acted_on))
+    shown.load = load_at(*object.load, object.model(), w.now.clock.time);
+  if (meets) {
+    follow_instruments(w, object);
+    shown.shaped = true;
+    warn_of_range(w, object);
+    if (object.statics->still)
+      shown.forces = object.statics->still->contact_forces();
+  } else if (object.method == Method::ffe && acted_on) {
+    update_in_time(w, object);
+    shown.forces = still_forces(object);
+    shown.shaped = false; // until somebody asks for it
+    // Who never asks is warned too, if the contacts alone may leave the range.
+    double most = 0;
+    for (const auto& [node, d] : shown.load->displacement)
+      most = std::max({most, std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    if (!object.range.warned && may_leave_range(object, most))
+      shape(w, object);
+  } else {
+    show_motion(object);
+  }
+  add_touches(object);
+  require_bounded(object);
+  shown.time = w.now.clock.time;
+  shown.valid = true;
+}
+
+} // namespace gewebe::simulation

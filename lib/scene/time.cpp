@@ -1,0 +1,106 @@
+// Time: steps through events.
+
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double same_time = 1e-9;  // of a step's length
+constexpr double most_events = 1e6; // repeated ones in a step
+
+/// A step with more events than anybody waits for is refused before it begins.
+void require_few_events(const World& w, double to) {
+  double count = 0;
+  for (const auto& [time, event] : *w.now.events)
+    if (event.period > 0 && time <= to)
+      count += (to - time) / event.period;
+  if (!(count <= most_events))
+    throw Error("a step to " + number_text(to) + " s holds " + number_text(std::round(count)) +
+                " repeated events, expected at most a million: a shorter step, or at every with a "
+                "longer time");
+}
+
+/// The first event stays among those that wait while it takes effect, so that its nodes are
+/// followed as those of all others; where what it is about comes apart it becomes several.
+void take_effect_first(World& w) {
+  Event& first = w.now.events.write().begin()->second;
+  first.in_flight = true;
+  const Change change = first.change;
+  apply(w, change);
+  std::multimap<double, Event>& events = w.now.events.write();
+  while (!events.empty() && events.begin()->second.in_flight) {
+    Event event = std::move(events.begin()->second);
+    events.erase(events.begin());
+    event.in_flight = false;
+    if (!(event.period > 0))
+      continue;
+    ++event.round;
+    const double next = event.origin + event.round * event.period;
+    if (!(next > w.now.clock.time))
+      throw Error("the period " + number_text(event.period) +
+                  " s is lost in the rounding of the time, expected a longer one");
+    events.emplace(next, std::move(event));
+  }
+}
+
+void require_bounded_instruments(const World& w) {
+  for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
+    const InstrumentReport report = report_of(w, k);
+    for (const Vec3& v : {report.force, report.torque})
+      if (!(norm(v) <= largest_number))
+        throw Error("the force on the instrument " + w.now.instruments[k].name +
+                    " leaves single precision, expected a smaller load or timestep");
+  }
+}
+
+void show_all(World& w) {
+  for (Object& object : w.now.objects) {
+    if (w.now.emits.shapes)
+      need_model(object);
+    if (!object.shown.valid ||
+        (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
+        touched_anew(w, object))
+      at_object(w, object, [&] { show(w, object); });
+    if (w.now.emits.shapes || w.options.shapes)
+      shape_in_step(w, object); // now, so that a failure is one of this step
+  }
+}
+
+} // namespace
+
+void advance(World& w, double to) {
+  require_few_events(w, to);
+  Clock& clock = w.now.clock;
+  const double start = clock.time;
+  const double slack = same_time * (to - start);
+  const auto move_to = [&](double time) {
+    move_bodies(w, time);
+    clock.time = std::max(clock.time, time);
+  };
+  while (!w.now.events->empty() && w.now.events->begin()->first <= to + slack) {
+    move_to(std::min(w.now.events->begin()->first, to));
+    take_effect_first(w);
+  }
+  move_to(to);
+  note_poses(w);
+  take_touches(w, clock.time - start);
+  sweep_blades(w);
+  for (std::size_t i = 0; i < w.now.objects.size(); ++i)
+    at_object(w, w.now.objects[i], [&] { find_free_motion(w, i); });
+  show_all(w);
+  if (w.now.poses.size() > 1)
+    w.now.poses.erase(w.now.poses.begin(), w.now.poses.end() - 1);
+  clock.shown = clock.time;
+  if (w.now.emits.instruments)
+    require_bounded_instruments(w);
+  tear(w);
+  ++w.now.counts.steps;
+}
+
+} // namespace gewebe::simulation

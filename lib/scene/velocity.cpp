@@ -1,0 +1,75 @@
+// How fast elastostatic objects move: as their load does. What a cut frees of one goes on so.
+
+#include "base/vector_at.h"
+#include "scene/world_internal.h"
+#include "solve/condition.h"
+
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gewebe::simulation {
+
+/// Before an object is shown anew: what it shows now is where it comes from.
+void leave_shown(World& w, Object& object) {
+  const double now = w.now.clock.time, before = w.now.clock.shown;
+  Shown& shown = object.shown;
+  const bool posed = object.method == Method::ffe && !object.stages.options;
+  if (now == before && shown.time == now) { // in place of what is shown
+    object.came.velocity.clear();
+    shown.posed = posed;
+    return;
+  }
+  CameFrom came{.load = std::exchange(shown.load, {}),
+                .touched = {},
+                .over = shown.posed && posed ? now - before : 0,
+                .velocity = {}};
+  for (const NodeTouch& t : shown.touches)
+    if (posed)
+      came.touched[t.node] = vector_at(*shown.displacement, t.node);
+  object.came = std::move(came);
+  shown.posed = posed;
+}
+
+/// Whether it moved in the last step. Between two steps that show it it stands still.
+bool has_moved(const World& w, const Object& object) {
+  return object.method == Method::ffe && object.came.over > 0 &&
+         object.shown.time == w.now.clock.shown;
+}
+
+/// mm/s by node: what the last step changed of its load, over its length; nothing where it stands
+/// still. Both shapes are those of the model as it is, so that a wound that has just opened counts
+/// for nothing. \param afresh with another factor of its own   \throw Error as Elastostatic
+std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
+  if (!object.came.velocity.empty())
+    return object.came.velocity;
+  if (!has_moved(w, object))
+    return {};
+  object.statics->ahead = true;
+  Load load = *object.came.load, now = *object.shown.load;
+  // Nodes that instruments push are where they are.
+  for (const auto& [node, u] : object.came.touched)
+    load.displacement[node] = u;
+  for (const NodeTouch& t : object.shown.touches)
+    now.displacement[t.node] = vector_at(*object.shown.displacement, t.node);
+  std::vector<Vec3> velocity;
+  try {
+    std::optional<Elastostatic> own;
+    if (afresh)
+      own.emplace(object.model(), StiffnessParts{}, w.context);
+    Elastostatic& still = afresh ? *own : still_of(w, object);
+    still.update(load);
+    const std::span<const double> shape = still.displacement();
+    const std::vector<double> before(shape.begin(), shape.end());
+    still.update(now);
+    const std::span<const double> after = still.displacement();
+    for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
+      velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.over);
+  } catch (const SingularStiffness&) {
+    // It hangs loosely, and nobody has asked for a shape since.
+  }
+  return velocity;
+}
+
+} // namespace gewebe::simulation

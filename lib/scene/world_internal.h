@@ -1,0 +1,149 @@
+#pragma once
+// A Simulation from within: the scene, what runs it, and the functions that do, by file.
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "scene/scene_internal.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe::simulation {
+
+using gewebe::number_text;
+
+/// Of what is told in single precision too, with room for sums.
+inline constexpr double largest_number = 1e38;
+
+struct World {
+  Context context;
+  SimulationOptions options;
+  Scene now{};
+  bool saved = false;                 // under guard: a call that throws goes back
+  std::vector<std::size_t> renewed{}; // see Simulation::take_renewed
+};
+
+// guard.cpp: a call that fails leaves the scene as it was
+struct Saved {
+  Scene scene;
+  std::vector<Body::Snapshot> bodies;
+};
+Saved save(World& w);
+void take_back(World& w, Saved&& saved) noexcept;
+
+/// Does all of the work or, if it throws under guard, nothing.
+template <class Work>
+void guarded(World& w, Work&& work) {
+  if (!w.options.guard || w.saved) {
+    work();
+    return;
+  }
+  Saved before = save(w);
+  try {
+    work();
+  } catch (...) {
+    take_back(w, std::move(before));
+    throw;
+  }
+  w.saved = false;
+}
+
+// objects.cpp: what they consist of, and their solvers
+void insert(World& w, Object object);
+void need_model(Object& object);
+Elastostatic& still_of(World& w, Object& object);
+void make_still(const World& w, Object& object, StiffnessParts parts);
+void update_still(World& w, Object& object, const Load& load);
+/// Forgets what is kept to be quick.
+void renew(Object& object);
+/// Counts add up, errors are the larger ones.
+void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
+
+/// What is shown of it, or moves it, is no longer right.
+inline void touch(Object& object) {
+  object.shown.valid = false;
+  if (object.body != nullptr)
+    object.body->changed = true;
+}
+
+/// Names object and time in an Error.
+template <class Work>
+void at_object(const World& w, const Object& object, Work&& work) {
+  try {
+    work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                " s: " + (error.place().empty() ? "" : error.place() + ": ") + error.what());
+  }
+}
+
+// stages.cpp: the two-step method
+void update_stages(World& w, Object& object, const Load& load);
+std::span<const double> still_shape(Object& object);
+const std::vector<NodeVector>& still_forces(const Object& object);
+
+// bodies.cpp: what is tied together and moves as one
+using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
+void need_body(World& w, std::size_t object);
+std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
+                                const Motions* motions = nullptr);
+void drop_body(World& w, const Body* body);
+void move_bodies(World& w, double to);
+/// How an object's nodes move. \pre it has a body
+std::span<const NodeMotion> motion_of(const Object& object);
+
+// time.cpp: steps through events; show.cpp: the picture at their end
+void advance(World& w, double to);
+void show(World& w, Object& object);
+void shape(World& w, Object& object);
+void shape_in_step(World& w, Object& object);
+double displacement_limit(Object& object);
+void require_bounded(Object& object, std::span<const double> displacement);
+
+// velocity.cpp: how fast elastostatic objects move
+void leave_shown(World& w, Object& object);
+bool has_moved(const World& w, const Object& object);
+std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh);
+
+// instruments.cpp: where they are and what they hold
+std::size_t instrument_place(const World& w, const std::string& name) noexcept;
+std::size_t add_instrument(World& w, const std::string& name);
+InstrumentReport report_of(const World& w, std::size_t instrument);
+void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
+void note_poses(World& w);
+bool instruments_there(const World& w);
+std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
+
+// contact.cpp: whom they touch
+void guide(World& w, Body& body, double to);
+void end_guiding(World& w, double to);
+void take_touches(World& w, double duration);
+void gather_impulses(World& w, Body& body);
+bool touched_anew(World& w, Object& object);
+void follow_instruments(World& w, Object& object);
+void add_touches(Object& object);
+
+// cuts.cpp: what they sever and what comes off
+void announce_cut(World& w, std::size_t index);
+void find_late_shape(World& w, Object& object);
+void sweep_blades(World& w);
+void tear(World& w);
+void find_free_motion(World& w, std::size_t index);
+
+// moves.cpp: all that names nodes follows them
+Object renumbered(const Object& old, std::shared_ptr<const Model> model);
+void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,
+              std::span<const Vec3> velocity = {});
+void renew_bodies(World& w, const Motions& motions);
+
+} // namespace gewebe::simulation
