@@ -218,7 +218,29 @@ struct FrontalFactor::State {
     }
   }
 
+  /// All anew, in an order of its own finding.
+  void begin(const Model& model, const Context& context) {
+    cpu = context.cpu;
+    graph = spring_graph(model);
+    const std::vector<std::uint32_t> order = elimination_order(graph.view());
+    if (order.empty())
+      throw Error("every node is fixed along every axis, expected a node that can move");
+    tree = front_tree(graph.view(), order);
+    fronts = std::vector<Front>(tree.fronts());
+    factorise(model, {}, context);
+    lay_out(model);
+    remember(model);
+  }
+
   // ---- changes
+
+  /// Whether each node is held along the axes along which it was.
+  bool held_alike(const Model& model, std::span<const std::uint32_t> origin) const {
+    for (std::size_t i = 0; i < model.nodes.size(); ++i)
+      if (model.nodes[i].fixed != fixed[origin.empty() ? i : origin[i]])
+        return false;
+    return true;
+  }
 
   /// By node: whether its row of K is other than it was, its neighbours' numbers aside. Both lists
   /// of springs ascend alike where nodes keep their order, so one pass finds what differs; in
@@ -231,7 +253,7 @@ struct FrontalFactor::State {
       const std::uint32_t old = origin.empty() ? i : origin[i];
       const bool copy = !place.empty() && place[old] != i;
       moved[i] = !(model.nodes[i].position == position[old]);
-      changed[i] = copy || moved[i] || model.nodes[i].fixed != fixed[old];
+      changed[i] = copy || moved[i];
     }
     const auto mark = [&](std::uint32_t node) {
       if (node != none)
@@ -314,6 +336,8 @@ struct FrontalFactor::State {
 
   void renew(const Model& model, std::span<const std::uint32_t> origin,
              std::span<const std::uint32_t> place, const Context& context) {
+    if (!held_alike(model, origin)) // rows come and go within fronts
+      return begin(model, context);
     cpu = context.cpu;
     SpringGraph now = spring_graph(model);
     const std::size_t n = model.nodes.size();
@@ -390,17 +414,7 @@ struct FrontalFactor::State {
 
 FrontalFactor::FrontalFactor(const Model& model, const Context& context)
     : state_(std::make_unique<State>()) {
-  State& s = *state_;
-  s.cpu = context.cpu;
-  s.graph = spring_graph(model);
-  const std::vector<std::uint32_t> order = elimination_order(s.graph.view());
-  if (order.empty())
-    throw Error("every node is fixed along every axis, expected a node that can move");
-  s.tree = front_tree(s.graph.view(), order);
-  s.fronts.resize(s.tree.fronts());
-  s.factorise(model, {}, context);
-  s.lay_out(model);
-  s.remember(model);
+  state_->begin(model, context);
 }
 
 FrontalFactor::~FrontalFactor() = default;

@@ -35,7 +35,8 @@ public:
 
   /// Goes over to a model that came from the one before: `origin` says of each node which one it
   /// was, `place` of each one before which it is now, or that it is gone (see CutModel); both may
-  /// be empty where nodes stayed. Equal to a fresh factor with the same tree, bit by bit.
+  /// be empty where nodes stayed. Equal to a fresh factor with the same tree, bit by bit; where
+  /// nodes are held along other axes than before, it is one.
   /// \throw as the constructor; then the factor is of no use
   FrontalWork renew(const Model& model, std::span<const std::uint32_t> origin,
                     std::span<const std::uint32_t> place, const Context& context);

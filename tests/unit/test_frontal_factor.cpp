@@ -193,6 +193,39 @@ TEST(FrontalFactor, FollowsStiffnessesAndComesBackToTheSameBits) {
   EXPECT_EQ(factor.renew(model, {}, {}, Context{}).computed, 0u);
 }
 
+TEST(FrontalFactor, FollowsWhateverChangesARow) {
+  const Model model = round_organ(3);
+  const std::vector<double> f = loads(3 * model.nodes.size(), 4);
+  const std::uint32_t node = 100;
+  struct Change {
+    const char* name;
+    void (*make)(Model&);
+  };
+  for (const Change& change :
+       std::vector<Change>{{"a rest length", [](Model& m) { m.springs[200].rest *= 0.5; }},
+                           {"a place",
+                            [](Model& m) {
+                              m.nodes[node].position += Vec3{0.02, 0.01, -0.03};
+                            }},
+                           {"an axis held", [](Model& m) { m.nodes[node].fixed = fixed_x; }},
+                           {"another axis held", [](Model& m) { m.nodes[node].fixed = fixed_z; }},
+                           {"a node held", [](Model& m) { m.nodes[node].fixed = fixed_all; }}}) {
+    Model before = model;
+    if (std::string(change.name) == "another axis held")
+      before.nodes[node].fixed = fixed_x;
+    Model after = before;
+    change.make(after);
+    FrontalFactor factor(before, Context{});
+    const std::vector<double> first = solved(factor, f);
+    const FrontalWork work = factor.renew(after, {}, {}, Context{});
+    EXPECT_GT(work.computed, 0U) << change.name;
+    EXPECT_LT(relative_difference(solved(factor, f), reference(after, f)), 1e-9) << change.name;
+    EXPECT_GT(relative_difference(solved(factor, f), first), 1e-6) << change.name;
+    (void)factor.renew(before, {}, {}, Context{});
+    EXPECT_LT(relative_difference(solved(factor, f), first), 1e-9) << change.name;
+  }
+}
+
 TEST(FrontalFactor, FollowsCutSprings) {
   Model model = round_organ(3);
   FrontalFactor factor(model, Context{});
