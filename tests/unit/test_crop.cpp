@@ -53,6 +53,28 @@ TEST(Crop, FacesOfTheBoxLieWhereItIs) {
     }
 }
 
+TEST(Crop, AFaceBeyondTheLastLeafLiesWhereItIs) {
+  // A cube whose last voxels on each side are the last of their leaves: the voxels that give the
+  // face its place are in no leaf.
+  for (const bool tiles : {false, true}) {
+    const Grid cube = scenes::sample(
+        {}, {0, 0, 0}, {15, 15, 15}, [](int, int, int) { return 1.0; }, tiles);
+    ASSERT_EQ(cube.leaves().size(), tiles ? 0U : 8U);
+    for (int side = 0; side < 6; ++side)
+      for (const double by : {0.2, 0.7}) {
+        Box3 box{{-99, -99, -99}, {99, 99, 99}};
+        (side < 3 ? box.min : box.max)[side % 3] = side < 3 ? -by : 15 + by;
+        Box3 expected{{-0.5, -0.5, -0.5}, {15.5, 15.5, 15.5}}; // half a voxel beyond the centres
+        (side < 3 ? expected.min : expected.max)[side % 3] = side < 3 ? -by : 15 + by;
+        const Box3 found = bounding_box(marching_cubes({}, crop({}, cube, box, 0.5)).mesh);
+        for (int axis = 0; axis < 3; ++axis) {
+          EXPECT_NEAR(found.min[axis], expected.min[axis], 1e-3) << side << ' ' << by;
+          EXPECT_NEAR(found.max[axis], expected.max[axis], 1e-3) << side << ' ' << by;
+        }
+      }
+  }
+}
+
 TEST(Crop, WithinTheBoxNothingChanges) {
   const Grid grid = metaballs(40, 3, 0.7);
   const Box3 box{{5.1, 6.2, 4.3}, {21, 19.7, 22.2}};

@@ -167,6 +167,21 @@ TEST(Csg, ClampsOnceAtTheEnd) {
   EXPECT_EQ(value.value({8, 3, 3}), 0.0f);
 }
 
+TEST(Csg, SetOperationsClampWhatNothingElseReaches) {
+  // A leaf of values from 0 to 2 beside a tile far away: it is not taken as it is.
+  std::mt19937 random(7);
+  const Grid grey = random_grid(random, 0, 2);
+  GridBuilder builder{GridInfo{}};
+  builder.add_tile({{80, 0, 0}, 8, 1.0f, true});
+  const Grid far = builder.finish(false);
+  for (const Op operation : {Op::unite, Op::difference, Op::exclusive_or})
+    expect_dense_equal(operation, {grey, far}, combine(operation, {grey, far}), 20, false);
+  CsgReport report; // control: a sum clamps nothing above 0
+  const Grid sum = combine(Op::add, {grey, far}, &report);
+  EXPECT_EQ(report.leaves_computed, 0U);
+  expect_dense_equal(Op::add, {grey, far}, sum, 20, false);
+}
+
 TEST(Csg, UntouchedLeavesAreShared) {
   const Grid a = ball(30, {0.1, 0.2, 0.3}, 2), far = ball(5, {80, 0, 0});
   for (const Op operation : {Op::add, Op::unite, Op::exclusive_or}) {
@@ -241,6 +256,48 @@ TEST(Csg, OverflowIsAnError) {
   const Grid grid = builder.finish(false);
   EXPECT_THROW(combine(Op::add, {grid, grid}), Error);
   EXPECT_NO_THROW(combine(Op::unite, {grid, grid}));
+}
+
+TEST(Csg, OverflowOfOneVoxelOfALeafIsAnError) {
+  const float most = std::numeric_limits<float>::max();
+  const auto leaf = [&](std::size_t place) {
+    GridBuilder builder{GridInfo{}};
+    const std::vector<Int3> origins{{8, -8, 16}};
+    for (const LeafRef& ref : builder.add_leaves(Context{}, origins))
+      for (std::size_t n = 0; n < leaf_voxels; ++n) {
+        ref.values[n] = n == place ? most : 0.25f + 0.5f * static_cast<float>(n % 2);
+        ref.active[n / 64] |= std::uint64_t{1} << (n % 64);
+      }
+    return builder.finish(false);
+  };
+  for (const std::size_t place : {0U, 77U, 511U}) {
+    const Grid grid = leaf(place);
+    EXPECT_THROW(combine(Op::add, {grid, grid}), Error) << place;
+    EXPECT_NO_THROW(combine(Op::add, {grid, leaf((place + 1) % leaf_voxels)}));
+    EXPECT_NO_THROW(combine(Op::subtract, {grid, grid}));
+    EXPECT_NO_THROW(combine(Op::unite, {grid, grid}));
+    // Against a tile, too.
+    GridBuilder builder{GridInfo{}};
+    builder.add_tile({{8, -8, 16}, 8, most, true});
+    const Grid tile = builder.finish(false);
+    EXPECT_THROW(combine(Op::add, {grid, tile}), Error) << place;
+    EXPECT_THROW(combine(Op::add, {tile, grid}), Error) << place;
+  }
+}
+
+TEST(Csg, LatticesThatPartFarFromTheFirstVolumeDiffer) {
+  // Voxels of 1 and of 1 + 1e-8: alike to a millionth of a voxel near the origin, not at 10,000.
+  const auto cube = [](double size, std::int32_t place) {
+    GridInfo info;
+    info.transform = uniform_transform(size);
+    GridBuilder builder(info);
+    builder.add_tile({{place, 0, 0}, 8, 1.0f, true});
+    return builder.finish(false);
+  };
+  const Grid near = cube(1, 0);
+  EXPECT_NO_THROW(combine(Op::unite, {near, cube(1 + 1e-8, 8)}));
+  EXPECT_THROW(combine(Op::unite, {near, cube(1 + 1e-8, 10000)}), Error);
+  EXPECT_THROW(combine(Op::unite, {cube(1 + 1e-8, 10000), near}), Error);
 }
 
 TEST(Csg, ResampleBringsOperandsToTheFirstLattice) {

@@ -126,6 +126,29 @@ TEST(DensityBand, HoldsExactlyTheCrossingLeavesOfRandomScenes) {
   EXPECT_GT(skipped, 5000U);
 }
 
+TEST(DensityBand, ARegionThatEndsAtFacesOfLeavesHasItsSurfaceThere) {
+  // All of the region is on one side: what is stored is the layer of leaves at its faces, beyond
+  // which no leaf was ever planned.
+  for (const double isovalue : {0.5, -0.5})
+    for (const int leaves : {3, 12}) { // few of them proven, most of them proven
+      const Particles particles{{{0.3, 1.2, -0.7}, 60.0 * leaves, isovalue > 0 ? 1.0 : -1.0}};
+      const int half = leaves / 2;
+      const Vec3 first{-8.0 * half - 8, -8.0 * half, 8 - 8.0 * half};
+      const double last = 8.0 * leaves - 1;
+      DensityOptions options = options_for(1);
+      options.clip = Box3{first, first + Vec3{last, last, last}};
+      const Grid plain = metaball_density({}, particles, options);
+      options.band = isovalue;
+      const Grid band = metaball_density({}, particles, options);
+      EXPECT_EQ(complaint(plain, band, isovalue), "") << isovalue << ' ' << leaves;
+      const auto n = static_cast<std::size_t>(leaves), inner = n - 2;
+      EXPECT_EQ(plain.leaves().size(), n * n * n);
+      EXPECT_EQ(band.leaves().size(), n * n * n - inner * inner * inner);
+      EXPECT_TRUE(
+          same_mesh(marching_cubes({}, band).mesh, marching_cubes({}, plain, isovalue).mesh));
+    }
+}
+
 TEST(DensityBand, CubesSeeTheParticlesBeyondTheirFaces) {
   // Lone balls of a few voxels: a particle that reaches no voxel of a cube but one beside its face.
   for (unsigned scene = 0; scene < 3; ++scene) {
