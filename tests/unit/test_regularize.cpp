@@ -4,6 +4,7 @@
 #include "mesh/quality.h"
 #include "mesh/self_intersections.h"
 #include "tests/unit/larger.h"
+#include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "volume/field.h"
 
@@ -72,6 +73,32 @@ TEST(Regularize, TurnedAndMirroredTransforms) {
   const MeshReport after = examine_mesh(mesh);
   EXPECT_TRUE(keeps_topology(before, after) && after.outward());
   EXPECT_GT(after.smallest_angle, 25);
+}
+
+TEST(Regularize, APointSlidesHalfTheWayToTheMiddleOfItsFaces) {
+  // An even net on a ball with one point out of place by a fifth of an edge. The area-weighted
+  // middle of the faces round it does not depend on where it stands: a round halves its way.
+  const double radius = 24;
+  const Grid grid = sample({}, {-30, -30, -30}, {30, 30, 30}, [&](int i, int j, int k) {
+    return std::clamp(0.5 + (radius - std::sqrt(i * i + j * j + k * k)) / 8, 0.0, 1.0);
+  });
+  TriangleMesh even = test::sphere_mesh(3, radius, {});
+  regularize({}, grid, 0.5, even, {60}); // until it rests
+  const double edge = norm(even.points[even.triangles[0][0]] - even.points[even.triangles[0][1]]);
+  std::size_t looked_at = 0;
+  for (std::size_t p = 40; p < even.points.size(); p += 90) {
+    const Vec3 out = even.points[p] / norm(even.points[p]);
+    const Vec3 along = cross(out, {0.36, 0.48, 0.8});
+    for (const double sign : {-1.0, 1.0}) {
+      TriangleMesh mesh = even;
+      const Vec3 by = along * (sign * 0.2 * edge / norm(along));
+      mesh.points[p] += by;
+      EXPECT_EQ(regularize({}, grid, 0.5, mesh, {1}).flips, 0U);
+      EXPECT_NEAR(dot(mesh.points[p] - even.points[p], by) / dot(by, by), 0.5, 0.05) << p;
+      ++looked_at;
+    }
+  }
+  EXPECT_GT(looked_at, 8U);
 }
 
 TEST(Regularize, NoRoundsNoChange) {

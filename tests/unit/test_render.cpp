@@ -137,6 +137,26 @@ TEST(RenderUv, SphereFollowsLongitudeAndLatitudeWithoutATear) {
   EXPECT_GT(across, 10); // the seam was met
 }
 
+TEST(RenderUv, TrianglesOfUpToHalfATurnGoOnAcrossTheSeam) {
+  // A coarse mesh: each triangle spans 0.05 to 0.45 turns, wherever it begins.
+  for (const UvMapping mapping : {UvMapping::sphere, UvMapping::cylinder})
+    for (int begin = 0; begin < 40; ++begin)
+      for (int width = 2; width <= 18; ++width)
+        for (int middle = 1; middle < width; middle += 3) {
+          std::vector<Vec3> points;
+          for (const int at : {0, width, middle}) {
+            const double angle = 2 * pi * ((begin + at) / 40.0 + 0.003);
+            points.push_back({std::cos(angle), std::sin(angle), at == middle ? 0.3 : -0.2});
+          }
+          const UvFrame frame{mapping, {{-1, -1, -1}, {1, 1, 1}}, 1};
+          const std::vector<Triangle> triangles{{0, 1, 2}};
+          const auto st = make_texcoords(points, triangles, frame, {}).at(0);
+          const auto s = [&](std::size_t corner) { return static_cast<double>(st[2 * corner]); };
+          ASSERT_NEAR(s(1) - s(0), width / 40.0, 1e-6) << begin << ' ' << width;
+          ASSERT_NEAR(s(2) - s(0), middle / 40.0, 1e-6) << begin << ' ' << width;
+        }
+}
+
 TEST(RenderUv, BoxIsUprightAndUnmirroredSeenFromOutside) {
   const TriangleMesh cube = test::sphere_mesh(3, 10, {0, 0, 0});
   const UvFrame frame{UvMapping::box, bounding_box(cube), 4};

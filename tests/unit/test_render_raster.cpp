@@ -243,6 +243,39 @@ TEST(RenderRaster, FourSamplesSmoothOutlinesAndNothingElse) {
       EXPECT_EQ(image.values[3 * (64 * y + x)], x < 30 ? 255 : x == 30 ? 128 : 0) << x << " " << y;
 }
 
+// Two surfaces cross along a line through the middle of a row, or of a column, of pixels: of four
+// samples there two see the one and two the other.
+TEST(RenderRaster, EachOfFourSamplesHasItsOwnDepth) {
+  Projection projection = pixels(40, 40);
+  projection.matrix[3] = {0, 0, 1, 1};
+  for (const bool rows : {false, true}) {
+    Drawing drawing;
+    const auto add = [&](double x, double y, double nearness, float shade) {
+      const double w = 1 / nearness;
+      DrawVertex v = vertex(20 * (w * (x / 20 - 1) + 1), 20 - 20 * w * (1 - y / 20));
+      v.position[2] = static_cast<float>(w - 1);
+      v.shade = shade;
+      drawing.vertices.push_back(v);
+    };
+    for (const auto& [x, y] : {std::pair{-10.0, -10.0}, {60.0, -10.0}, {60.0, 60.0}, {-10.0, 60.0}})
+      add(x, y, 1, 0.2F);
+    for (const auto& [x, y] : {std::pair{-10.0, -10.0}, {60.0, -10.0}, {60.0, 60.0}, {-10.0, 60.0}})
+      add(x, y, 1 + 0.005 * ((rows ? y : x) - 20.5), 0.8F);
+    drawing.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
+      Context context;
+      context.cpu = level;
+      const Image image = render_cpu(drawing, projection, {}, 40, 40, 4, context);
+      for (std::size_t y = 0; y < 40; ++y)
+        for (std::size_t x = 0; x < 40; ++x) {
+          const std::size_t at = rows ? y : x;
+          const double wanted = at < 20 ? 51 : at == 20 ? 127.5 : 204;
+          EXPECT_NEAR(image.values[3 * (40 * y + x)], wanted, 0.6) << x << ' ' << y;
+        }
+    }
+  }
+}
+
 TEST(RenderPicture, BackgroundAloneAndLimits) {
   PictureOptions options;
   options.width = 5;

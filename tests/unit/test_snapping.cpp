@@ -8,6 +8,7 @@
 
 #include <array>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 
@@ -119,6 +120,56 @@ TEST(Snapping, PointsStayNear) {
   const double unsnapped = worst({.epsilon = 0});
   EXPECT_LT(worst({0.15, Place::mean}), 2 * unsnapped);
   EXPECT_GT(worst({0.15, Place::corner}), 2 * worst({0.15, Place::mean})); // the report's steps
+}
+
+TEST(Snapping, MergedPointsStandAtTheWeightedMeanOfTheirCrossings) {
+  std::size_t merged = 0;
+  double off = 0, off_unweighted = 0;
+  for (std::uint32_t seed = 0; seed < 12; ++seed) {
+    const IsoSurface surface = marching_cubes({}, metaballs(32, seed, 0.5));
+    const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
+    for (const double epsilon : {0.15, 0.3}) {
+      const SnapResult result = snap({}, surface, {epsilon, Place::mean});
+      if (result.report.refused != 0 || result.report.fins != 0)
+        continue; // else each cluster is one point
+      struct Cluster {
+        Vec3 weighted, plain;
+        double weights = 0;
+        std::size_t count = 0;
+      };
+      std::vector<Cluster> clusters; // in the order of their first points
+      std::map<Int3, std::size_t> at;
+      for (const EdgeCrossing& c : crossings) {
+        const bool low = c.fraction <= epsilon, high = 1 - c.fraction <= epsilon;
+        std::size_t number = clusters.size();
+        if (low || high) {
+          Int3 corner = c.corner;
+          corner[static_cast<std::size_t>(c.axis)] += low ? 0 : 1;
+          number = at.emplace(corner, number).first->second;
+        }
+        if (number == clusters.size())
+          clusters.emplace_back();
+        const double weight = 1 - 1.5 * std::min(c.fraction, 1 - c.fraction);
+        Cluster& cluster = clusters[number];
+        cluster.weighted += weight * index_position(c);
+        cluster.plain += index_position(c);
+        cluster.weights += weight;
+        ++cluster.count;
+      }
+      ASSERT_EQ(result.mesh.points.size(), clusters.size());
+      for (std::size_t n = 0; n < clusters.size(); ++n) {
+        const Cluster& c = clusters[n];
+        const Vec3 found = surface.transform.to_index(result.mesh.points[n]);
+        off = test::larger(off, norm(found - c.weighted / c.weights));
+        off_unweighted =
+            test::larger(off_unweighted, norm(found - c.plain / static_cast<double>(c.count)));
+        merged += c.count > 1 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(merged, 2000U);
+  EXPECT_LT(off, 1e-6);
+  EXPECT_GT(off_unweighted, 1e-2); // the weights are about something
 }
 
 TEST(Snapping, CornerPlacesPointsOnTheLattice) {
