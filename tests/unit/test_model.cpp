@@ -251,6 +251,63 @@ TEST(ModelBuild, BendingSpringsCrossInnerEdges) {
   EXPECT_EQ(spring_count(fine, SpringKind::bend) + 12, spring_count(fine, SpringKind::edge));
 }
 
+TEST(ModelBuild, BendingSpringsAreTheirFactorTimesTheEdgeTheyCross) {
+  // Two unequal faces: k of the edge between them is E h (A1 + A2) / l².
+  TriangleMesh mesh;
+  mesh.points = {{0, 0, 0}, {2, 0, 0}, {0, 3, 0}, {4, 5, 1}};
+  mesh.triangles = {{0, 1, 2}, {1, 3, 2}};
+  BuildOptions options;
+  options.centrals = 0;
+  options.bend = true;
+  options.bend_factor = 0.3;
+  options.material.materials[0].young = 700;
+  options.material.materials[0].thickness = 2;
+  std::size_t bends = 0;
+  for (const Spring& s : build(mesh, options).model.springs)
+    if (s.kind == SpringKind::bend) {
+      ++bends;
+      EXPECT_EQ(s.i, 0U);
+      EXPECT_EQ(s.j, 3U);
+      EXPECT_NEAR(s.stiffness, 0.3 * 700 * 2 * area(mesh) / 13, 1e-9 * s.stiffness);
+    }
+  EXPECT_EQ(bends, 1U);
+}
+
+TEST(ModelBuild, FacesThatAreLeftOutTakeTheirNumbersWithThem) {
+  // A face with equal corners and one that stands twice, before and between the others.
+  TriangleMesh mesh = ball(1, 10);
+  const std::vector<Triangle> faces = mesh.triangles;
+  mesh.triangles.insert(mesh.triangles.begin(), {faces[3][0], faces[3][0], faces[3][1]});
+  mesh.triangles.insert(mesh.triangles.begin() + 9, {faces[2][1], faces[2][2], faces[2][0]});
+  const auto number = [](const Triangle& t) { return static_cast<float>(t[0] + t[1] + t[2]); };
+  for (const Triangle& t : mesh.triangles) {
+    mesh.texcoords.push_back({number(t), 1, 2, 3, 4, 5});
+    mesh.part.push_back(t[0] > 8 ? 1 : 0);
+  }
+  BuildOptions options;
+  options.material.materials.assign(2, material_presets()[0]);
+  options.material.of_part = {0, 1};
+  options.material.materials[1].density *= 2;
+  const BuiltModel built = build(mesh, options);
+  EXPECT_EQ(built.report.degenerate_faces, 1U);
+  EXPECT_EQ(built.report.duplicate_faces, 1U);
+  ASSERT_EQ(built.model.triangles.size(), faces.size());
+  ASSERT_EQ(built.model.texcoords.size(), faces.size());
+  std::vector<double> mass(surface_count(built.model));
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    const Triangle& t = built.model.triangles[f];
+    EXPECT_EQ(t, faces[f]) << f;
+    EXPECT_EQ(built.model.texcoords[f][0], static_cast<double>(number(t))) << f;
+    const auto& p = mesh.points;
+    const Material& m = options.material.materials[t[0] > 8 ? 1 : 0];
+    for (const std::uint32_t corner : t)
+      mass[corner] +=
+          m.density * m.thickness * norm(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])) / 6;
+  }
+  for (std::size_t i = 0; i < mass.size(); ++i)
+    EXPECT_NEAR(built.model.nodes[i].mass, mass[i], 1e-12 * mass[i]) << i;
+}
+
 TEST(ModelBuild, CentralNodesTieEveryNodeToItsOwnComponent) {
   const TriangleMesh mesh = joined(ball(2, 1), ball(3, 2, {10, 0, 0}));
   const BuiltModel built = build(mesh);

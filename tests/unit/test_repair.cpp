@@ -220,6 +220,58 @@ TEST(Repair, WeldKeepsClosedPartsApartAndJoinsPatches) {
   EXPECT_EQ(joined.components, 1U);
 }
 
+TEST(Repair, WeldReachesAsFarAsItsDistance) {
+  // Crosswise too: the points lie in one cell of the search, in the next, and round corners.
+  for (int seed = 0; seed < 40; ++seed) {
+    const double angle = 0.37 * seed, z = std::sin(1.7 * seed), r = std::sqrt(1 - z * z);
+    const Vec3 out{r * std::cos(angle), r * std::sin(angle), z};
+    for (const double part : {0.98, 1.02}) {
+      TriangleMesh mesh = ball();
+      const std::uint32_t from = mesh.triangles[3][0];
+      mesh.points.push_back(mesh.points[from] + out * (0.01 * part));
+      mesh.triangles[3][0] = static_cast<std::uint32_t>(mesh.points.size() - 1);
+      const RepairReport report = repair_mesh(mesh, parse_repair("weld:0.01"), Context{});
+      EXPECT_EQ(report.welded_points, part < 1 ? 1U : 0U) << seed;
+    }
+  }
+}
+
+TEST(Repair, WhatBelongsToFacesStaysWithThem) {
+  // Two faces stand twice and one is turned; each face has its own numbers.
+  TriangleMesh mesh = ball();
+  const auto mark = [](const TriangleMesh& m, const Triangle& t, std::size_t corner) {
+    return static_cast<float>(m.points[t[corner]].x + 3 * m.points[t[corner]].z);
+  };
+  mesh.triangles.insert(mesh.triangles.begin() + 20, mesh.triangles[4]);
+  mesh.triangles.insert(mesh.triangles.begin() + 90, mesh.triangles[60]);
+  std::swap(mesh.triangles[150][1], mesh.triangles[150][2]);
+  std::swap(mesh.triangles[7][0], mesh.triangles[7][1]);
+  const auto number = [](const Triangle& t) {
+    return static_cast<std::int32_t>(t[0] + t[1] + t[2]);
+  };
+  for (const Triangle& t : mesh.triangles) {
+    mesh.part.push_back(0);
+    mesh.material.push_back(number(t));
+    mesh.texcoords.push_back({mark(mesh, t, 0), 1, mark(mesh, t, 1), 2, mark(mesh, t, 2), 3});
+    for (std::size_t c = 0; c < 3; ++c)
+      mesh.texcoords.back()[2 * c + 1] = mark(mesh, t, c) / 2;
+  }
+  const RepairReport report = repair_mesh(mesh, parse_repair("duplicates,orientation"), Context{});
+  EXPECT_EQ(report.duplicate_faces, 2U);
+  EXPECT_EQ(report.turned_faces, 2U);
+  ASSERT_EQ(mesh.triangles.size(), ball().triangles.size());
+  ASSERT_EQ(mesh.material.size(), mesh.triangles.size());
+  ASSERT_EQ(mesh.texcoords.size(), mesh.triangles.size());
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
+    const Triangle& t = mesh.triangles[f];
+    EXPECT_EQ(mesh.material[f], number(t)) << f;
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(mesh.texcoords[f][2 * c], mark(mesh, t, c)) << f;
+      EXPECT_EQ(mesh.texcoords[f][2 * c + 1], mark(mesh, t, c) / 2) << f;
+    }
+  }
+}
+
 TEST(Repair, OrientationTurnsWholePartsOutwardAndCavitiesInward) {
   TriangleMesh mesh = ball();
   TriangleMesh inner = test::sphere_mesh(2, 5, {3, -2, 1});

@@ -105,6 +105,37 @@ TEST(Results, WhatIsWrittenIsRead) {
   EXPECT_EQ(forces.read<std::uint32_t>("node", 2), (std::vector<std::uint32_t>{3, 7}));
 }
 
+TEST(Results, WhatComesLaterWasAtRestInEveryFrameBefore) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  const Model a = textured(), b = test::organ(1);
+  const std::vector<double> ua(3 * a.nodes.size()), ub(3 * b.nodes.size(), 0.5);
+  const std::vector<NodeVector> none, forces{{3, {1, 2, 3}}, {7, {-0.5, 0.25, 1e-3}}};
+  {
+    const std::unique_ptr<ResultWriter> result = open_result(Kind::hdf5, path, {.binary = true});
+    result->add_object("a", a);
+    for (const double time : {0.0, 1.0, 2.0})
+      result->add_frame(time, std::vector<FrameObject>{{ua, none}});
+    result->add_object("b", b);
+    result->add_frame(3, std::vector<FrameObject>{{ua, none}, {ub, forces}});
+    result->commit();
+  }
+  for (std::size_t frame = 0; frame < 4; ++frame) {
+    const ResultSurface read = read_result_surface(path, "b", frame);
+    ASSERT_EQ(read.mesh.points.size(), read.rest.size());
+    for (std::size_t i = 0; i < read.rest.size(); ++i) {
+      const double by = frame < 3 ? 0 : 0.5;
+      EXPECT_EQ(read.mesh.points[i], read.rest[i] + Vec3(by, by, by)) << frame;
+    }
+  }
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group group = file.root().group("objects").group("b").group("forces");
+  EXPECT_EQ(group.read<std::uint64_t>("frame", 2), (std::vector<std::uint64_t>{3, 3}));
+  std::vector<double> values(6);
+  group.dataset("force", hdf5::Number::float64).read_rows(0, std::span<double>(values));
+  EXPECT_EQ(values, (std::vector<double>{1, 2, 3, -0.5, 0.25, 1e-3}));
+}
+
 TEST(Results, EqualRunsMakeEqualBytes) {
   const ScratchFolder folder, other;
   const Model a = textured(), b = test::two_masses();

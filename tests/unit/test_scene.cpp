@@ -94,6 +94,21 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_TRUE(parsed<InstrumentCommand>("instrument k blade 1 2 3 1 2 8").shape.blade);
   EXPECT_EQ(parsed<InstrumentCommand>("instrument k blade 1 2 3 1 2 8").shape.axis,
             (Vec3{0, 0, 5}));
+  const auto capsule = parsed<InstrumentCommand>("instrument k capsule 4 1 2 3 1 7 3 friction 0.3");
+  EXPECT_FALSE(capsule.shape.blade);
+  EXPECT_EQ(capsule.shape.radius, 4);
+  EXPECT_EQ(capsule.pose.place, (Vec3{1, 2, 3}));
+  EXPECT_EQ(capsule.shape.axis, (Vec3{0, 5, 0})); // from one end to the other
+  EXPECT_EQ(capsule.shape.friction, 0.3);
+  EXPECT_EQ(parsed<InstrumentCommand>("instrument k sphere 4 1 2 3").shape.axis, Vec3{});
+  const auto move = parsed<MoveCommand>("move k 1 2 3 quaternion 2 0 0 0 over 0.5");
+  EXPECT_EQ(move.place, (Vec3{1, 2, 3}));
+  EXPECT_EQ(move.turn, (Quaternion{1, 0, 0, 0}));
+  EXPECT_EQ(move.over, 0.5);
+  EXPECT_EQ(parsed<MoveCommand>("move k 1 2 3 quaternion 0 0 3 4").turn,
+            (Quaternion{0, 0, 0.6, 0.8}));
+  EXPECT_FALSE(parsed<MoveCommand>("move k 1 2 3").turn);
+  EXPECT_EQ(parsed<MoveCommand>("move k 1 2 3 turn 0 0 2 90").turn, turn_about({0, 0, 1}, 90));
 }
 
 TEST(SceneLine, WordsMakeALineThatHasTheseWords) {

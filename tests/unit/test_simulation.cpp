@@ -226,6 +226,37 @@ TEST(Simulation, AttachKeepsTheMotionAndMomentumOfTheObjects) {
   EXPECT_NO_THROW(s.step(0.01));
 }
 
+TEST(Simulation, ATieIsDampedByTheMeanRatioOfItsObjects) {
+  // Of each object one mass hangs on the tie alone; drawn apart and let go, half a swing later they
+  // are as near as the damping of a single oscillator leaves them.
+  constexpr double pi = 3.14159265358979323846, stiffness = 400, force = 4;
+  for (const bool first_is_stronger : {false, true}) {
+    Simulation s(threads(1), {});
+    const double ratios[2]{first_is_stronger ? 0.5 : 0.1, first_is_stronger ? 0.1 : 0.5};
+    for (const std::size_t object : {0U, 1U}) {
+      Model model = test::two_masses(object == 0 ? 1 : 3, 0);
+      model.materials[0].damping_ratio = ratios[object];
+      for (Node& node : model.nodes)
+        node.position.z += object == 0 ? 0 : 3;
+      s.add_object(object == 0 ? "a" : "b", model, Method::ela);
+    }
+    s.apply(SetTimestep{1e-4});
+    s.apply(Attach{0, {1}, 1, {1}, stiffness});
+    s.apply(SetForce{0, {1}, {0, 0, -force}});
+    s.apply(SetForce{1, {1}, {0, 0, force}});
+    s.step(5);
+    const auto apart = [&] { return moved(s, 1, 1).z - moved(s, 0, 1).z; };
+    const double drawn = apart();
+    EXPECT_NEAR(drawn, force / stiffness, 1e-6);
+    s.apply(Release{0, {1}});
+    s.apply(Release{1, {1}});
+    const double ratio = 0.3, damped = std::sqrt(1 - ratio * ratio);
+    const double frequency = std::sqrt(stiffness / 0.75) * damped;
+    s.step(pi / frequency);
+    EXPECT_NEAR(apart() / drawn, -std::exp(-pi * ratio / damped), 0.01);
+  }
+}
+
 TEST(Simulation, RefusesToAttachWhatHasNoMotion) {
   Simulation s(threads(1), {});
   add_two(s, Method::ffe);

@@ -3,6 +3,7 @@
 #include "compliance/verify.h"
 
 #include "compliance/compliance_columns.h"
+#include "larger.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 
@@ -73,6 +74,25 @@ TEST(Verify, FindsAWrongNumber) {
   Solved s;
   s.columns.kept[1][7] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW((void)s.verify(&s.columns), Error);
+}
+
+TEST(Verify, SymmetryIsThatOfAllAxes) {
+  Solved s;
+  const std::size_t axes = 3 * s.model.nodes.size();
+  // Node 5 is none of those that are computed again: of its columns only what meets them is seen.
+  std::vector<double>& column = s.columns.kept[1];
+  double largest = 0;
+  for (const double value : column)
+    largest = larger(largest, std::abs(value));
+  for (const std::size_t along : {0U, 1U, 2U})
+    for (const std::size_t axis : {0U, 1U, 2U}) {
+      double& entry = column[along * axes + 3 * std::size_t{17} + axis];
+      const double right = entry;
+      entry += 1e-6 * largest;
+      EXPECT_THROW((void)s.verify(&s.columns), Error) << along << ' ' << axis;
+      entry = right;
+    }
+  EXPECT_NO_THROW((void)s.verify(&s.columns));
 }
 
 TEST(Verify, AnotherFactorIsFound) {
