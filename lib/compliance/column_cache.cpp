@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "compliance/column_sum.h"
+#include "compliance/costs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +15,6 @@ namespace {
 
 // Rows whose sums stay in the first cache, and fewer where blocks of them may be left out.
 constexpr std::size_t rows_at_once = 3072, bounded_rows = 768;
-constexpr std::size_t worth_threads = 1000000; // products
 constexpr std::size_t solved_at_once = 8;
 
 float rounded_up(double value) {
@@ -226,7 +226,7 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
                                      sum.data(), begin, end);
   };
   Context some = context;
-  if (terms.size() * axes_ < worth_threads)
+  if (terms.size() * axes_ < costs::worth_threads)
     some.threads = 1;
   const std::size_t grain = std::max<std::size_t>(1, blocks / 16);
   parallel_blocks(some, blocks, grain, [&](std::size_t begin, std::size_t end) {

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "compliance/costs.h"
 #include "compliance/response_sum.h"
 
 #include <algorithm>
@@ -14,7 +15,6 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t rows_at_once = 768; // so that a block of responses stays in the second cache
-constexpr std::size_t worth_threads = 1000000; // products
 static_assert(rows_at_once % response_tile == 0);
 
 std::size_t packed_index(std::size_t row, std::size_t k, std::size_t rank) {
@@ -54,11 +54,10 @@ CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
 }
 
 bool CorrectedColumns::pays(std::size_t count) const {
-  const auto entries = static_cast<double>(solve_entries_);
-  const auto rank = static_cast<double>(change_.rank()), columns = 3 * static_cast<double>(count);
-  const double respond = prepared_ ? 0 : rank * entries * (solve_before_ ? 2 : 1);
-  const double correct = columns * (rank + 8) * static_cast<double>(change_.new_axes) / 2;
-  return count > 0 && (solve_entries_ == 0 || respond + correct <= columns * entries);
+  const int responses = prepared_ ? 0 : solve_before_ ? 2 : 1;
+  return count > 0 && (solve_entries_ == 0 ||
+                       costs::correcting_columns_pays(3 * count, change_.new_axes, solve_entries_,
+                                                      change_.rank(), responses));
 }
 
 void CorrectedColumns::prepare() const {
@@ -107,7 +106,7 @@ void CorrectedColumns::read(std::size_t first, std::size_t count, std::span<doub
   if (rank == 0)
     return;
   Context some = context_;
-  if (3 * count * rank * axes < worth_threads)
+  if (3 * count * rank * axes < costs::worth_threads)
     some.threads = 1;
   const ResponseSum sum = response_sum(context_.cpu);
   parallel_blocks(some, axes, rows_at_once, [&](std::size_t begin, std::size_t end) {

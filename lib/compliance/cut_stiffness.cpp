@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "compliance/corrected_columns.h"
+#include "compliance/costs.h"
 #include "compliance/half_blocks.h"
 #include "model/cut.h"
 #include "solve/condition.h"
@@ -17,18 +18,6 @@ namespace gewebe {
 
 namespace {
 
-// Microseconds, measured on 10,004 nodes: an operation of a front, and of a solve with eight
-// right-hand sides at a time; what a renewal and a correction do for each node, whatever is cut.
-constexpr double front_operation = 0.6e-4, solve_operation = 0.6e-4;
-constexpr double renewal_node = 0.3, correction_node = 0.3;
-// Behind a correction contacts need columns, behind a renewal half solutions do.
-constexpr double contact_panels = 1;
-// Of all operations, what a cut reaches as long as none has told.
-constexpr double usual_reach = 0.3;
-// Each solution takes a pass over the corrections; beyond so many it costs as much again.
-constexpr std::size_t most_rank = 48;
-// The order of elimination is found anew when following has made it so much worse.
-constexpr double worn_out = 1.6;
 // Beyond this condition of the small system a renewal is worth its digits.
 constexpr double most_condition = 1e8;
 // Below this the condition may be too large, and is looked at: by one column of C, or an estimate.
@@ -89,11 +78,35 @@ double stiffness_bound(const Model& model) {
   return most;
 }
 
+/// The factor of a cut model, or one before that is corrected; columns of the first model, to be
+/// corrected; blocks where the factor is that of the model.
+class CutSource final : public ComplianceSource {
+public:
+  CutSource(AxesSolve solve, std::size_t entries, std::unique_ptr<HalfBlocks> blocks,
+            std::unique_ptr<CorrectedColumns> columns)
+      : solve_(std::move(solve)), entries_(entries), blocks_(std::move(blocks)),
+        columns_(std::move(columns)) {}
+
+  void open(const Model&, const Context&) override {}
+  void solve(std::span<double> over_axes, std::size_t columns) override {
+    solve_(over_axes, columns);
+  }
+  std::size_t entries() const override { return entries_; }
+  const ColumnSource* columns() const override { return columns_.get(); }
+  HalfBlocks* blocks() override { return blocks_.get(); }
+
+private:
+  AxesSolve solve_;
+  std::size_t entries_;
+  std::unique_ptr<HalfBlocks> blocks_;
+  std::unique_ptr<CorrectedColumns> columns_;
+};
+
 } // namespace
 
 CutStiffness::CutStiffness(std::shared_ptr<const Model> first,
-                           std::shared_ptr<const ColumnSource> columns, const Context& context)
-    : first_(std::move(first)), now_(first_), columns_(std::move(columns)), context_(context),
+                           std::shared_ptr<const ComplianceSource> source, const Context& context)
+    : first_(std::move(first)), now_(first_), source_(std::move(source)), context_(context),
       first_origin_(identity(first_->nodes.size())), first_place_(first_origin_) {
   context_.progress = nullptr;
 }
@@ -149,17 +162,12 @@ void CutStiffness::prepare() {
   fresh_operations_ = factor_->work().all_operations;
 }
 
-/// Correction or renewal, by what each would take.
-CutWay CutStiffness::cheapest(std::size_t rank) const {
-  const auto nodes = static_cast<double>(now_->nodes.size());
-  const double reach = reached_ > 0 ? reached_ : usual_reach * factor_->work().all_operations;
-  const double renewal = nodes * renewal_node + reach * front_operation;
-  // One right-hand side alone takes half of what eight do.
-  const double panels = rank <= 1 ? 0.5 : std::ceil(static_cast<double>(rank) / 8);
-  const double correction = nodes * correction_node + (panels + contact_panels) * 8 *
-                                                          solve_operation * 4 *
-                                                          static_cast<double>(factor_->entries());
-  return rank <= most_rank && correction < renewal ? CutWay::correction : CutWay::renewal;
+bool CutStiffness::correction_pays(std::size_t rank) const {
+  return costs::correction_pays({.nodes = now_->nodes.size(),
+                                 .rank = rank,
+                                 .entries = factor_->entries(),
+                                 .all_operations = factor_->work().all_operations,
+                                 .reached = reached_});
 }
 
 CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
@@ -173,13 +181,11 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
-    if (way.value_or(cheapest(work.rank)) == CutWay::correction && !some_gone) {
+    if (!some_gone && (way ? way == CutWay::correction : correction_pays(work.rank))) {
       change = stiffness_change(*factored_, *now_, origin_, place_);
       work.rank = change->rank();
     }
-    if (!way)
-      way = change ? cheapest(work.rank) : CutWay::renewal;
-    if (way == CutWay::correction && change) {
+    if (change && (way || correction_pays(work.rank))) {
       try {
         const std::shared_ptr<const FrontalFactor> factor = factor_;
         auto correction = std::make_shared<const WoodburySolver>(
@@ -198,7 +204,7 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
       }
     }
     correction_.reset();
-    if (factor_->work().all_operations < worn_out * fresh_operations_) {
+    if (!costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
       ++*generation_;
       factorise([&] { work.factor = factor_->renew(*now_, origin_, place_, context_); });
       work.way = CutWay::renewal;
@@ -234,19 +240,22 @@ AxesSolve CutStiffness::solver() const {
   };
 }
 
-StiffnessParts CutStiffness::parts() const {
-  StiffnessParts parts;
-  parts.solve = solver();
-  parts.solve_entries = factor_->entries();
+std::shared_ptr<ComplianceSource> CutStiffness::compliance() const {
+  AxesSolve solve = solver();
+  std::size_t entries = factor_->entries();
+  std::unique_ptr<HalfBlocks> blocks;
   if (correction_ == nullptr)
-    parts.blocks = std::make_shared<HalfBlocks>(factor_, still_valid());
-  if (correction_ != nullptr)
-    parts.solve_entries += correction_->change().rank() * factor_->axes();
-  if (columns_ != nullptr)
-    parts.columns = std::make_unique<CorrectedColumns>(
-        columns_, stiffness_change(*first_, *now_, first_origin_, first_place_), parts.solve,
-        context_, AxesSolve{}, parts.solve_entries);
-  return parts;
+    blocks = std::make_unique<HalfBlocks>(factor_, still_valid());
+  else
+    entries += correction_->change().rank() * factor_->axes();
+  std::unique_ptr<CorrectedColumns> columns;
+  if (source_ != nullptr && source_->columns() != nullptr)
+    columns = std::make_unique<CorrectedColumns>(
+        std::shared_ptr<const ColumnSource>(source_, source_->columns()),
+        stiffness_change(*first_, *now_, first_origin_, first_place_), solve, context_, AxesSolve{},
+        entries);
+  return std::make_shared<CutSource>(std::move(solve), entries, std::move(blocks),
+                                     std::move(columns));
 }
 
 } // namespace gewebe

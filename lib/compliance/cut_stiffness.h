@@ -2,9 +2,8 @@
 // The stiffness of an object that is cut again and again: whatever is cheapest keeps its solutions
 // exact, and columns of the model as it came go on to serve.
 
-#include "base/columns.h"
 #include "base/context.h"
-#include "compliance/compliance.h"
+#include "compliance/compliance_source.h"
 #include "compliance/woodbury.h"
 #include "model/model.h"
 #include "solve/frontal_factor.h"
@@ -34,8 +33,8 @@ struct CutWork {
 
 class CutStiffness {
 public:
-  /// Of a model that has not been cut. \param columns of it, or null
-  CutStiffness(std::shared_ptr<const Model> first, std::shared_ptr<const ColumnSource> columns,
+  /// Of a model that has not been cut. \param source of it, whose columns go on to serve, or null
+  CutStiffness(std::shared_ptr<const Model> first, std::shared_ptr<const ComplianceSource> source,
                const Context& context);
 
   /// Factorises the present model, so that the next cut need not. \throw as FrontalFactor
@@ -48,18 +47,18 @@ public:
   CutWork cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
               std::span<const std::uint32_t> place, std::optional<CutWay> way = {});
 
-  /// Solutions and columns of the present model, which serve until the next cut.
+  /// The compliance of the present model, which serves until the next cut.
   /// \pre a cut was made, or it was prepared
-  StiffnessParts parts() const;
+  std::shared_ptr<ComplianceSource> compliance() const;
 
 private:
-  CutWay cheapest(std::size_t rank) const;
+  bool correction_pays(std::size_t rank) const;
   std::function<void()> still_valid() const;
   AxesSolve solver() const;
   void require_condition();
   void factorise(const std::function<void()>& work);
   std::shared_ptr<const Model> first_, factored_, now_;
-  std::shared_ptr<const ColumnSource> columns_;
+  std::shared_ptr<const ComplianceSource> source_;
   Context context_;
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
   std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_

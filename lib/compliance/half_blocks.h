@@ -2,7 +2,7 @@
 // Blocks of the compliance between a few nodes from half solutions of a factor that follows cuts:
 // what forces at contacts need, without a column of C.
 
-#include "compliance/compliance.h"
+#include "compliance/compliance_source.h"
 #include "solve/frontal_factor.h"
 
 #include <cstdint>
@@ -14,13 +14,15 @@
 
 namespace gewebe {
 
-class HalfBlocks final : public BlockSource {
+class HalfBlocks {
 public:
   /// \param check called before the factor is read; throws where it is no longer that of the model
   HalfBlocks(std::shared_ptr<const FrontalFactor> factor, std::function<void()> check);
 
-  void need(std::span<const std::uint32_t> nodes) override;
-  ComplianceBlock block(std::uint32_t node, std::uint32_t other) const override;
+  /// Prepares blocks between these nodes and all that were needed before; those may be forgotten.
+  void need(std::span<const std::uint32_t> nodes);
+  /// \pre both nodes were among the last ones needed
+  ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
 
 private:
   std::shared_ptr<const FrontalFactor> factor_;

@@ -1,7 +1,7 @@
 #pragma once
 // What can be done to a scene: objects and instruments by number, nodes by number.
 
-#include "compliance/compliance.h"
+#include "compliance/compliance_source.h"
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "model/cut_select.h"
@@ -82,7 +82,7 @@ struct SetTimestep {
 struct SetTwoStep {
   std::size_t object = 0;
   TwoStepOptions options;
-  std::function<StiffnessParts()> second; ///< asked once for an object
+  std::function<std::shared_ptr<ComplianceSource>()> second; ///< asked once for an object
 };
 struct Emit {
   bool forces = false;      ///< else shapes

@@ -41,10 +41,10 @@ CutStiffness* stiffness_of(World& w, Object& object) {
   object.statics->ahead = true;
   const std::shared_ptr<const Model> first =
       object.cut.first ? object.cut.first : object.matter->model;
-  StiffnessParts parts;
+  std::shared_ptr<ComplianceSource> source;
   if (object.matter->source.stiffness)
-    parts = object.matter->source.stiffness(*first);
-  auto stiffness = std::make_unique<CutStiffness>(first, std::move(parts.columns), w.context);
+    source = object.matter->source.stiffness(*first);
+  auto stiffness = std::make_unique<CutStiffness>(first, std::move(source), w.context);
   if (object.cut.first)
     (void)stiffness->cut(object.matter->model, *object.cut.first_nodes, *object.cut.places);
   object.statics->stiffness = std::move(stiffness);
@@ -53,17 +53,17 @@ CutStiffness* stiffness_of(World& w, Object& object) {
 
 /// Of a cut model, from the object as it was before; nothing: K is factorised when it is needed.
 /// Nodes of the object may be gone with a part (CutModel::place).
-std::optional<StiffnessParts> cut_parts(World& w, Object& object, std::shared_ptr<const Model> next,
-                                        const CutModel& cut) {
+std::shared_ptr<ComplianceSource>
+cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const CutModel& cut) {
   CutStiffness* const stiffness = stiffness_of(w, object);
   if (stiffness == nullptr)
-    return std::nullopt;
+    return nullptr;
   try {
     const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
     ++(work.way == CutWay::correction ? w.now.counts.cut_corrections
        : work.way == CutWay::renewal  ? w.now.counts.cut_renewals
                                       : w.now.counts.cut_factors);
-    return stiffness->parts();
+    return stiffness->compliance();
   } catch (...) {
     object.statics->stiffness.reset();
     throw;
@@ -154,13 +154,13 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
                .text = {}};
   CutModel rest = without_parts(std::move(cut), std::move(free.rest));
   const auto now = std::make_shared<const Model>(std::move(rest.model));
-  std::optional<StiffnessParts> prepared;
+  std::shared_ptr<ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
   if (ffe) {
     if (old.statics->still || old.statics->stiffness)
       old.statics->ahead = true;
     try {
-      prepared = cut_parts(w, old, now, rest);
+      prepared = cut_source(w, old, now, rest);
     } catch (const SingularStiffness&) {
       prepared.reset(); // found when the shape is asked for
       loose = true;
@@ -224,7 +224,7 @@ void announce_cut(World& w, std::size_t index) {
 void find_late_shape(World& w, Object& object) {
   const std::shared_ptr<const LateShape> held = object.shown.late;
   const LateShape& late = *held;
-  Elastostatic still(*late.model, StiffnessParts{}, w.context);
+  Elastostatic still(*late.model, nullptr, w.context);
   still.update(late.load);
   const std::span<const double> first = still.displacement();
   std::vector<double> shape(first.begin(), first.end());

@@ -39,8 +39,8 @@ void need_model(Object& object) {
   object.matter->known = true;
 }
 
-void make_still(const World& w, Object& object, StiffnessParts parts) {
-  object.statics->still.emplace(object.model(), std::move(parts), w.context,
+void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
+  object.statics->still.emplace(object.model(), std::move(source), w.context,
                                 ElastostaticOptions{.measure_error = w.options.measure_error,
                                                     .tolerance = w.options.tolerance});
 }
@@ -51,12 +51,12 @@ Elastostatic& still_of(World& w, Object& object) {
   if (statics.still)
     return *statics.still;
   statics.ahead = true;
-  StiffnessParts parts;
+  std::shared_ptr<ComplianceSource> source;
   if (statics.prepared)
-    parts = *std::exchange(statics.prepared, std::nullopt);
+    source = std::exchange(statics.prepared, nullptr);
   else if (!object.cut.first && object.matter->source.stiffness)
-    parts = object.matter->source.stiffness(object.model());
-  make_still(w, object, std::move(parts));
+    source = object.matter->source.stiffness(object.model());
+  make_still(w, object, std::move(source));
   return *statics.still;
 }
 

@@ -62,12 +62,12 @@ struct Matter {
 /// so it is made anew where one of them is taken back.
 struct Statics {
   std::optional<Elastostatic> still;
-  std::optional<TwoStep> two_step;         // over `still`, made when needed
-  std::optional<StiffnessParts> prepared;  // of the cut model, by cut_parts
-  std::unique_ptr<CutStiffness> stiffness; // that made them
-  ElastostaticCounts spent;                // of what was renewed
-  int slow = 0;                            // updates in a row that took too long for the rate
-  bool ahead = false;                      // it has moved on since the scene was saved
+  std::optional<TwoStep> two_step;            // over `still`, made when needed
+  std::shared_ptr<ComplianceSource> prepared; // of the cut model, by cut_source
+  std::unique_ptr<CutStiffness> stiffness;    // that made them
+  ElastostaticCounts spent;                   // of what was renewed
+  int slow = 0;                               // updates in a row that took too long for the rate
+  bool ahead = false;                         // it has moved on since the scene was saved
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.
@@ -96,8 +96,8 @@ struct Body {
 /// What two-step says of an object.
 struct Stages {
   std::optional<TwoStepOptions> options;
-  std::function<StiffnessParts()> second; // its second stage
-  bool warned = false;                    // of a threshold that was not reached
+  std::function<std::shared_ptr<ComplianceSource>()> second; // its second stage
+  bool warned = false;                                       // of a threshold that was not reached
 };
 
 /// The shape before cuts that nobody has asked for: it is found when somebody does, from the model

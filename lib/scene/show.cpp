@@ -1,6 +1,7 @@
 // The picture of an object at the end of a step.
 
 #include "scene/world_internal.h"
+#include "statics/linear_range.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,7 @@
 #include "scene/simulation.h"
 
 #include "scene/rules_internal.h"
+#include "statics/linear_range.h"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +55,7 @@ void Simulation::add_object(const std::string& name, ObjectSource source, Method
 }
 
 void Simulation::add_object(const std::string& name, Model model, Method method,
-                            StiffnessParts parts, Integration integration) {
+                            std::shared_ptr<ComplianceSource> source, Integration integration) {
   World& w = *world_;
   Object object;
   object.matter->name = name;
@@ -64,7 +65,7 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   need_model(object);
   object.matter->source = {};
   if (method == Method::ffe)
-    make_still(w, object, std::move(parts));
+    make_still(w, object, std::move(source));
   insert(w, std::move(object));
   if (method == Method::ffe)
     return;

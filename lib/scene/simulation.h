@@ -31,7 +31,8 @@ namespace gewebe {
 /// again after a Renew. What they throw leaves the call that needed it.
 struct ObjectSource {
   std::function<Model()> model;
-  std::function<StiffnessParts(const Model&)> stiffness{}; ///< none: K is factorised
+  std::function<std::shared_ptr<ComplianceSource>(const Model&)>
+      stiffness{}; ///< none: K is factorised
 };
 
 struct SimulationOptions {
@@ -114,10 +115,11 @@ public:
   Simulation(const Simulation&) = delete;
   Simulation& operator=(const Simulation&) = delete;
 
-  /// An object at rest, under the present gravity. \param parts for ffe: what is stored of it
+  /// An object at rest, under the present gravity. \param source for ffe: of its compliance
   /// \pre check_model(model) passes   \throw Error if there is one of that name, or it can't be
   /// simulated by this method; Cancelled
-  void add_object(const std::string& name, Model model, Method method, StiffnessParts parts = {},
+  void add_object(const std::string& name, Model model, Method method,
+                  std::shared_ptr<ComplianceSource> source = {},
                   Integration integration = Integration::semi_implicit);
   /// One of which nothing is read before it is needed: at the latest when something acts on it.
   /// Until then it rests. \throw Error if there is one of that name

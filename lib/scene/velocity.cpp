@@ -57,7 +57,7 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   try {
     std::optional<Elastostatic> own;
     if (afresh)
-      own.emplace(object.model(), StiffnessParts{}, w.context);
+      own.emplace(object.model(), nullptr, w.context);
     Elastostatic& still = afresh ? *own : still_of(w, object);
     still.update(load);
     const std::span<const double> shape = still.displacement();

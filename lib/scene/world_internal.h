@@ -60,7 +60,7 @@ void guarded(World& w, Work&& work) {
 void insert(World& w, Object object);
 void need_model(Object& object);
 Elastostatic& still_of(World& w, Object& object);
-void make_still(const World& w, Object& object, StiffnessParts parts);
+void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
 void update_still(World& w, Object& object, const Load& load);
 /// Forgets what is kept to be quick.
 void renew(Object& object);

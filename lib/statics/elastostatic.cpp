@@ -1,6 +1,10 @@
 #include "statics/elastostatic.h"
 
 #include "base/error.h"
+#include "compliance/axis_solver.h"
+#include "compliance/column_cache.h"
+#include "compliance/compliance.h"
+#include "compliance/costs.h"
 #include "solve/stiffness.h"
 #include "statics/contact_block.h"
 #include "statics/shape_modes.h"
@@ -16,12 +20,6 @@ namespace gewebe {
 namespace {
 
 constexpr double contact_tolerance = 1e-6;
-// Displaced nodes whose factor of C_cc is kept where their columns are stored: its 1200 rows take
-// 12 MB, read twice an update. Columns that are not stored cost three solves each, a fresh factor
-// with axes held some dozens.
-constexpr std::size_t block_stored = 400, block_solved = 32;
-// Nodes from which on a rigid motion is worth to be found out.
-constexpr std::size_t worth_modes = 6;
 // Roundings of sums that follow their changes stay below 1000 times one.
 constexpr std::uint64_t most_increments = 1000;
 
@@ -109,8 +107,9 @@ struct Elastostatic::State {
   Vec3 base_gravity;
   std::vector<double> base; // the shape with all displacements 0, under these; empty: unknown
 
-  State(const Model& m, StiffnessParts p, const Context& c, const ElastostaticOptions& o)
-      : model(m), context(c), options(o), compliance(m, std::move(p), c, o.tolerance > 0),
+  State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
+        const ElastostaticOptions& o)
+      : model(m), context(c), options(o), compliance(m, std::move(s), c, o.tolerance > 0),
         axes(3 * m.nodes.size()) {
     context.progress = nullptr;
     u.assign(axes, 0);
@@ -208,14 +207,9 @@ struct Elastostatic::State {
     const std::vector<std::uint32_t> nodes = nodes_of(now.force);
     if (compliance.columns_pay(nodes)) {
       renew_weight(now.gravity);
-      compliance.need(nodes);
-      for (const std::size_t axis : wanted) {
-        double sum = weight.empty() ? 0 : weight[axis];
-        for (const auto& [node, force] : now.force)
-          for (int a = 0; a < 3; ++a)
-            sum += compliance.entry(node, a, axis) * force[a];
-        values.push_back(sum);
-      }
+      for (const std::size_t axis : wanted)
+        values.push_back(weight.empty() ? 0 : weight[axis]);
+      compliance.add_rows(as_vectors(now.force), wanted, values);
       return values;
     }
     if (increments > 0)
@@ -232,9 +226,9 @@ struct Elastostatic::State {
     const std::size_t m = now.displacement.size();
     if (options.block_limit != SIZE_MAX)
       return m <= options.block_limit;
-    if (m > std::min(block_stored, compliance.capacity()))
+    if (m > std::min(costs::most_in_block(true), compliance.capacity()))
       return false;
-    return m <= block_solved || compliance.stored(nodes_of(now.displacement));
+    return m <= costs::most_in_block(false) || compliance.stored(nodes_of(now.displacement));
   }
 
   bool join(std::uint32_t node) {
@@ -366,7 +360,7 @@ struct Elastostatic::State {
 
   /// By what a rigid motion of the contacts did before, if this is one. \return whether it was
   bool shape_by_modes(const Load& now) {
-    if (contacts.size() < worth_modes || (modes.size() == 0 && !modes.open()))
+    if (contacts.size() < costs::worth_modes || (modes.size() == 0 && !modes.open()))
       return false;
     std::vector<double> coefficients, rest;
     if (!modes.express(question, coefficients, rest)) {
@@ -542,18 +536,8 @@ struct Elastostatic::State {
     }
     if (!shape_by_modes(now)) {
       const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
-      // One node's columns cost as much as a solve; more of them pay when a second shape comes.
-      if (by_block && compliance.has_blocks() &&
-          (nodes.size() <= block_solved || compliance.stored(nodes)) &&
-          (nodes.size() == 1 || ++shapes_of_contacts > 1))
-        compliance.need(nodes);
-      // Until then their stored columns, which would have to be corrected first, stay where they
-      // are.
-      const bool without = by_block && compliance.has_blocks() &&
-                           !std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) {
-                             return compliance.cache().resident(node);
-                           });
-      if (!without && (outer_known(now) || compliance.columns_pay(nodes))) {
+      const bool columns = !by_block || compliance.columns_for_shape(nodes, ++shapes_of_contacts);
+      if (columns && (outer_known(now) || compliance.columns_pay(nodes))) {
         renew_outer(now);
         u = outer;
         compliance.add(forces, tolerance * least_size(now), u);
@@ -730,9 +714,9 @@ struct Elastostatic::State {
   }
 };
 
-Elastostatic::Elastostatic(const Model& model, StiffnessParts parts, const Context& context,
-                           const ElastostaticOptions& options)
-    : state_(std::make_unique<State>(model, std::move(parts), context, options)) {}
+Elastostatic::Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source,
+                           const Context& context, const ElastostaticOptions& options)
+    : state_(std::make_unique<State>(model, std::move(source), context, options)) {}
 Elastostatic::~Elastostatic() = default;
 Elastostatic::Elastostatic(Elastostatic&&) noexcept = default;
 

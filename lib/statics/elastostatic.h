@@ -12,10 +12,8 @@
 // grasp that moves rigidly costs as much for a hundred nodes as for twelve.
 
 #include "base/context.h"
-#include "compliance/compliance.h"
 #include "contact/load.h"
 #include "model/model.h"
-#include "statics/linear_range.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -24,6 +22,8 @@
 #include <vector>
 
 namespace gewebe {
+
+class ComplianceSource;
 
 /// How an elastostatic object came to its shapes.
 struct ElastostaticCounts {
@@ -59,9 +59,10 @@ struct ContactSpace {
 
 class Elastostatic {
 public:
-  /// Keeps a reference to the model. \pre check_model(model) passes; parts belong to it
+  /// Keeps a reference to the model. \param source of its compliance; null: K is factorised
+  /// \pre check_model(model) passes; the source belongs to it
   /// \throw Error as the factor: K singular, memory
-  Elastostatic(const Model& model, StiffnessParts parts, const Context& context,
+  Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
                const ElastostaticOptions& options = {});
   ~Elastostatic();
   Elastostatic(Elastostatic&&) noexcept;

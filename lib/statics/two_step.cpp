@@ -222,8 +222,8 @@ struct TwoStep::State {
   std::vector<std::size_t> axes;    // of them, those that are free: 3 k + a for nodes[k]
   std::optional<TwoStepContact> contact;
 
-  State(const Model& m, StiffnessParts parts, const Context& context, double t)
-      : model(m), second(m, std::move(parts), context, {.tolerance = t}), tolerance(t),
+  State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context, double t)
+      : model(m), second(m, std::move(source), context, {.tolerance = t}), tolerance(t),
         u(3 * m.nodes.size()) {}
 
   void forget_contact() {
@@ -350,9 +350,9 @@ struct TwoStep::State {
   }
 };
 
-TwoStep::TwoStep(const Model& model, StiffnessParts second, const Context& context,
-                 const TwoStepOptions& options, double tolerance) {
-  if (!second.factor)
+TwoStep::TwoStep(const Model& model, std::shared_ptr<ComplianceSource> second,
+                 const Context& context, const TwoStepOptions& options, double tolerance) {
+  if (second == nullptr)
     throw Error("the second stage has no factor, expected a store with one");
   state_ = std::make_unique<State>(model, std::move(second), context, tolerance);
   set(options);

@@ -78,8 +78,9 @@ class TwoStep {
 public:
   /// Keeps a reference to the model, that of the first stage: positions, constraints and masses
   /// are shared. \param tolerance of the second stage, see ElastostaticOptions; each stage keeps
-  /// its own   \pre second.factor gives C2   \throw Error if the threshold is not positive
-  TwoStep(const Model& model, StiffnessParts second, const Context& context,
+  /// its own   \param second of C2
+  /// \throw Error if there is none or the threshold is not positive
+  TwoStep(const Model& model, std::shared_ptr<ComplianceSource> second, const Context& context,
           const TwoStepOptions& options, double tolerance = 0);
   ~TwoStep();
   TwoStep(TwoStep&&) noexcept;

@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "compliance/compliance_columns.h"
+#include "compliance/compliance_source.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/store/stiffness_store_writer.h"
@@ -187,11 +188,9 @@ public:
     facts_ = store_->facts(model);
   }
 
-  StiffnessParts parts() const {
-    StiffnessParts parts;
-    parts.columns = store_->columns(facts_);
-    parts.factor = [store = store_, facts = facts_] { return store->factor(facts); };
-    return parts;
+  std::shared_ptr<ComplianceSource> compliance() const {
+    return compliance_of_store({store_->columns(facts_),
+                                [store = store_, facts = facts_] { return store->factor(facts); }});
   }
 
 private:
@@ -220,14 +219,15 @@ public:
         continue;
       if (i == scene.touched)
         touched_ = simulation_.object_count();
-      StiffnessParts parts;
+      std::shared_ptr<ComplianceSource> source;
       if (still[i]) {
-        parts.factor = [&organ] { return Factor(stiffness_matrix(organ.model), Context{}); };
+        source = compliance_of_factor(
+            [&organ] { return Factor(stiffness_matrix(organ.model), Context{}); });
         if (i == scene.touched && variant.store != nullptr)
-          parts = variant.store->parts();
+          source = variant.store->compliance();
       }
       simulation_.add_object(organ.name, organ.model, still[i] ? Method::ffe : Method::ela,
-                             std::move(parts));
+                             std::move(source));
       if (!still[i]) { // what keeps it moving
         const std::size_t object = simulation_.object_count() - 1;
         const double weight = 1e-3 * 9810 * total_mass(organ.model);
@@ -440,7 +440,7 @@ void equal_error(const Organ& organ, const Stored& store) {
     std::vector<NodeVector> held;
     double error = 0;
     for (int run = 0; run < 3; ++run) {
-      Elastostatic still(model, store.parts(), one);
+      Elastostatic still(model, store.compliance(), one);
       still.update({.gravity = {0, 0, -1}}); // so that the store's factor is at hand
       (void)still.displacement();
       std::vector<double> u;

@@ -67,8 +67,8 @@ struct Way {
   int threads = 2;
 };
 
-StiffnessParts parts_of(const Organ& organ, bool single) {
-  return memory_parts(organ.matrix, organ.factor, organ.patch, single);
+std::shared_ptr<ComplianceSource> compliance_of(const Organ& organ, bool single) {
+  return compliance_of_store(memory_stiffness(organ.matrix, organ.factor, organ.patch, single));
 }
 
 /// Every displacement changes with every update, as of a surface that is pressed in.
@@ -86,9 +86,9 @@ double quantile(std::vector<double> times, double q) {
 
 void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
   const std::size_t n = organ.model.nodes.size();
-  Elastostatic object(organ.model, parts_of(organ, way.single), with_threads(way.threads),
+  Elastostatic object(organ.model, compliance_of(organ, way.single), with_threads(way.threads),
                       {.tolerance = way.tolerance});
-  Elastostatic exact(organ.model, parts_of(organ, false), with_threads(2));
+  Elastostatic exact(organ.model, compliance_of(organ, false), with_threads(2));
   Load load;
   for (std::size_t k = 0; k < contacts; ++k)
     load.displacement[organ.patch[k * organ.patch.size() / contacts]] = {};
@@ -139,7 +139,7 @@ void bench_contact(const Organ& organ, std::size_t contacts, const Way& way) {
 
 /// The whole patch, turned and shifted as one.
 void bench_grasp(const Organ& organ) {
-  Elastostatic object(organ.model, parts_of(organ, false), with_threads(2));
+  Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
   Load load;
   int frame = 0;
   const auto pose = [&] {
@@ -161,7 +161,7 @@ void bench_grasp(const Organ& organ) {
 
 /// One node joins, one leaves, as where an instrument slides.
 void bench_sliding(const Organ& organ, std::size_t contacts) {
-  Elastostatic object(organ.model, parts_of(organ, false), with_threads(2));
+  Elastostatic object(organ.model, compliance_of(organ, false), with_threads(2));
   Load load;
   for (std::size_t k = 0; k < contacts; ++k)
     load.displacement[organ.patch[k]] = {};

@@ -2,8 +2,8 @@
 // Columns of a compliance that stay in memory, as a store would give them, for the benchmarks.
 
 #include "base/columns.h"
-#include "compliance/compliance.h"
 #include "compliance/compliance_columns.h"
+#include "compliance/compliance_source.h"
 #include "solve/condition.h"
 
 #include <algorithm>
@@ -35,14 +35,11 @@ private:
 };
 
 /// Factor and columns of these nodes (ascending), as float32 where `single`.
-inline StiffnessParts memory_parts(const StiffnessMatrix& matrix, const FactorData& data,
-                                   const std::vector<std::uint32_t>& nodes, bool single) {
-  StiffnessParts parts;
+inline StoredStiffness memory_stiffness(const StiffnessMatrix& matrix, const FactorData& data,
+                                        const std::vector<std::uint32_t>& nodes, bool single) {
   auto columns = std::make_unique<MemoryColumns>(matrix.row_of_axis.size() / 3, nodes, single);
   (void)compliance_columns(matrix, Factor(data), stiffness_norm(matrix), nodes, {}, *columns);
-  parts.columns = std::move(columns);
-  parts.factor = [&data] { return Factor(data); };
-  return parts;
+  return {std::move(columns), [&data] { return Factor(data); }};
 }
 
 } // namespace gewebe::timing

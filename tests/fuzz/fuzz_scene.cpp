@@ -79,7 +79,7 @@ void play(std::string_view text, bool serving, bool binary) {
       throw Stop{};
     return small_model();
   };
-  options.files.store = [](const std::string& name, const Model&) -> StiffnessParts {
+  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
     throw Error(name, "no store here");
   };
   options.files.node_list = [](const std::string&) { return std::string("1 3"); };

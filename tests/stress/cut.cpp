@@ -62,8 +62,9 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     touched.push_back(i);
   const StiffnessMatrix matrix = stiffness_matrix(*model);
   const FactorData factor = Factor(matrix, context).data();
-  CutStiffness stiffness(model, timing::memory_parts(matrix, factor, touched, false).columns,
-                         context);
+  CutStiffness stiffness(
+      model, compliance_of_store(timing::memory_stiffness(matrix, factor, touched, false)),
+      context);
   stiffness.prepare();
   std::mt19937 random(7);
   std::array<int, 3> ways{};
@@ -107,11 +108,12 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     const CutWork work =
         stiffness.cut(now, next->origin, next->place,
                       done % 4 == 3 ? std::optional(CutWay::correction) : std::nullopt);
-    const StiffnessParts parts = stiffness.parts();
+    const std::shared_ptr<ComplianceSource> compliance = stiffness.compliance();
+    const ColumnSource& stored = *compliance->columns();
     ++ways[static_cast<std::size_t>(work.way)];
     springs += removed;
     std::vector<double> u = f, expected = f;
-    parts.solve(u, 1);
+    compliance->solve(u, 1);
     fresh->solve(expected);
     const double error = test::relative_difference(u, expected), back = residual(*now, u, f);
     worst = test::larger(worst, error);
@@ -121,9 +123,9 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     check(back < most_residual, which + ": residual " + std::to_string(back));
     if (done % 20 == 0) { // columns of the store, corrected
       std::vector<double> columns(9 * now->nodes.size()), right(columns.size(), 0);
-      const std::size_t k = random() % parts.columns->nodes().size();
-      const std::uint32_t node = parts.columns->nodes()[k];
-      parts.columns->read(k, columns);
+      const std::size_t k = random() % stored.nodes().size();
+      const std::uint32_t node = stored.nodes()[k];
+      stored.read(k, columns);
       for (std::size_t a = 0; a < 3; ++a)
         right[a * 3 * now->nodes.size() + 3 * std::size_t{node} + a] = 1;
       fresh->solve(right, 3);

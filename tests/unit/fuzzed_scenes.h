@@ -344,7 +344,7 @@ private:
 };
 
 /// Stores of the models, and of a second stage four times as stiff.
-inline StiffnessParts fuzzed_store(const std::string& name, double stiffer) {
+inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
   struct Kept {
     StiffnessMatrix matrix;
     FactorData data;
@@ -363,7 +363,7 @@ inline StiffnessParts fuzzed_store(const std::string& name, double stiffer) {
       made->surface.push_back(i);
     kept = std::move(made);
   }
-  return timing::memory_parts(kept->matrix, kept->data, kept->surface, false);
+  return timing::memory_stiffness(kept->matrix, kept->data, kept->surface, false);
 }
 
 struct FuzzedRun {
@@ -384,7 +384,7 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     return fuzzed_store(base(name), 1);
   };
   options.files.second_stage = [&](const std::string& name, const Model&) {
-    return [file = base(name)] { return fuzzed_store(file, 4); };
+    return [file = base(name)] { return compliance_of_store(fuzzed_store(file, 4)); };
   };
   options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
   options.reply = [&](std::string_view text) { out.replies += text; };

@@ -51,7 +51,7 @@ TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
     EXPECT_EQ(work.way, way);
     const std::vector<double> f = random_vector(3 * now->nodes.size(), 1);
     std::vector<double> u = f;
-    stiffness.parts().solve(u, 1);
+    stiffness.compliance()->solve(u, 1);
     EXPECT_LT(relative_difference(u, fresh(*now, f)), 1e-8);
   }
 }
@@ -80,7 +80,7 @@ TEST(CutStiffness, ManyCutsInARow) {
     corrected += work.way == CutWay::correction ? 1 : 0;
     renewed += work.way == CutWay::renewal ? 1 : 0;
     std::vector<double> u = f;
-    stiffness.parts().solve(u, 1);
+    stiffness.compliance()->solve(u, 1);
     ASSERT_LT(relative_difference(u, expected), 1e-8) << done;
     model = now;
     ++done;
@@ -93,22 +93,24 @@ TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
   const auto model = round_organ(4);
   const StiffnessMatrix matrix = stiffness_matrix(*model);
   const FactorData factor = Factor(matrix, {}).data();
-  CutStiffness stiffness(model, timing::memory_parts(matrix, factor, {3, 500, 1000}, false).columns,
-                         Context{});
+  CutStiffness stiffness(
+      model, compliance_of_store(timing::memory_stiffness(matrix, factor, {3, 500, 1000}, false)),
+      Context{});
   CutModel cut = opened(*model, 4);
   const auto now = std::make_shared<const Model>(std::move(cut.model));
   (void)stiffness.cut(now, cut.origin, cut.place);
-  const StiffnessParts parts = stiffness.parts();
-  ASSERT_NE(parts.columns, nullptr);
-  EXPECT_FALSE(parts.columns->pays(1)) << "one node is solved for";
-  for (std::size_t k = 0; k < parts.columns->nodes().size(); ++k) {
+  const std::shared_ptr<ComplianceSource> compliance = stiffness.compliance();
+  const ColumnSource* const stored = compliance->columns();
+  ASSERT_NE(stored, nullptr);
+  EXPECT_FALSE(stored->pays(1)) << "one node is solved for";
+  for (std::size_t k = 0; k < stored->nodes().size(); ++k) {
     std::vector<double> columns(9 * now->nodes.size()), right(columns.size(), 0);
-    parts.columns->read(k, columns);
+    stored->read(k, columns);
     for (std::size_t a = 0; a < 3; ++a)
-      right[a * 3 * now->nodes.size() + 3 * std::size_t{parts.columns->nodes()[k]} + a] = 1;
+      right[a * 3 * now->nodes.size() + 3 * std::size_t{stored->nodes()[k]} + a] = 1;
     EXPECT_LT(relative_difference(columns, fresh(*now, right)), 1e-9) << k;
   }
-  EXPECT_TRUE(parts.columns->pays(1)) << "now that the responses are there";
+  EXPECT_TRUE(stored->pays(1)) << "now that the responses are there";
 }
 
 TEST(CutStiffness, NamesWhatMovesFreely) {
@@ -137,12 +139,12 @@ TEST(CutStiffness, WhatWasHandedOutBeforeRefuses) {
   const auto model = round_organ(3);
   CutStiffness stiffness(model, nullptr, Context{});
   stiffness.prepare();
-  const StiffnessParts before = stiffness.parts();
+  const std::shared_ptr<ComplianceSource> before = stiffness.compliance();
   CutModel cut = opened(*model, 4);
   const auto now = std::make_shared<const Model>(std::move(cut.model));
   (void)stiffness.cut(now, cut.origin, cut.place, CutWay::renewal);
   std::vector<double> f(3 * model->nodes.size(), 1);
-  EXPECT_THROW(before.solve(f, 1), Error);
+  EXPECT_THROW(before->solve(f, 1), Error);
 }
 
 TEST(CutStiffness, RepeatedIsTheSameToTheBit) {
@@ -164,7 +166,7 @@ TEST(CutStiffness, RepeatedIsTheSameToTheBit) {
       ++done;
     }
     std::vector<double> u = random_vector(3 * model->nodes.size(), 4);
-    stiffness.parts().solve(u, 1);
+    stiffness.compliance()->solve(u, 1);
     if (first.empty())
       first = u;
     ASSERT_EQ(u.size(), first.size());

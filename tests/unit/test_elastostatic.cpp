@@ -1,9 +1,11 @@
 #include "base/error.h"
+#include "compliance/compliance_source.h"
 #include "dynamics/elastodynamic.h"
 #include "larger.h"
 #include "sim_models.h"
 #include "solve/stiffness.h"
 #include "statics/elastostatic.h"
+#include "statics/linear_range.h"
 
 #include <Eigen/Dense>
 
@@ -115,17 +117,15 @@ private:
 };
 
 /// The factor may be asked for only where `factor_asked` is given.
-StiffnessParts parts_with_columns(const Model& model, std::vector<std::uint32_t> nodes,
-                                  int* factor_asked = nullptr) {
-  StiffnessParts parts;
-  parts.columns = std::make_unique<Columns>(model, std::move(nodes));
-  parts.factor = [&model, factor_asked] {
-    if (factor_asked == nullptr)
-      throw Error("nobody should need the factor");
-    ++*factor_asked;
-    return Factor(stiffness_matrix(model), Context{});
-  };
-  return parts;
+std::shared_ptr<ComplianceSource> with_columns(const Model& model, std::vector<std::uint32_t> nodes,
+                                               int* factor_asked = nullptr) {
+  return compliance_of_store(
+      {std::make_unique<Columns>(model, std::move(nodes)), [&model, factor_asked] {
+         if (factor_asked == nullptr)
+           throw Error("nobody should need the factor");
+         ++*factor_asked;
+         return Factor(stiffness_matrix(model), Context{});
+       }});
 }
 
 Elastostatic plain(const Model& model, std::size_t block_limit = SIZE_MAX) {
@@ -342,7 +342,7 @@ TEST(Elastostatic, StoredColumnsNeedNoFactor) {
   const Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const std::vector<std::uint32_t> some(nodes.begin(), nodes.begin() + 6);
-  Elastostatic object(model, parts_with_columns(model, some), Context{});
+  Elastostatic object(model, with_columns(model, some), Context{});
   Load load;
   load.force[nodes[1]] = {10, -20, 30};
   load.displacement[nodes[0]] = {0.1, 0.2, 0.3};
@@ -359,7 +359,7 @@ TEST(Elastostatic, StoredColumnsNeedNoFactor) {
   load.force[nodes[7]] = {1, 2, 3};
   EXPECT_THROW(object.update(load), Error);
   int asked = 0;
-  Elastostatic both(model, parts_with_columns(model, some, &asked), Context{});
+  Elastostatic both(model, with_columns(model, some, &asked), Context{});
   EXPECT_EQ(asked, 0);
   both.update(load);
   EXPECT_EQ(asked, 1);
@@ -372,7 +372,7 @@ TEST(Elastostatic, LittleMemoryKeepsFewColumns) {
   Context context;
   context.max_memory = 4 * 72 * model.nodes.size() * 2; // two nodes' columns
   int asked = 0;
-  Elastostatic object(model, parts_with_columns(model, nodes, &asked), context);
+  Elastostatic object(model, with_columns(model, nodes, &asked), context);
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
     Load load;
     load.force[nodes[k]] = load.force[nodes[k + 1]] = {1, 2, 3};
@@ -476,7 +476,7 @@ TEST(Elastostatic, NodesJoinAndLeaveTheBlock) {
   const Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
   const double tolerance = 10 * 2.2e-16 * cond(model);
-  Elastostatic object(model, parts_with_columns(model, nodes), Context{});
+  Elastostatic object(model, with_columns(model, nodes), Context{});
   std::mt19937 random(7);
   Load load;
   for (int k = 0; k < 60; ++k) {
@@ -501,8 +501,8 @@ TEST(Elastostatic, WhatTheToleranceLeavesOutStaysBelowIt) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   for (const double tolerance : {1e-1, 1e-2, 1e-3}) {
-    Elastostatic exact(model, parts_with_columns(model, nodes), Context{}),
-        loose(model, parts_with_columns(model, nodes), Context{},
+    Elastostatic exact(model, with_columns(model, nodes), Context{}),
+        loose(model, with_columns(model, nodes), Context{},
               {.measure_error = true, .tolerance = tolerance});
     double worst = 0;
     for (int round = 0; round < 100; ++round) {
@@ -529,8 +529,8 @@ TEST(Elastostatic, WhatTheToleranceLeavesOutStaysBelowIt) {
 TEST(Elastostatic, SumsThatFollowTheirChangesStayExact) {
   const Model model = organ();
   const std::vector<std::uint32_t> nodes = free_nodes(model);
-  Elastostatic object(model, parts_with_columns(model, nodes), Context{}),
-      fresh(model, parts_with_columns(model, nodes), Context{});
+  Elastostatic object(model, with_columns(model, nodes), Context{}),
+      fresh(model, with_columns(model, nodes), Context{});
   Load load;
   for (std::size_t k = 0; k < 10; ++k)
     load.force[nodes[k]] = {1, 2, 3};

@@ -259,7 +259,7 @@ Played play(const std::vector<std::string>& lines) {
       throw Error(name, "cannot open");
     return organ();
   };
-  options.files.store = [](const std::string& name, const Model&) -> StiffnessParts {
+  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
     throw Error(name, "is of another model");
   };
   options.files.node_list = [](const std::string& name) {

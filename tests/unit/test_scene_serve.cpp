@@ -60,7 +60,7 @@ Served serve(const std::vector<std::string>& lines, const std::string& record = 
       throw Error(name, "cannot open");
     return organ(1);
   };
-  options.files.store = [](const std::string& name, const Model&) -> StiffnessParts {
+  options.files.store = [](const std::string& name, const Model&) -> StoredStiffness {
     throw Error(name, "is damaged");
   };
   options.files.node_list = [](const std::string&) { return std::string("4 6-7 # nodes\n"); };

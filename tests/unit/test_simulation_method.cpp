@@ -34,7 +34,7 @@ ObjectSource counted(Asked& asked) {
           },
           [&](const Model&) {
             ++asked.stiffness;
-            return StiffnessParts{};
+            return std::shared_ptr<ComplianceSource>();
           }};
 }
 

@@ -4,6 +4,8 @@
 #include "sim_models.h"
 #include "statics/two_step.h"
 
+#include "compliance/compliance_source.h"
+
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
@@ -24,10 +26,8 @@ Model stiffened(Model model, double from, double to) {
   return model;
 }
 
-StiffnessParts parts_of(const Model& model) {
-  StiffnessParts parts;
-  parts.factor = [&model] { return Factor(stiffness_matrix(model), Context{}); };
-  return parts;
+std::shared_ptr<ComplianceSource> compliance_of(const Model& model) {
+  return compliance_of_factor([&model] { return Factor(stiffness_matrix(model), Context{}); });
 }
 
 struct Stages {
@@ -37,7 +37,7 @@ struct Stages {
 
   Stages(Model one, Model other, const TwoStepOptions& options)
       : model(std::move(one)), stiff(std::move(other)), first(model, {}, Context{}),
-        two(model, parts_of(stiff), Context{}, options) {}
+        two(model, compliance_of(stiff), Context{}, options) {}
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
 
@@ -283,7 +283,7 @@ TEST(TwoStep, InASimulationByEventsWithAWarning) {
   s.add_object("still", model, Method::ffe);
   s.add_object("moving", model, Method::ela);
   const std::uint32_t node = free_nodes(model)[2];
-  const auto second = [&] { return parts_of(stiff); };
+  const auto second = [&] { return compliance_of(stiff); };
   EXPECT_THROW(s.apply(SetTwoStep{1, {.threshold = 1}, second}), Error);
   s.apply(SetForce{0, {node}, {0, 3, 0}});
   s.schedule(0.5, SetTwoStep{0, {.threshold = 1}, second});

@@ -75,10 +75,7 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
   files.store = [resolve](const std::string& name, const Model& model) {
     const auto store = std::make_shared<StiffnessStore>(resolve(name));
     const StiffnessFacts facts = store->facts(model);
-    StiffnessParts parts;
-    parts.columns = store->columns(facts);
-    parts.factor = [store, facts] { return store->factor(facts); };
-    return parts;
+    return StoredStiffness{store->columns(facts), [store, facts] { return store->factor(facts); }};
   };
   files.second_stage = [resolve](const std::string& name, const Model& model) {
     const auto store = std::make_shared<StiffnessStore>(resolve(name));
@@ -87,10 +84,8 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
       throw Error(resolve(name), "no second stage of this object, expected one, "
                                  "see --stage of ffe-precompute(1)");
     return [store, facts] {
-      StiffnessParts parts;
-      parts.columns = store->columns(*facts);
-      parts.factor = [store, facts] { return store->factor(*facts); };
-      return parts;
+      return compliance_of_store(
+          {store->columns(*facts), [store, facts] { return store->factor(*facts); }});
     };
   };
   files.node_list = [resolve](const std::string& name) {

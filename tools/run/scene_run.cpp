@@ -140,14 +140,12 @@ struct SceneRun::State {
       });
     };
     source.stiffness = [this, file = c.store, at = line](const Model& model) {
-      StiffnessParts parts;
       if (file.empty())
-        return parts;
-      parts = of_object(at, [&] { return options.files.store(file, model); });
+        return std::shared_ptr<ComplianceSource>();
+      StoredStiffness stored = of_object(at, [&] { return options.files.store(file, model); });
       ++counts.stores;
-      if (parts.factor)
-        parts.factor = [at, factor = parts.factor] { return of_object(at, factor); };
-      return parts;
+      stored.factor = [at, factor = std::move(stored.factor)] { return of_object(at, factor); };
+      return compliance_of_store(std::move(stored));
     };
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);

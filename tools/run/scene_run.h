@@ -3,6 +3,7 @@
 
 #include "base/context.h"
 #include "base/error.h"
+#include "compliance/compliance_source.h"
 #include "formats/results/results_writer.h"
 #include "formats/stream/stream.h"
 #include "model/selector.h"
@@ -27,10 +28,11 @@ struct SceneFiles {
   std::function<void(const std::string& name)> check;
   std::function<Model(const std::string& name)> model;
   /// \throw Error, among others if the store is of another model
-  std::function<StiffnessParts(const std::string& name, const Model& model)> store;
+  std::function<StoredStiffness(const std::string& name, const Model& model)> store;
   /// What the store has of the object's second stage, read when asked for.
   /// \throw Error, among others if it has none
-  std::function<std::function<StiffnessParts()>(const std::string& name, const Model& model)>
+  std::function<std::function<std::shared_ptr<ComplianceSource>()>(const std::string& name,
+                                                                   const Model& model)>
       second_stage;
   LoadNodeList node_list;
   /// Writes a model whole or not at all. May be absent. \throw Error

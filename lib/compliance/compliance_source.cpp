@@ -1,0 +1,59 @@
+#include "compliance/compliance_source.h"
+
+#include "compliance/axis_solver.h"
+#include "compliance/costs.h"
+
+#include <optional>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+/// One factor; of the model where none was made beforehand.
+class FactorSource final : public ComplianceSource {
+public:
+  explicit FactorSource(StoredStiffness stored) : stored_(std::move(stored)) {}
+
+  void open(const Model& model, const Context& context) override {
+    model_ = &model;
+    if (stored_.factor)
+      return;
+    ++factors_;
+    solver_.emplace(factorise_axes(model, context));
+  }
+  void solve(std::span<double> over_axes, std::size_t columns) override {
+    if (!solver_) {
+      ++factors_;
+      solver_.emplace(stored_axes(*model_, stored_.factor()));
+    }
+    solver_->solve(over_axes, columns);
+  }
+  std::size_t entries() const override {
+    return solver_ ? solver_->factor.entries() : costs::usual_entries(3 * model_->nodes.size());
+  }
+  std::uint64_t factors() const override { return factors_; }
+  const ColumnSource* columns() const override { return stored_.columns.get(); }
+
+private:
+  StoredStiffness stored_;
+  const Model* model_ = nullptr;
+  std::optional<AxisSolver> solver_;
+  std::uint64_t factors_ = 0;
+};
+
+} // namespace
+
+std::shared_ptr<ComplianceSource> compliance_of_model() {
+  return std::make_shared<FactorSource>(StoredStiffness{});
+}
+
+std::shared_ptr<ComplianceSource> compliance_of_factor(std::function<Factor()> factor) {
+  return std::make_shared<FactorSource>(StoredStiffness{nullptr, std::move(factor)});
+}
+
+std::shared_ptr<ComplianceSource> compliance_of_store(StoredStiffness stored) {
+  return std::make_shared<FactorSource>(std::move(stored));
+}
+
+} // namespace gewebe
