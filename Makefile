@@ -65,7 +65,8 @@ endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
 BENCH_SRC := $(wildcard tests/bench/*.cpp)
-HEADERS := $(filter-out %_internal.h,$(wildcard lib/*/*.h formats/*/*.h))
+# What others may include.
+PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
 SCRIPTS := .ci/run .ci/sanitize tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
@@ -241,7 +242,7 @@ $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@echo 'clang-format $<'
 	@clang-format-16 --dry-run -Werror $< && touch $@
 
-$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes scripts/check-nan | $(FIRST)
+$(INCLUDE_STAMPS): $(LINT)/%.includes: % scripts/check-includes scripts/check-nan lib/PUBLIC | $(FIRST)
 	@mkdir -p $(@D)
 	@scripts/check-includes $< && scripts/check-nan $< && touch $@
 
@@ -275,7 +276,7 @@ install: all
 	$(if $(TOOLS),$(INSTALL) $(TOOLS) '$(call to,$(BINDIR))')
 	$(INSTALL) -D -m 644 $(PLUGIN) '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
 	$(INSTALL) -m 644 $(ARCHIVE) '$(call to,$(LIBDIR))'
-	$(foreach h,$(HEADERS),$(INSTALL) -D -m 644 $h '$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)' &&) true
+	$(foreach h,$(PUBLIC),$(INSTALL) -D -m 644 $(firstword $(wildcard lib/$h $h) $h) '$(call to,$(INCLUDEDIR))/gewebe/$h' &&) true
 	$(foreach m,$(MAN),$(INSTALL) -D -m 644 $m '$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)' &&) true
 	sed -e 's|@VERSION@|$(VERSION)|' -e 's|@LIBS@|$(LIBS)|' -e 's|@PREFIX@|$(PREFIX)|' \
 	  -e 's|@LIBDIR@|$(LIBDIR:$(PREFIX)/%=$${prefix}/%)|' -e 's|@INCLUDEDIR@|$(INCLUDEDIR:$(PREFIX)/%=$${prefix}/%)|' \
@@ -283,12 +284,12 @@ install: all
 	chmod 644 '$(PC)'
 
 # Takes back what install laid down, then its folders as far as they are empty; a system's own stay.
-ours := $(sort $(dir $(HEADERS:lib/%=%)))
+ours := $(sort $(dir $(PUBLIC)))
 system_dir := $(filter /usr /usr/local,$(DESTDIR)$(PREFIX))
 uninstall:
 	rm -f $(foreach t,$(TOOLS),'$(call to,$(BINDIR))/$(notdir $t)') '$(call to,$(LIBDIR))/libgewebe.a' '$(PC)'
 	rm -f '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
-	rm -f $(foreach h,$(HEADERS),'$(call to,$(INCLUDEDIR))/gewebe/$(h:lib/%=%)')
+	rm -f $(foreach h,$(PUBLIC),'$(call to,$(INCLUDEDIR))/gewebe/$h')
 	rm -f $(foreach m,$(MAN),'$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)')
 	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') \
 	  '$(call to,$(INCLUDEDIR))/gewebe/formats' '$(call to,$(INCLUDEDIR))/gewebe' \

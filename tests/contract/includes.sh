@@ -28,13 +28,23 @@ test_directions() {
   wrong formats/a.cpp '#include "base/x.h"'
 }
 
-test_public_headers() {
+test_headers() {
   right lib/base/a.h '#pragma once' '#include <vector>' '#include "base/vec3.h"'
   right lib/volume/a_internal.h '#pragma once' '#include <openvdb/openvdb.h>'
   wrong lib/base/a.h '#pragma once' '#include <openvdb/openvdb.h>'
   wrong formats/mesh/a.h '#pragma once' '#include <nlohmann/json.hpp>'
   wrong lib/volume/a.h '#pragma once' '#include "volume/b_internal.h"'
   wrong lib/base/a.h '#include <vector>'
+}
+
+test_installed_headers() {
+  mkdir -p lib
+  printf '%s\n' '# a comment' 'base/a.h' 'formats/mesh/b.h # another' >lib/PUBLIC
+  right formats/mesh/b.h '#pragma once' '#include "base/a.h"' '#include <vector>'
+  right lib/base/own.h '#pragma once' '#include "base/other.h"'
+  right lib/base/a.cpp '#include "base/own.h"'
+  wrong lib/base/a.h '#pragma once' '#include "base/own.h"'
+  wrong formats/mesh/b.h '#pragma once' '#include "formats/stream/own.h"'
 }
 
 test_other_rules() {
