@@ -123,16 +123,24 @@ TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
 }
 
 TEST(DistanceRamp, LargeInteriorsKeepTheirTiles) {
-  // The wall at 129.4 has its band in the leaf from 128 on: only tiles without it stay whole.
-  const TriangleMesh mesh = box_mesh({-10.2, -10.3, -10.4}, {140.2, 140.3, 129.4});
-  for (const Grid& grid : {jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse),
-                           sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse)}) {
-    GridAccessor value(grid);
-    for (const Int3& v : {Int3{60, 60, 60}, Int3{0, 0, 127}, Int3{120, 120, 120}})
-      EXPECT_EQ(value.value(v), 1.0f);
-    EXPECT_EQ(value.value({60, 60, 133}), 0.0f);
-    const double volume = volume_stats(with(1), grid).volume;
-    EXPECT_LT(std::fabs(volume / (150.4 * 150.6 * 139.8) - 1), 1e-3);
+  // The wall at 129.4 has its band in the leaf from 128 on, that at 127.6 in the last leaf of a
+  // tile too: only tiles without it stay whole.
+  for (const double wall : {129.4, 127.6}) {
+    const TriangleMesh mesh = box_mesh({-10.2, -10.3, -10.4}, {140.2, 140.3, wall});
+    CoverageReport round, sharp;
+    for (const auto& [grid, report] :
+         {std::pair(jones_density(with(2), mesh, unit_lattice, OpenMesh::refuse, &round), &round),
+          std::pair(sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse, &sharp),
+                    &sharp)}) {
+      GridAccessor value(grid);
+      for (const Int3& v : {Int3{60, 60, 60}, Int3{0, 0, 125}, Int3{120, 120, 120}})
+        EXPECT_EQ(value.value(v), 1.0f);
+      EXPECT_EQ(value.value({60, 60, 133}), 0.0f);
+      EXPECT_LT(value.value({60, 60, static_cast<std::int32_t>(wall)}), 1.0f);
+      const double volume = volume_stats(with(1), grid).volume;
+      EXPECT_LT(std::fabs(volume / (150.4 * 150.6 * (wall + 10.4)) - 1), 1e-3);
+      EXPECT_NEAR(report->volume, volume, 1e-9 * volume); // no voxel counts twice
+    }
   }
 }
 

@@ -404,6 +404,28 @@ TEST(Results, TheXdmfOfACutObjectNamesTheRowsOfEachFrame) {
                       {"o", 0}, {"o", 1}, {"o", 2}, {"o", 3}, {"o.1", -3}, {"o", 4}, {"o.1", -4}}));
 }
 
+TEST(Results, ACutThatKeepsTheNodesHasThemInTheirPlaces) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  const Model whole = textured();
+  Model cut = whole; // springs alone
+  cut.springs.resize(cut.springs.size() / 2);
+  {
+    const std::vector<double> u(3 * whole.nodes.size());
+    const std::unique_ptr<ResultWriter> result = open_result(Kind::hdf5, path, {.binary = true});
+    result->add_object("o", whole);
+    result->add_frame(0, std::vector<FrameObject>{{u, {}}});
+    result->change_object(0, cut, {});
+    result->add_frame(1, std::vector<FrameObject>{{u, {}}});
+    result->commit();
+  }
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group group = file.root().group("objects").group("o").group("cuts").group("1");
+  const auto origin = group.read<std::uint32_t>("origin", cut.nodes.size());
+  for (std::uint32_t i = 0; i < origin.size(); ++i)
+    EXPECT_EQ(origin[i], i);
+}
+
 TEST(Results, EachShapeOfASeriesHasItsOwnTriangles) {
   const ScratchFolder folder;
   const CutRun run;
