@@ -135,80 +135,82 @@ What parse_object(Words& in) {
   return c;
 }
 
-What parse_force(Words& in) {
-  ForceCommand c;
+/// Whom a change is about: an object and its nodes.
+ChangeCommand parse_about(Words& in, Change change) {
+  ChangeCommand c{.change = std::move(change)};
   c.object = in.name();
   c.nodes = in.nodes();
-  c.force = in.vector("number");
+  return c;
+}
+
+What parse_force(Words& in) {
+  ChangeCommand c = parse_about(in, {});
+  SetForce set;
+  set.force = in.vector("number");
   c.total = in.take("total");
-  c.period = in.time_after("period");
+  set.period = in.time_after("period");
+  c.change = set;
   return c;
 }
 
 What parse_pressure(Words& in) {
-  PressureCommand c;
-  c.object = in.name();
-  c.nodes = in.nodes();
-  c.pressure = in.number("number");
-  c.period = in.time_after("period");
+  ChangeCommand c = parse_about(in, {});
+  SetPressure set;
+  set.pressure.pressure = in.number("number");
+  set.pressure.period = in.time_after("period");
+  c.change = set;
   return c;
 }
 
 What parse_attach(Words& in) {
-  AttachCommand c;
-  c.object = in.name();
-  c.nodes = in.nodes();
+  ChangeCommand c = parse_about(in, {});
   c.other = in.name();
   c.others = in.nodes();
-  c.stiffness = in.number("stiffness");
-  if (!(c.stiffness > 0))
+  Attach tie;
+  tie.stiffness = in.number("stiffness");
+  if (!(tie.stiffness > 0))
     in.fail("a stiffness that is not positive");
+  c.change = tie;
   return c;
 }
 
 What parse_displace(Words& in) {
-  DisplaceCommand c;
-  c.object = in.name();
-  c.nodes = in.nodes();
-  c.displacement = in.vector("number");
-  c.over = in.time_after("over");
+  ChangeCommand c = parse_about(in, {});
+  SetDisplacement set;
+  set.displacement = in.vector("number");
+  set.over = in.time_after("over");
+  c.change = set;
   return c;
 }
 
 What parse_release(Words& in) {
-  ReleaseCommand c;
-  c.object = in.name();
-  c.nodes = in.nodes();
-  return c;
+  return parse_about(in, Release{});
 }
 
 What parse_instrument(Words& in) {
-  InstrumentCommand c;
-  c.name = in.name();
+  SetInstrument set;
+  set.name = in.name();
   const std::string& kind = in.word("shape");
-  if (kind == "blade") {
-    c.shape.blade = true;
-    c.shape.radius = 0;
-    c.pose.place = in.vector("number");
-    c.shape.axis = in.vector("number") - c.pose.place;
-    if (c.shape.axis == Vec3{})
-      in.fail("an edge without length");
-    return c;
-  }
-  if (kind != "sphere" && kind != "capsule")
+  if (kind != "blade" && kind != "sphere" && kind != "capsule")
     in.fail(shown(kind) + " is no shape");
-  const bool capsule = kind == "capsule";
-  c.shape.radius = in.number("radius");
-  if (!(c.shape.radius > 0))
-    in.fail("a radius that is not positive");
-  c.pose.place = in.vector("number");
-  if (capsule)
-    c.shape.axis = in.vector("number") - c.pose.place;
-  if (in.take("friction"))
-    c.shape.friction = in.number("friction");
-  if (!(c.shape.friction >= 0))
+  set.shape.blade = kind == "blade";
+  set.shape.radius = 0;
+  if (!set.shape.blade) {
+    set.shape.radius = in.number("radius");
+    if (!(set.shape.radius > 0))
+      in.fail("a radius that is not positive");
+  }
+  set.pose.place = in.vector("number");
+  if (kind != "sphere")
+    set.shape.axis = in.vector("number") - set.pose.place;
+  if (set.shape.blade && set.shape.axis == Vec3{})
+    in.fail("an edge without length");
+  if (!set.shape.blade && in.take("friction"))
+    set.shape.friction = in.number("friction");
+  if (!(set.shape.friction >= 0))
     in.fail("a negative friction");
-  return c;
+  std::string name = set.name;
+  return ChangeCommand{.change = std::move(set), .instrument = std::move(name)};
 }
 
 /// A quaternion, or the degrees of a turn about an axis.
@@ -231,44 +233,46 @@ std::optional<Quaternion> parse_turn(Words& in) {
 }
 
 What parse_move(Words& in) {
-  MoveCommand c;
+  ChangeCommand c;
   c.instrument = in.name();
-  c.place = in.vector("number");
-  c.turn = parse_turn(in);
-  c.over = in.time_after("over");
+  MoveInstrument move;
+  move.place = in.vector("number");
+  move.turn = parse_turn(in);
+  move.over = in.time_after("over");
+  c.change = move;
   return c;
 }
 
 What parse_grasp(Words& in) {
-  GraspCommand c;
-  c.object = in.name();
-  c.nodes = in.nodes();
+  ChangeCommand c = parse_about(in, Grasp{});
   c.instrument = in.name();
   return c;
 }
 
 What parse_withdraw(Words& in) {
-  return WithdrawCommand{in.name()};
+  return ChangeCommand{.change = Withdraw{}, .instrument = in.name()};
 }
 
 What parse_gravity(Words& in) {
-  return GravityCommand{in.vector("number")};
+  return ChangeCommand{.change = SetGravity{in.vector("number")}};
 }
 
 What parse_timestep(Words& in) {
-  const TimestepCommand c{in.number("time")};
+  const SetTimestep c{in.number("time")};
   if (!(c.dt > 0))
     in.fail("a timestep that is not positive");
-  return c;
+  return ChangeCommand{.change = c};
 }
 
 What parse_two_step(Words& in) {
-  TwoStepCommand c;
+  ChangeCommand c;
   c.object = in.name();
-  c.threshold = in.number("force");
-  if (!(c.threshold > 0))
+  SetTwoStep set;
+  set.options.threshold = in.number("force");
+  if (!(set.options.threshold > 0))
     in.fail("a threshold that is not positive");
-  c.series = in.take("series");
+  set.options.series = in.take("series");
+  c.change = set;
   return c;
 }
 
@@ -284,7 +288,7 @@ What parse_emit(Words& in) {
   }
   if (word != "shapes" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
-  return EmitCommand{word == "forces", word == "instruments"};
+  return ChangeCommand{.change = Emit{word == "forces", word == "instruments"}};
 }
 
 What parse_step(Words& in) {
@@ -309,32 +313,34 @@ What parse_run(Words& in) {
 }
 
 What parse_method(Words& in) {
-  MethodCommand c;
+  ChangeCommand c;
   c.object = in.name();
   const std::string& word = in.word("method");
   if (word != "ffe" && word != "ela")
     in.fail(shown(word) + " is no method");
-  c.method = word == "ffe" ? Method::ffe : Method::ela;
+  c.change = SetMethod{0, word == "ffe" ? Method::ffe : Method::ela};
   return c;
 }
 
 What parse_cut(Words& in) {
-  CutCommand c;
+  ChangeCommand c;
   c.object = in.name();
   const std::string& kind = in.word("'springs' or 'plane'");
   if (kind == "plane") {
-    CutPlane& plane = c.plane.emplace();
-    plane.point = in.vector("number");
-    plane.normal = in.vector("number");
-    const double size = norm(plane.normal);
+    PlaneToCut what;
+    what.plane.point = in.vector("number");
+    what.plane.normal = in.vector("number");
+    const double size = norm(what.plane.normal);
     if (!(size > 0 && std::isfinite(size)))
       in.fail("a normal without direction");
     if (!in.done())
       c.nodes = in.nodes();
+    c.change = CutObject{0, what};
   } else if (kind == "springs") {
     c.nodes = in.nodes();
     if (!in.done())
       c.others = in.nodes();
+    c.change = CutObject{};
   } else {
     in.fail(shown(kind) + " can't be cut");
   }
@@ -342,20 +348,22 @@ What parse_cut(Words& in) {
 }
 
 What parse_tear(Words& in) {
-  TearCommand c;
+  ChangeCommand c;
   c.object = in.name();
-  c.strain = in.number("strain");
-  if (!(c.strain >= 0))
+  SetTear set;
+  set.strain = in.number("strain");
+  if (!(set.strain >= 0))
     in.fail("a negative strain");
+  c.change = set;
   return c;
 }
 
 What parse_restore(Words& in) {
-  return RestoreCommand{in.name()};
+  return ChangeCommand{.change = Restore{}, .object = in.name()};
 }
 
 What parse_renew(Words& in) {
-  return RenewCommand{in.name()};
+  return ChangeCommand{.change = Renew{}, .object = in.name()};
 }
 
 struct Verb {

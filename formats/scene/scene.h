@@ -1,7 +1,7 @@
 #pragma once
 // The language of scenes, scene(5): one command a line.
 
-#include "scene/command.h"
+#include "formats/scene/command.h"
 
 #include <optional>
 #include <string>

@@ -1,7 +1,6 @@
 #include "formats/scene/scene_answer.h"
 
 #include "base/vector_at.h"
-#include "formats/scene/scene_instrument.h"
 
 #include <algorithm>
 #include <array>
@@ -25,6 +24,28 @@ void append(std::string& text, const Vec3& v, char end) {
   text += ' ';
   append(text, v.z);
   text += end;
+}
+
+/// The lines of `emit instruments`, scene(5).
+std::string instrument_reply(const Simulation& simulation) {
+  std::size_t count = 0;
+  std::string lines;
+  for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
+    const InstrumentReport report = simulation.instrument(k);
+    if (!report.present)
+      continue;
+    ++count;
+    lines += simulation.instrument_name(k);
+    for (const Vec3& v : {report.pose.place, report.force, report.torque})
+      for (int a = 0; a < 3; ++a) {
+        std::array<char, 32> number{};
+        lines += ' ';
+        lines.append(number.data(),
+                     std::to_chars(number.data(), number.data() + number.size(), v[a] + 0.0).ptr);
+      }
+    lines += '\n';
+  }
+  return "instruments " + std::to_string(count) + "\n" + lines;
 }
 
 } // namespace

@@ -1,84 +1,65 @@
 #include "formats/scene/scene_changes.h"
 
-#include "formats/scene/scene_instrument.h"
-
+#include <cstdint>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace gewebe {
 
 namespace {
 
-Change cut_change(const CutCommand& cut, Simulation& simulation, const LoadNodeList& lists) {
-  CutObject change{simulation.find(cut.object), {}};
-  const auto nodes = [&](const std::optional<Selector>& selector) {
-    return select_nodes(simulation.model(change.object), *selector, lists);
-  };
-  if (cut.plane) {
-    PlaneToCut what{*cut.plane, {}};
-    if (cut.nodes)
-      what.nodes = nodes(cut.nodes);
-    change.what = std::move(what);
-  } else {
-    SpringsToCut what{nodes(cut.nodes), {}};
-    what.to = cut.others ? nodes(cut.others) : what.from;
-    change.what = std::move(what);
+/// Finds what a change names, by the fields that it has.
+struct Names {
+  const ChangeCommand& said;
+  const Simulation& simulation;
+  const LoadNodeList& lists;
+
+  std::vector<std::uint32_t> nodes(std::size_t object, const Selector& selector) const {
+    return select_nodes(simulation.model(object), selector, lists);
   }
-  return change;
-}
+
+  template <class Kind>
+  void find(Kind& c) const {
+    if constexpr (requires { c.object; })
+      c.object = simulation.find(said.object);
+    if constexpr (requires { c.other; })
+      c.other = simulation.find(said.other);
+    if constexpr (requires { c.instrument; })
+      c.instrument = simulation.find_instrument(said.instrument);
+    if constexpr (requires { c.nodes; })
+      c.nodes = nodes(c.object, *said.nodes);
+    if constexpr (requires { c.others; })
+      c.others = nodes(c.other, *said.others);
+    if constexpr (requires {
+                    c.force;
+                    c.nodes;
+                  })
+      if (said.total)
+        c.force = c.force / static_cast<double>(c.nodes.size());
+  }
+  void find(SetInstrument& c) const { c.instrument = simulation.instrument_place(c.name); }
+  void find(CutObject& c) const {
+    c.object = simulation.find(said.object);
+    if (auto* const plane = std::get_if<PlaneToCut>(&c.what)) {
+      if (said.nodes)
+        plane->nodes = nodes(c.object, *said.nodes);
+      return;
+    }
+    auto& springs = std::get<SpringsToCut>(c.what);
+    springs.from = nodes(c.object, *said.nodes);
+    springs.to = said.others ? nodes(c.object, *said.others) : springs.from;
+  }
+};
 
 } // namespace
 
-std::optional<Change> scene_change(const Command& command, Simulation& simulation,
-                                   const LoadNodeList& lists) {
-  if (const auto* const force = std::get_if<ForceCommand>(&command.what)) {
-    SetForce set{simulation.find(force->object), {}, force->force, force->period};
-    set.nodes = select_nodes(simulation.model(set.object), force->nodes, lists);
-    if (force->total)
-      set.force = set.force / static_cast<double>(set.nodes.size());
-    return set;
-  }
-  if (const auto* const displace = std::get_if<DisplaceCommand>(&command.what)) {
-    SetDisplacement set{
-        simulation.find(displace->object), {}, displace->displacement, displace->over};
-    set.nodes = select_nodes(simulation.model(set.object), displace->nodes, lists);
-    return set;
-  }
-  if (const auto* const pressure = std::get_if<PressureCommand>(&command.what)) {
-    SetPressure set{simulation.find(pressure->object), {}, {pressure->pressure, pressure->period}};
-    set.nodes = select_nodes(simulation.model(set.object), pressure->nodes, lists);
-    return set;
-  }
-  if (const auto* const tie = std::get_if<AttachCommand>(&command.what)) {
-    Attach set{simulation.find(tie->object), {}, simulation.find(tie->other), {}, tie->stiffness};
-    set.nodes = select_nodes(simulation.model(set.object), tie->nodes, lists);
-    set.others = select_nodes(simulation.model(set.other), tie->others, lists);
-    return set;
-  }
-  if (const auto* const release = std::get_if<ReleaseCommand>(&command.what)) {
-    Release set{simulation.find(release->object), {}};
-    set.nodes = select_nodes(simulation.model(set.object), release->nodes, lists);
-    return set;
-  }
-  if (const auto* const gravity = std::get_if<GravityCommand>(&command.what))
-    return SetGravity{gravity->gravity};
-  if (const auto* const timestep = std::get_if<TimestepCommand>(&command.what))
-    return SetTimestep{timestep->dt};
-  if (const auto* const emit = std::get_if<EmitCommand>(&command.what))
-    return Emit{emit->forces, emit->instruments};
-  if (const auto* const method = std::get_if<MethodCommand>(&command.what))
-    return SetMethod{simulation.find(method->object), method->method};
-  if (const auto* const renew = std::get_if<RenewCommand>(&command.what))
-    return Renew{simulation.find(renew->object)};
-  if (const auto* const cut = std::get_if<CutCommand>(&command.what))
-    return cut_change(*cut, simulation, lists);
-  if (const auto* const tear = std::get_if<TearCommand>(&command.what))
-    return SetTear{simulation.find(tear->object), tear->strain};
-  if (const auto* const restore = std::get_if<RestoreCommand>(&command.what))
-    return Restore{simulation.find(restore->object)};
-  return instrument_change(command, simulation, [&](std::size_t object, const Selector& selector) {
-    return select_nodes(simulation.model(object), selector, lists);
-  });
+Change scene_change(const ChangeCommand& command, const Simulation& simulation,
+                    const LoadNodeList& lists) {
+  Change change = command.change;
+  const Names names{command, simulation, lists};
+  std::visit([&](auto& c) { names.find(c); }, change);
+  return change;
 }
 
 } // namespace gewebe

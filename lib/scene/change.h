@@ -5,7 +5,6 @@
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "model/cut_select.h"
-#include "scene/command.h"
 #include "statics/two_step.h"
 
 #include <cstddef>
@@ -17,6 +16,13 @@
 #include <vector>
 
 namespace gewebe {
+
+enum class Method { ffe, ela }; ///< elastostatic (with stored stiffness), elastodynamic
+
+/// "ffe", "ela".
+constexpr const char* method_name(Method method) {
+  return method == Method::ffe ? "ffe" : "ela";
+}
 
 struct SetForce {
   std::size_t object = 0;

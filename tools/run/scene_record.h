@@ -2,7 +2,7 @@
 // A record of a scene: the lines that were accepted, as a scene that does the same again.
 
 #include "formats/stream/stream.h"
-#include "scene/command.h"
+#include "formats/scene/command.h"
 
 #include <map>
 #include <string>

@@ -156,12 +156,12 @@ struct SceneRun::State {
       options.events->object(simulation.time(), c.name, c.model, c.method);
   }
 
-  SetTwoStep stages(const TwoStepCommand& c) {
-    SetTwoStep set{simulation.find(c.object), {c.threshold, c.series}, {}};
+  /// Two-step asks the object's store for its second stage.
+  void add_stage(SetTwoStep& set) {
     if (set.object >= stores.size() || stores[set.object].empty())
-      throw Error("object " + c.object + " has no store, expected one with a second stage");
+      throw Error("object " + simulation.name(set.object) +
+                  " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
-    return set;
   }
 
   void write(const EmitModelCommand& c) {
@@ -175,7 +175,12 @@ struct SceneRun::State {
       options.events->model(simulation.time(), c.object, c.file);
   }
 
-  void schedule(const Command& command, const Change& change) {
+  void schedule(const Command& command, const ChangeCommand& what) {
+    Change change = scene_change(what, simulation, [&](const std::string& list) {
+      return lists[list] = options.files.node_list(list);
+    });
+    if (auto* const two_step = std::get_if<SetTwoStep>(&change))
+      add_stage(*two_step);
     if (command.every)
       simulation.schedule_every(*command.at, change);
     else if (command.at)
@@ -184,25 +189,21 @@ struct SceneRun::State {
       simulation.apply(change);
   }
 
+  void step(const StepCommand& c) {
+    go_on([&] { simulation.step(c.dt.value_or(simulation.timestep().value_or(default_step))); });
+  }
+
   void execute(const Command& command) {
-    if (const auto* const object = std::get_if<ObjectCommand>(&command.what)) {
-      add(*object);
-    } else if (const auto* const two_step = std::get_if<TwoStepCommand>(&command.what)) {
-      schedule(command, stages(*two_step));
-    } else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what)) {
-      write(*emit);
-    } else if (const std::optional<Change> change =
-                   scene_change(command, simulation, [&](const std::string& list) {
-                     return lists[list] = options.files.node_list(list);
-                   })) {
+    if (const auto* const change = std::get_if<ChangeCommand>(&command.what))
       schedule(command, *change);
-    } else if (const auto* const step = std::get_if<StepCommand>(&command.what)) {
-      go_on([&] {
-        simulation.step(step->dt.value_or(simulation.timestep().value_or(default_step)));
-      });
-    } else {
+    else if (const auto* const object = std::get_if<ObjectCommand>(&command.what))
+      add(*object);
+    else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what))
+      write(*emit);
+    else if (const auto* const one = std::get_if<StepCommand>(&command.what))
+      step(*one);
+    else
       run(std::get<RunCommand>(command.what));
-    }
   }
 
   /// A step and its answer, behind the first frame. Only when the step is done, so that one that

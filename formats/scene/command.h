@@ -1,0 +1,42 @@
+#pragma once
+// The commands of a scene, scene(5), as data.
+
+#include "model/selector.h"
+#include "scene/change.h"
+
+#include <optional>
+#include <string>
+#include <variant>
+
+namespace gewebe {
+
+struct ObjectCommand {
+  std::string name, model, store; ///< files as the scene names them; no store: ""
+  Method method = Method::ela;
+  bool implicit = false;
+};
+/// A change, but for the numbers of what it names, which scene_change() finds.
+struct ChangeCommand {
+  Change change;
+  std::string object{}, other{}, instrument{};
+  std::optional<Selector> nodes{}, others{};
+  bool total = false; ///< a force is divided among the nodes
+};
+/// Writes the model as it is now, at rest.
+struct EmitModelCommand {
+  std::string object, file;
+};
+struct StepCommand {
+  std::optional<double> dt; ///< >= 0
+};
+struct RunCommand {
+  double until = 0, every = 0; ///< every > 0
+};
+
+struct Command {
+  std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
+  bool every = false;       ///< at every multiple of it
+  std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, StepCommand, RunCommand> what;
+};
+
+} // namespace gewebe
