@@ -241,9 +241,7 @@ void move_bodies(World& w, double to) {
 void Rule<Attach>::check(World& w, const Attach& c) {
   const Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
   for (const Object* const o : {&a, &b})
-    if (o->method != Method::ela)
-      throw Error("object " + o->name() +
-                  " is elastostatic (ffe) and has no motion to tie, expected ela objects");
+    require_support(w, *o, Feature::attach);
   if (&a == &b)
     throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
   if (a.matter->integration != b.matter->integration)

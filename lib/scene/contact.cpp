@@ -56,10 +56,13 @@ void guide(World& w, Body& body, double to) {
     all.push_back(pushes ? std::optional(MovingInstrument{i.shape, i.before, i.way})
                          : std::nullopt);
   }
-  if (any && w.now.objects[body.parts[0]].matter->integration == Integration::implicit) {
+  const Object& first = w.now.objects[body.parts[0]];
+  const Gap* const passed = first.matter->integration == Integration::implicit
+                                ? gap(Way::implicit_motion, Feature::touch)
+                                : nullptr;
+  if (any && passed != nullptr) {
     if (!body.warned_implicit && w.options.warn)
-      w.options.warn("object " + w.now.objects[body.parts[0]].name() +
-                     " is integrated implicitly: instruments don't touch it");
+      w.options.warn("object " + first.name() + " " + std::string(passed->text));
     body.warned_implicit = true;
     return;
   }
@@ -154,8 +157,8 @@ void need_contact(Object& object) {
 
 /// Whether instruments moved where this object feels it.
 bool touched_anew(World& w, Object& object) {
-  if (object.method != Method::ffe || object.stages.options || w.now.poses.empty() ||
-      (object.contact && w.now.poses.size() < 2))
+  if (object.method != Method::ffe || gap_of(object, Feature::touch) != nullptr ||
+      w.now.poses.empty() || (object.contact && w.now.poses.size() < 2))
     return false;
   if (!object.shown.touches.empty())
     return true;

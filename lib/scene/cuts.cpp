@@ -72,11 +72,8 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
 
 /// Whether it is known and of one stage; who says otherwise is warned once.
 bool may_cut(World& w, Object& object) {
-  if (object.stages.options && !object.matter->told.cut && w.options.warn) {
-    object.matter->told.cut = true;
-    w.options.warn("object " + object.name() + " follows two steps of stiffness: it is not cut");
-  }
-  return object.matter->known && !object.stages.options;
+  const bool feels_it = feels(w, object, Feature::blade);
+  return object.matter->known && feels_it;
 }
 
 /// Where all nodes of a cut object go.
@@ -206,7 +203,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
 /// That the object will be cut, so that its first cut costs no more than others.
 void announce_cut(World& w, std::size_t index) {
   Object& object = w.now.objects.at(index);
-  if (object.method != Method::ffe || object.stages.options)
+  if (object.method != Method::ffe || gap_of(object, Feature::cut) != nullptr)
     return;
   try {
     if (CutStiffness* const stiffness = stiffness_of(w, object); stiffness != nullptr)
@@ -377,9 +374,7 @@ void find_free_motion(World& w, std::size_t index) {
 void Rule<CutObject>::apply(World& w, const CutObject& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
-  if (object.stages.options)
-    throw Error("object " + object.name() +
-                " follows two steps of stiffness, expected one without two-step");
+  require_support(w, object, Feature::cut);
   CutModel cut = of_object(object.name(), [&] {
     Cut what;
     if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
@@ -424,8 +419,7 @@ void Rule<SetTear>::log(const World&, const SetTear& c, ChangeRow& row) {
 
 void Rule<Restore>::apply(World& w, const Restore& c) {
   Object& old = w.now.objects.at(c.object);
-  if (!old.cut.first)
-    throw Error("object " + old.name() + " is as it came, expected one that was cut");
+  require_support(w, old, Feature::restore);
   if (old.method == Method::ffe)
     shape_in_step(w, old);
   Moves moves;

@@ -63,12 +63,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
   Object& object = w.now.objects[c.object];
   if (object.method == c.method)
     return;
-  if (object.body != nullptr && object.body->parts.size() > 1) {
-    const std::vector<std::size_t>& parts = object.body->parts;
-    throw Error("object " + object.name() + " is attached to " +
-                w.now.objects[parts[parts[0] == c.object ? 1 : 0]].name() +
-                " and moves with it, expected one that is attached to none");
-  }
+  require_support(w, object, Feature::method);
   const std::span<const double> still = shape_now(w, object);
   object.contact = nullptr;
   if (c.method == Method::ela) {

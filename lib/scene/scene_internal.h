@@ -6,8 +6,10 @@
 #include "base/copy_on_write.h"
 #include "compliance/cut_stiffness.h"
 #include "scene/simulation.h"
+#include "scene/support.h"
 #include "statics/static_contact.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -43,7 +45,8 @@ struct Moves {
 
 /// Warnings that are told once. A step back does not untell them.
 struct Told {
-  bool stuck = false, unsolved = false, stages = false, cut = false;
+  bool stuck = false, unsolved = false;
+  std::array<bool, all_features.size()> passed{}; // see feels()
 };
 
 /// What an object consists of. What was read stays so when a step is taken back.

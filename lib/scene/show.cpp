@@ -163,12 +163,7 @@ void show(World& w, Object& object) {
   if (object.body != nullptr || !object.load->empty())
     need_model(object);
   const bool near = object.method == Method::ffe && (object.contact || instruments_there(w));
-  const bool meets = near && !object.stages.options;
-  if (near && !meets && !object.matter->told.stages && w.options.warn) {
-    object.matter->told.stages = true;
-    w.options.warn("object " + object.name() +
-                   " follows two steps of stiffness: instruments don't touch it");
-  }
+  const bool meets = near && feels(w, object, Feature::touch);
   if (meets)
     shape_in_step(w, object); // that it comes from
   Shown& shown = object.shown;

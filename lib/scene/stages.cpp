@@ -32,13 +32,7 @@ const std::vector<NodeVector>& still_forces(const Object& object) {
 }
 
 void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
-  const Object& object = w.now.objects.at(c.object);
-  if (object.method != Method::ffe)
-    throw Error("object " + object.name() +
-                " is elastodynamic (ela), expected an elastostatic one for two-step");
-  if (object.cut.first)
-    throw Error("object " + object.name() +
-                " is cut and its second stage is not, expected one that is whole");
+  require_support(w, w.now.objects.at(c.object), Feature::two_step);
 }
 
 void Rule<SetTwoStep>::apply(World& w, const SetTwoStep& c) {

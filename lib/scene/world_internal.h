@@ -87,6 +87,14 @@ void at_object(const World& w, const Object& object, Work&& work) {
   }
 }
 
+// support.cpp: which methods go with which features
+/// What is in the way; null: it works.
+const Gap* gap_of(const Object& object, Feature feature);
+/// \throw Error "object NAME …" where it does not
+void require_support(const World& w, const Object& object, Feature feature);
+/// Whether it works; where not, the object is passed by, which is told once.
+bool feels(const World& w, Object& object, Feature feature);
+
 // stages.cpp: the two-step method
 void update_stages(World& w, Object& object, const Load& load);
 std::span<const double> still_shape(Object& object);

@@ -1,0 +1,72 @@
+// Which methods go with which features, asked of an object.
+
+#include "scene/support.h"
+
+#include "scene/world_internal.h"
+
+#include <string>
+
+namespace gewebe::simulation {
+
+namespace {
+
+bool goes(const Object& object, Way way) {
+  const bool moves = object.method == Method::ela;
+  const bool implicit = object.matter->integration == Integration::implicit;
+  switch (way) {
+  case Way::explicit_motion:
+    return moves && !implicit;
+  case Way::implicit_motion:
+    return moves && implicit;
+  case Way::attached:
+    return object.body != nullptr && object.body->parts.size() > 1;
+  case Way::elastostatic:
+    return !moves;
+  case Way::two_step:
+    return object.stages.options.has_value();
+  case Way::whole:
+    return object.cut.first == nullptr;
+  case Way::cut:
+    return object.cut.first != nullptr;
+  }
+  return false;
+}
+
+/// One of those that an object is attached to.
+const std::string& partner(const World& w, const Object& object) {
+  const Object& first = w.now.objects[object.body->parts[0]];
+  return &first == &object ? w.now.objects[object.body->parts[1]].name() : first.name();
+}
+
+} // namespace
+
+const Gap* gap_of(const Object& object, Feature feature) {
+  for (const Gap& one : gaps)
+    if (one.feature == feature && goes(object, one.way))
+      return &one;
+  return nullptr;
+}
+
+void require_support(const World& w, const Object& object, Feature feature) {
+  const Gap* const one = gap_of(object, feature);
+  if (one == nullptr)
+    return;
+  std::string text(one->text);
+  if (const std::size_t at = text.find('*'); at != std::string::npos)
+    text.replace(at, 1, partner(w, object));
+  throw Error("object " + object.name() + " " + text);
+}
+
+bool feels(const World& w, Object& object, Feature feature) {
+  const Gap* const one = gap_of(object, feature);
+  if (one == nullptr)
+    return true;
+  bool& told = object.matter->told.passed[static_cast<std::size_t>(feature)];
+  if (!told && w.options.warn) {
+    told = true;
+    w.options.warn("object " + object.name() + " " + std::string(one->text));
+  }
+  return false;
+}
+
+} // namespace gewebe::simulation

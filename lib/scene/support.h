@@ -1,0 +1,81 @@
+#pragma once
+// Which methods go with which features: the one table that says so. What it does not list works.
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace gewebe {
+
+/// How an object goes on. It may be several of these: cut and elastostatic, attached and implicit.
+enum class Way : std::uint8_t {
+  explicit_motion,
+  implicit_motion,
+  attached,
+  elastostatic,
+  two_step,
+  whole,
+  cut
+};
+inline constexpr std::array all_ways{
+    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
+    Way::two_step,        Way::whole,           Way::cut};
+
+/// What may act on an object, or be done to it.
+enum class Feature : std::uint8_t {
+  force,
+  pressure,
+  displace,
+  grasp,
+  touch, ///< by an instrument that pushes
+  cut,   ///< by the command
+  blade, ///< or tearing
+  restore,
+  attach,
+  method, ///< another one
+  two_step,
+  renew,
+};
+inline constexpr std::array all_features{Feature::force,  Feature::pressure, Feature::displace,
+                                         Feature::grasp,  Feature::touch,    Feature::cut,
+                                         Feature::blade,  Feature::restore,  Feature::attach,
+                                         Feature::method, Feature::two_step, Feature::renew};
+
+/// A pair that does not go together.
+struct Gap {
+  Way way{};
+  Feature feature{};
+  bool refused = true;   ///< the command is; else the object is passed by, which is told once
+  std::string_view text; ///< behind "object NAME "; '*' stands for what it is attached to
+};
+
+inline constexpr std::array gaps{
+    Gap{Way::implicit_motion, Feature::touch, false,
+        "is integrated implicitly: instruments don't touch it"},
+    Gap{Way::two_step, Feature::touch, false,
+        "follows two steps of stiffness: instruments don't touch it"},
+    Gap{Way::two_step, Feature::cut, true,
+        "follows two steps of stiffness, expected one without two-step"},
+    Gap{Way::two_step, Feature::blade, false, "follows two steps of stiffness: it is not cut"},
+    Gap{Way::elastostatic, Feature::attach, true,
+        "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
+    Gap{Way::explicit_motion, Feature::two_step, true,
+        "is elastodynamic (ela), expected an elastostatic one for two-step"},
+    Gap{Way::implicit_motion, Feature::two_step, true,
+        "is elastodynamic (ela), expected an elastostatic one for two-step"},
+    Gap{Way::cut, Feature::two_step, true,
+        "is cut and its second stage is not, expected one that is whole"},
+    Gap{Way::whole, Feature::restore, true, "is as it came, expected one that was cut"},
+    Gap{Way::attached, Feature::method, true,
+        "is attached to * and moves with it, expected one that is attached to none"},
+};
+
+/// What is in the way; null: it works.
+constexpr const Gap* gap(Way way, Feature feature) {
+  for (const Gap& one : gaps)
+    if (one.way == way && one.feature == feature)
+      return &one;
+  return nullptr;
+}
+
+} // namespace gewebe

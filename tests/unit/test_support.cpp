@@ -1,0 +1,214 @@
+// The table of methods and features, walked: what it does not list works, what it lists is refused
+// by its words before anything is done, or passed by, which is told.
+
+#include "base/error.h"
+#include "scene/support.h"
+#include "simulation_scenes.h"
+#include "solve/stiffness.h"
+
+#include <gtest/gtest.h>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+/// All that an object is which goes on this way, in these tests.
+std::vector<Way> ways_of(Way way) {
+  switch (way) {
+  case Way::attached:
+    return {Way::explicit_motion, Way::whole, Way::attached};
+  case Way::two_step:
+    return {Way::elastostatic, Way::whole, Way::two_step};
+  case Way::cut:
+    return {Way::elastostatic, Way::cut};
+  case Way::whole:
+    return {Way::elastostatic, Way::whole};
+  default:
+    return {way, Way::whole};
+  }
+}
+
+const Gap* expected(Way way, Feature feature) {
+  for (const Gap& one : gaps)
+    for (const Way is : ways_of(way))
+      if (one.way == is && one.feature == feature)
+        return &one;
+  return nullptr;
+}
+
+StiffnessParts stiffer(Model model) {
+  for (Spring& s : model.springs)
+    s.stiffness *= 3;
+  StiffnessParts parts;
+  parts.factor = [model] { return Factor(stiffness_matrix(model), Context{}); };
+  return parts;
+}
+
+class Pair {
+public:
+  Pair(Way way, std::vector<std::string>& warnings)
+      : model_(test::organ(3)), way_(way),
+        scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
+    const bool moves =
+        way == Way::explicit_motion || way == Way::implicit_motion || way == Way::attached;
+    const Integration integration =
+        way == Way::implicit_motion ? Integration::implicit : Integration::semi_implicit;
+    scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration);
+    Model beside = model_;
+    for (Node& n : beside.nodes)
+      n.position.x += 100;
+    scene_.add_object("p", std::move(beside), Method::ela, {}, integration);
+    if (way == Way::attached)
+      scene_.apply(tie());
+    if (way == Way::two_step)
+      scene_.apply(two_step());
+    if (way == Way::cut) {
+      scene_.apply(SetForce{0, {top()}, {0, 0, 1}});
+      scene_.step(0.001);
+      scene_.apply(CutObject{0, test::incision(model_)});
+      scene_.apply(Release{0, {top()}});
+      scene_.step(0.001);
+      scene_.take_cuttings();
+    }
+  }
+
+  /// Does it to the object. \return whether it had its effect
+  bool works(Feature feature) {
+    switch (feature) {
+    case Feature::force:
+      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      return bends();
+    case Feature::pressure:
+      scene_.apply(SetPressure{0, {top()}, {100, 0}});
+      return bends();
+    case Feature::displace:
+      scene_.apply(SetDisplacement{0, {top()}, {0, 0, 1}});
+      return bends();
+    case Feature::grasp:
+      scene_.apply(SetInstrument{0, {3, {}, 0}, {{100, -50, 90}, {}}, "tongs"});
+      scene_.apply(Grasp{0, {top()}, 0});
+      scene_.apply(MoveInstrument{0, {100, -50, 91}, {}, 0});
+      return bends();
+    case Feature::touch:
+      scene_.apply(SetInstrument{0, {5, {}, 0}, {{100, -50, 56}, {}}, "probe"});
+      scene_.step(0.001);
+      scene_.apply(MoveInstrument{0, {100, -50, 53}, {}, 0.02});
+      for (int k = 0; k < 20; ++k)
+        scene_.step(0.001);
+      return scene_.instrument(0).nodes > 0 && norm(scene_.instrument(0).force) > 0;
+    case Feature::cut:
+      scene_.apply(CutObject{0, way_ == Way::cut ? lower_incision() : test::incision(model_)});
+      return test::count(scene_, Cutting::Kind::cut) == 1;
+    case Feature::blade:
+      return sweep();
+    case Feature::restore:
+      scene_.apply(Restore{0});
+      return test::count(scene_, Cutting::Kind::restored) == 1;
+    case Feature::attach:
+      scene_.apply(tie());
+      scene_.apply(SetForce{1, {top()}, {0, 0, 2000}});
+      return bends();
+    case Feature::method: {
+      const Method other = scene_.method(0) == Method::ela ? Method::ffe : Method::ela;
+      scene_.apply(SetMethod{0, other});
+      return scene_.method(0) == other;
+    }
+    case Feature::two_step:
+      scene_.apply(two_step());
+      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      return bends();
+    case Feature::renew:
+      scene_.apply(Renew{0});
+      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      return bends();
+    }
+    return false;
+  }
+
+private:
+  std::uint32_t top() const { return test::highest(model_); }
+  Attach tie() const { return {0, {top()}, 1, {top()}, 1e5}; }
+  SetTwoStep two_step() const {
+    return {0, {.threshold = 1}, [model = model_] { return stiffer(model); }};
+  }
+  PlaneToCut lower_incision() const {
+    PlaneToCut cut{{{100.2, -50, 30}, {0.1, 1, 0}}, std::vector<std::uint32_t>{}};
+    const Model& now = scene_.model(0);
+    for (std::uint32_t i = 0; i < surface_count(now); ++i)
+      if (now.nodes[i].position.z > 40)
+        cut.nodes->push_back(i);
+    return cut;
+  }
+  bool bends() {
+    for (int k = 0; k < 3; ++k)
+      scene_.step(0.005);
+    double most = 0;
+    for (const double u : scene_.displacement(0))
+      most = std::max(most, std::abs(u));
+    return most > 0;
+  }
+  bool sweep() {
+    InstrumentShape edge;
+    edge.radius = 0;
+    edge.blade = true;
+    edge.axis = {0, 0, -8};
+    scene_.apply(SetInstrument{0, edge, {{88, -50.3, 53}, {}}, "blade"});
+    scene_.step(0);
+    scene_.apply(MoveInstrument{0, {112, -50.3, 53}, {}, 0.01});
+    for (int k = 0; k < 10; ++k)
+      scene_.step(0.001);
+    std::set<std::size_t> cut;
+    for (const Cutting& c : scene_.cuttings())
+      cut.insert(c.object);
+    return cut.contains(0);
+  }
+
+  Model model_;
+  Way way_;
+  Simulation scene_;
+};
+
+TEST(Support, EveryPairWorksOrIsRefusedByItsWords) {
+  for (const Way way : all_ways)
+    for (const Feature feature : all_features) {
+      SCOPED_TRACE("way " + std::to_string(static_cast<int>(way)) + ", feature " +
+                   std::to_string(static_cast<int>(feature)));
+      std::vector<std::string> warnings;
+      Pair pair(way, warnings);
+      warnings.clear();
+      const Gap* const gap = expected(way, feature);
+      std::string text = gap != nullptr ? "object o " + std::string(gap->text) : "";
+      if (const std::size_t at = text.find('*'); at != std::string::npos)
+        text.replace(at, 1, "p");
+      if (gap == nullptr) {
+        EXPECT_TRUE(pair.works(feature));
+      } else if (gap->refused) {
+        try {
+          (void)pair.works(feature);
+          ADD_FAILURE() << "it is not refused: " << text;
+        } catch (const Error& error) {
+          EXPECT_EQ(error.what(), text);
+        }
+      } else {
+        EXPECT_FALSE(pair.works(feature));
+        EXPECT_EQ(std::count(warnings.begin(), warnings.end(), text), 1) << text;
+      }
+    }
+}
+
+TEST(Support, TheTableNamesEachPairOnceAndEachGapIsReached) {
+  std::set<std::pair<Way, Feature>> named;
+  for (const Gap& one : gaps) {
+    EXPECT_TRUE(named.emplace(one.way, one.feature).second);
+    EXPECT_FALSE(one.text.empty());
+    bool reached = false;
+    for (const Way way : all_ways)
+      reached = reached || expected(way, one.feature) == &one;
+    EXPECT_TRUE(reached) << one.text;
+  }
+}
+
+} // namespace
+} // namespace gewebe
