@@ -33,10 +33,14 @@ struct RunCommand {
   double until = 0, every = 0; ///< every > 0
 };
 
+/// Asks where the scene is, without a step.
+struct SyncCommand {};
+
 struct Command {
   std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
   bool every = false;       ///< at every multiple of it
-  std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, StepCommand, RunCommand> what;
+  std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, StepCommand, RunCommand, SyncCommand>
+      what;
 };
 
 } // namespace gewebe

@@ -99,6 +99,11 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     for (const Vec3& v : {report.pose.place, report.force, report.torque})
       append_single(bytes, v);
   }
+  return bytes + binary_sync(simulation, step);
+}
+
+std::string binary_sync(const Simulation& simulation, std::uint64_t step) {
+  std::string bytes;
   append_head(bytes, {FrameKind::done, 0, step, 2});
   append(bytes, simulation.time());
   return bytes;

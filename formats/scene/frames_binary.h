@@ -40,6 +40,9 @@ struct FrameHead {
 /// text_answer \throw Error where a number does not fit single precision
 std::string binary_answer(const Simulation& simulation, std::uint64_t step);
 
+/// The frame that answers sync: done alone.
+std::string binary_sync(const Simulation& simulation, std::uint64_t step);
+
 /// The frame that refuses a line, behind `step` answered steps; its text is text_error's.
 std::string binary_error(std::uint64_t step, std::string_view text);
 

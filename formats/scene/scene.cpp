@@ -312,6 +312,10 @@ What parse_run(Words& in) {
   return c;
 }
 
+What parse_sync(Words&) {
+  return SyncCommand{};
+}
+
 What parse_method(Words& in) {
   ChangeCommand c;
   c.object = in.name();
@@ -373,8 +377,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 21>& verbs() {
-  static const std::array<Verb, 21> all{{
+const std::array<Verb, 22>& verbs() {
+  static const std::array<Verb, 22> all{{
       {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
@@ -402,6 +406,7 @@ const std::array<Verb, 21>& verbs() {
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
+      {"sync", "sync", false, parse_sync},
   }};
   return all;
 }

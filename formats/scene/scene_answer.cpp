@@ -113,6 +113,12 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
   return text + "done\n";
 }
 
+std::string text_sync(const Simulation& simulation) {
+  std::string text = "sync ";
+  append(text, simulation.time());
+  return text + "\n";
+}
+
 std::string text_error(std::uint64_t line, std::string_view text) {
   std::string answer = "error " + std::to_string(line) + ": ";
   for (const char c : text)

@@ -20,6 +20,9 @@ bool topology_changed(const Simulation& simulation, std::size_t object);
 /// objects are known where shapes are emitted
 std::string text_answer(const Simulation& simulation, std::uint64_t step);
 
+/// "sync T": where the scene is.
+std::string text_sync(const Simulation& simulation);
+
 /// "error LINE: TEXT", one line whatever the text holds.
 std::string text_error(std::uint64_t line, std::string_view text);
 

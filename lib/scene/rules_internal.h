@@ -95,7 +95,7 @@ struct Rule<SetMethod> : Plain<SetMethod> {
   static void log(const World& w, const SetMethod& c, ChangeRow& row);
 };
 
-// stages.cpp
+// statics.cpp
 template <>
 struct Rule<SetTwoStep> : Plain<SetTwoStep> {
   static void check(World& w, const SetTwoStep& c);

@@ -56,16 +56,9 @@ void guarded(World& w, Work&& work) {
   w.saved = false;
 }
 
-// objects.cpp: what they consist of, and their solvers
+// objects.cpp: what they consist of
 void insert(World& w, Object object);
 void need_model(Object& object);
-Elastostatic& still_of(World& w, Object& object);
-void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
-void update_still(World& w, Object& object, const Load& load);
-/// Forgets what is kept to be quick.
-void renew(Object& object);
-/// Counts add up, errors are the larger ones.
-void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 
 /// What is shown of it, or moves it, is no longer right.
 inline void touch(Object& object) {
@@ -95,7 +88,14 @@ void require_support(const World& w, const Object& object, Feature feature);
 /// Whether it works; where not, the object is passed by, which is told once.
 bool feels(const World& w, Object& object, Feature feature);
 
-// stages.cpp: the two-step method
+// statics.cpp: solvers of one step and of two
+Elastostatic& still_of(World& w, Object& object);
+void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
+void update_still(World& w, Object& object, const Load& load);
+/// Forgets what is kept to be quick.
+void renew(Object& object);
+/// Counts add up, errors are the larger ones.
+void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 void update_stages(World& w, Object& object, const Load& load);
 std::span<const double> still_shape(Object& object);
 const std::vector<NodeVector>& still_forces(const Object& object);

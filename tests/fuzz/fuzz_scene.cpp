@@ -67,8 +67,9 @@ bool is_answer(std::string_view text, bool binary, bool& refusal) {
     return refusal || are_frames(text, FrameKind::done);
   }
   refusal = text.starts_with("error ");
-  return refusal ? text.find('\n') == text.size() - 1
-                 : text.starts_with("step ") && text.ends_with("\ndone\n");
+  return refusal || text.starts_with("sync ")
+             ? text.find('\n') == text.size() - 1
+             : text.starts_with("step ") && text.ends_with("\ndone\n");
 }
 
 void play(std::string_view text, bool serving, bool binary) {

@@ -193,6 +193,13 @@ struct SceneRun::State {
     go_on([&] { simulation.step(c.dt.value_or(simulation.timestep().value_or(default_step))); });
   }
 
+  void sync() {
+    if (options.reply)
+      deliver([&] {
+        options.reply(options.binary ? binary_sync(simulation, steps) : text_sync(simulation));
+      });
+  }
+
   void execute(const Command& command) {
     if (const auto* const change = std::get_if<ChangeCommand>(&command.what))
       schedule(command, *change);
@@ -202,8 +209,10 @@ struct SceneRun::State {
       write(*emit);
     else if (const auto* const one = std::get_if<StepCommand>(&command.what))
       step(*one);
+    else if (const auto* const many = std::get_if<RunCommand>(&command.what))
+      run(*many);
     else
-      run(std::get<RunCommand>(command.what));
+      sync();
   }
 
   /// A step and its answer, behind the first frame. Only when the step is done, so that one that

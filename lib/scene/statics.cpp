@@ -1,0 +1,116 @@
+// The solvers of elastostatic objects: of one step, of two, made when they are needed.
+
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gewebe::simulation {
+
+void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
+  sum.updates += more.updates;
+  sum.unchanged += more.unchanged;
+  sum.shapes += more.shapes;
+  sum.terms += more.terms;
+  sum.skipped += more.skipped;
+  sum.solves += more.solves;
+  sum.columns_read += more.columns_read;
+  sum.factors += more.factors;
+  sum.backward_error = std::max(sum.backward_error, more.backward_error);
+  sum.contact_error = std::max(sum.contact_error, more.contact_error);
+  sum.shape_error = std::max(sum.shape_error, more.shape_error);
+}
+
+void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
+  object.statics->still.emplace(object.model(), std::move(source), w.context,
+                                ElastostaticOptions{.measure_error = w.options.measure_error,
+                                                    .tolerance = w.options.tolerance});
+}
+
+Elastostatic& still_of(World& w, Object& object) {
+  need_model(object);
+  Statics& statics = *object.statics;
+  if (statics.still)
+    return *statics.still;
+  statics.ahead = true;
+  std::shared_ptr<ComplianceSource> source;
+  if (statics.prepared)
+    source = std::exchange(statics.prepared, nullptr);
+  else if (!object.cut.first && object.matter->source.stiffness)
+    source = object.matter->source.stiffness(object.model());
+  make_still(w, object, std::move(source));
+  return *statics.still;
+}
+
+void update_still(World& w, Object& object, const Load& load) {
+  object.statics->ahead = true;
+  update_stages(w, object, load);
+}
+
+void renew(Object& object) {
+  Statics& statics = *object.statics;
+  if (statics.still) {
+    add_counts(statics.spent, statics.still->counts());
+    statics.still.reset();
+  }
+  if (statics.two_step) {
+    ElastostaticCounts second = statics.two_step->second_counts();
+    second.updates = second.unchanged = 0; // those of the first stage count
+    add_counts(statics.spent, second);
+    statics.two_step.reset();
+  }
+  statics.stiffness.reset();
+  statics.prepared.reset();
+  if (object.body != nullptr && object.matter->integration == Integration::implicit)
+    object.body->moving->renew();
+  object.shown.valid = false;
+}
+
+void update_stages(World& w, Object& object, const Load& load) {
+  Elastostatic& still = still_of(w, object);
+  if (!object.stages.options) {
+    still.update(load);
+    return;
+  }
+  std::optional<TwoStep>& two_step = object.statics->two_step;
+  if (!two_step)
+    two_step.emplace(object.model(), object.stages.second(), w.context, *object.stages.options,
+                     w.options.tolerance);
+  two_step->update(still, load);
+}
+
+std::span<const double> still_shape(Object& object) {
+  Statics& statics = *object.statics;
+  return statics.two_step ? statics.two_step->displacement(*statics.still)
+                          : statics.still->displacement();
+}
+
+const std::vector<NodeVector>& still_forces(const Object& object) {
+  const Statics& statics = *object.statics;
+  return statics.two_step ? statics.two_step->contact_forces() : statics.still->contact_forces();
+}
+
+void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
+  require_support(w, w.now.objects.at(c.object), Feature::two_step);
+}
+
+void Rule<SetTwoStep>::apply(World& w, const SetTwoStep& c) {
+  Object& object = w.now.objects.at(c.object);
+  if (object.statics->two_step) {
+    object.statics->ahead = true;
+    object.statics->two_step->set(c.options);
+  }
+  object.stages.options = c.options;
+  if (!object.stages.second)
+    object.stages.second = c.second;
+  object.stages.warned = false;
+  touch(object);
+}
+
+void Rule<SetTwoStep>::log(const World&, const SetTwoStep& c, ChangeRow& row) {
+  row.what = "two-step";
+  row.value = c.options.threshold;
+  row.text = c.options.series ? "series" : "";
+}
+
+} // namespace gewebe::simulation
