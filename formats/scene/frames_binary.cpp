@@ -58,12 +58,12 @@ void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
 
 std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
   std::string bytes;
-  for (const MethodJump& jump : simulation.jumps()) {
+  for (const MethodJump& jump : simulation.news().jumps) {
     append_head(bytes, {FrameKind::jump, static_cast<std::uint32_t>(jump.object), step, 1});
     append_single(bytes, jump.size);
   }
   const auto objects = static_cast<std::uint32_t>(simulation.object_count());
-  for (const Cutting& c : simulation.cuttings())
+  for (const Cutting& c : simulation.news().cuttings)
     append_cutting(bytes, c, step);
   for (std::uint32_t i = 0; simulation.emits().shapes && i < objects; ++i) {
     if (!topology_changed(simulation, i))

@@ -35,7 +35,7 @@ std::string instrument_reply(const Simulation& simulation) {
     if (!report.present)
       continue;
     ++count;
-    lines += simulation.instrument_name(k);
+    lines += simulation.instrument(k).name;
     for (const Vec3& v : {report.pose.place, report.force, report.torque})
       for (int a = 0; a < 3; ++a) {
         std::array<char, 32> number{};
@@ -67,7 +67,7 @@ std::string cutting_line(const Simulation& simulation, const Cutting& c) {
 }
 
 bool topology_changed(const Simulation& simulation, std::size_t object) {
-  const std::vector<Cutting>& all = simulation.cuttings();
+  const std::vector<Cutting>& all = simulation.news().cuttings;
   return std::any_of(all.begin(), all.end(), [&](const Cutting& c) {
     return c.kind != Cutting::Kind::loose &&
            (c.kind == Cutting::Kind::part ? c.part : c.object) == object;
@@ -78,12 +78,12 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
   std::string text = "step " + std::to_string(step) + " ";
   append(text, simulation.time());
   text += '\n';
-  for (const MethodJump& jump : simulation.jumps()) {
+  for (const MethodJump& jump : simulation.news().jumps) {
     text += "jump " + simulation.name(jump.object) + " ";
     append(text, jump.size);
     text += '\n';
   }
-  for (const Cutting& c : simulation.cuttings())
+  for (const Cutting& c : simulation.news().cuttings)
     text += cutting_line(simulation, c) + "\n";
   for (std::size_t i = 0; simulation.emits().shapes && i < simulation.object_count(); ++i) {
     if (!topology_changed(simulation, i))

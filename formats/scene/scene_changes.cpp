@@ -22,11 +22,11 @@ struct Names {
   template <class Kind>
   void find(Kind& c) const {
     if constexpr (requires { c.object; })
-      c.object = simulation.find(said.object);
+      c.object = find_object(simulation, said.object);
     if constexpr (requires { c.other; })
-      c.other = simulation.find(said.other);
+      c.other = find_object(simulation, said.other);
     if constexpr (requires { c.instrument; })
-      c.instrument = simulation.find_instrument(said.instrument);
+      c.instrument = find_instrument(simulation, said.instrument);
     if constexpr (requires { c.nodes; })
       c.nodes = nodes(c.object, *said.nodes);
     if constexpr (requires { c.others; })
@@ -38,9 +38,9 @@ struct Names {
       if (said.total)
         c.force = c.force / static_cast<double>(c.nodes.size());
   }
-  void find(SetInstrument& c) const { c.instrument = simulation.instrument_place(c.name); }
+  void find(SetInstrument& c) const { c.instrument = instrument_place(simulation, c.name); }
   void find(CutObject& c) const {
-    c.object = simulation.find(said.object);
+    c.object = find_object(simulation, said.object);
     if (auto* const plane = std::get_if<PlaneToCut>(&c.what)) {
       if (said.nodes)
         plane->nodes = nodes(c.object, *said.nodes);

@@ -181,18 +181,18 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
           next.came.velocity[to.node] = velocity[i];
   }
   told.nodes = now->nodes.size();
-  w.now.cuttings.push_back(told);
+  w.now.news.cuttings.push_back(told);
   for (std::size_t k = 0; k < free.parts.size(); ++k) {
     Object& part = pieces.emplace_back(
         renumbered(old, std::make_shared<const Model>(std::move(free.parts[k].model))));
     part.method = Method::ela;
     part.matter->source = {};
-    w.now.cuttings.push_back({.kind = Cutting::Kind::part,
-                              .object = index,
-                              .part = moves.objects[k + 1],
-                              .nodes = part.model().nodes.size(),
-                              .time = w.now.clock.time,
-                              .text = {}});
+    w.now.news.cuttings.push_back({.kind = Cutting::Kind::part,
+                                   .object = index,
+                                   .part = moves.objects[k + 1],
+                                   .nodes = part.model().nodes.size(),
+                                   .time = w.now.clock.time,
+                                   .text = {}});
   }
   ++w.now.counts.cuts;
   move_all(w, index, moves, std::move(pieces), velocity);
@@ -342,16 +342,16 @@ void find_free_motion(World& w, std::size_t index) {
     (void)still_of(w, object);
     return;
   } catch (const SingularStiffness& error) {
-    w.now.cuttings.push_back({.kind = Cutting::Kind::loose,
-                              .object = index,
-                              .nodes = object.model().nodes.size(),
-                              .time = w.now.clock.time,
-                              .text = error.what()});
+    w.now.news.cuttings.push_back({.kind = Cutting::Kind::loose,
+                                   .object = index,
+                                   .nodes = object.model().nodes.size(),
+                                   .time = w.now.clock.time,
+                                   .text = error.what()});
   }
   if (w.options.warn)
     w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
                    " s: it goes on elastodynamic, for behind the cut " +
-                   w.now.cuttings.back().text);
+                   w.now.news.cuttings.back().text);
   if (object.shown.late)
     shape_in_step(w, object);
   object.contact = nullptr;
@@ -433,11 +433,11 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
   moves.add(ways, old.model().nodes.size());
   std::deque<Object> pieces;
   pieces.push_back(renumbered(old, old.cut.first));
-  w.now.cuttings.push_back({.kind = Cutting::Kind::restored,
-                            .object = c.object,
-                            .nodes = old.cut.first->nodes.size(),
-                            .time = w.now.clock.time,
-                            .text = {}});
+  w.now.news.cuttings.push_back({.kind = Cutting::Kind::restored,
+                                 .object = c.object,
+                                 .nodes = old.cut.first->nodes.size(),
+                                 .time = w.now.clock.time,
+                                 .text = {}});
   move_all(w, c.object, moves, std::move(pieces));
 }
 

@@ -71,8 +71,11 @@ std::size_t add_instrument(World& w, const std::string& name) {
 
 InstrumentReport report_of(const World& w, std::size_t instrument) {
   const Instrument& i = w.now.instruments.at(instrument);
-  InstrumentReport report{
-      .present = i.present, .pose = i.way.at(w.now.clock.time), .force = {}, .torque = {}};
+  InstrumentReport report{.name = i.name,
+                          .present = i.present,
+                          .pose = i.way.at(w.now.clock.time),
+                          .force = {},
+                          .torque = {}};
   if (!i.present)
     return report;
   const auto add = [&](const Vec3& at, const Vec3& force) {

@@ -70,7 +70,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
     set_going(w, c.object, still);
   } else {
     const double jump = stop(w, object, still);
-    w.now.jumps.push_back({c.object, jump});
+    w.now.news.jumps.push_back({c.object, jump});
     w.now.counts.largest_jump = std::max(w.now.counts.largest_jump, jump);
   }
   object.method = c.method;
@@ -80,7 +80,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
 void Rule<SetMethod>::log(const World& w, const SetMethod& c, ChangeRow& row) {
   row.what = "method";
   row.text = method_name(c.method);
-  const std::vector<MethodJump>& jumps = w.now.jumps;
+  const std::vector<MethodJump>& jumps = w.now.news.jumps;
   if (c.method == Method::ffe && !jumps.empty() && jumps.back().object == c.object)
     row.value = jumps.back().size;
 }

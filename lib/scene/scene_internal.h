@@ -216,8 +216,7 @@ struct Scene {
   Clock clock;
   Emits emits;
   SimulationCounts counts;
-  std::vector<MethodJump> jumps;
-  std::vector<Cutting> cuttings;
+  News news;
 };
 
 } // namespace gewebe::simulation

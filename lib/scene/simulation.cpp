@@ -13,17 +13,25 @@ using namespace simulation;
 
 namespace {
 
-/// The place of the one of this name. \throw Error naming those there are
-template <class All, class NameOf>
-std::size_t place_of(const std::string& name, const char* what, const All& all, NameOf&& name_of) {
-  std::string list;
+/// The place of the one of this name among so many.
+template <class NameOf>
+std::size_t place_of(const std::string& name, std::size_t count, NameOf&& name_of) {
   std::size_t k = 0;
-  for (const auto& one : all) {
-    if (name_of(one) == name)
-      return k;
-    list += (list.empty() ? "" : ", ") + name_of(one);
+  while (k < count && name_of(k) != name)
     ++k;
-  }
+  return k;
+}
+
+/// As place_of. \throw Error naming those there are
+template <class NameOf>
+std::size_t number_of(const char* what, const std::string& name, std::size_t count,
+                      NameOf&& name_of) {
+  const std::size_t place = place_of(name, count, name_of);
+  if (place < count)
+    return place;
+  std::string list;
+  for (std::size_t k = 0; k < count; ++k)
+    list += (list.empty() ? "" : ", ") + name_of(k);
   throw Error(std::string("there is no ") + what + " '" + name + "', expected " +
               (list.empty() ? std::string("an ") + what + " command first" : "one of " + list));
 }
@@ -96,24 +104,14 @@ const Model& Simulation::first_model(std::size_t object) const {
   return first ? *first : now;
 }
 
-std::span<const std::uint32_t> Simulation::first_nodes(std::size_t object) const {
-  return *world_->now.objects.at(object).cut.first_nodes;
+ObjectFacts Simulation::object(std::size_t object) const {
+  const Object& one = world_->now.objects.at(object);
+  return {one.method, one.matter->known, *one.cut.first_nodes, *one.cut.places};
 }
 
-std::span<const std::uint32_t> Simulation::places(std::size_t object) const {
-  return *world_->now.objects.at(object).cut.places;
-}
-
-bool Simulation::known(std::size_t object) const {
-  return world_->now.objects.at(object).matter->known;
-}
-
-Method Simulation::method(std::size_t object) const {
-  return world_->now.objects.at(object).method;
-}
-
-std::size_t Simulation::find(const std::string& name) const {
-  return place_of(name, "object", world_->now.objects, [](const Object& o) { return o.name(); });
+std::size_t find_object(const Simulation& simulation, const std::string& name) {
+  return number_of("object", name, simulation.object_count(),
+                   [&](std::size_t k) { return simulation.name(k); });
 }
 
 // ---- instruments
@@ -122,21 +120,18 @@ std::size_t Simulation::add_instrument(const std::string& name) {
   return simulation::add_instrument(*world_, name);
 }
 
-std::size_t Simulation::instrument_place(const std::string& name) const noexcept {
-  return simulation::instrument_place(*world_, name);
-}
-
 std::size_t Simulation::instrument_count() const noexcept {
   return world_->now.instruments.size();
 }
 
-const std::string& Simulation::instrument_name(std::size_t instrument) const {
-  return world_->now.instruments.at(instrument).name;
+std::size_t find_instrument(const Simulation& simulation, const std::string& name) {
+  return number_of("instrument", name, simulation.instrument_count(),
+                   [&](std::size_t k) { return simulation.instrument(k).name; });
 }
 
-std::size_t Simulation::find_instrument(const std::string& name) const {
-  return place_of(name, "instrument", world_->now.instruments,
-                  [](const Instrument& i) { return i.name; });
+std::size_t instrument_place(const Simulation& simulation, const std::string& name) {
+  return place_of(name, simulation.instrument_count(),
+                  [&](std::size_t k) { return simulation.instrument(k).name; });
 }
 
 InstrumentReport Simulation::instrument(std::size_t instrument) const {
@@ -227,24 +222,16 @@ const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) co
   return *world_->now.objects.at(object).shown.forces;
 }
 
-const std::vector<MethodJump>& Simulation::jumps() const noexcept {
-  return world_->now.jumps;
-}
-
-void Simulation::take_jumps() noexcept {
-  world_->now.jumps.clear();
-}
-
 std::vector<std::size_t> Simulation::take_renewed() {
   return std::exchange(world_->renewed, {});
 }
 
-const std::vector<Cutting>& Simulation::cuttings() const noexcept {
-  return world_->now.cuttings;
+const News& Simulation::news() const noexcept {
+  return world_->now.news;
 }
 
-void Simulation::take_cuttings() noexcept {
-  world_->now.cuttings.clear();
+void Simulation::take_news() noexcept {
+  world_->now.news = {};
 }
 
 void Simulation::warn_of_thresholds() {
@@ -285,7 +272,7 @@ SimulationCounts Simulation::counts() const {
 SimulationState Simulation::state() const {
   SimulationState state;
   for (std::size_t i = 0; i < object_count(); ++i) {
-    if (!known(i))
+    if (!object(i).known)
       continue;
     state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
     const Object& object = world_->now.objects[i];

@@ -84,8 +84,25 @@ struct SimulationCounts {
   std::uint64_t cut_corrections = 0, cut_renewals = 0, cut_factors = 0;
 };
 
+/// What is known of an object without reading it.
+struct ObjectFacts {
+  Method method = Method::ela;
+  bool known = false; ///< its model was needed so far
+  /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
+  std::span<const std::uint32_t> first_nodes;
+  /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.
+  std::span<const std::uint32_t> places;
+};
+
+/// What has happened, each in its order.
+struct News {
+  std::vector<MethodJump> jumps;
+  std::vector<Cutting> cuttings;
+};
+
 /// An instrument at the end of the last step.
 struct InstrumentReport {
+  std::string name{};
   bool present = false;
   Pose pose;
   Vec3 force, torque;    ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
@@ -133,25 +150,13 @@ public:
   const Model& model(std::size_t object) const;
   /// The model as it came. \throw as its source
   const Model& first_model(std::size_t object) const;
-  /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
-  std::span<const std::uint32_t> first_nodes(std::size_t object) const;
-  /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.
-  std::span<const std::uint32_t> places(std::size_t object) const;
-  /// Whether its model was needed so far.
-  bool known(std::size_t object) const;
-  Method method(std::size_t object) const;
-  /// \throw Error naming those there are
-  std::size_t find(const std::string& name) const;
+  /// Valid until something is cut.
+  ObjectFacts object(std::size_t object) const;
 
   /// An instrument that is in no place until SetInstrument; its number, the old one where there is
   /// one of that name.
   std::size_t add_instrument(const std::string& name);
-  /// The number of the one of that name; instrument_count() where there is none.
-  std::size_t instrument_place(const std::string& name) const noexcept;
   std::size_t instrument_count() const noexcept;
-  const std::string& instrument_name(std::size_t instrument) const;
-  /// \throw Error naming those there are
-  std::size_t find_instrument(const std::string& name) const;
   InstrumentReport instrument(std::size_t instrument) const;
 
   /// Takes effect now. \pre objects and nodes exist, numbers are finite
@@ -189,14 +194,12 @@ public:
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
-  /// Since they were last taken: jumps; and objects for which a call that threw (under guard) did
-  /// what Renew does.
-  const std::vector<MethodJump>& jumps() const noexcept;
-  void take_jumps() noexcept;
+  /// Since it was last taken.
+  const News& news() const noexcept;
+  void take_news() noexcept;
+  /// Objects for which a call that threw (under guard) did what Renew does, since they were last
+  /// taken.
   std::vector<std::size_t> take_renewed();
-  /// Since they were last taken, in the order in which they happened.
-  const std::vector<Cutting>& cuttings() const noexcept;
-  void take_cuttings() noexcept;
   /// Behind the last step: warns, once per object, where the threshold of the two-step method was
   /// never reached.
   void warn_of_thresholds();
@@ -207,5 +210,11 @@ public:
 private:
   std::unique_ptr<simulation::World> world_;
 };
+
+/// The number of the one of that name. \throw Error naming those there are
+std::size_t find_object(const Simulation& simulation, const std::string& name);
+std::size_t find_instrument(const Simulation& simulation, const std::string& name);
+/// As find_instrument; where there is none, the number of the next: instrument_count().
+std::size_t instrument_place(const Simulation& simulation, const std::string& name);
 
 } // namespace gewebe

@@ -40,7 +40,7 @@ inline std::uint32_t highest(const Model& model) {
 }
 
 inline std::size_t count(const Simulation& s, Cutting::Kind kind) {
-  return static_cast<std::size_t>(std::count_if(s.cuttings().begin(), s.cuttings().end(),
+  return static_cast<std::size_t>(std::count_if(s.news().cuttings.begin(), s.news().cuttings.end(),
                                                 [&](const Cutting& c) { return c.kind == kind; }));
 }
 

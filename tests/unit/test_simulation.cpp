@@ -164,8 +164,8 @@ TEST(Simulation, RefusesDisplacementAlongFixedAxesAndThePast) {
   s.step(1);
   EXPECT_THROW(s.schedule(0.5, Emit{true}), Error);
   EXPECT_THROW(s.step_to(0.5), Error);
-  EXPECT_THROW((void)s.find("b"), Error);
-  EXPECT_EQ(s.find("a"), 0U);
+  EXPECT_THROW((void)find_object(s, "b"), Error);
+  EXPECT_EQ(find_object(s, "a"), 0U);
   EXPECT_FALSE(s.emits().forces);
   s.schedule(1, Emit{true}); // now
   EXPECT_TRUE(s.emits().forces);

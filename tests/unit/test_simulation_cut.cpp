@@ -27,7 +27,7 @@ TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
   const std::vector<double> before = shape(s, 0);
   s.apply(CutObject{0, incision(s.model(0))});
   ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
-  EXPECT_GT(s.cuttings()[0].doubled, 2U);
+  EXPECT_GT(s.news().cuttings[0].doubled, 2U);
   s.step(0.1);
   EXPECT_EQ(count(s, Cutting::Kind::loose), 0U);
   const std::vector<double> after = shape(s, 0);
@@ -35,7 +35,7 @@ TEST(SimulationCut, AnElastostaticShapeIsThatOfTheCutModel) {
   // Afresh.
   Load load{};
   const Model& model = s.model(0);
-  const std::span<const std::uint32_t> first = s.first_nodes(0);
+  const std::span<const std::uint32_t> first = s.object(0).first_nodes;
   std::vector<double> mass(s.first_model(0).nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     if (first[i] == node)
@@ -80,10 +80,11 @@ TEST(SimulationCut, NothingMovesWhereNothingIsSeveredThatCarries) {
   for (const std::uint32_t node : near)
     for (std::size_t a = 0; a < 3; ++a)
       EXPECT_EQ(after[3 * std::size_t{node} + a], before[3 * std::size_t{node} + a]);
-  for (std::uint32_t i = 0; i < s.first_nodes(0).size(); ++i)
+  for (std::uint32_t i = 0; i < s.object(0).first_nodes.size(); ++i)
     if (i >= surface_count(s.first_model(0)) && i < surface_count(s.model(0))) {
       for (std::size_t a = 0; a < 3; ++a)
-        EXPECT_EQ(after[3 * std::size_t{i} + a], before[3 * std::size_t{s.first_nodes(0)[i]} + a]);
+        EXPECT_EQ(after[3 * std::size_t{i} + a],
+                  before[3 * std::size_t{s.object(0).first_nodes[i]} + a]);
     }
 }
 
@@ -98,11 +99,11 @@ TEST(SimulationCut, ALobeComesOffAndFalls) {
     s.step(0.02);
     ASSERT_EQ(s.object_count(), 2U);
     EXPECT_EQ(s.name(1), "organ.1");
-    EXPECT_EQ(s.method(1), Method::ela);
+    EXPECT_EQ(s.object(1).method, Method::ela);
     EXPECT_EQ(count(s, Cutting::Kind::cut), 1U);
     EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
     EXPECT_NEAR(total_mass(s.model(0)) + total_mass(s.model(1)), mass, 1e-12 * mass);
-    s.take_cuttings();
+    s.take_news();
     const auto height = [&] {
       const std::vector<double> u = shape(s, 1);
       double sum = 0;
@@ -197,7 +198,7 @@ TEST(SimulationCut, AnEventThatCutsKeepsItsOwnNodes) {
   // The force that follows it is on the centrals, wherever they are.
   for (std::uint32_t i = 0; i < s.model(0).nodes.size(); ++i) {
     const bool central = i >= surface_count(s.model(0));
-    EXPECT_EQ(central, s.first_nodes(0)[i] >= surface) << i;
+    EXPECT_EQ(central, s.object(0).first_nodes[i] >= surface) << i;
   }
 }
 
@@ -234,7 +235,7 @@ TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
   s.apply(CutObject{0, test::all_but_one(model, highest(model))});
   s.step(0.01);
   ASSERT_EQ(count(s, Cutting::Kind::loose), 1U);
-  EXPECT_EQ(s.method(0), Method::ela);
+  EXPECT_EQ(s.object(0).method, Method::ela);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("goes on elastodynamic"), std::string::npos);
   s.step(0.1);
@@ -298,11 +299,11 @@ TEST(SimulationCut, BadCutsAreRefusedAndChangeNothing) {
       }
       EXPECT_EQ(s.model(0), before);
     }
-    EXPECT_TRUE(s.cuttings().empty());
+    EXPECT_TRUE(s.news().cuttings.empty());
     EXPECT_EQ(shape(s, 0), u);
     s.apply(CutObject{0, incision(s.model(0))});
     EXPECT_THROW(s.apply(CutObject{0, incision(before)}), Error); // nothing is left
-    EXPECT_EQ(s.cuttings().size(), 1U);
+    EXPECT_EQ(s.news().cuttings.size(), 1U);
   }
 }
 
@@ -331,7 +332,7 @@ TEST(SimulationCut, AStepThatFailsTakesACutBack) {
     EXPECT_EQ(s.model(0), before);
     EXPECT_EQ(s.time(), 0.01);
     EXPECT_EQ(s.pending(), 2U);
-    EXPECT_TRUE(s.cuttings().empty());
+    EXPECT_TRUE(s.news().cuttings.empty());
     EXPECT_EQ(shape(s, 0), shape(calm, 0));
     // Up to the cut it goes on as if nothing had been.
     s.step_to(0.014);
@@ -361,7 +362,7 @@ TEST(SimulationCut, ABladeCutsWhatItSweepsOver) {
         s.step(1.0 / steps);
       EXPECT_GE(count(s, Cutting::Kind::cut), 1U);
       std::size_t doubled = 0;
-      for (const Cutting& c : s.cuttings())
+      for (const Cutting& c : s.news().cuttings)
         doubled += c.doubled;
       EXPECT_GT(doubled, 8U) << steps;
       EXPECT_EQ(s.instrument(blade).nodes, 0U);

@@ -59,7 +59,7 @@ TEST(SimulationLazy, NothingIsReadBeforeItIsNeeded) {
     EXPECT_EQ(asked[2].model, 1);
     EXPECT_EQ(asked[2].stiffness, method == Method::ffe ? 1 : 0);
     EXPECT_EQ(asked[0].model + asked[3].model, 0);
-    EXPECT_TRUE(s.known(2) && !s.known(0));
+    EXPECT_TRUE(s.object(2).known && !s.object(0).known);
     EXPECT_TRUE(s.displacement(0).empty());
     EXPECT_GT(largest_difference(shape(s, 2), std::vector<double>(s.displacement(2).size())), 0);
     s.apply(SetGravity{{0, 0, -1}}); // acts on all
@@ -96,11 +96,11 @@ TEST(SimulationMethod, AnElastostaticObjectStartsToMoveAtItsShapeAndAtRest) {
   s.step(0.1);
   const std::vector<double> still = shape(s, 0);
   s.apply(SetMethod{0, Method::ela});
-  EXPECT_EQ(s.method(0), Method::ela);
+  EXPECT_EQ(s.object(0).method, Method::ela);
   s.step(0);
   EXPECT_EQ(shape(s, 0), still);
   EXPECT_EQ(s.state().kinetic_energy, 0);
-  EXPECT_TRUE(s.jumps().empty());
+  EXPECT_TRUE(s.news().jumps.empty());
   s.step(0.001);
   // It starts near its equilibrium: linear and non-linear shapes differ a little.
   EXPECT_GT(s.state().kinetic_energy, 0);
@@ -121,17 +121,17 @@ TEST(SimulationMethod, AMovingObjectTakesItsElastostaticShapeAndTellsTheJump) {
   s.apply(SetMethod{0, Method::ffe});
   s.step(0);
   EXPECT_EQ(shape(s, 0), still);
-  ASSERT_EQ(s.jumps().size(), 1U);
-  EXPECT_EQ(s.jumps()[0].size, largest_difference(moving, still));
-  EXPECT_GT(s.jumps()[0].size, 1e-3);
-  EXPECT_EQ(s.counts().largest_jump, s.jumps()[0].size);
-  s.take_jumps();
+  ASSERT_EQ(s.news().jumps.size(), 1U);
+  EXPECT_EQ(s.news().jumps[0].size, largest_difference(moving, still));
+  EXPECT_GT(s.news().jumps[0].size, 1e-3);
+  EXPECT_EQ(s.counts().largest_jump, s.news().jumps[0].size);
+  s.take_news();
   // There and back again, at a time; what is not touched jumps nowhere.
   s.schedule(0.01, SetMethod{0, Method::ela});
   s.schedule(0.01, SetMethod{0, Method::ffe});
   s.step(0.01);
-  ASSERT_EQ(s.jumps().size(), 1U);
-  EXPECT_EQ(s.jumps()[0].size, 0);
+  ASSERT_EQ(s.news().jumps.size(), 1U);
+  EXPECT_EQ(s.news().jumps[0].size, 0);
   EXPECT_EQ(shape(s, 0), still);
 }
 
@@ -143,12 +143,12 @@ TEST(SimulationMethod, RefusedWhereItCannotBe) {
   s.add_object("massless", {[] { return test::two_masses(0); }}, Method::ffe);
   s.apply(Attach{0, {1}, 1, {2}, 10});
   EXPECT_THROW(s.apply(SetMethod{0, Method::ffe}), Error);
-  EXPECT_EQ(s.method(0), Method::ela);
+  EXPECT_EQ(s.object(0).method, Method::ela);
   s.apply(SetForce{2, {0}, {1, 0, 0}});
   s.step(0.01);
   const std::vector<double> before = shape(s, 2);
   EXPECT_THROW(s.apply(SetMethod{2, Method::ffe}), Error); // nothing holds it
-  EXPECT_EQ(s.method(2), Method::ela);
+  EXPECT_EQ(s.object(2).method, Method::ela);
   s.step(0);
   EXPECT_EQ(shape(s, 2), before);
   s.step(0.01);
@@ -201,9 +201,9 @@ std::vector<double> disturbed(bool with_failures, std::vector<std::vector<std::s
     }
     all.push_back(s.state().kinetic_energy);
     all.push_back(s.emits().forces ? 1 : 0);
-    for (const MethodJump& jump : s.jumps())
+    for (const MethodJump& jump : s.news().jumps)
       all.push_back(jump.size);
-    s.take_jumps();
+    s.take_news();
   };
   s.apply(SetForce{0, {nodes[1]}, {0, 30, 0}, 0.05});
   s.apply(SetForce{1, {nodes[1]}, {0, 30, 0}});

@@ -189,8 +189,8 @@ TEST(SimulationMomentum, AWoundThatHasJustOpenedIsNoMotion) {
     else if (s.model(0).nodes[i].position.y < -50)
       inside.from.push_back(i);
   s.apply(CutObject{0, inside});
-  EXPECT_GT(s.cuttings()[0].springs, 10U);
-  EXPECT_EQ(s.cuttings()[0].doubled, 0U);
+  EXPECT_GT(s.news().cuttings[0].springs, 10U);
+  EXPECT_EQ(s.news().cuttings[0].doubled, 0U);
   pull_for_a_step(s, nodes, 3);
   ASSERT_EQ(s.object_count(), 1U);
   const Model opened = s.model(0);
@@ -331,7 +331,7 @@ TEST(SimulationMomentum, WhatHangsLooselyIsAsFastAsItsShape) {
       fail = false;
       s.step(dt);
       ASSERT_EQ(test::count(s, Cutting::Kind::loose), 1U);
-      ASSERT_EQ(s.method(0), Method::ela);
+      ASSERT_EQ(s.object(0).method, Method::ela);
       const double should = moving ? energy : 0;
       EXPECT_LE(std::abs(s.state().kinetic_energy - should), 1e-8 * should);
     }
@@ -358,7 +358,7 @@ TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
   s.apply(most);
   ASSERT_EQ(s.object_count(), 1U);
   for (std::uint32_t& node : lobe)
-    node = s.places(0)[node];
+    node = s.object(0).places[node];
   s.apply(SetTear{0, 0.4});
   for (int k = 2; k < 20 && s.object_count() == 1; ++k)
     pulled(k);

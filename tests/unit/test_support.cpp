@@ -70,7 +70,7 @@ public:
       scene_.apply(CutObject{0, test::incision(model_)});
       scene_.apply(Release{0, {top()}});
       scene_.step(0.001);
-      scene_.take_cuttings();
+      scene_.take_news();
     }
   }
 
@@ -111,9 +111,9 @@ public:
       scene_.apply(SetForce{1, {top()}, {0, 0, 2000}});
       return bends();
     case Feature::method: {
-      const Method other = scene_.method(0) == Method::ela ? Method::ffe : Method::ela;
+      const Method other = scene_.object(0).method == Method::ela ? Method::ffe : Method::ela;
       scene_.apply(SetMethod{0, other});
-      return scene_.method(0) == other;
+      return scene_.object(0).method == other;
     }
     case Feature::two_step:
       scene_.apply(two_step());
@@ -160,7 +160,7 @@ private:
     for (int k = 0; k < 10; ++k)
       scene_.step(0.001);
     std::set<std::size_t> cut;
-    for (const Cutting& c : scene_.cuttings())
+    for (const Cutting& c : scene_.news().cuttings)
       cut.insert(c.object);
     return cut.contains(0);
   }

@@ -36,7 +36,7 @@ void SceneChecks::instrument(std::size_t number, const InstrumentShape& shape) {
 
 void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& warn,
                        const Tell& distrust) {
-  for (const MethodJump& jump : simulation.jumps()) {
+  for (const MethodJump& jump : simulation.news().jumps) {
     Object& object = objects_[jump.object];
     const double most = largest(simulation.displacement(jump.object));
     if (object.jump || !(jump.size > most_jump * most) || !warn)
@@ -47,14 +47,14 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
          " mm as its method changed, and its forces with it");
   }
   for (std::size_t n = 0; n < simulation.object_count(); ++n)
-    if (simulation.known(n))
+    if (simulation.object(n).known)
       look_at(simulation, n, shapes, warn, distrust);
 }
 
 void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool shapes,
                           const Tell& warn, const Tell& distrust) {
   Object& object = objects_[number];
-  const bool wanted = simulation.method(number) == Method::ela || shapes;
+  const bool wanted = simulation.object(number).method == Method::ela || shapes;
   const bool thin = !radius_.empty() && !object.thin;
   if ((!wanted || (object.turned && object.volume && object.strain)) && !thin)
     return;
@@ -75,7 +75,7 @@ void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool
       continue;
     object.thin = true;
     warn("object " + simulation.name(number) + ": the instrument " +
-         simulation.instrument_name(instrument) + " is " + number_text(2 * radius) +
+         simulation.instrument(instrument).name + " is " + number_text(2 * radius) +
          " mm thick, less than an edge (" + rounded_text(object.check->mean_edge()) +
          " mm in the mean), it can pass between nodes");
   }
@@ -111,7 +111,7 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
              percent(faults.volume) + ", which tissue does not do");
   }
   if (!(faults.strain <= most_strain) && !object.strain && distrust &&
-      simulation.method(number) == Method::ela) {
+      simulation.object(number).method == Method::ela) {
     object.strain = true;
     distrust(who + "the edge " + std::to_string(faults.i) + "-" + std::to_string(faults.j) +
              " is strained by " + percent(faults.strain) +

@@ -165,7 +165,7 @@ struct SceneRun::State {
   }
 
   void write(const EmitModelCommand& c) {
-    const std::size_t object = simulation.find(c.object);
+    const std::size_t object = find_object(simulation, c.object);
     if (!options.files.write_model)
       throw Error("models can't be written here");
     if (std::find(models.begin(), models.end(), c.file) != models.end())
@@ -256,7 +256,7 @@ struct SceneRun::State {
     for (; in_result < objects; ++in_result) {
       const Model& model = models_too ? simulation.first_model(in_result) : none;
       const bool part = std::any_of(
-          simulation.cuttings().begin(), simulation.cuttings().end(),
+          simulation.news().cuttings.begin(), simulation.news().cuttings.end(),
           [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
       deliver([&] {
         if (part)
@@ -268,13 +268,13 @@ struct SceneRun::State {
     if (!cut || !models_too)
       return;
     std::set<std::size_t> changed;
-    for (const Cutting& c : simulation.cuttings())
+    for (const Cutting& c : simulation.news().cuttings)
       if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
         changed.insert(c.object);
     for (const std::size_t object : changed)
       deliver([&] {
         options.result->change_object(object, simulation.model(object),
-                                      simulation.first_nodes(object));
+                                      simulation.object(object).first_nodes);
       });
   }
 
@@ -293,7 +293,8 @@ struct SceneRun::State {
     std::vector<std::vector<double>> rest;
     std::vector<FrameObject> frame;
     for (std::size_t i = 0; i < objects; ++i)
-      rest.emplace_back(simulation.known(i) ? 3 * simulation.first_model(i).nodes.size() : 0);
+      rest.emplace_back(simulation.object(i).known ? 3 * simulation.first_model(i).nodes.size()
+                                                   : 0);
     for (const std::vector<double>& one : rest)
       frame.push_back({one, {}});
     deliver([&] { options.result->add_frame(0, frame); });
@@ -311,9 +312,8 @@ struct SceneRun::State {
         options.reply(options.binary ? binary_answer(simulation, steps)
                                      : text_answer(simulation, steps));
       });
-    simulation.take_jumps();
     if (options.events != nullptr)
-      for (const Cutting& c : simulation.cuttings())
+      for (const Cutting& c : simulation.news().cuttings)
         options.events->cutting(simulation, c);
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
@@ -327,7 +327,7 @@ struct SceneRun::State {
       deliver([&] { options.result->add_frame(simulation.time(), frame); });
       ++counts.frames;
     }
-    simulation.take_cuttings();
+    simulation.take_news();
     if (options.measure)
       deliver([&] { measure(); });
     if (options.events != nullptr)
