@@ -236,7 +236,9 @@ std::vector<RepairReport::Line> RepairReport::lines() const {
           {"hole_points", hole_points, "points are new in them", false},
           {"hole_faces", hole_faces, "faces are new in them", false},
           {"degenerate_left", degenerate_left, "faces without area could not be removed", true},
-          {"holes_left", holes_left, "holes were not filled", true}};
+          {"holes_left", holes_left, "holes were not filled", true},
+          {"holes_bent", holes_bent,
+           "of these are so long and bent that the search for triangles would take minutes", true}};
 }
 
 RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const Context& context) {

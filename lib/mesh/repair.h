@@ -21,6 +21,10 @@ struct RepairOptions {
   bool orientation = false;           ///< faces are turned so that neighbours agree, and outward
   bool degenerate = false;            ///< faces without area go
   std::optional<std::uint64_t> holes; ///< of at most so many edges are filled
+  /// Holes that are so bent that Delaunay's tetrahedra hold no filling are filled by a search of as
+  /// many steps as the third power of their edges, all together by those of one hole of so many
+  /// edges: seconds.
+  std::uint64_t searched_edges = 600;
 
   bool operator==(const RepairOptions&) const = default;
 };
@@ -46,6 +50,7 @@ struct RepairReport {
   std::uint64_t holes = 0, hole_points = 0, hole_faces = 0; ///< filled, new, new
   std::uint64_t holes_left = 0; ///< larger than asked, or the border meets itself, another sheet,
                                 ///< or is that of one face alone
+  std::uint64_t holes_bent = 0; ///< of those left: the search would take more than it may
 
   /// Each count under its name; `text` says what it means ("points were welded").
   struct Line {
@@ -70,7 +75,7 @@ struct RepairReport {
 ///   degenerate   short edges are collapsed, flat faces merged with the neighbour at their longest
 ///                edge (CGAL)
 ///   holes        borders of one loop are filled by triangles like those around (CGAL; Liepa,
-///                Filling Holes in Meshes, 2003)
+///                Filling Holes in Meshes, 2003), but for what searched_edges says
 ///
 /// Edges of three faces or more stay as they are; degenerate and holes work on each sheet alone.
 /// \pre check_mesh(mesh) passes   \throw Error if the weld distance is below 1e-12 of the box;

@@ -1,11 +1,11 @@
 #include "mesh/edges.h"
 #include "mesh/repair_internal.h"
+#include "mesh/sheets.h"
 
 #define CGAL_HOLE_FILLING_DO_NOT_USE_CDT2 // off by default, and dear to compile
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/border.h>
-#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
@@ -19,7 +19,6 @@
 #include <vector>
 
 namespace gewebe::repair {
-
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -28,26 +27,63 @@ using Vertex = Surface::Vertex_index;
 using Face = Surface::Face_index;
 using Edge = Surface::Edge_index;
 using Halfedge = Surface::Halfedge_index;
+
+/// The points around one, but for `other`, ascending.
+std::vector<Vertex> neighbours(const Surface& surface, Vertex of, Vertex other) {
+  std::vector<Vertex> around;
+  for (const Halfedge h : CGAL::halfedges_around_target(of, surface))
+    if (surface.source(h) != other)
+      around.push_back(surface.source(h));
+  std::sort(around.begin(), around.end());
+  return around;
+}
+
+/// Whether the surface stays one when this edge is made a point: the ends have no neighbour in
+/// common but the corners of the edge's faces, and nothing folds up.
+bool link_condition(const Surface& surface, Edge edge) {
+  const Halfedge there = surface.halfedge(edge), back = surface.opposite(there);
+  const Vertex a = surface.source(there), b = surface.target(there);
+  const bool left = !surface.is_border(there), right = !surface.is_border(back);
+  const Vertex on_left = surface.target(surface.next(there));
+  const Vertex on_right = surface.target(surface.next(back));
+  std::vector<Vertex> both;
+  const std::vector<Vertex> of_a = neighbours(surface, a, b), of_b = neighbours(surface, b, a);
+  std::set_intersection(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                        std::back_inserter(both));
+  for (const Vertex v : both)
+    if (!(left && v == on_left) && !(right && v == on_right))
+      return false;
+  const auto alone = [&](Halfedge h) { // the face has no other neighbour
+    return surface.is_border(surface.opposite(surface.next(h))) &&
+           surface.is_border(surface.opposite(surface.prev(h)));
+  };
+  if ((left && alone(there)) || (right && alone(back)))
+    return false;
+  if (!left || !right)
+    return true;
+  return !(surface.is_border(a) && surface.is_border(b)) && !CGAL::is_tetrahedron(there, surface) &&
+         !(surface.next(there) == surface.opposite(surface.prev(back)) &&
+           surface.prev(there) == surface.opposite(surface.next(back)));
+}
+
+} // namespace
+} // namespace gewebe::repair
+
+/// CGAL's own goes round the neighbours of each neighbour: for thousands of flat faces at one point
+/// that takes hours. The answer is the same.
+template <>
+inline bool CGAL::Euler::does_satisfy_link_condition<gewebe::repair::Surface>(
+    gewebe::repair::Edge edge, const gewebe::repair::Surface& surface) {
+  return gewebe::repair::link_condition(surface, edge);
+}
+
+namespace gewebe::repair {
+
+namespace {
+
 namespace pmp = CGAL::Polygon_mesh_processing;
 
 constexpr std::uint32_t none = UINT32_MAX;
-
-/// What CGAL did to make sheets of a soup: which point a copy is of, which faces run backward.
-struct Sheets {
-  std::vector<std::uint32_t> origin;
-  std::vector<char> backward;
-};
-struct SheetsVisitor : pmp::Default_orientation_visitor {
-  explicit SheetsVisitor(Sheets& sheets) : sheets_(&sheets) {}
-  void duplicated_vertex(std::size_t from, std::size_t to) {
-    sheets_->origin.resize(std::max(sheets_->origin.size(), to + 1), none);
-    sheets_->origin[to] = sheets_->origin[from];
-  }
-  void polygon_orientation_reversed(std::size_t face) { sheets_->backward[face] ^= 1; }
-
-private:
-  Sheets* sheets_;
-};
 
 using TextureCoordinates = std::array<float, 2>;
 
@@ -56,6 +92,8 @@ public:
   Repair(TriangleMesh& mesh, RepairReport& report) : mesh_(mesh), report_(report) {}
 
   void run(const RepairOptions& options) {
+    searched_edges_ = std::min<std::uint64_t>(options.searched_edges, 1'000'000);
+    steps_left_ = searched_edges_ * searched_edges_ * searched_edges_;
     cut_into_sheets();
     if (options.degenerate)
       remove_flat_faces();
@@ -65,46 +103,51 @@ public:
   }
 
 private:
-  /// Makes the mesh, but for faces with equal corners, sheets that agree: copies points where more
-  /// than two faces meet in an edge. These copies are undone in write_back().
+  /// Makes the mesh, but for faces with equal corners, sheets that agree, and gives them to CGAL.
+  /// Copies of points are undone in write_back(). The half-edges are linked here: CGAL's add_face()
+  /// goes round each corner's point, and would take hours where many faces meet.
   void cut_into_sheets() {
-    std::vector<Kernel::Point_3> points;
-    for (const Vec3& p : mesh_.points)
-      points.emplace_back(p.x, p.y, p.z);
-    std::vector<std::array<std::size_t, 3>> faces;
+    std::vector<Triangle> faces;
     std::vector<std::uint32_t> source;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-      const auto& [a, b, c] = mesh_.triangles[t];
       if (has_equal_corners(mesh_.triangles[t]))
         continue;
-      faces.push_back({a, b, c});
+      faces.push_back(mesh_.triangles[t]);
       source.push_back(t);
     }
-    edges_ = edge_table(mesh_.triangles, points.size());
-    sheets_.origin.resize(points.size());
-    for (std::uint32_t p = 0; p < points.size(); ++p)
-      sheets_.origin[p] = p;
-    sheets_.backward.assign(faces.size(), 0);
-    pmp::orient_polygon_soup(points, faces, CGAL::parameters::visitor(SheetsVisitor(sheets_)));
+    edges_ = edge_table(mesh_.triangles, mesh_.points.size());
+    const Sheets sheets = gewebe::cut_into_sheets(mesh_.points.size(), faces);
+    const HalfEdges links = half_edges(sheets.origin.size(), sheets.triangles);
 
     origin_ = surface_.add_property_map<Vertex, std::uint32_t>("v:origin", none).first;
-    for (std::size_t p = 0; p < points.size(); ++p)
-      origin_[surface_.add_vertex(points[p])] = sheets_.origin[p];
+    for (std::uint32_t p = 0; p < sheets.origin.size(); ++p) {
+      const Vec3& at = mesh_.points[sheets.origin[p]];
+      const Vertex v = surface_.add_vertex({at.x, at.y, at.z});
+      origin_[v] = sheets.origin[p];
+      surface_.set_halfedge(v, halfedge(links.of_point[p]));
+    }
     source_ = surface_.add_property_map<Face, std::uint32_t>("f:source", none).first;
     backward_ = surface_.add_property_map<Face, char>("f:backward", 0).first;
-    for (std::size_t f = 0; f < faces.size(); ++f) {
-      const Face face =
-          surface_.add_face(vertex(faces[f][0]), vertex(faces[f][1]), vertex(faces[f][2]));
-      if (face == Surface::null_face()) { // can't be; the face must not be lost in any case
-        unplaced_.push_back(source[f]);
-        continue;
-      }
+    for (std::uint32_t f = 0; f < sheets.triangles.size(); ++f) {
+      const Face face = surface_.add_face();
       source_[face] = source[f];
-      backward_[face] = sheets_.backward[f];
+      backward_[face] = sheets.backward[f];
+      surface_.set_halfedge(face, halfedge(links.of_face[f]));
+    }
+    for (std::uint32_t h = 0; h < links.target.size(); h += 2)
+      (void)surface_.add_edge();
+    for (std::uint32_t h = 0; h < links.target.size(); ++h) {
+      surface_.set_target(halfedge(h), Vertex(links.target[h]));
+      surface_.set_next(halfedge(h), halfedge(links.next[h]));
+      surface_.set_face(halfedge(h),
+                        links.face[h] == none ? Surface::null_face() : Face(links.face[h]));
     }
   }
 
-  static Vertex vertex(std::size_t index) { return Vertex(static_cast<Surface::size_type>(index)); }
+  /// CGAL's null is none.
+  static Halfedge halfedge(std::uint32_t index) {
+    return index == none ? Surface::null_halfedge() : Halfedge(index);
+  }
 
   /// Whether sheets meet in a border edge, which is no border then.
   bool is_seam(Halfedge h) const {
@@ -127,8 +170,8 @@ private:
 
   void remove_flat_faces() {
     const std::uint64_t before = flat_faces();
-    report_.degenerate_faces = mesh_.triangles.size() - surface_.number_of_faces() -
-                               unplaced_.size(); // those with equal corners
+    report_.degenerate_faces =
+        mesh_.triangles.size() - surface_.number_of_faces(); // those with equal corners
     if (before == 0)
       return;
     auto seam = surface_.add_property_map<Edge, bool>("e:seam", false).first;
@@ -164,6 +207,25 @@ private:
     });
   }
 
+  /// With Delaunay's tetrahedra, or else by a search while there are steps left for it.
+  void fill_hole(Halfedge start, std::uint64_t edges, std::vector<Face>& faces,
+                 std::vector<Vertex>& points) {
+    const auto fill = [&](bool search) {
+      pmp::triangulate_and_refine_hole(surface_, start, std::back_inserter(faces),
+                                       std::back_inserter(points),
+                                       CGAL::parameters::do_not_use_cubic_algorithm(!search));
+    };
+    fill(false);
+    if (!faces.empty())
+      return;
+    if (edges > searched_edges_ || edges * edges * edges > steps_left_) {
+      ++report_.holes_bent;
+      return;
+    }
+    steps_left_ -= edges * edges * edges;
+    fill(true);
+  }
+
   void fill_holes(std::uint64_t most_edges) {
     std::vector<Halfedge> starts;
     pmp::extract_boundary_cycles(surface_, std::back_inserter(starts));
@@ -178,8 +240,7 @@ private:
       std::vector<Vertex> points;
       if (open == border.size() && open <= most_edges && !meets_itself(border) &&
           !is_lone_face(border))
-        pmp::triangulate_and_refine_hole(surface_, start, std::back_inserter(faces),
-                                         std::back_inserter(points));
+        fill_hole(start, border.size(), faces, points);
       if (faces.empty()) {
         ++report_.holes_left;
         continue;
@@ -281,8 +342,6 @@ private:
         std::swap(t[1], t[2]);
       out.push_back({source_[f], heir[f.idx()], t});
     }
-    for (const std::uint32_t t : unplaced_)
-      out.push_back({t, t, mesh_.triangles[t]});
     if (keep_collapsed)
       for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
         if (has_equal_corners(mesh_.triangles[t]))
@@ -349,12 +408,11 @@ private:
   TriangleMesh& mesh_;
   RepairReport& report_;
   EdgeTable edges_; ///< of the mesh
-  Sheets sheets_;
   Surface surface_;
   Surface::Property_map<Vertex, std::uint32_t> origin_; ///< point of the mesh, or none
   Surface::Property_map<Face, std::uint32_t> source_;   ///< face of the mesh, or none
   Surface::Property_map<Face, char> backward_;          ///< it runs the other way in the mesh
-  std::vector<std::uint32_t> unplaced_;                 ///< faces of the mesh
+  std::uint64_t searched_edges_ = 0, steps_left_ = 0;   ///< for bent holes
   std::vector<std::vector<std::uint32_t>> borders_;     ///< of filled holes, points of the mesh
   std::vector<std::uint32_t> hole_of_;                  ///< of each new vertex
   std::vector<std::uint32_t> hole_of_point_;            ///< of each new point

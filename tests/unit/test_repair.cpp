@@ -10,6 +10,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <ctime>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -168,6 +172,94 @@ TEST(Repair, HolesAreFilledUpToTheirSize) {
   alone.triangles = {{0, 1, 2}};
   EXPECT_EQ(repair_mesh(alone, parse_repair("all"), Context{}).holes_left, 1U);
   EXPECT_EQ(alone.triangles.size(), 1U);
+}
+
+/// A cone over a rim of so many edges that goes up and down at random.
+TriangleMesh bent_cone(std::uint32_t edges) {
+  std::mt19937 random(edges);
+  TriangleMesh mesh;
+  mesh.points.push_back({0, 0, 50});
+  for (std::uint32_t n = 0; n < edges; ++n) {
+    const double angle = 2 * M_PI * n / edges, r = 25 + static_cast<double>(random() % 1000) / 100;
+    mesh.points.push_back({r * std::cos(angle), r * std::sin(angle),
+                           static_cast<double>(random() % 4000) / 100 - 20});
+    mesh.triangles.push_back({0, 1 + n, 1 + (n + 1) % edges});
+  }
+  return mesh;
+}
+
+TEST(Repair, HolesThatWouldBeSearchedForMinutesAreLeft) {
+  RepairOptions options = parse_repair("holes");
+  TriangleMesh mesh = bent_cone(100);
+  RepairReport report = repair_mesh(mesh, options, Context{});
+  EXPECT_EQ(report.holes, 1U);
+  EXPECT_EQ(report.holes_bent, 0U);
+  EXPECT_TRUE(examine_mesh(mesh).closed());
+  mesh = bent_cone(static_cast<std::uint32_t>(options.searched_edges) + 1);
+  report = repair_mesh(mesh, options, Context{});
+  EXPECT_EQ(report.holes, 0U);
+  EXPECT_EQ(report.holes_left, 1U);
+  EXPECT_EQ(report.holes_bent, 1U);
+  // The limit is that of all together.
+  mesh = {};
+  for (int n = 0; n < 5; ++n) {
+    TriangleMesh one = bent_cone(200);
+    for (Vec3& p : one.points)
+      p.x += 100 * n;
+    test::append(mesh, one);
+  }
+  options.searched_edges = 300;
+  report = repair_mesh(mesh, options, Context{});
+  EXPECT_EQ(report.holes, 3U); // 300³ / 200³
+  EXPECT_EQ(report.holes_bent, 2U);
+  // A long border alone is none.
+  mesh = {};
+  mesh.points.push_back({0, 0, 50});
+  for (std::uint32_t n = 0; n < 10000; ++n) {
+    const double angle = 2 * M_PI * n / 10000;
+    mesh.points.push_back({30 * std::cos(angle), 30 * std::sin(angle), 5 * std::sin(7 * angle)});
+    mesh.triangles.push_back({0, 1 + n, 1 + (n + 1) % 10000});
+  }
+  report = repair_mesh(mesh, parse_repair("holes"), Context{});
+  EXPECT_EQ(report.holes, 1U);
+  EXPECT_TRUE(examine_mesh(mesh).closed());
+}
+
+/// Double cones side by side, so high that all faces are needles, their faces in any order.
+TriangleMesh double_cones(std::uint32_t count, std::uint32_t edges, double height) {
+  TriangleMesh mesh;
+  for (std::uint32_t cone = 0; cone < count; ++cone) {
+    const auto first = static_cast<std::uint32_t>(mesh.points.size());
+    const double x = 100 * cone;
+    mesh.points.insert(mesh.points.end(), {{x, 0, height}, {x, 0, -height}});
+    for (std::uint32_t n = 0; n < edges; ++n) {
+      const double angle = 2 * M_PI * n / edges;
+      const std::uint32_t a = first + 2 + n, b = first + 2 + (n + 1) % edges;
+      mesh.points.push_back({x + 30 * std::cos(angle), 30 * std::sin(angle), 0});
+      mesh.triangles.push_back({first, a, b});
+      mesh.triangles.push_back({first + 1, b, a});
+    }
+  }
+  std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), std::mt19937(1));
+  return mesh;
+}
+
+TEST(Repair, FacesThatMeetInAPointCostWhatTheyDoElsewhere) {
+  std::array<double, 2> clocks{}; // of the processor: other programs do not count
+  for (const bool together : {false, true}) {
+    TriangleMesh mesh = together ? double_cones(1, 40000, 1000) : double_cones(80, 500, 10000);
+    const double volume = signed_volume(mesh);
+    const std::clock_t begin = std::clock();
+    const RepairReport report = repair_mesh(mesh, parse_repair("all"), Context{});
+    clocks[together ? 1 : 0] = static_cast<double>(std::clock() - begin);
+    EXPECT_EQ(report.degenerate_faces, 80000U);
+    EXPECT_EQ(report.degenerate_left, 0U);
+    EXPECT_LT(mesh.triangles.size(), 40000U);
+    const MeshReport after = examine_mesh(mesh);
+    EXPECT_TRUE(after.closed() && after.manifold() && after.outward());
+    EXPECT_NEAR(signed_volume(mesh), volume, 1e-3 * volume);
+  }
+  EXPECT_LT(clocks[1], 10 * clocks[0]); // 1; by the square of the faces at a point 20
 }
 
 TEST(Repair, SheetsThatMeetInAnEdgeStayJoinedAndAreNoHoles) {
