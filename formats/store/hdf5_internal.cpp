@@ -560,9 +560,20 @@ File::File(Handle handle, std::shared_ptr<FileState> file)
 
 File File::create(const std::string& path, const std::string& name) {
   silence();
-  const std::string& called = name.empty() ? path : name;
+  return create(path, name.empty() ? path : name, access());
+}
+
+File File::create_by_link(const std::string& link, const std::string& name) {
+  silence();
+  Handle how = access();
+  // Its usual driver asks where a link leads to, which is nowhere.
+  if (H5Pset_fapl_stdio(how.id()) < 0)
+    throw Error(name, "cannot be made as an HDF5 file");
+  return create(link, name, std::move(how));
+}
+
+File File::create(const std::string& path, const std::string& called, Handle how) {
   const Handle made = properties(H5P_FILE_CREATE);
-  const Handle how = access();
   Handle handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, made.id(), how.id()));
   if (handle.id() < 0)
     throw Error(called, "cannot be made as an HDF5 file" + system_reason());

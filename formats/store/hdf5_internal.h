@@ -235,6 +235,8 @@ class File {
 public:
   /// Empties or makes it. `name` is what messages call it, the path itself if empty.
   static File create(const std::string& path, const std::string& name = "");
+  /// The same for a file without a name, by a link of /proc to it.
+  static File create_by_link(const std::string& link, const std::string& name);
   /// For reading. \throw Error too if it is missing, a folder, empty, no HDF5 or cut off
   static File open(const std::string& path);
   /// A file that stands in memory; `name` is what messages call it.
@@ -254,6 +256,7 @@ public:
 
 private:
   File(Handle handle, std::shared_ptr<FileState> file);
+  static File create(const std::string& path, const std::string& called, Handle how);
 
   std::shared_ptr<FileState> file_;
   Handle handle_;

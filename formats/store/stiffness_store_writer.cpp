@@ -11,16 +11,10 @@
 #include "formats/stream/raw_file_internal.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <limits>
 #include <optional>
-#include <unistd.h>
 
 namespace gewebe {
 
@@ -179,23 +173,6 @@ struct Place {
   std::uint64_t offset = 0, bytes = 0;
 };
 
-/// An empty file under a name that nobody has.
-std::string fresh_beside(const std::string& path, const std::string& name) {
-  std::string fresh = path + ".XXXXXX";
-  const int fd = ::mkostemp(fresh.data(), O_CLOEXEC);
-  if (fd < 0)
-    throw Error(name, std::string("cannot create a file in its folder: ") + std::strerror(errno));
-  (void)::close(fd);
-  return fresh;
-}
-
-/// Gives a file the name of nothing: it lives as long as someone has it open.
-RawFile nameless(const std::string& path, const std::string& name) {
-  RawFile file(path, name);
-  (void)std::remove(path.c_str());
-  return file;
-}
-
 /// All of `from` to `to`, but not the columns, which stand there already.
 void copy_frame(const RawFile& from, RawFile& to, std::vector<Place> columns,
                 const std::string& name) {
@@ -224,10 +201,9 @@ void copy_frame(const RawFile& from, RawFile& to, std::vector<Place> columns,
 
 struct StiffnessStoreWriter::State {
   Output& output;
-  std::string path; ///< of HDF5's file: that of the output, or beside it
+  std::optional<RawFile> frame; ///< HDF5's file where it isn't the output
   hdf5::File file;
-  RawFile data;                 ///< where columns go, and in the end all
-  std::optional<RawFile> frame; ///< HDF5's file where it is another
+  RawFile data; ///< where columns go, and in the end all
   std::optional<ColumnJournal> journal;
   std::vector<Place> places;
   std::uint64_t kept = 0;
@@ -243,12 +219,18 @@ struct StiffnessStoreWriter::State {
   std::vector<float> row;
 
   explicit State(Output& to)
-      : output(to), path(to.part() ? fresh_beside(to.temporary(), to.name()) : to.temporary()),
-        file(hdf5::File::create(path, to.name())), data(to.temporary(), to.name()) {
+      : output(to), frame(frame_of(to)),
+        file(frame ? hdf5::File::create_by_link(frame->path(), to.name())
+                   : hdf5::File::create(to.temporary(), to.name())),
+        data(to.temporary(), to.name()) {
+    if (to.part())
+      journal.emplace(to.temporary(), data.size());
+  }
+
+  static std::optional<RawFile> frame_of(const Output& to) {
     if (!to.part())
-      return;
-    frame.emplace(nameless(path, to.name()));
-    journal.emplace(to.temporary(), data.size());
+      return std::nullopt;
+    return RawFile::nameless(to.temporary(), to.name());
   }
 
   std::uint64_t place_of(std::size_t k) const { return places.back().offset + k * row_bytes; }

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -14,6 +15,17 @@ RawFile::RawFile(const std::string& path, std::string name)
     : fd_(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_CLOEXEC)), name_(std::move(name)) {
   if (fd_ < 0)
     fail("cannot open");
+}
+
+RawFile RawFile::nameless(const std::string& beside, std::string name) {
+  const std::size_t slash = beside.find_last_of('/');
+  const std::string folder = slash == std::string::npos ? "." : beside.substr(0, slash + 1);
+  int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (fd < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL))
+    fd = ::memfd_create("gewebe", MFD_CLOEXEC);
+  if (fd < 0)
+    throw Error(name, std::string("cannot create a file in its folder: ") + std::strerror(errno));
+  return {fd, std::move(name)};
 }
 
 RawFile::~RawFile() {
@@ -65,6 +77,10 @@ std::uint64_t RawFile::size() const {
 std::uint64_t RawFile::stored() const {
   struct stat info {};
   return ::fstat(fd_, &info) == 0 ? static_cast<std::uint64_t>(info.st_blocks) * 512 : 0;
+}
+
+std::string RawFile::path() const {
+  return "/proc/self/fd/" + std::to_string(fd_);
 }
 
 void RawFile::resize(std::uint64_t size) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 namespace gewebe {
 
@@ -11,6 +12,10 @@ class RawFile {
 public:
   /// `name` is what messages call it. \throw Error if it can't be opened for reading and writing
   RawFile(const std::string& path, std::string name);
+  /// A new file without a name, on the disk of `beside` (a path in some folder), or in memory where
+  /// that disk knows no such files. It is gone with the last who has it open, however that ends.
+  /// \throw Error
+  static RawFile nameless(const std::string& beside, std::string name);
   ~RawFile();
   RawFile(RawFile&& other) noexcept;
   RawFile(const RawFile&) = delete;
@@ -25,8 +30,11 @@ public:
   /// Bytes that it takes on the disk, less than its size where it has holes.
   std::uint64_t stored() const;
   void resize(std::uint64_t size);
+  /// A path by which libraries open the same file again, in this process alone.
+  std::string path() const;
 
 private:
+  RawFile(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
   [[noreturn]] void fail(const char* what) const;
   int fd_;
   std::string name_;

@@ -6,17 +6,21 @@
 #include "compliance/compliance_columns.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_writer.h"
+#include "formats/stream/raw_file_internal.h"
 #include "larger.h"
 #include "scratch.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <iterator>
+#include <string>
+#include <unistd.h>
 
 using namespace gewebe;
 using namespace gewebe::test;
@@ -116,6 +120,22 @@ Model small_model() {
 }
 
 } // namespace
+
+TEST(RawFile, WithoutANameIsOnTheDiskOrInMemory) {
+  const ScratchFile beside(".part");
+  for (const std::string& place : {beside.path(), std::string("/proc/none")}) { // that has no such
+    RawFile file = RawFile::nameless(place, "test");
+    file.write(3, "abc", 3);
+    EXPECT_EQ(file.size(), 6U);
+    std::ifstream again(file.path());
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), std::string("\0\0\0abc", 6));
+    std::array<char, 300> target{};
+    EXPECT_GT(::readlink(file.path().c_str(), target.data(), target.size() - 1), 0);
+    EXPECT_NE(std::string(target.data()).find(" (deleted)"), std::string::npos);
+    EXPECT_EQ(std::string(target.data()).starts_with("/memfd:"), place == "/proc/none");
+  }
+  EXPECT_THROW((void)RawFile::nameless("/nowhere/x", "test"), Error);
+}
 
 TEST(Crc32c, KnownValues) {
   EXPECT_EQ(crc32c("123456789", 9), 0xE3069283U);
