@@ -241,6 +241,8 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
                          static_cast<double>(layout.size[1]) * layout.size[2];
     require_memory(request.context, std::max(16 * words + 16.0 * layout.size[0] + 1e6, bytes),
                    ("the label volume of " + size_text(layout.size) + " voxels").c_str());
+    if (request.check)
+      request.check(volume.mask);
   });
   Counter counter(request.labels);
   volume.voxels = convert_any(data, name, layout, request.context, counter, volume.mask);
@@ -329,17 +331,17 @@ std::int64_t whole_of(const std::string& place, std::string_view word) {
 // ---- the readers
 
 LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
-                              const Context& context) {
+                              const Context& context, const LabelCheck& check) {
   (void)input.peek(1); // says that it is empty
   StreamBytes source(input.stream(), input.name());
-  return read_any(source, input.name(), {labels, context, input.name() != "-"});
+  return read_any(source, input.name(), {labels, context, check, input.name() != "-"});
 }
 
 LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
-                                    const std::vector<std::int64_t>& labels,
-                                    const Context& context) {
+                                    const std::vector<std::int64_t>& labels, const Context& context,
+                                    const LabelCheck& check) {
   MemoryBytes source(bytes);
-  return read_any(source, name, {labels, context, false});
+  return read_any(source, name, {labels, context, check, false});
 }
 
 bool is_label_volume(std::string_view first_bytes) {

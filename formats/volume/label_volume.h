@@ -21,6 +21,7 @@
 #include "labels/label_mask.h"
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -37,19 +38,24 @@ struct LabelVolume {
   std::vector<std::string> warnings;
 };
 
+/// What the caller has against a mask of this size and place, asked before a voxel is unpacked: it
+/// throws.
+using LabelCheck = std::function<void(const LabelMask& without_bits)>;
+
 /// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
 /// Compression is told by its bytes. Values must be whole numbers, in whatever type they are kept.
 /// \throw Error with the place if it is none of the three, is cut off or goes on beyond its end, if
 /// a value is no whole number, if the affine is singular, if one of `labels` doesn't occur (the
-/// message names those that do), or if the mask would need more than context.max_memory
+/// message names those that do), if the mask or the voxels unpacked would need more than
+/// context.max_memory, or what `check` throws
 LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
-                              const Context& context);
+                              const Context& context, const LabelCheck& check = {});
 
 /// The same for bytes that are there already; `name` is for messages. Files of two parts are
 /// refused.
 LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
-                                    const std::vector<std::int64_t>& labels,
-                                    const Context& context);
+                                    const std::vector<std::int64_t>& labels, const Context& context,
+                                    const LabelCheck& check = {});
 
 /// Are these first bytes (the more the better, up to 4096) those of a label volume, compressed or
 /// not?

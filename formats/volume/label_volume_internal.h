@@ -98,6 +98,7 @@ struct VoxelLayout {
 struct LabelRequest {
   const std::vector<std::int64_t>& labels;
   const Context& context;
+  const LabelCheck& check;
   bool side_files; ///< whether the name is that of a file, beside which others may be opened
 };
 

@@ -187,19 +187,31 @@ struct Plan {
   std::vector<Int3> leaves;
 };
 
-Plan plan_grid(const Context& context, const LabelField& field, const Sampling& sampling) {
+/// The cubes of 128 voxels of the grid that a field meets.
+struct Nodes {
   Int3 low{}, count{};
+  double bytes() const {
+    return static_cast<double>(sizeof(Plan)) * count[0] * static_cast<double>(count[1]) * count[2];
+  }
+};
+
+Nodes nodes_of(const LabelField& field, const Sampling& sampling) {
+  Nodes nodes;
   for (std::size_t a = 0; a < 3; ++a) {
     const double begin = field.origin[a] / sampling.ratio[a],
                  end = (field.origin[a] + 8.0 * field.blocks[a]) / sampling.ratio[a];
     if (!(begin > -0x1p30 && end < 0x1p30))
       throw Error("an index of the volume would leave ±2^30, expected a larger voxel");
-    low[a] = floor_int(begin / 128);
-    count[a] = floor_int(end / 128) + 1 - low[a];
+    nodes.low[a] = floor_int(begin / 128);
+    nodes.count[a] = floor_int(end / 128) + 1 - nodes.low[a];
   }
+  return nodes;
+}
+
+Plan plan_grid(const Context& context, const LabelField& field, const Sampling& sampling) {
+  const auto [low, count] = nodes_of(field, sampling);
   const std::size_t nodes = static_cast<std::size_t>(count[0]) *
                             static_cast<std::size_t>(count[1]) * static_cast<std::size_t>(count[2]);
-  require_memory(context, static_cast<double>(nodes) * sizeof(Plan), "the lattice of the labels");
   std::vector<Plan> parts(nodes);
   parallel_blocks(context, nodes, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -279,6 +291,41 @@ GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear) 
   return t;
 }
 
+namespace {
+
+/// A field without mask and band, as far as a mask's size and place tell it.
+void lay_out(const LabelMask& mask, const LabelDensityOptions& options, LabelField& field,
+             Sampling& sampling) {
+  const Vec3 size = mask.transform.voxel_size();
+  const double smallest = std::fmin(size.x, std::fmin(size.y, size.z));
+  sampling.voxel = options.voxel.value_or(smallest);
+  if (!(sampling.voxel <= largest_ratio * smallest))
+    throw Error("a voxel of " + number(sampling.voxel) + " mm over labels every " +
+                number(smallest) + " mm, expected at most " + number(largest_ratio * smallest));
+  for (std::size_t a = 0; a < 3; ++a) {
+    field.spacing[a] = size[static_cast<int>(a)];
+    sampling.ratio[a] = sampling.voxel / field.spacing[a];
+    field.reach[a] = std::max(4, floor_int(1.5 * sampling.ratio[a]) + 2);
+  }
+  place_blocks(mask.size, field);
+}
+
+} // namespace
+
+void check_label_density(const Context& context, const LabelMask& mask,
+                         const LabelDensityOptions& options) {
+  (void)label_lattice(mask, 1);
+  LabelField field;
+  Sampling sampling;
+  lay_out(mask, options, field, sampling);
+  const double words =
+      static_cast<double>(mask.row_words()) * mask.size[1] * static_cast<double>(mask.size[2]);
+  const double blocks =
+      field.blocks[0] * static_cast<double>(field.blocks[1]) * static_cast<double>(field.blocks[2]);
+  require_memory(context, 16 * words + 4 * blocks + nodes_of(field, sampling).bytes(),
+                 "the lattice of the labels");
+}
+
 Grid label_density(const Context& context, const LabelMask& mask,
                    const LabelDensityOptions& options, LabelDensityReport* report) {
   LabelDensityReport local;
@@ -287,24 +334,15 @@ Grid label_density(const Context& context, const LabelMask& mask,
   Context quiet = context; // all but the solution is quick
   quiet.progress = nullptr;
   const Vec3 size = mask.transform.voxel_size();
-  const double smallest = std::fmin(size.x, std::fmin(size.y, size.z));
+  check_label_density(context, mask, options);
+  LabelField field;
   Sampling sampling;
-  sampling.voxel = options.voxel.value_or(smallest);
+  lay_out(mask, options, field, sampling);
   GridInfo info;
   info.transform = label_lattice(mask, sampling.voxel, &r.shear);
-  if (!(sampling.voxel <= largest_ratio * smallest))
-    throw Error("a voxel of " + number(sampling.voxel) + " mm over labels every " +
-                number(smallest) + " mm, expected at most " + number(largest_ratio * smallest));
   r.voxels = count_bits(mask);
   r.volume = static_cast<double>(r.voxels) * size.x * size.y * size.z;
-
-  LabelField field;
   field.mask = mask;
-  for (std::size_t a = 0; a < 3; ++a) {
-    field.spacing[a] = size[static_cast<int>(a)];
-    sampling.ratio[a] = sampling.voxel / field.spacing[a];
-    field.reach[a] = std::max(4, floor_int(1.5 * sampling.ratio[a]) + 2);
-  }
   find_band(quiet, field);
   r.band_voxels = field.band.size() * leaf_voxels;
   r.leaves_skipped = field.directory.size() - field.band.size();

@@ -60,6 +60,12 @@ struct LabelDensityReport {
 /// smallest spacing
 GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear = nullptr);
 
+/// What can be said against a density before a voxel is known: `mask` needs no bits yet. Memory is
+/// that of the copy of the mask, of its blocks and of the lattice; what the boundary takes comes to
+/// it. \throw Error as label_density
+void check_label_density(const Context& context, const LabelMask& mask,
+                         const LabelDensityOptions& options);
+
 /// The density of the set voxels: background 0, isovalue 0.5, on label_lattice. Voxels outside the
 /// mask count as unlabelled, so the surface closes half a voxel beyond the volume's edge. The
 /// result has the same bytes for any number of threads and on every CPU level.

@@ -291,14 +291,19 @@ double LabelField::far() const {
   return least;
 }
 
-void find_band(const Context& context, LabelField& field) {
-  Int3 halo{};
+void place_blocks(const Int3& size, LabelField& field) {
   for (std::size_t a = 0; a < 3; ++a) {
     const std::int32_t margin = (field.reach[a] + 7) & ~7;
-    halo[a] = field.reach[a] - 1;
     field.origin[a] = -margin;
-    field.blocks[a] = (field.mask.size[a] + 2 * margin + 7) / 8;
+    field.blocks[a] = (size[a] + 2 * margin + 7) / 8;
   }
+}
+
+void find_band(const Context& context, LabelField& field) {
+  place_blocks(field.mask.size, field);
+  Int3 halo{};
+  for (std::size_t a = 0; a < 3; ++a)
+    halo[a] = field.reach[a] - 1;
   const std::size_t row = static_cast<std::size_t>(field.blocks[0]);
   const std::size_t rows =
       static_cast<std::size_t>(field.blocks[1]) * static_cast<std::size_t>(field.blocks[2]);

@@ -45,6 +45,8 @@ struct LabelField {
   double far() const;
 };
 
+/// Where its blocks are. \pre spacing and reach are set
+void place_blocks(const Int3& size, LabelField& field);
 /// Finds the band: blocks with both kinds of voxels within reach - 1.
 void find_band(const Context& context, LabelField& field);
 /// Fills `distance`, and `value` with the same.

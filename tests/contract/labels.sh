@@ -130,3 +130,28 @@ test_truncated_label_volumes() {
   done
   rm in.cut
 }
+
+# A few bytes that unpack to gigabytes, in voxels so oblong that the lattice would take 50 GB: the header is enough.
+test_a_volume_too_large_is_refused_by_its_header() {
+  python3 - <<'E2'
+import gzip, struct
+head = bytearray(352)
+struct.pack_into('<i', head, 0, 348)
+struct.pack_into('<8h', head, 40, 3, 1600, 1600, 1600, 1, 1, 1, 1)
+struct.pack_into('<hh', head, 70, 2, 8)
+struct.pack_into('<8f', head, 76, 1, 1, 1, 5e5, 0, 0, 0, 0)
+struct.pack_into('<f', head, 108, 352)
+struct.pack_into('<h', head, 254, 1)
+for row, column, value in ((0, 0, 1), (1, 1, 1), (2, 2, 5e5)):
+    struct.pack_into('<f', head, 280 + 16 * row + 4 * column, value)
+head[344:348] = b'n+1\0'
+open('in.nii.gz', 'wb').write(gzip.compress(bytes(head)))
+E2
+  voxelize --label 1 --max-memory 8G in.nii.gz >out 2>message && fail 'it is not refused'
+  grep -qx 'voxelize: in.nii.gz: the lattice of the labels needs .* GiB, the limit is 8.0 GiB (--max-memory)' message ||
+    fail "$(<message)"
+  # Where it could be done, the voxels are missed.
+  voxelize --label 1 --max-memory 200G in.nii.gz >out 2>message && fail 'the voxels are not missed'
+  grep -qx 'voxelize: in.nii.gz: ends after 0 of 4096000000 bytes of voxels (1600 x 1600 x 1600)' message || fail "$(<message)"
+  rm in.nii.gz out message
+}

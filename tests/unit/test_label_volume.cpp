@@ -292,6 +292,28 @@ TEST(LabelVolume, HugeClaimsTakeNoMemory) {
   EXPECT_THROW((void)read(h.bytes), Error); // the bytes end first
 }
 
+TEST(LabelVolume, WhatItsSizeRulesOutIsRefusedBeforeAVoxelIsUnpacked) {
+  Header h(352, false);
+  h.bytes = nifti_of_bytes().substr(0, 352);
+  h.put<std::int16_t>(40, {3, 1600, 1600, 1600});
+  std::size_t asked = 0;
+  const LabelCheck check = [&](const LabelMask& mask) {
+    ++asked;
+    EXPECT_EQ(mask.size, (Int3{1600, 1600, 1600}));
+    EXPECT_TRUE(mask.bits.empty());
+    throw Error("too large");
+  };
+  for (const std::string& bytes : {h.bytes, gzipped(h.bytes)}) // no voxel follows
+    try {
+      (void)label_volume_from_bytes(bytes, "test", {9}, {}, check);
+      ADD_FAILURE() << "not refused";
+    } catch (const Error& error) {
+      EXPECT_STREQ(error.what(), "too large");
+      EXPECT_EQ(error.place(), "test");
+    }
+  EXPECT_EQ(asked, 2U);
+}
+
 TEST(LabelVolume, FirstBytesTellOne) {
   EXPECT_TRUE(is_label_volume(nifti_of_bytes()));
   EXPECT_TRUE(is_label_volume(gzipped(nifti_of_bytes()).substr(0, 80)) ||

@@ -56,8 +56,12 @@ void voxelize_labels(cli::Run& run, const std::string& path,
   (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
   Output output(run.output(), run.output_options(true));
   Input input(path);
-  const LabelVolume volume =
-      run.timed("read", [&] { return read_label_volume(input, labels, run.context()); });
+  // What its size rules out is refused before its voxels are unpacked.
+  const LabelVolume volume = run.timed("read", [&] {
+    return read_label_volume(input, labels, run.context(), [&](const LabelMask& mask) {
+      check_label_density(run.context(), mask, {voxel});
+    });
+  });
   for (const std::string& warning : volume.warnings)
     run.warn(warning);
   LabelDensityReport report;
