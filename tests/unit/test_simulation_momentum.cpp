@@ -1,7 +1,6 @@
 // What a cut frees of an elastostatic object goes on as fast as it was moved.
 
 #include "base/error.h"
-#include "larger.h"
 #include "simulation_scenes.h"
 
 #include <gtest/gtest.h>
@@ -337,8 +336,20 @@ TEST(SimulationMomentum, WhatHangsLooselyIsAsFastAsItsShape) {
     }
 }
 
+/// Stiffnesses of its own, whatever exp2ela's defaults are: the lobe hangs on soft springs, so that
+/// it tears off as one, with what holds it.
+Model soft_below_the_lobe() {
+  Model model = undragged();
+  for (Spring& spring : model.springs) {
+    const bool crosses =
+        (model.nodes[spring.i].position.z > 41) != (model.nodes[spring.j].position.z > 41);
+    spring.stiffness = crosses ? 5 : 1000;
+  }
+  return model;
+}
+
 TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
-  const Model model = undragged();
+  const Model model = soft_below_the_lobe();
   Simulation s(one_thread(), {});
   s.add_object("organ", model, Method::ffe);
   std::vector<std::uint32_t> lobe, cut;
@@ -370,14 +381,11 @@ TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
     s.apply(Release{part, all});
     s.apply(SetTear{part, 0});
   }
-  double fastest = 0;
   for (std::size_t part = 1; part < parts; ++part) {
     const Vec3 is = momentum(s, part) / total_mass(s.model(part));
-    EXPECT_GE(is.z, 0); // of what none was held and none hung on it: nothing
+    EXPECT_GT(is.z, 0.3 / dt); // a third of its nodes was held, or more
     EXPECT_LT(is.z, 1.0001 / dt);
-    fastest = test::larger(fastest, is.z);
   }
-  EXPECT_GT(fastest, 0.15 / dt); // of that one a sixth of the nodes was held, or more
 }
 
 } // namespace
