@@ -2,11 +2,16 @@
 // by its words before anything is done, or passed by, which is told.
 
 #include "base/error.h"
+#include "compliance/compliance_source.h"
+#include "larger.h"
 #include "scene/support.h"
 #include "simulation_scenes.h"
 #include "solve/stiffness.h"
 
+#include <algorithm>
+#include <cmath>
 #include <gtest/gtest.h>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -38,12 +43,10 @@ const Gap* expected(Way way, Feature feature) {
   return nullptr;
 }
 
-StiffnessParts stiffer(Model model) {
+std::shared_ptr<ComplianceSource> stiffer(Model model) {
   for (Spring& s : model.springs)
     s.stiffness *= 3;
-  StiffnessParts parts;
-  parts.factor = [model] { return Factor(stiffness_matrix(model), Context{}); };
-  return parts;
+  return compliance_of_factor([model] { return Factor(stiffness_matrix(model), Context{}); });
 }
 
 class Pair {
@@ -146,7 +149,7 @@ private:
       scene_.step(0.005);
     double most = 0;
     for (const double u : scene_.displacement(0))
-      most = std::max(most, std::abs(u));
+      most = test::larger(most, std::abs(u));
     return most > 0;
   }
   bool sweep() {

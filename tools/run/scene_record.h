@@ -1,8 +1,8 @@
 #pragma once
 // A record of a scene: the lines that were accepted, as a scene that does the same again.
 
-#include "formats/stream/stream.h"
 #include "formats/scene/command.h"
+#include "formats/stream/stream.h"
 
 #include <map>
 #include <string>
