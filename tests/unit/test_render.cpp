@@ -65,7 +65,7 @@ TEST(RenderCamera, EveryViewShowsTheWholeBoxAndFillsThePicture) {
         const auto clip = clip_of(projection, (p - Vec3{1, 2, 3}) / 7);
         EXPECT_GT(clip[3], projection.near);
         EXPECT_LE(std::fabs(clip[2]), clip[3]) << view;
-        for (int a = 0; a < 2; ++a)
+        for (const std::size_t a : {0U, 1U})
           most = test::larger(most, std::fabs(clip[a]) / clip[3]);
       }
       EXPECT_LT(most, 1);
