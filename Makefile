@@ -21,9 +21,9 @@ flags_coverage := -O0 -g --coverage
 flags_fuzz := -O1 -g1 -fsanitize=address,fuzzer-no-link -fno-omit-frame-pointer -DGEWEBE_SANITIZE
 # The units of tests/unit are long and run for moments: most of a build would be their code. They are optimised less, and
 # the sanitizers watch the library and not the tests' own code (it is linked behind the library, so that functions of
-# headers are the library's).
+# headers are the library's; Eigen's must agree on who allocates, for it does so in another way under AddressSanitizer).
 unit_flags_release := -O1 -DNDEBUG
-unit_flags_sanitize := -O1 -g1 -fno-omit-frame-pointer -DGEWEBE_SANITIZE
+unit_flags_sanitize := -O1 -g1 -fno-omit-frame-pointer -DGEWEBE_SANITIZE -DEIGEN_MALLOC_ALREADY_ALIGNED=0
 ifeq ($(flags_$(config)),)
 $(error config=$(config) is unknown, expected release, debug, sanitize, thread, coverage or fuzz)
 endif
