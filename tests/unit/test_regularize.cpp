@@ -101,6 +101,20 @@ TEST(Regularize, APointSlidesHalfTheWayToTheMiddleOfItsFaces) {
   EXPECT_GT(looked_at, 8U);
 }
 
+// Where the whole way would turn a face over, half of it is gone: of 10,111 wishes 1,496 are
+// refused, without it 1,711.
+TEST(Regularize, AWayThatIsTooLongIsGoneHalf) {
+  std::uint64_t moves = 0, refused = 0;
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    const Grid grid = noise(12, seed, seed % 2 == 0 ? 0 : 4);
+    TriangleMesh mesh = snap({}, marching_cubes({}, grid), {0.15}).mesh;
+    const RegularizeReport report = regularize({}, grid, 0.5, mesh, {1});
+    moves += report.moves;
+    refused += report.refused_moves;
+  }
+  EXPECT_LT(static_cast<double>(refused) / static_cast<double>(moves + refused), 0.16);
+}
+
 TEST(Regularize, NoRoundsNoChange) {
   const Grid grid = metaballs(24, 1);
   TriangleMesh mesh = snap({}, marching_cubes({}, grid), {}).mesh;

@@ -68,8 +68,7 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
   stats.seconds("step_largest", latency.largest());
 }
 
-void require_verified(const SceneRun& scene, double tolerance) {
-  const ElastostaticCounts errors = scene.simulation().counts().elastostatic;
+void require_verified(const ElastostaticCounts& errors, double tolerance) {
   const auto require = [](const char* what, double error, double most) {
     if (!(error <= most))
       throw Error(std::string("the ") + what + " of a shape is " + number_text(error) +

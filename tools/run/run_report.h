@@ -16,6 +16,6 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
 
 /// \throw Error unless every shape was within the tolerance, and its backward error that of a
 /// right solution. \pre errors were measured
-void require_verified(const SceneRun& scene, double tolerance);
+void require_verified(const ElastostaticCounts& errors, double tolerance);
 
 } // namespace gewebe
