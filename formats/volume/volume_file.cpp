@@ -55,16 +55,8 @@ public:
     (void)std::cout.rdbuf(cout_);
     (void)std::cerr.rdbuf(cerr_);
   }
-  /// The first line, without colours and the word before it; empty if nothing was said.
-  std::string first() {
-    std::string text = kept_.text();
-    for (std::size_t begin = 0; (begin = text.find('\033', begin)) != std::string::npos;)
-      text.erase(begin, text.find('m', begin) - begin + 1);
-    const std::size_t colon = text.find(": ");
-    if (colon != std::string::npos && colon < 10)
-      text.erase(0, colon + 2);
-    return text.substr(0, text.find('\n'));
-  }
+  /// All that was said.
+  std::string text() { return kept_.text(); }
 
 private:
   /// Several threads may speak at once.
@@ -463,6 +455,24 @@ Grid parse_volume(const std::string& bytes, const std::string& name, const Conte
   return grid;
 }
 
+/// What is wrong with a volume, by what OpenVDB says of it in an exception or a remark.
+std::string fault_of(std::string_view remark) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 7> faults{{
+      {"multi-buffer", "the grid's tree has several buffers, expected one"},
+      {"Map ", "the grid's transform is of an unknown kind, expected an affine one"},
+      {"nregistered type", "the stream holds a grid of an unknown type, expected float grids"},
+      {"rid type ", "the stream holds a grid of an unknown type, expected float grids"},
+      {"-byte chunk", "a packed block is damaged: it has another size than is said"},
+      {"decompress", "a packed block is damaged: it does not unpack"},
+      {"ncoding is not supported",
+       "the volume is packed in a way that this system's OpenVDB lacks"},
+  }};
+  for (const auto& [words, fault] : faults)
+    if (remark.find(words) != std::string_view::npos)
+      return std::string(fault);
+  return "is damaged or of a kind that this program does not read";
+}
+
 } // namespace
 
 Grid read_volume(Input& input, const Context& context) {
@@ -477,24 +487,18 @@ Grid volume_from_bytes(std::string bytes, const std::string& name, const Context
                        StreamWay way) {
   initialize_openvdb();
   check_vdb_head(bytes, name);
-  const std::string damaged = "is damaged or of a kind that this program does not read";
   Remarks remarks;
   try {
     Grid grid = at(name, [&] { return parse_volume(bytes, name, context, way); });
-    if (const std::string remark = remarks.first(); !remark.empty())
-      throw Error(name, damaged + " (OpenVDB: " + remark + ")");
+    if (const std::string remark = remarks.text(); !remark.empty())
+      throw Error(name, fault_of(remark));
     return grid;
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw Error(name, "is damaged, or there is less memory than it needs");
-  } catch (const openvdb::Exception& error) {
-    const std::string text = error.what(); // begins with the name of its class
-    const std::size_t colon = text.find(": ");
-    throw Error(name, damaged + " (OpenVDB: " +
-                          (colon == std::string::npos ? text : text.substr(colon + 2)) + ")");
-  } catch (const std::exception&) {
-    throw Error(name, damaged);
+  } catch (const std::exception& error) {
+    throw Error(name, fault_of(error.what()));
   }
 }
 

@@ -39,8 +39,16 @@ test_remarks_of_openvdb_are_errors() {
   [[ $map ]] || fail 'the volume has another map'
   printf '\2' | dd of=in.vdb bs=1 seek=$((map + 15 + 120)) conv=notrunc 2>/dev/null # buffers of its tree
   mc-opt in.vdb >out 2>message && fail 'a tree of two buffers is read'
-  [[ $(<message) == 'mc-opt: in.vdb: is damaged or of a kind that this program does not read (OpenVDB: multi-buffer trees'* ]] || fail "$(<message)"
+  [[ $(<message) == "mc-opt: in.vdb: the grid's tree has several buffers, expected one" ]] || fail "$(<message)"
   [[ $(wc -l <message) == 1 && ! -s out ]] || fail 'more than one line' "$(<message)"
+}
+
+# Messages are UTF-8, whatever bytes a name or a value has.
+test_bytes_that_are_no_text_are_escaped() {
+  mc-opt --iso $'\xff\xc3\xa4' 2>message && fail 'bytes for a number are taken'
+  [[ $(<message) == "mc-opt: --iso: '\\xffä' is no number" ]] || fail "$(<message)"
+  mc-opt $'no\xe9\x1b[31m.vdb' 2>message && fail 'a file of no name is read'
+  [[ $(<message) == 'mc-opt: no\xe9 [31m.vdb: cannot open: '* ]] || fail "$(<message)"
 }
 
 test_two_names_for_one_file_are_refused() {

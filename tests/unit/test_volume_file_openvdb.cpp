@@ -9,6 +9,10 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <sstream>
 #include <string>
 
@@ -72,6 +76,57 @@ TEST(VolumeFileOpenvdb, OfSeveralGridsDensityIsRead) {
   EXPECT_GT(volume_of(stream_of({vectors, other})), expected);
   EXPECT_EQ(complaint(stream_of({other, cube<openvdb::FloatGrid>("fuel", 1)})),
             "2 float grids and none named density, expected a grid 'density'");
+}
+
+/// `bytes` with the last `from` in it replaced by `to`, which is as long.
+std::string with(std::string bytes, const std::string& from, const std::string& to) {
+  const std::size_t place = bytes.rfind(from);
+  EXPECT_NE(place, std::string::npos) << from;
+  return bytes.replace(place, to.size(), to);
+}
+
+TEST(VolumeFileOpenvdb, FaultsAreSaidWithoutTheWordsOfTheLibrary) {
+  const std::string unknown_type =
+      "the stream holds a grid of an unknown type, expected float grids";
+  for (const bool two : {false, true}) { // alone by our reader, of two grids by OpenVDB's
+    openvdb::GridPtrVec grids{cube<openvdb::FloatGrid>("density", 1)};
+    if (two)
+      grids.push_back(cube<openvdb::DoubleGrid>("other", 1));
+    const std::string whole = stream_of(grids);
+    EXPECT_EQ(complaint(whole), "");
+    EXPECT_EQ(complaint(with(whole, "UniformScaleMap", "UniformScaleMaq")),
+              "the grid's transform is of an unknown kind, expected an affine one");
+    if (two) {
+      EXPECT_EQ(complaint(with(whole, "Tree_double_5_4_3", "Tree_double_5_4_2")), unknown_type);
+    }
+  }
+  const std::string one = stream_of({cube<openvdb::FloatGrid>("density", 1)});
+  EXPECT_EQ(complaint(with(one, "Tree_float_5_4_3", "Tree_float_5_4_2")), unknown_type);
+  // The tree begins behind the map's name and its fifteen numbers: how many buffers it has.
+  const std::size_t tree = one.rfind("UniformScaleMap") + 15 + 15 * sizeof(double);
+  std::string several = one;
+  several[tree] = 2;
+  EXPECT_EQ(complaint(several), "the grid's tree has several buffers, expected one");
+  // Values that do not unpack, as Blosc and as zlib packs them.
+  const auto grid = openvdb::FloatGrid::create();
+  for (int n = 0; n < 512; ++n)
+    grid->tree().setValue({n & 7, n >> 3 & 7, n >> 6}, 0.01F * static_cast<float>(n % 9));
+  for (const std::uint32_t way : {openvdb::io::COMPRESS_BLOSC, openvdb::io::COMPRESS_ZIP}) {
+    std::ostringstream out;
+    openvdb::io::Stream stream(out);
+    stream.setCompression(way | openvdb::io::COMPRESS_ACTIVE_MASK);
+    stream.write(openvdb::GridPtrVec{grid});
+    std::string bytes = std::move(out).str();
+    EXPECT_EQ(complaint(bytes), "");
+    // Last are the values of the one leaf, behind their size.
+    std::int64_t size = 0;
+    std::size_t packed = bytes.size();
+    do {
+      std::memcpy(&size, bytes.data() + --packed - sizeof size, sizeof size);
+    } while (size != static_cast<std::int64_t>(bytes.size() - packed));
+    std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(packed), bytes.end(), '\xff');
+    EXPECT_EQ(complaint(bytes), "a packed block is damaged: it does not unpack") << way;
+  }
 }
 
 #ifndef GEWEBE_SANITIZE // OpenVDB's reader of other types leaks the tree when it throws
