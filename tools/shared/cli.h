@@ -48,6 +48,8 @@ public:
   /// A nested object.
   Stats& object(std::string_view key);
   std::string json() const;
+  /// What is worth a line to people: numbers and words of this object, then of each nested one.
+  std::vector<std::string> figures() const;
 
 private:
   struct State;
@@ -124,24 +126,12 @@ public:
   ~Program();
 
   // Options. `names` is "--long" or "-s,--long"; `metavar` names the value; the value before
-  // parsing is the default that --help shows (optionals and empty strings show none). Numbers are
-  // strict: the whole word, finite. A list is one word with commas.
-  OptionRef option(const std::string& names, double& value, const std::string& metavar,
-                   const std::string& help);
-  OptionRef option(const std::string& names, std::optional<double>& value,
-                   const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::int64_t& value, const std::string& metavar,
-                   const std::string& help);
-  OptionRef option(const std::string& names, std::optional<std::int64_t>& value,
-                   const std::string& metavar, const std::string& help);
-  OptionRef option(const std::string& names, std::string& value, const std::string& metavar,
-                   const std::string& help);
-  OptionRef option(const std::string& names, std::vector<double>& value, const std::string& metavar,
-                   const std::string& help);
-  /// Three numbers: a place, a direction, a colour.
-  OptionRef option(const std::string& names, Vec3& value, const std::string& metavar,
-                   const std::string& help);
-  OptionRef option(const std::string& names, std::optional<Vec3>& value, const std::string& metavar,
+  // parsing is the default that --help shows (optionals, lists and empty strings show none).
+  // Numbers are strict: the whole word, finite. A list is one word with commas.
+  /// T: double, std::int64_t, Vec3 (a place, a direction, a colour) or an optional of one of them,
+  /// std::string, std::vector<double>.
+  template <class T>
+  OptionRef option(const std::string& names, T& value, const std::string& metavar,
                    const std::string& help);
   void flag(const std::string& names, bool& value, const std::string& help);
 
@@ -163,6 +153,10 @@ public:
 
 private:
   struct State;
+  void declare_common();
+  bool parse(const std::vector<std::string>& words);
+  void prepare_run();
+  void carry_out(const std::function<void(Run&)>& work);
   std::unique_ptr<State> state_;
 };
 
