@@ -47,6 +47,9 @@ struct RepairReport {
   std::uint64_t turned_faces = 0;     ///< whose corners run the other way now
   std::uint64_t degenerate_faces = 0; ///< without area before and not after
   std::uint64_t degenerate_left = 0;  ///< which could not be removed
+  /// Neighbours asked whether the ends of an edge may become one point: what this costs, a few for
+  /// each face whose edge goes, however many faces meet in a point.
+  std::uint64_t neighbours_asked = 0;
   std::uint64_t holes = 0, hole_points = 0, hole_faces = 0; ///< filled, new, new
   std::uint64_t holes_left = 0; ///< larger than asked, or the border meets itself, another sheet,
                                 ///< or is that of one face alone

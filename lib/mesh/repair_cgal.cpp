@@ -28,12 +28,16 @@ using Face = Surface::Face_index;
 using Edge = Surface::Edge_index;
 using Halfedge = Surface::Halfedge_index;
 
+/// By link_condition, of this thread's repair: CGAL calls it without an object.
+thread_local std::uint64_t neighbours_asked = 0;
+
 /// The points around one, but for `other`, ascending.
 std::vector<Vertex> neighbours(const Surface& surface, Vertex of, Vertex other) {
   std::vector<Vertex> around;
   for (const Halfedge h : CGAL::halfedges_around_target(of, surface))
     if (surface.source(h) != other)
       around.push_back(surface.source(h));
+  neighbours_asked += around.size();
   std::sort(around.begin(), around.end());
   return around;
 }
@@ -178,9 +182,11 @@ private:
     for (const Halfedge h : surface_.halfedges())
       if (surface_.is_border(h) && is_seam(h))
         seam[surface_.edge(h)] = true;
+    neighbours_asked = 0;
     (void)pmp::experimental::remove_almost_degenerate_faces(
         surface_.faces(), surface_, std::cos(repair_cap * M_PI / 180), repair_needle, 0,
         CGAL::parameters::edge_is_constrained_map(seam));
+    report_.neighbours_asked = neighbours_asked;
     report_.degenerate_left = flat_faces();
     report_.degenerate_faces += before - std::min(before, report_.degenerate_left);
   }

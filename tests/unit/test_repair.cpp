@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <ctime>
 #include <random>
 #include <string>
 #include <vector>
@@ -245,21 +244,21 @@ TriangleMesh double_cones(std::uint32_t count, std::uint32_t edges, double heigh
 }
 
 TEST(Repair, FacesThatMeetInAPointCostWhatTheyDoElsewhere) {
-  std::array<double, 2> clocks{}; // of the processor: other programs do not count
   for (const bool together : {false, true}) {
-    TriangleMesh mesh = together ? double_cones(1, 40000, 1000) : double_cones(80, 500, 10000);
+    TriangleMesh mesh = together ? double_cones(1, 4000, 1000) : double_cones(8, 500, 10000);
     const double volume = signed_volume(mesh);
-    const std::clock_t begin = std::clock();
     const RepairReport report = repair_mesh(mesh, parse_repair("all"), Context{});
-    clocks[together ? 1 : 0] = static_cast<double>(std::clock() - begin);
-    EXPECT_EQ(report.degenerate_faces, 80000U);
+    EXPECT_EQ(report.degenerate_faces, 8000U);
     EXPECT_EQ(report.degenerate_left, 0U);
-    EXPECT_LT(mesh.triangles.size(), 40000U);
+    const std::size_t gone = 8000 - mesh.triangles.size();
+    EXPECT_GT(gone, 4000U);
+    // An edge that goes takes two faces with it, and has few neighbours, but for one at the tips.
+    EXPECT_GE(report.neighbours_asked, gone);
+    EXPECT_LE(report.neighbours_asked, 8 * gone) << together;
     const MeshReport after = examine_mesh(mesh);
     EXPECT_TRUE(after.closed() && after.manifold() && after.outward());
     EXPECT_NEAR(signed_volume(mesh), volume, 1e-3 * volume);
   }
-  EXPECT_LT(clocks[1], 10 * clocks[0]); // 1; by the square of the faces at a point 20
 }
 
 TEST(Repair, SheetsThatMeetInAnEdgeStayJoinedAndAreNoHoles) {
