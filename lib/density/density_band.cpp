@@ -244,6 +244,18 @@ void evaluate_in_place(const Context& context, GridBuilder& builder,
   report.leaf_particle_pairs += evaluated.pairs;
 }
 
+/// By block.
+std::vector<std::vector<std::uint32_t>> crossed_leaves(const std::vector<LeafLists>& plans,
+                                                       const std::vector<std::size_t>& first,
+                                                       const std::vector<Fate>& fates) {
+  std::vector<std::vector<std::uint32_t>> crossed(plans.size());
+  for (std::size_t n = 0; n < plans.size(); ++n)
+    for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
+      if (fates[first[n] + m] == Fate::crossed)
+        crossed[n].push_back(static_cast<std::uint32_t>(m));
+  return crossed;
+}
+
 /// Where bounds spare most, values wait outside the grid until it is known that they are needed;
 /// leaves on one side that are needed for a neighbour are evaluated again.
 void evaluate_in_batches(const Context& context, GridBuilder& builder,
@@ -332,12 +344,7 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
   in_batches({});
 
   const std::vector<Fate> fates = find_fates(quiet, blocks.size, plans, first, sides);
-  std::vector<std::vector<std::uint32_t>> needed(plans.size());
-  for (std::size_t n = 0; n < plans.size(); ++n)
-    for (std::size_t m = 0; m < plans[n].leaves.size(); ++m)
-      if (fates[first[n] + m] == Fate::crossed)
-        needed[n].push_back(static_cast<std::uint32_t>(m));
-  in_batches(needed);
+  in_batches(crossed_leaves(plans, first, fates));
 
   const float value = opposite_value(isovalue);
   for (std::size_t n = 0; n < plans.size(); ++n)

@@ -161,46 +161,82 @@ std::vector<std::uint8_t> marked_near(const std::vector<Vec3>& at, const Area& a
   return marked;
 }
 
-template <class Area>
-Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) {
-  Cut cut;
-  std::vector<Vec3> middle;
-  middle.reserve(model.triangles.size());
+/// How far a corner is from its triangle's middle, at most.
+double longest_reach(const Model& model, const std::vector<Vec3>& at,
+                     const std::vector<Vec3>& middle) {
   double square = 0;
-  for (const Triangle& t : model.triangles) {
-    middle.push_back((at[t[0]] + at[t[1]] + at[t[2]]) / 3);
-    for (const std::uint32_t corner : t) {
-      const Vec3 d = at[corner] - middle.back();
+  for (std::size_t t = 0; t < middle.size(); ++t)
+    for (const std::uint32_t corner : model.triangles[t]) {
+      const Vec3 d = at[corner] - middle[t];
       square = std::max(square, dot(d, d));
     }
+  return std::sqrt(square);
+}
+
+std::vector<Vec3> middles(const Model& model, const std::vector<Vec3>& at) {
+  std::vector<Vec3> all;
+  all.reserve(model.triangles.size());
+  for (const Triangle& t : model.triangles)
+    all.push_back((at[t[0]] + at[t[1]] + at[t[2]]) / 3);
+  return all;
+}
+
+template <class Area>
+class AreaCutter {
+public:
+  AreaCutter(const Model& model, const std::vector<Vec3>& at, const Area& area)
+      : model_(model), at_(at), area_(area), middle_(middles(model, at)) {
+    // A triangle reaches so far from the midpoint of its edge. Each round that tidies the rim moves
+    // it by a triangle, bending springs reach over two.
+    const double reach = longest_reach(model, at, middle_);
+    const double far = (2 * most_rounds + 8) * reach;
+    edges_ = surface_part(model, marked_near(at, area, far)).edges;
+    const double around_edge = Area::bounded ? 2 * reach : far;
+    grown_ = {around_edge, around_edge, around_edge};
   }
-  const double reach = std::sqrt(square); // of a triangle from the midpoint of its edge
-  // Each round that tidies the rim moves it by a triangle, bending springs reach over two.
-  const double far = (2 * most_rounds + 8) * reach;
-  const EdgeTable edges = surface_part(model, marked_near(at, area, far)).edges;
-  const double around_edge = Area::bounded ? 2 * reach : far;
-  const Vec3 grown{around_edge, around_edge, around_edge};
-  std::vector<std::size_t> opened;
-  const auto open = [&](std::size_t e) {
-    const auto [i, j] = edges.ends[e];
-    const auto around = edges.around(e);
-    const Vec3 here = 0.5 * (at[i] + at[j]);
-    if (around.size() < 2 || !area.has(i) || !area.has(j) || !area.near(here - grown, here + grown))
+
+  Cut cut() {
+    Cut cut;
+    for (const std::size_t e : opened_edges())
+      cut.edges.push_back(edges_.ends[e]);
+    cut_springs(cut);
+    put_in_order(cut);
+    return cut;
+  }
+
+private:
+  bool opens(std::size_t e) const {
+    const auto [i, j] = edges_.ends[e];
+    const auto around = edges_.around(e);
+    const Vec3 here = 0.5 * (at_[i] + at_[j]);
+    if (around.size() < 2 || !area_.has(i) || !area_.has(j) ||
+        !area_.near(here - grown_, here + grown_))
       return false;
     for (std::size_t k = 1; k < around.size(); ++k)
-      if (area.parts(here, middle[around[0] / 3], middle[around[k] / 3]))
+      if (area_.parts(here, middle_[around[0] / 3], middle_[around[k] / 3]))
         return true;
     return false;
-  };
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    if (open(e))
-      opened.push_back(e);
-  // A triangle that would be left with one neighbour on its side goes to the other one: it counts
-  // as standing where its neighbour there does. So the rim has no teeth that hang loosely.
-  for (int round = 0; round < most_rounds; ++round) {
+  }
+
+  std::vector<std::size_t> opened_edges() {
+    std::vector<std::size_t> opened;
+    for (int round = 0;; ++round) {
+      opened.clear();
+      for (std::size_t e = 0; e < edges_.size(); ++e)
+        if (opens(e))
+          opened.push_back(e);
+      if (round == most_rounds || !move_teeth(opened))
+        return opened;
+    }
+  }
+
+  /// A triangle that would be left with one neighbour on its side goes to the other one: it counts
+  /// as standing where its neighbour there does. So the rim has no teeth that hang loosely. Returns
+  /// whether there was any.
+  bool move_teeth(const std::vector<std::size_t>& opened) {
     std::map<std::uint32_t, std::pair<int, std::uint32_t>> teeth; // opened edges, who is across
     for (const std::size_t e : opened) {
-      const auto around = edges.around(e);
+      const auto around = edges_.around(e);
       if (around.size() != 2)
         continue;
       for (const std::size_t k : {0U, 1U}) {
@@ -211,72 +247,81 @@ Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) 
     std::set<std::uint32_t> moved;
     for (const auto& [t, tooth] : teeth)
       if (tooth.first > 1 && !moved.contains(tooth.second)) {
-        middle[t] = middle[tooth.second];
+        middle_[t] = middle_[tooth.second];
         moved.insert(t);
       }
-    if (moved.empty())
-      break;
-    opened.clear();
-    for (std::size_t e = 0; e < edges.size(); ++e)
-      if (open(e))
-        opened.push_back(e);
+    return !moved.empty();
   }
-  for (const std::size_t e : opened)
-    cut.edges.push_back(edges.ends[e]);
 
-  // Springs without a triangle.
-  const CornersOfNodes fans(model);
-  std::vector<std::array<std::uint32_t, 2>> across;
-  const auto passes = [&](std::uint32_t from, std::uint32_t to, std::vector<Cut::Side>& sides) {
-    const std::span<const std::uint32_t> corners = fans.of(from);
+  /// Whether all sides of `from` lie across the area from `to`, and which do.
+  bool passes(std::uint32_t from, std::uint32_t to, std::vector<Cut::Side>& sides) const {
+    const std::span<const std::uint32_t> corners = fans_.of(from);
     if (corners.empty())
-      return area.pierced(at[from], at[to]);
+      return area_.pierced(at_[from], at_[to]);
     std::size_t count = 0;
     for (const std::uint32_t c : corners)
-      if (area.pierced(middle[c / 3], at[to])) {
+      if (area_.pierced(middle_[c / 3], at_[to])) {
         sides.push_back({c, to});
         ++count;
       }
     return count == corners.size();
-  };
-  std::size_t edge = 0;
-  for (std::size_t s = 0; s < model.springs.size(); ++s) {
-    const Spring& spring = model.springs[s];
-    const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
-    if (spring.kind == SpringKind::edge) {
-      while (edge < edges.size() && edges.ends[edge] < ends)
-        ++edge;
-      if (edge < edges.size() && edges.ends[edge] == ends)
-        continue;
-    }
-    const bool central = spring.kind == SpringKind::central;
-    if (!area.has(spring.i) || !(central || area.has(spring.j)))
-      continue;
-    Vec3 low = at[spring.i], high = low;
-    for (int a = 0; a < 3; ++a) {
-      low[a] = std::min(low[a], at[spring.j][a]);
-      high[a] = std::max(high[a], at[spring.j][a]);
-    }
-    if (!area.near(low - grown, high + grown))
-      continue;
-    std::vector<Cut::Side> sides;
-    const bool severed =
-        passes(spring.i, spring.j, sides) || (!central && passes(spring.j, spring.i, sides));
-    if (!severed && sides.empty())
-      continue;
-    if (spring.kind == SpringKind::bend) {
-      if (across.empty())
-        across = opposite_pairs(model, edges);
-      if (std::binary_search(across.begin(), across.end(), ends))
-        continue; // gone with the edge that it crosses
-    }
-    if (severed)
-      cut.springs.push_back(s);
-    else
-      cut.sides.insert(cut.sides.end(), sides.begin(), sides.end());
   }
-  put_in_order(cut);
-  return cut;
+
+  bool is_near(const Spring& spring) const {
+    Vec3 low = at_[spring.i], high = low;
+    for (int a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], at_[spring.j][a]);
+      high[a] = std::max(high[a], at_[spring.j][a]);
+    }
+    return area_.near(low - grown_, high + grown_);
+  }
+
+  /// Those without a triangle.
+  void cut_springs(Cut& cut) const {
+    std::vector<std::array<std::uint32_t, 2>> across;
+    std::size_t edge = 0;
+    for (std::size_t s = 0; s < model_.springs.size(); ++s) {
+      const Spring& spring = model_.springs[s];
+      const std::array<std::uint32_t, 2> ends{spring.i, spring.j};
+      if (spring.kind == SpringKind::edge) {
+        while (edge < edges_.size() && edges_.ends[edge] < ends)
+          ++edge;
+        if (edge < edges_.size() && edges_.ends[edge] == ends)
+          continue;
+      }
+      const bool central = spring.kind == SpringKind::central;
+      if (!area_.has(spring.i) || !(central || area_.has(spring.j)) || !is_near(spring))
+        continue;
+      std::vector<Cut::Side> sides;
+      const bool severed =
+          passes(spring.i, spring.j, sides) || (!central && passes(spring.j, spring.i, sides));
+      if (!severed && sides.empty())
+        continue;
+      if (spring.kind == SpringKind::bend) {
+        if (across.empty())
+          across = opposite_pairs(model_, edges_);
+        if (std::binary_search(across.begin(), across.end(), ends))
+          continue; // gone with the edge that it crosses
+      }
+      if (severed)
+        cut.springs.push_back(s);
+      else
+        cut.sides.insert(cut.sides.end(), sides.begin(), sides.end());
+    }
+  }
+
+  const Model& model_;
+  const std::vector<Vec3>& at_;
+  const Area& area_;
+  std::vector<Vec3> middle_;
+  EdgeTable edges_;
+  Vec3 grown_;
+  CornersOfNodes fans_{model_};
+};
+
+template <class Area>
+Cut area_cut(const Model& model, const std::vector<Vec3>& at, const Area& area) {
+  return AreaCutter<Area>(model, at, area).cut();
 }
 
 std::string text(const Vec3& v) {

@@ -121,7 +121,7 @@ struct Edges {
 
 struct Nearness { // of the triangle's plane, at pixels of the tile
   double c, dx, dy;
-  float least, most;
+  float min, max;
 };
 
 template <class Number>
@@ -139,19 +139,22 @@ inline Ints inside(const Number (&e)[3], const Number (&dx)[3], Floats) {
   }
 }
 
+struct PixelBox { // of the tile, the last ones too
+  std::int32_t left, right, top, bottom;
+};
+
 template <class Number>
-inline void cover(const Edges<Number>& edges, const Nearness& near, std::int32_t left,
-                  std::int32_t right, std::int32_t top, std::int32_t bottom, std::uint32_t shown,
-                  float* depth, std::uint32_t* seen) {
-  const Floats least = splat(near.least), most = splat(near.most);
+inline void rasterise(const Edges<Number>& edges, const Nearness& near, const PixelBox& box,
+                      std::uint32_t shown, float* depth, std::uint32_t* seen) {
+  const Floats min = splat(near.min), max = splat(near.max);
   const Floats slope = ramp() * splat(static_cast<float>(near.dx));
   const Ints id = splat(static_cast<std::int32_t>(shown));
-  for (std::int32_t y = top; y <= bottom; ++y) {
+  for (std::int32_t y = box.top; y <= box.bottom; ++y) {
     Number e[3];
     for (int k = 0; k < 3; ++k)
       e[k] = edges.c[k] + edges.dy[k] * static_cast<Number>(y) +
-             edges.dx[k] * static_cast<Number>(left);
-    for (std::int32_t x = left; x <= right; x += lanes) {
+             edges.dx[k] * static_cast<Number>(box.left);
+    for (std::int32_t x = box.left; x <= box.right; x += lanes) {
       const Ints covered = inside<Number>(e, edges.dx, slope);
       for (int k = 0; k < 3; ++k)
         e[k] += edges.dx[k] * lanes;
@@ -159,7 +162,7 @@ inline void cover(const Edges<Number>& edges, const Nearness& near, std::int32_t
         continue;
       const std::ptrdiff_t at = std::ptrdiff_t{y} * stride + x;
       const auto start = static_cast<float>(near.c + near.dx * x + near.dy * y);
-      const Floats z = smaller(larger(splat(start) + slope, least), most);
+      const Floats z = smaller(larger(splat(start) + slope, min), max);
       const auto old = load<Floats>(depth + at);
       const Ints wins = covered & (z > old);
       store(depth + at, choose(wins, z, old));
@@ -168,20 +171,19 @@ inline void cover(const Edges<Number>& edges, const Nearness& near, std::int32_t
   }
 }
 
-inline std::int32_t least_of(const std::int32_t (&a)[3]) {
+inline std::int32_t min_of(const std::int32_t (&a)[3]) {
   const std::int32_t m = a[0] < a[1] ? a[0] : a[1];
   return m < a[2] ? m : a[2];
 }
-inline std::int32_t most_of(const std::int32_t (&a)[3]) {
+inline std::int32_t max_of(const std::int32_t (&a)[3]) {
   const std::int32_t m = a[0] > a[1] ? a[0] : a[1];
   return m > a[2] ? m : a[2];
 }
 
 template <class Number>
-inline void cover_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3],
-                          const float (&z)[3], double area, std::int32_t left, std::int32_t right,
-                          std::int32_t top, std::int32_t bottom, int samples, std::uint32_t shown,
-                          float* depth, std::uint32_t* seen) {
+inline void rasterise_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3],
+                              const float (&z)[3], double area, const PixelBox& box, int samples,
+                              std::uint32_t shown, float* depth, std::uint32_t* seen) {
   Edges<Number> edges;
   Nearness near{0, 0, 0, z[0], z[0]};
   constexpr std::int32_t pixel = 1 << raster_subpixel_bits, half = pixel / 2;
@@ -199,14 +201,14 @@ inline void cover_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3]
     near.c += static_cast<double>(edges.c[k]) * weight;
     near.dx += static_cast<double>(edges.dx[k]) * weight;
     near.dy += static_cast<double>(edges.dy[k]) * weight;
-    near.least = z[k] < near.least ? z[k] : near.least;
-    near.most = z[k] > near.most ? z[k] : near.most;
+    near.min = z[k] < near.min ? z[k] : near.min;
+    near.max = z[k] > near.max ? z[k] : near.max;
     // A point on an edge belongs to the triangle if the edge is a top or a left one.
     if (!(ey[k] < 0 || (ey[k] == 0 && ex[k] > 0)))
       edges.c[k] -= 1;
   }
   if (samples == 1) {
-    cover<Number>(edges, near, left, right, top, bottom, shown, depth, seen);
+    rasterise<Number>(edges, near, box, shown, depth, seen);
     return;
   }
   for (int s = 0; s < 4; ++s) {
@@ -216,13 +218,13 @@ inline void cover_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3]
       moved.c[k] +=
           ex[k] * static_cast<Number>(sample_y[s]) - ey[k] * static_cast<Number>(sample_x[s]);
     there.c += (near.dx * sample_x[s] + near.dy * sample_y[s]) / pixel;
-    cover<Number>(moved, there, left, right, top, bottom, shown, depth + std::ptrdiff_t{s} * plane,
-                  seen + std::ptrdiff_t{s} * plane);
+    rasterise<Number>(moved, there, box, shown, depth + std::ptrdiff_t{s} * plane,
+                      seen + std::ptrdiff_t{s} * plane);
   }
 }
 
-inline void cover_triangle(const KernelScreen& screen, const KernelTile& tile, std::uint32_t n,
-                           float* depth, std::uint32_t* seen) {
+inline void rasterise_triangle(const KernelScreen& screen, const KernelTile& tile, std::uint32_t n,
+                               float* depth, std::uint32_t* seen) {
   const std::uint32_t* const corner = screen.corners + std::size_t{3} * n;
   std::int32_t x[3], y[3];
   float z[3];
@@ -243,31 +245,26 @@ inline void cover_triangle(const KernelScreen& screen, const KernelTile& tile, s
     x[2] = sx, y[2] = sy, z[2] = sz;
     area = -area;
   }
-  const std::int32_t low_x = least_of(x), high_x = most_of(x), low_y = least_of(y),
-                     high_y = most_of(y);
+  const std::int32_t low_x = min_of(x), high_x = max_of(x), low_y = min_of(y), high_y = max_of(y);
   // The centre of pixel p is at (p + 1/2) subpixels; samples are less than half a pixel away.
   const std::int32_t early = tile.samples == 1 ? pixel / 2 - 1 : 0;
   const std::int32_t late = tile.samples == 1 ? pixel / 2 : 0;
-  std::int32_t left = (low_x + early) >> raster_subpixel_bits,
-               right = (high_x - late) >> raster_subpixel_bits,
-               top = (low_y + early) >> raster_subpixel_bits,
-               bottom = (high_y - late) >> raster_subpixel_bits;
-  left = left > 0 ? left : 0;
-  top = top > 0 ? top : 0;
-  right = right < tile.width ? right : tile.width - 1;
-  bottom = bottom < tile.height ? bottom : tile.height - 1;
-  if (left > right || top > bottom)
+  PixelBox box{(low_x + early) >> raster_subpixel_bits, (high_x - late) >> raster_subpixel_bits,
+               (low_y + early) >> raster_subpixel_bits, (high_y - late) >> raster_subpixel_bits};
+  box.left = box.left > 0 ? box.left : 0;
+  box.top = box.top > 0 ? box.top : 0;
+  box.right = box.right < tile.width ? box.right : tile.width - 1;
+  box.bottom = box.bottom < tile.height ? box.bottom : tile.height - 1;
+  if (box.left > box.right || box.top > box.bottom)
     return;
   // Within 96 pixels edge functions fit in 31 bits, over all lanes; else doubles hold them exactly.
   constexpr std::int32_t small = 96 * pixel;
   const std::uint32_t shown = screen.shown[n];
   const auto twice = static_cast<double>(area);
   if (high_x - low_x <= small && high_y - low_y <= small)
-    cover_samples<std::int32_t>(x, y, z, twice, left, right, top, bottom, tile.samples, shown,
-                                depth, seen);
+    rasterise_samples<std::int32_t>(x, y, z, twice, box, tile.samples, shown, depth, seen);
   else
-    cover_samples<double>(x, y, z, twice, left, right, top, bottom, tile.samples, shown, depth,
-                          seen);
+    rasterise_samples<double>(x, y, z, twice, box, tile.samples, shown, depth, seen);
 }
 
 // --- What it looks like

@@ -129,7 +129,7 @@ inline std::uint64_t draw_tile(const KernelScene& scene, const KernelScreen& scr
     std::memset(seen, 0xff, static_cast<std::size_t>(planes) * sizeof *seen);
   }
   for (std::size_t n = 0; n < tile.count; ++n)
-    cover_triangle(screen, tile, tile.list[n], depth, seen);
+    rasterise_triangle(screen, tile, tile.list[n], depth, seen);
   std::uint64_t covered = 0;
   Corners corners;
   Slots slots;

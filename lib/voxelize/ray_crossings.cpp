@@ -13,13 +13,14 @@ bool past_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::int32_t j,
   return turn != 0 ? turn > 0 : q.y <= p.y;
 }
 
-std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, std::int32_t i,
-                              std::int32_t j, std::int32_t low, std::int32_t high, TieOrder ties,
+std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, Ray ray,
+                              std::int32_t low, std::int32_t high, TieOrder ties,
                               std::uint64_t& exact_tests) {
   // The normal's z is not 0: some ray crosses the triangle.
   const int normal_z = turn_sign(a.x, a.y, b.x, b.y, c.x, c.y, exact_tests);
   const auto past = [&](std::int32_t k) {
-    const Vec3 sample{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
+    const Vec3 sample{static_cast<double>(ray.i), static_cast<double>(ray.j),
+                      static_cast<double>(k)};
     int side = side_sign(a, b, c, sample, exact_tests);
     // The move adds normal_x, normal_y and normal_z times their infinitesimals.
     if (side == 0 && ties != TieOrder::zxy)

@@ -26,12 +26,49 @@ Floor floor_of(__m256d x, __m256d error) {
   return {value, _mm256_and_pd(above, below)};
 }
 
+__m128i lane_numbers() {
+  return _mm_setr_epi32(0, 1, 2, 3);
+}
+
+/// z of a triangle's plane along a row: by how much it grows from y on, and errs.
+struct Plane {
+  __m256d y, slope, error;
+};
+struct Row {
+  std::int32_t i, low, high; ///< of j
+};
+
+/// Writes the crossings of a row, whose z is `row_z` at the plane's y, four at a time. Returns
+/// which lanes are sure.
+inline __m256d cross_row(const Plane& plane, double row_z, const Row& row, CrossingBuffer& buffer,
+                         std::size_t& count) {
+  __m256d sure = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
+  const __m256d start = _mm256_set1_pd(row_z);
+  std::int32_t j = row.low;
+  do {
+    const __m128i js = _mm_add_epi32(_mm_set1_epi32(j), lane_numbers());
+    const __m256d from_y = _mm256_sub_pd(_mm256_cvtepi32_pd(js), plane.y);
+    const Floor z = floor_of(_mm256_fmadd_pd(from_y, plane.slope, start), plane.error);
+    const __m128i beyond = _mm_cmpgt_epi32(js, _mm_set1_epi32(row.high - 1));
+    sure = _mm256_and_pd(sure,
+                         _mm256_or_pd(z.sure, _mm256_castsi256_pd(_mm256_cvtepi32_epi64(beyond))));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.i + count), _mm_set1_epi32(row.i));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.j + count), js);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.k + count),
+                     _mm_add_epi32(_mm256_cvtpd_epi32(z.value), _mm_set1_epi32(1)));
+    const std::int32_t some = row.high - j;
+    count += static_cast<std::size_t>(some < 4 ? some : 4);
+    j += 4;
+  } while (j < row.high);
+  return sure;
+}
+
 } // namespace
 
 std::size_t cross_small_triangles_avx2(const TriangleList& list, std::size_t next,
                                        CrossingBuffer& buffer) {
   std::size_t count = 0, left = 0;
-  const __m128i lanes = _mm_setr_epi32(0, 1, 2, 3), ones = _mm_set1_epi32(1);
+  const __m128i lanes = lane_numbers(), ones = _mm_set1_epi32(1);
   alignas(16) std::int32_t low[4], high[4];
   alignas(32) double row_z[4];
   for (; next < list.count; ++next) {
@@ -74,8 +111,8 @@ std::size_t cross_small_triangles_avx2(const TriangleList& list, std::size_t nex
     const double slope_x = -nx * quotient[3], slope_y = -ny * quotient[3];
     const double error = 0x1p-47 * (size_x * size_y * size_z) * absolute(quotient[3]) +
                          0x1p-50 * (absolute(a[2]) + size_z);
-    const __m256d z_error = _mm256_set1_pd(error), z_slope = _mm256_set1_pd(slope_y);
     const __m256d ax = _mm256_set1_pd(a[0]), ay = _mm256_set1_pd(a[1]), bx = _mm256_set1_pd(b[0]);
+    const Plane plane{ay, _mm256_set1_pd(slope_y), _mm256_set1_pd(error)};
     const __m256d long_error = _mm256_set1_pd(0x1p-49 * (absolute(a[1]) + absolute(vy)));
     __m256d sure = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
     const std::size_t start = count;
@@ -106,25 +143,9 @@ std::size_t cross_small_triangles_avx2(const TriangleList& list, std::size_t nex
                       _mm256_fmadd_pd(from_a, _mm256_set1_pd(slope_x), _mm256_set1_pd(a[2])));
       // Where an edge is unsure the bounds below may be off, by one at most.
       const std::int32_t rows = end - i < 4 ? end - i : 4;
-      for (std::int32_t r = 0; r < rows; ++r) {
-        const __m256d z_row = _mm256_set1_pd(row_z[r]);
-        std::int32_t j = low[r];
-        do {
-          const __m128i js = _mm_add_epi32(_mm_set1_epi32(j), lanes);
-          const __m256d from_y = _mm256_sub_pd(_mm256_cvtepi32_pd(js), ay);
-          const Floor z = floor_of(_mm256_fmadd_pd(from_y, z_slope, z_row), z_error);
-          const __m128i beyond = _mm_cmpgt_epi32(js, _mm_set1_epi32(high[r] - 1));
-          sure = _mm256_and_pd(
-              sure, _mm256_or_pd(z.sure, _mm256_castsi256_pd(_mm256_cvtepi32_epi64(beyond))));
-          _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.i + count), _mm_set1_epi32(i + r));
-          _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.j + count), js);
-          _mm_storeu_si128(reinterpret_cast<__m128i*>(buffer.k + count),
-                           _mm_add_epi32(_mm256_cvtpd_epi32(z.value), ones));
-          const std::int32_t some = high[r] - j;
-          count += static_cast<std::size_t>(some < 4 ? some : 4);
-          j += 4;
-        } while (j < high[r]);
-      }
+      for (std::int32_t r = 0; r < rows; ++r)
+        sure = _mm256_and_pd(sure,
+                             cross_row(plane, row_z[r], {i + r, low[r], high[r]}, buffer, count));
     }
     if (_mm256_movemask_pd(sure) != 0xf) {
       count = start;

@@ -33,10 +33,15 @@ enum class TieOrder { xyz, xzy, zxy };
 bool past_edge(const Vec3& p, const Vec3& q, std::int32_t i, std::int32_t j,
                std::uint64_t& exact_tests);
 
+/// The ray along k through (i, j).
+struct Ray {
+  std::int32_t i, j;
+};
+
 /// Smallest k in [low, high] whose sample (i, j, k) lies past the plane of a, b, c in the direction
 /// of k. \pre ray (i, j) crosses the triangle; sample `high` lies past it
-std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, std::int32_t i,
-                              std::int32_t j, std::int32_t low, std::int32_t high, TieOrder ties,
+std::int32_t first_past_plane(const Vec3& a, const Vec3& b, const Vec3& c, Ray ray,
+                              std::int32_t low, std::int32_t high, TieOrder ties,
                               std::uint64_t& exact_tests);
 
 /// Where an edge crosses rows of rays: y = p.y + (i - p.x) slope.
@@ -129,12 +134,12 @@ void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner
             emit(i, j, below + 1);
           } else {
             const std::int32_t nearest = rest < 0.5 ? below : below + 1;
-            emit(i, j, first_past_plane(a, b, c, i, j, nearest, nearest + 1, ties, exact_tests));
+            emit(i, j, first_past_plane(a, b, c, {i, j}, nearest, nearest + 1, ties, exact_tests));
           }
         } else {
           const auto [z_min, z_max] = std::minmax({a.z, b.z, c.z});
           emit(i, j,
-               first_past_plane(a, b, c, i, j, ceil_int(z_min), floor_int(z_max) + 1, ties,
+               first_past_plane(a, b, c, {i, j}, ceil_int(z_min), floor_int(z_max) + 1, ties,
                                 exact_tests));
         }
       }
