@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -172,12 +174,25 @@ Entries entries_of(const StiffnessMatrix& matrix, const Nodes& nodes, const Fron
   return entries;
 }
 
+struct Free {
+  void operator()(double* numbers) const noexcept { std::free(numbers); }
+};
+using Zeros = std::unique_ptr<double[], Free>;
+
+/// Zeros as the system gives them, so that nobody writes them before they are used.
+Zeros zeros(std::size_t count) {
+  Zeros made(static_cast<double*>(std::calloc(std::max<std::size_t>(count, 1), sizeof(double))));
+  if (made == nullptr)
+    throw std::bad_alloc();
+  return made;
+}
+
 } // namespace
 
 /// Arrays from a file, or made by fronts.
 struct Factor::State {
   FactorData data; // `x` only of one from a file
-  std::unique_ptr<double[]> made;
+  Zeros made;
   std::span<const double> x;
   CpuLevel cpu;
 
@@ -251,15 +266,19 @@ struct Factor::State {
                    8 * static_cast<double>(size + data.s.size() + matrix.row.size()) +
                        update_bytes(tree, fronts, false, thread_count(context)),
                    "the factor of the stiffness matrix");
-    if (made == nullptr)
-      made = std::make_unique_for_overwrite<double[]>(size);
+    const bool first = made == nullptr;
+    if (first)
+      made = zeros(size);
     x = {made.get(), size};
     for (std::size_t f = 0; f < fronts.size(); ++f)
       fronts[f].l = made.get() + data.px[f];
     try {
-      (void)gewebe::factorise(
-          {tree, nodes.axes, fronts, [&](const FrontAssembly& to) { assemble(matrix, to); }, false},
-          {}, context);
+      (void)gewebe::factorise({.tree = tree,
+                               .axes = nodes.axes,
+                               .fronts = fronts,
+                               .assemble = [&](const FrontAssembly& to) { assemble(matrix, to); },
+                               .zero = first},
+                              {}, context);
     } catch (const PivotTooSmall& pivot) {
       throw NotPositiveDefinite(static_cast<std::size_t>(
           data.permutation[static_cast<std::size_t>(data.super[pivot.front]) + pivot.column]));
@@ -323,7 +342,7 @@ void Factor::solve_panel(std::vector<double>& x, std::size_t width) const {
   const FactorView v = view();
   const SupernodalArrays l{v.super.size() - 1, v.super.data(), v.pi.data(),
                            v.px.data(),        v.s.data(),     v.x.data()};
-  std::vector<double> work(static_cast<std::size_t>(v.max_row_size) * panel_width);
+  std::vector<double> work(static_cast<std::size_t>(v.max_row_size) * width);
   (state_->cpu == CpuLevel::baseline ? solve_supernodal_baseline
                                      : solve_supernodal_avx2)(l, x.data(), width, work.data());
 }

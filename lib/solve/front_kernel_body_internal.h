@@ -267,6 +267,15 @@ inline void update_corner(double* const* columns, std::ptrdiff_t start, std::siz
       columns[j][start + static_cast<std::ptrdiff_t>(i)] = square[j][i];
 }
 
+/// A tile comes to the first cache while the one before it is computed; fetched earlier, it would
+/// give way to the strips.
+inline void fetch_tile(double* const* columns, std::ptrdiff_t start) {
+  for (std::size_t j = 0; j < tile_columns; ++j) {
+    __builtin_prefetch(columns[j] + start, 1);
+    __builtin_prefetch(columns[j] + start + strip_rows - 1, 1);
+  }
+}
+
 inline void update(const FrontArrays& f, std::size_t begin, std::size_t count,
                    const FrontScratch& scratch, std::size_t first, std::size_t last) {
   const Strips strips(f, begin + count);
@@ -278,8 +287,9 @@ inline void update(const FrontArrays& f, std::size_t begin, std::size_t count,
     const std::size_t to = std::min(from + at_once, last);
     double* columns[at_once][strip_rows];
     for (std::size_t c = from; c < to; ++c)
-      for (std::size_t j = strips.missing(c); j < strip_rows; ++j)
-        columns[c - from][j] = f.column(static_cast<std::size_t>(strips.start(c)) + j);
+      for (std::size_t j = 0; j < strip_rows; ++j)
+        columns[c - from][j] = f.column(static_cast<std::size_t>(
+            strips.start(c) + static_cast<std::ptrdiff_t>(std::max(j, strips.missing(c)))));
     for (std::size_t r = from; r < strips.count; ++r) {
       const std::ptrdiff_t start = strips.start(r);
       const double* const a = packed + r * size;
@@ -296,10 +306,12 @@ inline void update(const FrontArrays& f, std::size_t begin, std::size_t count,
             into[j] = group + j < missing ? unused : columns[c - from][group + j] + start;
           Tile<most_parts> tile;
           tile.load(into);
-          for (std::size_t j = 0; j < tile_columns; ++j) { // where the next strip comes to
-            __builtin_prefetch(into[j] + strip_rows, 1);
-            __builtin_prefetch(into[j] + 2 * strip_rows - 1, 1);
-          }
+          if (group + tile_columns < strip_rows)
+            fetch_tile(columns[c - from] + group + tile_columns, start);
+          else if (c + 1 < std::min(to, r + 1))
+            fetch_tile(columns[c - from + 1], start);
+          else
+            fetch_tile(columns[0], start + static_cast<std::ptrdiff_t>(strip_rows));
           tile.lose(a, strip_rows, packed + c * size + group, strip_rows, count);
           tile.store(into);
         }

@@ -140,9 +140,12 @@ struct FrontalFactor::State {
     for (std::size_t f = 0; f < tree.fronts(); ++f)
       fronts[f].l = memory[f].reserve(fronts[f].rows * fronts[f].columns, true);
     try {
-      work = gewebe::factorise(
-          {tree, graph.axes, fronts, [&](const FrontAssembly& to) { assemble(model, to); }, true},
-          wanted, context);
+      work = gewebe::factorise({.tree = tree,
+                                .axes = graph.axes,
+                                .fronts = fronts,
+                                .assemble = [&](const FrontAssembly& to) { assemble(model, to); },
+                                .keep_updates = true},
+                               wanted, context);
     } catch (const PivotTooSmall& pivot) {
       throw NotPositiveDefinite(axis_at(model, pivot.front, pivot.column));
     }
@@ -451,11 +454,12 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
   const State& s = *state_;
   const SupernodalArrays l = s.arrays();
   const std::size_t order = s.axis_of_row.size(), all = axes();
-  std::vector<double> x, work(s.longest * panel_width);
+  std::vector<double> x, work;
   for (std::size_t first = 0; first < columns;) {
     const std::size_t count = std::min(Factor::most_units, columns - first);
     const std::size_t width = solve_width(count);
     x.assign(order * width, 0.0);
+    work.resize(s.longest * width);
     double* const from = over_axes.data() + first * all;
     for (std::size_t k = 0; k < order; ++k)
       for (std::size_t j = 0; j < count; ++j)
@@ -475,13 +479,14 @@ FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
   constexpr std::size_t at_once = panel_width;
   const State& s = *state_;
   std::vector<HalfSolution> all(nodes.size());
-  std::vector<double> x;
+  std::vector<double> x, work;
   std::vector<std::uint32_t> fronts;
   for (std::size_t first = 0; first < nodes.size(); first += at_once) {
     const std::size_t count = std::min(at_once, nodes.size() - first);
     const std::size_t width = solve_width(3 * count);
     fronts.clear();
     x.assign(s.axis_of_row.size() * width, 0.0);
+    work.resize(s.longest * width);
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
       all[first + k].front = s.front_of_node(node);
@@ -492,8 +497,8 @@ FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
     }
     std::sort(fronts.begin(), fronts.end());
     fronts.erase(std::unique(fronts.begin(), fronts.end()), fronts.end());
-    (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline
-                                 : forward_supernodal_avx2)(s.arrays(), fronts, x.data(), width);
+    (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
+        s.arrays(), fronts, x.data(), width, work.data());
     for (std::size_t k = 0; k < count; ++k) {
       HalfSolution& half = all[first + k];
       if (half.front != none)

@@ -3,11 +3,12 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "solve/front_kernel_internal.h"
+#include "solve/front_plan_internal.h"
 
 #include <algorithm>
 #include <limits>
 #include <optional>
-#include <utility>
+#include <ranges>
 
 // Based on: Duff, Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations,
 // 1983; Liu, The multifrontal method for sparse matrix solution: theory and practice, 1992.
@@ -19,15 +20,6 @@ namespace {
 constexpr std::uint32_t none = FrontTree::none;
 constexpr double worth_threads = 1e6;                   // operations
 constexpr std::size_t worth_threads_entries = 1U << 18; // to be added or cleared
-
-std::size_t packed(std::size_t rows) {
-  return rows * (rows + 1) / 2;
-}
-
-double operations(const Front& front) {
-  const auto c = static_cast<double>(front.columns), b = static_cast<double>(front.below());
-  return c * c * c / 3 + c * c * b + c * b * b;
-}
 
 } // namespace
 
@@ -53,12 +45,21 @@ struct Run {
   std::size_t to = 0; // where the first stands
 };
 
+/// A child's update matrix, and where it goes.
+struct Gain {
+  const double* update;
+  std::size_t below;
+  std::size_t first, last; // of its runs
+};
+
 /// What a thread works with.
 struct Scratch {
   std::vector<std::uint32_t> row;
   std::vector<double> least;
   std::vector<Run> runs;
+  std::vector<Gain> gains;
   std::vector<double> square, strips;
+  UpdateStacks stacks;
 };
 
 /// work(begin, end) over [0, count): on all threads if it is worth them.
@@ -71,42 +72,64 @@ void over(const Context& context, bool worth, std::size_t count, std::size_t gra
     work(std::size_t{0}, count);
 }
 
-/// The parent's matrix gains rows and columns of a child's update matrix.
-void extend_add(const Multifrontal& task, const FrontArrays& into, std::size_t child,
-                Scratch& scratch, const Context& context) {
-  const Front& from = task.fronts[child];
-  const std::size_t below = from.below();
+void find_gains(const Multifrontal& task, std::span<const std::uint32_t> children,
+                Scratch& scratch) {
   std::vector<Run>& runs = scratch.runs;
   runs.clear();
-  std::size_t size = 0;
-  for (const std::uint32_t node : task.tree.boundary_of(child)) {
-    const std::size_t axes = task.axes[node], row = scratch.row[node];
-    if (!runs.empty() && runs.back().to + size - runs.back().begin == row)
-      runs.back().end += axes;
-    else
-      runs.push_back({size, size + axes, row});
-    size += axes;
+  scratch.gains.clear();
+  for (const std::uint32_t child : children) {
+    const std::size_t first = runs.size();
+    std::size_t size = 0;
+    for (const std::uint32_t node : task.tree.boundary_of(child)) {
+      const std::size_t axes = task.axes[node], row = scratch.row[node];
+      if (runs.size() > first && runs.back().to + size - runs.back().begin == row)
+        runs.back().end += axes;
+      else
+        runs.push_back({size, size + axes, row});
+      size += axes;
+    }
+    scratch.gains.push_back({task.fronts[child].update, size, first, runs.size()});
   }
-  const double* const update = from.update.data();
-  const std::size_t large = packed(below);
-  over(context, large >= worth_threads_entries, below, 64,
-       [&](std::size_t first, std::size_t last) {
-         auto run = std::partition_point(runs.begin(), runs.end(),
-                                         [&](const Run& r) { return r.end <= first; });
-         for (std::size_t c = first; c < last; ++c) {
-           if (c == run->end)
-             ++run;
-           const double* const column = update + (c * below - c * (c + 1) / 2); // [r] is row r
-           double* const to = into.column(run->to + c - run->begin);
-           for (auto rows = run; rows != runs.end(); ++rows) {
-             const std::size_t begin = rows == run ? c : rows->begin;
-             double* const __restrict there = to + (rows->to + begin - rows->begin);
-             const double* const __restrict here = column + begin;
-             for (std::size_t k = 0; k < rows->end - begin; ++k)
-               there[k] += here[k];
-           }
-         }
-       });
+}
+
+/// Columns [first, last) of the parent gain a child's.
+void extend_add(const FrontArrays& into, const Gain& gain, std::span<const Run> runs,
+                std::size_t first, std::size_t last) {
+  auto run = std::partition_point(runs.begin(), runs.end(),
+                                  [&](const Run& r) { return r.to + (r.end - r.begin) <= first; });
+  for (; run != runs.end() && run->to < last; ++run) {
+    const std::size_t stop = run->begin + std::min(run->end - run->begin, last - run->to);
+    for (std::size_t c = run->begin + (std::max(first, run->to) - run->to); c < stop; ++c) {
+      const double* const column = gain.update + (c * gain.below - c * (c + 1) / 2); // [r] is row r
+      double* const to = into.column(run->to + c - run->begin);
+      for (auto rows = run; rows != runs.end(); ++rows) {
+        const std::size_t begin = rows == run ? c : rows->begin;
+        double* const __restrict there = to + (rows->to + begin - rows->begin);
+        const double* const __restrict here = column + begin;
+        for (std::size_t k = 0; k < rows->end - begin; ++k)
+          there[k] += here[k];
+      }
+    }
+  }
+}
+
+/// The parent's update matrix is cleared, and all of it gains the update matrices of its children:
+/// some columns at a time, which stay in the cache meanwhile.
+void gather(const Multifrontal& task, const FrontArrays& into,
+            std::span<const std::uint32_t> children, Scratch& scratch, const Context& context) {
+  constexpr std::size_t at_once = 16;
+  find_gains(task, children, scratch);
+  const auto work = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t first = begin; first < end; first += at_once) {
+      const std::size_t last = std::min(first + at_once, end);
+      if (const std::size_t from = std::max(first, into.columns); from < last)
+        std::fill(into.column(from) + from, into.column(last - 1) + into.rows, 0.0);
+      for (const Gain& gain : scratch.gains)
+        extend_add(into, gain, std::span(scratch.runs).subspan(gain.first, gain.last - gain.first),
+                   first, last);
+    }
+  };
+  over(context, packed_triangle(into.rows) >= worth_threads_entries, into.rows, 4 * at_once, work);
 }
 
 /// \throw PivotTooSmall
@@ -138,8 +161,8 @@ void eliminate(Front& front, std::size_t f, const FrontArrays& arrays, Scratch& 
   }
 }
 
-void compute(const Multifrontal& task, std::size_t f, std::span<const std::uint32_t> children,
-             Scratch& scratch, const Context& context) {
+void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scratch& scratch,
+             const Context& context) {
   Front& front = task.fronts[f];
   std::uint32_t next = 0;
   const auto place = [&](std::span<const std::uint32_t> nodes) {
@@ -150,21 +173,24 @@ void compute(const Multifrontal& task, std::size_t f, std::span<const std::uint3
   };
   place(task.tree.eliminated(f));
   place(task.tree.boundary_of(f));
-  const FrontArrays arrays{front.rows, front.columns, front.l,
-                           front.update.reserve(packed(front.below()), task.keep_updates)};
-  const auto clear = [&](double* at, std::size_t size) {
+  const bool own = plan.place[f] == FrontPlan::own;
+  front.update = own ? front.kept.reserve(packed_triangle(front.below()), task.keep_updates)
+                     : scratch.stacks.push(plan.place[f], front.below());
+  const FrontArrays arrays{front.rows, front.columns, front.l, front.update};
+  const std::size_t size = front.rows * front.columns;
+  if (!task.zero)
     over(context, size >= worth_threads_entries, size, worth_threads_entries / 4,
-         [&](std::size_t first, std::size_t last) { std::fill(at + first, at + last, 0.0); });
-  };
-  clear(front.l, front.rows * front.columns);
-  clear(front.update.data(), packed(front.below()));
+         [&](std::size_t first, std::size_t last) {
+           std::fill(front.l + first, front.l + last, 0.0);
+         });
   scratch.least.assign(front.columns, 0.0);
   task.assemble({f, scratch.row, front.rows, front.l, scratch.least});
-  for (const std::uint32_t child : children) {
-    extend_add(task, arrays, child, scratch, context);
-    if (!task.keep_updates)
-      task.fronts[child].update.release();
-  }
+  gather(task, arrays, plan.children[f], scratch, context);
+  for (const std::uint32_t child : plan.children[f])
+    if (plan.place[child] != FrontPlan::own)
+      scratch.stacks.pop(plan.place[child], task.fronts[child].below());
+    else if (!task.keep_updates)
+      task.fronts[child].kept.release();
   eliminate(front, f, arrays, scratch, context);
   front.weakest = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < front.columns; ++c) {
@@ -174,39 +200,6 @@ void compute(const Multifrontal& task, std::size_t f, std::span<const std::uint3
       front.weakest_column = c;
     }
   }
-}
-
-std::vector<std::vector<std::uint32_t>> children_of(const FrontTree& tree) {
-  std::vector<std::vector<std::uint32_t>> children(tree.fronts());
-  for (std::uint32_t f = 0; f < tree.fronts(); ++f)
-    if (tree.parent[f] != none)
-      children[tree.parent[f]].push_back(f);
-  return children;
-}
-
-/// Which fronts are computed where.
-struct Plan {
-  std::vector<std::pair<std::size_t, std::size_t>> subtrees; ///< ranges, each by one thread
-  std::vector<std::size_t> above;                            ///< by all threads
-};
-
-/// \param under operations in the subtree of each front
-Plan plan(const FrontTree& tree, std::span<const double> under, double all, int threads) {
-  Plan p;
-  const std::size_t count = tree.fronts();
-  const double share = threads == 1 ? 2 * all : all / 16;
-  std::vector<std::size_t> smallest(count); // front of each subtree
-  for (std::size_t f = 0; f < count; ++f)
-    smallest[f] = f;
-  for (std::size_t f = 0; f < count; ++f)
-    if (const std::uint32_t parent = tree.parent[f]; parent != none)
-      smallest[parent] = std::min(smallest[parent], smallest[f]);
-  for (std::size_t f = 0; f < count; ++f)
-    if (under[f] > share)
-      p.above.push_back(f);
-    else if (under[f] > 0 && (tree.parent[f] == none || under[tree.parent[f]] > share))
-      p.subtrees.emplace_back(smallest[f], f + 1);
-  return p;
 }
 
 } // namespace
@@ -230,52 +223,42 @@ std::size_t measure_fronts(const FrontTree& tree, std::span<const std::uint8_t> 
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,
                     int threads) {
   const std::size_t count = tree.fronts();
-  std::vector<double> size(count), under(count);
+  std::vector<double> under(count);
   double all = 0;
   for (std::size_t f = 0; f < count; ++f) {
-    size[f] = 8 * static_cast<double>(packed(fronts[f].below()));
-    under[f] += operations(fronts[f]);
-    all += operations(fronts[f]);
+    const double one = front_operations(fronts[f]);
+    under[f] += one;
+    all += one;
     if (tree.parent[f] != none)
       under[tree.parent[f]] += under[f];
   }
-  double most = 0, now = 0;
-  std::vector<double> taken(count); // by children, gone when the front is computed
-  const auto one = [&](std::size_t f) {
-    now += size[f];
-    most = std::max(most, now);
-    if (!keep_updates)
-      now -= taken[f];
-    if (tree.parent[f] != none)
-      taken[tree.parent[f]] += size[f];
-  };
-  const Plan p = plan(tree, under, all, threads);
-  double peaks = 0; // beside what the subtrees leave: those of the worst, on each thread
-  for (const auto& [first, last] : p.subtrees) {
-    const double before = now;
-    most = now;
+  const FrontPlan plan = front_plan(tree, under, all, threads, keep_updates);
+  std::size_t kept = 0, subtree = 0; // the most that one of them needs
+  for (std::size_t f = 0; f < count; ++f)
+    if (plan.place[f] == FrontPlan::own)
+      kept += packed_triangle(fronts[f].below());
+  for (const auto& [first, last] : plan.subtrees) {
+    UpdateStacks::Size size;
     for (std::size_t f = first; f < last; ++f)
-      one(f);
-    peaks = std::max(peaks, most - before);
+      size.compute(plan, fronts, f);
+    subtree = std::max(subtree, size.numbers());
   }
-  most = now + (threads == 1 ? 0 : peaks * threads);
-  if (p.above.empty())
-    most = std::max(most, peaks);
-  for (const std::size_t f : p.above)
-    one(f);
-  return most;
+  UpdateStacks::Size above;
+  for (const std::size_t f : plan.above)
+    above.compute(plan, fronts, f);
+  const auto at_once = static_cast<std::size_t>(std::max(threads, 1));
+  return 8 * static_cast<double>(kept + std::max(subtree * at_once, above.numbers()));
 }
 
 FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
                       const Context& context) {
   const FrontTree& tree = task.tree;
   const std::size_t count = tree.fronts();
-  const std::vector<std::vector<std::uint32_t>> children = children_of(tree);
   const auto is_wanted = [&](std::size_t f) { return wanted.empty() || wanted[f] != 0; };
   std::vector<double> under(count, 0); // operations wanted in the subtree
   FrontalWork work{count, 0, 0, 0};
   for (std::size_t f = 0; f < count; ++f) {
-    const double one = operations(task.fronts[f]);
+    const double one = front_operations(task.fronts[f]);
     work.all_operations += one;
     if (is_wanted(f)) {
       ++work.computed;
@@ -289,20 +272,27 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
   quiet.progress = nullptr;
   Context alone = quiet;
   alone.threads = 1;
-  const auto run = [&](std::size_t f, Scratch& scratch, const Context& with) {
-    if (with.cancelled && with.cancelled())
-      throw Cancelled();
-    compute(task, f, children[f], scratch, with);
+  const FrontPlan plan =
+      front_plan(tree, under, work.operations, thread_count(context), task.keep_updates);
+  // Those of `some` that are wanted, one after the other.
+  const auto run = [&](const auto& some, const Context& with) {
+    UpdateStacks::Size size;
+    for (const std::size_t f : some)
+      size.compute(plan, task.fronts, f);
+    Scratch scratch;
+    scratch.row.resize(task.axes.size());
+    scratch.stacks.prepare(size);
+    for (const std::size_t f : some)
+      if (is_wanted(f)) {
+        if (with.cancelled && with.cancelled())
+          throw Cancelled();
+        compute(task, plan, f, scratch, with);
+      }
   };
-  const Plan p = plan(tree, under, work.operations, thread_count(context));
-  std::vector<std::optional<PivotTooSmall>> failed(p.subtrees.size());
-  parallel_blocks(quiet, p.subtrees.size(), 1, [&](std::size_t k, std::size_t) {
-    Scratch own;
-    own.row.resize(task.axes.size());
+  std::vector<std::optional<PivotTooSmall>> failed(plan.subtrees.size());
+  parallel_blocks(quiet, plan.subtrees.size(), 1, [&](std::size_t k, std::size_t) {
     try {
-      for (std::size_t f = p.subtrees[k].first; f < p.subtrees[k].second; ++f)
-        if (is_wanted(f))
-          run(f, own, alone);
+      run(std::views::iota(plan.subtrees[k].first, plan.subtrees[k].second), alone);
     } catch (const PivotTooSmall& pivot) {
       failed[k] = pivot;
     }
@@ -310,11 +300,7 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
   for (const auto& pivot : failed)
     if (pivot)
       throw PivotTooSmall(*pivot);
-  Scratch scratch;
-  scratch.row.resize(task.axes.size());
-  for (const std::size_t f : p.above)
-    if (is_wanted(f))
-      run(f, scratch, quiet);
+  run(plan.above, quiet);
   return work;
 }
 

@@ -34,8 +34,9 @@ private:
 
 struct Front {
   std::size_t rows = 0, columns = 0;
-  double* l = nullptr; ///< rows x columns, column by column
-  FrontMemory update;  ///< what it leaves to its parent: a lower triangle, packed by columns
+  double* l = nullptr;      ///< rows x columns, column by column
+  double* update = nullptr; ///< what it leaves to its parent: a lower triangle, packed by columns
+  FrontMemory kept;         ///< where that is, if it isn't on a stack
   double weakest = std::numeric_limits<double>::infinity(); ///< pivot over what it had to exceed
   std::size_t weakest_column = 0;
 
@@ -62,6 +63,7 @@ struct Multifrontal {
   std::span<Front> fronts;                            ///< of the tree, with room for L
   std::function<void(const FrontAssembly&)> assemble; ///< called from several threads
   bool keep_updates = false; ///< update matrices stay, so that some fronts can be computed again
+  bool zero = false;         ///< L is 0 already
 };
 
 /// What a factorisation did.
@@ -75,7 +77,7 @@ struct FrontalWork {
 std::size_t measure_fronts(const FrontTree& tree, std::span<const std::uint8_t> axes,
                            std::span<Front> fronts);
 
-/// Bytes of the update matrices that exist at once, at most, on so many threads.
+/// Bytes that the update matrices need at once, at most, on so many threads.
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,
                     int threads);
 

@@ -14,13 +14,13 @@ void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t
 
 void forward_supernodal_baseline(const SupernodalArrays& l,
                                  std::span<const std::uint32_t> supernodes, double* x,
-                                 std::size_t vectors) {
+                                 std::size_t vectors, double* work) {
   if (vectors == 1)
-    forward_some<Single>(l, supernodes, x, 1);
+    forward_some<Single>(l, supernodes, x, 1, work);
   else if (vectors == 4)
-    forward_some<Narrow>(l, supernodes, x, 4);
+    forward_some<Narrow>(l, supernodes, x, 4, work);
   else
-    forward_some<Wide>(l, supernodes, x, vectors);
+    forward_some<Wide>(l, supernodes, x, vectors, work);
 }
 
 } // namespace gewebe

@@ -32,9 +32,9 @@ inline std::size_t solve_width(std::size_t vectors) {
                         : (vectors + panel_width - 1) / panel_width * panel_width;
 }
 
-/// x = L⁻ᵀ L⁻¹ x in place, for `vectors` of them side by side, x[row][vector]: solve_width() many.
-/// `work` holds panel_width numbers for each row that the longest supernode has below its own
-/// columns.
+/// x = L⁻ᵀ L⁻¹ x in place, for `vectors` of them side by side, x[row][vector]: solve_width() many,
+/// at most 64 panels. `work` holds `vectors` numbers for each row that the longest supernode has
+/// below its own columns.
 using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, std::size_t vectors,
                                  double* work);
 
@@ -42,7 +42,7 @@ using SupernodalSolve = void (*)(const SupernodalArrays& l, double* x, std::size
 /// ascending.
 using SupernodalForward = void (*)(const SupernodalArrays& l,
                                    std::span<const std::uint32_t> supernodes, double* x,
-                                   std::size_t vectors);
+                                   std::size_t vectors, double* work);
 
 void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
                                double* work);
@@ -50,8 +50,8 @@ void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vec
 
 void forward_supernodal_baseline(const SupernodalArrays& l,
                                  std::span<const std::uint32_t> supernodes, double* x,
-                                 std::size_t vectors);
+                                 std::size_t vectors, double* work);
 void forward_supernodal_avx2(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
-                             double* x, std::size_t vectors);
+                             double* x, std::size_t vectors, double* work);
 
 } // namespace gewebe

@@ -5,6 +5,7 @@
 
 #include "solve/supernodal_solve_internal.h"
 
+#include <cstdint>
 #include <type_traits>
 #include <utility>
 
@@ -22,19 +23,21 @@ using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
 using Unaligned =
     double __attribute__((vector_size(lanes * sizeof(double)), aligned(sizeof(double)), may_alias));
 
-/// The right-hand sides of one row: one number, or a panel of them.
+/// The right-hand sides of one row: one number, or a panel of them; how many rows lose products at
+/// once, and of how many columns: so many short streams the caches can hold.
 struct Single {
-  static constexpr std::size_t width = 1, registers = 1, rows = 8;
+  static constexpr std::size_t width = 1, registers = 1, rows = 8, columns = rows;
   using Value = double;
   using Stored = double;
 };
 struct Narrow {
-  static constexpr std::size_t width = 4, registers = 4 / lanes, rows = 8 / registers;
+  static constexpr std::size_t width = 4, registers = 4 / lanes, rows = 8 / registers, columns = 64;
   using Value = Lanes;
   using Stored = Unaligned;
 };
 struct Wide {
-  static constexpr std::size_t width = panel_width, registers = panel_width / lanes, rows = lanes;
+  static constexpr std::size_t width = panel_width, registers = panel_width / lanes, rows = lanes,
+                               columns = 64;
   using Value = Lanes;
   using Stored = Unaligned;
 };
@@ -64,6 +67,7 @@ struct Row {
 /// A supernode: `columns` of its own, `below` rows under them, `rows` = both.
 struct Supernode {
   std::size_t columns, below, rows;
+  bool far;                ///< too large for the second cache, see fetch
   std::size_t first;       ///< own column
   const std::int64_t* row; ///< of those below
   const double* l;
@@ -76,30 +80,38 @@ inline Supernode supernode(const SupernodalArrays& a, std::size_t k) {
   const auto columns = static_cast<std::size_t>(a.super[k + 1]) - first;
   const auto rows = static_cast<std::size_t>(a.pi[k + 1] - a.pi[k]);
   const double* const l = a.blocks != nullptr ? a.blocks[k] : a.x + a.px[k];
-  return {columns, rows - columns, rows, first, a.s + a.pi[k] + columns, l};
+  constexpr std::size_t near = std::size_t{192} << 10; // bytes
+  const bool far = columns * rows * sizeof(double) > near;
+  return {columns, rows - columns, rows, far, first, a.s + a.pi[k] + columns, l};
 }
 
-/// N rows from `r` on lose what columns [0, count) contribute; `x` are the supernode's own,
+inline constexpr std::size_t ahead = 64; ///< how far ahead in a column L is asked for, if far
+
+/// N rows from `r` on lose what columns [begin, end) contribute; `x` are the supernode's own,
 /// `stride` numbers from one row to the next.
-template <class Of, std::size_t N>
-void lose_columns(const Supernode& n, std::size_t r, std::size_t count, const double* x,
-                  std::size_t stride, Row<Of> (&sum)[N]) {
-  for (std::size_t c = 0; c < count; ++c) {
+template <class Of, bool Far, std::size_t N>
+void lose_columns(const Supernode& n, std::size_t r, std::size_t begin, std::size_t end,
+                  const double* x, std::size_t stride, Row<Of> (&sum)[N]) {
+  for (std::size_t c = begin; c < end; ++c) {
     Row<Of> xc;
     xc.load(x + c * stride);
     const double* const l = n.l + c * n.rows + r;
+    if constexpr (Far)
+      __builtin_prefetch(l + ahead);
     for (std::size_t i = 0; i < N; ++i)
       sum[i].subtract(l[i], xc);
   }
 }
 
-/// N own columns from `c` on, once all before them are solved.
+/// N own columns from `c` on, once all before them are solved, of which those before `begin` have
+/// been taken from them.
 template <class Of, std::size_t N>
-void forward_own(const Supernode& n, std::size_t c, double* x, std::size_t stride) {
+void forward_own(const Supernode& n, std::size_t begin, std::size_t c, double* x,
+                 std::size_t stride) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
     sum[i].load(x + (c + i) * stride);
-  lose_columns<Of, N>(n, c, c, x, stride, sum);
+  lose_columns<Of, false>(n, c, begin, c, x, stride, sum);
   for (std::size_t i = 0; i < N; ++i) {
     for (std::size_t j = 0; j < i; ++j)
       sum[i].subtract(n.at(c + i, c + j), sum[j]);
@@ -108,21 +120,27 @@ void forward_own(const Supernode& n, std::size_t c, double* x, std::size_t strid
   }
 }
 
-template <class Of, std::size_t N>
-void forward_below(const Supernode& n, std::size_t r, const double* own, double* x,
-                   std::size_t stride) {
+/// N rows of the supernode behind columns [begin, end), which they lose; `to(row)` is where a row's
+/// right-hand sides are.
+template <class Of, std::size_t N, bool Far, class To>
+void forward_rows(const Supernode& n, std::size_t r, std::size_t begin, std::size_t end,
+                  const double* own, std::size_t stride, const To& to) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].load(x + static_cast<std::size_t>(n.row[r + i]) * stride);
-  lose_columns<Of, N>(n, n.columns + r, n.columns, own, stride, sum);
+    sum[i].load(to(r + i));
+  lose_columns<Of, Far>(n, r, begin, end, own, stride, sum);
   for (std::size_t i = 0; i < N; ++i)
-    sum[i].store(x + static_cast<std::size_t>(n.row[r + i]) * stride);
+    sum[i].store(to(r + i));
 }
 
-/// Asks for all of L's block at once: its columns are short streams, which no hardware foresees,
-/// and one miss after the other would cost several times what memory needs to deliver them.
+/// Asks for all of L's block at once where it is small: its columns are short streams, which no
+/// hardware foresees, and one miss after the other would cost several times what memory needs to
+/// deliver them. A large block would be gone again before it is used: there each column is asked
+/// for a little ahead.
 inline void fetch(const Supernode& n) {
   constexpr std::size_t line = 64 / sizeof(double);
+  if (n.far)
+    return;
   const std::size_t count = n.columns * n.rows;
   for (std::size_t k = 0; k < count; k += line)
     __builtin_prefetch(n.l + k);
@@ -150,40 +168,137 @@ void in_runs(std::size_t count, const Work& work) {
   }(std::make_index_sequence<Of::rows - 1>{});
 }
 
-template <class Of>
-void forward(const Supernode& n, double* x, std::size_t stride) {
-  double* const own = x + n.first * stride;
-  if (all_zero<Of>(own, n.columns, stride)) // and so stays everything that only hears from it
-    return;
-  fetch(n);
-  in_runs<Of>(n.columns, [&](std::size_t c, auto run) {
-    forward_own<Of, decltype(run)::value>(n, c, own, stride);
+/// Rows y lose what N columns of L contribute, `step` numbers from one to the next, in order.
+template <std::size_t N>
+void lose_streams(const double* l, std::size_t step, const double* x, double* y, std::size_t rows) {
+  constexpr std::size_t at_once = 8, parts = at_once / lanes;
+  std::size_t r = 0;
+  for (; r + at_once <= rows; r += at_once) {
+    Lanes sum[parts];
+    for (std::size_t i = 0; i < parts; ++i)
+      sum[i] = reinterpret_cast<const Unaligned*>(y + r)[i];
+    for (std::size_t j = 0; j < N; ++j) {
+      const double* const column = l + j * step + r;
+      __builtin_prefetch(column + ahead);
+      for (std::size_t i = 0; i < parts; ++i)
+        sum[i] -= reinterpret_cast<const Unaligned*>(column)[i] * x[j];
+    }
+    for (std::size_t i = 0; i < parts; ++i)
+      reinterpret_cast<Unaligned*>(y + r)[i] = sum[i];
+  }
+  for (; r < rows; ++r) {
+    double sum = y[r];
+    for (std::size_t j = 0; j < N; ++j)
+      sum -= l[j * step + r] * x[j];
+    y[r] = sum;
+  }
+}
+
+/// One right-hand side: the rows below stand side by side in `work` meanwhile.
+inline void forward_single(const Supernode& n, double* own, double* x, double* work) {
+  for (std::size_t r = 0; r < n.below; ++r)
+    work[r] = x[n.row[r]];
+  in_runs<Single>(n.columns, [&](std::size_t c, auto run) {
+    constexpr std::size_t count = decltype(run)::value;
+    forward_own<Single, count>(n, c, c, own, 1);
+    const double* const l = n.l + c * n.rows;
+    lose_streams<count>(l + c + count, n.rows, own + c, own + c + count, n.columns - c - count);
+    lose_streams<count>(l + n.columns, n.rows, own + c, work, n.below);
   });
+  for (std::size_t r = 0; r < n.below; ++r)
+    x[n.row[r]] = work[r];
+}
+
+/// A panel of right-hand sides.
+template <class Of>
+void forward_near(const Supernode& n, double* own, double* x, std::size_t stride) {
+  in_runs<Of>(n.columns, [&](std::size_t c, auto run) {
+    forward_own<Of, decltype(run)::value>(n, 0, c, own, stride);
+  });
+  const auto to = [&](std::size_t r) {
+    return x + static_cast<std::size_t>(n.row[r - n.columns]) * stride;
+  };
   in_runs<Of>(n.below, [&](std::size_t r, auto run) {
-    forward_below<Of, decltype(run)::value>(n, r, own, x, stride);
+    forward_rows<Of, decltype(run)::value, false>(n, n.columns + r, 0, n.columns, own, stride, to);
   });
 }
 
+/// All panels: some columns, and whatever is behind them.
+template <class Of>
+void forward_far(const Supernode& n, double* own, double* x, std::size_t stride) {
+  constexpr std::size_t rows_at_once = 256; // that stay in the second cache for all panels
+  for (std::size_t begin = 0; begin < n.columns; begin += Of::columns) {
+    const std::size_t end = begin + Of::columns < n.columns ? begin + Of::columns : n.columns;
+    std::uint64_t some = 0; // panels that these columns mean anything to
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      if (!all_zero<Of>(own + begin * stride + v, end - begin, stride)) {
+        some |= std::uint64_t{1} << v / Of::width;
+        in_runs<Of>(end - begin, [&](std::size_t c, auto run) {
+          forward_own<Of, decltype(run)::value>(n, begin, begin + c, own + v, stride);
+        });
+      }
+    for (std::size_t top = end; some != 0 && top < n.rows; top += rows_at_once) {
+      const std::size_t count = n.rows - top < rows_at_once ? n.rows - top : rows_at_once;
+      for (std::size_t v = 0; v < stride; v += Of::width) {
+        if ((some >> v / Of::width & 1) == 0)
+          continue;
+        const auto to = [&](std::size_t r) {
+          return v + (r < n.columns ? own + r * stride
+                                    : x + static_cast<std::size_t>(n.row[r - n.columns]) * stride);
+        };
+        in_runs<Of>(count, [&](std::size_t r, auto run) {
+          forward_rows<Of, decltype(run)::value, true>(n, top + r, begin, end, own + v, stride, to);
+        });
+      }
+    }
+  }
+}
+
+/// \pre at most 64 panels   \param work as SupernodalSolve has it
+template <class Of>
+void forward(const Supernode& n, double* x, std::size_t stride, double* work) {
+  double* const own = x + n.first * stride;
+  bool fetched = false;
+  for (std::size_t v = 0; v < stride; v += Of::width) {
+    if (all_zero<Of>(own + v, n.columns, stride)) // and so stays what only hears from it
+      continue;
+    if (!fetched)
+      fetch(n);
+    fetched = true;
+    if constexpr (Of::width == 1) {
+      forward_single(n, own, x, work);
+    } else if (n.far) {
+      forward_far<Of>(n, own, x, stride);
+      return;
+    } else {
+      forward_near<Of>(n, own + v, x + v, stride);
+    }
+  }
+}
+
 /// N own columns from `c` on, once all behind them are solved; `below` are the rows below.
-template <class Of, std::size_t N>
+template <class Of, bool Far, std::size_t N>
 void backward_own(const Supernode& n, std::size_t c, const double* below, double* x,
                   std::size_t stride) {
   Row<Of> sum[N];
   for (std::size_t i = 0; i < N; ++i)
     sum[i].load(x + (c + i) * stride);
   const double* const l = n.l + c * n.rows;
+  const auto lose = [&](std::size_t row, const double* values) {
+    Row<Of> xr;
+    xr.load(values);
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i].subtract(l[i * n.rows + row], xr);
+  };
   for (std::size_t r = 0; r < n.below; ++r) {
-    Row<Of> xr;
-    xr.load(below + r * Of::width);
-    for (std::size_t i = 0; i < N; ++i)
-      sum[i].subtract(l[i * n.rows + n.columns + r], xr);
+    constexpr std::size_t line = 64 / sizeof(double);
+    if (Far && r % line == 0)
+      for (std::size_t i = 0; i < N; ++i)
+        __builtin_prefetch(l + i * n.rows + n.columns + r + ahead);
+    lose(n.columns + r, below + r * Of::width);
   }
-  for (std::size_t r = n.columns; r-- > c + N;) {
-    Row<Of> xr;
-    xr.load(x + r * stride);
-    for (std::size_t i = 0; i < N; ++i)
-      sum[i].subtract(l[i * n.rows + r], xr);
-  }
+  for (std::size_t r = n.columns; r-- > c + N;)
+    lose(r, x + r * stride);
   for (std::size_t i = N; i-- > 0;) {
     for (std::size_t j = N; j-- > i + 1;)
       sum[i].subtract(n.at(c + j, c + i), sum[j]);
@@ -192,42 +307,46 @@ void backward_own(const Supernode& n, std::size_t c, const double* below, double
   }
 }
 
+/// The rows below stand in `work` meanwhile, panel by panel.
 template <class Of>
 void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
   fetch(n);
-  for (std::size_t r = 0; r < n.below; ++r) {
-    Row<Of> xr;
-    xr.load(x + static_cast<std::size_t>(n.row[r]) * stride);
-    xr.store(work + r * Of::width);
-  }
+  for (std::size_t v = 0; v < stride; v += Of::width)
+    for (std::size_t r = 0; r < n.below; ++r) {
+      Row<Of> xr;
+      xr.load(x + static_cast<std::size_t>(n.row[r]) * stride + v);
+      xr.store(work + v * n.below + r * Of::width);
+    }
   double* const own = x + n.first * stride;
-  in_runs<Of>(n.columns, [&](std::size_t done, auto run) { // from the last column on
-    constexpr std::size_t count = decltype(run)::value;
-    backward_own<Of, count>(n, n.columns - done - count, work, own, stride);
-  });
+  const auto panels = [&]<bool Far>(std::bool_constant<Far>, std::size_t begin, std::size_t end) {
+    in_runs<Of>(n.columns, [&](std::size_t done, auto run) { // from the last column on
+      constexpr std::size_t count = decltype(run)::value;
+      for (std::size_t v = begin; v < end; v += Of::width)
+        backward_own<Of, Far, count>(n, n.columns - done - count, work + v * n.below, own + v,
+                                     stride);
+    });
+  };
+  if (n.far) // what comes from afar is used for all of them
+    panels(std::true_type{}, 0, stride);
+  else
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      panels(std::false_type{}, v, v + Of::width);
 }
 
 template <class Of>
 void forward_some(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes, double* x,
-                  std::size_t stride) {
+                  std::size_t stride, double* work) {
   for (const std::uint32_t k : supernodes)
-    for (std::size_t v = 0; v < stride; v += Of::width)
-      forward<Of>(supernode(l, k), x + v, stride);
+    forward<Of>(supernode(l, k), x, stride, work);
 }
 
-/// `stride` vectors side by side, Of::width of them at a time: a supernode is read once for all.
+/// A supernode is read once for all of the `stride` vectors side by side.
 template <class Of>
 void solve(const SupernodalArrays& l, double* x, std::size_t stride, double* work) {
-  for (std::size_t k = 0; k < l.supernodes; ++k) {
-    const Supernode n = supernode(l, k);
-    for (std::size_t v = 0; v < stride; v += Of::width)
-      forward<Of>(n, x + v, stride);
-  }
-  for (std::size_t k = l.supernodes; k-- > 0;) {
-    const Supernode n = supernode(l, k);
-    for (std::size_t v = 0; v < stride; v += Of::width)
-      backward<Of>(n, x + v, stride, work);
-  }
+  for (std::size_t k = 0; k < l.supernodes; ++k)
+    forward<Of>(supernode(l, k), x, stride, work);
+  for (std::size_t k = l.supernodes; k-- > 0;)
+    backward<Of>(supernode(l, k), x, stride, work);
 }
 
 } // namespace

@@ -125,40 +125,6 @@ TEST(Factor, SolvesTheSameBitsWhateverIsBesideIt) {
                            all.begin() + static_cast<std::ptrdiff_t>(c % count * n)));
 }
 
-/// A block of material: nodes on a lattice, coupled as the corners of tetrahedra are. Its fronts
-/// are as large as those of solids.
-Model block_of_material(std::size_t side) {
-  Model model;
-  const auto number = [&](std::size_t x, std::size_t y, std::size_t z) {
-    return static_cast<std::uint32_t>((x * side + y) * side + z);
-  };
-  std::mt19937 random(1);
-  for (std::size_t k = 0; k < side * side * side; ++k) {
-    const auto off = [&] { return 1e-10 * static_cast<double>(random()); };
-    const std::size_t x = k / (side * side), y = k / side % side, z = k % side;
-    Node node;
-    node.position = {static_cast<double>(x) + off(), static_cast<double>(y) + off(),
-                     static_cast<double>(z) + off()};
-    node.fixed = z == 0 ? 7 : static_cast<std::uint8_t>(k % 97 == 1 ? 2 : 0);
-    model.nodes.push_back(node);
-  }
-  for (std::size_t x = 0; x < side; ++x)
-    for (std::size_t y = 0; y < side; ++y)
-      for (std::size_t z = 0; z < side; ++z)
-        for (std::size_t way = 1; way < 8; ++way) {
-          const std::size_t a = x + way % 2, b = y + way / 2 % 2, c = z + way / 4;
-          if (std::max({a, b, c}) == side)
-            continue;
-          Spring spring;
-          spring.i = std::min(number(x, y, z), number(a, b, c));
-          spring.j = std::max(number(x, y, z), number(a, b, c));
-          spring.stiffness = 1 + 1e-10 * static_cast<double>(random());
-          spring.rest = norm(model.nodes[spring.j].position - model.nodes[spring.i].position);
-          model.springs.push_back(spring);
-        }
-  return model;
-}
-
 bool same_numbers(const Factor& a, const Factor& b) {
   return a.entries() == b.entries() &&
          std::memcmp(a.view().x.data(), b.view().x.data(), 8 * a.entries()) == 0;

@@ -1,0 +1,294 @@
+// The sparse factor against CHOLMOD's and against the rate of BLAS's matrix product in the same
+// run: a net and blocks of material of several sizes, one and two threads, 1, 3 and 24 right-hand
+// sides; one large front; and the memory of 300,000 rows.
+//
+// Writes CSV to standard output: stage, program, rows, right-hand sides, threads, fastest and
+// median time in ms (of the processor where there is one thread), a figure and its unit. Words on
+// the command line choose among product, front, net, blocks, memory.
+
+#include "solve/factor.h"
+#include "solve/multifrontal.h"
+#include "solve/stiffness.h"
+#include "tests/bench/timing.h"
+#include "tests/unit/mesh_fixtures.h"
+#include "tests/unit/stiffness_models.h"
+
+#include <cholmod.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+extern "C" void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*,
+                       const double*, const int*, const double*, const int*, const double*, double*,
+                       const int*);
+
+using namespace gewebe;
+using namespace gewebe::timing;
+
+namespace {
+
+void report(const char* stage, const char* program, std::size_t rows, std::size_t columns,
+            int threads, const Times& times, double figure, const char* unit) {
+  std::printf("%s,%s,%zu,%zu,%d,%.3f,%.3f,%.4g,%s\n", stage, program, rows, columns, threads,
+              times.fastest, times.median, figure, unit);
+  std::fflush(stdout);
+}
+
+/// Of the processor on one thread, which others on the machine disturb less.
+Times timed(const std::function<void()>& work, int threads, int runs) {
+  std::vector<double> times;
+  for (int run = 0; run < runs; ++run)
+    times.push_back(threads == 1 ? processor_milliseconds(work) : milliseconds(work));
+  return times_of(std::move(times));
+}
+
+/// GFLOP/s of BLAS at 1024 x 1024 x 1024, and what two threads with one product each gain.
+double product_rate() {
+  const int n = 1024;
+  constexpr std::size_t entries = std::size_t{1024} * 1024;
+  const auto product = [&](std::vector<double>& c) {
+    static const std::vector<double> a(entries, 0.5), b(entries, 0.25);
+    const double one = 1, zero = 0;
+    dgemm_("N", "N", &n, &n, &n, &one, a.data(), &n, b.data(), &n, &zero, c.data(), &n);
+  };
+  std::vector<double> first(entries), second(entries);
+  product(first);
+  double rate = 0;
+  for (const int threads : {1, 2}) {
+    const Times times = timed(
+        [&] {
+          std::optional<std::jthread> other;
+          if (threads == 2)
+            other.emplace([&] { product(second); });
+          product(first);
+        },
+        threads, 7);
+    const double now = 2.0 * threads * n * n * n / times.fastest * 1e-6;
+    report("matrix product", "BLAS", n, n, threads, times, now, "GFLOP/s");
+    rate = threads == 1 ? now : rate;
+  }
+  return rate;
+}
+
+double operations(double columns, double below) {
+  return columns * columns * columns / 3 + columns * columns * below + columns * below * below;
+}
+
+/// Two fronts, the second as wide as the first is below its columns.
+void bench_front(std::size_t eliminated, std::size_t below, double rate) {
+  FrontTree tree;
+  const std::size_t nodes = eliminated + below;
+  for (std::uint32_t i = 0; i < nodes; ++i) {
+    tree.sequence.push_back(i);
+    tree.position.push_back(i);
+    if (i >= eliminated)
+      tree.boundary.push_back(i);
+  }
+  tree.first = {0, static_cast<std::uint32_t>(eliminated), static_cast<std::uint32_t>(nodes)};
+  tree.parent = {1, FrontTree::none};
+  tree.start = {0, below, below};
+  const std::vector<std::uint8_t> axes(nodes, 3);
+  std::vector<Front> fronts(2);
+  std::vector<double> l(measure_fronts(tree, axes, fronts));
+  fronts[0].l = l.data();
+  fronts[1].l = l.data() + fronts[0].rows * fronts[0].columns;
+  const auto assemble = [&](const FrontAssembly& to) {
+    for (std::size_t c = 0; c < fronts[to.front].columns; ++c) {
+      std::fill_n(to.l + c * to.rows + c, to.rows - c, -0.5);
+      to.l[c * to.rows + c] = 2.0 * static_cast<double>(l.size());
+    }
+  };
+  double one = 0;
+  for (const int threads : {1, 2}) {
+    const Times times = timed(
+        [&] {
+          (void)factorise({.tree = tree, .axes = axes, .fronts = fronts, .assemble = assemble}, {},
+                          with_threads(threads));
+        },
+        threads, 5);
+    double all = 0;
+    for (const Front& f : fronts)
+      all += operations(static_cast<double>(f.columns), static_cast<double>(f.below()));
+    const double now = all / times.fastest * 1e-6;
+    report("two fronts", "gewebe", 3 * nodes, 3 * eliminated, threads, times, now, "GFLOP/s");
+    if (threads == 1) {
+      one = times.fastest;
+      report("two fronts", "gewebe", 3 * nodes, 3 * eliminated, 1, times, now / rate,
+             "of the rate of the product");
+    } else {
+      report("two fronts", "gewebe", 3 * nodes, 3 * eliminated, 2, times, one / times.fastest,
+             "times as quick as one thread");
+    }
+  }
+}
+
+class Peer {
+public:
+  explicit Peer(const StiffnessMatrix& matrix) {
+    (void)cholmod_l_start(&common_);
+    common_.print = 0;
+    common_.supernodal = CHOLMOD_SUPERNODAL;
+    matrix_ = cholmod_l_allocate_sparse(matrix.order(), matrix.order(), matrix.row.size(), 1, 1, -1,
+                                        CHOLMOD_REAL, &common_);
+    std::memcpy(matrix_->p, matrix.column_start.data(), 8 * matrix.column_start.size());
+    std::memcpy(matrix_->i, matrix.row.data(), 8 * matrix.row.size());
+    std::memcpy(matrix_->x, matrix.value.data(), 8 * matrix.value.size());
+  }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+  ~Peer() {
+    (void)cholmod_l_free_sparse(&matrix_, &common_);
+    (void)cholmod_l_free_factor(&factor_, &common_);
+    (void)cholmod_l_finish(&common_);
+  }
+  void order() {
+    (void)cholmod_l_free_factor(&factor_, &common_);
+    factor_ = cholmod_l_analyze(matrix_, &common_);
+  }
+  void factorise() { (void)cholmod_l_factorize(matrix_, factor_, &common_); }
+  double entries() const { return static_cast<double>(factor_->xsize); }
+
+  void solve(const std::vector<double>& f, std::size_t count) {
+    cholmod_dense* from = cholmod_l_zeros(factor_->n, count, CHOLMOD_REAL, &common_);
+    std::memcpy(from->x, f.data(), 8 * factor_->n * count);
+    cholmod_dense* u = cholmod_l_solve(CHOLMOD_A, factor_, from, &common_);
+    (void)cholmod_l_free_dense(&u, &common_);
+    (void)cholmod_l_free_dense(&from, &common_);
+  }
+
+private:
+  cholmod_common common_{};
+  cholmod_sparse* matrix_ = nullptr;
+  cholmod_factor* factor_ = nullptr;
+};
+
+double all_operations(const Factor& factor) {
+  const FactorView l = factor.view();
+  double all = 0;
+  for (std::size_t f = 0; f + 1 < l.super.size(); ++f) {
+    const auto columns = static_cast<double>(l.super[f + 1] - l.super[f]);
+    all += operations(columns, static_cast<double>(l.pi[f + 1] - l.pi[f]) - columns);
+  }
+  return all;
+}
+
+void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) {
+  const std::size_t rows = matrix.order();
+  const int runs = rows > 30000 ? 3 : 7;
+  std::optional<Factor> factor;
+  const auto say = [&](const char* what, const char* program, std::size_t columns, int threads,
+                       const Times& times, double figure, const char* unit) {
+    report((std::string(stage) + ", " + what).c_str(), program, rows, columns, threads, times,
+           figure, unit);
+  };
+  const Times anew = timed([&] { factor.emplace(matrix, with_threads(1)); }, 1, runs);
+  say("order and factor", "gewebe", 0, 1, anew, static_cast<double>(factor->entries()) * 8e-6,
+      "MB");
+  const double all = all_operations(*factor);
+  for (const int threads : {1, 2}) {
+    const Times times = timed([&] { factor->renew(matrix, with_threads(threads)); }, threads, runs);
+    say("factor", "gewebe", 0, threads, times, all / times.fastest * 1e-6, "GFLOP/s");
+  }
+  std::optional<Peer> peer;
+  if (peers) {
+    peer.emplace(matrix);
+    const Times order = timed([&] { peer->order(); }, 1, runs);
+    const Times times = timed([&] { peer->factorise(); }, 1, runs);
+    say("order", "CHOLMOD", 0, 1, order, 0, "");
+    say("factor", "CHOLMOD", 0, 1, times, peer->entries() * 8e-6, "MB");
+  }
+  std::vector<double> f(rows * 24), u(f.size());
+  for (std::size_t k = 0; k < f.size(); ++k)
+    f[k] = static_cast<double>(k * 7 % 23) - 11;
+  for (const std::size_t columns : std::initializer_list<std::size_t>{1, 3, 24}) {
+    std::vector<double> ours, theirs;
+    for (int turn = 0; turn < 4 * runs; ++turn) { // by turns, so that both see the same machine
+      const std::span<double> some(u.data(), rows * columns);
+      ours.push_back(processor_milliseconds([&] {
+        factor->solve({f.data(), some.size()}, some, columns);
+      }));
+      if (peer)
+        theirs.push_back(processor_milliseconds([&] { peer->solve(f, columns); }));
+    }
+    const Times own = times_of(ours);
+    say("solve", "gewebe", columns, 1, own,
+        static_cast<double>(factor->entries()) * 16e-6 / own.fastest, "GB/s of L");
+    if (peer) {
+      const Times other = times_of(theirs);
+      say("solve", "CHOLMOD", columns, 1, other, own.fastest / other.fastest, "ours over its time");
+    }
+  }
+}
+
+/// The most memory that a child process held, in MB, above what it began with.
+double most_memory(const std::function<void()>& work) {
+  const pid_t child = fork();
+  if (child == 0) {
+    work();
+    _exit(0);
+  }
+  rusage used{};
+  int status = 0;
+  if (wait4(child, &status, 0, &used) != child || status != 0)
+    return -1;
+  return static_cast<double>(used.ru_maxrss) * 1024e-6;
+}
+
+void bench_memory(std::size_t side) {
+  const StiffnessMatrix matrix = stiffness_matrix(test::block_of_material(side));
+  const double nothing = most_memory([] {});
+  double ours = 0;
+  for (const int threads : {1, 2}) {
+    double most = 0;
+    const Times times = timed(
+        [&] { most = most_memory([&] { const Factor f(matrix, with_threads(threads)); }); }, 2, 1);
+    ours = threads == 1 ? most - nothing : ours;
+    report("memory", "gewebe", matrix.order(), 0, threads, times, most - nothing, "MB");
+  }
+  double most = 0;
+  const Times times = timed(
+      [&] {
+        most = most_memory([&] {
+          Peer peer(matrix);
+          peer.order();
+          peer.factorise();
+        });
+      },
+      2, 1);
+  report("memory", "CHOLMOD", matrix.order(), 0, 1, times, most - nothing, "MB");
+  report("memory", "gewebe", matrix.order(), 0, 1, times, ours / (most - nothing),
+         "times CHOLMOD's");
+}
+
+} // namespace
+
+int main(int count, char** words) {
+  const auto wanted = [&](const char* stage) {
+    return count < 2 || std::any_of(words + 1, words + count,
+                                    [&](const char* w) { return std::strcmp(w, stage) == 0; });
+  };
+  std::puts("stage,program,rows,columns,threads,fastest_ms,median_ms,figure,unit");
+  const double rate = wanted("product") || wanted("front") ? product_rate() : 0;
+  if (wanted("front"))
+    for (const std::size_t below : std::initializer_list<std::size_t>{0, 400, 1000})
+      bench_front(400, below, rate);
+  if (wanted("net"))
+    bench_matrix("net", stiffness_matrix(test::model_of(test::sphere_mesh(5, 100, {}))), true);
+  if (wanted("blocks"))
+    for (const std::size_t side : std::initializer_list<std::size_t>{12, 20, 28})
+      bench_matrix("block", stiffness_matrix(test::block_of_material(side)), true);
+  if (wanted("memory"))
+    bench_memory(47);
+  return EXIT_SUCCESS;
+}
