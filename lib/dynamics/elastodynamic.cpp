@@ -194,6 +194,7 @@ void Elastodynamic::restore(const State& state) {
 }
 
 void Elastodynamic::renew() {
+  implicit_touch_.reset();
   if (implicit_)
     implicit_ = std::make_unique<ImplicitEuler>(model_);
 }
@@ -383,6 +384,24 @@ std::optional<std::vector<NodeTouch>> Elastodynamic::held_touches(double duratio
   return touch_->held();
 }
 
+bool Elastodynamic::step_implicit(std::uint64_t step, std::uint64_t steps, double h, double start,
+                                  std::span<NodeMotion> now, const ImplicitContact::Step& what,
+                                  const Context& context, std::uint32_t& worst) {
+  if (!touch_ || !touch_->any()) {
+    if (touch_)
+      touch_->add({}, {}, true);
+    return implicit_->step(now, what.outer, what.held, h, context, worst);
+  }
+  if (!implicit_touch_)
+    implicit_touch_ = std::make_unique<ImplicitContact>(model_, *implicit_);
+  touch_->clear_way(touch_->moment(step, steps, start, h), traits_.data(), now);
+  std::vector<NodeTouch> touched = touch_->state().touched;
+  ImplicitContact::Result result = implicit_touch_->step(what, now, touched, context);
+  worst = result.worst;
+  touch_->add(std::move(touched), result.impulses, result.exact);
+  return result.solved;
+}
+
 void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
                                  const Context& context) {
   const std::size_t n = model_.nodes.size();
@@ -411,7 +430,13 @@ void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
       }
     }
     std::uint32_t worst = 0;
-    const bool solved = implicit_->step(now, outer, held, h, context, worst);
+    const double from = start + static_cast<double>(s) * h;
+    const bool solved = step_implicit(s, steps, h, from, now,
+                                      {outer, held, load_->displacement,
+                                       touch_ ? std::span(touch_->state().instruments)
+                                              : std::span<const std::optional<MovingInstrument>>{},
+                                       from, h},
+                                      context, worst);
     std::vector<NodeRow>& rows = rows_.write();
     for (std::size_t row = 0; row < n; ++row) {
       const NodeMotion& m = now[layout_.node_of_row[row]];

@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "contact/load.h"
 #include "dynamics/dynamic_contact.h"
+#include "dynamics/implicit_contact.h"
 #include "dynamics/implicit_euler.h"
 #include "dynamics/spring_force.h"
 #include "dynamics/spring_layout.h"
@@ -94,7 +95,6 @@ public:
   std::vector<NodeVector> contact_forces() const;
 
   /// Instruments during the advances to come, by number; none of them: no cost. Wakes nobody.
-  /// \pre semi-implicit
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments);
   void wake() { resting_ = false; }
   /// That it rests for `duration` s more, in place of an advance. \pre resting()
@@ -102,6 +102,8 @@ public:
   /// Impulses (forces times s) of the instruments since the last call, by ascending node and
   /// instrument.
   std::vector<NodeTouch> take_impulses();
+  /// Whether the forces of instruments in implicit steps so far meet the conditions.
+  bool touches_exact() const { return !touch_ || touch_->state().exact; }
   /// The forces of the instruments, if it rested for these last `duration` s, all since that call.
   std::optional<std::vector<NodeTouch>> held_touches(double duration) const;
 
@@ -130,6 +132,9 @@ private:
   Vec3 outer_force(const Driven& driven, double time, const At& position) const;
   void run_steps(std::uint64_t steps, double h, double start, const Context& context);
   void run_implicit(std::uint64_t steps, double h, double start, const Context& context);
+  bool step_implicit(std::uint64_t step, std::uint64_t steps, double h, double start,
+                     std::span<NodeMotion> now, const ImplicitContact::Step& what,
+                     const Context& context, std::uint32_t& worst);
   bool step_block(std::size_t block, const NodeRow* now, NodeRow* next, double h, double time,
                   CpuLevel cpu);
   Vec3 outer_force(std::uint32_t node, double time) const;
@@ -145,7 +150,8 @@ private:
   CopyOnWrite<std::vector<NodeRow>> rows_, next_;
   std::vector<Drive> drives_; ///< by block; empty where nothing changes
   std::unique_ptr<ImplicitEuler> implicit_;
-  std::unique_ptr<DynamicContact> touch_; ///< while there are instruments
+  std::unique_ptr<DynamicContact> touch_;           ///< while there are instruments
+  std::unique_ptr<ImplicitContact> implicit_touch_; ///< of implicit_, when needed
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

@@ -56,20 +56,38 @@ void ImplicitEuler::make_factor(std::span<const NodeMotion> motion, double h,
   ++factorisations_;
 }
 
-bool ImplicitEuler::step(std::span<NodeMotion> motion, std::span<const Vec3> outer,
-                         std::span<const std::uint8_t> held, double h, const Context& context,
-                         std::uint32_t& worst) {
+/// \return whether anything can move
+bool ImplicitEuler::hold(std::span<const std::uint8_t> held) {
   if (!std::equal(held.begin(), held.end(), held_.begin(), held_.end())) {
     held_.assign(held.begin(), held.end());
     factor_.reset(); // another pattern
   }
-  if (std::find(held_.begin(), held_.end(), 0) == held_.end())
-    return true;
+  return std::find(held_.begin(), held_.end(), 0) != held_.end();
+}
+
+void ImplicitEuler::respond(std::span<double> over_axes, std::size_t columns) const {
+  const std::size_t axes = 3 * model_.nodes.size(), order = matrix_.order();
+  std::vector<double> f(order * columns), u(order * columns);
+  for (std::size_t c = 0; c < columns; ++c)
+    for (std::size_t r = 0; r < order; ++r)
+      f[c * order + r] = over_axes[c * axes + static_cast<std::size_t>(matrix_.axis_of_row[r])];
+  factor_->solve(f, u, columns);
+  std::fill(over_axes.begin(), over_axes.end(), 0.0);
+  for (std::size_t c = 0; c < columns; ++c)
+    for (std::size_t r = 0; r < order; ++r)
+      over_axes[c * axes + static_cast<std::size_t>(matrix_.axis_of_row[r])] = u[c * order + r];
+}
+
+bool ImplicitEuler::step(std::span<NodeMotion> motion, std::span<const Vec3> outer,
+                         std::span<const std::uint8_t> held, double h, const Context& context,
+                         std::uint32_t& worst) {
   const std::vector<NodeMotion> before(motion.begin(), motion.end());
   for (int part = 0, count = 1; part < most_parts; ++part, count *= 2) {
     bool solved = true;
-    for (int k = 0; k < count && solved; ++k)
-      solved = solve_step(motion, outer, h / count, context, worst);
+    for (int k = 0; k < count && solved; ++k) {
+      const std::vector<NodeMotion> from(motion.begin(), motion.end());
+      solved = solve(from, motion, outer, held, h / count, false, context, worst);
+    }
     if (solved)
       return true;
     std::copy(before.begin(), before.end(), motion.begin());
@@ -77,10 +95,12 @@ bool ImplicitEuler::step(std::span<NodeMotion> motion, std::span<const Vec3> out
   return false;
 }
 
-bool ImplicitEuler::solve_step(std::span<NodeMotion> motion, std::span<const Vec3> outer, double h,
-                               const Context& context, std::uint32_t& worst) {
+bool ImplicitEuler::solve(std::span<const NodeMotion> before, std::span<NodeMotion> motion,
+                          std::span<const Vec3> outer, std::span<const std::uint8_t> held, double h,
+                          bool guess, const Context& context, std::uint32_t& worst) {
+  if (!hold(held))
+    return true;
   const std::size_t n = model_.nodes.size();
-  const std::vector<NodeMotion> before(motion.begin(), motion.end());
   if (!factor_ || factor_step_ != h)
     make_factor(before, h, context);
   const auto is_held = [&](std::size_t i, std::size_t a) { return held_[3 * i + a] != 0; };
@@ -112,9 +132,11 @@ bool ImplicitEuler::solve_step(std::span<NodeMotion> motion, std::span<const Vec
     }
     return square;
   };
-  for (std::size_t i = 0; i < n; ++i) // as it goes on by itself
+  for (std::size_t i = 0; i < n; ++i)
     for (std::size_t a = 0; a < 3; ++a)
-      moved[3 * i + a] = is_held(i, a) ? 0 : h * before[i].velocity[static_cast<int>(a)];
+      if (const int axis = static_cast<int>(a); !is_held(i, a))
+        moved[3 * i + a] = guess ? motion[i].displacement[axis] - before[i].displacement[axis]
+                                 : h * before[i].velocity[axis];
   set(moved);
   double square = measure(), last_change = HUGE_VAL;
   int renewed = 0;

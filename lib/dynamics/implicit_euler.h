@@ -40,12 +40,24 @@ public:
             std::span<const std::uint8_t> held, double h, const Context& context,
             std::uint32_t& worst);
 
+  /// As `step`, but in one part. \param before the state it starts from \param guess whether the
+  /// new state is sought near `motion`, else near to where it goes on by itself
+  bool solve(std::span<const NodeMotion> before, std::span<NodeMotion> motion,
+             std::span<const Vec3> outer, std::span<const std::uint8_t> held, double h, bool guess,
+             const Context& context, std::uint32_t& worst);
+  /// A⁻¹ f in place, of the last matrix, for right-hand sides over all 3 n axes. \pre a step of
+  /// something that can move was solved
+  void respond(std::span<double> over_axes, std::size_t columns) const;
+  /// Makes A anew, of this state.
+  void renew(std::span<const NodeMotion> motion, const Context& context) {
+    make_factor(motion, factor_step_, context);
+  }
+
   std::uint64_t factorisations() const noexcept { return factorisations_; }
   std::uint64_t solves() const noexcept { return solves_; }
 
 private:
-  bool solve_step(std::span<NodeMotion> motion, std::span<const Vec3> outer, double h,
-                  const Context& context, std::uint32_t& worst);
+  bool hold(std::span<const std::uint8_t> held);
   void make_factor(std::span<const NodeMotion> motion, double h, const Context& context);
 
   const Model& model_;

@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "scene/world_internal.h"
+#include "statics/two_step_contact.h"
 
 #include <algorithm>
 #include <cmath>
@@ -40,6 +41,15 @@ std::vector<NodeTouch> means_of(std::vector<NodeTouch> impulses, double duration
   return all;
 }
 
+/// Once: what is told of forces is not to be trusted.
+void warn_inexact(World& w, Object& object) {
+  if (object.matter->told.unsolved || !w.options.warn)
+    return;
+  object.matter->told.unsolved = true;
+  w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                 " s: the forces of instruments are not exact, expected a slower way");
+}
+
 } // namespace
 
 // ---- elastodynamic objects
@@ -49,23 +59,10 @@ void guide(World& w, Body& body, double to) {
   if (!instruments_there(w))
     return;
   std::vector<std::optional<MovingInstrument>> all;
-  bool any = false;
-  for (Instrument& i : w.now.instruments) {
-    const bool pushes = i.present && !i.shape.blade;
-    any = any || pushes;
-    all.push_back(pushes ? std::optional(MovingInstrument{i.shape, i.before, i.way})
-                         : std::nullopt);
-  }
-  const Object& first = w.now.objects[body.parts[0]];
-  const Gap* const passed = first.matter->integration == Integration::implicit
-                                ? gap(Way::implicit_motion, Feature::touch)
-                                : nullptr;
-  if (any && passed != nullptr) {
-    if (!body.warned_implicit && w.options.warn)
-      w.options.warn("object " + first.name() + " " + std::string(passed->text));
-    body.warned_implicit = true;
-    return;
-  }
+  for (const Instrument& i : w.now.instruments)
+    all.push_back(i.present && !i.shape.blade
+                      ? std::optional(MovingInstrument{i.shape, i.before, i.way})
+                      : std::nullopt);
   if (!body.moving->resting()) {
     body.rest_box.reset();
   } else {
@@ -120,6 +117,8 @@ void take_touches(World& w, double duration) {
     const std::optional<std::vector<NodeTouch>> held = body->moving->held_touches(duration);
     gather_impulses(w, *body);
     body->touched = false;
+    if (!body->moving->touches_exact())
+      warn_inexact(w, w.now.objects[body->parts[0]]);
     for (const std::size_t part : body->parts) {
       Object& object = w.now.objects[part];
       std::vector<NodeTouch> touches;
@@ -184,6 +183,10 @@ void follow_instruments(World& w, Object& object) {
   need_contact(object);
   const std::size_t count = w.now.instruments.size();
   bool solved = true;
+  const TwoStepYielding::Stages stages = [&]() -> std::pair<Elastostatic&, TwoStep&> {
+    Elastostatic& still = still_of(w, object);
+    return {still, two_step_of(w, object)};
+  };
   std::vector<double>& shape = object.shown.displacement.write();
   // An object that nothing ever acted on has no shape to find.
   const bool changed = !object.shown.touches.empty() ||
@@ -209,8 +212,15 @@ void follow_instruments(World& w, Object& object) {
                                     between(way.before, way.now, at(part))};
         }
       const bool last = changed && p + 1 == w.now.poses.size() && part == parts;
-      object.contact->update([&]() -> Elastostatic& { return still_of(w, object); },
-                             *object.shown.load, here, shape, last);
+      const Load& load = *object.shown.load;
+      if (object.stages.options) {
+        TwoStepYielding both(object.model(), stages, load);
+        object.contact->update(both, load.displacement, here, shape, last);
+        solved = solved && both.solved();
+      } else {
+        object.contact->update([&]() -> Elastostatic& { return still_of(w, object); }, load, here,
+                               shape, last);
+      }
       solved = solved && object.contact->solved();
     }
   }
@@ -222,11 +232,8 @@ void follow_instruments(World& w, Object& object) {
                    " s: node " + std::to_string(stuck->node) + " is fixed, the instrument " +
                    w.now.instruments[stuck->instrument].name + " goes through it");
   }
-  if (!solved && !object.matter->told.unsolved && w.options.warn) {
-    object.matter->told.unsolved = true;
-    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
-                   " s: the forces of instruments are not exact, expected a slower way");
-  }
+  if (!solved)
+    warn_inexact(w, object);
 }
 
 /// Among the forces that are shown.

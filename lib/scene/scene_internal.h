@@ -83,7 +83,7 @@ struct Body {
   bool touched = false;         // by an instrument, in the last step
   std::optional<Box3> rest_box; // while at rest
   bool ahead = false;           // it has moved on since the scene was saved
-  bool warned_step = false, warned_implicit = false;
+  bool warned_step = false;
   std::uint64_t taken = 0; // by the last advance
   std::exception_ptr failure;
 

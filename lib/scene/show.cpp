@@ -178,7 +178,7 @@ void show(World& w, Object& object) {
     shown.shaped = true;
     warn_of_range(w, object);
     if (object.statics->still)
-      shown.forces = object.statics->still->contact_forces();
+      shown.forces = still_forces(object);
   } else if (object.method == Method::ffe && acted_on) {
     update_in_time(w, object);
     shown.forces = still_forces(object);

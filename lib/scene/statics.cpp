@@ -66,17 +66,21 @@ void renew(Object& object) {
   object.shown.valid = false;
 }
 
-void update_stages(World& w, Object& object, const Load& load) {
-  Elastostatic& still = still_of(w, object);
-  if (!object.stages.options) {
-    still.update(load);
-    return;
-  }
+/// \pre it has stages
+TwoStep& two_step_of(World& w, Object& object) {
   std::optional<TwoStep>& two_step = object.statics->two_step;
   if (!two_step)
     two_step.emplace(object.model(), object.stages.second(), w.context, *object.stages.options,
                      w.options.tolerance);
-  two_step->update(still, load);
+  return *two_step;
+}
+
+void update_stages(World& w, Object& object, const Load& load) {
+  Elastostatic& still = still_of(w, object);
+  if (object.stages.options)
+    two_step_of(w, object).update(still, load);
+  else
+    still.update(load);
 }
 
 std::span<const double> still_shape(Object& object) {

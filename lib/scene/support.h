@@ -50,10 +50,6 @@ struct Gap {
 };
 
 inline constexpr std::array gaps{
-    Gap{Way::implicit_motion, Feature::touch, false,
-        "is integrated implicitly: instruments don't touch it"},
-    Gap{Way::two_step, Feature::touch, false,
-        "follows two steps of stiffness: instruments don't touch it"},
     Gap{Way::two_step, Feature::cut, true,
         "follows two steps of stiffness, expected one without two-step"},
     Gap{Way::two_step, Feature::blade, false, "follows two steps of stiffness: it is not cut"},

@@ -96,6 +96,7 @@ void update_still(World& w, Object& object, const Load& load);
 void renew(Object& object);
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
+TwoStep& two_step_of(World& w, Object& object);
 void update_stages(World& w, Object& object, const Load& load);
 std::span<const double> still_shape(Object& object);
 const std::vector<NodeVector>& still_forces(const Object& object);

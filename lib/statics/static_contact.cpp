@@ -25,6 +25,7 @@ constexpr std::size_t most_new = 256;   ///< nodes that join at once, the deepes
 constexpr double outside = 1e-9;        ///< of the radius: so deep is not inside
 constexpr double immovable = 1e-12;     ///< of the largest compliance
 constexpr double deep = 1e-6;
+constexpr int most_rounds = 300; ///< until an object agrees
 
 /// Speeds up the convergence of directions: the next ones are taken where a linear map with the
 /// last changes would not change them. Any directions are fit for a turn.
@@ -116,8 +117,9 @@ StaticContact::StaticContact(const Model& model, std::span<const double> shape,
 
 /// Nodes deeper in an instrument than `depth` of its radius join `inside`, which stays ascending;
 /// of new ones the deepest if they are many.
-void StaticContact::find(const Placed& placed, const Load& load, std::span<const double> shape,
-                         double depth, std::vector<std::uint32_t>& inside) {
+void StaticContact::find(const Placed& placed, const std::map<std::uint32_t, Vec3>& displaced,
+                         std::span<const double> shape, double depth,
+                         std::vector<std::uint32_t>& inside) {
   std::vector<std::pair<double, std::uint32_t>> found;
   for (std::uint32_t k = 0; k < placed.size(); ++k) {
     if (!placed[k])
@@ -127,8 +129,8 @@ void StaticContact::find(const Placed& placed, const Load& load, std::span<const
       const double d = instrument.distance(rest(node) + vector_at(shape, node));
       if (!(d < -depth * instrument.radius))
         return;
-      if (model_.nodes[node].fixed == fixed_all || load.displacement.contains(node)) {
-        if (!stuck_ && d < -deep * instrument.radius && !load.displacement.contains(node))
+      if (model_.nodes[node].fixed == fixed_all || displaced.contains(node)) {
+        if (!stuck_ && d < -deep * instrument.radius && !displaced.contains(node))
           stuck_ = NodeTouch{node, k, {}};
         return;
       }
@@ -264,46 +266,60 @@ void StaticContact::solve(const ContactSpace& space, const Placed& placed,
       at[pair.place] -= d * placed[pair.instrument]->normal(at[pair.place]);
 }
 
-void StaticContact::update(const std::function<Elastostatic&()>& still, const Load& load,
+void StaticContact::restart(std::span<const double> shape, std::vector<NodeTouch> touches) {
+  touches_ = std::move(touches);
+  blocks_.set_shape(model_, shape);
+}
+
+/// Forces at these nodes, and where they then stand. \return whether the object agrees
+bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
+                              const Placed& placed,
+                              std::span<const std::optional<MovedInstrument>> moved,
+                              std::span<const double> before, std::vector<Vec3>& at) {
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<Pair> pairs;
+    if (!nodes.empty()) {
+      const ContactSpace space = object.space(nodes);
+      for (const NodeTouch& t : touches_) {
+        const auto place = std::lower_bound(nodes.begin(), nodes.end(), t.node) - nodes.begin();
+        pairs.push_back({static_cast<std::uint32_t>(place), t.instrument, {}, t.force});
+      }
+      solve(space, placed, moved, pairs, before, at);
+    }
+    touches_.clear();
+    for (const Pair& pair : pairs)
+      if (pair.force != Vec3{})
+        touches_.push_back({nodes[pair.place], pair.instrument, pair.force});
+    if (object.push(touches_, at))
+      return true;
+  }
+  return false;
+}
+
+void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>& displaced,
                            std::span<const std::optional<MovedInstrument>> instruments,
                            std::vector<double>& shape, bool last) {
   Placed placed;
   for (const auto& i : instruments)
     placed.push_back(i ? std::optional(PlacedInstrument(i->shape, i->now)) : std::nullopt);
   std::erase_if(touches_, [&](const NodeTouch& t) {
-    return t.instrument >= placed.size() || !placed[t.instrument] ||
-           load.displacement.contains(t.node);
+    return t.instrument >= placed.size() || !placed[t.instrument] || displaced.contains(t.node);
   });
   std::vector<std::uint32_t> nodes;
   for (const NodeTouch& t : touches_)
     if (nodes.empty() || nodes.back() != t.node)
       nodes.push_back(t.node);
   stuck_.reset();
-  find(placed, load, shape, 0, nodes);
+  find(placed, displaced, shape, 0, nodes);
   if (nodes.empty() && !last)
     return;
   const std::vector<double> before = shape;
   solved_ = true;
   for (;;) {
-    Load pushed = load;
-    std::vector<Pair> pairs;
     std::vector<Vec3> at;
-    if (!nodes.empty()) {
-      const ContactSpace space = still().contact_space(load, nodes);
-      for (const NodeTouch& t : touches_) {
-        const auto place = std::lower_bound(nodes.begin(), nodes.end(), t.node) - nodes.begin();
-        pairs.push_back({static_cast<std::uint32_t>(place), t.instrument, {}, t.force});
-      }
-      solve(space, placed, instruments, pairs, before, at);
-    }
-    touches_.clear();
-    for (const Pair& pair : pairs)
-      if (pair.force != Vec3{}) {
-        touches_.push_back({nodes[pair.place], pair.instrument, pair.force});
-        pushed.force[nodes[pair.place]] += pair.force;
-      }
-    still().update(pushed);
-    const std::span<const double> u = still().displacement();
+    const bool agreed = solve_all(object, nodes, placed, instruments, before, at);
+    solved_ = solved_ && agreed;
+    const std::span<const double> u = object.shape();
     shape.assign(u.begin(), u.end());
     // As the contacts have it, whatever is left out of the rest of the shape.
     for (std::size_t k = 0; k < nodes.size(); ++k)
@@ -312,10 +328,46 @@ void StaticContact::update(const std::function<Elastostatic&()>& still, const Lo
             (at[k] - rest(nodes[k]))[a];
     blocks_.set_shape(model_, shape);
     const std::size_t known = nodes.size();
-    find(placed, load, shape, outside, nodes);
+    find(placed, displaced, shape, outside, nodes);
     if (nodes.size() == known)
       return;
   }
+}
+
+namespace {
+
+/// One solution for any forces.
+class Still final : public Yielding {
+public:
+  Still(const std::function<Elastostatic&()>& still, const Load& load)
+      : still_(still), load_(load) {}
+  ContactSpace space(std::span<const std::uint32_t> nodes) override {
+    return still_().contact_space(load_, nodes);
+  }
+  bool push(std::span<const NodeTouch> touches, std::span<const Vec3>) override {
+    pushed_ = load_;
+    for (const NodeTouch& t : touches)
+      pushed_.force[t.node] += t.force;
+    return true;
+  }
+  std::span<const double> shape() override {
+    still_().update(pushed_);
+    return still_().displacement();
+  }
+
+private:
+  const std::function<Elastostatic&()>& still_;
+  const Load& load_;
+  Load pushed_;
+};
+
+} // namespace
+
+void StaticContact::update(const std::function<Elastostatic&()>& still, const Load& load,
+                           std::span<const std::optional<MovedInstrument>> instruments,
+                           std::vector<double>& shape, bool last) {
+  Still object(still, load);
+  update(object, load.displacement, instruments, shape, last);
 }
 
 } // namespace gewebe

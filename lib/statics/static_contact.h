@@ -1,12 +1,14 @@
 #pragma once
-// Instruments against an elastostatic object: the shape under a load and the forces that keep its
-// nodes out of the instruments, unilateral and with Coulomb friction.
+// Instruments against what gives way to them, an elastostatic object or one in an implicit step:
+// its shape and the forces that keep its nodes out of the instruments, unilateral and with Coulomb
+// friction.
 //
 // In turn: each touched node is kept beyond the plane that supports the instrument where the node
 // was last (contact_solver.h solves for the forces), then the planes are taken anew. What is beyond
 // such a plane is outside, so no node is inside in any turn; and without friction the energy falls
 // from turn to turn to a minimum, where each force is normal to the surface. Nodes found inside the
-// whole shape join, and it begins again.
+// whole shape join, and it begins again. Where the answer to forces is not linear it is solved as
+// if it were, at the last forces, until what comes of the new ones is what they were found with.
 
 #include "contact/instrument.h"
 #include "contact/load.h"
@@ -17,6 +19,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -44,6 +47,22 @@ struct MovedInstrument {
 /// most `most`
 std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t most);
 
+/// What gives way to forces of contact.
+class Yielding {
+public:
+  Yielding() = default;
+  Yielding(const Yielding&) = delete;
+  Yielding& operator=(const Yielding&) = delete;
+  virtual ~Yielding() = default;
+  /// Near the forces of the last `push`. \pre nodes ascending, none of them displaced
+  virtual ContactSpace space(std::span<const std::uint32_t> nodes) = 0;
+  /// These forces act now, beside all others. \param at where the last space puts its nodes under
+  /// them \return whether they stand there; else another space is asked for
+  virtual bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) = 0;
+  /// The shape under them, 3 n displacements.
+  virtual std::span<const double> shape() = 0;
+};
+
 class StaticContact {
 public:
   /// Keeps a reference to the model. \param shape the present one
@@ -51,13 +70,19 @@ public:
   StaticContact(const Model& model, std::span<const double> shape,
                 std::vector<NodeTouch> touches = {});
 
-  /// Takes the shape of `still` (asked for when needed) on to that under `load` with the
-  /// instruments where they are now; `shape` (3 n displacements) is the last one before and the new
-  /// one after. An absent instrument is no element. Where more of the way is to come (not `last`)
-  /// and nothing is touched, nothing is done. \pre as Elastostatic::update   \throw as it
+  /// Takes the object's shape on to that with the instruments where they are now; `shape` (3 n
+  /// displacements) is the last one before and the new one after. An absent instrument is no
+  /// element. Where more of the way is to come (not `last`) and nothing is touched, nothing is
+  /// done. \param displaced nodes that stand where they must   \throw as the object
+  void update(Yielding& object, const std::map<std::uint32_t, Vec3>& displaced,
+              std::span<const std::optional<MovedInstrument>> instruments,
+              std::vector<double>& shape, bool last = true);
+  /// Of an elastostatic object, asked for when needed, under `load`. \pre as Elastostatic::update
   void update(const std::function<Elastostatic&()>& still, const Load& load,
               std::span<const std::optional<MovedInstrument>> instruments,
               std::vector<double>& shape, bool last = true);
+  /// From another state: its shape and what is touched in it.
+  void restart(std::span<const double> shape, std::vector<NodeTouch> touches);
   /// Of the last shape.
   const Box3& box() const noexcept { return blocks_.box(); }
 
@@ -76,8 +101,11 @@ private:
     Vec3 normal, force;
   };
   using Placed = std::vector<std::optional<PlacedInstrument>>;
-  void find(const Placed& placed, const Load& load, std::span<const double> shape, double depth,
-            std::vector<std::uint32_t>& inside);
+  void find(const Placed& placed, const std::map<std::uint32_t, Vec3>& displaced,
+            std::span<const double> shape, double depth, std::vector<std::uint32_t>& inside);
+  bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes, const Placed& placed,
+                 std::span<const std::optional<MovedInstrument>> moved,
+                 std::span<const double> before, std::vector<Vec3>& at);
   void solve(const ContactSpace& space, const Placed& placed,
              std::span<const std::optional<MovedInstrument>> moved, std::vector<Pair>& pairs,
              std::span<const double> before, std::vector<Vec3>& at);

@@ -384,6 +384,23 @@ void TwoStep::update(Elastostatic& first, const Load& load) {
   state.shaped = false;
 }
 
+ContactSpace TwoStep::second_space(const Load& load, std::span<const std::uint32_t> nodes) {
+  return state_->second.contact_space(load, nodes);
+}
+
+void TwoStep::settle(Load load, Answer answer) {
+  State& state = *state_;
+  if (!std::isfinite(answer.norm))
+    throw Error("the load is not finite, expected a smaller one");
+  state.total = std::move(answer.total);
+  state.forces = std::move(answer.forces);
+  state.s = answer.s;
+  state.norm = answer.norm;
+  state.largest = std::max(state.largest, answer.norm);
+  state.last = std::move(load);
+  state.shaped = false;
+}
+
 std::span<const double> TwoStep::displacement(Elastostatic& first) {
   if (state_->last && !state_->shaped) {
     state_->shape(first);
@@ -393,6 +410,9 @@ std::span<const double> TwoStep::displacement(Elastostatic& first) {
 }
 const std::vector<NodeVector>& TwoStep::contact_forces() const noexcept {
   return state_->forces;
+}
+const TwoStepOptions& TwoStep::options() const noexcept {
+  return state_->options;
 }
 double TwoStep::threshold() const noexcept {
   return state_->options.threshold;

@@ -97,6 +97,18 @@ public:
   std::span<const double> displacement(Elastostatic& first);
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
+  // ---- for contact, see two_step_contact.h
+  /// As Elastostatic::contact_space, of the second stage.
+  ContactSpace second_space(const Load& load, std::span<const std::uint32_t> nodes);
+  struct Answer {
+    Load total;                     ///< all forces, what holds displaced nodes among them
+    std::vector<NodeVector> forces; ///< of contact
+    double s = 1, norm = 0;
+  };
+  /// In place of an update: what was found for this load.
+  void settle(Load load, Answer answer);
+
+  const TwoStepOptions& options() const noexcept;
   double threshold() const noexcept;
   double load() const noexcept;    ///< |f| of the last update
   double largest() const noexcept; ///< of all updates

@@ -122,12 +122,14 @@ private:
       names.push_back(name);
     const std::string model = of(names), name(1, static_cast<char>('a' + objects_.size()));
     std::string text = "object " + name + " " + model;
-    if (one_in(3))
+    if (one_in(2))
       text += " store=" + model;
     text += one_in(3) ? " method=ffe" : one_in(3) ? " method=ela" : "";
-    text += one_in(6) ? " integration=implicit" : "";
+    text += one_in(4) ? " integration=implicit" : "";
     objects_.push_back({name, &fuzzed_models().at(model)});
     line(text);
+    if (one_in(4))
+      line(two_step(objects_.back()));
   }
 
   struct Known {
@@ -230,6 +232,10 @@ private:
     return "cut " + o.name + " plane " + numbers(place(*o.model)) + " " + numbers(vector(2)) +
            (one_in(3) ? " " + nodes(*o.model) : "");
   }
+  std::string two_step(const Known& o) {
+    const double threshold = one_in(2) ? real(1, 1e4) : real(1e3, 1e6);
+    return "two-step " + o.name + " " + number_text(threshold) + (one_in(2) ? " series" : "");
+  }
   std::string change() {
     const Known o = object(), other = object();
     switch (below(14)) {
@@ -252,8 +258,7 @@ private:
     case 8:
       return one_in(3)   ? "gravity " + triple(1e4)
              : one_in(4) ? "timestep " + number_text(of(std::vector{1e-3, 2e-4, 1e-300}))
-                         : "two-step " + o.name + " " + number_text(real(1, 1e4)) +
-                               (one_in(2) ? " series" : "");
+                         : two_step(o);
     default:
       return load();
     }

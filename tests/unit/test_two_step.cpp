@@ -276,6 +276,79 @@ TEST(TwoStep, RootIsFoundFarBeyondTheThreshold) {
   }
 }
 
+/// An organ pressed from above by a sphere, one of its nodes displaced.
+struct Pressed {
+  std::vector<double> u;
+  std::vector<NodeVector> forces;
+  Vec3 tool;
+};
+Pressed pressed(const Model& model, const Model& stiff, std::optional<TwoStepOptions> options,
+                double friction, bool displaced) {
+  Simulation s(test::one_thread(),
+               {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
+  s.add_object("o", model, Method::ffe);
+  if (options)
+    s.apply(SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
+  if (displaced)
+    s.apply(SetDisplacement{0, {free_nodes(model)[2]}, {0.01, 0.02, 0}});
+  s.add_instrument("tool");
+  const Vec3 start{100.3, -49.8, 58};
+  s.apply(SetInstrument{0, {8, {}, friction}, {start, {}}});
+  s.apply(MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
+  for (int k = 0; k < 4; ++k)
+    s.step(0.05);
+  return {{s.displacement(0).begin(), s.displacement(0).end()},
+          s.contact_forces(0),
+          s.instrument(0).force};
+}
+
+TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  for (const double friction : {0.0, 0.3})
+    for (const bool displaced : {false, true}) {
+      const Pressed one = pressed(model, stiff, {}, friction, displaced),
+                    two = pressed(model, stiff, TwoStepOptions{1e9, true}, friction, displaced);
+      EXPECT_GT(norm(one.tool), 0);
+      EXPECT_EQ(one.u, two.u);
+      EXPECT_EQ(one.forces, two.forces);
+    }
+}
+
+TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  for (const bool series : {false, true})
+    for (const double friction : {0.0, 0.3})
+      for (const bool displaced : {false, true}) {
+        const double reached = norm(pressed(model, stiff, {}, friction, displaced).tool);
+        const TwoStepOptions options{reached / 3, series};
+        const Pressed one = pressed(model, stiff, {}, friction, displaced),
+                      two = pressed(model, stiff, options, friction, displaced);
+        EXPECT_GT(norm(two.tool - one.tool), 0.2 * norm(one.tool)); // it would show
+        // The touched nodes displaced to where they are take the same forces.
+        Load load;
+        double largest = 0;
+        for (const NodeVector& f : two.forces) {
+          load.displacement[f.node] = at(two.u, f.node);
+          largest = test::larger(largest, norm(f.value));
+        }
+        Stages stages(model, stiff, options);
+        EXPECT_LT(difference(stages.shape(load), two.u), 1e-9);
+        ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
+        for (std::size_t k = 0; k < two.forces.size(); ++k)
+          EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
+                    1e-9 * largest);
+        if (friction > 0)
+          continue;
+        const Vec3 centre{100.4, -49.8, 57.6};
+        for (const NodeVector& f : two.forces) {
+          const Vec3 n = model.nodes[f.node].position + at(two.u, f.node) - centre;
+          if (f.node != free_nodes(model)[2]) {
+            EXPECT_LT(norm(cross(f.value, n)), 1e-6 * norm(f.value) * norm(n));
+          }
+        }
+      }
+}
+
 TEST(TwoStep, InASimulationByEventsWithAWarning) {
   std::vector<std::string> warnings;
   const Model model = organ(), stiff = stiffened(model, 2, 5);
