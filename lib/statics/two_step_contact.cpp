@@ -70,10 +70,12 @@ ContactSpace TwoStepYielding::combined() {
       throw Error("the two stages' compliances of the displaced nodes are not positive definite, "
                   "expected fewer of them");
     const MatrixXd across = c(held_, rows_);
-    of_free_ = llt.solve(d - v(held_));
-    of_touch_ = llt.solve(across);
-    free += across.transpose() * of_free_;
-    w -= across.transpose() * of_touch_;
+    const VectorXd of_free = llt.solve(d - v(held_));
+    const MatrixXd of_touch = llt.solve(across);
+    free += across.transpose() * of_free;
+    w -= across.transpose() * of_touch;
+    of_free_.assign(of_free.data(), of_free.data() + of_free.size());
+    of_touch_.assign(of_touch.data(), of_touch.data() + of_touch.size());
     w = (0.5 * (w + w.transpose())).eval();
   }
   ContactSpace space;
@@ -96,7 +98,9 @@ std::vector<NodeVector> TwoStepYielding::held_forces(std::span<const NodeTouch> 
     for (int a = 0; a < 3; ++a)
       f[3 * k + a] += t.force[a];
   }
-  const VectorXd held = of_free_ - of_touch_ * f;
+  const auto size = static_cast<Index>(held_.size());
+  const VectorXd held = Eigen::Map<const VectorXd>(of_free_.data(), size) -
+                        Eigen::Map<const MatrixXd>(of_touch_.data(), size, f.size()) * f;
   for (std::size_t k = 0; k < held_.size(); ++k) {
     const std::uint32_t node = one_.nodes[held_[k] / 3];
     const auto at =

@@ -8,8 +8,6 @@
 #include "statics/static_contact.h"
 #include "statics/two_step.h"
 
-#include <Eigen/Core>
-
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -46,8 +44,8 @@ private:
   std::vector<std::uint32_t> nodes_;     ///< of the last space
   ContactSpace one_, two_;               ///< of these and the displaced nodes, by stage
   std::vector<std::size_t> rows_, held_; ///< of `nodes_`, and of what is displaced, in them
-  Eigen::VectorXd of_free_;              ///< held forces without touches
-  Eigen::MatrixXd of_touch_;             ///< what a touch takes from them
+  std::vector<double> of_free_;          ///< held forces without touches
+  std::vector<double> of_touch_;         ///< what touches take from them, by columns
   double s_ = 1, low_ = 0, high_ = 1, low_value_ = 0, high_value_ = 0;
   int rounds_ = 0;
   bool scanning_ = true, solved_ = true;

@@ -193,7 +193,8 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
     for (const int k : {0, 1}) {
       const auto s = pressed(Method::ela, friction, 2, 8, 3, 1,
                              k == 0 ? Integration::semi_implicit : Integration::implicit);
-      s->step(10);
+      EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), 2e-9) << k; // on its way
+      s->step(6);
       s->step(0.1);
       force[k] = s->instrument(0).force;
       rest[k].assign(s->displacement(0).begin(), s->displacement(0).end());
@@ -439,7 +440,8 @@ TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
   for (const auto& [method, integration] : ways)
     for (const double over : {0.0, 0.002}) {
       Simulation s({}, {});
-      s.add_object("o", organ(4), method, {}, integration);
+      s.add_object("o", organ(integration == Integration::implicit ? 3 : 4), method, {},
+                   integration);
       s.add_instrument("tool");
       s.apply(sphere(8, middle + Vec3{0.3, 0.2, 28.5}));
       s.step(0.001);
