@@ -8,8 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <string>
 #include <utility>
 
@@ -174,25 +172,12 @@ Entries entries_of(const StiffnessMatrix& matrix, const Nodes& nodes, const Fron
   return entries;
 }
 
-struct Free {
-  void operator()(double* numbers) const noexcept { std::free(numbers); }
-};
-using Zeros = std::unique_ptr<double[], Free>;
-
-/// Zeros as the system gives them, so that nobody writes them before they are used.
-Zeros zeros(std::size_t count) {
-  Zeros made(static_cast<double*>(std::calloc(std::max<std::size_t>(count, 1), sizeof(double))));
-  if (made == nullptr)
-    throw std::bad_alloc();
-  return made;
-}
-
 } // namespace
 
 /// Arrays from a file, or made by fronts.
 struct Factor::State {
   FactorData data; // `x` only of one from a file
-  Zeros made;
+  std::unique_ptr<double[]> made;
   std::span<const double> x;
   CpuLevel cpu;
 
@@ -266,9 +251,8 @@ struct Factor::State {
                    8 * static_cast<double>(size + data.s.size() + matrix.row.size()) +
                        update_bytes(tree, fronts, false, thread_count(context)),
                    "the factor of the stiffness matrix");
-    const bool first = made == nullptr;
-    if (first)
-      made = zeros(size);
+    if (made == nullptr)
+      made = std::make_unique_for_overwrite<double[]>(size);
     x = {made.get(), size};
     for (std::size_t f = 0; f < fronts.size(); ++f)
       fronts[f].l = made.get() + data.px[f];
@@ -276,8 +260,7 @@ struct Factor::State {
       (void)gewebe::factorise({.tree = tree,
                                .axes = nodes.axes,
                                .fronts = fronts,
-                               .assemble = [&](const FrontAssembly& to) { assemble(matrix, to); },
-                               .zero = first},
+                               .assemble = [&](const FrontAssembly& to) { assemble(matrix, to); }},
                               {}, context);
     } catch (const PivotTooSmall& pivot) {
       throw NotPositiveDefinite(static_cast<std::size_t>(

@@ -178,11 +178,10 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
                      : scratch.stacks.push(plan.place[f], front.below());
   const FrontArrays arrays{front.rows, front.columns, front.l, front.update};
   const std::size_t size = front.rows * front.columns;
-  if (!task.zero)
-    over(context, size >= worth_threads_entries, size, worth_threads_entries / 4,
-         [&](std::size_t first, std::size_t last) {
-           std::fill(front.l + first, front.l + last, 0.0);
-         });
+  over(context, size >= worth_threads_entries, size, worth_threads_entries / 4,
+       [&](std::size_t first, std::size_t last) {
+         std::fill(front.l + first, front.l + last, 0.0);
+       });
   scratch.least.assign(front.columns, 0.0);
   task.assemble({f, scratch.row, front.rows, front.l, scratch.least});
   gather(task, arrays, plan.children[f], scratch, context);

@@ -63,7 +63,6 @@ struct Multifrontal {
   std::span<Front> fronts;                            ///< of the tree, with room for L
   std::function<void(const FrontAssembly&)> assemble; ///< called from several threads
   bool keep_updates = false; ///< update matrices stay, so that some fronts can be computed again
-  bool zero = false;         ///< L is 0 already
 };
 
 /// What a factorisation did.
