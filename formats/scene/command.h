@@ -20,7 +20,8 @@ struct ChangeCommand {
   Change change;
   std::string object{}, other{}, instrument{};
   std::optional<Selector> nodes{}, others{};
-  bool total = false; ///< a force is divided among the nodes
+  bool total = false;  ///< a force is divided among the nodes
+  std::string stage{}; ///< file of the second stage's model; none: ""
 };
 /// Writes the model as it is now, at rest.
 struct EmitModelCommand {

@@ -273,6 +273,12 @@ What parse_two_step(Words& in) {
     in.fail("a threshold that is not positive");
   set.options.series = in.take("series");
   c.change = set;
+  if (in.done())
+    return c;
+  const std::string word = in.word("");
+  if (!word.starts_with("stage=") || word.size() == 6)
+    in.fail(shown(word) + " is no use here");
+  c.stage = word.substr(6);
   return c;
 }
 
@@ -401,7 +407,7 @@ const std::array<Verb, 22>& verbs() {
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
-      {"two-step", "two-step NAME f0 [series], f0 positive", true, parse_two_step},
+      {"two-step", "two-step NAME f0 [series] [stage=FILE.ela], f0 positive", true, parse_two_step},
       {"emit", "emit shapes|forces|instruments, or emit model NAME FILE", true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},

@@ -89,6 +89,8 @@ struct SetTwoStep {
   std::size_t object = 0;
   TwoStepOptions options;
   std::function<std::shared_ptr<ComplianceSource>()> second; ///< asked once for an object
+  /// In place of `second`: the object as it came with other stiffnesses. It follows cuts.
+  std::shared_ptr<const Model> model{};
 };
 struct Emit {
   bool forces = false;      ///< else shapes

@@ -70,7 +70,7 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
   }
 }
 
-/// Whether it is known and of one stage; who says otherwise is warned once.
+/// Whether it is known and its second stage can follow; who says otherwise is warned once.
 bool may_cut(World& w, Object& object) {
   const bool feels_it = feels(w, object, Feature::blade);
   return object.matter->known && feels_it;
@@ -169,6 +169,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   Object& next = pieces.emplace_back(renumbered(old, now));
   next.statics->stiffness = std::move(old.statics->stiffness);
   next.statics->prepared = std::move(prepared);
+  follow_cut(w, old, rest.origin, next);
   next.cut = cut_again(old, rest.origin, moves);
   next.cut.scored = std::move(rest.left);
   if (late)
@@ -186,6 +187,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
     Object& part = pieces.emplace_back(
         renumbered(old, std::make_shared<const Model>(std::move(free.parts[k].model))));
     part.method = Method::ela;
+    part.stages = {};
     part.matter->source = {};
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::part,
                                    .object = index,
@@ -433,6 +435,7 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
   moves.add(ways, old.model().nodes.size());
   std::deque<Object> pieces;
   pieces.push_back(renumbered(old, old.cut.first));
+  make_whole(w, pieces[0]);
   w.now.news.cuttings.push_back({.kind = Cutting::Kind::restored,
                                  .object = c.object,
                                  .nodes = old.cut.first->nodes.size(),

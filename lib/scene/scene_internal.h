@@ -100,7 +100,8 @@ struct Body {
 struct Stages {
   std::optional<TwoStepOptions> options;
   std::function<std::shared_ptr<ComplianceSource>()> second; // its second stage
-  bool warned = false;                                       // of a threshold that was not reached
+  std::shared_ptr<const Model> model, first_model; // of that, now and as it came, if known
+  bool warned = false;                             // of a threshold that was not reached
 };
 
 /// The shape before cuts that nobody has asked for: it is found when somebody does, from the model

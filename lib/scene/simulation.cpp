@@ -106,7 +106,8 @@ const Model& Simulation::first_model(std::size_t object) const {
 
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
-  return {one.method, one.matter->known, *one.cut.first_nodes, *one.cut.places};
+  return {one.method, one.matter->known, one.stages.model != nullptr, *one.cut.first_nodes,
+          *one.cut.places};
 }
 
 std::size_t find_object(const Simulation& simulation, const std::string& name) {

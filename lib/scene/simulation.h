@@ -87,7 +87,8 @@ struct SimulationCounts {
 /// What is known of an object without reading it.
 struct ObjectFacts {
   Method method = Method::ela;
-  bool known = false; ///< its model was needed so far
+  bool known = false;  ///< its model was needed so far
+  bool staged = false; ///< that of its second stage is known
   /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
   std::span<const std::uint32_t> first_nodes;
   /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.

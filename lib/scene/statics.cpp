@@ -1,6 +1,8 @@
 // The solvers of elastostatic objects: of one step, of two, made when they are needed.
 
 #include "scene/rules_internal.h"
+#include "solve/stiffness.h"
+#include "statics/second_stage.h"
 
 #include <algorithm>
 #include <utility>
@@ -94,8 +96,45 @@ const std::vector<NodeVector>& still_forces(const Object& object) {
   return statics.two_step ? statics.two_step->contact_forces() : statics.still->contact_forces();
 }
 
+namespace {
+
+/// Goes on with this model of the second stage.
+void set_second(const World& w, Object& object, std::shared_ptr<const Model> model) {
+  object.stages.model = model;
+  object.stages.second = [context = w.context, model = std::move(model)] {
+    return compliance_of_factor(
+        [context, model] { return Factor(stiffness_matrix(*model), context); });
+  };
+}
+
+} // namespace
+
+/// The second stage of a cut object, if its model is known.
+void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t> origin,
+                Object& next) {
+  if (old.stages.model)
+    set_second(w, next,
+               std::make_shared<const Model>(
+                   cut_second_stage(next.model(), origin, old.model(), *old.stages.model)));
+}
+
+/// That of an object that is as it came again.
+void make_whole(const World& w, Object& object) {
+  if (object.stages.first_model)
+    set_second(w, object, object.stages.first_model);
+}
+
 void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {
-  require_support(w, w.now.objects.at(c.object), Feature::two_step);
+  Object& object = w.now.objects.at(c.object);
+  if (!object.cut.first || !object.stages.model) // else that is cut too
+    require_support(w, object, Feature::two_step);
+  if (!c.model)
+    return;
+  need_model(object);
+  if (!same_but_stiffness(object.cut.first ? *object.cut.first : object.model(), *c.model))
+    throw Error("object " + object.name() +
+                " and the model of its second stage differ in more than stiffness, expected the "
+                "same nodes, springs and triangles");
 }
 
 void Rule<SetTwoStep>::apply(World& w, const SetTwoStep& c) {
@@ -105,8 +144,16 @@ void Rule<SetTwoStep>::apply(World& w, const SetTwoStep& c) {
     object.statics->two_step->set(c.options);
   }
   object.stages.options = c.options;
-  if (!object.stages.second)
+  if (c.model && !object.cut.first && c.model != object.stages.first_model) {
+    if (object.statics->two_step) {
+      renew(object);
+      object.statics->ahead = true;
+    }
+    object.stages.first_model = c.model;
+    set_second(w, object, c.model);
+  } else if (!object.stages.second) {
     object.stages.second = c.second;
+  }
   object.stages.warned = false;
   touch(object);
 }

@@ -24,6 +24,8 @@ bool goes(const Object& object, Way way) {
     return !moves;
   case Way::two_step:
     return object.stages.options.has_value();
+  case Way::two_step_stored:
+    return object.stages.options && object.stages.model == nullptr;
   case Way::whole:
     return object.cut.first == nullptr;
   case Way::cut:

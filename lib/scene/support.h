@@ -14,12 +14,13 @@ enum class Way : std::uint8_t {
   attached,
   elastostatic,
   two_step,
+  two_step_stored, ///< its second stage known by its stiffness alone
   whole,
   cut
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
-    Way::two_step,        Way::whole,           Way::cut};
+    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -50,9 +51,10 @@ struct Gap {
 };
 
 inline constexpr std::array gaps{
-    Gap{Way::two_step, Feature::cut, true,
-        "follows two steps of stiffness, expected one without two-step"},
-    Gap{Way::two_step, Feature::blade, false, "follows two steps of stiffness: it is not cut"},
+    Gap{Way::two_step_stored, Feature::cut, true,
+        "has a second stage of its store, expected two-step with the model of that, stage=FILE"},
+    Gap{Way::two_step_stored, Feature::blade, false,
+        "has a second stage of its store and not its model: it is not cut"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

@@ -15,7 +15,7 @@ namespace gewebe::simulation {
 void leave_shown(World& w, Object& object) {
   const double now = w.now.clock.time, before = w.now.clock.shown;
   Shown& shown = object.shown;
-  const bool posed = object.method == Method::ffe && !object.stages.options;
+  const bool posed = object.method == Method::ffe && gap_of(object, Feature::cut) == nullptr;
   if (now == before && shown.time == now) { // in place of what is shown
     object.came.velocity.clear();
     shown.posed = posed;
@@ -56,14 +56,24 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   std::vector<Vec3> velocity;
   try {
     std::optional<Elastostatic> own;
+    std::optional<TwoStep> own_stages;
     if (afresh)
       own.emplace(object.model(), nullptr, w.context);
+    if (afresh && object.stages.options)
+      own_stages.emplace(object.model(), object.stages.second(), w.context, *object.stages.options);
     Elastostatic& still = afresh ? *own : still_of(w, object);
-    still.update(load);
-    const std::span<const double> shape = still.displacement();
+    const auto shape_under = [&](const Load& acting) {
+      if (!object.stages.options) {
+        still.update(acting);
+        return still.displacement();
+      }
+      TwoStep& both = afresh ? *own_stages : two_step_of(w, object);
+      both.update(still, acting);
+      return both.displacement(still);
+    };
+    const std::span<const double> shape = shape_under(load);
     const std::vector<double> before(shape.begin(), shape.end());
-    still.update(now);
-    const std::span<const double> after = still.displacement();
+    const std::span<const double> after = shape_under(now);
     for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
       velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.over);
   } catch (const SingularStiffness&) {

@@ -97,6 +97,9 @@ void renew(Object& object);
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 TwoStep& two_step_of(World& w, Object& object);
+void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t> origin,
+                Object& next);
+void make_whole(const World& w, Object& object);
 void update_stages(World& w, Object& object, const Load& load);
 std::span<const double> still_shape(Object& object);
 const std::vector<NodeVector>& still_forces(const Object& object);

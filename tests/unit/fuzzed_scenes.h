@@ -234,7 +234,8 @@ private:
   }
   std::string two_step(const Known& o) {
     const double threshold = one_in(2) ? real(1, 1e4) : real(1e3, 1e6);
-    return "two-step " + o.name + " " + number_text(threshold) + (one_in(2) ? " series" : "");
+    return "two-step " + o.name + " " + number_text(threshold) + (one_in(2) ? " series" : "") +
+           (one_in(2) ? " stage=" + o.model->name + ".stiff" : "");
   }
   std::string change() {
     const Known o = object(), other = object();
@@ -385,7 +386,15 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   CheckedResult result;
   SceneOptions options;
-  options.files.model = [&](const std::string& name) { return fuzzed_models().at(base(name)); };
+  options.files.model = [&](const std::string& name) {
+    const std::string file = base(name), stiff = ".stiff";
+    if (!file.ends_with(stiff))
+      return fuzzed_models().at(file);
+    Model model = fuzzed_models().at(file.substr(0, file.size() - stiff.size()));
+    for (Spring& s : model.springs)
+      s.stiffness *= 4;
+    return model;
+  };
   options.files.store = [&](const std::string& name, const Model&) {
     return fuzzed_store(base(name), 1);
   };

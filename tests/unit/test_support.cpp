@@ -26,6 +26,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::explicit_motion, Way::whole, Way::attached};
   case Way::two_step:
     return {Way::elastostatic, Way::whole, Way::two_step};
+  case Way::two_step_stored:
+    return {Way::elastostatic, Way::whole, Way::two_step, Way::two_step_stored};
   case Way::cut:
     return {Way::elastostatic, Way::cut};
   case Way::whole:
@@ -43,10 +45,10 @@ const Gap* expected(Way way, Feature feature) {
   return nullptr;
 }
 
-std::shared_ptr<ComplianceSource> stiffer(Model model) {
+Model stiffer(Model model) {
   for (Spring& s : model.springs)
     s.stiffness *= 3;
-  return compliance_of_factor([model] { return Factor(stiffness_matrix(model), Context{}); });
+  return model;
 }
 
 class Pair {
@@ -65,7 +67,7 @@ public:
     scene_.add_object("p", std::move(beside), Method::ela, {}, integration);
     if (way == Way::attached)
       scene_.apply(tie());
-    if (way == Way::two_step)
+    if (way == Way::two_step || way == Way::two_step_stored)
       scene_.apply(two_step());
     if (way == Way::cut) {
       scene_.apply(SetForce{0, {top()}, {0, 0, 1}});
@@ -134,7 +136,12 @@ private:
   std::uint32_t top() const { return test::highest(model_); }
   Attach tie() const { return {0, {top()}, 1, {top()}, 1e5}; }
   SetTwoStep two_step() const {
-    return {0, {.threshold = 1}, [model = model_] { return stiffer(model); }};
+    if (way_ == Way::two_step)
+      return {0, {.threshold = 1}, {}, std::make_shared<const Model>(stiffer(model_))};
+    return {0, {.threshold = 1}, [model = stiffer(model_)] {
+              return compliance_of_factor(
+                  [model] { return Factor(stiffness_matrix(model), Context{}); });
+            }};
   }
   PlaneToCut lower_incision() const {
     PlaneToCut cut{{{100.2, -50, 30}, {0.1, 1, 0}}, std::vector<std::uint32_t>{}};

@@ -2,6 +2,7 @@
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
+#include "simulation_scenes.h"
 #include "statics/two_step.h"
 
 #include "compliance/compliance_source.h"
@@ -347,6 +348,84 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
           }
         }
       }
+}
+
+/// By two cuts, each of both stages for itself.
+TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
+  const Model model = organ(3), stiff = stiffened(model, 2, 5);
+  const std::uint32_t node = free_nodes(model)[2];
+  for (const double threshold : {1.0, 1e9})
+    for (const bool series : {false, true}) {
+      const TwoStepOptions options{threshold, series};
+      Simulation s(test::one_thread(), {});
+      s.add_object("o", model, Method::ffe);
+      s.apply(SetTwoStep{0, options, {}, std::make_shared<const Model>(stiff)});
+      s.apply(SetForce{0, {node}, {0, 3, 1}});
+      s.step(0.1);
+      const std::vector<double> whole = test::shape(s, 0);
+      Model one = model, two = stiff;
+      std::vector<double> before = whole;
+      for (const Vec3& normal : {Vec3{1, 0.1, 0}, Vec3{0.1, 1, 0}}) {
+        PlaneToCut what{{{100.2, -50, 30}, normal}, std::vector<std::uint32_t>{}};
+        for (std::uint32_t i = 0; i < surface_count(one); ++i)
+          if (one.nodes[i].position.z > 40)
+            what.nodes->push_back(i);
+        const Cut cut = plane_cut(one, what.plane, *what.nodes);
+        one = cut_model(one, cut).model;
+        two = cut_model(two, cut).model;
+        s.apply(CutObject{0, what});
+        s.step(0.1);
+        Stages stages(one, two, options);
+        Load load;
+        load.force[node] = {0, 3, 1};
+        EXPECT_LT(difference(test::shape(s, 0), stages.shape(load)), 1e-9);
+        Stages uncut(one, one, {.threshold = 1e9}); // it would show
+        if (threshold == 1) {
+          EXPECT_GT(difference(test::shape(s, 0), uncut.shape(load)), 1e-3);
+        }
+        EXPECT_NE(test::shape(s, 0), before);
+        before = test::shape(s, 0);
+      }
+      s.apply(SetTwoStep{0, {threshold * 0.9, series}, {}}); // of what is cut
+      s.step(0.1);
+      EXPECT_EQ(test::shape(s, 0) == before, threshold == 1e9);
+      s.apply(SetTwoStep{0, options, {}});
+      s.apply(Restore{0});
+      s.step(0.1);
+      EXPECT_LT(difference(test::shape(s, 0), whole), 1e-12);
+    }
+}
+
+TEST(TwoStep, WhatComesOffIsAsFastAsBelowTheThreshold) {
+  const Model model = test::soft_organ();
+  const std::uint32_t top = test::highest(model);
+  std::vector<std::vector<double>> parts;
+  for (const bool staged : {false, true}) {
+    Simulation s(test::one_thread(), {});
+    s.add_object("o", model, Method::ffe);
+    if (staged)
+      s.apply(SetTwoStep{0, {1e9}, {}, std::make_shared<const Model>(stiffened(model, 2, 5))});
+    for (const double z : {0.1, 0.2}) {
+      s.apply(SetDisplacement{0, {top}, {0, 0, z}});
+      s.step(0.01);
+    }
+    s.apply(Release{0, {top}});
+    s.apply(test::lobe_off());
+    s.step(0.001);
+    ASSERT_EQ(s.object_count(), 2U);
+    parts.push_back(test::shape(s, 1));
+  }
+  EXPECT_EQ(parts[0], parts[1]);
+}
+
+TEST(TwoStep, RefusesAnotherModelAsSecondStage) {
+  const Model model = organ(2);
+  Model other = model;
+  other.nodes[3].position.x += 1;
+  Simulation s({}, {});
+  s.add_object("o", model, Method::ffe);
+  for (const Model& wrong : {other, organ(3)})
+    EXPECT_THROW(s.apply(SetTwoStep{0, {1}, {}, std::make_shared<const Model>(wrong)}), Error);
 }
 
 TEST(TwoStep, InASimulationByEventsWithAWarning) {

@@ -84,7 +84,9 @@ void SceneRecord::line(std::string_view text, const Command& command,
                        const std::map<std::string, std::string>& lists) {
   const bool object = std::holds_alternative<ObjectCommand>(command.what);
   const bool model = std::holds_alternative<EmitModelCommand>(command.what);
-  if (object || model ? prefix_.empty() : lists.empty())
+  const auto* const change = std::get_if<ChangeCommand>(&command.what);
+  const bool stage = change != nullptr && !change->stage.empty();
+  if (object || model || stage ? prefix_.empty() : lists.empty())
     return write(text);
   std::vector<std::string> words = scene_words(text);
   if (model) {
@@ -94,6 +96,8 @@ void SceneRecord::line(std::string_view text, const Command& command,
     for (std::string& word : words)
       if (word.starts_with("store="))
         word = "store=" + moved(word.substr(6));
+  } else if (stage) {
+    words.back() = "stage=" + moved(change->stage);
   } else {
     for (std::string& word : words)
       word = numbered(word, lists);

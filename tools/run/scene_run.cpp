@@ -156,8 +156,15 @@ struct SceneRun::State {
       options.events->object(simulation.time(), c.name, c.model, c.method);
   }
 
-  /// Two-step asks the object's store for its second stage.
-  void add_stage(SetTwoStep& set) {
+  /// Two-step asks the object's store for its second stage, where it has no model.
+  void add_stage(SetTwoStep& set, const std::string& file) {
+    if (!file.empty()) {
+      set.model = std::make_shared<const Model>(options.files.model(file));
+      models.push_back(file);
+      return;
+    }
+    if (simulation.object(set.object).staged)
+      return;
     if (set.object >= stores.size() || stores[set.object].empty())
       throw Error("object " + simulation.name(set.object) +
                   " has no store, expected one with a second stage");
@@ -180,7 +187,7 @@ struct SceneRun::State {
       return lists[list] = options.files.node_list(list);
     });
     if (auto* const two_step = std::get_if<SetTwoStep>(&change))
-      add_stage(*two_step);
+      add_stage(*two_step, what.stage);
     if (command.every)
       simulation.schedule_every(*command.at, change);
     else if (command.at)

@@ -1,0 +1,44 @@
+#include "statics/second_stage.h"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+namespace gewebe {
+
+bool same_but_stiffness(const Model& first, const Model& second) {
+  return std::equal(first.nodes.begin(), first.nodes.end(), second.nodes.begin(),
+                    second.nodes.end(),
+                    [](const Node& a, const Node& b) {
+                      return a.position == b.position && a.fixed == b.fixed;
+                    }) &&
+         std::equal(first.springs.begin(), first.springs.end(), second.springs.begin(),
+                    second.springs.end(),
+                    [](const Spring& a, const Spring& b) {
+                      return a.i == b.i && a.j == b.j && a.kind == b.kind;
+                    }) &&
+         first.triangles == second.triangles;
+}
+
+Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, const Model& first,
+                       const Model& second) {
+  const auto key = [](const Spring& s, std::uint32_t i, std::uint32_t j) {
+    return std::tuple(std::min(i, j), std::max(i, j), s.kind);
+  };
+  std::map<std::tuple<std::uint32_t, std::uint32_t, SpringKind>, std::pair<double, double>> sums;
+  for (std::size_t k = 0; k < first.springs.size(); ++k) {
+    const Spring& s = first.springs[k];
+    auto& [one, two] = sums[key(s, s.i, s.j)];
+    one += s.stiffness;
+    two += second.springs[k].stiffness;
+  }
+  Model stiff = cut;
+  for (Spring& s : stiff.springs) {
+    const auto& [one, two] = sums.at(key(s, origin[s.i], origin[s.j]));
+    s.stiffness *= two / one;
+  }
+  return stiff;
+}
+
+} // namespace gewebe
