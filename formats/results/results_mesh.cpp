@@ -104,10 +104,14 @@ private:
   std::vector<std::vector<double>> last_;
 };
 
-class LastShape final : public ResultWriter {
+/// The shapes of the last frame, or of each in a file of its own.
+class ShapeWriter final : public ResultWriter {
 public:
-  LastShape(Kind kind, const std::string& path, const Output::Options& options)
-      : kind_(kind), output_(path, options) {}
+  ShapeWriter(Kind kind, const std::string& path, const Output::Options& options)
+      : kind_(kind), options_(options), pattern_(pattern_in(path)) {
+    if (!pattern_)
+      last_.emplace(path, options);
+  }
 
   void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
   void change_object(std::size_t object, const Model& model,
@@ -116,36 +120,21 @@ public:
   }
   void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
     shapes_.set(objects);
-  }
-  void commit() override { shapes_.write(kind_, output_); }
-
-private:
-  Kind kind_;
-  Output output_;
-  Shapes shapes_;
-};
-
-class ShapeSeries final : public ResultWriter {
-public:
-  ShapeSeries(Kind kind, Pattern pattern, const Output::Options& options)
-      : kind_(kind), pattern_(std::move(pattern)), options_(options) {}
-
-  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
-  void change_object(std::size_t object, const Model& model,
-                     std::span<const std::uint32_t> /*origin*/) override {
-    shapes_.change(object, model);
-  }
-  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
-    shapes_.set(objects);
-    Output output(pattern_.name(frame_++), options_);
+    if (!pattern_)
+      return;
+    Output output(pattern_->name(frame_++), options_);
     shapes_.write(kind_, output);
   }
-  void commit() override {}
+  void commit() override {
+    if (last_)
+      shapes_.write(kind_, *last_);
+  }
 
 private:
   Kind kind_;
-  Pattern pattern_;
   Output::Options options_;
+  std::optional<Pattern> pattern_; ///< of a series, else
+  std::optional<Output> last_;
   Shapes shapes_;
   std::uint64_t frame_ = 0;
 };
@@ -154,9 +143,7 @@ private:
 
 std::unique_ptr<ResultWriter> open_mesh_result(Kind kind, const std::string& path,
                                                const Output::Options& options) {
-  if (std::optional<Pattern> pattern = pattern_in(path))
-    return std::make_unique<ShapeSeries>(kind, std::move(*pattern), options);
-  return std::make_unique<LastShape>(kind, path, options);
+  return std::make_unique<ShapeWriter>(kind, path, options);
 }
 
 } // namespace gewebe

@@ -31,42 +31,18 @@ void silence() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
+// In the order of Number.
 hid_t file_type(Number type) {
-  switch (type) {
-  case Number::float64:
-    return H5T_IEEE_F64LE;
-  case Number::float32:
-    return H5T_IEEE_F32LE;
-  case Number::int64:
-    return H5T_STD_I64LE;
-  case Number::uint64:
-    return H5T_STD_U64LE;
-  case Number::int32:
-    return H5T_STD_I32LE;
-  case Number::uint32:
-    return H5T_STD_U32LE;
-  default:
-    return H5T_STD_U8LE;
-  }
+  const std::array<hid_t, 7> types{H5T_IEEE_F64LE, H5T_IEEE_F32LE, H5T_STD_I64LE, H5T_STD_U64LE,
+                                   H5T_STD_I32LE,  H5T_STD_U32LE,  H5T_STD_U8LE};
+  return types.at(static_cast<std::size_t>(type));
 }
 
 hid_t memory_type(Number type) {
-  switch (type) {
-  case Number::float64:
-    return H5T_NATIVE_DOUBLE;
-  case Number::float32:
-    return H5T_NATIVE_FLOAT;
-  case Number::int64:
-    return H5T_NATIVE_INT64;
-  case Number::uint64:
-    return H5T_NATIVE_UINT64;
-  case Number::int32:
-    return H5T_NATIVE_INT32;
-  case Number::uint32:
-    return H5T_NATIVE_UINT32;
-  default:
-    return H5T_NATIVE_UINT8;
-  }
+  const std::array<hid_t, 7> types{H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT, H5T_NATIVE_INT64,
+                                   H5T_NATIVE_UINT64, H5T_NATIVE_INT32, H5T_NATIVE_UINT32,
+                                   H5T_NATIVE_UINT8};
+  return types.at(static_cast<std::size_t>(type));
 }
 
 const char* type_name(Number type) {

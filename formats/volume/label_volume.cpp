@@ -276,6 +276,9 @@ void check_affine(const std::string& place, const GridTransform& transform) {
     throw Error(place, "the transform to the world is singular, expected three independent axes");
 }
 
+namespace {
+
+/// `file` as seen from the folder of `header`.
 std::string beside(const std::string& header, std::string_view file) {
   if (leaves_folder(file))
     throw Error(header, "names " + quoted(file) +
@@ -284,6 +287,36 @@ std::string beside(const std::string& header, std::string_view file) {
   const std::size_t slash = header.find_last_of('/');
   return (slash == std::string::npos ? std::string() : header.substr(0, slash + 1)) +
          std::string(file);
+}
+
+} // namespace
+
+const HeaderField* HeaderFields::find(const std::string& key) const {
+  const auto found = fields_.find(key);
+  return found == fields_.end() ? nullptr : &found->second;
+}
+
+const HeaderField& HeaderFields::need(const std::string& key) const {
+  if (const HeaderField* const field = find(key))
+    return *field;
+  throw Error(name_, "the " + header_ + " has no field '" + key + "', expected one");
+}
+
+LabelVolume read_side_file(const std::string& header, const HeaderField& file,
+                           const LabelRequest& request,
+                           const std::function<LabelVolume(BufferedBytes&)>& read) {
+  if (file.value == "LIST" || file.value.starts_with("LIST ") ||
+      file.value.find('%') != std::string::npos)
+    throw Error(file.place, "several data files, expected one");
+  if (!request.side_files)
+    throw Error(file.place,
+                "the voxels are in another file, expected a file name or one file of both");
+  const std::string path = beside(header, file.value);
+  Input input(path);
+  (void)input.peek(1);
+  StreamBytes source(input.stream(), path);
+  BufferedBytes data(source, path);
+  return read(data);
 }
 
 std::string_view trimmed(std::string_view text) {

@@ -4,7 +4,9 @@
 #include "formats/volume/label_volume.h"
 
 #include <cstddef>
+#include <functional>
 #include <istream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -112,9 +114,6 @@ Int3 checked_size(const std::string& place, const std::array<std::int64_t, 3>& s
 /// \throw Error unless finite and far enough from singular
 void check_affine(const std::string& place, const GridTransform& transform);
 
-/// `file` as seen from the folder of `header`.
-std::string beside(const std::string& header, std::string_view file);
-
 /// Words of a header's value, split at blanks.
 std::vector<std::string_view> words_of(std::string_view text);
 std::string_view trimmed(std::string_view text);
@@ -123,6 +122,34 @@ std::string quoted(std::string_view text);
 /// \throw Error (place) unless the whole word is a finite number, a whole number
 double number_of(const std::string& place, std::string_view word);
 std::int64_t whole_of(const std::string& place, std::string_view word);
+
+struct HeaderField {
+  std::string value, place;
+};
+
+/// The fields of a header of text by name.
+class HeaderFields {
+public:
+  const HeaderField* find(const std::string& key) const;
+  /// \throw Error if absent
+  const HeaderField& need(const std::string& key) const;
+
+protected:
+  /// `header` says what it is, \pre `file` outlives this
+  HeaderFields(const std::string& file, std::string header)
+      : name_(file), header_(std::move(header)) {}
+  const std::string& name_;
+  std::map<std::string, HeaderField> fields_;
+
+private:
+  std::string header_;
+};
+
+/// Reads voxels from the file that a header's field names, in the header's folder. \throw Error if
+/// it names several, or the request has no side files
+LabelVolume read_side_file(const std::string& header, const HeaderField& file,
+                           const LabelRequest& request,
+                           const std::function<LabelVolume(BufferedBytes&)>& read);
 
 LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request);
 LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request);

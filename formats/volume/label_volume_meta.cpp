@@ -10,14 +10,10 @@
 namespace gewebe {
 namespace {
 
-struct Field {
-  std::string value, place;
-};
-
 /// "Key = value" lines up to ElementDataFile, the last one.
-class Fields {
+class Fields : public HeaderFields {
 public:
-  explicit Fields(BufferedBytes& bytes) : name_(bytes.name()) {
+  explicit Fields(BufferedBytes& bytes) : HeaderFields(bytes.name(), "MetaImage header") {
     for (std::size_t number = 1;; ++number) {
       const std::optional<std::string> line = bytes.line();
       if (!line)
@@ -40,24 +36,15 @@ public:
           {"ElementByteOrderMSB", "BinaryDataByteOrderMSB"}};
       const auto alias = aliases.find(key);
       const std::string usual(alias == aliases.end() ? std::string_view(key) : alias->second);
-      if (!fields_.try_emplace(usual, Field{value, place}).second)
+      if (!fields_.try_emplace(usual, HeaderField{value, place}).second)
         throw Error(place, "a second " + quoted(key) + ", expected one");
       if (key == "ElementDataFile")
         return;
     }
   }
 
-  const Field* find(const std::string& key) const {
-    const auto found = fields_.find(key);
-    return found == fields_.end() ? nullptr : &found->second;
-  }
-  const Field& need(const std::string& key) const {
-    if (const Field* const field = find(key))
-      return *field;
-    throw Error(name_, "the MetaImage header has no " + key + ", expected one");
-  }
   /// `count` numbers.
-  std::vector<double> numbers(const Field& field, std::size_t count) const {
+  std::vector<double> numbers(const HeaderField& field, std::size_t count) const {
     std::vector<double> values;
     for (const std::string_view word : words_of(field.value))
       values.push_back(number_of(field.place, word));
@@ -67,7 +54,7 @@ public:
     return values;
   }
   bool flag(const std::string& key) const {
-    const Field* const field = find(key);
+    const HeaderField* const field = find(key);
     if (field == nullptr)
       return false;
     if (field->value == "True" || field->value == "true" || field->value == "1")
@@ -78,17 +65,13 @@ public:
   }
   /// \throw Error unless absent or of this value
   void expect(const std::string& key, std::string_view value) const {
-    if (const Field* const field = find(key); field != nullptr && field->value != value)
+    if (const HeaderField* const field = find(key); field != nullptr && field->value != value)
       throw Error(field->place,
                   key + " is " + quoted(field->value) + ", expected " + std::string(value));
   }
-
-private:
-  const std::string& name_;
-  std::map<std::string, Field> fields_;
 };
 
-ScalarType scalar_type(const Field& field) {
+ScalarType scalar_type(const HeaderField& field) {
   static const std::map<std::string_view, ScalarType> types{
       {"MET_CHAR", ScalarType::i8},       {"MET_UCHAR", ScalarType::u8},
       {"MET_SHORT", ScalarType::i16},     {"MET_USHORT", ScalarType::u16},
@@ -103,7 +86,7 @@ ScalarType scalar_type(const Field& field) {
 }
 
 double unit_of(const Fields& fields) {
-  const Field* const field = fields.find("DistanceUnits");
+  const HeaderField* const field = fields.find("DistanceUnits");
   if (field == nullptr || field->value == "mm" || field->value == "?" || field->value.empty())
     return 1;
   if (field->value == "cm")
@@ -119,9 +102,9 @@ GridTransform affine(const Fields& fields) {
   const double unit = unit_of(fields);
   const std::vector<double> spacing = fields.numbers(fields.need("ElementSpacing"), 3);
   std::vector<double> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1}, offset{0, 0, 0};
-  if (const Field* const field = fields.find("TransformMatrix"))
+  if (const HeaderField* const field = fields.find("TransformMatrix"))
     matrix = fields.numbers(*field, 9);
-  if (const Field* const field = fields.find("Offset"))
+  if (const HeaderField* const field = fields.find("Offset"))
     offset = fields.numbers(*field, 3);
   GridTransform t;
   for (std::size_t row = 0; row < 3; ++row) {
@@ -136,7 +119,7 @@ GridTransform affine(const Fields& fields) {
 
 LabelVolume read_data(BufferedBytes& bytes, const Fields& fields, const VoxelLayout& layout,
                       const LabelRequest& request) {
-  if (const Field* const field = fields.find("HeaderSize")) {
+  if (const HeaderField* const field = fields.find("HeaderSize")) {
     const std::int64_t skip = whole_of(field->place, field->value);
     if (skip < 0 || skip > 1000000000)
       throw Error(field->place, "HeaderSize " + std::to_string(skip) + ", expected 0 to 1e9");
@@ -169,7 +152,7 @@ LabelVolume read_meta_image(BufferedBytes& bytes, const LabelRequest& request) {
   if (fields.find("BinaryData") != nullptr && !fields.flag("BinaryData"))
     throw Error(fields.need("BinaryData").place, "voxels as text, expected BinaryData = True");
   VoxelLayout layout;
-  const Field& sizes = fields.need("DimSize");
+  const HeaderField& sizes = fields.need("DimSize");
   const std::vector<std::string_view> words = words_of(sizes.value);
   if (words.size() != 3)
     throw Error(sizes.place, std::to_string(words.size()) + " sizes, expected 3");
@@ -181,21 +164,13 @@ LabelVolume read_meta_image(BufferedBytes& bytes, const LabelRequest& request) {
   layout.transform = affine(fields);
 
   LabelVolume volume;
-  const Field& file = fields.need("ElementDataFile");
+  const HeaderField& file = fields.need("ElementDataFile");
   if (file.value == "LOCAL" || file.value == "Local" || file.value == "local") {
     volume = read_data(bytes, fields, layout, request);
   } else {
-    if (file.value.starts_with("LIST") || file.value.find('%') != std::string::npos)
-      throw Error(file.place, "several data files, expected one");
-    if (!request.side_files)
-      throw Error(file.place, "the voxels are in another file, expected a file name or one file of "
-                              "both");
-    const std::string path = beside(name, file.value);
-    Input input(path);
-    (void)input.peek(1);
-    StreamBytes source(input.stream(), path);
-    BufferedBytes data(source, path);
-    volume = read_data(data, fields, layout, request);
+    volume = read_side_file(name, file, request, [&](BufferedBytes& data) {
+      return read_data(data, fields, layout, request);
+    });
   }
   volume.format = "MetaImage";
   return volume;

@@ -12,14 +12,10 @@
 namespace gewebe {
 namespace {
 
-struct Field {
-  std::string value, place;
-};
-
 /// The fields of a header by name.
-class Fields {
+class Fields : public HeaderFields {
 public:
-  explicit Fields(BufferedBytes& bytes) : name_(bytes.name()) {
+  explicit Fields(BufferedBytes& bytes) : HeaderFields(bytes.name(), "NRRD header") {
     std::size_t number = 1;
     std::optional<std::string> line = bytes.line();
     if (!line || line->size() != 8 || !line->starts_with("NRRD000") || (*line)[7] < '1' ||
@@ -34,16 +30,6 @@ public:
         return;
       add(*line, name_ + ":" + std::to_string(number));
     }
-  }
-
-  const Field* find(const std::string& key) const {
-    const auto found = fields_.find(key);
-    return found == fields_.end() ? nullptr : &found->second;
-  }
-  const Field& need(const std::string& key) const {
-    if (const Field* const field = find(key))
-      return *field;
-    throw Error(name_, "the NRRD header has no field '" + key + "', expected one");
   }
 
 private:
@@ -99,16 +85,13 @@ private:
                                       "measurement frame"};
     if (std::find(known.begin(), known.end(), key) == known.end())
       throw Error(place, "no field " + quoted(key) + " is known, expected one of the NRRD format");
-    if (!fields_.try_emplace(key, Field{std::string(trimmed(line.substr(colon + 1))), place})
+    if (!fields_.try_emplace(key, HeaderField{std::string(trimmed(line.substr(colon + 1))), place})
              .second)
       throw Error(place, "a second field '" + key + "', expected one");
   }
-
-  const std::string& name_;
-  std::map<std::string, Field> fields_;
 };
 
-ScalarType scalar_type(const Field& field) {
+ScalarType scalar_type(const HeaderField& field) {
   static const std::map<std::string_view, ScalarType> types{
       {"signed char", ScalarType::i8},
       {"int8", ScalarType::i8},
@@ -157,7 +140,7 @@ ScalarType scalar_type(const Field& field) {
 }
 
 /// "(1,0,0) (0,1,0) none (0,0,1)": the vectors, "none" as nothing.
-std::vector<std::optional<Vec3>> vectors_of(const Field& field) {
+std::vector<std::optional<Vec3>> vectors_of(const HeaderField& field) {
   std::vector<std::optional<Vec3>> vectors;
   std::string_view rest = trimmed(field.value);
   while (!rest.empty()) {
@@ -186,7 +169,7 @@ std::vector<std::optional<Vec3>> vectors_of(const Field& field) {
 
 /// Signs that turn the space's axes to right, anterior, superior.
 Vec3 to_ras(const Fields& fields, const std::string& name, LabelVolume& volume) {
-  const Field* const space = fields.find("space");
+  const HeaderField* const space = fields.find("space");
   const std::string text = space != nullptr ? space->value : "";
   std::string lower;
   for (const char c : text)
@@ -208,7 +191,7 @@ Vec3 to_ras(const Fields& fields, const std::string& name, LabelVolume& volume) 
 }
 
 /// Millimetres of units that are all alike; absent ones are mm.
-double unit_of(const Field* field) {
+double unit_of(const HeaderField* field) {
   if (field == nullptr)
     return 1;
   std::vector<std::string> units;
@@ -234,7 +217,8 @@ double unit_of(const Field* field) {
 }
 
 /// The three axes among `sizes` that span the volume; the others must have size 1.
-std::array<std::size_t, 3> space_axes(const Field& sizes, const std::vector<std::int64_t>& size,
+std::array<std::size_t, 3> space_axes(const HeaderField& sizes,
+                                      const std::vector<std::int64_t>& size,
                                       const std::vector<std::optional<Vec3>>& directions) {
   std::array<std::size_t, 3> axes{0, 1, 2};
   std::size_t count = 0;
@@ -259,7 +243,7 @@ GridTransform affine(const Fields& fields, const std::string& name,
   const Vec3 sign = to_ras(fields, name, volume);
   double unit = unit_of(fields.find("space units"));
   if (!directions.empty()) {
-    const Field& field = fields.need("space origin");
+    const HeaderField& field = fields.need("space origin");
     const auto vectors = vectors_of(field);
     if (vectors.size() != 1 || !vectors.front())
       throw Error(field.place, quoted(field.value) + ", expected one origin (x,y,z)");
@@ -267,15 +251,15 @@ GridTransform affine(const Fields& fields, const std::string& name,
     for (std::size_t a = 0; a < 3; ++a)
       column.at(a) = *directions[axes.at(a)];
   } else {
-    const Field& field = fields.need("spacings");
-    if (const Field* const mins = fields.find("axis mins"))
+    const HeaderField& field = fields.need("spacings");
+    if (const HeaderField* const mins = fields.find("axis mins"))
       throw Error(mins->place, "axis mins, expected space directions and space origin");
     const std::vector<std::string_view> words = words_of(field.value);
     if (words.size() != 3)
       throw Error(field.place, std::to_string(words.size()) + " spacings, expected 3");
     for (std::size_t a = 0; a < 3; ++a)
       column.at(a)[static_cast<int>(a)] = number_of(field.place, words[a]);
-    if (const Field* const units = fields.find("units"); units != nullptr && unit == 1)
+    if (const HeaderField* const units = fields.find("units"); units != nullptr && unit == 1)
       unit = unit_of(units);
   }
   GridTransform t;
@@ -293,7 +277,7 @@ GridTransform affine(const Fields& fields, const std::string& name,
 bool big_endian_of(const Fields& fields, ScalarType type) {
   if (bytes_of(type) == 1)
     return false;
-  const Field& field = fields.need("endian");
+  const HeaderField& field = fields.need("endian");
   if (field.value != "little" && field.value != "big")
     throw Error(field.place, quoted(field.value) + ", expected little or big");
   return field.value == "big";
@@ -302,12 +286,12 @@ bool big_endian_of(const Fields& fields, ScalarType type) {
 /// Reads the voxels of `bytes` after the skips that the header asks for.
 LabelVolume read_data(BufferedBytes& bytes, const Fields& fields, const VoxelLayout& layout,
                       const LabelRequest& request) {
-  const Field& encoding = fields.need("encoding");
+  const HeaderField& encoding = fields.need("encoding");
   const bool gzip = encoding.value == "gzip" || encoding.value == "gz";
   if (!gzip && encoding.value != "raw")
     throw Error(encoding.place, "encoding " + quoted(encoding.value) + ", expected raw or gzip");
   const auto skip_of = [&](const char* key) {
-    const Field* const field = fields.find(key);
+    const HeaderField* const field = fields.find(key);
     const std::int64_t n = field == nullptr ? 0 : whole_of(field->place, field->value);
     if (n < 0 || n > 1000000000)
       throw Error(field->place, std::to_string(n) + ", expected 0 to 1e9");
@@ -335,8 +319,8 @@ bool is_nrrd(std::string_view bytes) {
 LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request) {
   const std::string& name = bytes.name();
   const Fields fields(bytes);
-  const Field& dimension = fields.need("dimension");
-  const Field& sizes = fields.need("sizes");
+  const HeaderField& dimension = fields.need("dimension");
+  const HeaderField& sizes = fields.need("sizes");
   std::vector<std::int64_t> size;
   for (const std::string_view word : words_of(sizes.value))
     size.push_back(whole_of(sizes.place, word));
@@ -344,7 +328,7 @@ LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request) {
     throw Error(sizes.place, std::to_string(size.size()) + " sizes, expected " +
                                  quoted(dimension.value) + " as dimension says");
   std::vector<std::optional<Vec3>> directions;
-  if (const Field* const field = fields.find("space directions")) {
+  if (const HeaderField* const field = fields.find("space directions")) {
     directions = vectors_of(*field);
     if (directions.size() != size.size())
       throw Error(field->place, std::to_string(directions.size()) + " directions, expected " +
@@ -360,19 +344,10 @@ LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request) {
   layout.transform = affine(fields, name, directions, axes, head);
 
   LabelVolume volume;
-  if (const Field* const file = fields.find("data file")) {
-    if (file->value == "LIST" || file->value.starts_with("LIST ") ||
-        file->value.find('%') != std::string::npos)
-      throw Error(file->place, "several data files, expected one");
-    if (!request.side_files)
-      throw Error(file->place, "the voxels are in another file, expected a file name or one file "
-                               "of both");
-    const std::string path = beside(name, file->value);
-    Input input(path);
-    (void)input.peek(1);
-    StreamBytes source(input.stream(), path);
-    BufferedBytes data(source, path);
-    volume = read_data(data, fields, layout, request);
+  if (const HeaderField* const file = fields.find("data file")) {
+    volume = read_side_file(name, *file, request, [&](BufferedBytes& data) {
+      return read_data(data, fields, layout, request);
+    });
   } else {
     volume = read_data(bytes, fields, layout, request);
   }

@@ -110,6 +110,7 @@ struct GlRenderer::State {
   int use_colors(int unit);
   void next_pass(GLenum source, GLenum destination);
   void draw_geometry(const Context& context);
+  void draw_relief(const std::array<float, 4>& half, const Context& context);
   void draw_three(const Context& context);
   void draw_three_layered(const Context& context);
   void draw_two(const Context& context);
@@ -226,20 +227,25 @@ void GlRenderer::State::draw_geometry(const Context& context) {
   geometry->no_colors();
 }
 
-/// f / 2, then (1 - f') / 2 added, then the base blended: c times what stands there, plus what
-/// stands there times c.
-void GlRenderer::State::draw_three(const Context& context) {
+/// Half of f, then half of 1 - f' added, in two passes; `half` has 1/2 where it is wanted.
+void GlRenderer::State::draw_relief(const std::array<float, 4>& half, const Context& context) {
   use(0, now->structure, now->look->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
-  glColor4f(0.5F, 0.5F, 0.5F, 1);
+  glColor4fv(half.data());
   draw_geometry(context);
   next_pass(GL_ONE, GL_ONE);
   use(0, now->structure, now->look->structure, true);
   constexpr std::array<float, 4> black{};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, black.data());
   set_env(GL_TEXTURE_ENV_MODE, GL_BLEND);
-  glColor4f(0.5F, 0.5F, 0.5F, 1);
+  glColor4fv(half.data());
   draw_geometry(context);
+}
+
+/// f / 2, then (1 - f') / 2 added, then the base blended: c times what stands there, plus what
+/// stands there times c.
+void GlRenderer::State::draw_three(const Context& context) {
+  draw_relief({0.5F, 0.5F, 0.5F, 1}, context);
   next_pass(GL_DST_COLOR, GL_SRC_COLOR);
   geometry->use_colors(*now->look);
   use_colors(0);
@@ -278,17 +284,7 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
     return;
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
   next_pass(GL_ONE, GL_ZERO);
-  use(0, now->structure, now->look->structure);
-  set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
-  glColor4f(1, 1, 1, 0.5F);
-  draw_geometry(context);
-  next_pass(GL_ONE, GL_ONE);
-  use(0, now->structure, now->look->structure, true);
-  constexpr std::array<float, 4> black{};
-  glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, black.data());
-  set_env(GL_TEXTURE_ENV_MODE, GL_BLEND);
-  glColor4f(1, 1, 1, 0.5F);
-  draw_geometry(context);
+  draw_relief({1, 1, 1, 0.5F}, context);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_FALSE);
   white(GL_ZERO, GL_DST_ALPHA);
   white(GL_DST_COLOR, GL_ONE);

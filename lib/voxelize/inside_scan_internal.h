@@ -124,6 +124,23 @@ struct Slab {
   std::vector<LeafKey> keys;
   std::vector<Leaf> leaves;
   std::vector<FullRun> runs;
+
+  /// `leaf` stands at `from` and above it up to k_end. \param full of what a leaf wholly inside is
+  void put(const Leaf& leaf, LeafKey from, std::int32_t k_end, std::uint64_t full) {
+    if (leaf.is_constant(0))
+      return;
+    if (leaf.is_constant(full)) {
+      if (!runs.empty() && runs.back().j == from.j && runs.back().k_end == from.k)
+        runs.back().k_end = k_end;
+      else
+        runs.push_back({from.j, from.k, k_end});
+      return;
+    }
+    for (std::int32_t k = from.k; k < k_end; ++k) {
+      keys.push_back({from.j, k});
+      leaves.push_back(leaf);
+    }
+  }
 };
 
 /// Takes the flips of rays with an odd number of them out of a column of leaves; returns how many
@@ -174,21 +191,6 @@ std::uint64_t integrate_slab(LeafMap<Leaf>& map, int samples, Slab<Leaf>& slab) 
   slab.keys.reserve(sorted.size());
   slab.leaves.reserve(sorted.size());
   const std::uint64_t full = Leaf::full(samples);
-  const auto put = [&](const Leaf& leaf, LeafKey from, std::int32_t k_end) {
-    if (leaf.is_constant(0))
-      return;
-    if (leaf.is_constant(full)) {
-      if (!slab.runs.empty() && slab.runs.back().j == from.j && slab.runs.back().k_end == from.k)
-        slab.runs.back().k_end = k_end;
-      else
-        slab.runs.push_back({from.j, from.k, k_end});
-      return;
-    }
-    for (std::int32_t k = from.k; k < k_end; ++k) {
-      slab.keys.push_back({from.j, k});
-      slab.leaves.push_back(leaf);
-    }
-  };
   std::uint64_t odd = 0;
   for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
     while (end < sorted.size() && sorted[end].key.j == sorted[begin].key.j)
@@ -200,11 +202,11 @@ std::uint64_t integrate_slab(LeafMap<Leaf>& map, int samples, Slab<Leaf>& slab) 
       if (n > begin && sorted[n - 1].key.k + 1 < key.k) {
         Leaf gap;
         gap.integrate(carry);
-        put(gap, {key.j, sorted[n - 1].key.k + 1}, key.k);
+        slab.put(gap, {key.j, sorted[n - 1].key.k + 1}, key.k, full);
       }
       Leaf& leaf = map.leaves[order[n]];
       leaf.integrate(carry);
-      put(leaf, key, key.k + 1);
+      slab.put(leaf, key, key.k + 1, full);
     }
   }
   return odd;

@@ -130,21 +130,7 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return map.keys[a] < map.keys[b]; });
   Slab<BitLeaf> slab;
-  const auto put = [&](const BitLeaf& leaf, LeafKey from, std::int32_t k_end) {
-    if (leaf.is_constant(0))
-      return;
-    if (leaf.is_constant(BitLeaf::full(1))) {
-      if (!slab.runs.empty() && slab.runs.back().j == from.j && slab.runs.back().k_end == from.k)
-        slab.runs.back().k_end = k_end;
-      else
-        slab.runs.push_back({from.j, from.k, k_end});
-      return;
-    }
-    for (std::int32_t k = from.k; k < k_end; ++k) {
-      slab.keys.push_back({from.j, k});
-      slab.leaves.push_back(leaf);
-    }
-  };
+  const std::uint64_t full = BitLeaf::full(1);
   CountLeaf::Carry carry{};
   for (std::size_t n = 0; n < order.size(); ++n) {
     const LeafKey key = map.keys[order[n]];
@@ -152,7 +138,7 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
     if (last.j == key.j && last.k + 1 < key.k) {
       CountLeaf gap;
       gap.integrate(carry);
-      put(bits_of(gap), {key.j, last.k + 1}, key.k);
+      slab.put(bits_of(gap), {key.j, last.k + 1}, key.k, full);
     }
     CountLeaf& leaf = map.leaves[order[n]];
     leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
@@ -160,9 +146,9 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
       BitLeaf bits;
       decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
              leaf_dim, bits, counters.summed);
-      put(bits, key, key.k + 1);
+      slab.put(bits, key, key.k + 1, full);
     } else {
-      put(bits_of(leaf), key, key.k + 1);
+      slab.put(bits_of(leaf), key, key.k + 1, full);
     }
   }
   return slab;
