@@ -60,9 +60,9 @@ private:
   void check_room(const Element& element) const {
     std::size_t least = 0;
     for (const Property& p : element.properties) {
-      least += Source::least_size(p.count_type.value_or(p.type));
+      least += Source::min_size(p.count_type.value_or(p.type));
       if (p.use == Use::indices)
-        least += 3 * Source::least_size(p.type);
+        least += 3 * Source::min_size(p.type);
     }
     if (least > 0 && element.count > source_.left() / least)
       source_.fail(std::to_string(element.count) + " elements " + quoted(element.name) + " in " +
@@ -78,7 +78,7 @@ private:
     if (!(count >= 0 && count <= UINT32_MAX && count == std::floor(count)))
       source_.fail("a list of " + number(count) + " values, expected a count from 0");
     const std::size_t size = static_cast<std::size_t>(count);
-    if (size > source_.left() / Source::least_size(property.type))
+    if (size > source_.left() / Source::min_size(property.type))
       source_.fail("a list of " + std::to_string(size) + " values in " +
                    std::to_string(source_.left()) + " bytes, expected a count that fits");
     return size;

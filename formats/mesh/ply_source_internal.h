@@ -30,7 +30,7 @@ public:
   }
 
   /// The least room that one value of the type takes.
-  static std::size_t least_size(Type type) { return size_of(type); }
+  static std::size_t min_size(Type type) { return size_of(type); }
   std::size_t left() const { return bytes_.size() - at_; }
   void begin_record(const Element&) {}
   void end_record() {}
@@ -100,7 +100,7 @@ public:
   }
 
   // A digit and the blank or line end behind it; the very last may lack that.
-  static std::size_t least_size(Type) { return 2; }
+  static std::size_t min_size(Type) { return 2; }
   std::size_t left() const { return bytes_.size() - at_ + 1 + rest_.size(); }
 
   /// An element is one line; blank lines between are passed over.

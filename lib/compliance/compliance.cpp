@@ -10,7 +10,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr double most_column_bytes = 1073741824; // where memory is not bounded
+constexpr double max_column_bytes = 1073741824; // where memory is not bounded
 
 std::vector<std::uint32_t> nodes_of(std::span<const NodeVector> forces) {
   std::vector<std::uint32_t> nodes;
@@ -35,7 +35,7 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
                 columns[(3 * k + a) * axes_ + 3 * std::size_t{nodes[k]} + a] = 1;
             solve(columns, 3 * nodes.size());
           },
-          std::min(static_cast<double>(context.max_memory) / 4, most_column_bytes), bounded) {
+          std::min(static_cast<double>(context.max_memory) / 4, max_column_bytes), bounded) {
   context_.progress = nullptr;
   source_->open(model, context_);
 }

@@ -37,7 +37,7 @@ bool correction_pays(const CutCosts& cut) {
   // Of all operations, what a cut reaches as long as none has told.
   constexpr double usual_reach = 0.3;
   // Each solution takes a pass over the corrections; beyond so many it costs as much again.
-  constexpr std::size_t most_rank = 48;
+  constexpr std::size_t max_rank = 48;
   const auto nodes = static_cast<double>(cut.nodes);
   const double reach = cut.reached > 0 ? cut.reached : usual_reach * cut.all_operations;
   const double renewal = nodes * renewal_node + reach * front_operation;
@@ -46,7 +46,7 @@ bool correction_pays(const CutCosts& cut) {
   const double correction = nodes * correction_node + (panels + contact_panels) * 8 *
                                                           solve_operation * 4 *
                                                           static_cast<double>(cut.entries);
-  return cut.rank <= most_rank && correction < renewal;
+  return cut.rank <= max_rank && correction < renewal;
 }
 
 bool order_is_worn_out(double all_operations, double fresh_operations) {

@@ -6,7 +6,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t most_kept = 1024; ///< nodes; some 50 kB each on 10,000 nodes
+constexpr std::size_t max_kept = 1024; ///< nodes; some 50 kB each on 10,000 nodes
 
 } // namespace
 
@@ -21,7 +21,7 @@ void HalfBlocks::need(std::span<const std::uint32_t> nodes) {
   if (missing.empty())
     return;
   check_();
-  if (half_.size() + missing.size() > most_kept) {
+  if (half_.size() + missing.size() > max_kept) {
     half_.clear();
     missing.assign(nodes.begin(), nodes.end());
   }

@@ -34,7 +34,7 @@ bool index_box(const Particles& particles, const DensityOptions& options, IndexB
 
 /// Leaves that one particle fills at the least, by the cube in its ball: refuses absurd radii
 /// before anything is listed.
-double least_leaves(std::span<const IndexParticle> particles, const IndexBox& clip) {
+double min_leaves(std::span<const IndexParticle> particles, const IndexBox& clip) {
   double most = 0;
   for (const IndexParticle& p : particles) {
     const double center[3] = {p.x, p.y, p.z};
@@ -129,7 +129,7 @@ Grid metaball_density(const Context& context, const Particles& particles,
   counts.particles_out_of_reach = particles.size() - local.size();
   counts.predicted_evaluations = expected_pairs(local) * leaf_voxels;
   if (!options.band)
-    require_memory(context, least_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
+    require_memory(context, min_leaves(local, clip) * leaf_bytes, "the volume, at the least,");
 
   // Bounds over leaves of particles below two leaves spare less than they cost. They need the voxel
   // beside each face too.

@@ -12,7 +12,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::uint64_t most_blocks = 8192;
+constexpr std::uint64_t max_blocks = 8192;
 constexpr std::uint64_t list_budget = std::uint64_t{256} << 20; // bytes of leaf lists kept
 constexpr std::uint64_t block_budget = std::uint64_t{16} << 20; // of one block
 
@@ -133,9 +133,9 @@ Blocks sort_into_blocks(const Context& context, std::span<const IndexParticle> p
     return blocks;
   // Small blocks share the work well and large ones keep the lists short.
   int shift = 5;
-  const double most_pairs = 3.2e7 + 4 * static_cast<double>(particles.size());
-  while (count_blocks(clip, shift) > most_blocks ||
-         (shift < 30 && count_pairs(particles, clip, shift, margin) > most_pairs))
+  const double max_pairs = 3.2e7 + 4 * static_cast<double>(particles.size());
+  while (count_blocks(clip, shift) > max_blocks ||
+         (shift < 30 && count_pairs(particles, clip, shift, margin) > max_pairs))
     ++shift;
   blocks.size = std::int32_t{1} << shift;
 

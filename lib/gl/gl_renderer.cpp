@@ -58,7 +58,7 @@ std::string shader_kind(const Look& look) {
 }
 
 // At most so many passes blend into one group.
-constexpr int most_blended = 16;
+constexpr int max_blended = 16;
 
 } // namespace
 
@@ -372,7 +372,7 @@ void GlRenderer::State::draw_group(const Context& context) {
   glDisable(GL_BLEND);
   glDepthFunc(GL_LESS);
   if (groups.size() > 1) {
-    if (blended > 255 - most_blended) {
+    if (blended > 255 - max_blended) {
       glClear(GL_STENCIL_BUFFER_BIT);
       blended = 0;
     }

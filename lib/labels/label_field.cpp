@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t block_voxels = 512;
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-constexpr int most_steps = 120;
+constexpr int max_steps = 120;
 constexpr double pull = 1.0 / 128;
 
 std::size_t offset_of(const Int3& v) {
@@ -241,7 +241,7 @@ void minimise(const Context& context, LabelField& field, LabelDensityReport& rep
   std::vector<float> y(target.size()), old = target;
   std::vector<float> changes(blocks);
   const double enough = 2e-3 * finest;
-  for (int n = 0; n < most_steps; ++n) {
+  for (int n = 0; n < max_steps; ++n) {
     parallel_blocks(context, blocks, 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin * block_voxels; v < end * block_voxels; ++v) {
         y[v] = field.value[v] + momentum * (field.value[v] - old[v]);
@@ -265,7 +265,7 @@ void minimise(const Context& context, LabelField& field, LabelDensityReport& rep
     });
     ++report.steps;
     if (progress)
-      progress(static_cast<double>(n + 1) / most_steps);
+      progress(static_cast<double>(n + 1) / max_steps);
     report.last_change = blocks == 0 ? 0 : *std::max_element(changes.begin(), changes.end());
     if (report.last_change <= enough)
       break;

@@ -11,7 +11,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t most_triangles = (std::size_t{1} << 31) / 3;
+constexpr std::size_t max_triangles = (std::size_t{1} << 31) / 3;
 
 /// Calls visit(low, side) for the sides of all faces, by face.
 template <class Visit>
@@ -45,9 +45,9 @@ EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles,
 }
 
 void EdgeSides::fill(std::span<const Triangle> triangles) {
-  if (triangles.size() > most_triangles)
+  if (triangles.size() > max_triangles)
     throw Error(std::to_string(triangles.size()) + " triangles, expected at most " +
-                std::to_string(most_triangles));
+                std::to_string(max_triangles));
   for_each_side(triangles, [&](std::uint32_t low, const EdgeSide&) { ++first_[low + 1]; });
   for (std::size_t p = 1; p < first_.size(); ++p)
     first_[p] += first_[p - 1];

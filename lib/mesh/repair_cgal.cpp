@@ -232,7 +232,7 @@ private:
     fill(true);
   }
 
-  void fill_holes(std::uint64_t most_edges) {
+  void fill_holes(std::uint64_t max_edges) {
     std::vector<Halfedge> starts;
     pmp::extract_boundary_cycles(surface_, std::back_inserter(starts));
     for (const Halfedge start : starts) {
@@ -244,7 +244,7 @@ private:
         continue; // where sheets meet
       std::vector<Face> faces;
       std::vector<Vertex> points;
-      if (open == border.size() && open <= most_edges && !meets_itself(border) &&
+      if (open == border.size() && open <= max_edges && !meets_itself(border) &&
           !is_lone_face(border))
         fill_hole(start, border.size(), faces, points);
       if (faces.empty()) {

@@ -15,7 +15,7 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t grain = 8192;
-constexpr int most_rounds = 100;
+constexpr int max_rounds = 100;
 constexpr double alike = 0.98; // of the largest squared distance: what is as far
 
 double square_distance(const Vec3& a, const Vec3& b) {
@@ -154,7 +154,7 @@ Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, cons
   clusters.centers = farthest_points(points, count, context, weights);
   clusters.of_point.assign(points.size(), 0);
   assign(points, clusters, context);
-  for (int round = 0; round < most_rounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
     move_centers(points, clusters, weights);
     if (!assign(points, clusters, context))
       break;

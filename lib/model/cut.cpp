@@ -17,7 +17,7 @@ namespace gewebe {
 namespace {
 
 constexpr std::uint32_t none = CutModel::gone;
-constexpr double least_share = 1e-3; ///< of a copy: one without mass could not be moved
+constexpr double min_share = 1e-3; ///< of a copy: one without mass could not be moved
 
 using Pair = std::array<std::uint32_t, 2>;
 
@@ -246,7 +246,7 @@ private:
     for (const Piece& p : pieces)
       total += p.area;
     const auto part = [&](const Piece& p) {
-      return total > 0 ? std::max(p.area / total, least_share) : 1.0;
+      return total > 0 ? std::max(p.area / total, min_share) : 1.0;
     };
     for (const Piece& p : pieces)
       sum += part(p);

@@ -50,8 +50,8 @@ std::vector<Vec3> ends(const Model& model, std::uint32_t node) {
   return ends;
 }
 
-std::uint32_t most_alike(const Model& before, const Model& after, const std::uint32_t* first,
-                         const std::uint32_t* last, std::uint32_t node) {
+std::uint32_t max_alike(const Model& before, const Model& after, const std::uint32_t* first,
+                        const std::uint32_t* last, std::uint32_t node) {
   const std::vector<Vec3> own = ends(after, node);
   std::uint32_t best = *first;
   std::size_t most = 0;
@@ -84,7 +84,7 @@ CutOrigin find_cut_origin(const Model& before, const Model& after) {
     const bool own = node < surface && before.nodes[node].position == position;
     cut.origin.push_back(own                 ? node
                          : last - first == 1 ? *first
-                                             : most_alike(before, after, first, last, node));
+                                             : max_alike(before, after, first, last, node));
   }
   for (std::uint32_t node = 0; node < cut.origin.size(); ++node) {
     std::uint32_t& place = cut.place[cut.origin[node]];

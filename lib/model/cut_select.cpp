@@ -16,7 +16,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr int most_rounds = 8; ///< of tidying the rim of a cut
+constexpr int max_rounds = 8; ///< of tidying the rim of a cut
 
 void put_in_order(Cut& cut) {
   const auto tidy = [](auto& list) {
@@ -189,7 +189,7 @@ public:
     // A triangle reaches so far from the midpoint of its edge. Each round that tidies the rim moves
     // it by a triangle, bending springs reach over two.
     const double reach = longest_reach(model, at, middle_);
-    const double far = (2 * most_rounds + 8) * reach;
+    const double far = (2 * max_rounds + 8) * reach;
     edges_ = surface_part(model, marked_near(at, area, far)).edges;
     const double around_edge = Area::bounded ? 2 * reach : far;
     grown_ = {around_edge, around_edge, around_edge};
@@ -225,7 +225,7 @@ private:
       for (std::size_t e = 0; e < edges_.size(); ++e)
         if (opens(e))
           opened.push_back(e);
-      if (round == most_rounds || !move_teeth(opened))
+      if (round == max_rounds || !move_teeth(opened))
         return opened;
     }
   }

@@ -33,7 +33,7 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
 }
 
 MaterialChoice parse_material_choice(std::string_view text, const std::vector<Material>& table) {
-  constexpr std::int32_t most_parts = 4096;
+  constexpr std::int32_t max_parts = 4096;
   MaterialChoice choice;
   choice.materials.push_back(material_named("generic", table));
   std::vector<bool> named;
@@ -48,9 +48,9 @@ MaterialChoice parse_material_choice(std::string_view text, const std::vector<Ma
     } else {
       std::int32_t part = -1;
       const auto [rest, status] = std::from_chars(word.data(), word.data() + sign, part);
-      if (status != std::errc{} || rest != word.data() + sign || part < 0 || part >= most_parts)
+      if (status != std::errc{} || rest != word.data() + sign || part < 0 || part >= max_parts)
         throw Error("no part '" + std::string(word.substr(0, sign)) + "', expected 0 to " +
-                    std::to_string(most_parts - 1));
+                    std::to_string(max_parts - 1));
       const auto p = static_cast<std::size_t>(part);
       if (p >= named.size()) {
         named.resize(p + 1);

@@ -12,7 +12,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr double most_nodes = 1e8;
+constexpr double max_nodes = 1e8;
 
 /// Cosine and sine of k/m of a turn. By their series over an eighth of it: libraries differ in the
 /// last digit. \pre k <= m
@@ -66,14 +66,14 @@ Primitive parse_primitive(std::string_view text, std::string_view size) {
   };
   if (colon == std::string_view::npos || by == std::string_view::npos)
     throw wrong();
-  std::uint32_t least_m = 3, least_n = 2;
+  std::uint32_t min_m = 3, min_n = 2;
   if (name == "plane")
-    least_m = 2;
+    min_m = 2;
   else if (name == "tube")
     p = {PrimitiveShape::tube, 3, 2, 20, 100};
   else if (name == "sphere") {
     p = {PrimitiveShape::sphere, 3, 1, 50, 50};
-    least_n = 1;
+    min_n = 1;
   } else
     throw wrong();
   const auto count = [&](std::string_view word, std::uint32_t least) {
@@ -83,13 +83,13 @@ Primitive parse_primitive(std::string_view text, std::string_view size) {
       throw wrong();
     if (value < least)
       throw Error("a " + std::string(name) + " of " + std::string(text.substr(colon + 1)) +
-                  " nodes, expected " + std::to_string(least_m) + "x" + std::to_string(least_n) +
+                  " nodes, expected " + std::to_string(min_m) + "x" + std::to_string(min_n) +
                   " or more");
     return value;
   };
-  p.m = count(text.substr(colon + 1, by - colon - 1), least_m);
-  p.n = count(text.substr(by + 1), least_n);
-  if (static_cast<double>(p.m) * p.n > most_nodes)
+  p.m = count(text.substr(colon + 1, by - colon - 1), min_m);
+  p.n = count(text.substr(by + 1), min_n);
+  if (static_cast<double>(p.m) * p.n > max_nodes)
     throw Error("over 1e8 nodes, expected fewer");
   if (!size.empty()) {
     const std::size_t comma = size.find(',');
