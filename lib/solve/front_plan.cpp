@@ -47,6 +47,9 @@ FrontPlan front_plan(const FrontTree& tree, std::span<const double> under, doubl
       p.subtrees.emplace_back(smallest[f], f + 1);
       p.place[f] = FrontPlan::own; // another thread may take it, when the stacks are gone
     }
+  std::stable_sort(p.subtrees.begin(), p.subtrees.end(), [&](const auto& a, const auto& b) {
+    return under[a.second - 1] > under[b.second - 1];
+  });
   return p;
 }
 

@@ -22,8 +22,9 @@ inline std::size_t packed_triangle(std::size_t rows) {
 }
 
 struct FrontPlan {
-  std::vector<std::pair<std::size_t, std::size_t>> subtrees; ///< ranges, each by one thread
-  std::vector<std::size_t> above;                            ///< by all threads, ascending
+  /// Ranges, each by one thread; those of most work first, so that the last ones are short.
+  std::vector<std::pair<std::size_t, std::size_t>> subtrees;
+  std::vector<std::size_t> above; ///< by all threads, ascending
   /// By front: where its update matrix stands until the parent has taken it: on one of two stacks,
   /// or in memory of its own. A front that is computed takes its children from one stack, where
   /// they are the last, and puts its own on the other.

@@ -296,9 +296,12 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
       failed[k] = pivot;
     }
   });
+  std::optional<PivotTooSmall> first;
   for (const auto& pivot : failed)
-    if (pivot)
-      throw PivotTooSmall(*pivot);
+    if (pivot && (!first || pivot->front < first->front))
+      first = pivot;
+  if (first)
+    throw PivotTooSmall(*first);
   run(plan.above, quiet);
   return work;
 }

@@ -171,6 +171,23 @@ TEST(Factor, IsTheSameOnAnyThreadsAndProcessors) {
   EXPECT_TRUE(same_numbers(Factor(small, {}), Factor(small, baseline)));
 }
 
+TEST(Factor, NamesTheSamePivotOnAnyThreads) {
+  StiffnessMatrix k = stiffness_matrix(block_of_material(13));
+  Factor factor(k, {});
+  const FactorView l = factor.view();
+  for (std::size_t f = 0; f < l.super.size() / 2; f += 20) { // in many subtrees
+    const auto row = static_cast<std::size_t>(l.permutation[static_cast<std::size_t>(l.super[f])]);
+    k.value[static_cast<std::size_t>(k.column_start[row])] = -1;
+  }
+  for (const int count : {1, 2, 3, 7})
+    try {
+      factor.renew(k, threads(count));
+      ADD_FAILURE() << count;
+    } catch (const NotPositiveDefinite& error) {
+      EXPECT_EQ(static_cast<std::int64_t>(error.row()), l.permutation[0]) << count;
+    }
+}
+
 TEST(Factor, RoundsOnceWhereTheProcessorRoundsTwice) {
   std::mt19937_64 random(3);
   const auto number = [&](std::int64_t range) {
