@@ -1,4 +1,4 @@
-#include "statics/shape_modes.h"
+#include "compliance/shape_modes.h"
 
 #include <cmath>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "statics/contact_block.h"
+#include "compliance/contact_block.h"
 
 #include <cmath>
 

@@ -1,0 +1,191 @@
+#include "compliance/forces_at.h"
+
+#include "compliance/costs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr double contact_tolerance = 1e-6;
+// Roundings of factors that follow their changes stay below 1000 times one.
+constexpr std::uint64_t most_changes = 1000;
+
+double largest_size(std::span<const double> values) {
+  double m = 0;
+  for (const double v : values)
+    m = std::isnan(v) ? v : std::max(m, std::abs(v));
+  return m;
+}
+
+std::size_t axis_of(std::uint32_t node, int axis) {
+  return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
+}
+
+} // namespace
+
+bool ForcesAt::cheaper(const Load& now, std::size_t limit) const {
+  const std::size_t m = now.displacement.size();
+  if (limit != SIZE_MAX)
+    return m <= limit;
+  if (m > std::min(costs::most_in_block(true), compliance_.capacity()))
+    return false;
+  return m <= costs::most_in_block(false) || compliance_.stored(nodes_of(now.displacement));
+}
+
+bool ForcesAt::join(std::uint32_t node) {
+  Contact contact{node, {}};
+  std::vector<ComplianceBlock> with;
+  with.reserve(contacts_.size());
+  for (const Contact& other : contacts_)
+    with.push_back(compliance_.block(node, other.node));
+  const ComplianceBlock own = compliance_.block(node, node);
+  std::vector<double> row;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (is_fixed(model_, node, static_cast<int>(a)))
+      continue;
+    contact.axes.push_back(axis_of(node, static_cast<int>(a)));
+    row.clear();
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+      for (const std::size_t axis : contacts_[k].axes)
+        row.push_back(with[k][a][axis % 3]);
+    for (const std::size_t axis : contact.axes)
+      row.push_back(own[a][axis % 3]);
+    if (!block_.append(row)) {
+      block_.remove(block_.size() + 1 - contact.axes.size(), contact.axes.size() - 1);
+      return false;
+    }
+  }
+  contacts_.push_back(std::move(contact));
+  ++changes_;
+  return true;
+}
+
+void ForcesAt::leave_all() {
+  contacts_.clear();
+  block_.clear();
+  changes_ = 0;
+  modes_.clear();
+}
+
+/// Whether C_cc of these nodes is positive definite.
+bool ForcesAt::renew(const std::map<std::uint32_t, Vec3>& nodes) {
+  std::size_t staying = 0;
+  for (const Contact& c : contacts_)
+    staying += nodes.contains(c.node) ? 1 : 0;
+  if (staying == contacts_.size() && staying == nodes.size())
+    return true;
+  modes_.clear();
+  if (2 * staying < contacts_.size() || changes_ > most_changes)
+    leave_all();
+  shapes_ = 0;
+  compliance_.need_blocks(nodes_of(nodes));
+  std::size_t row = 0;
+  for (std::size_t k = 0; k < contacts_.size();) {
+    if (nodes.contains(contacts_[k].node)) {
+      row += contacts_[k++].axes.size();
+      continue;
+    }
+    block_.remove(row, contacts_[k].axes.size());
+    contacts_.erase(contacts_.begin() + static_cast<std::ptrdiff_t>(k));
+    ++changes_;
+  }
+  for (const auto& entry : nodes) {
+    const bool there = std::any_of(contacts_.begin(), contacts_.end(),
+                                   [&](const Contact& c) { return c.node == entry.first; });
+    if (!there && !join(entry.first)) {
+      leave_all();
+      return false;
+    }
+  }
+  return true;
+}
+
+std::vector<std::size_t> ForcesAt::axes() const {
+  std::vector<std::size_t> all;
+  for (const Contact& c : contacts_)
+    all.insert(all.end(), c.axes.begin(), c.axes.end());
+  return all;
+}
+
+std::vector<NodeVector> ForcesAt::by_node(std::span<const double> force) const {
+  std::vector<NodeVector> list;
+  std::size_t row = 0;
+  for (const Contact& c : contacts_) {
+    NodeVector& f = list.emplace_back(NodeVector{c.node, {}});
+    for (const std::size_t axis : c.axes)
+      f.value[static_cast<int>(axis % 3)] = force[row++];
+  }
+  std::sort(list.begin(), list.end(),
+            [](const NodeVector& a, const NodeVector& b) { return a.node < b.node; });
+  return list;
+}
+
+/// Whether it came out right.
+bool ForcesAt::meet(const Load& now) {
+  if (!renew(now.displacement))
+    return false;
+  const std::vector<std::size_t> where = axes();
+  std::vector<double> wanted = answer_.at(now, where);
+  double size = largest_size(wanted);
+  for (std::size_t k = 0; k < where.size(); ++k) {
+    const double d = now.displacement.at(
+        static_cast<std::uint32_t>(where[k] / 3))[static_cast<int>(where[k] % 3)];
+    size = std::max(size, std::abs(d));
+    wanted[k] = d - wanted[k];
+  }
+  std::vector<double> f = wanted, back(wanted.size()), correction(wanted.size());
+  block_.solve(f);
+  double miss = 0;
+  for (int round = 0; round < 2; ++round) { // once more where updates of the factor left error
+    block_.multiply(f, back);
+    for (std::size_t k = 0; k < back.size(); ++k)
+      correction[k] = wanted[k] - back[k];
+    miss = largest_size(correction);
+    if (round == 1 || miss <= 1e-13 * size)
+      break;
+    block_.solve(correction);
+    for (std::size_t k = 0; k < f.size(); ++k)
+      f[k] += correction[k];
+  }
+  if (size > 0)
+    miss /= size;
+  if (!(miss <= contact_tolerance))
+    return false;
+  miss_ = std::max(miss_, miss);
+  question_ = std::move(wanted);
+  force_ = std::move(f);
+  return true;
+}
+
+/// By what a rigid motion of the contacts_ did before, if this is one. \return whether it was
+bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
+  if (contacts_.size() < costs::worth_modes || (modes_.size() == 0 && !modes_.open()))
+    return false;
+  std::vector<double> coefficients, rest;
+  if (!modes_.express(question_, coefficients, rest)) {
+    if (!modes_.open()) {
+      modes_.give_up();
+      return false;
+    }
+    double square = 0;
+    for (const double r : rest)
+      square += r * r;
+    const double length = std::sqrt(square);
+    for (double& r : rest)
+      r /= length;
+    std::vector<double> f = rest, answer(compliance_.axes(), 0);
+    block_.solve(f);
+    compliance_.add(by_node(f), 0, answer);
+    modes_.add(rest, std::move(answer));
+    coefficients.push_back(length);
+  }
+  u = answer_.whole(now);
+  modes_.answer(coefficients, u);
+  return true;
+}
+
+} // namespace gewebe

@@ -1,0 +1,125 @@
+#include "compliance/load_answer.h"
+
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+// Roundings of sums that follow their changes stay below 1000 times one.
+constexpr std::uint64_t most_increments = 1000;
+
+} // namespace
+
+std::vector<double> forces_over_axes(const Model& model, const Load& load) {
+  std::vector<double> f(3 * model.nodes.size(), 0);
+  if (load.gravity != Vec3{})
+    for (std::size_t i = 0; i < model.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        f[3 * i + static_cast<std::size_t>(a)] = model.nodes[i].mass * load.gravity[a];
+  for (const auto& [node, force] : load.force)
+    for (int a = 0; a < 3; ++a)
+      f[3 * std::size_t{node} + static_cast<std::size_t>(a)] += force[a];
+  return f;
+}
+
+std::vector<std::uint32_t> nodes_of(const std::map<std::uint32_t, Vec3>& values) {
+  std::vector<std::uint32_t> nodes;
+  nodes.reserve(values.size());
+  for (const auto& entry : values)
+    nodes.push_back(entry.first);
+  return nodes;
+}
+
+std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) {
+  std::vector<NodeVector> list;
+  list.reserve(values.size());
+  for (const auto& [node, value] : values)
+    list.push_back({node, value});
+  return list;
+}
+
+LoadAnswer::LoadAnswer(const Model& model, Compliance& compliance)
+    : model_(model), compliance_(compliance), answer_(compliance.axes(), 0) {}
+
+const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
+  if (gravity == weight_gravity_)
+    return weight_;
+  std::vector<double> fresh;
+  if (gravity != Vec3{}) {
+    Load alone;
+    alone.gravity = gravity;
+    fresh = forces_over_axes(model_, alone);
+    compliance_.solve(fresh);
+  }
+  weight_ = std::move(fresh);
+  weight_gravity_ = gravity;
+  return weight_;
+}
+
+/// Forces that differ from those of the answer, by their difference.
+std::vector<NodeVector> LoadAnswer::changed_forces(const std::map<std::uint32_t, Vec3>& now) const {
+  std::vector<NodeVector> changed;
+  auto a = force_.begin();
+  auto b = now.begin();
+  while (a != force_.end() || b != now.end()) {
+    if (b == now.end() || (a != force_.end() && a->first < b->first)) {
+      changed.push_back({a->first, -a->second});
+      ++a;
+    } else if (a == force_.end() || b->first < a->first) {
+      changed.push_back({b->first, b->second});
+      ++b;
+    } else {
+      if (!(a->second == b->second))
+        changed.push_back({b->first, b->second - a->second});
+      ++a;
+      ++b;
+    }
+  }
+  return changed;
+}
+
+const std::vector<double>& LoadAnswer::whole(const Load& load) {
+  if (known(load))
+    return answer_;
+  (void)weight(load.gravity);
+  const std::vector<NodeVector> changed =
+      load.gravity == gravity_ ? changed_forces(load.force) : std::vector<NodeVector>{};
+  std::vector<double> fresh;
+  if (load.gravity == gravity_ && changed.size() < load.force.size() &&
+      increments_ < most_increments) {
+    fresh = std::move(answer_);
+    forget(); // should the sum fail
+    compliance_.add(changed, 0, fresh);
+    ++increments_;
+  } else {
+    fresh = weight_;
+    fresh.resize(compliance_.axes(), 0);
+    compliance_.add(as_vectors(load.force), 0, fresh);
+    increments_ = 0;
+  }
+  answer_ = std::move(fresh);
+  gravity_ = load.gravity;
+  force_ = load.force;
+  return answer_;
+}
+
+std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t> rows) {
+  std::vector<double> values;
+  values.reserve(rows.size());
+  if (compliance_.columns_pay(nodes_of(load.force))) {
+    (void)weight(load.gravity);
+    for (const std::size_t row : rows)
+      values.push_back(weight_.empty() ? 0 : weight_[row]);
+    compliance_.add_rows(as_vectors(load.force), rows, values);
+    return values;
+  }
+  if (increments_ > 0)
+    forget();
+  const std::vector<double>& all = whole(load);
+  for (const std::size_t row : rows)
+    values.push_back(all[row]);
+  return values;
+}
+
+} // namespace gewebe

@@ -1,0 +1,53 @@
+#pragma once
+// u = C f for the forces and the weight of a load, where loads follow one another: sums follow
+// their changes, and where only a few rows are asked for these alone are computed.
+
+#include "compliance/compliance.h"
+#include "contact/load.h"
+#include "model/model.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// The forces and weights of a load over all 3 n axes, its displacements left out.
+std::vector<double> forces_over_axes(const Model& model, const Load& load);
+
+/// The nodes of a list by node, in their order, and its vectors as a list.
+std::vector<std::uint32_t> nodes_of(const std::map<std::uint32_t, Vec3>& values);
+std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values);
+
+class LoadAnswer {
+public:
+  /// Keeps references to both.
+  LoadAnswer(const Model& model, Compliance& compliance);
+
+  /// Whether the whole answer to this load is the last one.
+  bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
+  /// The whole answer, 3 n numbers.
+  const std::vector<double>& whole(const Load& load);
+  /// That of the weight alone; empty for none.
+  const std::vector<double>& weight(const Vec3& gravity);
+  /// Rows of it. The same bits whatever answers were asked for.
+  std::vector<double> at(const Load& load, std::span<const std::size_t> rows);
+
+private:
+  std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const;
+  void forget() { gravity_ = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
+
+  const Model& model_;
+  Compliance& compliance_;
+  Vec3 weight_gravity_;
+  std::vector<double> weight_;
+  std::map<std::uint32_t, Vec3> force_; ///< that the answer is to
+  Vec3 gravity_;
+  std::vector<double> answer_;
+  std::uint64_t increments_ = 0; ///< by which it came to be
+};
+
+} // namespace gewebe

@@ -1,0 +1,152 @@
+#include "statics/held_contacts.h"
+
+#include "compliance/load_answer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+std::size_t axis_of(std::uint32_t node, int axis) {
+  return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
+}
+
+template <class Map>
+bool same_nodes(const Map& a, const Map& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& x, const auto& y) { return x.first == y.first; });
+}
+
+} // namespace
+
+void HeldContacts::renew(const Load& now) {
+  if (!nodes_.empty() && same_nodes(now.displacement, nodes_))
+    return;
+  if (spring_blocks_.empty())
+    spring_blocks_ = stiffness_blocks(model_);
+  held_.reset();
+  nodes_.clear();
+  columns_.reset();
+  base_.clear();
+  modes_.clear();
+  std::vector<std::uint8_t> fixed(axes_, 0);
+  for (const auto& entry : now.displacement)
+    std::fill_n(fixed.begin() + static_cast<std::ptrdiff_t>(axis_of(entry.first, 0)), 3, 1);
+  bool any_free = false;
+  for (std::uint32_t i = 0; i < model_.nodes.size() && !any_free; ++i)
+    for (int a = 0; a < 3; ++a)
+      any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model_, i, a));
+  if (any_free) {
+    ++factors_;
+    held_.emplace(factorise_axes(model_, fixed, context_));
+  }
+  nodes_ = now.displacement;
+}
+
+void HeldContacts::solve(std::span<double> over_axes, std::size_t columns) {
+  if (!held_) {
+    std::fill(over_axes.begin(), over_axes.end(), 0.0);
+    return;
+  }
+  held_->solve(over_axes, columns);
+  solves_ += columns;
+}
+
+/// The shape under f (over all axes) and these displacements.
+void HeldContacts::shape_under(std::span<const double> f, std::span<const double> prescribed,
+                               std::vector<double>& shape) {
+  std::vector<double> product(axes_, 0);
+  multiply_stiffness(model_, spring_blocks_, prescribed, product);
+  shape.resize(axes_);
+  for (std::size_t r = 0; r < axes_; ++r)
+    shape[r] = (f.empty() ? 0 : f[r]) - product[r];
+  solve(shape, 1);
+  for (std::size_t r = 0; r < axes_; ++r)
+    shape[r] += prescribed[r]; // on held axes the solution is 0
+}
+
+std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>& u) {
+  renew(now);
+  const std::vector<double> f = forces_over_axes(model_, now);
+  std::vector<double> wanted(3 * now.displacement.size()), prescribed(axes_, 0);
+  std::size_t k = 0;
+  for (const auto& [node, d] : now.displacement)
+    for (int a = 0; a < 3; ++a)
+      wanted[k++] = d[a];
+  const auto spread = [&](std::span<const double> values, double factor) {
+    std::size_t at = 0;
+    for (const auto& entry : now.displacement)
+      for (int a = 0; a < 3; ++a)
+        prescribed[axis_of(entry.first, a)] = factor * values[at++];
+  };
+  std::vector<double> coefficients, rest;
+  std::vector<double> shape;
+  const bool rigid = held_ && modes_.express(wanted, coefficients, rest);
+  if (!held_) { // nothing is left to give way
+    spread(wanted, 1);
+    shape = std::move(prescribed);
+  } else if (rigid || modes_.open()) {
+    if (base_.empty() || base_gravity_ != now.gravity || base_force_ != now.force) {
+      shape_under(f, prescribed, base_);
+      base_gravity_ = now.gravity;
+      base_force_ = now.force;
+    }
+    if (!rigid) {
+      const double length = [&] {
+        double square = 0;
+        for (const double r : rest)
+          square += r * r;
+        return std::sqrt(square);
+      }();
+      spread(rest, 1 / length);
+      std::vector<double> answer;
+      shape_under({}, prescribed, answer);
+      for (double& r : rest)
+        r /= length;
+      modes_.add(rest, std::move(answer));
+      coefficients.push_back(length);
+    }
+    shape = base_;
+    modes_.answer(coefficients, shape);
+  } else {
+    modes_.give_up();
+    spread(wanted, 1);
+    shape_under(f, prescribed, shape);
+  }
+  for (const auto& [node, d] : now.displacement)
+    for (int a = 0; a < 3; ++a)
+      shape[axis_of(node, a)] = d[a];
+  std::vector<double> product(axes_, 0);
+  multiply_stiffness(model_, spring_blocks_, shape, product);
+  std::vector<NodeVector> forces;
+  for (const auto& entry : now.displacement) {
+    Vec3 force;
+    for (int a = 0; a < 3; ++a)
+      if (!is_fixed(model_, entry.first, a))
+        force[a] = product[axis_of(entry.first, a)] - f[axis_of(entry.first, a)];
+    forces.push_back({entry.first, force});
+  }
+  u = std::move(shape);
+  return forces;
+}
+
+const ColumnCache& HeldContacts::columns(std::span<const std::uint32_t> nodes) {
+  if (!columns_)
+    columns_.emplace(
+        model_.nodes.size(), nullptr,
+        [this](std::span<const std::uint32_t> some, std::span<double> columns) {
+          std::fill(columns.begin(), columns.end(), 0.0);
+          for (std::size_t k = 0; k < some.size(); ++k)
+            for (int a = 0; a < 3; ++a)
+              columns[(3 * k + static_cast<std::size_t>(a)) * axes_ + axis_of(some[k], a)] = 1;
+          solve(columns, 3 * some.size());
+        },
+        static_cast<double>(context_.max_memory) / 4, false);
+  columns_->need(nodes);
+  return *columns_;
+}
+
+} // namespace gewebe

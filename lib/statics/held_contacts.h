@@ -1,0 +1,58 @@
+#pragma once
+// Displaced nodes by K with their axes held: K_ff u_f = f - K_fc d, f_c = K_cf u_f + K_cc d.
+
+#include "base/context.h"
+#include "compliance/axis_solver.h"
+#include "compliance/column_cache.h"
+#include "compliance/shape_modes.h"
+#include "contact/load.h"
+#include "model/model.h"
+#include "solve/stiffness.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class HeldContacts {
+public:
+  /// Keeps a reference to the model.
+  HeldContacts(const Model& model, const Context& context)
+      : model_(model), context_(context), axes_(3 * model.nodes.size()) {}
+  HeldContacts(const HeldContacts&) = delete;
+  HeldContacts& operator=(const HeldContacts&) = delete;
+
+  /// The shape under a load. \return what holds its displaced nodes, by ascending node
+  /// \throw Error as the factor
+  std::vector<NodeVector> meet(const Load& now, std::vector<double>& u);
+  /// Columns of the compliance with the nodes of the last load held. \pre a load was met
+  const ColumnCache& columns(std::span<const std::uint32_t> nodes);
+
+  std::uint64_t factors() const noexcept { return factors_; }
+  std::uint64_t solves() const noexcept { return solves_; }
+
+private:
+  void renew(const Load& now);
+  void solve(std::span<double> over_axes, std::size_t columns);
+  void shape_under(std::span<const double> f, std::span<const double> prescribed,
+                   std::vector<double>& shape);
+
+  const Model& model_;
+  const Context& context_;
+  std::size_t axes_; ///< 3 n
+  std::vector<SymmetricBlock> spring_blocks_;
+  std::map<std::uint32_t, Vec3> nodes_;
+  std::optional<AxisSolver> held_; ///< none where nothing is free
+  std::optional<ColumnCache> columns_;
+  ShapeModes modes_; ///< displacements to shape
+  std::map<std::uint32_t, Vec3> base_force_;
+  Vec3 base_gravity_;
+  std::vector<double> base_; ///< the shape with all displacements 0, under these; empty: unknown
+  std::uint64_t factors_ = 0, solves_ = 0;
+};
+
+} // namespace gewebe
