@@ -11,32 +11,16 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
 
-#ifdef __SANITIZE_THREAD__
-#include <sanitizer/tsan_interface.h>
-#endif
-
 namespace gewebe {
 
 namespace {
-
-// ThreadSanitizer doesn't see how TBB's library, which it can't look into, starts tasks and waits
-// for them: what stands before `told` comes before what stands after `heard` at the same place.
-void told([[maybe_unused]] char& place) {
-#ifdef __SANITIZE_THREAD__
-  __tsan_release(&place);
-#endif
-}
-void heard([[maybe_unused]] char& place) {
-#ifdef __SANITIZE_THREAD__
-  __tsan_acquire(&place);
-#endif
-}
 
 /// How many of `wanted` threads live at once beside this one.
 int threads_to_be_had(int wanted) {
@@ -81,6 +65,48 @@ int arena_threads(int wanted) {
   return std::min(wanted, available);
 }
 
+/// Calls `run(block)` for each block on up to `together` threads; the first that throws ends it.
+template <class Run>
+void run_blocks(int together, std::size_t blocks, const Run& run) {
+#ifdef __SANITIZE_THREAD__
+  // ThreadSanitizer can't look into TBB's library and takes what it hands over for races. In its
+  // builds plain threads take the blocks, so that what it sees are those of the blocks themselves.
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    try {
+      for (std::size_t block; (block = next++) < blocks;)
+        run(block);
+    } catch (...) {
+      next = blocks;
+      const std::lock_guard lock(mutex);
+      if (!failure)
+        failure = std::current_exception();
+    }
+  };
+  std::vector<std::thread> others;
+  while (static_cast<int>(others.size()) + 1 < together)
+    others.emplace_back(work);
+  work();
+  for (std::thread& other : others)
+    other.join();
+  if (failure)
+    std::rethrow_exception(failure);
+#else
+  oneapi::tbb::task_arena arena(together);
+  arena.execute([&] {
+    oneapi::tbb::parallel_for(
+        oneapi::tbb::blocked_range<std::size_t>(0, blocks, 1),
+        [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t block = range.begin(); block != range.end(); ++block)
+            run(block);
+        },
+        oneapi::tbb::simple_partitioner());
+  });
+#endif
+}
+
 } // namespace
 
 int thread_count(const Context& context) noexcept {
@@ -108,21 +134,7 @@ void parallel_blocks(const Context& context, std::size_t count, std::size_t grai
       run_block(block);
     return;
   }
-  oneapi::tbb::task_arena arena(together);
-  char start = 0, end = 0;
-  told(start);
-  arena.execute([&] {
-    oneapi::tbb::parallel_for(
-        oneapi::tbb::blocked_range<std::size_t>(0, blocks, 1),
-        [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-          heard(start);
-          for (std::size_t block = range.begin(); block != range.end(); ++block)
-            run_block(block);
-          told(end);
-        },
-        oneapi::tbb::simple_partitioner());
-  });
-  heard(end);
+  run_blocks(together, blocks, run_block);
 }
 
 } // namespace gewebe
