@@ -509,7 +509,8 @@ TEST(SimulationContact, TheSameBytesForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3}) {
     std::vector<double>& r = results.emplace_back();
     for (const auto& [method, integration] : ways) {
-      const auto s = pressed(method, 0.3, 2, 8, 4, threads, integration);
+      const int rounds = integration == Integration::implicit ? 3 : 4; // for the sake of its time
+      const auto s = pressed(method, 0.3, 2, 8, rounds, threads, integration);
       r.insert(r.end(), s->displacement(0).begin(), s->displacement(0).end());
       for (const NodeVector& f : s->contact_forces(0))
         r.insert(r.end(), {1.0 * f.node, f.value.x, f.value.y, f.value.z});
