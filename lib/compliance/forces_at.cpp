@@ -1,5 +1,6 @@
 #include "compliance/forces_at.h"
 
+#include "base/vector_at.h"
 #include "compliance/costs.h"
 
 #include <algorithm>
@@ -13,17 +14,6 @@ namespace {
 constexpr double contact_tolerance = 1e-6;
 // Roundings of factors that follow their changes stay below 1000 times one.
 constexpr std::uint64_t most_changes = 1000;
-
-double largest_size(std::span<const double> values) {
-  double m = 0;
-  for (const double v : values)
-    m = std::isnan(v) ? v : std::max(m, std::abs(v));
-  return m;
-}
-
-std::size_t axis_of(std::uint32_t node, int axis) {
-  return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
-}
 
 } // namespace
 

@@ -1,6 +1,7 @@
 #include "statics/elastostatic.h"
 
 #include "base/error.h"
+#include "base/vector_at.h"
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
 #include "compliance/load_answer.h"
@@ -14,21 +15,6 @@
 #include <utility>
 
 namespace gewebe {
-
-namespace {
-
-double largest_size(std::span<const double> values) {
-  double m = 0;
-  for (const double v : values)
-    m = std::isnan(v) ? v : std::max(m, std::abs(v));
-  return m;
-}
-
-std::size_t axis_of(std::uint32_t node, int axis) {
-  return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
-}
-
-} // namespace
 
 struct Elastostatic::State {
   const Model& model;

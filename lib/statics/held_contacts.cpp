@@ -1,5 +1,6 @@
 #include "statics/held_contacts.h"
 
+#include "base/vector_at.h"
 #include "compliance/load_answer.h"
 
 #include <algorithm>
@@ -9,10 +10,6 @@
 namespace gewebe {
 
 namespace {
-
-std::size_t axis_of(std::uint32_t node, int axis) {
-  return 3 * std::size_t{node} + static_cast<std::size_t>(axis);
-}
 
 template <class Map>
 bool same_nodes(const Map& a, const Map& b) {

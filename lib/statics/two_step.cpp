@@ -1,6 +1,7 @@
 #include "statics/two_step.h"
 
 #include "base/error.h"
+#include "base/vector_at.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -57,13 +58,6 @@ double norm_of(const Model& model, const Load& load, bool displaced_too) {
     for (std::uint32_t node = 0; node < model.nodes.size(); ++node)
       add(node);
   return std::sqrt(sum);
-}
-
-double largest_size(std::span<const double> values) {
-  double size = 0;
-  for (const double value : values)
-    size = std::isnan(value) ? value : std::max(size, std::abs(value));
-  return size;
 }
 
 } // namespace
