@@ -9,6 +9,7 @@
 #include "solve/factor.h"
 #include "solve/multifrontal.h"
 #include "solve/stiffness.h"
+#include "tests/bench/blas.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/stiffness_models.h"
@@ -28,10 +29,6 @@
 #include <thread>
 #include <unistd.h>
 #include <vector>
-
-extern "C" void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*,
-                       const double*, const int*, const double*, const int*, const double*, double*,
-                       const int*);
 
 using namespace gewebe;
 using namespace gewebe::timing;

@@ -11,6 +11,7 @@
 #include "dynamics/relaxation.h"
 #include "model/build.h"
 #include "solve/condition.h"
+#include "tests/bench/blas.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
@@ -27,10 +28,6 @@
 #include <span>
 #include <string>
 #include <vector>
-
-extern "C" void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*,
-                       const double*, const int*, const double*, const int*, const double*, double*,
-                       const int*);
 
 using namespace gewebe;
 using namespace gewebe::timing;
