@@ -65,7 +65,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
   const auto objects = static_cast<std::uint32_t>(simulation.object_count());
   for (const Cutting& c : simulation.news().cuttings)
     append_cutting(bytes, c, step);
-  for (std::uint32_t i = 0; simulation.emits().shapes && i < objects; ++i) {
+  for (std::uint32_t i = 0; simulation.settings().emits.shapes && i < objects; ++i) {
     if (!topology_changed(simulation, i))
       continue;
     const std::vector<Triangle>& triangles = simulation.model(i).triangles;
@@ -73,7 +73,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     for (const Triangle& t : triangles)
       append(bytes, t);
   }
-  for (std::uint32_t i = 0; simulation.emits().forces && i < objects; ++i) {
+  for (std::uint32_t i = 0; simulation.settings().emits.forces && i < objects; ++i) {
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
     append_head(bytes, {FrameKind::nodes, i, step, forces.size()});
     for (const NodeVector& f : forces)
@@ -82,7 +82,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     for (const NodeVector& f : forces)
       append_single(bytes, f.value);
   }
-  for (std::uint32_t i = 0; simulation.emits().shapes && i < objects; ++i) {
+  for (std::uint32_t i = 0; simulation.settings().emits.shapes && i < objects; ++i) {
     const std::vector<Node>& nodes = simulation.model(i).nodes;
     const std::span<const double> u = simulation.displacement(i);
     append_head(bytes, {FrameKind::shapes, i, step, 3 * nodes.size()});
@@ -90,8 +90,8 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append_single(bytes, nodes[k].position + vector_at(u, k));
   }
-  for (std::uint32_t k = 0; simulation.emits().instruments && k < simulation.instrument_count();
-       ++k) {
+  for (std::uint32_t k = 0;
+       simulation.settings().emits.instruments && k < simulation.instrument_count(); ++k) {
     const InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;

@@ -51,14 +51,14 @@ std::string instrument_reply(const Simulation& simulation) {
 } // namespace
 
 std::string cutting_line(const Simulation& simulation, const Cutting& c) {
-  const std::string& name = simulation.name(c.object);
+  const std::string& name = simulation.object(c.object).name;
   const std::string nodes = " nodes " + std::to_string(c.nodes);
   switch (c.kind) {
   case Cutting::Kind::cut:
     return "cut " + name + " springs " + std::to_string(c.springs) + " doubled " +
            std::to_string(c.doubled) + nodes;
   case Cutting::Kind::part:
-    return "part " + name + " " + simulation.name(c.part) + nodes;
+    return "part " + name + " " + simulation.object(c.part).name + nodes;
   case Cutting::Kind::loose:
     return "loose " + name + nodes;
   default:
@@ -79,36 +79,40 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
   append(text, simulation.time());
   text += '\n';
   for (const MethodJump& jump : simulation.news().jumps) {
-    text += "jump " + simulation.name(jump.object) + " ";
+    text += "jump " + simulation.object(jump.object).name + " ";
     append(text, jump.size);
     text += '\n';
   }
   for (const Cutting& c : simulation.news().cuttings)
     text += cutting_line(simulation, c) + "\n";
-  for (std::size_t i = 0; simulation.emits().shapes && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.settings().emits.shapes && i < simulation.object_count();
+       ++i) {
     if (!topology_changed(simulation, i))
       continue;
     const std::vector<Triangle>& triangles = simulation.model(i).triangles;
-    text += "triangles " + simulation.name(i) + " " + std::to_string(triangles.size()) + "\n";
+    text +=
+        "triangles " + simulation.object(i).name + " " + std::to_string(triangles.size()) + "\n";
     for (const Triangle& t : triangles)
       text += std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
   }
-  for (std::size_t i = 0; simulation.emits().forces && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.settings().emits.forces && i < simulation.object_count();
+       ++i) {
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
-    text += "forces " + simulation.name(i) + " " + std::to_string(forces.size()) + "\n";
+    text += "forces " + simulation.object(i).name + " " + std::to_string(forces.size()) + "\n";
     for (const NodeVector& f : forces) {
       text += std::to_string(f.node) + " ";
       append(text, f.value, '\n');
     }
   }
-  for (std::size_t i = 0; simulation.emits().shapes && i < simulation.object_count(); ++i) {
+  for (std::size_t i = 0; simulation.settings().emits.shapes && i < simulation.object_count();
+       ++i) {
     const std::vector<Node>& nodes = simulation.model(i).nodes;
     const std::span<const double> u = simulation.displacement(i);
-    text += "shapes " + simulation.name(i) + " " + std::to_string(nodes.size()) + "\n";
+    text += "shapes " + simulation.object(i).name + " " + std::to_string(nodes.size()) + "\n";
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append(text, nodes[k].position + vector_at(u, k), '\n');
   }
-  if (simulation.emits().instruments)
+  if (simulation.settings().emits.instruments)
     text += instrument_reply(simulation);
   return text + "done\n";
 }

@@ -70,7 +70,7 @@ Integration integration_of(const World& w, const Body& body) {
 }
 
 double integration_step(World& w, Body& body) {
-  const std::optional<double> wish = w.now.clock.timestep;
+  const std::optional<double> wish = w.now.settings.timestep;
   if (integration_of(w, body) == Integration::implicit)
     return wish.value_or(implicit_step);
   const double usual = safe_step_fraction * body.safe;

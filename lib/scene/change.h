@@ -54,13 +54,12 @@ struct Release { ///< of force, pressure, displacement and grasp
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
 };
-/// Puts an instrument there, in place of itself, or moves it from where it is; see
-/// add_instrument().
+/// Puts an instrument there, in place of itself, or moves it from where it is.
 struct SetInstrument {
   std::size_t instrument = 0; ///< instrument_count(): a new one, from when this is accepted
   InstrumentShape shape;      ///< radius > 0, friction >= 0
   Pose pose;                  ///< turn of length 1
-  std::string name{};         ///< of a new one
+  std::string name{};         ///< of a new one, which no other has
 };
 struct MoveInstrument {
   std::size_t instrument = 0;

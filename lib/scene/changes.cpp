@@ -75,6 +75,8 @@ void apply(World& w, const Change& change) {
       change);
   if (w.options.applied)
     w.options.applied(change);
+  if (w.options.log)
+    w.options.log(row_of(w, change));
 }
 
 ChangeRow row_of(const World& w, const Change& change) {
@@ -197,7 +199,7 @@ void Rule<SetGravity>::log(const World&, const SetGravity& c, ChangeRow& row) {
 }
 
 void Rule<SetTimestep>::apply(World& w, const SetTimestep& c) {
-  w.now.clock.timestep = c.dt;
+  w.now.settings.timestep = c.dt;
 }
 void Rule<SetTimestep>::log(const World&, const SetTimestep& c, ChangeRow& row) {
   row.what = "timestep";
@@ -205,9 +207,9 @@ void Rule<SetTimestep>::log(const World&, const SetTimestep& c, ChangeRow& row) 
 }
 
 void Rule<Emit>::apply(World& w, const Emit& c) {
-  (c.instruments ? w.now.emits.instruments
-   : c.forces    ? w.now.emits.forces
-                 : w.now.emits.shapes) = true;
+  (c.instruments ? w.now.settings.emits.instruments
+   : c.forces    ? w.now.settings.emits.forces
+                 : w.now.settings.emits.shapes) = true;
 }
 void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
   row.what = "emit";

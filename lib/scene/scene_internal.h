@@ -202,7 +202,6 @@ struct Clock {
   double time = 0;
   double shown = 0;         // when all objects were last shown
   double sum = 0, lost = 0; // of the steps so far, and what rounding took from it
-  std::optional<double> timestep;
 };
 
 struct Scene {
@@ -215,7 +214,7 @@ struct Scene {
   CopyOnWrite<std::multimap<double, Event>> events;
   Vec3 gravity;
   Clock clock;
-  Emits emits;
+  SceneSettings settings;
   SimulationCounts counts;
   News news;
 };

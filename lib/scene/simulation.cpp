@@ -89,10 +89,6 @@ std::size_t Simulation::object_count() const noexcept {
   return world_->now.objects.size();
 }
 
-const std::string& Simulation::name(std::size_t object) const {
-  return world_->now.objects.at(object).name();
-}
-
 const Model& Simulation::model(std::size_t object) const {
   need_model(world_->now.objects.at(object));
   return world_->now.objects[object].model();
@@ -106,20 +102,16 @@ const Model& Simulation::first_model(std::size_t object) const {
 
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
-  return {one.method, one.matter->known, one.stages.model != nullptr, *one.cut.first_nodes,
-          *one.cut.places};
+  return {one.name(),           one.method,     one.matter->known, one.stages.model != nullptr,
+          *one.cut.first_nodes, *one.cut.places};
 }
 
 std::size_t find_object(const Simulation& simulation, const std::string& name) {
   return number_of("object", name, simulation.object_count(),
-                   [&](std::size_t k) { return simulation.name(k); });
+                   [&](std::size_t k) { return simulation.object(k).name; });
 }
 
 // ---- instruments
-
-std::size_t Simulation::add_instrument(const std::string& name) {
-  return simulation::add_instrument(*world_, name);
-}
 
 std::size_t Simulation::instrument_count() const noexcept {
   return world_->now.instruments.size();
@@ -145,13 +137,15 @@ void Simulation::apply(const Change& change) {
   simulation::apply(*world_, change);
 }
 
-ChangeRow Simulation::row_of(const Change& change) const {
-  return simulation::row_of(*world_, change);
-}
-
-void Simulation::schedule(double time, const Change& change) {
+void Simulation::schedule(double time, const Change& change, std::optional<double> period) {
   World& w = *world_;
   require_not_past(w, time);
+  if (period) {
+    require_period(*period);
+    accept(w, change);
+    w.now.events.write().emplace(time + *period, Event{change, time, *period, 1});
+    return;
+  }
   if (time == w.now.clock.time) {
     apply(change);
     return;
@@ -159,14 +153,6 @@ void Simulation::schedule(double time, const Change& change) {
   accept(w, change);
   announce(w, change);
   w.now.events.write().emplace(time, Event{change});
-}
-
-void Simulation::schedule_every(double period, const Change& change) {
-  World& w = *world_;
-  require_period(period);
-  accept(w, change);
-  const double now = w.now.clock.time;
-  w.now.events.write().emplace(now + period, Event{change, now, period, 1});
 }
 
 std::size_t Simulation::pending() const noexcept {
@@ -181,8 +167,8 @@ double Simulation::time() const noexcept {
   return world_->now.clock.time;
 }
 
-std::optional<double> Simulation::timestep() const noexcept {
-  return world_->now.clock.timestep;
+const SceneSettings& Simulation::settings() const noexcept {
+  return world_->now.settings;
 }
 
 void Simulation::step(double dt) {
@@ -209,10 +195,6 @@ void Simulation::step_to(double time) {
 }
 
 // ---- what is shown and told
-
-const Emits& Simulation::emits() const noexcept {
-  return world_->now.emits;
-}
 
 std::span<const double> Simulation::displacement(std::size_t object) const {
   shape(*world_, world_->now.objects.at(object));

@@ -45,8 +45,9 @@ struct SimulationOptions {
   /// A step or change that throws leaves the state as it was, which costs a copy of what moves.
   bool guard = false;
   double rate = 0; ///< steps a second that are wanted; 0: any. Too large contact sets are warned of
-  /// Told of each change as it takes effect, at time().
+  /// Told of each change as it takes effect, at time(); and what a log says of it.
   std::function<void(const Change&)> applied{};
+  std::function<void(const ChangeRow&)> log{};
 };
 
 /// How far the shape of an object jumped when it became elastostatic.
@@ -86,6 +87,7 @@ struct SimulationCounts {
 
 /// What is known of an object without reading it.
 struct ObjectFacts {
+  const std::string& name;
   Method method = Method::ela;
   bool known = false;  ///< its model was needed so far
   bool staged = false; ///< that of its second stage is known
@@ -113,6 +115,12 @@ struct InstrumentReport {
 /// What the answer to a step tells.
 struct Emits {
   bool forces = false, shapes = false, instruments = false;
+};
+
+/// What changes have set for the scene as a whole.
+struct SceneSettings {
+  std::optional<double> timestep; ///< the integration step asked for, s
+  Emits emits;
 };
 
 /// Of the last step.
@@ -145,7 +153,6 @@ public:
                   Integration integration = Integration::semi_implicit);
 
   std::size_t object_count() const noexcept;
-  const std::string& name(std::size_t object) const;
   /// Read now if it was not needed before. The first one of an object lives as long as this; a cut
   /// one as long as nothing more is cut. \throw as its source
   const Model& model(std::size_t object) const;
@@ -154,9 +161,7 @@ public:
   /// Valid until something is cut.
   ObjectFacts object(std::size_t object) const;
 
-  /// An instrument that is in no place until SetInstrument; its number, the old one where there is
-  /// one of that name.
-  std::size_t add_instrument(const std::string& name);
+  /// Of those that a SetInstrument was accepted for.
   std::size_t instrument_count() const noexcept;
   InstrumentReport instrument(std::size_t instrument) const;
 
@@ -165,21 +170,15 @@ public:
   /// million times the size of its model, an instrument should stand where single precision does
   /// not reach, or objects can't be attached or change their method
   void apply(const Change& change);
-  /// What a log says of a change that has just taken effect.
-  ChangeRow row_of(const Change& change) const;
-  /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier.
-  /// \throw Error as apply, and if the time is past
-  void schedule(double time, const Change& change);
-  /// Takes effect at every multiple of `period` behind now. \throw Error as apply
-  /// \pre period > 0
-  void schedule_every(double period, const Change& change);
+  /// Takes effect at `time`, which is now or later, behind what was scheduled for it earlier; where
+  /// there is a period, at each multiple of it behind `time` instead.
+  /// \throw Error as apply, and if the time is past or the period below 1e-9 s
+  void schedule(double time, const Change& change, std::optional<double> period = {});
   /// Events that wait, repeated ones not counted.
   std::size_t pending() const noexcept;
 
   double time() const noexcept;
-  /// The integration step asked for by SetTimestep.
-  std::optional<double> timestep() const noexcept;
-  const Emits& emits() const noexcept;
+  const SceneSettings& settings() const noexcept;
 
   /// Goes on by dt >= 0, or to `time` (now or later), through the events up to and at its end.
   /// Times add up without the rounding of each sum. \throw Error "object NAME at T s: …", among

@@ -61,13 +61,13 @@ void require_bounded_instruments(const World& w) {
 
 void show_all(World& w) {
   for (Object& object : w.now.objects) {
-    if (w.now.emits.shapes)
+    if (w.now.settings.emits.shapes)
       need_model(object);
     if (!object.shown.valid ||
         (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
         touched_anew(w, object))
       at_object(w, object, [&] { show(w, object); });
-    if (w.now.emits.shapes || w.options.shapes)
+    if (w.now.settings.emits.shapes || w.options.shapes)
       shape_in_step(w, object); // now, so that a failure is one of this step
   }
 }
@@ -97,7 +97,7 @@ void advance(World& w, double to) {
   if (w.now.poses.size() > 1)
     w.now.poses.erase(w.now.poses.begin(), w.now.poses.end() - 1);
   clock.shown = clock.time;
-  if (w.now.emits.instruments)
+  if (w.now.settings.emits.instruments)
     require_bounded_instruments(w);
   tear(w);
   ++w.now.counts.steps;

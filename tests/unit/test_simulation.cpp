@@ -166,9 +166,9 @@ TEST(Simulation, RefusesDisplacementAlongFixedAxesAndThePast) {
   EXPECT_THROW(s.step_to(0.5), Error);
   EXPECT_THROW((void)find_object(s, "b"), Error);
   EXPECT_EQ(find_object(s, "a"), 0U);
-  EXPECT_FALSE(s.emits().forces);
+  EXPECT_FALSE(s.settings().emits.forces);
   s.schedule(1, Emit{true}); // now
-  EXPECT_TRUE(s.emits().forces);
+  EXPECT_TRUE(s.settings().emits.forces);
   EXPECT_EQ(s.pending(), 0U);
 }
 
@@ -285,8 +285,8 @@ TEST(Simulation, RepeatedEventsComeAtEveryMultiple) {
   Simulation s(threads(1), {});
   s.add_object("a", organ(), Method::ela);
   const std::uint32_t node = free_nodes(s.model(0))[3];
-  s.schedule_every(0.01, SetForce{0, {node}, {100, 0, 0}});
-  s.schedule_every(0.015, Release{0, {node}});
+  s.schedule(s.time(), SetForce{0, {node}, {100, 0, 0}}, 0.01);
+  s.schedule(s.time(), Release{0, {node}}, 0.015);
   EXPECT_EQ(s.pending(), 0U); // they never end
   s.step(0.0099);
   EXPECT_EQ(s.counts().integration, 0U);
@@ -345,10 +345,10 @@ TEST(Simulation, AMillionRepeatedEventsAreRefused) {
   Simulation s(threads(1), how);
   s.add_object("a", organ(), Method::ffe);
   const std::uint32_t node = free_nodes(s.model(0))[3];
-  EXPECT_THROW(s.schedule_every(1e-300, Release{0, {node}}), Error);
+  EXPECT_THROW(s.schedule(s.time(), Release{0, {node}}, 1e-300), Error);
   EXPECT_THROW(s.apply(SetForce{0, {node}, {1, 0, 0}, 1e-300}), Error);
   EXPECT_THROW(s.apply(SetPressure{0, {node}, {1, 1e-10}}), Error);
-  s.schedule_every(1e-8, Release{0, {node}});
+  s.schedule(s.time(), Release{0, {node}}, 1e-8);
   EXPECT_THROW(s.step(1), Error);
   EXPECT_EQ(s.time(), 0);
   s.step(1e-6);

@@ -57,7 +57,6 @@ std::unique_ptr<Simulation> pressed(Method method, double friction, double by, d
   context.threads = threads;
   auto s = std::make_unique<Simulation>(context, SimulationOptions{});
   s->add_object("o", organ(rounds), method, {}, integration);
-  s->add_instrument("tool");
   const Vec3 start = middle + Vec3{0.3, 0.2, 20 + radius};
   s->apply(sphere(radius, start, friction));
   s->apply(MoveInstrument{0, start - Vec3{0, 0, by}, {}, 0.2});
@@ -96,7 +95,6 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
   for (const auto& [method, integration] : ways) {
     Simulation s({}, {});
     s.add_object("sheet", m, method, {}, integration);
-    s.add_instrument("tool");
     s.apply(sphere(radius, {0, 0, radius + 1}));
     s.apply(MoveInstrument{0, {0, 0, radius - down}, {}, 0.5});
     s.step(method == Method::ffe ? 0.5 : 20);
@@ -224,7 +222,6 @@ TEST(SimulationContact, ShortImplicitStepsGiveTheForcesOfExplicitOnes) {
     const auto force = [&](Integration integration, double dt) {
       Simulation s(test::one_thread(), {});
       s.add_object("o", organ(2), Method::ela, {}, integration);
-      s.add_instrument("tool");
       const Vec3 start = middle + Vec3{0.3, 0.2, 28};
       s.apply(SetTimestep{dt});
       s.apply(sphere(8, start, friction));
@@ -248,7 +245,6 @@ TEST(SimulationContact, AnImplicitStepTakenBackLeavesNoTrace) {
     how.guard = true;
     Simulation s(test::one_thread(), how);
     s.add_object("o", organ(2), Method::ela, {}, Integration::implicit);
-    s.add_instrument("tool");
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}, 0.3));
     s.step(0.01);
     if (fails) {
@@ -310,7 +306,6 @@ TEST(SimulationContact, NothingIsDoneFarAway) {
   for (const Method method : {Method::ffe, Method::ela}) {
     Simulation s({}, {});
     s.add_object("o", organ(), method);
-    s.add_instrument("tool");
     s.apply(sphere(5, middle + Vec3{60, 0, 0}));
     s.step(0.01);
     for (int k = 0; k < 5; ++k) {
@@ -337,7 +332,6 @@ TEST(SimulationContact, AContactAtRestCostsNothing) {
   Simulation s({}, {});
   s.add_object("moving", organ(), Method::ela);
   s.add_object("still", organ(), Method::ffe);
-  s.add_instrument("tool");
   s.apply(sphere(8, middle + Vec3{0.3, 0.2, 27}));
   s.step(50);
   s.step(1); // found at rest
@@ -364,7 +358,6 @@ TEST(SimulationContact, TheForceIsTheMeanOverTheStepWhateverCameBefore) {
     s.apply(SetForce{0, {node}, {0, 0, 1e-9}}); // that it is awake
     for (int k = 0; k < steps_before; ++k)
       s.step(0.001);
-    s.add_instrument("tool");
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}));
     if (refused) {
       EXPECT_THROW(s.apply(CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}), Error);
@@ -389,7 +382,6 @@ TEST(SimulationContact, ACutWithinAStepLeavesTheForceItsMean) {
     Simulation s(test::one_thread(), {});
     s.add_object("o", organ(), Method::ela);
     s.add_object("far", test::two_masses(), Method::ela);
-    s.add_instrument("tool");
     s.apply(sphere(8, middle + Vec3{0.3, 0.2, 26}));
     for (int k = 0; k < 20; ++k)
       s.step(0.05);
@@ -415,7 +407,6 @@ TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
   for (const double friction : {0.2, 0.5}) {
     Simulation s(test::one_thread(), {});
     s.add_object("o", test::two_masses(2), Method::ela);
-    s.add_instrument("bar");
     s.apply(SetInstrument{0, {50, {20, 0, 0}, friction}, {{-10, 0, -50}, {}}});
     s.apply(SetGravity{{0, 0.3 * weight, -weight}});
     s.apply(SetTimestep{1e-4});
@@ -442,7 +433,6 @@ TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
       Simulation s({}, {});
       s.add_object("o", organ(integration == Integration::implicit ? 3 : 4), method, {},
                    integration);
-      s.add_instrument("tool");
       s.apply(sphere(8, middle + Vec3{0.3, 0.2, 28.5}));
       s.step(0.001);
       s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 18}, {}, over});
@@ -462,7 +452,6 @@ TEST(SimulationContact, GraspedNodesFollowExactly) {
   for (const Method method : {Method::ffe, Method::ela}) {
     Simulation s({}, {});
     s.add_object("o", organ(), method);
-    s.add_instrument("forceps");
     s.apply(SetInstrument{0, {3, {10, 0, 0}, 0}, {middle + Vec3{0, 0, 22}, {}}});
     const std::vector<std::uint32_t> nodes{free_nodes(s.model(0))[3], free_nodes(s.model(0))[8]};
     s.apply(Grasp{0, nodes, 0});
@@ -542,7 +531,6 @@ TEST(SimulationContact, DrawnAlongALiver) {
       std::vector<std::string> warnings;
       Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("liver", model, method);
-      s.add_instrument("tool");
       const Vec3 start{c.x - 0.2 * size.x, c.y, box.max.z + radius};
       s.apply(sphere(radius, start, friction));
       std::size_t touched = 0;
@@ -585,7 +573,6 @@ TEST(SimulationContact, StrangeScenes) {
       std::vector<std::string> warnings;
       Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("o", model, method);
-      s.add_instrument("tool");
       s.apply(sphere(strange.radius, strange.at));
       for (int k = 0; k < 3; ++k)
         s.step(0.001);
@@ -605,11 +592,9 @@ TEST(SimulationContact, TwoInstrumentsAtOneNode) {
     for (const double apart : {7.0, 3.0, 1e-3}) { // pinched, overlapping
       Simulation s({}, {});
       s.add_object("o", model, method);
-      s.add_instrument("left");
-      s.add_instrument("right");
       for (const std::size_t k : {0U, 1U}) {
         const Vec3 at = top + Vec3{k == 0 ? -apart : apart, 0, 2};
-        s.apply(SetInstrument{k, {6, {}, 0.1}, {at, {}}});
+        s.apply(SetInstrument{k, {6, {}, 0.1}, {at, {}}, k == 0 ? "left" : "right"});
       }
       for (int k = 0; k < 3; ++k)
         s.step(0.001);

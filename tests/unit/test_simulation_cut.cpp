@@ -98,7 +98,7 @@ TEST(SimulationCut, ALobeComesOffAndFalls) {
     s.schedule(0.03, lobe_off());
     s.step(0.02);
     ASSERT_EQ(s.object_count(), 2U);
-    EXPECT_EQ(s.name(1), "organ.1");
+    EXPECT_EQ(s.object(1).name, "organ.1");
     EXPECT_EQ(s.object(1).method, Method::ela);
     EXPECT_EQ(count(s, Cutting::Kind::cut), 1U);
     EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
@@ -159,7 +159,7 @@ TEST(SimulationCut, LoadsGripsAndEventsFollowTheirNodes) {
   s.add_object("organ", soft_organ(), Method::ela);
   const std::uint32_t top = highest(s.model(0)), low = free_nodes(s.model(0))[0];
   ASSERT_LT(s.model(0).nodes[low].position.z, 40);
-  const std::size_t probe = s.add_instrument("probe");
+  constexpr std::size_t probe = 0;
   s.apply(SetInstrument{probe, {1, {}, 0}, {{100, -50, 80}, {}}});
   s.apply(Grasp{0, {top}, probe});
   s.apply(SetForce{0, {low}, {5, 0, 0}});
@@ -189,8 +189,8 @@ TEST(SimulationCut, AnEventThatCutsKeepsItsOwnNodes) {
   std::vector<std::uint32_t> centrals;
   for (std::size_t i = surface; i < nodes; ++i)
     centrals.push_back(static_cast<std::uint32_t>(i));
-  s.schedule_every(0.01, CutObject{0, incision(s.model(0))});
-  s.schedule_every(0.01, SetForce{0, centrals, {1, 0, 0}});
+  s.schedule(s.time(), CutObject{0, incision(s.model(0))}, 0.01);
+  s.schedule(s.time(), SetForce{0, centrals, {1, 0, 0}}, 0.01);
   s.step(0.01);
   ASSERT_GT(s.model(0).nodes.size(), nodes); // copies came between
   s.apply(Release{0, free_nodes(s.model(0))});
@@ -210,7 +210,7 @@ TEST(SimulationCut, AnEventInFlightIsFollowedIntoWhatComesOff) {
     all[i] = i;
   CutObject cut = lobe_off();
   std::get<PlaneToCut>(cut.what).nodes = all;
-  s.schedule_every(0.01, cut);
+  s.schedule(s.time(), cut, 0.01);
   s.step(0.01);
   ASSERT_EQ(s.object_count(), 2U);
   // It comes again, with nodes that there are: the plane has nothing to part any more.
@@ -320,11 +320,11 @@ TEST(SimulationCut, AStepThatFailsTakesACutBack) {
       one->step(0.01);
     }
     const Model before = s.model(0);
-    const std::size_t probe = s.add_instrument("probe"), same = calm.add_instrument("probe");
+    constexpr std::size_t probe = 0;
     for (Simulation* one : {&s, &calm})
-      one->apply(SetInstrument{one == &s ? probe : same, {1, {}, 0}, {{100, -50, 90}, {}}});
+      one->apply(SetInstrument{probe, {1, {}, 0}, {{100, -50, 90}, {}}});
     s.apply(Grasp{0, {highest(before)}, probe});
-    calm.apply(Grasp{0, {highest(before)}, same});
+    calm.apply(Grasp{0, {highest(before)}, probe});
     s.schedule(0.015, lobe_off());
     s.schedule(0.018, CutObject{1, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
     EXPECT_THROW(s.step(0.01), Error);
@@ -350,7 +350,7 @@ TEST(SimulationCut, ABladeCutsWhatItSweepsOver) {
       Simulation s(one_thread(), {});
       s.add_object("organ", organ(4), method);
       s.apply(SetForce{0, {highest(s.model(0))}, {0, 1, 5}});
-      const std::size_t blade = s.add_instrument("blade");
+      constexpr std::size_t blade = 0;
       InstrumentShape edge;
       edge.radius = 0;
       edge.blade = true;
@@ -451,7 +451,7 @@ TEST(SimulationCut, AShapeThatNobodyAskedForIsThereWhenSomebodyDoes) {
     CutObject more{0, incision(s.model(0))};
     std::get<PlaneToCut>(more.what).plane.point.x += 4;
     s.apply(more); // two in a row
-    const std::size_t tool = s.add_instrument("tool");
+    constexpr std::size_t tool = 0;
     InstrumentShape sphere;
     sphere.radius = 1;
     s.apply(SetInstrument{tool, sphere, {{200, 200, 200}, {}}});

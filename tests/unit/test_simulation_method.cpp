@@ -200,7 +200,7 @@ std::vector<double> disturbed(bool with_failures, std::vector<std::vector<std::s
         all.push_back(f.value.x);
     }
     all.push_back(s.state().kinetic_energy);
-    all.push_back(s.emits().forces ? 1 : 0);
+    all.push_back(s.settings().emits.forces ? 1 : 0);
     for (const MethodJump& jump : s.news().jumps)
       all.push_back(jump.size);
     s.take_news();
@@ -211,7 +211,7 @@ std::vector<double> disturbed(bool with_failures, std::vector<std::vector<std::s
   s.apply(SetDisplacement{0, {nodes[3]}, {0, 0, 0.2}, 0.025});
   s.apply(SetDisplacement{1, {nodes[3]}, {0, 0, 0.2}, 0.025});
   s.schedule(0.015, Release{0, {nodes[3]}});
-  s.schedule_every(0.008, SetForce{1, {nodes[7]}, {1, 1, 1}});
+  s.schedule(s.time(), SetForce{1, {nodes[7]}, {1, 1, 1}}, 0.008);
   s.schedule(0.021, Attach{0, {nodes[2], nodes[4]}, 3, {nodes[5]}, 300});
   s.schedule(0.5, Emit{true});
   s.schedule(0.022, SetMethod{2, Method::ffe});
@@ -258,10 +258,10 @@ TEST(SimulationUndo, AnEventThatFailsStaysUntilItCanHappen) {
   s.apply(SetMethod{1, Method::ffe});
   EXPECT_THROW(s.step(0.03), Error);
   EXPECT_EQ(s.pending(), 2U);
-  EXPECT_FALSE(s.emits().forces);
+  EXPECT_FALSE(s.settings().emits.forces);
   EXPECT_EQ(s.time(), 0);
   s.step(0.015);
-  EXPECT_TRUE(s.emits().forces);
+  EXPECT_TRUE(s.settings().emits.forces);
   EXPECT_THROW(s.step(0.015), Error);
   s.apply(SetMethod{1, Method::ela});
   s.step(0.015);

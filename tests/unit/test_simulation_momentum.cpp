@@ -211,7 +211,7 @@ TEST(SimulationMomentum, WhatAnInstrumentPushesMovesWithIt) {
   const Model model = undragged();
   Simulation s(one_thread(), {});
   s.add_object("organ", model, Method::ffe);
-  const std::size_t tool = s.add_instrument("tool");
+  constexpr std::size_t tool = 0;
   s.apply(SetInstrument{tool, {8, {}, 0}, {{100.3, -49.8, 59}, {}}});
   s.apply(MoveInstrument{tool, {101, -49.5, 55}, {}, 4 * dt});
   s.step(dt);

@@ -292,7 +292,6 @@ Pressed pressed(const Model& model, const Model& stiff, std::optional<TwoStepOpt
     s.apply(SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
   if (displaced)
     s.apply(SetDisplacement{0, {free_nodes(model)[2]}, {0.01, 0.02, 0}});
-  s.add_instrument("tool");
   const Vec3 start{100.3, -49.8, 58};
   s.apply(SetInstrument{0, {8, {}, friction}, {start, {}}});
   s.apply(MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});

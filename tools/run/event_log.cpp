@@ -57,8 +57,8 @@ void EventLog::model(double time, const std::string& name, const std::string& fi
   rows_.push_back(csv(time, {.what = "emit", .object = name, .text = "model " + file}));
 }
 
-void EventLog::change(const Simulation& simulation, const Change& change) {
-  rows_.push_back(csv(simulation.time(), simulation.row_of(change)));
+void EventLog::change(double time, const ChangeRow& row) {
+  rows_.push_back(csv(time, row));
 }
 
 void EventLog::cutting(const Simulation& simulation, const Cutting& c) {
@@ -67,9 +67,9 @@ void EventLog::cutting(const Simulation& simulation, const Cutting& c) {
                                        : part                           ? "part"
                                        : c.kind == Cutting::Kind::loose ? "loose"
                                                                         : "restored",
-                               .object = simulation.name(c.object),
+                               .object = simulation.object(c.object).name,
                                .value = static_cast<double>(c.nodes),
-                               .other = part ? simulation.name(c.part) : "",
+                               .other = part ? simulation.object(c.part).name : "",
                                .text = c.kind == Cutting::Kind::cut
                                            ? std::to_string(c.springs) + " springs, " +
                                                  std::to_string(c.doubled) + " nodes doubled"

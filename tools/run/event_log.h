@@ -20,7 +20,7 @@ public:
   void object(double time, const std::string& name, const std::string& model, Method method);
   /// An object's model was written to this file.
   void model(double time, const std::string& name, const std::string& file);
-  void change(const Simulation& simulation, const Change& change);
+  void change(double time, const ChangeRow& row);
   /// What cutting did to an object.
   void cutting(const Simulation& simulation, const Cutting& cutting);
   /// `what` is "error" or "warning".

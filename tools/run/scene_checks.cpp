@@ -42,7 +42,7 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
     if (object.jump || !(jump.size > most_jump * most) || !warn)
       continue;
     object.jump = true;
-    warn("object " + simulation.name(jump.object) + " at " + number_text(simulation.time()) +
+    warn("object " + simulation.object(jump.object).name + " at " + number_text(simulation.time()) +
          " s: its shape jumped by " + rounded_text(jump.size) +
          " mm as its method changed, and its forces with it");
   }
@@ -74,7 +74,7 @@ void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool
     if (!report.present)
       continue;
     object.thin = true;
-    warn("object " + simulation.name(number) + ": the instrument " +
+    warn("object " + simulation.object(number).name + ": the instrument " +
          simulation.instrument(instrument).name + " is " + number_text(2 * radius) +
          " mm thick, less than an edge (" + rounded_text(object.check->mean_edge()) +
          " mm in the mean), it can pass between nodes");
@@ -98,7 +98,7 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
   object.not_looked = 0;
   const ShapeFaults faults = object.check->look(simulation.model(number), u);
   const std::string who =
-      "object " + simulation.name(number) + " at " + number_text(simulation.time()) + " s: ";
+      "object " + simulation.object(number).name + " at " + number_text(simulation.time()) + " s: ";
   if (faults.turned > 0 && !object.turned && distrust) {
     object.turned = true;
     distrust(who + std::to_string(faults.turned) +

@@ -104,9 +104,9 @@ struct SceneRun::State {
     s.applied = [this](const Change& change) {
       if (const auto* const set = std::get_if<SetInstrument>(&change))
         checks.instrument(set->instrument, set->shape);
-      if (options.events != nullptr)
-        options.events->change(simulation, change);
     };
+    if (options.events != nullptr)
+      s.log = [this](const ChangeRow& row) { options.events->change(simulation.time(), row); };
     return s;
   }
 
@@ -166,7 +166,7 @@ struct SceneRun::State {
     if (simulation.object(set.object).staged)
       return;
     if (set.object >= stores.size() || stores[set.object].empty())
-      throw Error("object " + simulation.name(set.object) +
+      throw Error("object " + simulation.object(set.object).name +
                   " has no store, expected one with a second stage");
     set.second = options.files.second_stage(stores[set.object], simulation.model(set.object));
   }
@@ -189,7 +189,7 @@ struct SceneRun::State {
     if (auto* const two_step = std::get_if<SetTwoStep>(&change))
       add_stage(*two_step, what.stage);
     if (command.every)
-      simulation.schedule_every(*command.at, change);
+      simulation.schedule(simulation.time(), change, *command.at);
     else if (command.at)
       simulation.schedule(*command.at, change);
     else
@@ -197,7 +197,9 @@ struct SceneRun::State {
   }
 
   void step(const StepCommand& c) {
-    go_on([&] { simulation.step(c.dt.value_or(simulation.timestep().value_or(default_step))); });
+    go_on([&] {
+      simulation.step(c.dt.value_or(simulation.settings().timestep.value_or(default_step)));
+    });
   }
 
   void sync() {
@@ -267,9 +269,9 @@ struct SceneRun::State {
           [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
       deliver([&] {
         if (part)
-          options.result->add_part(simulation.name(in_result), model);
+          options.result->add_part(simulation.object(in_result).name, model);
         else
-          options.result->add_object(simulation.name(in_result), model);
+          options.result->add_object(simulation.object(in_result).name, model);
       });
     }
     if (!cut || !models_too)
@@ -311,7 +313,8 @@ struct SceneRun::State {
   void answer() {
     ++steps;
     checks.look(
-        simulation, simulation.emits().shapes || options.result != nullptr || options.measure,
+        simulation,
+        simulation.settings().emits.shapes || options.result != nullptr || options.measure,
         [this](const std::string& text) { warn(text); },
         [this](const std::string& text) { distrust(text); });
     if (options.reply)
@@ -383,7 +386,7 @@ struct SceneRun::State {
         if (under_way)
           options.record->run(under_way->until, under_way->every);
         for (const std::size_t object : simulation.take_renewed())
-          options.record->renew(simulation.name(object));
+          options.record->renew(simulation.object(object).name);
       }
       if (options.events != nullptr) {
         options.events->drop();
