@@ -349,6 +349,72 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
       }
 }
 
+/// All that a scene shows of its objects and the instrument.
+struct Seen {
+  double time = 0, strain = 0;
+  std::size_t pending = 0, nodes = 0;
+  std::vector<double> u;
+  std::vector<NodeVector> forces;
+  Vec3 force, torque;
+
+  bool operator==(const Seen&) const = default;
+};
+Seen seen(const Simulation& s) {
+  const InstrumentReport tool = s.instrument(0);
+  return {s.time(),          s.state().strain,    s.pending(), tool.nodes,
+          test::shape(s, 0), s.contact_forces(0), tool.force,  tool.torque};
+}
+
+/// The step goes wrong when the object in contact has been through it: a second one that it shows
+/// then has no stiffness.
+TEST(TwoStep, AStepInContactThatFailsLeavesNoTrace) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  Model away = model; // where no instrument is
+  for (Node& node : away.nodes)
+    node.position.x += 500;
+  for (const bool series : {false, true})
+    for (const double threshold : {5.0, 1e9})
+      for (const double friction : {0.0, 0.3}) {
+        std::vector<Seen> results[2];
+        for (const bool fails : {false, true}) {
+          Simulation s(test::one_thread(), {.guard = true});
+          s.add_object("o", model, Method::ffe);
+          s.add_object("other",
+                       {.model = [&] { return away; },
+                        .stiffness = [](const Model&) -> std::shared_ptr<ComplianceSource> {
+                          throw Error("broken");
+                        }},
+                       Method::ffe);
+          s.apply(SetTwoStep{0, {threshold, series}, [&] { return compliance_of(stiff); }});
+          // Most forces stay, so that their answer is followed by increments.
+          s.apply(SetForce{0, free_nodes(model), {0, 0.03, 0.01}});
+          s.apply(SetForce{0, {free_nodes(model)[2]}, {0.3, 0.7, 0}, 0.37}); // pulses
+          const Vec3 start{100.3, -49.8, 58};
+          s.apply(SetInstrument{0, {8, {}, friction}, {start, {}}});
+          s.apply(MoveInstrument{0, start + Vec3{0.1, 0, -0.4}, {}, 0.2});
+          s.step(0.1);
+          EXPECT_GT(s.instrument(0).nodes, 0U);
+          EXPECT_EQ(norm(s.instrument(0).force) > threshold, threshold < 1e9);
+          if (fails) {
+            const Seen before = seen(s);
+            s.apply(SetForce{1, {free_nodes(model)[4]}, {0, 0, 1}});
+            EXPECT_THROW(s.step(0.1), Error);
+            EXPECT_EQ(seen(s), before);
+            EXPECT_EQ(s.take_renewed(), (std::vector<std::size_t>{0, 1}));
+            s.apply(Release{1, {free_nodes(model)[4]}});
+          } else {
+            s.apply(Renew{0});
+          }
+          for (int k = 0; k < 3; ++k) {
+            s.step(0.025);
+            results[fails ? 1 : 0].push_back(seen(s));
+          }
+        }
+        for (std::size_t k = 0; k < 3; ++k)
+          EXPECT_EQ(results[0][k], results[1][k]) << series << threshold << friction << k;
+      }
+}
+
 /// By two cuts, each of both stages for itself.
 TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
   const Model model = organ(3), stiff = stiffened(model, 2, 5);
