@@ -1,6 +1,7 @@
 #include "formats/mesh/particles_file.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 
 #include <array>
 #include <charconv>
@@ -41,7 +42,7 @@ struct Line {
 
 double parse(std::string_view word, const Line& where) {
   double value = 0;
-  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+  const std::string_view digits = without_plus(word);
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size())
     where.fail(quote(word) + " is no number, expected x y z R [weight]");

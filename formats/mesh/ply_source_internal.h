@@ -2,6 +2,7 @@
 // Where the numbers of a PLY body come from, for the reader in ply_read.cpp.
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "formats/mesh/ply_header_internal.h"
 
 #include <bit>
@@ -123,14 +124,12 @@ public:
     std::size_t size = 0;
     while (size < rest_.size() && !is_blank(rest_[size]))
       ++size;
-    std::string_view word = rest_.substr(0, size);
-    const std::string_view shown = word;
-    if (word.starts_with('+'))
-      word.remove_prefix(1);
+    const std::string_view word = rest_.substr(0, size), digits = without_plus(word);
+    const char* const end = digits.data() + digits.size();
     double number = 0;
-    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-    if (error != std::errc() || stop != word.data() + word.size() || word.starts_with("+-"))
-      fail(quoted(shown) + ", expected a number");
+    const auto [stop, error] = std::from_chars(digits.data(), end, number);
+    if (error != std::errc() || stop != end)
+      fail(quoted(word) + ", expected a number");
     rest_.remove_prefix(size);
     trim();
     return number;

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "base/number_text.h"
 
 #include <algorithm>
 #include <array>
@@ -50,10 +51,10 @@ public:
 
   double number(const char* what) {
     const std::string& text = word(what);
-    const char* const end = text.data() + text.size();
-    const char* const begin = text.data() + (text.starts_with('+') && text.size() > 1 ? 1 : 0);
+    const std::string_view digits = without_plus(text);
+    const char* const end = digits.data() + digits.size();
     double value = 0;
-    const auto [rest, status] = std::from_chars(begin, end, value);
+    const auto [rest, status] = std::from_chars(digits.data(), end, value);
     if (status != std::errc{} || rest != end)
       fail(shown(text) + " is no " + what);
     if (!std::isfinite(value))

@@ -1,6 +1,7 @@
 #include "formats/volume/label_volume.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "formats/stream/file_names.h"
 #include "formats/volume/label_volume_internal.h"
 
@@ -346,7 +347,7 @@ std::string quoted(std::string_view text) {
 
 double number_of(const std::string& place, std::string_view word) {
   double value = 0;
-  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+  const std::string_view digits = without_plus(word);
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
     throw Error(place, quoted(word) + ", expected a finite number");

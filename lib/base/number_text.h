@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <string>
+#include <string_view>
 
 namespace gewebe {
 
@@ -11,6 +12,13 @@ namespace gewebe {
 inline std::string number_text(double value) {
   std::array<char, 32> text{};
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+/// What std::from_chars, which knows no plus sign, is to read of a word: "+1" is a number, "+-1"
+/// and
+/// "++1" are none.
+constexpr std::string_view without_plus(std::string_view word) {
+  return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
 }
 
 } // namespace gewebe

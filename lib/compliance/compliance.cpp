@@ -1,5 +1,6 @@
 #include "compliance/compliance.h"
 
+#include "base/vector_at.h"
 #include "compliance/costs.h"
 #include "compliance/half_blocks.h"
 
@@ -105,8 +106,8 @@ void Compliance::add(std::span<const NodeVector> forces, double allowed, std::sp
   }
   std::vector<double> f(axes_, 0);
   for (const NodeVector& force : forces)
-    for (std::size_t a = 0; a < 3; ++a)
-      f[3 * std::size_t{force.node} + a] = force.value[static_cast<int>(a)];
+    for (int a = 0; a < 3; ++a)
+      f[axis_of(force.node, a)] = force.value[a];
   solve(f);
   for (std::size_t r = 0; r < u.size(); ++r)
     u[r] += f[r];

@@ -1,5 +1,7 @@
 #include "compliance/load_answer.h"
 
+#include "base/vector_at.h"
+
 #include <utility>
 
 namespace gewebe {
@@ -14,12 +16,12 @@ constexpr std::uint64_t most_increments = 1000;
 std::vector<double> forces_over_axes(const Model& model, const Load& load) {
   std::vector<double> f(3 * model.nodes.size(), 0);
   if (load.gravity != Vec3{})
-    for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
-        f[3 * i + static_cast<std::size_t>(a)] = model.nodes[i].mass * load.gravity[a];
+        f[axis_of(i, a)] = model.nodes[i].mass * load.gravity[a];
   for (const auto& [node, force] : load.force)
     for (int a = 0; a < 3; ++a)
-      f[3 * std::size_t{node} + static_cast<std::size_t>(a)] += force[a];
+      f[axis_of(node, a)] += force[a];
   return f;
 }
 

@@ -130,8 +130,8 @@ void move_shown(const Object& old, const Moves& moves, std::deque<Object>& piece
       if (!to.main && moves.objects.size() == 1 && moves.of(i).size() == 1)
         continue;
       std::vector<double>& moved = piece(to).shown.displacement.write();
-      for (std::size_t a = 0; a < 3; ++a)
-        moved[3 * std::size_t{to.node} + a] = u[static_cast<int>(a)];
+      for (int a = 0; a < 3; ++a)
+        moved[axis_of(to.node, a)] = u[a];
     }
   }
 }

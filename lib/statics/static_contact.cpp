@@ -324,8 +324,7 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     // As the contacts have it, whatever is left out of the rest of the shape.
     for (std::size_t k = 0; k < nodes.size(); ++k)
       for (int a = 0; a < 3; ++a)
-        shape[3 * std::size_t{nodes[k]} + static_cast<std::size_t>(a)] =
-            (at[k] - rest(nodes[k]))[a];
+        shape[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
     blocks_.set_shape(model_, shape);
     const std::size_t known = nodes.size();
     find(placed, displaced, shape, outside, nodes);

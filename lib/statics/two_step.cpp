@@ -333,7 +333,7 @@ struct TwoStep::State {
     double miss = 0;
     for (const auto& [node, d] : last->displacement)
       for (int a = 0; a < 3; ++a) {
-        double& value = u[3 * std::size_t{node} + static_cast<std::size_t>(a)];
+        double& value = u[axis_of(node, a)];
         const double error = std::abs(value - d[a]);
         miss = std::isnan(error) ? error : std::max(miss, error);
         value = d[a];

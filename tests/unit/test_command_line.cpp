@@ -116,6 +116,9 @@ TEST(CommandLine, MistakesAreNamed) {
   EXPECT_EQ(complaint({"a", "--voxel", "--color", "x"}), "--voxel: '--color' is no number");
   EXPECT_EQ(complaint({"a", "-j100"}), "--threads: expected 0 to 99, not 100");
   EXPECT_EQ(complaint({"a", "-j", "1.5"}), "--threads: '1.5' is no whole number");
+  EXPECT_EQ(complaint({"a", "-j", "+-1"}), "--threads: '+-1' is no whole number");
+  EXPECT_EQ(complaint({"a", "--voxel", "+-1"}), "--voxel: '+-1' is no number");
+  EXPECT_EQ(complaint({"a", "--voxel", "++1"}), "--voxel: '++1' is no number");
   EXPECT_EQ(complaint({"a", "--voxel", "inf"}), "--voxel: 'inf' is not finite");
 }
 

@@ -237,6 +237,14 @@ TEST(LabelVolume, SpacesOfNrrd) {
   EXPECT_EQ(unknown.warnings.size(), 1U);
   EXPECT_EQ(unknown.mask.transform.m[3], 10);
   EXPECT_NE(message(nrrd("space: 3D-left-handed\n" + ras + data, bytes)), "");
+  const auto with_origin = [&](const std::string& word) {
+    return nrrd("space: RAS\nspace directions: (0,1,0) (-2,0,0) (0,0,-4)\nspace origin: (" + word +
+                    ",20,30)\n" + data,
+                bytes);
+  };
+  expect_sample(with_origin("+10"));
+  EXPECT_NE(message(with_origin("+-10")).find("'+-10', expected a finite number"),
+            std::string::npos);
   // An axis that is none of space counts if it has one sample only.
   const std::string four = "NRRD0005\ndimension: 4\nsizes: 1 5 4 3\nspace: RAS\nspace directions: "
                            "none (0,1,0) (-2,0,0) (0,0,-4)\nspace origin: (10,20,30)\n" +

@@ -30,8 +30,9 @@ TEST(ParticlesFile, RoundTripIsExact) {
 }
 
 TEST(ParticlesFile, BadLinesAreNamed) {
-  for (const char* bad : {"1 2 3", "1 2 3 0", "1 2 3 -4", "1 2 3 4 5 6", "1 2 x 4", "nan 2 3 4",
-                          "1 2 3 inf", "1 2 3 4 nan", "0x1 2 3 4", "1,2,3,4", "1e999 0 0 1"}) {
+  for (const char* bad :
+       {"1 2 3", "1 2 3 0", "1 2 3 -4", "1 2 3 4 5 6", "1 2 x 4", "+-1 2 3 4", "nan 2 3 4",
+        "1 2 3 inf", "1 2 3 4 nan", "0x1 2 3 4", "1,2,3,4", "1e999 0 0 1"}) {
     try {
       (void)read_particles(std::string("1 2 3 4\n") + bad + "\n", "p");
       ADD_FAILURE() << bad;

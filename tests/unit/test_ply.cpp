@@ -268,6 +268,8 @@ TEST(Ply, BadContentIsNamedWithItsPlace) {
   EXPECT_EQ(spoiled("1 1 0", "1 nan 0"), "m.ply:12: y is not finite, expected a finite number");
   EXPECT_EQ(spoiled("1 1 0", "1 inf 0"), "m.ply:12: y is not finite, expected a finite number");
   EXPECT_EQ(spoiled("1 1 0", "1 1e999 0"), "m.ply:12: \"1e999\", expected a number");
+  EXPECT_EQ(spoiled("1 1 0", "1 +1 0"), "");
+  EXPECT_EQ(spoiled("1 1 0", "1 +-1 0"), "m.ply:12: \"+-1\", expected a number");
   EXPECT_EQ(spoiled("1 1 0", "1 0x1 0"), "m.ply:12: \"0x1\", expected a number");
   EXPECT_EQ(spoiled("1 1 0", "1 1"), "m.ply:12: the line ends here, expected another number");
   EXPECT_EQ(spoiled("face 1", "face 2"),

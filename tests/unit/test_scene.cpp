@@ -164,6 +164,8 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"force a 1 0x10 0 0", "'0x10' is no number"},
       {"force a 1 1,5 0 0", "'1,5' is no number"},
       {"force a 1 + 0 0", "'+' is no number"},
+      {"force a 1 +-1 0 0", "'+-1' is no number"},
+      {"force a 1 ++1 0 0", "'++1' is no number"},
       {"force a z<< 0 0 1", "selector 'z<<': column 3"},
       {"displace a 1 0 0", "expected displace NAME NODES dx dy dz"},
       {"displace a 1 nan 0 0", "'nan' is not finite"},

@@ -15,9 +15,9 @@ namespace {
 template <class Number>
 Number parse_number(const std::string& name, std::string_view word) {
   Number value{};
-  const char* const end = word.data() + word.size();
-  const char* const begin = word.starts_with('+') ? word.data() + 1 : word.data();
-  const auto [rest, status] = std::from_chars(begin, end, value);
+  const std::string_view digits = without_plus(word);
+  const char* const end = digits.data() + digits.size();
+  const auto [rest, status] = std::from_chars(digits.data(), end, value);
   if (status != std::errc{} || rest != end)
     throw UsageError(name + ": '" + std::string(word) + "' is no " +
                      (std::is_integral_v<Number> ? "whole number" : "number"));
