@@ -1,6 +1,6 @@
 #include "base/error.h"
 #include "formats/mesh/ply.h"
-#include "formats/mesh/ply_source_internal.h"
+#include "formats/mesh/ply_source.h"
 #include "mesh/triangulate.h"
 
 #include <algorithm>

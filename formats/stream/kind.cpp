@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 17> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 22> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -25,6 +25,11 @@ constexpr std::array<std::pair<Kind, std::string_view>, 17> names{{
     {Kind::glb, "glb"},
     {Kind::three_ds, "3ds"},
     {Kind::dae, "dae"},
+    {Kind::vtu, "vtu"},
+    {Kind::msh, "msh"},
+    {Kind::msh4, "msh4"},
+    {Kind::medit, "medit"},
+    {Kind::tetgen, "tetgen"},
     {Kind::png, "png"},
     {Kind::ppm, "ppm"},
     {Kind::csv, "csv"},
@@ -54,8 +59,8 @@ std::string_view foreign_suffix(std::string_view path) {
   if (suffix.empty() || suffix.size() > 5 || !is(std::isalpha)(suffix[0]) ||
       !std::ranges::all_of(suffix, is(std::isalnum)))
     return {};
-  constexpr std::array<std::string_view, 11> plain{"tmp", "part", "new", "old",  "bak", "out",
-                                                   "dat", "bin",  "txt", "mesh", "log"};
+  constexpr std::array<std::string_view, 10> plain{"tmp", "part", "new", "old", "bak",
+                                                   "out", "dat",  "bin", "txt", "log"};
   return std::ranges::find(plain, suffix) == plain.end() ? suffix : std::string_view();
 }
 
@@ -77,6 +82,13 @@ std::string_view first_word(std::string_view text) {
   while (end < text.size() && std::isspace(static_cast<unsigned char>(text[end])) == 0)
     ++end;
   return text.substr(at, end - at);
+}
+
+/// Whether a tag of XML, with which `text` begins, says type="UnstructuredGrid".
+bool is_unstructured_grid(std::string_view text) {
+  const std::string_view tag = text.substr(0, text.find('>'));
+  return tag.find("\"UnstructuredGrid\"") != std::string_view::npos ||
+         tag.find("'UnstructuredGrid'") != std::string_view::npos;
 }
 
 } // namespace
@@ -116,7 +128,11 @@ Kind kind_from_suffix(std::string_view path) {
   const std::string suffix = lower.substr(dot + 1);
   if (suffix == "hdf5")
     return Kind::hdf5;
-  if (suffix == "txt" || suffix == "mesh")
+  if (suffix == "mesh")
+    return Kind::medit;
+  if (suffix == "node" || suffix == "ele")
+    return Kind::tetgen;
+  if (suffix == "txt" || suffix == "msh4" || suffix == "medit" || suffix == "tetgen")
     return Kind::unknown;
   return kind_from_name(suffix);
 }
@@ -136,7 +152,16 @@ Kind kind_from_magic(std::string_view bytes) {
   if (bytes.size() >= 348 &&
       (bytes.substr(344, 4) == "n+1\0"sv || bytes.substr(344, 4) == "ni1\0"sv))
     return Kind::nifti;
-  if (first_word(bytes) == "ela_expl")
+  if (bytes.starts_with("$MeshFormat") || bytes.starts_with("$Comments"))
+    return Kind::msh;
+  if (const std::size_t at = bytes.find("<VTKFile"); at != std::string_view::npos &&
+                                                     first_word(bytes).starts_with('<') &&
+                                                     is_unstructured_grid(bytes.substr(at)))
+    return Kind::vtu;
+  const std::string_view word = first_word(bytes);
+  if (word == "MeshVersionFormatted")
+    return Kind::medit;
+  if (word == "ela_expl")
     return Kind::ela;
   return Kind::unknown;
 }
@@ -172,7 +197,8 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
 
 bool is_binary(Kind kind) {
   return kind != Kind::particles && kind != Kind::ela && kind != Kind::obj && kind != Kind::off &&
-         kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae && kind != Kind::csv;
+         kind != Kind::dxf && kind != Kind::gltf && kind != Kind::dae && kind != Kind::csv &&
+         kind != Kind::msh && kind != Kind::medit && kind != Kind::tetgen;
 }
 
 } // namespace gewebe

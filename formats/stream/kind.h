@@ -23,6 +23,11 @@ enum class Kind {
   glb,
   three_ds,
   dae,
+  vtu,    ///< VTK's unstructured grids
+  msh,    ///< Gmsh, 2.2 where written
+  msh4,   ///< Gmsh 4.1, for outputs; inputs are msh
+  medit,  ///< .mesh
+  tetgen, ///< .node and .ele
   png,
   ppm,
   rgb,
@@ -31,12 +36,12 @@ enum class Kind {
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …
 std::string_view kind_name(Kind kind);
-/// The kind of that name ("mesh" is ply), or unknown.
+/// The kind of that name ("mesh" is ply; the suffix .mesh is medit), or unknown.
 Kind kind_from_name(std::string_view name);
 /// The kind that a file name's suffix stands for, or unknown. Case does not matter.
 Kind kind_from_suffix(std::string_view path);
-/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, `ela_expl` after blank
-/// lines and comments), or unknown.
+/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, VTU, Gmsh; `ela_expl`
+/// and Medit's word after blank lines and comments), or unknown.
 Kind kind_from_magic(std::string_view first_bytes);
 /// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first
 /// 4096 bytes. \throw UsageError if `format` names no kind

@@ -1,10 +1,12 @@
 #pragma once
-// Where the numbers of a PLY body come from, for the reader in ply_read.cpp.
+// Where the numbers of a PLY body come from.
 
 #include "base/error.h"
 #include "base/number_text.h"
-#include "formats/mesh/ply_header_internal.h"
+#include "formats/mesh/ply_header.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>

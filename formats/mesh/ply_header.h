@@ -1,5 +1,5 @@
 #pragma once
-// The header of a PLY file, for the reader in ply_read.cpp.
+// The header of a PLY file.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,0 +1,273 @@
+#include "formats/tetrahedra/tet_file.h"
+
+#include "base/number_text.h"
+#include "formats/tetrahedra/tet_file_internal.h"
+#include "tetrahedra/check.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace gewebe {
+namespace tet {
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text.substr(0, 40))
+    out += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > 40)
+    out += "...";
+  return out + '"';
+}
+
+void Words::fail(const std::string& what) const {
+  const std::string_view before = bytes_.substr(0, std::min(last_, bytes_.size()));
+  throw Error(name_ + ":" + std::to_string(1 + std::ranges::count(before, '\n')), what);
+}
+
+namespace {
+bool is_blank(char c) {
+  return c == ' ' || (c >= '\t' && c <= '\r');
+}
+} // namespace
+
+void Words::skip_blanks() {
+  while (at_ < bytes_.size()) {
+    if (bytes_[at_] == comment_ && comment_ != '\0')
+      at_ = std::min(bytes_.find('\n', at_), bytes_.size());
+    else if (is_blank(bytes_[at_]))
+      ++at_;
+    else
+      break;
+  }
+}
+
+std::string_view Words::word() {
+  skip_blanks();
+  last_ = at_;
+  while (at_ < bytes_.size() && !is_blank(bytes_[at_]))
+    ++at_;
+  return bytes_.substr(last_, at_ - last_);
+}
+
+std::string_view Words::peek() {
+  const std::string_view next = word();
+  at_ = last_;
+  return next;
+}
+
+std::string_view Words::line() {
+  last_ = at_;
+  const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+  at_ = std::min(end + 1, bytes_.size());
+  std::string_view text = bytes_.substr(last_, end - last_);
+  if (text.ends_with('\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+namespace {
+template <class Number>
+bool parse(std::string_view word, Number& number) {
+  word = without_plus(word);
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  return error == std::errc() && stop == word.data() + word.size();
+}
+} // namespace
+
+double Words::real(const char* what) {
+  const std::string_view text = word();
+  double number = 0;
+  if (!parse(text, number) || !std::isfinite(number))
+    fail(text.empty() ? std::string("the file ends here, expected ") + what
+                      : quoted(text) + ", expected " + what + ", a finite number");
+  return number;
+}
+
+std::uint64_t Words::count(const char* what) {
+  const std::string_view text = word();
+  std::uint64_t number = 0;
+  if (!parse(text, number))
+    fail(text.empty() ? std::string("the file ends here, expected ") + what
+                      : quoted(text) + ", expected " + what + ", an integer from 0");
+  return number;
+}
+
+std::int64_t Words::integer(const char* what) {
+  const std::string_view text = word();
+  std::int64_t number = 0;
+  if (!parse(text, number))
+    fail(text.empty() ? std::string("the file ends here, expected ") + what
+                      : quoted(text) + ", expected " + what + ", an integer");
+  return number;
+}
+
+void Words::require(std::uint64_t count, std::size_t words, const char* what) const {
+  // A word takes a digit and a blank; the last of the file may lack that.
+  if (count > (left() + 1) / (2 * words))
+    fail(std::to_string(count) + " " + what + " in " + std::to_string(left()) +
+         " bytes, expected a count that fits");
+  if (count >= UINT32_MAX)
+    fail(std::to_string(count) + " " + what + ", expected fewer than " +
+         std::to_string(UINT32_MAX));
+}
+
+TetMesh Tetrahedra::take_unless_zero() {
+  if (std::ranges::all_of(mesh.material, [](std::int32_t m) { return m == 0; }))
+    mesh.material = {};
+  return std::move(mesh);
+}
+
+} // namespace tet
+
+namespace {
+
+std::string list(const std::vector<Kind>& kinds) {
+  std::string text;
+  for (const Kind kind : kinds)
+    text += (text.empty() ? "" : ", ") + std::string(kind_name(kind));
+  return text;
+}
+
+bool contains(const std::vector<Kind>& kinds, Kind kind) {
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
+/// The names of TetGen's two files by that of one.
+TetgenFiles tetgen_names(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  std::string suffix = dot == std::string::npos ? "" : name.substr(dot);
+  std::ranges::transform(suffix, suffix.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (suffix != ".node" && suffix != ".ele")
+    throw Error(name, "TetGen's mesh is two files, expected the name of one, which ends in .node "
+                      "or .ele");
+  TetgenFiles names{name, name};
+  if (suffix == ".node")
+    names.ele = name.substr(0, dot) + ".ele";
+  else
+    names.node = name.substr(0, dot) + ".node";
+  return names;
+}
+
+TetMesh read_tetgen(Input& input) {
+  const TetgenFiles names = tetgen_names(input.name());
+  Input beside(names.node == input.name() ? names.ele : names.node, false);
+  TetgenFiles bytes{input.read_all(), beside.read_all()};
+  if (names.node != input.name())
+    std::swap(bytes.node, bytes.ele);
+  return tet_mesh_from_tetgen(bytes, names);
+}
+
+void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& options) {
+  const TetgenFiles names = tetgen_names(output.name());
+  const bool nodes = names.node == output.name();
+  Output beside(nodes ? names.ele : names.node, options);
+  const auto to = [](Output& file) {
+    return [&file](std::string_view piece) { file.write(piece); };
+  };
+  tet::write_node(mesh, nodes ? to(output) : to(beside));
+  tet::write_ele(mesh, nodes ? to(beside) : to(output));
+  beside.commit();
+}
+
+void write_to(const TetMesh& mesh, Kind kind, const tet::Sink& sink) {
+  if (kind == Kind::ply)
+    tet::write_ply(mesh, sink);
+  else if (kind == Kind::vtu)
+    tet::write_vtu(mesh, sink);
+  else if (kind == Kind::msh)
+    tet::write_msh2(mesh, sink);
+  else if (kind == Kind::msh4)
+    tet::write_msh4(mesh, sink);
+  else if (kind == Kind::medit)
+    tet::write_medit(mesh, sink);
+  else
+    throw UsageError(std::string(kind_name(kind)) + " is not written, expected one of " +
+                     list(writable_tet_kinds()));
+}
+
+void scale_points(TetMesh& mesh, double scale) {
+  if (scale == 1)
+    return;
+  for (std::size_t p = 0; p < mesh.points.size(); ++p) {
+    mesh.points[p] *= scale;
+    if (!is_finite(mesh.points[p]))
+      throw Error("point " + std::to_string(p) + " is not finite in mm, expected less");
+  }
+}
+
+} // namespace
+
+const std::vector<Kind>& readable_tet_kinds() {
+  static const std::vector<Kind> kinds{Kind::ply, Kind::vtu, Kind::msh, Kind::medit, Kind::tetgen};
+  return kinds;
+}
+
+const std::vector<Kind>& writable_tet_kinds() {
+  static const std::vector<Kind> kinds{Kind::ply,  Kind::vtu,   Kind::msh,
+                                       Kind::msh4, Kind::medit, Kind::tetgen};
+  return kinds;
+}
+
+bool holds_tetrahedra(std::string_view peeked, Kind kind) {
+  if (kind != Kind::ply)
+    return kind == Kind::msh4 || contains(readable_tet_kinds(), kind);
+  const std::string_view header = peeked.substr(0, peeked.find("\nend_header"));
+  return header.find("\nelement tetrahedron ") != std::string_view::npos;
+}
+
+TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
+                            TetReadStats* stats) {
+  TetReadStats unused;
+  TetReadStats& counts = stats == nullptr ? unused : *stats;
+  return at(name, [&] {
+    TetMesh mesh;
+    if (kind == Kind::ply)
+      mesh = tet::read_ply(bytes, name, counts);
+    else if (kind == Kind::vtu)
+      mesh = tet::read_vtu(bytes, name, counts);
+    else if (kind == Kind::msh || kind == Kind::msh4)
+      mesh = tet::read_msh(bytes, name, counts);
+    else if (kind == Kind::medit)
+      mesh = tet::read_medit(bytes, name, counts);
+    else
+      throw Error((kind == Kind::unknown ? std::string("the format is not known")
+                                         : std::string(kind_name(kind)) + " has no tetrahedra") +
+                  ", expected one of " + list(readable_tet_kinds()) +
+                  " by content, suffix or --format");
+    check_mesh(mesh);
+    return mesh;
+  });
+}
+
+TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats* stats) {
+  TetReadStats counts;
+  TetMesh mesh;
+  if (options.kind == Kind::tetgen)
+    mesh = read_tetgen(input);
+  else
+    mesh = tet_mesh_from_bytes(input.read_all(), input.name(), options.kind, &counts);
+  at(input.name(), [&] { scale_points(mesh, options.scale); });
+  if (options.drop_unused)
+    counts.dropped_points = drop_unused_points(mesh);
+  if (stats != nullptr)
+    *stats = counts;
+  return mesh;
+}
+
+std::string tet_mesh_bytes(const TetMesh& mesh, Kind kind) {
+  std::string bytes;
+  write_to(mesh, kind, [&](std::string_view piece) { bytes += piece; });
+  return bytes;
+}
+
+void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind, const Output::Options& beside) {
+  at(output.name(), [&] {
+    if (kind == Kind::tetgen)
+      write_tetgen(output, mesh, beside);
+    else
+      write_to(mesh, kind, [&](std::string_view piece) { output.write(piece); });
+  });
+}
+
+} // namespace gewebe

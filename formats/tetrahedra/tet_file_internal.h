@@ -1,0 +1,156 @@
+#pragma once
+// What the readers and writers of tetrahedral meshes share.
+
+#include "base/error.h"
+#include "formats/tetrahedra/tet_file.h"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace gewebe::tet {
+
+static_assert(std::endian::native == std::endian::little, "the codecs copy little-endian memory");
+
+using Sink = std::function<void(std::string_view)>;
+
+TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats);
+TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats);
+TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats);
+TetMesh read_medit(std::string_view bytes, const std::string& name, TetReadStats& stats);
+void write_ply(const TetMesh& mesh, const Sink& sink);
+void write_vtu(const TetMesh& mesh, const Sink& sink);
+void write_msh2(const TetMesh& mesh, const Sink& sink);
+void write_msh4(const TetMesh& mesh, const Sink& sink);
+void write_medit(const TetMesh& mesh, const Sink& sink);
+void write_node(const TetMesh& mesh, const Sink& sink);
+void write_ele(const TetMesh& mesh, const Sink& sink);
+
+/// A word as messages show it.
+std::string quoted(std::string_view text);
+
+/// Words of a text, apart by blanks and line ends; where `comment` stands at the start of a word,
+/// the rest of the line is one. A NUL stands for no comments.
+class Words {
+public:
+  Words(std::string_view bytes, const std::string& name, char comment)
+      : bytes_(bytes), name_(name), comment_(comment) {}
+
+  /// Place: the line of the last word.
+  [[noreturn]] void fail(const std::string& what) const;
+
+  /// The next one, "" at the end.
+  std::string_view word();
+  /// The same, but it stays the next.
+  std::string_view peek();
+  /// The rest of the line, which may be "", without its end.
+  std::string_view line();
+  double real(const char* what);          ///< \throw Error unless it is a finite number
+  std::uint64_t count(const char* what);  ///< \throw Error unless it is an integer from 0
+  std::int64_t integer(const char* what); ///< \throw Error unless it is an integer
+  /// \throw Error unless `count` things of `words` words each may follow
+  void require(std::uint64_t count, std::size_t words, const char* what) const;
+
+  std::size_t at() const { return at_; }
+  void move_to(std::size_t at) { at_ = at; }
+  std::size_t left() const { return bytes_.size() - at_; }
+  std::string_view bytes() const { return bytes_; }
+
+private:
+  void skip_blanks();
+  std::string_view bytes_;
+  const std::string& name_;
+  std::size_t at_ = 0, last_ = 0;
+  char comment_;
+};
+
+/// Which element has which order, and materials that come with every tetrahedron.
+class Tetrahedra {
+public:
+  /// Adds one: 4 or 10 nodes, in our order. `fail` is called with what is wrong.
+  template <class Fail>
+  void add(std::span<const std::uint32_t> nodes, std::int64_t material, const Fail& fail) {
+    if (!mesh.tetrahedra.empty() && (nodes.size() == 10) == mesh.middles.empty())
+      fail("tetrahedra of 4 and of 10 nodes, expected one order");
+    if (material < 0 || material > INT32_MAX)
+      fail("material " + std::to_string(material) + ", expected 0 to " + std::to_string(INT32_MAX));
+    mesh.tetrahedra.push_back({nodes[0], nodes[1], nodes[2], nodes[3]});
+    if (nodes.size() == 10)
+      mesh.middles.push_back({nodes[4], nodes[5], nodes[6], nodes[7], nodes[8], nodes[9]});
+    mesh.material.push_back(static_cast<std::int32_t>(material));
+  }
+  /// Without materials if all are 0.
+  TetMesh take_unless_zero();
+
+  TetMesh mesh;
+};
+
+/// The nodes of one, corners then middles: 4 or 10.
+class TetNodes {
+public:
+  TetNodes(const TetMesh& mesh, std::size_t t) {
+    for (std::size_t k = 0; k < 4; ++k)
+      nodes_[k] = mesh.tetrahedra[t][k];
+    if (mesh.middles.empty())
+      return;
+    size_ = 10;
+    for (std::size_t k = 0; k < 6; ++k)
+      nodes_[4 + k] = mesh.middles[t][k];
+  }
+  std::span<const std::uint32_t> in_order() const& { return {nodes_.data(), size_}; }
+  std::span<const std::uint32_t> in_order() const&& = delete; // would dangle
+  std::uint32_t operator[](std::size_t k) const { return nodes_[k]; }
+  std::size_t size() const { return size_; }
+
+private:
+  std::array<std::uint32_t, 10> nodes_{};
+  std::size_t size_ = 4;
+};
+
+/// Collects text and bytes into large pieces.
+class Pieces {
+public:
+  explicit Pieces(const Sink& sink) : sink_(sink) {}
+  Pieces(const Pieces&) = delete;
+  Pieces& operator=(const Pieces&) = delete;
+
+  Pieces& operator<<(std::string_view text) {
+    bytes_ += text;
+    if (bytes_.size() >= piece)
+      flush();
+    return *this;
+  }
+  /// The shortest text that reads back exactly.
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  Pieces& operator<<(Number value) {
+    std::array<char, 32> text;
+    const char* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+    return *this << std::string_view(text.data(), static_cast<std::size_t>(end - text.data()));
+  }
+  template <class T>
+  void put(const T& value) {
+    *this << std::string_view(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  void flush() {
+    sink_(bytes_);
+    bytes_.clear();
+  }
+
+private:
+  static constexpr std::size_t piece = 1 << 18;
+  const Sink& sink_;
+  std::string bytes_;
+};
+
+} // namespace gewebe::tet

@@ -1,0 +1,608 @@
+// Tetrahedral meshes through files: what we write comes back bit for bit, what others write is
+// read, what is broken is one error.
+
+#include "base/error.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "scratch.h"
+#include "tet_fixtures.h"
+#include "tetrahedra/boundary.h"
+#include "tetrahedra/check.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::same_bytes;
+
+const std::vector<Kind> in_memory{Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit};
+
+std::string with_place(const Error& error) {
+  return error.place() + ": " + error.what();
+}
+
+std::string complaint(const std::string& bytes, Kind kind) {
+  try {
+    (void)tet_mesh_from_bytes(bytes, "m", kind);
+  } catch (const Error& error) {
+    return with_place(error);
+  }
+  return "";
+}
+
+std::string complaint(const TetgenFiles& bytes) {
+  try {
+    (void)tet_mesh_from_tetgen(bytes, {"m.node", "m.ele"});
+  } catch (const Error& error) {
+    return with_place(error);
+  }
+  return "";
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+/// Two tetrahedra with a face in common, by nodes with every kind of double.
+TetMesh strange() {
+  TetMesh mesh;
+  mesh.points = {{0.1, -0.0, 1e-300}, {1.0 / 3, 5e-324, 0},     {0, M_PI, -1e300},
+                 {-7, 1, 2},          {1e22, 123456789.125, 1}, {0, 0, 0}};
+  mesh.tetrahedra = {{0, 1, 2, 3}, {1, 4, 3, 2}};
+  return mesh;
+}
+
+/// All meshes that a round trip is made of.
+std::vector<TetMesh> meshes() {
+  std::vector<TetMesh> all{strange()};
+  for (const bool quadratic : {false, true})
+    for (const bool material : {false, true})
+      all.push_back(test::odd_tetrahedra(quadratic, material));
+  all.push_back(strange()); // the largest material, and none of 0
+  all.back().material = {INT32_MAX, 3};
+  all.push_back(strange()); // 0 where 1, the first entity, is taken
+  all.back().material = {1, 0};
+  all.push_back({}); // nothing at all
+  all.back().points = {{1, 2, 3}};
+  return all;
+}
+
+template <class T>
+void put(std::string& bytes, T value, bool swap = false) {
+  std::array<char, sizeof(T)> raw;
+  std::memcpy(raw.data(), &value, sizeof(T));
+  if (swap)
+    std::reverse(raw.begin(), raw.end());
+  bytes.append(raw.data(), raw.size());
+}
+
+// ---- What we write
+
+TEST(TetFile, RoundTripsBitForBit) {
+  int n = 0;
+  for (const TetMesh& mesh : meshes()) {
+    for (const Kind kind : in_memory) {
+      const std::string bytes = tet_mesh_bytes(mesh, kind);
+      TetReadStats stats;
+      const TetMesh again = tet_mesh_from_bytes(bytes, "m", kind, &stats);
+      EXPECT_TRUE(same_bytes(again, mesh)) << n << " " << kind_name(kind);
+      EXPECT_EQ(tet_mesh_bytes(again, kind), bytes) << n << " " << kind_name(kind);
+      EXPECT_EQ(stats.skipped_elements + stats.skipped_properties, 0U);
+      const Kind told = kind_from_magic(bytes.substr(0, 4096));
+      EXPECT_EQ(told, kind == Kind::msh4 ? Kind::msh : kind);
+      EXPECT_TRUE(holds_tetrahedra(bytes.substr(0, 4096), told));
+    }
+    const TetgenFiles files = tetgen_bytes(mesh);
+    const TetMesh again = tet_mesh_from_tetgen(files, {"m.node", "m.ele"});
+    EXPECT_TRUE(mesh.tetrahedra.empty() || same_bytes(again, mesh)) << n;
+    EXPECT_TRUE(same_bytes(again.points, mesh.points)) << n;
+    ++n;
+  }
+}
+
+TEST(TetFile, MaterialThatIsZeroEverywhere) {
+  TetMesh mesh = strange();
+  mesh.material = {0, 0};
+  for (const Kind kind : {Kind::ply, Kind::vtu, Kind::msh, Kind::msh4})
+    EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(tet_mesh_bytes(mesh, kind), "m", kind), mesh));
+  EXPECT_TRUE(same_bytes(tet_mesh_from_tetgen(tetgen_bytes(mesh), {"n", "e"}), mesh));
+  EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(tet_mesh_bytes(mesh, Kind::medit), "m", Kind::medit),
+                         strange()));
+}
+
+TEST(TetFile, PlyShowsTheBoundaryAsFaces) {
+  const TetMesh mesh = test::box_tetrahedra(2, 2, 2);
+  const std::string bytes = tet_mesh_bytes(mesh, Kind::ply);
+  EXPECT_TRUE(bytes.starts_with(
+      "ply\nformat binary_little_endian 1.0\ncomment gewebe_tetmesh, millimetres\n"
+      "element vertex 27\nproperty double x\nproperty double y\nproperty double z\n"
+      "element face 48\nproperty list uchar int vertex_indices\n"
+      "element tetrahedron 48\nproperty list uchar int vertex_indices\nend_header\n"));
+  EXPECT_FALSE(holds_tetrahedra("ply\nformat ascii 1.0\nelement face 3\nend_header\n\nelement "
+                                "tetrahedron 1",
+                                Kind::ply));
+}
+
+TEST(TetFile, TetgenIsTwoFilesByEitherName) {
+  const TetMesh mesh = test::odd_tetrahedra(true, true);
+  for (const std::string suffix : {".node", ".ele"}) {
+    const ScratchFile file(suffix);
+    const std::string stem = file.path().substr(0, file.path().size() - suffix.size());
+    const std::string other = stem + (suffix == ".node" ? ".ele" : ".node");
+    {
+      Output output(file.path(), {});
+      write_tet_mesh(output, mesh, kind_from_suffix(file.path()));
+      output.commit();
+    }
+    for (const std::string& name : {file.path(), other}) {
+      Input input(name);
+      TetReadOptions options;
+      options.kind = input_kind(input.peek(4096), name, "");
+      EXPECT_EQ(options.kind, Kind::tetgen);
+      EXPECT_TRUE(same_bytes(read_tet_mesh(input, options), mesh));
+    }
+    (void)std::remove(other.c_str());
+    try {
+      Input input(file.path());
+      (void)read_tet_mesh(input, {.kind = Kind::tetgen});
+      FAIL() << "half a mesh was read";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.place(), other);
+    }
+  }
+  const ScratchFile file(".txt");
+  Output output(file.path(), {});
+  EXPECT_THROW(write_tet_mesh(output, mesh, Kind::tetgen), Error);
+}
+
+TEST(TetFile, ScalesAndDropsWhereAsked) {
+  const ScratchFile file(".vtu");
+  TetMesh mesh = test::box_tetrahedra(1, 1, 1);
+  mesh.points.insert(mesh.points.begin(), {7, 7, 7});
+  for (Tetrahedron& t : mesh.tetrahedra)
+    for (std::uint32_t& node : t)
+      ++node;
+  Output output(file.path(), {});
+  write_tet_mesh(output, mesh, Kind::vtu);
+  output.commit();
+  Input input(file.path());
+  TetReadStats stats;
+  const TetMesh read =
+      read_tet_mesh(input, {.kind = Kind::vtu, .scale = 10, .drop_unused = true}, &stats);
+  EXPECT_EQ(stats.dropped_points, 1U);
+  EXPECT_EQ(read.tetrahedra, test::box_tetrahedra(1, 1, 1).tetrahedra);
+  EXPECT_EQ(read.points, test::box_tetrahedra(1, 1, 1, 10).points);
+}
+
+TEST(TetFile, KindsByName) {
+  EXPECT_EQ(kind_from_suffix("a.VTU"), Kind::vtu);
+  EXPECT_EQ(kind_from_suffix("a.msh"), Kind::msh);
+  EXPECT_EQ(kind_from_suffix("a.mesh"), Kind::medit);
+  EXPECT_EQ(kind_from_suffix("a.1.node"), Kind::tetgen);
+  EXPECT_EQ(kind_from_suffix("a.1.ele"), Kind::tetgen);
+  EXPECT_EQ(kind_from_suffix("a.msh4"), Kind::unknown);
+  EXPECT_EQ(kind_from_suffix("a.tetgen"), Kind::unknown);
+  for (const Kind kind : writable_tet_kinds())
+    EXPECT_EQ(kind_from_name(kind_name(kind)), kind);
+  EXPECT_EQ(kind_from_name("mesh"), Kind::ply);
+  EXPECT_EQ(kind_from_magic("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">"), Kind::unknown);
+  EXPECT_EQ(kind_from_magic("# a\n\nMeshVersionFormatted 2"), Kind::medit);
+  EXPECT_EQ(complaint("", Kind::obj),
+            "m: obj has no tetrahedra, expected one of ply, vtu, msh, medit, tetgen by content, "
+            "suffix or --format");
+}
+
+// ---- What others write
+
+const char* const gmsh2 =
+    "$Comments\nby hand\n$EndComments\n$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    "$PhysicalNames\n1\n3 7 \"a b\"\n$EndPhysicalNames\n"
+    "$Nodes\n5\n10 0 0 0\n3 1 0 0\n4 0 1 0\n5 0 0 1\n99 1 1 1.5e0\n$EndNodes\n"
+    "$Elements\n4\n1 15 2 0 1 10\n2 2 2 1 1 10 3 4\n3 4 3 7 1 0 10 3 4 5\n"
+    "4 4 2 8 2 3 4 5 99\n$EndElements\n";
+
+TEST(TetFile, GmshByHand) {
+  TetReadStats stats;
+  const TetMesh mesh = tet_mesh_from_bytes(gmsh2, "m", Kind::msh, &stats);
+  EXPECT_EQ(stats.skipped_elements, 2U);
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}, {1, 2, 3, 4}}));
+  EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{7, 8}));
+  EXPECT_EQ(mesh.points[4], Vec3({1, 1, 1.5}));
+  EXPECT_EQ(kind_from_magic(gmsh2), Kind::msh);
+  // Without groups it is the entities, if there are several.
+  std::string text =
+      replaced(replaced(gmsh2, "3 4 3 7 1 0", "3 4 2 0 1"), "4 4 2 8 2", "4 4 2 0 2");
+  EXPECT_EQ(tet_mesh_from_bytes(text, "m", Kind::msh).material, (std::vector<std::int32_t>{1, 2}));
+  text = replaced(text, "4 4 2 0 2", "4 4 2 0 1");
+  EXPECT_TRUE(tet_mesh_from_bytes(text, "m", Kind::msh).material.empty());
+  text = replaced(text, "4 4 2 0 1", "4 4 0"); // no tags at all
+  EXPECT_EQ(tet_mesh_from_bytes(text, "m", Kind::msh).tetrahedra.size(), 2U);
+}
+
+TEST(TetFile, Gmsh4ByHand) {
+  const std::string text =
+      "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+      "$Entities\n1 0 0 2\n1 0 0 0 0\n4 0 0 0 1 1 1 2 9 8 0\n5 0 0 0 1 1 1 0 0\n$EndEntities\n"
+      "$Nodes\n2 5 3 99\n0 1 0 1\n10\n0 0 0\n3 4 1 4\n3\n4\n5\n99\n1 0 0 .1 .2 .3\n0 1 0 0 0 0\n"
+      "0 0 1 0 0 0\n1 1 1.5 0 0 0\n$EndNodes\n"
+      "$Elements\n3 3 1 3\n0 1 15 1\n1 10\n3 4 4 1\n2 10 3 4 5\n3 5 4 1\n3 3 4 5 99\n$EndElements\n"
+      "$NodeData\nanything 1 2 3\n$EndNodeData\n";
+  TetReadStats stats;
+  const TetMesh mesh = tet_mesh_from_bytes(text, "m", Kind::msh, &stats);
+  EXPECT_EQ(stats.skipped_elements, 1U);
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}, {1, 2, 3, 4}}));
+  EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{9, 0}));
+}
+
+TEST(TetFile, GmshBinaryOfVersion2AndTheOtherEndian) {
+  for (const bool swap : {false, true}) {
+    const TetMesh mesh = test::odd_tetrahedra(true, true);
+    std::string bytes = "$MeshFormat\n2.2 1 8\n";
+    put(bytes, std::int32_t{1}, swap);
+    bytes += "\n$EndMeshFormat\n$Nodes\n" + std::to_string(mesh.points.size()) + "\n";
+    for (std::size_t p = 0; p < mesh.points.size(); ++p) {
+      put(bytes, static_cast<std::int32_t>(p + 5), swap);
+      for (const double x : {mesh.points[p].x, mesh.points[p].y, mesh.points[p].z})
+        put(bytes, x, swap);
+    }
+    bytes += "\n$EndNodes\n$Elements\n" + std::to_string(mesh.tetrahedra.size() + 1) + "\n";
+    const auto integers = [&](const std::vector<std::uint32_t>& numbers) {
+      for (const std::uint32_t number : numbers)
+        put(bytes, number, swap);
+    };
+    integers({2, 1, 2, 1, 5, 6, 7, 5, 6});
+    integers({11, static_cast<std::uint32_t>(mesh.tetrahedra.size()), 2});
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+      const Tetrahedron& c = mesh.tetrahedra[t];
+      const EdgeMiddles& m = mesh.middles[t];
+      integers({static_cast<std::uint32_t>(t), static_cast<std::uint32_t>(mesh.material[t]), 1,
+                c[0] + 5, c[1] + 5, c[2] + 5, c[3] + 5, m[0] + 5, m[1] + 5, m[2] + 5, m[3] + 5,
+                m[5] + 5, m[4] + 5});
+    }
+    bytes += "\n$EndElements\n";
+    TetReadStats stats;
+    EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(bytes, "m", Kind::msh, &stats), mesh));
+    EXPECT_EQ(stats.skipped_elements, 1U);
+  }
+}
+
+const char* const medit = "MeshVersionFormatted\n1 # a comment\n\nDimension\n3\n"
+                          "Vertices 4 0 0 0 1  1 0 0 1  0 1 0 1  0 0 1 1\n"
+                          "Edges 1 1 2 3\nTriangles\n2\n1 2 3 4\n2 3 4 0\nCorners 2 1 2\n"
+                          "Normals 1\n 0.5 -1e-3 2\n"
+                          "Tetrahedra\n1\n1 2 3 4 12\nHexahedra 0\nEnd\n";
+
+TEST(TetFile, MeditByHand) {
+  TetReadStats stats;
+  const TetMesh mesh = tet_mesh_from_bytes(medit, "m", Kind::medit, &stats);
+  EXPECT_EQ(stats.skipped_elements, 3U);
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{12}));
+  EXPECT_NEAR(volume(mesh), 1.0 / 6, 1e-16);
+}
+
+TEST(TetFile, TetgenByHand) {
+  const TetgenFiles files{"# nodes\n4 3 1 1\n1 0 0 0 0.5 1 # first\n2 1 0 0 0.5 1\n\n3 0 1 0 .5 0\n"
+                          "4 0 0 1 -1 0\n",
+                          "1 4 2\n1 1 2 3 4 6 0.25\n# the end\n"};
+  const TetMesh mesh = tet_mesh_from_tetgen(files, {"m.node", "m.ele"});
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{6}));
+}
+
+TEST(TetFile, PlyByHand) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement tetrahedron 1\nproperty uchar material\n"
+      "property list uchar uint vertex_index\nproperty float quality\nelement vertex 4\n"
+      "property float z\nproperty float y\nproperty float x\nproperty float nx\n"
+      "element edge 1\nproperty int a\nend_header\n3 4 0 1 2 3 0.5\n0 0 0 1\n0 0 1 1\n0 1 0 1\n"
+      "1 0 0 1\n5\n";
+  TetReadStats stats;
+  const TetMesh mesh = tet_mesh_from_bytes(text, "m", Kind::ply, &stats);
+  EXPECT_EQ(stats.skipped_elements, 1U);
+  EXPECT_EQ(stats.skipped_properties, 2U);
+  EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{3}));
+  EXPECT_NEAR(volume(mesh), 1.0 / 6, 1e-16);
+}
+
+// ---- VTU, however it is stored
+
+struct VtuStyle {
+  bool text = false, appended = false, base64 = false, zlib = false, big = false, wide = false;
+};
+
+std::string base64(const std::string& bytes) {
+  const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t n = 0; n < bytes.size(); n += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      bits = bits << 8U | (n + k < bytes.size() ? static_cast<std::uint8_t>(bytes[n + k]) : 0U);
+    for (std::uint32_t k = 0; k < 4; ++k)
+      text += n + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63U];
+  }
+  return text;
+}
+
+class VtuWriter {
+public:
+  explicit VtuWriter(const VtuStyle& style) : style_(style) {}
+
+  template <class T>
+  void array(const char* type, const char* name, const std::vector<T>& values,
+             const char* components = "") {
+    xml_ += std::string("<DataArray type='") + type + "' Name='" + name + "' " + components;
+    if (style_.text) {
+      xml_ += ">\n";
+      for (const T value : values)
+        xml_ += std::to_string(value) + "\n";
+    } else {
+      std::string data;
+      for (const T value : values)
+        put(data, value, style_.big);
+      const std::string stored = store(data);
+      if (style_.appended) {
+        xml_ += "format='appended' offset='" + std::to_string(appended_.size()) + "'>";
+        xml_ += "<InformationKey name='L2' location='x'><Value>1</Value></InformationKey>";
+        appended_ += stored;
+      } else {
+        xml_ += "format='binary'>\n<InformationKey name='x'> 1 </InformationKey>\n" + stored + "\n";
+      }
+    }
+    xml_ += "</DataArray>\n";
+  }
+
+  std::string write(const TetMesh& mesh) {
+    std::vector<double> points;
+    std::vector<std::int64_t> nodes, offsets, types, material;
+    for (const Vec3& p : mesh.points)
+      points.insert(points.end(), {p.x, p.y, p.z});
+    nodes = {0, 1, 2}; // a triangle first
+    offsets = {3};
+    types = {5};
+    material = {77};
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+      nodes.insert(nodes.end(), mesh.tetrahedra[t].begin(), mesh.tetrahedra[t].end());
+      if (!mesh.middles.empty())
+        nodes.insert(nodes.end(), mesh.middles[t].begin(), mesh.middles[t].end());
+      offsets.push_back(static_cast<std::int64_t>(nodes.size()));
+      types.push_back(mesh.middles.empty() ? 10 : 24);
+      material.push_back(mesh.material[t]);
+    }
+    xml_ =
+        std::string("<?xml version=\"1.0\"?><!-- <Piece> -->\n<VTKFile type='UnstructuredGrid' ") +
+        "version='1.0' byte_order='" + (style_.big ? "BigEndian" : "LittleEndian") + "' " +
+        (style_.wide ? "header_type='UInt64' " : "") +
+        (style_.zlib ? "compressor='vtkZLibDataCompressor'" : "") +
+        "><UnstructuredGrid>\n<FieldData><DataArray type='Int32' Name='x' "
+        "format='ascii'>1</DataArray></FieldData><Piece NumberOfPoints='" +
+        std::to_string(mesh.points.size()) + "' NumberOfCells='" + std::to_string(types.size()) +
+        "'>\n<CellData>";
+    array("Int32", "material", std::vector<std::int32_t>(material.begin(), material.end()));
+    xml_ += "</CellData><Points>";
+    array("Float64", "Points", points, "NumberOfComponents='3'");
+    xml_ += "</Points><Cells>";
+    array("Int64", "connectivity", nodes);
+    array("UInt32", "offsets", std::vector<std::uint32_t>(offsets.begin(), offsets.end()));
+    array("UInt8", "types", std::vector<std::uint8_t>(types.begin(), types.end()));
+    xml_ += "</Cells></Piece></UnstructuredGrid>\n";
+    if (style_.appended)
+      xml_ += std::string("<AppendedData encoding='") + (style_.base64 ? "base64" : "raw") +
+              "'>\n  _" + appended_ + "\n</AppendedData>\n";
+    return xml_ + "</VTKFile>\n";
+  }
+
+private:
+  void size(std::string& to, std::uint64_t number) const {
+    if (style_.wide)
+      put(to, number, style_.big);
+    else
+      put(to, static_cast<std::uint32_t>(number), style_.big);
+  }
+
+  std::string store(const std::string& data) const {
+    const bool coded = style_.base64 || !style_.appended;
+    std::string head, body = data;
+    if (!style_.zlib) {
+      size(head, data.size());
+      return coded ? base64(head + body) : head + body;
+    }
+    constexpr std::size_t block = 100;
+    body.clear();
+    const std::size_t blocks = (data.size() + block - 1) / block;
+    size(head, blocks);
+    size(head, block);
+    size(head, data.size() % block);
+    for (std::size_t n = 0; n < blocks; ++n) {
+      const std::string part = data.substr(n * block, block);
+      uLongf packed = compressBound(static_cast<uLong>(part.size()));
+      std::string bytes(packed, '\0');
+      (void)compress(reinterpret_cast<Bytef*>(bytes.data()), &packed,
+                     reinterpret_cast<const Bytef*>(part.data()), static_cast<uLong>(part.size()));
+      body.append(bytes, 0, packed);
+      size(head, packed);
+    }
+    return coded ? base64(head) + base64(body) : head + body;
+  }
+
+  VtuStyle style_;
+  std::string xml_, appended_;
+};
+
+TEST(TetFile, VtuHoweverItIsStored) {
+  for (const bool quadratic : {false, true}) {
+    const TetMesh mesh = test::odd_tetrahedra(quadratic, true);
+    std::vector<VtuStyle> styles;
+    for (const bool big : {false, true})
+      for (const bool wide : {false, true})
+        for (const bool zlib : {false, true})
+          for (const auto& [appended, coded] :
+               {std::pair(false, true), std::pair(true, true), std::pair(true, false)})
+            styles.push_back({false, appended, coded, zlib, big, wide});
+    for (std::size_t n = 0; n < styles.size(); ++n) {
+      const std::string bytes = VtuWriter(styles[n]).write(mesh);
+      ASSERT_EQ(complaint(bytes, Kind::vtu), "") << n << bytes.substr(0, 600);
+      TetReadStats stats;
+      EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(bytes, "m", Kind::vtu, &stats), mesh)) << n;
+      EXPECT_EQ(stats.skipped_elements, 1U);
+    }
+    VtuStyle text;
+    text.text = true;
+    const TetMesh read = tet_mesh_from_bytes(VtuWriter(text).write(mesh), "m", Kind::vtu);
+    EXPECT_EQ(read.tetrahedra, mesh.tetrahedra);
+    EXPECT_EQ(read.middles, mesh.middles);
+    EXPECT_EQ(read.material, mesh.material);
+    for (std::size_t p = 0; p < mesh.points.size(); ++p) // std::to_string has six digits
+      EXPECT_LT(norm(read.points[p] - mesh.points[p]), 2e-6);
+  }
+}
+
+// ---- What is broken
+
+/// An Error, or a mesh that passes. Nothing else may come of any bytes.
+bool is_mesh(const std::string& bytes, Kind kind) {
+  try {
+    check_mesh(tet_mesh_from_bytes(bytes, "m", kind));
+    return true;
+  } catch (const Error& error) {
+    EXPECT_FALSE(error.place().empty()) << error.what();
+    return false;
+  }
+}
+
+std::vector<std::pair<Kind, std::string>> samples() {
+  std::vector<std::pair<Kind, std::string>> all;
+  TetMesh mesh = strange();
+  mesh.material = {1, 4};
+  for (const Kind kind : in_memory)
+    all.emplace_back(kind, tet_mesh_bytes(mesh, kind));
+  all.emplace_back(Kind::msh, gmsh2);
+  all.emplace_back(Kind::medit, medit);
+  VtuStyle style;
+  style.zlib = true;
+  all.emplace_back(Kind::vtu, VtuWriter(style).write(mesh));
+  style.text = true;
+  all.emplace_back(Kind::vtu, VtuWriter(style).write(mesh));
+  return all;
+}
+
+TEST(TetFile, EveryPrefixIsAnError) {
+  for (const auto& [kind, bytes] : samples()) {
+    ASSERT_TRUE(is_mesh(bytes, kind));
+    // Behind the last word blanks may lack, and in Medit all that follows the tetrahedra.
+    const std::size_t end =
+        kind == Kind::medit ? bytes.rfind("\n1 ") + 1 : bytes.find_last_not_of(" \n") + 1;
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+      EXPECT_FALSE(is_mesh(bytes.substr(0, size), kind) && size < end)
+          << kind_name(kind) << " " << size << " of " << bytes.size();
+  }
+  const TetgenFiles files = tetgen_bytes(strange());
+  for (std::size_t size = 0; size + 2 < files.node.size(); ++size)
+    EXPECT_NE(complaint({files.node.substr(0, size), files.ele}), "");
+  for (std::size_t size = 0; size + 2 < files.ele.size(); ++size)
+    EXPECT_NE(complaint({files.node, files.ele.substr(0, size)}), "");
+}
+
+TEST(TetFile, EveryChangedByteIsAnErrorOrAMesh) {
+  std::mt19937 random(11);
+  for (const auto& [kind, bytes] : samples())
+    for (std::size_t n = 0; n < bytes.size(); ++n)
+      for (int round = 0; round < 3; ++round) {
+        std::string changed = bytes;
+        changed[n] =
+            static_cast<char>(round == 0 ? bytes[n] ^ 0x80 : static_cast<int>(random() % 256));
+        (void)is_mesh(changed, kind);
+        changed = bytes.substr(0, n) + bytes.substr(n + 1 + random() % 40 % (bytes.size() - n));
+        (void)is_mesh(changed, kind);
+      }
+  const TetgenFiles files = tetgen_bytes(strange());
+  for (std::size_t n = 0; n < files.node.size() + files.ele.size(); ++n) {
+    TetgenFiles changed = files;
+    std::string& text = n < files.node.size() ? changed.node : changed.ele;
+    text[n < files.node.size() ? n : n - files.node.size()] = static_cast<char>(random() % 256);
+    (void)complaint(changed);
+  }
+}
+
+TEST(TetFile, BadContentIsNamedWithItsPlace) {
+  const auto gmsh = [](const char* from, const char* to) {
+    return complaint(replaced(gmsh2, from, to), Kind::msh);
+  };
+  EXPECT_EQ(gmsh("2.2 0 8", "4 0 8"), "m:5: version \"4\", expected 2.2 or 4.1");
+  EXPECT_EQ(gmsh("3 4 5 99", "3 4 5 98"), "m:24: an element with node 98, which is not there");
+  EXPECT_EQ(gmsh("2 2 2 1 1 10 3 4", "2 5 2 1 1 10 3 4 5 3 4 5 3"),
+            "m:22: hexahedra, expected tetrahedra of 4 or 10 nodes");
+  EXPECT_EQ(gmsh("2 2 2 1 1 10 3 4", "2 29 2 1 1 10 3 4"),
+            "m:22: tetrahedra of over 10 nodes, expected tetrahedra of 4 or 10 nodes");
+  EXPECT_EQ(gmsh("\n3 1 0 0", "\n10 1 0 0"), "m:17: two nodes of number 10, expected one");
+  EXPECT_EQ(gmsh("\n3 1 0 0", "\n3 1 nan 0"), "m:14: \"nan\", expected y, a finite number");
+  EXPECT_EQ(gmsh("$Nodes\n5", "$Nodes\n4"), "m:17: expected $EndNodes");
+  EXPECT_EQ(gmsh("$Nodes\n5", "$Nodes\n500000"),
+            "m:12: 500000 nodes in 153 bytes, expected a count that fits");
+  EXPECT_EQ(gmsh("1.5e0", "1e999"), "m:17: \"1e999\", expected z, a finite number");
+
+  const auto in_medit = [](const char* from, const char* to) {
+    return complaint(replaced(medit, from, to), Kind::medit);
+  };
+  EXPECT_EQ(in_medit("1 2 3 4 12", "1 2 3 5 12"), "m:17: vertex 5, expected 1 to 4");
+  EXPECT_EQ(in_medit("1 2 3 4 12", "1 2 3 4 -2"), "m:17: material -2, expected 0 to 2147483647");
+  EXPECT_EQ(in_medit("Dimension\n3", "Dimension\n2"),
+            "m:5: a mesh of another dimension, expected 3");
+  EXPECT_EQ(in_medit("Hexahedra 0", "Hexahedra 1 1 1 1 1 1 1 1 1 1"),
+            "m:18: Hexahedra, expected tetrahedra of 4 or 10 nodes in the usual order");
+  EXPECT_EQ(in_medit("End\n", "TetrahedraP2 1\n1 2 3 4 1 2 3 4 1 2 0"),
+            "m:20: tetrahedra of 4 and of 10 nodes, expected one order");
+  EXPECT_EQ(in_medit("Vertices 4", "Vertices 4000000000"),
+            "m:6: 4000000000 vertices in 155 bytes, expected a count that fits");
+
+  VtuStyle style;
+  style.text = true;
+  TetMesh mesh = strange();
+  mesh.material = {1, 4};
+  for (Vec3& p : mesh.points)
+    p = {1, 2, 3};
+  const std::string text = VtuWriter(style).write(mesh);
+  const auto in_vtu = [&](const char* from, const char* to) {
+    return complaint(replaced(text, from, to), Kind::vtu);
+  };
+  EXPECT_EQ(in_vtu("5\n10\n10", "5\n10\n12"),
+            "m:47: hexahedra, expected tetrahedra of 4 or 10 nodes");
+  EXPECT_EQ(in_vtu("NumberOfPoints='6'", "NumberOfPoints='4'"), "m:9: more than 12 numbers");
+  EXPECT_EQ(in_vtu("NumberOfPoints='6'", "NumberOfPoints='4000000000'"),
+            "m:9: 12000000000 numbers in 163 bytes, expected a count that fits");
+  EXPECT_EQ(in_vtu("LittleEndian", "MiddleEndian"),
+            "m:2: byte_order \"MiddleEndian\", expected LittleEndian or BigEndian");
+  EXPECT_EQ(in_vtu("version='1.0'", "compressor='vtkLZ4DataCompressor'"),
+            "m:2: data packed by \"vtkLZ4DataCompressor\", expected vtkZLibDataCompressor or none");
+  EXPECT_EQ(in_vtu("'connectivity'", "'conectivity'"),
+            "m: no DataArray Cells/connectivity, expected one");
+
+  const TetgenFiles files = tetgen_bytes(strange());
+  EXPECT_EQ(complaint({files.node, replaced(files.ele, "2 4 0", "2 5 0")}),
+            "m.ele:2: tetrahedra of 5 nodes, expected 4 or 10");
+  EXPECT_EQ(complaint({files.node, replaced(files.ele, "0 1 2 3", "0 1 2 6")}),
+            "m.ele:3: point 6, expected 0 to below 6");
+  EXPECT_EQ(complaint({replaced(files.node, "\n3 ", "\n4 "), files.ele}),
+            "m.node:6: point 4, expected 3");
+  const std::string ply = tet_mesh_bytes(strange(), Kind::ply);
+  EXPECT_EQ(complaint(replaced(ply, "tetrahedron 2", "tetrahedron 3"), Kind::ply),
+            "m: byte 491: 3 elements \"tetrahedron\" in 34 bytes, expected a count that fits");
+  EXPECT_EQ(complaint(replaced(ply, "element tetrahedron", "element other"), Kind::ply),
+            "m: a PLY file without the element tetrahedron, expected that");
+}
+
+} // namespace
+} // namespace gewebe
