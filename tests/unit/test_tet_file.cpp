@@ -15,7 +15,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <random>
 #include <string>
 #include <utility>
@@ -602,6 +604,44 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
             "m: byte 491: 3 elements \"tetrahedron\" in 34 bytes, expected a count that fits");
   EXPECT_EQ(complaint(replaced(ply, "element tetrahedron", "element other"), Kind::ply),
             "m: a PLY file without the element tetrahedron, expected that");
+}
+
+// ---- Other programs (tests/contract/tet_files.sh)
+
+// Writes a mesh in every format into a folder, $GEWEBE_TET_FILES if that is set, and reads it; what
+// lies in its folder `other` is written as TetGen's, in text, beside each file.
+TEST(TetFile, ForOtherPrograms) {
+  const char* const given = std::getenv("GEWEBE_TET_FILES");
+  const ScratchFile own(".folder");
+  const std::string folder = given != nullptr ? given : own.path() + ".d";
+  std::filesystem::create_directories(folder);
+  const auto read = [](const std::string& path) {
+    Input input(path);
+    return read_tet_mesh(input, {.kind = input_kind(input.peek(4096), path, "")});
+  };
+  const auto write = [](const std::string& path, const TetMesh& mesh, Kind kind) {
+    Output output(path, {});
+    write_tet_mesh(output, mesh, kind);
+    output.commit();
+  };
+  for (const bool quadratic : {false, true}) {
+    const std::string stem = folder + (quadratic ? "/quadratic" : "/linear");
+    const TetMesh mesh = test::odd_tetrahedra(quadratic, true);
+    for (const char* const suffix : {".ply", ".vtu", ".msh", ".4.msh", ".mesh", ".node"}) {
+      write(stem + suffix, mesh,
+            suffix == std::string(".4.msh") ? Kind::msh4 : kind_from_suffix(suffix));
+      EXPECT_TRUE(same_bytes(read(stem + suffix), mesh)) << suffix;
+    }
+  }
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder + "/other", none)) {
+    const std::string path = entry.path();
+    const TetMesh mesh = read(path);
+    EXPECT_NO_THROW(require_sound(examine_tetrahedra(mesh))) << path;
+    write(path + ".node", mesh, Kind::tetgen);
+  }
+  if (given == nullptr)
+    std::filesystem::remove_all(folder);
 }
 
 } // namespace
