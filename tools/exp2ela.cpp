@@ -130,9 +130,9 @@ void work(cli::Run& run, ModelArguments& a) {
     run.stats().set(key, count);
   run.stats().set("total_mass", total_mass(model));
   const std::vector<double> steps = safe_steps(model);
-  const auto least = std::min_element(steps.begin(), steps.end());
-  run.stats().set("safe_step", *least);
-  run.stats().set("safe_step_node", static_cast<std::uint64_t>(least - steps.begin()));
+  const auto min = std::min_element(steps.begin(), steps.end());
+  run.stats().set("safe_step", *min);
+  run.stats().set("safe_step_node", static_cast<std::uint64_t>(min - steps.begin()));
   run.stats().set("digest", model_digest(model));
 }
 

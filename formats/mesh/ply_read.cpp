@@ -58,17 +58,17 @@ public:
 private:
   // Nothing is reserved for a count that the bytes left can't hold.
   void check_room(const Element& element) const {
-    std::size_t least = 0;
+    std::size_t min = 0;
     for (const Property& p : element.properties) {
-      least += Source::min_size(p.count_type.value_or(p.type));
+      min += Source::min_size(p.count_type.value_or(p.type));
       if (p.use == Use::indices)
-        least += 3 * Source::min_size(p.type);
+        min += 3 * Source::min_size(p.type);
     }
-    if (least > 0 && element.count > source_.left() / least)
+    if (min > 0 && element.count > source_.left() / min)
       source_.fail(std::to_string(element.count) + " elements " + quoted(element.name) + " in " +
                    std::to_string(source_.left()) + " bytes, expected at least " +
-                   std::to_string(least) + " bytes for each");
-    if (least > 0 && element.count >= UINT32_MAX)
+                   std::to_string(min) + " bytes for each");
+    if (min > 0 && element.count >= UINT32_MAX)
       source_.fail(std::to_string(element.count) + " elements, expected fewer than " +
                    std::to_string(UINT32_MAX));
   }

@@ -179,7 +179,7 @@ What parse_displace(Words& in) {
   ChangeCommand c = parse_about(in, {});
   SetDisplacement set;
   set.displacement = in.vector("number");
-  set.over = in.time_after("over");
+  set.duration = in.time_after("over");
   c.change = set;
   return c;
 }
@@ -239,7 +239,7 @@ What parse_move(Words& in) {
   MoveInstrument move;
   move.place = in.vector("number");
   move.turn = parse_turn(in);
-  move.over = in.time_after("over");
+  move.duration = in.time_after("over");
   c.change = move;
   return c;
 }

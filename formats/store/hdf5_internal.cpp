@@ -432,9 +432,9 @@ Dataset Group::create_growing(const std::string& name, Number type, const Shape&
   if (chunk.size() > 1 && bytes > max_chunk)
     chunk[1] = std::max<std::uint64_t>(1, chunk[1] / ((bytes - 1) / max_chunk + 1));
   const Handle made = properties(H5P_DATASET_CREATE);
-  std::vector<hsize_t> dims = dims_of(shape), most = dims;
-  most[0] = H5S_UNLIMITED;
-  const Handle space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), most.data()));
+  std::vector<hsize_t> dims = dims_of(shape), max_dims = dims;
+  max_dims[0] = H5S_UNLIMITED;
+  const Handle space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), max_dims.data()));
   Handle handle(-1);
   if (H5Pset_chunk(made.id(), static_cast<int>(chunk.size()), chunk.data()) >= 0)
     handle = Handle(H5Dcreate2(handle_.id(), name.c_str(), file_type(type), space.id(), H5P_DEFAULT,

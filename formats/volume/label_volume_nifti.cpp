@@ -61,20 +61,20 @@ public:
   std::int32_t units() const {
     return version_ == 1 ? get<std::uint8_t>(f_.units) : get<std::int32_t>(f_.units);
   }
-  std::uint64_t vox_offset(std::uint64_t least) const {
+  std::uint64_t vox_offset(std::uint64_t min) const {
     if (version_ == 1) {
       const double offset = real(f_.vox_offset);
       if (offset == 0)
-        return least; // as nibabel reads it
-      if (!(offset >= static_cast<double>(least) && offset <= 1e9) || offset != std::trunc(offset))
-        fail_offset(least);
+        return min; // as nibabel reads it
+      if (!(offset >= static_cast<double>(min) && offset <= 1e9) || offset != std::trunc(offset))
+        fail_offset(min);
       return static_cast<std::uint64_t>(offset);
     }
     const auto offset = get<std::int64_t>(f_.vox_offset);
     if (offset == 0)
-      return least;
-    if (offset < static_cast<std::int64_t>(least) || offset > 1000000000)
-      fail_offset(least);
+      return min;
+    if (offset < static_cast<std::int64_t>(min) || offset > 1000000000)
+      fail_offset(min);
     return static_cast<std::uint64_t>(offset);
   }
 
@@ -87,9 +87,9 @@ private:
       std::reverse(raw.begin(), raw.end());
     return std::bit_cast<T>(raw);
   }
-  [[noreturn]] void fail_offset(std::uint64_t least) const {
+  [[noreturn]] void fail_offset(std::uint64_t min) const {
     throw Error(place(f_.vox_offset), "vox_offset is wrong, expected a whole number from " +
-                                          std::to_string(least) + " to 1e9");
+                                          std::to_string(min) + " to 1e9");
   }
 
   std::string bytes_;
@@ -281,8 +281,8 @@ LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request) {
     voxels.skip(header.vox_offset(0));
     volume = read_voxels(voxels, image, layout, request);
   } else {
-    const std::uint64_t least = header.version() == 1 ? 352 : 544;
-    bytes.skip(header.vox_offset(least) - (least - 4));
+    const std::uint64_t min = header.version() == 1 ? 352 : 544;
+    bytes.skip(header.vox_offset(min) - (min - 4));
     volume = read_voxels(bytes, name, layout, request);
   }
   volume.format = header.version() == 1 ? "NIfTI-1" : "NIfTI-2";

@@ -32,14 +32,14 @@ std::size_t distance(std::string_view a, std::string_view b) {
 std::string nearest_word(std::string_view word, std::span<const std::string> known) {
   constexpr std::size_t longest = 64; // a longer one is no slip
   std::string found;
-  std::size_t least = longest;
+  std::size_t min = longest;
   if (word.empty() || word.size() > longest)
     return found;
   for (const std::string& candidate : known) {
     const bool begun = word.size() >= 3 && candidate.starts_with(word);
     const std::size_t d = begun ? 1 : distance(word, candidate);
-    if (d < least && d <= std::max(word.size(), candidate.size()) / 3) {
-      least = d;
+    if (d < min && d <= std::max(word.size(), candidate.size()) / 3) {
+      min = d;
       found = candidate;
     }
   }

@@ -29,11 +29,11 @@ std::vector<float> bounds_of(const Entry* columns, std::size_t axes) {
   std::vector<float> bounds;
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (std::size_t begin = 0; begin < axes; begin += bounded_rows) {
-      Entry most = 0;
+      Entry max = 0;
       const std::size_t end = std::min(axes, begin + bounded_rows);
       for (std::size_t r = begin; r < end; ++r)
-        most = std::max(most, std::abs(columns[axis * axes + r]));
-      bounds.push_back(rounded_up(static_cast<double>(most)));
+        max = std::max(max, std::abs(columns[axis * axes + r]));
+      bounds.push_back(rounded_up(static_cast<double>(max)));
     }
   return bounds;
 }
@@ -243,10 +243,10 @@ double ColumnCache::add(std::span<const NodeVector> forces, double allowed, cons
     taken_ += k;
     skipped_ += terms.size() - k;
   }
-  double most = 0;
+  double max = 0;
   for (const double value : left_out)
-    most = std::max(most, value);
-  return most;
+    max = std::max(max, value);
+  return max;
 }
 
 } // namespace gewebe

@@ -2,7 +2,7 @@
 
 #include "base/vector_at.h"
 #include "compliance/costs.h"
-#include "compliance/half_blocks.h"
+#include "compliance/forward_blocks.h"
 
 #include <algorithm>
 #include <utility>
@@ -47,14 +47,14 @@ void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
 }
 
 void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
-  if (HalfBlocks* const blocks = source_->blocks(); blocks != nullptr)
+  if (ForwardBlocks* const blocks = source_->blocks(); blocks != nullptr)
     blocks->need(nodes);
   else
     need(nodes);
 }
 
 ComplianceBlock Compliance::block(std::uint32_t node, std::uint32_t other) const {
-  if (const HalfBlocks* const blocks = source_->blocks(); blocks != nullptr)
+  if (const ForwardBlocks* const blocks = source_->blocks(); blocks != nullptr)
     return blocks->block(node, other);
   ComplianceBlock block{};
   for (int a = 0; a < 3; ++a)
@@ -81,8 +81,8 @@ bool Compliance::stored(std::span<const std::uint32_t> nodes) const {
 bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
   const ColumnSource* const columns = source_->columns();
   const bool single = columns != nullptr && columns->single();
-  const std::size_t most = costs::nodes_worth_a_solve(source_->entries(), axes_, single);
-  return nodes.size() <= std::min(most, capacity()) && stored(nodes);
+  const std::size_t max = costs::nodes_worth_a_solve(source_->entries(), axes_, single);
+  return nodes.size() <= std::min(max, capacity()) && stored(nodes);
 }
 
 bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int shapes) {

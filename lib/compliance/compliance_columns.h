@@ -13,7 +13,7 @@
 namespace gewebe {
 
 /// So many nodes, one behind the other from the first one on, are solved and checked together.
-inline constexpr std::size_t compliance_block = Factor::most_units / 3;
+inline constexpr std::size_t compliance_block = Factor::max_units / 3;
 
 /// Solves for the columns of `nodes` in blocks, in parallel, and hands them to `sink` in the order
 /// of `nodes` while later ones are being computed. The same bytes for any number of threads. Memory

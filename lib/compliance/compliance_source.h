@@ -17,7 +17,7 @@
 
 namespace gewebe {
 
-class HalfBlocks;
+class ForwardBlocks;
 
 /// C at the axes of a node and of another, [axis][axis of the other].
 using ComplianceBlock = std::array<std::array<double, 3>, 3>;
@@ -42,7 +42,7 @@ public:
   /// Columns of some nodes or of all, or null. They may be read without open.
   virtual const ColumnSource* columns() const { return nullptr; }
   /// Blocks between nodes for less than their columns cost, or null.
-  virtual HalfBlocks* blocks() { return nullptr; }
+  virtual ForwardBlocks* blocks() { return nullptr; }
 };
 
 /// What was computed beforehand and kept. The factor is asked for when first needed, once.

@@ -59,8 +59,8 @@ CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const Ax
     result.residual = compliance_columns(matrix, solver.factor, norm, nodes, context, sink);
     return result;
   }
-  const double most = columns.single() ? static_cast<double>(std::numeric_limits<float>::epsilon())
-                                       : max_backward_error;
+  const double max = columns.single() ? static_cast<double>(std::numeric_limits<float>::epsilon())
+                                      : max_backward_error;
   const Blocks blocks(matrix, solver, norm);
   const std::size_t each = 3 * matrix.row_of_axis.size();
   std::vector<double> kept(each * compliance_block);
@@ -72,7 +72,7 @@ CorrectedCompliance corrected_compliance(const StiffnessMatrix& matrix, const Ax
     const auto block = std::span(kept).first(each * count);
     columns.read(first, count, block);
     double error = blocks.residual(some, block);
-    if (error <= most) {
+    if (error <= max) {
       result.corrected += 3 * count;
     } else {
       blocks.solve(some, block);

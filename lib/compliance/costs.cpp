@@ -16,7 +16,7 @@ std::size_t nodes_worth_a_solve(std::size_t entries, std::size_t axes, bool sing
   return std::max<std::size_t>(1, (single ? 6 : 5) * entries / (3 * axes));
 }
 
-std::size_t most_in_block(bool stored) {
+std::size_t max_in_block(bool stored) {
   // The 1200 rows of 400 nodes take 12 MB, read twice an update. Columns that are not stored cost
   // three solves each, a fresh factor with axes held some dozens.
   return stored ? 400 : 32;
@@ -24,29 +24,28 @@ std::size_t most_in_block(bool stored) {
 
 bool columns_pay_for_shapes(std::size_t nodes, bool stored, int shapes) {
   // One node's columns cost as much as a solve; more of them pay when a second shape comes.
-  return (stored || nodes <= most_in_block(false)) && (nodes == 1 || shapes > 1);
+  return (stored || nodes <= max_in_block(false)) && (nodes == 1 || shapes > 1);
 }
 
-bool correction_pays(const CutCosts& cut) {
+bool woodbury_pays(const CutCosts& cut) {
   // Microseconds: an operation of a front, and of a solve with eight right-hand sides at a time;
-  // what a renewal and a correction do for each node, whatever is cut.
+  // what a partial refactorisation and Woodbury do for each node, whatever is cut.
   constexpr double front_operation = 0.6e-4, solve_operation = 0.6e-4;
-  constexpr double renewal_node = 0.3, correction_node = 0.3;
-  // Behind a correction contacts need columns, behind a renewal half solutions do.
+  constexpr double refactor_node = 0.3, woodbury_node = 0.3;
+  // Behind Woodbury contacts need columns, behind a refactorisation forward solves do.
   constexpr double contact_panels = 1;
   // Of all operations, what a cut reaches as long as none has told.
   constexpr double usual_reach = 0.3;
-  // Each solution takes a pass over the corrections; beyond so many it costs as much again.
+  // Each solution takes a pass over the low rank; beyond so many it costs as much again.
   constexpr std::size_t max_rank = 48;
   const auto nodes = static_cast<double>(cut.nodes);
   const double reach = cut.reached > 0 ? cut.reached : usual_reach * cut.all_operations;
-  const double renewal = nodes * renewal_node + reach * front_operation;
+  const double refactor = nodes * refactor_node + reach * front_operation;
   // One right-hand side alone takes half of what eight do.
   const double panels = cut.rank <= 1 ? 0.5 : std::ceil(static_cast<double>(cut.rank) / 8);
-  const double correction = nodes * correction_node + (panels + contact_panels) * 8 *
-                                                          solve_operation * 4 *
-                                                          static_cast<double>(cut.entries);
-  return cut.rank <= max_rank && correction < renewal;
+  const double woodbury = nodes * woodbury_node + (panels + contact_panels) * 8 * solve_operation *
+                                                      4 * static_cast<double>(cut.entries);
+  return cut.rank <= max_rank && woodbury < refactor;
 }
 
 bool order_is_worn_out(double all_operations, double fresh_operations) {

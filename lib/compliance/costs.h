@@ -32,7 +32,7 @@ inline constexpr std::size_t worth_modes = 6;
 
 /// Displaced nodes up to which forces come from their block of C; beyond, from K with their axes
 /// held. \param stored as above
-std::size_t most_in_block(bool stored);
+std::size_t max_in_block(bool stored);
 
 // ---- cuts
 
@@ -42,11 +42,12 @@ struct CutCosts {
   std::size_t rank = 0;      ///< of the change since the factor was made
   std::size_t entries = 0;   ///< doubles of L
   double all_operations = 0; ///< of all fronts
-  double reached = 0;        ///< operations of the last renewal; 0: there was none
+  double reached = 0;        ///< operations of the last refactorisation; 0: there was none
 };
 
-/// Whether to correct the solutions of the factor that there is, rather than to renew its fronts.
-bool correction_pays(const CutCosts& cut);
+/// Whether to take the factor that there is by Woodbury, rather than to refactor what the cut
+/// reaches.
+bool woodbury_pays(const CutCosts& cut);
 
 /// Whether the order of elimination is to be found anew, for following cuts has made it worse.
 /// \param all_operations of all fronts now \param fresh_operations as they were in a fresh order

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "compliance/corrected_columns.h"
 #include "compliance/costs.h"
-#include "compliance/half_blocks.h"
+#include "compliance/forward_blocks.h"
 #include "model/cut.h"
 #include "solve/condition.h"
 #include "solve/factor.h"
@@ -18,8 +18,8 @@ namespace gewebe {
 
 namespace {
 
-// Beyond this condition of the small system a renewal is worth its digits.
-constexpr double most_condition = 1e8;
+// Beyond this condition of the small system a refactorisation is worth its digits.
+constexpr double max_woodbury_condition = 1e8;
 // Below this the condition may be too large, and is looked at: by one column of C, or an estimate.
 // What moves freely takes less than ten thousand other axes with it, or else it did before the cut.
 constexpr double weak_pivot = 1e-8, column_margin = 100, estimate_margin = 3;
@@ -64,7 +64,7 @@ void tell_what_moves(const Model& model, const Context& context) {
 /// A bound of ‖K‖₁. Cuts leave no spring stiffer than it was.
 double stiffness_bound(const Model& model) {
   std::vector<double> sum(model.nodes.size());
-  double most = 0;
+  double max = 0;
   for (const Spring& s : model.springs) {
     const SymmetricBlock b = stiffness_block(model, s);
     const double largest = std::max({std::abs(b[0]) + std::abs(b[1]) + std::abs(b[2]),
@@ -72,17 +72,17 @@ double stiffness_bound(const Model& model) {
                                      std::abs(b[2]) + std::abs(b[4]) + std::abs(b[5])});
     for (const std::uint32_t i : {s.i, s.j}) {
       sum[i] += 2 * largest; // on the diagonal and beside it
-      most = sum[i] <= most ? most : sum[i];
+      max = sum[i] <= max ? max : sum[i];
     }
   }
-  return most;
+  return max;
 }
 
 /// The factor of a cut model, or one before that is corrected; columns of the first model, to be
 /// corrected; blocks where the factor is that of the model.
 class CutSource final : public ComplianceSource {
 public:
-  CutSource(AxesSolve solve, std::size_t entries, std::unique_ptr<HalfBlocks> blocks,
+  CutSource(AxesSolve solve, std::size_t entries, std::unique_ptr<ForwardBlocks> blocks,
             std::unique_ptr<CorrectedColumns> columns)
       : solve_(std::move(solve)), entries_(entries), blocks_(std::move(blocks)),
         columns_(std::move(columns)) {}
@@ -93,12 +93,12 @@ public:
   }
   std::size_t entries() const override { return entries_; }
   const ColumnSource* columns() const override { return columns_.get(); }
-  HalfBlocks* blocks() override { return blocks_.get(); }
+  ForwardBlocks* blocks() override { return blocks_.get(); }
 
 private:
   AxesSolve solve_;
   std::size_t entries_;
-  std::unique_ptr<HalfBlocks> blocks_;
+  std::unique_ptr<ForwardBlocks> blocks_;
   std::unique_ptr<CorrectedColumns> columns_;
 };
 
@@ -157,17 +157,17 @@ void CutStiffness::prepare() {
   norm_ = stiffness_bound(*now_);
   factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
   factored_ = now_;
-  correction_.reset();
+  woodbury_.reset();
   origin_ = place_ = identity(now_->nodes.size());
   fresh_operations_ = factor_->work().all_operations;
 }
 
-bool CutStiffness::correction_pays(std::size_t rank) const {
-  return costs::correction_pays({.nodes = now_->nodes.size(),
-                                 .rank = rank,
-                                 .entries = factor_->entries(),
-                                 .all_operations = factor_->work().all_operations,
-                                 .reached = reached_});
+bool CutStiffness::woodbury_pays(std::size_t rank) const {
+  return costs::woodbury_pays({.nodes = now_->nodes.size(),
+                               .rank = rank,
+                               .entries = factor_->entries(),
+                               .all_operations = factor_->work().all_operations,
+                               .reached = reached_});
 }
 
 CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
@@ -181,33 +181,33 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
-    if (!some_gone && (way ? way == CutWay::correction : correction_pays(work.rank))) {
+    if (!some_gone && (way ? way == CutWay::woodbury : woodbury_pays(work.rank))) {
       change = stiffness_change(*factored_, *now_, origin_, place_);
       work.rank = change->rank();
     }
-    if (change && (way || correction_pays(work.rank))) {
+    if (change && (way || woodbury_pays(work.rank))) {
       try {
         const std::shared_ptr<const FrontalFactor> factor = factor_;
-        auto correction = std::make_shared<const WoodburySolver>(
+        auto woodbury = std::make_shared<const WoodburySolver>(
             std::move(*change),
             [factor](std::span<double> f, std::size_t columns) { factor->solve(f, columns); },
             context_);
-        if (correction->condition() < most_condition) {
-          correction_ = std::move(correction);
-          work.way = CutWay::correction;
+        if (woodbury->condition() < max_woodbury_condition) {
+          woodbury_ = std::move(woodbury);
+          work.way = CutWay::woodbury;
           return work;
         }
       } catch (const Cancelled&) {
         throw;
       } catch (const Error&) {
-        // Singular, or nearly: a renewal tells.
+        // Singular, or nearly: a refactorisation tells.
       }
     }
-    correction_.reset();
+    woodbury_.reset();
     if (!costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
       ++*generation_;
-      factorise([&] { work.factor = factor_->renew(*now_, origin_, place_, context_); });
-      work.way = CutWay::renewal;
+      factorise([&] { work.factor = factor_->refactor(*now_, origin_, place_, context_); });
+      work.way = CutWay::refactor;
       reached_ = work.factor.operations;
       factored_ = now_;
       origin_ = place_ = identity(now_->nodes.size());
@@ -230,11 +230,11 @@ std::function<void()> CutStiffness::still_valid() const {
 
 /// Solves for the model of now.
 AxesSolve CutStiffness::solver() const {
-  return [factor = std::shared_ptr<const FrontalFactor>(factor_), correction = correction_,
+  return [factor = std::shared_ptr<const FrontalFactor>(factor_), woodbury = woodbury_,
           check = still_valid()](std::span<double> f, std::size_t columns) {
     check();
-    if (correction != nullptr)
-      correction->solve(f, columns);
+    if (woodbury != nullptr)
+      woodbury->solve(f, columns);
     else
       factor->solve(f, columns);
   };
@@ -243,11 +243,11 @@ AxesSolve CutStiffness::solver() const {
 std::shared_ptr<ComplianceSource> CutStiffness::compliance() const {
   AxesSolve solve = solver();
   std::size_t entries = factor_->entries();
-  std::unique_ptr<HalfBlocks> blocks;
-  if (correction_ == nullptr)
-    blocks = std::make_unique<HalfBlocks>(factor_, still_valid());
+  std::unique_ptr<ForwardBlocks> blocks;
+  if (woodbury_ == nullptr)
+    blocks = std::make_unique<ForwardBlocks>(factor_, still_valid());
   else
-    entries += correction_->change().rank() * factor_->axes();
+    entries += woodbury_->change().rank() * factor_->axes();
   std::unique_ptr<CorrectedColumns> columns;
   if (source_ != nullptr && source_->columns() != nullptr)
     columns = std::make_unique<CorrectedColumns>(

@@ -20,15 +20,15 @@ namespace gewebe {
 
 /// How a cut was followed.
 enum class CutWay : std::uint8_t {
-  correction, ///< the factor stays, its solutions are corrected (Woodbury)
-  renewal,    ///< the fronts that the cut reaches are computed again
-  fresh,      ///< everything is
+  woodbury, ///< the factor stays, its solutions are corrected (Sherman–Morrison–Woodbury)
+  refactor, ///< partial refactorisation: the fronts that the cut reaches are computed again
+  fresh,    ///< everything is
 };
 
 struct CutWork {
   CutWay way = CutWay::fresh;
-  std::size_t rank = 0; ///< of the correction, all cuts since the factor counted
-  FrontalWork factor;   ///< of renewal and fresh
+  std::size_t rank = 0; ///< for Woodbury, all cuts since the factor counted
+  FrontalWork factor;   ///< of refactor and fresh
 };
 
 class CutStiffness {
@@ -52,7 +52,7 @@ public:
   std::shared_ptr<ComplianceSource> compliance() const;
 
 private:
-  bool correction_pays(std::size_t rank) const;
+  bool woodbury_pays(std::size_t rank) const;
   std::function<void()> still_valid() const;
   AxesSolve solver() const;
   void require_condition();
@@ -63,11 +63,11 @@ private:
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
   std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_
   std::shared_ptr<FrontalFactor> factor_;
-  std::shared_ptr<const WoodburySolver> correction_;
+  std::shared_ptr<const WoodburySolver> woodbury_;
   std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_
   double norm_ = 0;             ///< bound of ‖K‖₁
   double fresh_operations_ = 0; ///< of the last factor with an order of its own
-  double reached_ = 0;          ///< operations of the last renewal
+  double reached_ = 0;          ///< operations of the last refactorisation
   double accepted_pivot_ = 1; ///< the weakest for which the condition was found to be small enough
 };
 

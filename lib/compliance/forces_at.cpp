@@ -13,7 +13,7 @@ namespace {
 
 constexpr double contact_tolerance = 1e-6;
 // Roundings of factors that follow their changes stay below 1000 times one.
-constexpr std::uint64_t most_changes = 1000;
+constexpr std::uint64_t max_changes = 1000;
 
 } // namespace
 
@@ -21,9 +21,9 @@ bool ForcesAt::cheaper(const Load& now, std::size_t limit) const {
   const std::size_t m = now.displacement.size();
   if (limit != SIZE_MAX)
     return m <= limit;
-  if (m > std::min(costs::most_in_block(true), compliance_.capacity()))
+  if (m > std::min(costs::max_in_block(true), compliance_.capacity()))
     return false;
-  return m <= costs::most_in_block(false) || compliance_.stored(nodes_of(now.displacement));
+  return m <= costs::max_in_block(false) || compliance_.stored(nodes_of(now.displacement));
 }
 
 bool ForcesAt::join(std::uint32_t node) {
@@ -62,14 +62,14 @@ void ForcesAt::leave_all() {
 }
 
 /// Whether C_cc of these nodes is positive definite.
-bool ForcesAt::renew(const std::map<std::uint32_t, Vec3>& nodes) {
+bool ForcesAt::take_nodes(const std::map<std::uint32_t, Vec3>& nodes) {
   std::size_t staying = 0;
   for (const Contact& c : contacts_)
     staying += nodes.contains(c.node) ? 1 : 0;
   if (staying == contacts_.size() && staying == nodes.size())
     return true;
   modes_.clear();
-  if (2 * staying < contacts_.size() || changes_ > most_changes)
+  if (2 * staying < contacts_.size() || changes_ > max_changes)
     leave_all();
   shapes_ = 0;
   compliance_.need_blocks(nodes_of(nodes));
@@ -116,7 +116,7 @@ std::vector<NodeVector> ForcesAt::by_node(std::span<const double> force) const {
 
 /// Whether it came out right.
 bool ForcesAt::meet(const Load& now) {
-  if (!renew(now.displacement))
+  if (!take_nodes(now.displacement))
     return false;
   const std::vector<std::size_t> where = axes();
   std::vector<double> wanted = answer_.at(now, where);

@@ -50,7 +50,7 @@ private:
   };
   bool join(std::uint32_t node);
   void leave_all();
-  bool renew(const std::map<std::uint32_t, Vec3>& nodes);
+  bool take_nodes(const std::map<std::uint32_t, Vec3>& nodes);
   std::vector<NodeVector> by_node(std::span<const double> force) const;
 
   const Model& model_;

@@ -9,7 +9,7 @@ namespace gewebe {
 namespace {
 
 // Roundings of sums that follow their changes stay below 1000 times one.
-constexpr std::uint64_t most_increments = 1000;
+constexpr std::uint64_t max_increments = 1000;
 
 } // namespace
 
@@ -89,7 +89,7 @@ const std::vector<double>& LoadAnswer::whole(const Load& load) {
       load.gravity == gravity_ ? changed_forces(load.force) : std::vector<NodeVector>{};
   std::vector<double> fresh;
   if (load.gravity == gravity_ && changed.size() < load.force.size() &&
-      increments_ < most_increments) {
+      increments_ < max_increments) {
     fresh = std::move(answer_);
     forget(); // should the sum fail
     compliance_.add(changed, 0, fresh);

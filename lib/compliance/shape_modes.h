@@ -12,11 +12,11 @@ namespace gewebe {
 class ShapeModes {
 public:
   /// Most modes that pay: those of a rigid grasp, and some for a load beside it and for rounding.
-  static constexpr std::size_t most = 16;
+  static constexpr std::size_t max_questions = 16;
 
   void clear();
   /// Whether a question outside the span may still be added.
-  bool open() const noexcept { return questions_.size() < most && !given_up_; }
+  bool open() const noexcept { return questions_.size() < max_questions && !given_up_; }
   std::size_t size() const noexcept { return questions_.size(); }
 
   /// The coefficients of `question` in the basis, and in `rest` what is outside its span.

@@ -155,11 +155,11 @@ private:
 
 /// Two unit vectors that make a right-handed frame with n.
 std::array<Vec3, 2> across(const Vec3& n) {
-  int least = 0;
+  int smallest = 0;
   for (int a = 1; a < 3; ++a)
-    if (std::abs(n[a]) < std::abs(n[least]))
-      least = a;
-  const Vec3 axis{least == 0 ? 1.0 : 0.0, least == 1 ? 1.0 : 0.0, least == 2 ? 1.0 : 0.0};
+    if (std::abs(n[a]) < std::abs(n[smallest]))
+      smallest = a;
+  const Vec3 axis{smallest == 0 ? 1.0 : 0.0, smallest == 1 ? 1.0 : 0.0, smallest == 2 ? 1.0 : 0.0};
   const Vec3 u = cross(n, axis);
   const Vec3 first = u / norm(u);
   return {first, cross(n, first)};

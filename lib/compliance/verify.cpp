@@ -25,10 +25,10 @@ double larger(double a, double b) {
 }
 
 double largest(std::span<const double> values) {
-  double most = 0;
+  double max = 0;
   for (const double value : values)
-    most = larger(most, std::fabs(value));
-  return most;
+    max = larger(max, std::fabs(value));
+  return max;
 }
 
 std::string number(double value) {
@@ -106,12 +106,12 @@ void verify_stored(const ColumnSource& columns, std::span<const std::size_t> cho
       throw Cancelled();
     columns.read(k, read);
     result.columns_read += 3;
-    const double most = largest(read);
-    if (!std::isfinite(most))
+    const double max = largest(read);
+    if (!std::isfinite(max))
       throw Error("the columns of node " + std::to_string(columns.nodes()[k]) + " aren't finite");
     for (std::size_t c = 0; c < chosen.size(); ++c) { // C_ij = C_ji
       const std::size_t i = columns.nodes()[k], j = columns.nodes()[chosen[c]];
-      const double scale = std::max(most, largest(kept[c]));
+      const double scale = std::max(max, largest(kept[c]));
       for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t b = 0; b < 3; ++b) {
           const double difference =

@@ -19,7 +19,7 @@ namespace gewebe {
 namespace {
 
 /// Beyond this condition of the capacitance matrix nothing that it gives is meant.
-constexpr double most_condition = 1e13;
+constexpr double max_capacitance_condition = 1e13;
 
 Eigen::Index index(std::size_t k) {
   return static_cast<Eigen::Index>(k);
@@ -82,7 +82,7 @@ struct WoodburySolver::State {
     lu.compute(s);
     // Eigen calls any single number well conditioned; ours is small where it should be 0.
     condition = rank == 1 ? 1 / std::abs(s(0, 0)) : 1 / lu.rcond();
-    if (!(condition <= most_condition))
+    if (!(condition <= max_capacitance_condition))
       throw Error("the cut leaves a part that nothing holds, expected one that is determined");
   }
 

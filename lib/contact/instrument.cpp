@@ -15,7 +15,7 @@ Quaternion operator*(const Quaternion& p, const Quaternion& q) {
       p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x, p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
 }
 
-Vec3 turned_by(double w, const Vec3& v, const Vec3& p) {
+Vec3 rotated_by(double w, const Vec3& v, const Vec3& p) {
   const Vec3 t = 2 * cross(v, p);
   return p + w * t + cross(v, t);
 }
@@ -48,12 +48,12 @@ Quaternion turn_about(const Vec3& axis, double degrees) {
   return unit({std::cos(half), s * along.x, s * along.y, s * along.z});
 }
 
-Vec3 turned(const Quaternion& q, const Vec3& v) {
-  return turned_by(q.w, {q.x, q.y, q.z}, v);
+Vec3 rotated(const Quaternion& q, const Vec3& v) {
+  return rotated_by(q.w, {q.x, q.y, q.z}, v);
 }
 
-Vec3 turned_back(const Quaternion& q, const Vec3& v) {
-  return turned_by(q.w, {-q.x, -q.y, -q.z}, v);
+Vec3 rotated_back(const Quaternion& q, const Vec3& v) {
+  return rotated_by(q.w, {-q.x, -q.y, -q.z}, v);
 }
 
 Pose between(const Pose& a, const Pose& b, double x) {
@@ -76,7 +76,7 @@ Pose PoseWay::at(double time) const {
 }
 
 PlacedInstrument::PlacedInstrument(const InstrumentShape& shape, const Pose& pose)
-    : a(pose.place), ab(turned(pose.turn, shape.axis)), radius(shape.radius),
+    : a(pose.place), ab(rotated(pose.turn, shape.axis)), radius(shape.radius),
       friction(shape.friction) {
   const double square = dot(ab, ab);
   inverse_square = square > 0 && std::isfinite(1 / square) ? 1 / square : 0;
@@ -107,7 +107,7 @@ Box3 PlacedInstrument::box() const {
   return b;
 }
 
-double travel(const InstrumentShape& shape, const Pose& from, const Pose& to) {
+double path_length(const InstrumentShape& shape, const Pose& from, const Pose& to) {
   // A turn by q from p moves a point at distance r along an arc of at most r times the angle, which
   // is 2 asin of what follows, at most π times it.
   const Quaternion back{from.turn.w, -from.turn.x, -from.turn.y, -from.turn.z};

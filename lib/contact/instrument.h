@@ -20,16 +20,16 @@ Quaternion unit(const Quaternion& q);
 /// By `degrees` about `axis`. \pre norm(axis) > 0
 Quaternion turn_about(const Vec3& axis, double degrees);
 /// \pre length(q) == 1
-Vec3 turned(const Quaternion& q, const Vec3& v);
-Vec3 turned_back(const Quaternion& q, const Vec3& v);
+Vec3 rotated(const Quaternion& q, const Vec3& v);
+Vec3 rotated_back(const Quaternion& q, const Vec3& v);
 
-/// Where a rigid body's own point r stands: place + turned(turn, r).
+/// Where a rigid body's own point r stands: place + rotated(turn, r).
 struct Pose {
   Vec3 place; ///< of its origin
   Quaternion turn;
 
-  Vec3 operator()(const Vec3& r) const { return place + turned(turn, r); }
-  Vec3 inverse(const Vec3& p) const { return turned_back(turn, p - place); }
+  Vec3 operator()(const Vec3& r) const { return place + rotated(turn, r); }
+  Vec3 inverse(const Vec3& p) const { return rotated_back(turn, p - place); }
   bool operator==(const Pose&) const = default;
 };
 
@@ -75,7 +75,7 @@ struct PlacedInstrument {
 };
 
 /// No point of the shape moves further between the two poses than this.
-double travel(const InstrumentShape& shape, const Pose& from, const Pose& to);
+double path_length(const InstrumentShape& shape, const Pose& from, const Pose& to);
 
 /// Where p on a rigid body goes when the body moves.
 inline Vec3 carried(const Pose& from, const Pose& to, const Vec3& p) {

@@ -11,7 +11,7 @@ double Load::changes_until() const {
   for (const auto& [node, p] : pressure)
     if (p.period > 0)
       return HUGE_VAL;
-  for (const auto& [node, way] : travel)
+  for (const auto& [node, way] : ramp)
     end = std::max(end, way.end);
   return end;
 }
@@ -20,7 +20,7 @@ Load load_at(const Load& load, const Model& model, double time) {
   Load now{.force = load.force, .displacement = load.displacement, .gravity = load.gravity};
   for (const auto& [node, period] : load.force_period)
     now.force[node] *= pulse(time, period);
-  for (const auto& [node, way] : load.travel)
+  for (const auto& [node, way] : load.ramp)
     now.displacement[node] = way.at(time);
   if (load.pressure.empty())
     return now;

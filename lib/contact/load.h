@@ -51,7 +51,7 @@ struct Carrier {
 };
 
 /// A displaced node's way, taken smoothly from `start` to `end` s, straight or with a rigid body.
-struct Travel {
+struct Ramp {
   Vec3 from, to;
   double start = 0, end = 0;
   std::optional<Carrier> by{};
@@ -64,7 +64,7 @@ struct Travel {
     const double x = time > start ? (time - start) / (end - start) : 0;
     return from + smooth_step(x) * (to - from);
   }
-  bool operator==(const Travel&) const = default;
+  bool operator==(const Ramp&) const = default;
 };
 
 /// Nodes without a force have none, nodes without a displacement are free. Where both are given the
@@ -75,13 +75,13 @@ struct Load {
   Vec3 gravity{};                                   ///< mm/s²
   std::map<std::uint32_t, double> force_period{};   ///< of the forces that pulse, s
   std::map<std::uint32_t, NodePressure> pressure{}; ///< on a third of each triangle at the node
-  std::map<std::uint32_t, Travel> travel{};         ///< of displaced nodes that are on their way
+  std::map<std::uint32_t, Ramp> ramp{};             ///< of displaced nodes that are on their way
 
   bool operator==(const Load&) const = default;
   bool empty() const {
     return force.empty() && displacement.empty() && gravity == Vec3{} && pressure.empty();
   }
-  /// Until when it changes with time: the end of the last travel, or for ever.
+  /// Until when it changes with time: the end of the last ramp, or for ever.
   double changes_until() const;
 };
 

@@ -6,7 +6,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t most_in_block = 64;
+constexpr std::size_t max_in_block = 64;
 
 } // namespace
 
@@ -29,7 +29,7 @@ SurfaceBlocks::SurfaceBlocks(const Model& model) : nodes_(surface_count(model)) 
   while (!open.empty()) {
     const auto [begin, end] = open.back();
     open.pop_back();
-    if (end - begin <= most_in_block) {
+    if (end - begin <= max_in_block) {
       first_.push_back(begin);
       continue;
     }

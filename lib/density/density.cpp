@@ -35,7 +35,7 @@ bool index_box(const Particles& particles, const DensityOptions& options, IndexB
 /// Leaves that one particle fills at the least, by the cube in its ball: refuses absurd radii
 /// before anything is listed.
 double min_leaves(std::span<const IndexParticle> particles, const IndexBox& clip) {
-  double most = 0;
+  double max = 0;
   for (const IndexParticle& p : particles) {
     const double center[3] = {p.x, p.y, p.z};
     const double half = p.radius / std::numbers::sqrt3;
@@ -44,9 +44,9 @@ double min_leaves(std::span<const IndexParticle> particles, const IndexBox& clip
       voxels *=
           std::max(0.0, std::min(center[axis] + half, static_cast<double>(clip.max[axis])) -
                             std::max(center[axis] - half, static_cast<double>(clip.min[axis])));
-    most = std::max(most, voxels / leaf_voxels);
+    max = std::max(max, voxels / leaf_voxels);
   }
-  return most;
+  return max;
 }
 
 /// Leaves within the support of a particle that lies anywhere in its leaf, on average (Steiner's

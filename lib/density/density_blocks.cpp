@@ -266,15 +266,15 @@ bool BlockTree::outside_clip(const Int3& origin, std::int32_t size) const {
 
 /// The background is 0; what the clip box cuts off has it too.
 Side BlockTree::prove(const Int3& origin, std::int32_t size, float lower, float upper) const {
-  double least = static_cast<double>(lower), most = static_cast<double>(upper);
+  double min = static_cast<double>(lower), max = static_cast<double>(upper);
   if (!in_clip(origin, size, 1)) {
-    least = std::min(least, 0.0);
-    most = std::max(most, 0.0);
+    min = std::min(min, 0.0);
+    max = std::max(max, 0.0);
   }
   const bool background_above = 0 > *isovalue_;
-  if (least > *isovalue_)
+  if (min > *isovalue_)
     return background_above ? Side::background : Side::opposite;
-  if (most < *isovalue_)
+  if (max < *isovalue_)
     return background_above ? Side::opposite : Side::background;
   return Side::unknown;
 }

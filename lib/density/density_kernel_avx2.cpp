@@ -229,11 +229,11 @@ void bound_children_avx2(const IndexParticle* particles, const std::uint32_t* li
     const __m256 t_far = _mm256_mul_ps(
         inverse2, _mm256_add_ps(farthest2, _mm256_fmadd_ps(_mm256_set1_ps(2), farthest, one)));
     const __m256 u = clamped(_mm256_fnmadd_ps(inverse2, center2, one));
-    const __m256 most = _mm256_mul_ps(weight, density(clamped(_mm256_sub_ps(one, t_near))));
-    const __m256 least = _mm256_mul_ps(weight, density(clamped(_mm256_sub_ps(one, t_far))));
-    upper = _mm256_add_ps(upper, p.weight > 0 ? most : least);
-    lower = _mm256_add_ps(lower, p.weight > 0 ? least : most);
-    absolute = _mm256_add_ps(absolute, magnitude(most));
+    const __m256 max = _mm256_mul_ps(weight, density(clamped(_mm256_sub_ps(one, t_near))));
+    const __m256 min = _mm256_mul_ps(weight, density(clamped(_mm256_sub_ps(one, t_far))));
+    upper = _mm256_add_ps(upper, p.weight > 0 ? max : min);
+    lower = _mm256_add_ps(lower, p.weight > 0 ? min : max);
+    absolute = _mm256_add_ps(absolute, magnitude(max));
     const __m256 in_reach = _mm256_cmp_ps(t_near, limit, _CMP_LT_OQ);
     masks[n] = static_cast<std::uint8_t>(_mm256_movemask_ps(in_reach));
     const __m256 counted = _mm256_and_ps(in_reach, magnitude(weight));

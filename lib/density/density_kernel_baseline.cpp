@@ -50,11 +50,11 @@ void add_child(const IndexParticle& p, const Children& children, int child, Sums
   const float u_near = larger(1 - inverse2 * (nearest2 - nearer2), 0);
   const float u_far = larger(1 - inverse2 * (farthest2 + 2 * farthest + 1), 0);
   const float u = larger(1 - inverse2 * center2, 0);
-  const float most = p.weight * density(u_near);
-  const float least = p.weight * density(u_far);
-  sums.upper[child] += p.weight > 0 ? most : least;
-  sums.lower[child] += p.weight > 0 ? least : most;
-  sums.absolute[child] += std::fabs(most);
+  const float max = p.weight * density(u_near);
+  const float min = p.weight * density(u_far);
+  sums.upper[child] += p.weight > 0 ? max : min;
+  sums.lower[child] += p.weight > 0 ? min : max;
+  sums.absolute[child] += std::fabs(max);
   if (!(inverse2 * (nearest2 - nearer2) < reach_limit))
     return;
   sums.weight[child] += std::fabs(p.weight);

@@ -12,9 +12,9 @@ namespace gewebe {
 namespace {
 
 constexpr double on_surface = 1e-9; ///< of the radius
-constexpr std::uint64_t most_unseen = 16;
-constexpr std::size_t most_parts = 256;
-constexpr int most_passes = 32; ///< between instruments that touch one node
+constexpr std::uint64_t max_unseen = 16;
+constexpr std::size_t max_parts = 256;
+constexpr int max_passes = 32; ///< between instruments that touch one node
 
 Vec3 vector_of(const double* row) {
   return {row[0], row[1], row[2]};
@@ -109,11 +109,11 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
     t.placed = PlacedInstrument(i.shape, t.to);
     t.box = t.placed.box();
     t.speed = i.way.end > time
-                  ? 2 * travel(i.shape, i.way.from, i.way.to) / (i.way.end - i.way.start)
+                  ? 2 * path_length(i.shape, i.way.from, i.way.to) / (i.way.end - i.way.start)
                   : 0;
     const auto go = [&](const Pose& from, const Pose& to) {
       const MovedInstrument way{i.shape, from, to};
-      const std::size_t parts = parts_of_way({&way, 1}, most_parts);
+      const std::size_t parts = parts_of_way({&way, 1}, max_parts);
       for (std::size_t p = 1; p <= parts; ++p) {
         const Pose pose = between(from, to, static_cast<double>(p) / static_cast<double>(parts));
         if (pose == t.to)
@@ -148,7 +148,7 @@ void DynamicContact::keep_out(std::size_t block, const ContactMoment& moment,
   if (box.empty())
     return;
   fastest = std::sqrt(fastest);
-  std::uint64_t unseen = most_unseen;
+  std::uint64_t unseen = max_unseen;
   bool any = false;
   for (const ContactMoment::There& t : moment.there) {
     const double gap = apart(box, t.box);
@@ -193,7 +193,7 @@ void DynamicContact::push(std::size_t row, const ContactMoment& moment, const No
   }
   // The velocity once per instrument; between several the place in turns.
   std::size_t hits = 0;
-  for (int pass = 0; pass < most_passes; ++pass) {
+  for (int pass = 0; pass < max_passes; ++pass) {
     bool clear = true;
     for (const ContactMoment::There& t : moment.there) {
       if (inverse == Vec3{} || !(t.placed.distance(p) < 0) || (pass > 0 && !inside(t.placed, p)))

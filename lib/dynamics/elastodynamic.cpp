@@ -18,7 +18,7 @@ namespace gewebe {
 namespace {
 
 constexpr double rest_tolerance = 1e-15, same_duration = 1e-9;
-constexpr double most_steps = 1e9;
+constexpr double max_steps = 1e9;
 // Springs times steps, and springs, below which a thread costs more than it gains.
 constexpr double pulls_of_a_thread = 2e6;
 constexpr std::uint64_t pulls_of_a_step = 4000;
@@ -131,16 +131,16 @@ void Elastodynamic::apply_load() {
   }
   for (const auto& [node, displacement] : load_->displacement) {
     const std::size_t row = layout_.row_of_node[node];
-    const auto way = load_->travel.find(node);
-    const bool travels = way != load_->travel.end() && time_ < way->second.end;
+    const auto way = load_->ramp.find(node);
+    const bool ramps = way != load_->ramp.end() && time_ < way->second.end;
     if (row < layout_.movable) {
       std::fill(std::begin(traits_[row].inverse_mass), std::end(traits_[row].inverse_mass), 0.0);
-      if (travels)
-        drive_of(row).travellers.push_back({node, way->second});
+      if (ramps)
+        drive_of(row).ramped.push_back({node, way->second});
     }
     NodeRow& here = rows_.write()[row];
     here = {};
-    put(travels ? way->second.at(time_) : displacement, here.u);
+    put(ramps ? way->second.at(time_) : displacement, here.u);
   }
   copy_held_rows();
   motion_shown_ = false;
@@ -262,7 +262,7 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
     return 0;
   // A hair more than a whole number of steps is rounding.
   const double exact = duration / largest_step * (1 - 1e-12);
-  if (!(exact <= most_steps))
+  if (!(exact <= max_steps))
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));
   const double h = duration / count;
@@ -353,7 +353,7 @@ bool Elastodynamic::step_block(std::size_t block, const NodeRow* now, NodeRow* n
   const bool finite =
       kernel(layout_.blocks[block], layout_.rest.data(), traits_.data(), now, next, h);
   if (drive != nullptr)
-    for (const Traveller& t : drive->travellers) {
+    for (const RampedNode& t : drive->ramped) {
       const std::size_t row = layout_.row_of_node[t.node];
       const Vec3 u = t.way.at(time + h);
       put(time + h < t.way.end ? (u - vector_of(now[row].u)) / h : Vec3{}, next[row].v);
@@ -422,7 +422,7 @@ void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
     for (const Drive& drive : drives_) {
       for (const Driven& driven : drive.driven)
         outer[driven.node] = outer_force(driven, time, position);
-      for (const Traveller& t : drive.travellers) {
+      for (const RampedNode& t : drive.ramped) {
         NodeMotion& m = now[t.node];
         const Vec3 u = t.way.at(time);
         m.velocity = time < t.way.end ? (u - m.displacement) / h : Vec3{};

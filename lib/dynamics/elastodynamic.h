@@ -116,13 +116,13 @@ private:
     NodePressure pressure;
     std::vector<Triangle> around; ///< if there is a pressure
   };
-  struct Traveller {
+  struct RampedNode {
     std::uint32_t node = 0;
-    Travel way;
+    Ramp way;
   };
   struct Drive { ///< of a block
     std::vector<Driven> driven;
-    std::vector<Traveller> travellers;
+    std::vector<RampedNode> ramped;
   };
 
   void apply_load();

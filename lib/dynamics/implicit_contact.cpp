@@ -11,7 +11,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr int most_parts = 10, most_rounds = 60;
+constexpr int max_parts = 10, max_rounds = 60;
 constexpr double same_place = 1e-10; ///< of the smallest radius
 constexpr double rounding = 1e-14;   ///< of the size
 constexpr double slow = 0.2;         ///< contraction above which the matrix is made anew
@@ -40,7 +40,7 @@ public:
     tolerance_ = std::max(same_place * radius, rounding * all.size_);
   }
 
-  ContactSpace space(std::span<const std::uint32_t> nodes) override {
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
     if (!ready_)
       run();
     if (!all_.columns_ || all_.columns_of_ != all_.euler_.factorisations()) {
@@ -62,26 +62,28 @@ public:
       throw Error("the columns of " + std::to_string(nodes.size()) +
                   " nodes in contact do not fit in memory, expected more of it or fewer contacts");
     all_.columns_->need(nodes);
-    ContactSpace space;
-    space.nodes.assign(nodes.begin(), nodes.end());
+    DelassusOperator delassus;
+    delassus.nodes.assign(nodes.begin(), nodes.end());
     const std::size_t size = 3 * nodes.size();
-    space.compliance.resize(size * size);
+    delassus.compliance.resize(size * size);
     for (std::size_t c = 0; c < size; ++c)
       for (std::size_t r = c; r < size; ++r)
-        space.compliance[c * size + r] = space.compliance[r * size + c] = all_.columns_->entry(
-            nodes[c / 3], static_cast<int>(c % 3), 3 * std::size_t{nodes[r / 3]} + r % 3);
+        delassus.compliance[c * size + r] = delassus.compliance[r * size + c] =
+            all_.columns_->entry(nodes[c / 3], static_cast<int>(c % 3),
+                                 3 * std::size_t{nodes[r / 3]} + r % 3);
     for (const std::uint32_t node : nodes)
       for (int a = 0; a < 3; ++a)
-        space.free.push_back(motion_[node].displacement[a]);
+        delassus.free.push_back(motion_[node].displacement[a]);
     for (const NodeTouch& t : force_) { // without these
       const auto k = static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), t.node) -
                                               nodes.begin());
       for (std::size_t r = 0; r < size; ++r)
         for (std::size_t a = 0; a < 3; ++a)
-          space.free[r] -= space.compliance[(3 * k + a) * size + r] * t.force[static_cast<int>(a)];
+          delassus.free[r] -=
+              delassus.compliance[(3 * k + a) * size + r] * t.force[static_cast<int>(a)];
     }
-    nodes_ = space.nodes;
-    return space;
+    nodes_ = delassus.nodes;
+    return delassus;
   }
 
   bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) override {
@@ -94,11 +96,11 @@ public:
       miss = std::isnan(error) ? error : std::max(miss, error);
     }
     agreed_ = miss <= tolerance_;
-    failed_ = failed_ || ++rounds_ == most_rounds;
+    failed_ = failed_ || ++rounds_ == max_rounds;
     if (agreed_ || failed_)
       return true;
     if (!(miss <= slow * last_miss_))
-      all_.euler_.renew(motion_, context_);
+      all_.euler_.refactor(motion_, context_);
     last_miss_ = miss;
     return false;
   }
@@ -178,7 +180,7 @@ ImplicitContact::Result ImplicitContact::step(const Step& step, std::span<NodeMo
   const std::vector<NodeMotion> before(motion.begin(), motion.end());
   const std::vector<NodeTouch> touched = touches;
   Result result;
-  for (int parts = 0, count = 1; parts < most_parts && !result.solved; ++parts, count *= 2) {
+  for (int parts = 0, count = 1; parts < max_parts && !result.solved; ++parts, count *= 2) {
     std::copy(before.begin(), before.end(), motion.begin());
     touches = touched;
     result = {.solved = true, .impulses = {}};

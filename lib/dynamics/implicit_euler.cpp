@@ -9,7 +9,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr int most_iterations = 200, most_parts = 10, most_renewals = 2;
+constexpr int max_iterations = 200, max_parts = 10, max_refactors = 2;
 constexpr double tolerance = 1e-10, size_tolerance = 1e-16;
 constexpr double noise = 1e-12; // of the size: a change below it that does not shrink is rounding
 constexpr double slow = 0.2;    // contraction above which the factor is made anew
@@ -49,7 +49,7 @@ void ImplicitEuler::make_factor(std::span<const NodeMotion> motion, double h,
     diagonal[i] = model_.nodes[i].mass / (h * h) + model_.nodes[i].drag / h;
   matrix_ = spring_matrix(model_, blocks, diagonal, held_);
   if (factor_)
-    factor_->renew(matrix_, context);
+    factor_->refactor(matrix_, context);
   else
     factor_ = std::make_unique<Factor>(matrix_, context);
   factor_step_ = h;
@@ -82,7 +82,7 @@ bool ImplicitEuler::step(std::span<NodeMotion> motion, std::span<const Vec3> out
                          std::span<const std::uint8_t> held, double h, const Context& context,
                          std::uint32_t& worst) {
   const std::vector<NodeMotion> before(motion.begin(), motion.end());
-  for (int part = 0, count = 1; part < most_parts; ++part, count *= 2) {
+  for (int part = 0, count = 1; part < max_parts; ++part, count *= 2) {
     bool solved = true;
     for (int k = 0; k < count && solved; ++k) {
       const std::vector<NodeMotion> from(motion.begin(), motion.end());
@@ -139,8 +139,8 @@ bool ImplicitEuler::solve(std::span<const NodeMotion> before, std::span<NodeMoti
                                  : h * before[i].velocity[axis];
   set(moved);
   double square = measure(), last_change = HUGE_VAL;
-  int renewed = 0;
-  for (int k = 0; k < most_iterations; ++k) {
+  int refactored = 0;
+  for (int k = 0; k < max_iterations; ++k) {
     solve_axes(matrix_, *factor_, residual, change);
     ++solves_;
     double scale = 1, largest_change = 0, largest = 0, next_square = HUGE_VAL;
@@ -169,9 +169,9 @@ bool ImplicitEuler::solve(std::span<const NodeMotion> before, std::span<NodeMoti
     if (largest_change <= noise * size_ && largest_change >= last_change / 2)
       return true;
     // A matrix of this very state may not help further: what the max leaves out limits the rate.
-    if (renewed < most_renewals && k > 0 && !(largest_change <= slow * last_change)) {
+    if (refactored < max_refactors && k > 0 && !(largest_change <= slow * last_change)) {
       make_factor(motion, h, context);
-      ++renewed;
+      ++refactored;
     }
     last_change = largest_change;
   }

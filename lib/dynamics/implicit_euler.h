@@ -49,7 +49,7 @@ public:
   /// something that can move was solved
   void respond(std::span<double> over_axes, std::size_t columns) const;
   /// Makes A anew, of this state.
-  void renew(std::span<const NodeMotion> motion, const Context& context) {
+  void refactor(std::span<const NodeMotion> motion, const Context& context) {
     make_factor(motion, factor_step_, context);
   }
 

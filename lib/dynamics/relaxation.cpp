@@ -22,7 +22,7 @@ namespace {
 
 constexpr int checks_a_period = 16;
 constexpr double largest_move = 1e-4; // of the shortest spring
-constexpr double most_periods = 1000;
+constexpr double max_periods = 1000;
 
 /// √ of the least ω² with K x = ω² M x, by inverse iteration; M by node.
 double slowest_mode(const StiffnessMatrix& matrix, const Factor& factor, const Model& model) {
@@ -138,12 +138,12 @@ private:
     constant = force;
     const BlockStep kernel =
         context_.cpu == CpuLevel::baseline ? block_step_baseline : block_step_avx2;
-    const auto most =
+    const auto max =
         options_.steps != 0
             ? options_.steps
-            : between_checks_ * static_cast<std::uint64_t>(checks_a_period * most_periods);
+            : between_checks_ * static_cast<std::uint64_t>(checks_a_period * max_periods);
     int calm = 0; // checks in a row
-    for (std::uint64_t s = 1; s <= most; ++s) {
+    for (std::uint64_t s = 1; s <= max; ++s) {
       bool finite = true;
       for (const SpringBlock& block : layout_.blocks)
         finite = kernel(block, layout_.rest.data(), work.traits.data(), work.now.data(),
@@ -164,7 +164,7 @@ private:
     }
     if (options_.steps == 0 && calm <= checks_a_period)
       throw Error("node " + std::to_string(node) + " does not come to rest in " +
-                  std::to_string(most) + " steps, expected a larger threshold of velocity");
+                  std::to_string(max) + " steps, expected a larger threshold of velocity");
     constant = 0;
     ++work.pulls;
   }

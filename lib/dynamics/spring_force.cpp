@@ -42,7 +42,7 @@ Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> moti
     const Vec3 along =
         (network.position[half.other] - position) + (other.displacement - own.displacement);
     const double square = dot(along, along);
-    if (!(square > least_square))
+    if (!(square > min_square))
       continue;
     const double length = std::sqrt(square);
     const double pull = half.stiffness * (length - half.rest) * length +

@@ -46,7 +46,7 @@ struct SpringBlock {
 inline constexpr std::size_t largest_block = 256;
 
 /// Of a length in mm², below which a spring has no direction.
-inline constexpr double least_square = 1e-300;
+inline constexpr double min_square = 1e-300;
 
 /// v' = v + h (constant - drag v + F) / m, u' = u + h v' for the rows of the block; F sums the
 /// springs within, then those across, each in order. \return whether u' and v' are finite

@@ -106,7 +106,7 @@ inline void pull_of(const SpringGroup& g, const Four& square, Four& rate) {
   Four length;
   square_root(square, length);
   const Four one{1, 1, 1, 1};
-  const Four no_direction{least_square, least_square, least_square, least_square};
+  const Four no_direction{min_square, min_square, min_square, min_square};
   const auto inverse =
       reinterpret_cast<Four>(reinterpret_cast<FourBits>(one / square) & (square > no_direction));
   rate = (four(g.stiffness) * (length - four(g.rest)) * length + four(g.damping) * rate) * inverse;

@@ -175,7 +175,8 @@ void GlTarget::resolve() const {
   glBindFramebuffer(GL_FRAMEBUFFER, read_);
 }
 
-GlGeometry::GlGeometry(const Drawing& drawing, const Look& look) : buffers_(delete_buffers) {
+GlGeometry::GlGeometry(const Drawing& drawing, const SurfaceMaterial& material)
+    : buffers_(delete_buffers) {
   vertices_ = new_buffer(buffers_, GL_ARRAY_BUFFER, drawing.vertices.data(),
                          drawing.vertices.size() * sizeof(DrawVertex));
   if (!drawing.frames.empty())
@@ -189,7 +190,7 @@ GlGeometry::GlGeometry(const Drawing& drawing, const Look& look) : buffers_(dele
                         drawing.turns.size() * sizeof(DrawTurn));
   if (std::ranges::any_of(drawing.vertices, [](const DrawVertex& v) { return v.shade != 1.0F; }))
     for (std::size_t g = 0; g < group_count(drawing); ++g) {
-      const Vec3& color = look_of_group(look, g).color;
+      const Vec3& color = material_of_group(material, g).color;
       if (std::ranges::any_of(colors_, [&](const auto& c) { return c.first == color; }))
         continue;
       std::vector<std::array<float, 4>> colors;
@@ -240,10 +241,10 @@ void GlGeometry::use_rests() const {
   use(6, sizeof(DrawTurn), offsetof(DrawTurn, y));
 }
 
-void GlGeometry::use_colors(const Look& look) const {
-  glColor4d(look.color.x, look.color.y, look.color.z, 1);
+void GlGeometry::use_colors(const SurfaceMaterial& material) const {
+  glColor4d(material.color.x, material.color.y, material.color.z, 1);
   for (const auto& [color, buffer] : colors_)
-    if (color == look.color) {
+    if (color == material.color) {
       glBindBuffer(GL_ARRAY_BUFFER, buffer);
       glEnableClientState(GL_COLOR_ARRAY);
       glColorPointer(4, GL_FLOAT, 0, nullptr);

@@ -3,7 +3,7 @@
 
 #include "base/context.h"
 #include "shading/drawing.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 
 #include <epoxy/gl.h>
 
@@ -68,21 +68,23 @@ private:
 /// A drawing in buffers.
 class GlGeometry {
 public:
-  GlGeometry(const Drawing& drawing, const Look& look);
+  GlGeometry(const Drawing& drawing, const SurfaceMaterial& material);
   /// Of one unit.
   void use_texcoords(int unit, std::size_t offset, int count) const;
   void use_frames() const; ///< normals; tangent and side as coordinates of unit 1
   /// Places and normals at rest as coordinates of units 3 and 4, turns of 5 and 6 where there are
   /// any.
   void use_rests() const;
-  void use_colors(const Look& look) const; ///< those of the vertices, times the look's
+  void use_colors(
+      const SurfaceMaterial& material) const; ///< those of the vertices, times the material's
   void no_colors() const;
   void draw(std::size_t first, std::size_t count, const Context& context) const; ///< triangles
 
 private:
   GlNames buffers_;
   GLuint vertices_ = 0, frames_ = 0, rests_ = 0, turns_ = 0, indices_ = 0;
-  std::vector<std::pair<Vec3, GLuint>> colors_; ///< where vertices are shaded, by the look's colour
+  std::vector<std::pair<Vec3, GLuint>>
+      colors_; ///< where vertices are shaded, by the material's colour
 };
 
 void check_gl();

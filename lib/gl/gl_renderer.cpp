@@ -50,11 +50,12 @@ void combine(GLenum target, GLenum function, std::initializer_list<Source> sourc
 }
 
 /// What the program of a GlShader depends on, besides the drawing.
-std::string shader_kind(const Look& look) {
+std::string shader_kind(const SurfaceMaterial& material) {
   unsigned kind = 0;
-  for (const auto* texture : {&look.base, &look.detail, &look.reflection, &look.structure})
+  for (const auto* texture :
+       {&material.base, &material.detail, &material.reflection, &material.structure})
     kind = 4 * kind + (*texture ? ((*texture)->options.sphere ? 3U : 1U) : 0U);
-  return std::to_string(kind) + (is_at_rest(look) ? rest_definitions(look) : "");
+  return std::to_string(kind) + (is_at_rest(material) ? rest_definitions(material) : "");
 }
 
 // At most so many passes blend into one group.
@@ -75,8 +76,9 @@ GlMode gl_mode_from_name(std::string_view name) {
 }
 
 struct GlRenderer::State {
-  State(GlContext& gl, const Look& l, std::uint32_t w, std::uint32_t h, const GlOptions& o)
-      : look(l), options(o), width(w), height(h), target(check(gl), h, o.wide, o.samples) {}
+  State(GlContext& gl, const SurfaceMaterial& l, std::uint32_t w, std::uint32_t h,
+        const GlOptions& o)
+      : material(l), options(o), width(w), height(h), target(check(gl), h, o.wide, o.samples) {}
 
   /// The width, after a look at all sides.
   std::uint32_t check(const GlContext& gl) const {
@@ -86,8 +88,8 @@ struct GlRenderer::State {
                     " exceeds this OpenGL, expected sides up to " + std::to_string(gl.max_side()));
     };
     at_most("a picture", width, height);
-    for (std::size_t g = 0; g <= look.others.size(); ++g) {
-      const Look& own = look_of_group(look, g);
+    for (std::size_t g = 0; g <= material.others.size(); ++g) {
+      const SurfaceMaterial& own = material_of_group(material, g);
       for (const auto* texture : {&own.base, &own.detail, &own.reflection, &own.structure})
         if (*texture)
           at_most("a texture", (*texture)->width(), (*texture)->height());
@@ -95,9 +97,9 @@ struct GlRenderer::State {
     return width;
   }
 
-  /// Triangles with their look and its textures.
+  /// Triangles with their material and its textures.
   struct Group {
-    const Look* look = nullptr;
+    const SurfaceMaterial* material = nullptr;
     GLuint base = 0, detail = 0, reflection = 0, structure = 0, joined = 0;
     std::size_t first = 0, count = 0; ///< triangles
   };
@@ -117,7 +119,7 @@ struct GlRenderer::State {
   void draw_one(const Context& context);
   void draw_shader(const Context& context);
 
-  Look look;
+  SurfaceMaterial material;
   GlOptions options;
   std::uint32_t width, height;
   GlTarget target;
@@ -145,10 +147,10 @@ GLuint GlRenderer::State::load(const std::optional<Texture>& texture, bool is_st
 }
 
 void GlRenderer::State::load_textures() {
-  for (std::size_t g = 0; g <= look.others.size(); ++g) {
-    const Look& own = look_of_group(look, g);
+  for (std::size_t g = 0; g <= material.others.size(); ++g) {
+    const SurfaceMaterial& own = material_of_group(material, g);
     Group& group = groups.emplace_back();
-    group.look = &own;
+    group.material = &own;
     const bool join = options.mode == GlMode::passes1 && own.structure;
     if (join) {
       if (own.base && own.base->options.sphere != own.structure->options.sphere)
@@ -195,12 +197,12 @@ void GlRenderer::State::drop_units() {
 
 /// min(1, min(1, base + detail) + reflection) by units from `unit` on; the next free one.
 int GlRenderer::State::use_colors(int unit) {
-  if (now->look->base && now->base != 0) {
-    use(unit++, now->base, now->look->base);
+  if (now->material->base && now->base != 0) {
+    use(unit++, now->base, now->material->base);
     set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   }
-  for (const auto& [layer, name] :
-       {std::pair{&now->look->detail, now->detail}, {&now->look->reflection, now->reflection}})
+  for (const auto& [layer, name] : {std::pair{&now->material->detail, now->detail},
+                                    {&now->material->reflection, now->reflection}})
     if (*layer) {
       use(unit++, name, *layer);
       combine(GL_COMBINE_RGB, GL_ADD, {{GL_PREVIOUS, GL_SRC_COLOR}, {GL_TEXTURE, GL_SRC_COLOR}});
@@ -229,12 +231,12 @@ void GlRenderer::State::draw_geometry(const Context& context) {
 
 /// Half of f, then half of 1 - f' added, in two passes; `half` has 1/2 where it is wanted.
 void GlRenderer::State::draw_relief(const std::array<float, 4>& half, const Context& context) {
-  use(0, now->structure, now->look->structure);
+  use(0, now->structure, now->material->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   glColor4fv(half.data());
   draw_geometry(context);
   next_pass(GL_ONE, GL_ONE);
-  use(0, now->structure, now->look->structure, true);
+  use(0, now->structure, now->material->structure, true);
   constexpr std::array<float, 4> black{};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, black.data());
   set_env(GL_TEXTURE_ENV_MODE, GL_BLEND);
@@ -247,7 +249,7 @@ void GlRenderer::State::draw_relief(const std::array<float, 4>& half, const Cont
 void GlRenderer::State::draw_three(const Context& context) {
   draw_relief({0.5F, 0.5F, 0.5F, 1}, context);
   next_pass(GL_DST_COLOR, GL_SRC_COLOR);
-  geometry->use_colors(*now->look);
+  geometry->use_colors(*now->material);
   use_colors(0);
   draw_geometry(context);
 }
@@ -255,9 +257,9 @@ void GlRenderer::State::draw_three(const Context& context) {
 /// With one unit the colours must be summed first: r goes to alpha, and both are multiplied at
 /// last.
 void GlRenderer::State::draw_three_layered(const Context& context) {
-  geometry->use_colors(*now->look);
-  if (now->look->base) {
-    use(0, now->base, now->look->base);
+  geometry->use_colors(*now->material);
+  if (now->material->base) {
+    use(0, now->base, now->material->base);
     set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
   }
   draw_geometry(context);
@@ -267,8 +269,8 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
     draw_geometry(context);
   };
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_FALSE);
-  for (const auto& [layer, name] :
-       {std::pair{&now->look->detail, now->detail}, {&now->look->reflection, now->reflection}})
+  for (const auto& [layer, name] : {std::pair{&now->material->detail, now->detail},
+                                    {&now->material->reflection, now->reflection}})
     if (*layer) {
       next_pass(GL_ONE, GL_ONE);
       use(0, name, *layer);
@@ -280,7 +282,7 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
         glBlendEquation(GL_FUNC_ADD);
       }
     }
-  if (!now->look->structure)
+  if (!now->material->structure)
     return;
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
   next_pass(GL_ONE, GL_ZERO);
@@ -293,9 +295,9 @@ void GlRenderer::State::draw_three_layered(const Context& context) {
 /// Pass 1: r = 1/2 f + (1 - 1/2) (1 - f'). (Added as f + (1 - f') - 1/2 the relief would be twice
 /// as strong.) Pass 2: the colours, blended as in three passes.
 void GlRenderer::State::draw_two(const Context& context) {
-  use(0, now->structure, now->look->structure);
+  use(0, now->structure, now->material->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_REPLACE);
-  use(1, now->structure, now->look->structure, true);
+  use(1, now->structure, now->material->structure, true);
   constexpr std::array<float, 4> half{0.5F, 0.5F, 0.5F, 1.0F};
   glTexEnvfv(GL_TEXTURE_ENV, GL_TEXTURE_ENV_COLOR, half.data());
   combine(GL_COMBINE_RGB, GL_INTERPOLATE,
@@ -306,28 +308,28 @@ void GlRenderer::State::draw_two(const Context& context) {
   glColor4f(1, 1, 1, 1);
   draw_geometry(context);
   next_pass(GL_DST_COLOR, GL_SRC_COLOR);
-  geometry->use_colors(*now->look);
+  geometry->use_colors(*now->material);
   use_colors(0);
   draw_geometry(context);
 }
 
 /// Alpha: f/2, then f/2 + (1 - f'/2) - 1/2 = r; at last the colours times alpha, scaled.
 void GlRenderer::State::draw_one(const Context& context) {
-  geometry->use_colors(*now->look);
+  geometry->use_colors(*now->material);
   int unit = 0;
   if (now->joined != 0) {
-    use(unit++, now->joined, now->look->structure);
+    use(unit++, now->joined, now->material->structure);
     combine(GL_COMBINE_RGB, GL_MODULATE,
             {{GL_TEXTURE, GL_SRC_COLOR}, {GL_PRIMARY_COLOR, GL_SRC_COLOR}});
     combine(GL_COMBINE_ALPHA, GL_REPLACE, {{GL_TEXTURE, GL_SRC_ALPHA}});
-    use(unit++, now->joined, now->look->structure, true);
+    use(unit++, now->joined, now->material->structure, true);
     combine(GL_COMBINE_RGB, GL_REPLACE, {{GL_PREVIOUS, GL_SRC_COLOR}});
     combine(GL_COMBINE_ALPHA, GL_ADD_SIGNED,
             {{GL_PREVIOUS, GL_SRC_ALPHA}, {GL_TEXTURE, GL_ONE_MINUS_SRC_ALPHA}});
   }
   unit = use_colors(unit);
   if (now->joined != 0) {
-    use(unit, now->joined, now->look->structure); // a unit without a texture does nothing
+    use(unit, now->joined, now->material->structure); // a unit without a texture does nothing
     combine(GL_COMBINE_RGB, GL_MODULATE,
             {{GL_PREVIOUS, GL_SRC_COLOR}, {GL_PREVIOUS, GL_SRC_ALPHA}});
     combine(GL_COMBINE_ALPHA, GL_REPLACE, {{GL_PRIMARY_COLOR, GL_SRC_ALPHA}});
@@ -337,7 +339,7 @@ void GlRenderer::State::draw_one(const Context& context) {
 }
 
 void GlRenderer::State::draw_shader(const Context& context) {
-  shaders.at(shader_kind(*now->look)).use(light, *now->look);
+  shaders.at(shader_kind(*now->material)).use(light, *now->material);
   const auto bind = [&](GlUnit unit, GLuint texture) {
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     glBindTexture(GL_TEXTURE_2D, texture);
@@ -355,11 +357,11 @@ void GlRenderer::State::draw_shader(const Context& context) {
   }
   units = 3;
   units = 3;
-  if (is_at_rest(*now->look)) {
+  if (is_at_rest(*now->material)) {
     geometry->use_rests();
     units = light.turns.empty() ? 5 : 7;
   }
-  geometry->use_colors(*now->look);
+  geometry->use_colors(*now->material);
   draw_geometry(context);
   glDisableClientState(GL_NORMAL_ARRAY);
   glUseProgram(0);
@@ -383,12 +385,12 @@ void GlRenderer::State::draw_group(const Context& context) {
     glDisable(GL_STENCIL_TEST);
   }
   const int first_pass = blended;
-  const bool layered = now->look->detail || now->look->reflection;
+  const bool layered = now->material->detail || now->material->reflection;
   if (options.mode == GlMode::shader)
     draw_shader(context);
   else if (options.mode == GlMode::passes3 && layered)
     draw_three_layered(context);
-  else if (options.mode == GlMode::passes1 || !now->look->structure)
+  else if (options.mode == GlMode::passes1 || !now->material->structure)
     draw_one(context); // without structure one pass does for all
   else if (options.mode == GlMode::passes3)
     draw_three(context);
@@ -403,24 +405,24 @@ void GlRenderer::State::draw_group(const Context& context) {
   }
 }
 
-GlRenderer::GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std::uint32_t height,
-                       const GlOptions& options)
-    : state_(std::make_unique<State>(gl, look, width, height, options)) {
-  for (std::size_t g = 0; g <= look.others.size(); ++g)
-    if (is_at_rest(look_of_group(look, g)) && options.mode != GlMode::shader)
+GlRenderer::GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint32_t width,
+                       std::uint32_t height, const GlOptions& options)
+    : state_(std::make_unique<State>(gl, material, width, height, options)) {
+  for (std::size_t g = 0; g <= material.others.size(); ++g)
+    if (is_at_rest(material_of_group(material, g)) && options.mode != GlMode::shader)
       throw Error("the fixed functions know neither three projections nor solid textures, expected "
                   "the shader");
   state_->load_textures();
-  GLint most = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_UNITS, &most);
+  GLint max = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_UNITS, &max);
   int wanted = 2;
-  for (std::size_t g = 0; g <= look.others.size(); ++g) {
-    const Look& own = look_of_group(look, g);
+  for (std::size_t g = 0; g <= material.others.size(); ++g) {
+    const SurfaceMaterial& own = material_of_group(material, g);
     if (options.mode == GlMode::passes1 && own.structure)
       wanted = std::max(wanted, 3 + (own.detail ? 1 : 0) + (own.reflection ? 1 : 0));
   }
-  if (most < wanted)
-    throw Error("this OpenGL has " + std::to_string(most) + " texture units, expected " +
+  if (max < wanted)
+    throw Error("this OpenGL has " + std::to_string(max) + " texture units, expected " +
                 std::to_string(wanted));
   check_gl();
 }
@@ -433,10 +435,10 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
   s.geometry.reset();
   if (drawing.triangles.empty())
     return;
-  s.geometry.emplace(drawing, s.look);
+  s.geometry.emplace(drawing, s.material);
   const bool frames = !drawing.frames.empty();
-  const bool turned = !drawing.turns.empty();
-  if (frames == s.light.frames.empty() || turned == s.light.turns.empty())
+  const bool rotated = !drawing.turns.empty();
+  if (frames == s.light.frames.empty() || rotated == s.light.turns.empty())
     s.shaders.clear();
   for (std::size_t g = 0; g < s.groups.size(); ++g) {
     State::Group& group = s.groups[g];
@@ -446,13 +448,13 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     group.count = triangles.size();
     if (group.count == 0)
       continue;
-    if (is_at_rest(*group.look) && drawing.rests.empty())
+    if (is_at_rest(*group.material) && drawing.rests.empty())
       throw Error("textures on the shape at rest for a drawing without it, expected its places");
     if (s.options.mode == GlMode::shader)
-      s.shaders.try_emplace(shader_kind(*group.look), *group.look, frames, turned);
+      s.shaders.try_emplace(shader_kind(*group.material), *group.material, frames, rotated);
   }
   s.light.frames.resize(frames ? 1 : 0);
-  s.light.turns.resize(turned ? 1 : 0);
+  s.light.turns.resize(rotated ? 1 : 0);
   s.light.rest_origin = drawing.rest_origin;
   s.light.rest_scale = drawing.rest_scale;
   set_light(drawing);
@@ -475,7 +477,7 @@ void GlRenderer::draw(const Projection& projection, const Context& context) {
   glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
   glClampColor(GL_CLAMP_FRAGMENT_COLOR, GL_TRUE);
   glClampColor(GL_CLAMP_VERTEX_COLOR, GL_FALSE);
-  const std::array<std::uint8_t, 3> background = stored(s.look.background);
+  const std::array<std::uint8_t, 3> background = stored(s.material.background);
   glClearColor(background[0] / 255.0F, background[1] / 255.0F, background[2] / 255.0F, 1);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glDepthMask(GL_TRUE);

@@ -7,7 +7,7 @@
 #include "shading/camera.h"
 #include "shading/drawing.h"
 #include "shading/image.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 
 #include <cstdint>
 #include <memory>
@@ -43,8 +43,8 @@ struct GlOptions {
 /// or fails; for passes1 also if base and structure aren't mapped alike
 class GlRenderer {
 public:
-  GlRenderer(GlContext& gl, const Look& look, std::uint32_t width, std::uint32_t height,
-             const GlOptions& options);
+  GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint32_t width,
+             std::uint32_t height, const GlOptions& options);
   ~GlRenderer();
   GlRenderer(const GlRenderer&) = delete;
   GlRenderer& operator=(const GlRenderer&) = delete;

@@ -23,7 +23,7 @@ varying vec2 shifted, mirrored;
 varying vec3 rest_place, rest_normal, now_place;
 #endif
 #ifdef TURNED
-varying vec3 turned_x, turned_y;
+varying vec3 rotated_x, rotated_y;
 #endif
 void main() {
   gl_Position = gl_ModelViewProjectionMatrix * gl_Vertex;
@@ -43,8 +43,8 @@ void main() {
   now_place = gl_Vertex.xyz;
 #endif
 #ifdef TURNED
-  turned_x = gl_MultiTexCoord5.xyz;
-  turned_y = gl_MultiTexCoord6.xyz;
+  rotated_x = gl_MultiTexCoord5.xyz;
+  rotated_y = gl_MultiTexCoord6.xyz;
 #endif
 })";
 
@@ -146,25 +146,26 @@ void set(GLuint program, const char* name, const Vec3& v) {
 
 } // namespace
 
-GlShader::GlShader(const Look& look, bool frames, bool turned) {
-  const bool rest = is_at_rest(look);
-  std::string head = rest ? "#version 130\n" + rest_definitions(look) : "#version 120\n";
-  head += rest && turned ? "#define TURNED\n" : "";
+GlShader::GlShader(const SurfaceMaterial& material, bool frames, bool rotated) {
+  const bool rest = is_at_rest(material);
+  std::string head = rest ? "#version 130\n" + rest_definitions(material) : "#version 120\n";
+  head += rest && rotated ? "#define TURNED\n" : "";
   bool sphere = false;
   const auto define = [&](const std::optional<Texture>& texture, const char* name) {
-    if (!texture || is_triplanar(look, texture))
+    if (!texture || is_triplanar(material, texture))
       return;
     sphere = sphere || texture->options.sphere;
     head += std::string("#define ") + name + (texture->options.sphere ? " around\n" : " st\n");
   };
-  define(look.base, "BASE");
-  define(look.detail, "DETAIL");
-  define(look.reflection, "REFLECTION");
-  define(look.structure, "STRUCTURE");
+  define(material.base, "BASE");
+  define(material.detail, "DETAIL");
+  define(material.reflection, "REFLECTION");
+  define(material.structure, "STRUCTURE");
   head += std::string(sphere ? "#define SPHERE\n" : "") + (frames ? "#define FRAMES\n" : "");
   const GLuint vertex = compiled(GL_VERTEX_SHADER, head + vertex_source);
-  const GLuint fragment = compiled(
-      GL_FRAGMENT_SHADER, head + fragment_head + (rest ? rest_source(look) : "") + fragment_source);
+  const GLuint fragment =
+      compiled(GL_FRAGMENT_SHADER,
+               head + fragment_head + (rest ? rest_source(material) : "") + fragment_source);
   program_ = glCreateProgram();
   for (const GLuint shader : {vertex, fragment}) {
     glAttachShader(program_, shader);
@@ -183,7 +184,7 @@ GlShader::~GlShader() {
   glDeleteProgram(program_);
 }
 
-void GlShader::use(const Drawing& drawing, const Look& look) const {
+void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material) const {
   glUseProgram(program_);
   int unit = 0;
   for (const char* name : {"base", "detail", "reflection", "structure"})
@@ -197,8 +198,8 @@ void GlShader::use(const Drawing& drawing, const Look& look) const {
   set(program_, "right", drawing.camera.right);
   set(program_, "up", drawing.camera.up);
   set(program_, "back", drawing.camera.back);
-  if (is_at_rest(look))
-    set_rest(program_, look, drawing);
+  if (is_at_rest(material))
+    set_rest(program_, material, drawing);
 }
 
 } // namespace gewebe

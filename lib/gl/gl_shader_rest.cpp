@@ -16,7 +16,7 @@ namespace {
 constexpr const char* common_source = R"(
 varying vec3 rest_place, rest_normal, now_place;
 #ifdef TURNED
-varying vec3 turned_x, turned_y;
+varying vec3 rotated_x, rotated_y;
 #endif
 vec3 across_x, across_y; // what the place changes by from pixel to pixel
 vec3 at_rest_normal;
@@ -34,8 +34,8 @@ void find_rest() {
 vec3 light_at_rest() {
   vec3 l = light.w > 0.0 ? unit(light.xyz - now_place) : light.xyz;
 #ifdef TURNED
-  vec3 x = unit(turned_x);
-  vec3 y = unit(turned_y - x * dot(x, turned_y));
+  vec3 x = unit(rotated_x);
+  vec3 y = unit(rotated_y - x * dot(x, rotated_y));
   l = vec3(dot(l, x), dot(l, y), dot(l, cross(x, y)));
 #endif
   return l;
@@ -154,10 +154,10 @@ float weight_of(float ratio) {
 }
 vec3 weights() {
   vec3 n = abs(at_rest_normal);
-  float most = max(max(n.x, n.y), n.z);
-  if (!(most > 0.0))
+  float largest = max(max(n.x, n.y), n.z);
+  if (!(largest > 0.0))
     return vec3(0.0, 0.0, 1.0);
-  n /= most;
+  n /= largest;
   vec3 w = vec3(weight_of(n.x), weight_of(n.y), weight_of(n.z));
   return w / (w.x + w.y + w.z);
 }
@@ -218,11 +218,11 @@ struct Layer {
   const std::optional<Texture>& image;
   const std::optional<SolidTexture>* solid;
 };
-std::array<Layer, 4> layers_of(const Look& look) {
-  return {{{"base", "REST_BASE", look.base, &look.solid_base},
-           {"detail", "REST_DETAIL", look.detail, &look.solid_detail},
-           {"reflection", "REST_REFLECTION", look.reflection, nullptr},
-           {"structure", "REST_STRUCTURE", look.structure, &look.solid_structure}}};
+std::array<Layer, 4> layers_of(const SurfaceMaterial& material) {
+  return {{{"base", "REST_BASE", material.base, &material.solid_base},
+           {"detail", "REST_DETAIL", material.detail, &material.solid_detail},
+           {"reflection", "REST_REFLECTION", material.reflection, nullptr},
+           {"structure", "REST_STRUCTURE", material.structure, &material.solid_structure}}};
 }
 
 bool is_solid(const Layer& layer) {
@@ -231,11 +231,11 @@ bool is_solid(const Layer& layer) {
 
 } // namespace
 
-std::string rest_definitions(const Look& look) {
-  std::string head = "#define REST\n#define SHARPNESS " + std::to_string(look.rest.sharpness) +
+std::string rest_definitions(const SurfaceMaterial& material) {
+  std::string head = "#define REST\n#define SHARPNESS " + std::to_string(material.rest.sharpness) +
                      "\n#define REACH " + std::to_string(1 / (vein_reach * vein_reach)) + "\n";
-  for (const Layer& layer : layers_of(look)) {
-    if (!is_solid(layer) && !is_triplanar(look, layer.image))
+  for (const Layer& layer : layers_of(material)) {
+    if (!is_solid(layer) && !is_triplanar(material, layer.image))
       continue;
     head += std::string("#define ") + layer.define + "\n";
     if (!is_solid(layer))
@@ -248,16 +248,16 @@ std::string rest_definitions(const Look& look) {
   return head;
 }
 
-std::string rest_source(const Look& look) {
+std::string rest_source(const SurfaceMaterial& material) {
   std::string source = common_source;
   bool noise = false, images = false;
-  for (const Layer& layer : layers_of(look)) {
+  for (const Layer& layer : layers_of(material)) {
     noise = noise || is_solid(layer);
-    images = images || is_triplanar(look, layer.image);
+    images = images || is_triplanar(material, layer.image);
   }
   source += noise ? noise_source : "";
   source += images ? triplanar_source : "";
-  for (const Layer& layer : layers_of(look)) {
+  for (const Layer& layer : layers_of(material)) {
     const std::string name = layer.name;
     const bool relief = name == "structure";
     if (is_solid(layer)) {
@@ -271,7 +271,7 @@ float rest_relief() {
 }
 )"
                        : "vec3 rest_" + name + "() { return " + name + "_color(); }\n";
-    } else if (is_triplanar(look, layer.image)) {
+    } else if (is_triplanar(material, layer.image)) {
       source += relief ? "float rest_relief() { return read_relief(structure); }\n"
                        : "vec3 rest_" + name + "() { return read_all(" + name + "); }\n";
     }
@@ -279,16 +279,17 @@ float rest_relief() {
   return source;
 }
 
-void set_rest(GLuint program, const Look& look, const Drawing& drawing) {
+void set_rest(GLuint program, const SurfaceMaterial& material, const Drawing& drawing) {
   const auto place = [&](const std::string& name) {
     return glGetUniformLocation(program, name.c_str());
   };
-  const Vec3 part = (drawing.rest_origin - look.rest.start) / look.rest.edge;
+  const Vec3 part = (drawing.rest_origin - material.rest.start) / material.rest.edge;
   glUniform4f(place("projection"), static_cast<float>(part.x), static_cast<float>(part.y),
-              static_cast<float>(part.z), static_cast<float>(drawing.rest_scale / look.rest.edge));
+              static_cast<float>(part.z),
+              static_cast<float>(drawing.rest_scale / material.rest.edge));
   glUniform1f(place("solid_shift"),
-              static_cast<float>(drawing.offset[0] * look.rest.edge / drawing.rest_scale));
-  for (const Layer& layer : layers_of(look)) {
+              static_cast<float>(drawing.offset[0] * material.rest.edge / drawing.rest_scale));
+  for (const Layer& layer : layers_of(material)) {
     if (!is_solid(layer))
       continue;
     const std::string name = std::string(layer.name) + "_";

@@ -204,9 +204,9 @@ void prolong(const Context& context, const LabelField& coarse, const Int3& strid
           sum += coarse.value_at({(c & 1) != 0 ? high[0] : low[0], (c & 2) != 0 ? high[1] : low[1],
                                   (c & 4) != 0 ? high[2] : low[2]});
         const float size = std::fabs(d), f = std::copysign(1.0F, d) * sum / 8;
-        const float least = bounds.least(size), most = bounds.most(size);
-        if (f >= least - slack && f <= most + slack)
-          fine.value[b * block_voxels + n] = std::copysign(std::clamp(f, least, most), d);
+        const float min = bounds.min(size), max = bounds.max(size);
+        if (f >= min - slack && f <= max + slack)
+          fine.value[b * block_voxels + n] = std::copysign(std::clamp(f, min, max), d);
       }
   });
 }
@@ -285,10 +285,10 @@ LabelBounds label_bounds(const LabelField& field) {
 }
 
 double LabelField::far() const {
-  double least = HUGE_VAL;
+  double min = HUGE_VAL;
   for (std::size_t a = 0; a < 3; ++a)
-    least = std::min(least, (reach[a] + 0.5) * spacing[a]);
-  return least;
+    min = std::min(min, (reach[a] + 0.5) * spacing[a]);
+  return min;
 }
 
 void place_blocks(const Int3& size, LabelField& field) {

@@ -65,10 +65,10 @@ void keep_volume(const Context& context, LabelField& field);
 /// The bounds of |F| where |D| is `distance`.
 struct LabelBounds {
   float half_diagonal; ///< g
-  float least(float distance) const {
+  float min(float distance) const {
     return distance - half_diagonal > 0.1F * distance ? distance - half_diagonal : 0.1F * distance;
   }
-  float most(float distance) const { return 2 * distance; }
+  float max(float distance) const { return 2 * distance; }
 };
 LabelBounds label_bounds(const LabelField& field);
 

@@ -145,7 +145,7 @@ void keep_volume(const Context& context, LabelField& field) {
         }
         const float d = field.distance[b * block_voxels + n], size = std::fabs(d);
         const float moved = std::copysign(1.0F, d) * (f + c);
-        f = std::copysign(1.0F, d) * std::clamp(moved, bounds.least(size), bounds.most(size));
+        f = std::copysign(1.0F, d) * std::clamp(moved, bounds.min(size), bounds.max(size));
       }
     }
   });

@@ -315,9 +315,9 @@ private:
           samples[c].weights.push_back(area[c] > 0 ? std::max(area_[i], tiny * area[c]) : 1);
         }
       // A center with a single node would coincide with it, hence two nodes per center at least.
-      const std::size_t most = std::max<std::size_t>(1, points.size() / 2);
+      const std::size_t max = std::max<std::size_t>(1, points.size() / 2);
       const std::size_t wanted =
-          std::min<std::size_t>(static_cast<std::size_t>(options_.centrals), most);
+          std::min<std::size_t>(static_cast<std::size_t>(options_.centrals), max);
       const Clusters places =
           cluster_points(samples[c].points, wanted, context_, samples[c].weights);
       samples[c] = {};

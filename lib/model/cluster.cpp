@@ -41,12 +41,12 @@ Vec3 mean(const std::vector<Vec3>& points, std::span<const double> weights) {
 /// its own: on round bodies, where rounding would choose, fine and coarse nets get the same seeds.
 std::size_t farthest(const std::vector<Vec3>& points, const std::vector<double>& distance,
                      std::size_t seed) {
-  const double least = alike * *std::max_element(distance.begin(), distance.end());
+  const double min = alike * *std::max_element(distance.begin(), distance.end());
   const double turn = 2.4 * static_cast<double>(seed);
   const Vec3 along{std::cos(turn), std::sin(turn), std::cos(0.5 * turn + 1)};
   std::size_t best = points.size();
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (distance[i] >= least &&
+    if (distance[i] >= min &&
         (best == points.size() || dot(points[i], along) > dot(points[best], along)))
       best = i;
   return best;

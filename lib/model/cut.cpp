@@ -424,7 +424,7 @@ private:
     if (fan == fans_.end())
       return number(node);
     std::uint32_t best = none;
-    double most = 0;
+    double max = 0;
     const Vec3& here = model_.nodes[node].position;
     for (const Piece& piece : fan->second) {
       if (!open_area(piece, other))
@@ -435,9 +435,9 @@ private:
           way += area_[c / 3] * (model_.nodes[corner].position - here);
       const double size = norm(way);
       const double cosine = size > 0 ? dot(way, place - here) / size : 0;
-      if (best == none || cosine > most) {
+      if (best == none || cosine > max) {
         best = piece.node;
-        most = cosine;
+        max = cosine;
       }
     }
     return best;

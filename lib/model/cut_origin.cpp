@@ -54,14 +54,14 @@ std::uint32_t max_alike(const Model& before, const Model& after, const std::uint
                         const std::uint32_t* last, std::uint32_t node) {
   const std::vector<Vec3> own = ends(after, node);
   std::uint32_t best = *first;
-  std::size_t most = 0;
+  std::size_t max = 0;
   for (; first != last; ++first) {
     std::vector<Vec3> shared;
     const std::vector<Vec3> theirs = ends(before, *first);
     std::set_intersection(own.begin(), own.end(), theirs.begin(), theirs.end(),
                           std::back_inserter(shared), before_in_space);
-    if (shared.size() > most) {
-      most = shared.size();
+    if (shared.size() > max) {
+      max = shared.size();
       best = *first;
     }
   }

@@ -161,11 +161,11 @@ double safe_step(const Model& model) {
 
 void require_safe_step(const Model& model, double step) {
   const std::vector<double> steps = safe_steps(model);
-  const auto least = std::min_element(steps.begin(), steps.end());
-  if (least == steps.end() || *least >= step)
+  const auto min = std::min_element(steps.begin(), steps.end());
+  if (min == steps.end() || *min >= step)
     return;
-  throw Error("a step of " + number_text(step) + " s is beyond the safe step " +
-              number_text(*least) + " s of node " + std::to_string(least - steps.begin()) +
+  throw Error("a step of " + number_text(step) + " s is beyond the safe step " + number_text(*min) +
+              " s of node " + std::to_string(min - steps.begin()) +
               ", expected a shorter one or scaled masses");
 }
 

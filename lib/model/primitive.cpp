@@ -76,12 +76,12 @@ Primitive parse_primitive(std::string_view text, std::string_view size) {
     min_n = 1;
   } else
     throw wrong();
-  const auto count = [&](std::string_view word, std::uint32_t least) {
+  const auto count = [&](std::string_view word, std::uint32_t min) {
     std::uint32_t value = 0;
     const auto [end, status] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (status != std::errc{} || end != word.data() + word.size())
       throw wrong();
-    if (value < least)
+    if (value < min)
       throw Error("a " + std::string(name) + " of " + std::string(text.substr(colon + 1)) +
                   " nodes, expected " + std::to_string(min_m) + "x" + std::to_string(min_n) +
                   " or more");

@@ -213,8 +213,8 @@ Bins sorted(const Screen& screen, std::uint32_t width, std::uint32_t height, int
   bins.down = (height + raster_tile_height - 1) / raster_tile_height;
   const std::size_t tiles = bins.across * bins.down, count = screen.shown.size();
   // Blocks so that their counters stay within 16 MiB.
-  const std::size_t most = std::max<std::size_t>(1, (std::size_t{1} << 22) / tiles);
-  const std::size_t grain = std::max<std::size_t>(4096, (count + most - 1) / most);
+  const std::size_t max = std::max<std::size_t>(1, (std::size_t{1} << 22) / tiles);
+  const std::size_t grain = std::max<std::size_t>(4096, (count + max - 1) / max);
   const std::size_t blocks = (count + grain - 1) / grain;
   std::vector<TileRange> ranges(count);
   std::vector<std::uint32_t> counters(blocks * tiles);
@@ -262,14 +262,14 @@ void set(float (&to)[3], const Vec3& from) {
     to[a] = static_cast<float>(from[a]);
 }
 
-/// A look's textures as kernels see them.
+/// A material's textures as kernels see them.
 class Textures {
 public:
-  explicit Textures(const Look& look) {
-    take(look.base, 0);
-    take(look.detail, 1);
-    take(look.reflection, 2);
-    take(look.structure, 3);
+  explicit Textures(const SurfaceMaterial& material) {
+    take(material.base, 0);
+    take(material.detail, 1);
+    take(material.reflection, 2);
+    take(material.structure, 3);
   }
   const KernelTexture* at(std::size_t n) const { return there_[n] ? &textures_[n] : nullptr; }
 
@@ -295,8 +295,9 @@ private:
   std::array<std::vector<KernelLevel>, 4> levels_;
 };
 
-KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Look& look,
-                     const Textures& textures, std::optional<RasterRest>& rest) {
+KernelScene scene_of(const Drawing& drawing, const Viewport& viewport,
+                     const SurfaceMaterial& material, const Textures& textures,
+                     std::optional<RasterRest>& rest) {
   static_assert(sizeof(DrawVertex) == 10 * sizeof(float) && sizeof(DrawFrame) == 7 * sizeof(float));
   static_assert(sizeof(Triangle) == 3 * sizeof(std::uint32_t));
   KernelScene scene{};
@@ -309,14 +310,14 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Loo
   scene.detail = textures.at(1);
   scene.reflection = textures.at(2);
   scene.structure = textures.at(3);
-  rest.emplace(drawing, look, scene);
+  rest.emplace(drawing, material, scene);
   for (const KernelTexture* texture : {scene.base, scene.detail, scene.reflection, scene.structure})
     if (texture != nullptr) {
       scene.sphere = scene.sphere || texture->sphere;
       scene.clamped = scene.clamped || texture->wrap == 1;
       scene.derivatives = scene.derivatives || (texture->count > 1 && !texture->sphere);
     }
-  set(scene.color, look.color);
+  set(scene.color, material.color);
   set(scene.light, drawing.light);
   set(scene.eye, drawing.camera.eye);
   set(scene.right, drawing.camera.right);
@@ -328,33 +329,35 @@ KernelScene scene_of(const Drawing& drawing, const Viewport& viewport, const Loo
   return scene;
 }
 
-std::uint32_t background_of(const Look& look) {
-  const std::array<std::uint8_t, 3> background = stored(look.background);
+std::uint32_t background_of(const SurfaceMaterial& material) {
+  const std::array<std::uint8_t, 3> background = stored(material.background);
   return background[0] | static_cast<std::uint32_t>(background[1]) << 8 |
          static_cast<std::uint32_t>(background[2]) << 16;
 }
 
 /// The scene of some triangles, linked to that of the next ones.
-struct LookScene {
-  LookScene(const Drawing& drawing, const Viewport& viewport, const Look& look)
-      : textures(look), scene(scene_of(drawing, viewport, look, textures, rest)) {}
+struct MaterialScene {
+  MaterialScene(const Drawing& drawing, const Viewport& viewport, const SurfaceMaterial& material)
+      : textures(material), scene(scene_of(drawing, viewport, material, textures, rest)) {}
   Textures textures;
   std::optional<RasterRest> rest;
   KernelScene scene;
 };
 
 /// One for each group of triangles, one at least.
-std::list<LookScene> scenes_of(const Drawing& drawing, const Viewport& viewport, const Look& look) {
-  std::list<LookScene> scenes;
+std::list<MaterialScene> scenes_of(const Drawing& drawing, const Viewport& viewport,
+                                   const SurfaceMaterial& material) {
+  std::list<MaterialScene> scenes;
   for (std::size_t g = 0; g < group_count(drawing); ++g) {
     const std::span<const Triangle> group = triangles_of_group(drawing, g);
     if (group.empty() && g > 0)
       continue;
     KernelScene* const last = scenes.empty() ? nullptr : &scenes.back().scene;
-    KernelScene& scene = scenes.emplace_back(drawing, viewport, look_of_group(look, g)).scene;
+    KernelScene& scene =
+        scenes.emplace_back(drawing, viewport, material_of_group(material, g)).scene;
     scene.first = static_cast<std::uint32_t>(group.data() - drawing.triangles.data());
     scene.count = static_cast<std::uint32_t>(group.size());
-    scene.background = background_of(look);
+    scene.background = background_of(material);
     if (last != nullptr)
       last->next = &scene;
   }
@@ -363,13 +366,13 @@ std::list<LookScene> scenes_of(const Drawing& drawing, const Viewport& viewport,
 
 } // namespace
 
-Image render_cpu(const Drawing& drawing, const Projection& projection, const Look& look,
-                 std::uint32_t width, std::uint32_t height, int samples, const Context& context,
-                 RenderReport* report) {
+Image render_cpu(const Drawing& drawing, const Projection& projection,
+                 const SurfaceMaterial& material, std::uint32_t width, std::uint32_t height,
+                 int samples, const Context& context, RenderReport* report) {
   const Viewport viewport(projection, width, height);
   const Screen screen = project(drawing, viewport, context);
   const Bins bins = sorted(screen, width, height, samples, context);
-  const std::list<LookScene> scenes = scenes_of(drawing, viewport, look);
+  const std::list<MaterialScene> scenes = scenes_of(drawing, viewport, material);
   const KernelScreen kernel_screen{screen.x.data(), screen.y.data(), screen.nearness.data(),
                                    screen.corners.data(), screen.shown.data()};
   const TileKernel draw_tile =

@@ -6,7 +6,7 @@
 #include "shading/camera.h"
 #include "shading/drawing.h"
 #include "shading/image.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 
 #include <cstdint>
 
@@ -20,16 +20,16 @@ struct RenderReport {
   std::uint64_t covered = 0;   ///< pixels, or samples
 };
 
-/// Draws `drawing` as width × height pixels of `look`. A pixel has the value at its centre; a
+/// Draws `drawing` as width × height pixels of `material`. A pixel has the value at its centre; a
 /// triangle owns the centres inside it and those on its top and left edges, on a lattice of 1/256
 /// pixel; the nearest surface is seen, from both sides; attributes are linear in space. Of
 /// coincident surfaces the first counts. With samples == 4 a pixel is the mean of four samples, in
 /// which every surface has its value at the pixel's centre (multisampling). Every CPU level gives
 /// the same bytes.
 /// \pre width, height <= max_picture_side, samples is 1 or 4   \throw Cancelled
-Image render_cpu(const Drawing& drawing, const Projection& projection, const Look& look,
-                 std::uint32_t width, std::uint32_t height, int samples, const Context& context,
-                 RenderReport* report = nullptr);
+Image render_cpu(const Drawing& drawing, const Projection& projection,
+                 const SurfaceMaterial& material, std::uint32_t width, std::uint32_t height,
+                 int samples, const Context& context, RenderReport* report = nullptr);
 
 /// Bytes that render_cpu needs for a picture, without its drawing.
 double render_cpu_bytes(std::uint32_t width, std::uint32_t height, int samples,

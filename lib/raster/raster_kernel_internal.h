@@ -43,14 +43,14 @@ struct KernelRest {
   float shift; ///< of a solid structure towards the light, in the unit of places
 };
 
-/// What shading needs of the triangles from `first` on; others have another look. Vertices are 10
-/// floats: position, s t, shifted s t, sphere s t, shade; frames 7: normal, tangent, side.
+/// What shading needs of the triangles from `first` on; others have another material. Vertices are
+/// 10 floats: position, s t, shifted s t, sphere s t, shade; frames 7: normal, tangent, side.
 struct KernelScene {
   const float* vertices;
   const float* frames; ///< null: `shifted` and `sphere` of the vertices count
   const std::uint32_t* triangles;
-  std::uint32_t first, count; ///< triangles of this look
-  const KernelScene* next;    ///< other triangles with their look, or null
+  std::uint32_t first, count; ///< triangles of this material
+  const KernelScene* next;    ///< other triangles with their material, or null
   double clip[3][4];          ///< rows x, y, w: to pixels times w, from the upper left
   const KernelTexture *base, *detail, *reflection, *structure; ///< null where absent
   float color[3];

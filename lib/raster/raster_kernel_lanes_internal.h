@@ -603,11 +603,12 @@ inline Colors sample_level(const KernelTexture& texture, const Level& level, Flo
   return result;
 }
 
-/// Between level k and k + 1 for a pixel that covers 2^k (1 + part) texels; `most` is their square.
-inline Colors sample_levels(const KernelTexture& texture, Floats most, Floats s, Floats t) {
-  if (!any(most > splat(1.0F)))
+/// Between level k and k + 1 for a pixel that covers 2^k (1 + part) texels; `largest` is their
+/// square.
+inline Colors sample_levels(const KernelTexture& texture, Floats largest, Floats s, Floats t) {
+  if (!any(largest > splat(1.0F)))
     return sample_level(texture, first_level(texture), s, t);
-  const Floats texels = larger(smaller(root(most), splat(1e9F)), splat(1.0F));
+  const Floats texels = larger(smaller(root(largest), splat(1e9F)), splat(1.0F));
   const Ints bits = as<Ints>(texels);
   Ints k = (bits >> 23) - 127;
   Floats part = as<Floats>((bits & 0x7fffff) | (127 << 23)) - splat(1.0F);
@@ -629,14 +630,14 @@ inline Colors sample(const KernelTexture& texture, const Slots& slots, std::size
   if (texture.count == 1 || texture.sphere)
     return sample_level(texture, first_level(texture), s, t);
   const KernelLevel& l = texture.levels[0];
-  Floats most = splat(0.0F);
+  Floats largest = splat(0.0F);
   for (std::size_t a = 0; a < 2; ++a) {
     const Floats u = load<Floats>(slots.change[2 * a] + at) * splat(static_cast<float>(l.width));
     const Floats v =
         load<Floats>(slots.change[2 * a + 1] + at) * splat(static_cast<float>(l.height));
-    most = larger(u * u + v * v, most);
+    largest = larger(u * u + v * v, largest);
   }
-  return sample_levels(texture, most, s, t);
+  return sample_levels(texture, largest, s, t);
 }
 
 inline Colors sample_layer(const KernelTexture& texture, const Slots& slots, std::size_t at) {

@@ -230,11 +230,11 @@ inline void project_images(const KernelScene& scene, const Slots& slots, std::si
                            RestColors& colors) {
   const KernelRest& rest = *scene.rest;
   const Floats none = splat(0.0F), n[3] = {normal.x, normal.y, normal.z};
-  const Floats most = larger(larger(magnitude(n[0]), magnitude(n[1])), magnitude(n[2]));
+  const Floats largest = larger(larger(magnitude(n[0]), magnitude(n[1])), magnitude(n[2]));
   Floats weight[3];
   for (int a = 0; a < 3; ++a)
-    weight[a] = weight_of(magnitude(n[a]) * inverse_or_zero(most), rest.sharpness);
-  weight[2] = most > none ? weight[2] : splat(1.0F);
+    weight[a] = weight_of(magnitude(n[a]) * inverse_or_zero(largest), rest.sharpness);
+  weight[2] = largest > none ? weight[2] : splat(1.0F);
   const Floats over = splat(1.0F) / (weight[0] + weight[1] + weight[2]);
   const Floats scale = splat(rest.scale);
   const Floats q[3] = {place.x * scale + splat(rest.part[0]), place.y * scale + splat(rest.part[1]),

@@ -4,8 +4,9 @@
 
 namespace gewebe {
 
-RasterRest::RasterRest(const Drawing& drawing, const Look& look, KernelScene& scene) {
-  if (!is_at_rest(look) || drawing.vertices.empty())
+RasterRest::RasterRest(const Drawing& drawing, const SurfaceMaterial& material,
+                       KernelScene& scene) {
+  if (!is_at_rest(material) || drawing.vertices.empty())
     return;
   static_assert(sizeof(DrawRest) == 6 * sizeof(float) && sizeof(DrawTurn) == 6 * sizeof(float));
   if (drawing.rests.size() != drawing.vertices.size())
@@ -15,17 +16,17 @@ RasterRest::RasterRest(const Drawing& drawing, const Look& look, KernelScene& sc
     rest_.turns = reinterpret_cast<const float*>(drawing.turns.data());
   const auto image = [&](const std::optional<Texture>& texture, const KernelTexture*& there,
                          KernelRestLayer& layer) {
-    if (!is_triplanar(look, texture))
+    if (!is_triplanar(material, texture))
       return;
     layer.image = there;
     rest_.normals = true;
     rest_.derivatives = rest_.derivatives || there->count > 1;
     there = nullptr;
   };
-  image(look.base, scene.base, rest_.base);
-  image(look.detail, scene.detail, rest_.detail);
-  image(look.reflection, scene.reflection, rest_.reflection);
-  image(look.structure, scene.structure, rest_.structure);
+  image(material.base, scene.base, rest_.base);
+  image(material.detail, scene.detail, rest_.detail);
+  image(material.reflection, scene.reflection, rest_.reflection);
+  image(material.structure, scene.structure, rest_.structure);
   const auto solid = [&](const std::optional<SolidTexture>& texture, std::optional<SolidPlan>& plan,
                          KernelRestLayer& layer) {
     if (!texture)
@@ -34,16 +35,16 @@ RasterRest::RasterRest(const Drawing& drawing, const Look& look, KernelScene& sc
     layer.solid = &*plan;
     rest_.derivatives = rest_.derivatives || texture->filtered;
   };
-  solid(look.solid_base, base_, rest_.base);
-  solid(look.solid_detail, detail_, rest_.detail);
-  solid(look.solid_structure, structure_, rest_.structure);
-  rest_.normals = rest_.normals || look.solid_structure;
-  rest_.scale = static_cast<float>(drawing.rest_scale / look.rest.edge);
-  const Vec3 part = (drawing.rest_origin - look.rest.start) / look.rest.edge;
+  solid(material.solid_base, base_, rest_.base);
+  solid(material.solid_detail, detail_, rest_.detail);
+  solid(material.solid_structure, structure_, rest_.structure);
+  rest_.normals = rest_.normals || material.solid_structure;
+  rest_.scale = static_cast<float>(drawing.rest_scale / material.rest.edge);
+  const Vec3 part = (drawing.rest_origin - material.rest.start) / material.rest.edge;
   for (int a = 0; a < 3; ++a)
     rest_.part[a] = static_cast<float>(part[a]);
-  rest_.sharpness = look.rest.sharpness;
-  rest_.shift = static_cast<float>(drawing.offset[0] * look.rest.edge / drawing.rest_scale);
+  rest_.sharpness = material.rest.sharpness;
+  rest_.shift = static_cast<float>(drawing.offset[0] * material.rest.edge / drawing.rest_scale);
   scene.rest = &rest_;
 }
 

@@ -3,7 +3,7 @@
 
 #include "raster/raster_kernel_internal.h"
 #include "shading/drawing.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 
 #include <optional>
 
@@ -12,7 +12,7 @@ namespace gewebe {
 class RasterRest {
 public:
   /// Takes the images that lie on the shape at rest out of `scene`.
-  RasterRest(const Drawing& drawing, const Look& look, KernelScene& scene);
+  RasterRest(const Drawing& drawing, const SurfaceMaterial& material, KernelScene& scene);
   RasterRest(const RasterRest&) = delete;
   RasterRest& operator=(const RasterRest&) = delete;
 

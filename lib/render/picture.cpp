@@ -37,8 +37,8 @@ std::pair<std::uint32_t, std::uint32_t> picture_size_from_text(std::string_view 
 }
 
 struct Painter::State {
-  State(const Look& l, const PictureOptions& o, const Context& c)
-      : look(l), options(o), context(c) {
+  State(const SurfaceMaterial& l, const PictureOptions& o, const Context& c)
+      : material(l), options(o), context(c) {
     const std::uint64_t w = std::uint64_t{options.width} * options.supersample;
     const std::uint64_t h = std::uint64_t{options.height} * options.supersample;
     if (std::max(w, h) > max_picture_side)
@@ -55,7 +55,7 @@ struct Painter::State {
           return gl.reset();
         GlOptions with_samples = options.gl;
         with_samples.samples = options.samples;
-        renderer.emplace(*gl, look, width, height, with_samples);
+        renderer.emplace(*gl, material, width, height, with_samples);
       });
     if (!renderer)
       require_memory(context, render_cpu_bytes(width, height, options.samples, context),
@@ -88,7 +88,7 @@ struct Painter::State {
     }
   }
 
-  Look look;
+  SurfaceMaterial material;
   PictureOptions options;
   Context context;
   std::uint32_t width = 0, height = 0;
@@ -98,8 +98,9 @@ struct Painter::State {
   std::uint64_t version = 0, uploads = 0; ///< of the drawing that OpenGL has
 };
 
-Painter::Painter(const Look& look, const PictureOptions& options, const Context& context)
-    : state_(std::make_unique<State>(look, options, context)) {}
+Painter::Painter(const SurfaceMaterial& material, const PictureOptions& options,
+                 const Context& context)
+    : state_(std::make_unique<State>(material, options, context)) {}
 Painter::~Painter() = default;
 
 bool Painter::per_pixel() const {
@@ -137,8 +138,8 @@ Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport
   told.gl_failure = s.gl_failure;
   if (!s.renderer) {
     RenderReport drawn;
-    image = render_cpu(drawing, projection, s.look, s.width, s.height, s.options.samples, s.context,
-                       &drawn);
+    image = render_cpu(drawing, projection, s.material, s.width, s.height, s.options.samples,
+                       s.context, &drawn);
     told.backend = Backend::cpu;
     told.passes = 1;
     told.triangles = drawn.triangles;
@@ -147,9 +148,9 @@ Image Painter::paint(const Drawing& drawing, const Camera& camera, PictureReport
   return shrunk(image, s.options.supersample);
 }
 
-Image make_picture(const Drawing& drawing, const Camera& camera, const Look& look,
+Image make_picture(const Drawing& drawing, const Camera& camera, const SurfaceMaterial& material,
                    const PictureOptions& options, const Context& context, PictureReport* report) {
-  return Painter(look, options, context).paint(drawing, camera, report);
+  return Painter(material, options, context).paint(drawing, camera, report);
 }
 
 } // namespace gewebe

@@ -6,7 +6,7 @@
 #include "shading/camera.h"
 #include "shading/drawing.h"
 #include "shading/image.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 
 #include <cstdint>
 #include <memory>
@@ -52,22 +52,22 @@ struct PictureReport {
   std::uint64_t covered = 0;   ///< samples; cpu alone
 };
 
-/// Draws pictures of one look and size. What a sequence keeps is kept: the context of OpenGL, the
-/// shader, the textures there.
+/// Draws pictures of one material and size. What a sequence keeps is kept: the context of OpenGL,
+/// the shader, the textures there.
 class Painter {
 public:
   /// With Backend::automatic OpenGL is tried, and what fails kept for the report; one that is
   /// software counts where the mode is one of its fixed functions alone.
   /// \throw Error if sides times supersample exceed max_picture_side or the estimate the memory,
   /// and, with Backend::gl, where OpenGL fails
-  Painter(const Look& look, const PictureOptions& options, const Context& context);
+  Painter(const SurfaceMaterial& material, const PictureOptions& options, const Context& context);
   ~Painter();
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
 
   /// Whether drawings should have frames: for the rasteriser and the shader, unless told otherwise.
   bool per_pixel() const;
-  /// \pre the drawing has no more groups than the look; drawings with versions are one maker's
+  /// \pre the drawing has no more groups than the material; drawings with versions are one maker's
   /// The picture, three channels. All modes draw the same: of 255, values differ by 2 at most where
   /// the picture is continuous, for one kind of drawings.
   /// \throw Error where OpenGL fails; Cancelled
@@ -79,7 +79,7 @@ private:
 };
 
 /// One picture.
-Image make_picture(const Drawing& drawing, const Camera& camera, const Look& look,
+Image make_picture(const Drawing& drawing, const Camera& camera, const SurfaceMaterial& material,
                    const PictureOptions& options, const Context& context,
                    PictureReport* report = nullptr);
 

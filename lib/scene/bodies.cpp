@@ -99,7 +99,7 @@ void load_body(const World& w, Body& body) {
     add(object.load->displacement, load.displacement);
     add(object.load->force_period, load.force_period);
     add(object.load->pressure, load.pressure);
-    add(object.load->travel, load.travel);
+    add(object.load->ramp, load.ramp);
     load.gravity = object.load->gravity;
   }
   body.ahead = true;
@@ -260,15 +260,15 @@ void Rule<Attach>::apply(World& w, const Attach& c) {
   for (const std::uint32_t node : c.nodes) {
     const Vec3 here = position(a, node);
     std::uint32_t nearest = c.others[0];
-    double least = HUGE_VAL;
+    double min = HUGE_VAL;
     for (const std::uint32_t other : c.others) {
       const Vec3 d = position(b, other) - here;
-      if (dot(d, d) < least) {
-        least = dot(d, d);
+      if (dot(d, d) < min) {
+        min = dot(d, d);
         nearest = other;
       }
     }
-    w.now.ties.push_back({c.object, c.other, node, nearest, c.stiffness, std::sqrt(least)});
+    w.now.ties.push_back({c.object, c.other, node, nearest, c.stiffness, std::sqrt(min)});
   }
   std::vector<std::size_t> parts = a.body->parts;
   if (a.body != b.body)

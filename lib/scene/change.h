@@ -39,7 +39,7 @@ struct SetDisplacement {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
   Vec3 displacement;
-  double over = 0; ///< s that the way there takes an elastodynamic object's nodes
+  double duration = 0; ///< s that the way there takes an elastodynamic object's nodes
 };
 /// Ties each of the first object's nodes to the nearest of the second's by a spring, at rest as
 /// they stand.
@@ -65,7 +65,7 @@ struct MoveInstrument {
   std::size_t instrument = 0;
   Vec3 place;
   std::optional<Quaternion> turn; ///< of length 1; none: as it is
-  double over = 0;                ///< s that the way takes
+  double duration = 0;            ///< s that the way takes
 };
 /// Nodes follow an instrument as parts of it, from where they stand.
 struct Grasp {

@@ -33,9 +33,9 @@ void displace(const World& w, Object& object, const SetDisplacement& set) {
     else if (const auto old = load.displacement.find(node); old != load.displacement.end())
       from = old->second;
     load.displacement[node] = set.displacement;
-    load.travel.erase(node);
-    if (set.over > 0)
-      load.travel[node] = {from, set.displacement, w.now.clock.time, w.now.clock.time + set.over};
+    load.ramp.erase(node);
+    if (set.duration > 0)
+      load.ramp[node] = {from, set.displacement, w.now.clock.time, w.now.clock.time + set.duration};
   }
 }
 
@@ -91,8 +91,8 @@ ChangeRow row_of(const World& w, const Change& change) {
 }
 
 void require_period(double period) {
-  constexpr double least = 1e-9; // s
-  if (!(period >= least))
+  constexpr double min = 1e-9; // s
+  if (!(period >= min))
     throw Error("a period of " + number_text(period) + " s, expected 1e-9 s or longer");
 }
 
@@ -146,12 +146,12 @@ void Rule<SetPressure>::log(const World&, const SetPressure& c, ChangeRow& row) 
 void Rule<SetDisplacement>::check(World& w, const SetDisplacement& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
-  const double most = displacement_limit(object);
+  const double max = displacement_limit(object);
   for (int a = 0; a < 3; ++a)
-    if (!(std::abs(c.displacement[a]) <= most))
+    if (!(std::abs(c.displacement[a]) <= max))
       throw Error("a displacement of " + number_text(c.displacement[a]) +
                   " mm, expected at most a million times the size of the object, " +
-                  number_text(most) + " mm");
+                  number_text(max) + " mm");
   for (const std::uint32_t node : c.nodes)
     for (int a = 0; a < 3; ++a)
       if (is_fixed(object.model(), node, a) && c.displacement[a] != 0)
@@ -167,7 +167,7 @@ void Rule<SetDisplacement>::apply(World& w, const SetDisplacement& c) {
 void Rule<SetDisplacement>::log(const World&, const SetDisplacement& c, ChangeRow& row) {
   row.what = "displace";
   row.vector = c.displacement;
-  row.duration = c.over;
+  row.duration = c.duration;
 }
 
 void Rule<Release>::apply(World& w, const Release& c) {
@@ -179,7 +179,7 @@ void Rule<Release>::apply(World& w, const Release& c) {
     load.force_period.erase(node);
     load.pressure.erase(node);
     load.displacement.erase(node);
-    load.travel.erase(node);
+    load.ramp.erase(node);
   }
   touch(object);
 }

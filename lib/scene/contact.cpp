@@ -12,7 +12,7 @@ namespace gewebe::simulation {
 
 namespace {
 
-constexpr std::size_t most_parts = 256; ///< of an instrument's way in one step
+constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
 
 Box3 joined(Box3 a, const Box3& b) {
   a.add(b.min);
@@ -184,13 +184,13 @@ void follow_instruments(World& w, Object& object) {
   const std::size_t count = w.now.instruments.size();
   bool solved = true;
   const TwoStepYielding::Stages stages = [&]() -> std::pair<Elastostatic&, TwoStep&> {
-    Elastostatic& still = still_of(w, object);
-    return {still, two_step_of(w, object)};
+    Elastostatic& solver = solver_of(w, object);
+    return {solver, two_step_of(w, object)};
   };
   std::vector<double>& shape = object.shown.displacement.write();
   // An object that nothing ever acted on has no shape to find.
   const bool changed = !object.shown.touches.empty() ||
-                       ((object.statics->still || !object.load->empty()) &&
+                       ((object.statics->solver || !object.load->empty()) &&
                         (!object.shown.valid || object.load->changes_until() > object.shown.time));
   for (std::size_t p = w.now.poses.size() > 1 ? 1 : 0; p < w.now.poses.size(); ++p) {
     std::vector<MovedInstrument> moved;
@@ -198,7 +198,7 @@ void follow_instruments(World& w, Object& object) {
       if (const auto now = pose_at(w, p, k))
         moved.push_back(
             {w.now.instruments[k].shape, p > 0 ? pose_at(w, p - 1, k).value_or(*now) : *now, *now});
-    const std::size_t parts = parts_of_way(moved, most_parts);
+    const std::size_t parts = parts_of_way(moved, max_parts);
     for (std::size_t part = 1; part <= parts; ++part) {
       const auto at = [&](std::size_t n) {
         return static_cast<double>(n) / static_cast<double>(parts);
@@ -218,7 +218,7 @@ void follow_instruments(World& w, Object& object) {
         object.contact->update(both, load.displacement, here, shape, last);
         solved = solved && both.solved();
       } else {
-        object.contact->update([&]() -> Elastostatic& { return still_of(w, object); }, load, here,
+        object.contact->update([&]() -> Elastostatic& { return solver_of(w, object); }, load, here,
                                shape, last);
       }
       solved = solved && object.contact->solved();

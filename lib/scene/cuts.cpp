@@ -36,7 +36,7 @@ auto of_object(const std::string& name, Work&& work) {
 /// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
 /// back.
 CutStiffness* stiffness_of(World& w, Object& object) {
-  if (object.statics->stiffness || (!object.statics->still && !has_moved(w, object)))
+  if (object.statics->stiffness || (!object.statics->solver && !has_moved(w, object)))
     return object.statics->stiffness.get();
   object.statics->ahead = true;
   const std::shared_ptr<const Model> first =
@@ -60,8 +60,8 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
     return nullptr;
   try {
     const CutWork work = stiffness->cut(std::move(next), cut.origin, cut.place);
-    ++(work.way == CutWay::correction ? w.now.counts.cut_corrections
-       : work.way == CutWay::renewal  ? w.now.counts.cut_renewals
+    ++(work.way == CutWay::woodbury   ? w.now.counts.cut_woodbury
+       : work.way == CutWay::refactor ? w.now.counts.cut_refactors
                                       : w.now.counts.cut_factors);
     return stiffness->compliance();
   } catch (...) {
@@ -120,11 +120,12 @@ CutState cut_again(const Object& old, std::vector<std::uint32_t> origin, const M
 }
 
 /// Its shape is found from that before this cut, when somebody asks.
-void leave_late(const Object& old, const Moves& moves, Object& next) {
-  auto shape = std::make_shared<LateShape>(
-      old.shown.late ? *old.shown.late : LateShape{old.matter->model, *old.shown.load, {}});
+void defer_shape(const Object& old, const Moves& moves, Object& next) {
+  auto shape = std::make_shared<DeferredShape>(
+      old.shown.deferred ? *old.shown.deferred
+                         : DeferredShape{old.matter->model, *old.shown.load, {}});
   shape->moves.push_back(std::make_shared<const Moves>(moves));
-  next.shown.late = std::move(shape);
+  next.shown.deferred = std::move(shape);
   next.shown.shaped = false;
 }
 
@@ -134,9 +135,9 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   const bool ffe = old.method == Method::ffe;
   FreeParts free = free_parts(old.model(), cut);
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
-  const bool late = ffe && !old.shown.shaped && free.parts.empty() && w.now.instruments.empty() &&
-                    old.matter->known && !old.stages.options;
-  if (ffe && !late)
+  const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
+                        w.now.instruments.empty() && old.matter->known && !old.stages.options;
+  if (ffe && !deferred)
     shape_in_step(w, old);
   const Moves moves = moves_of(w, index, cut, free);
   std::vector<Vec3> velocity = old.came.velocity;
@@ -154,7 +155,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   std::shared_ptr<ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
   if (ffe) {
-    if (old.statics->still || old.statics->stiffness)
+    if (old.statics->solver || old.statics->stiffness)
       old.statics->ahead = true;
     try {
       prepared = cut_source(w, old, now, rest);
@@ -172,8 +173,8 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   follow_cut(w, old, rest.origin, next);
   next.cut = cut_again(old, rest.origin, moves);
   next.cut.scored = std::move(rest.left);
-  if (late)
-    leave_late(old, moves, next);
+  if (deferred)
+    defer_shape(old, moves, next);
   if (loose && !velocity.empty()) {
     next.came.velocity.resize(now->nodes.size());
     for (std::uint32_t i = 0; i < old.model().nodes.size(); ++i)
@@ -220,14 +221,14 @@ void announce_cut(World& w, std::size_t index) {
 }
 
 /// Of an object that was cut before its shape was known.
-void find_late_shape(World& w, Object& object) {
-  const std::shared_ptr<const LateShape> held = object.shown.late;
-  const LateShape& late = *held;
-  Elastostatic still(*late.model, nullptr, w.context);
-  still.update(late.load);
-  const std::span<const double> first = still.displacement();
+void find_deferred_shape(World& w, Object& object) {
+  const std::shared_ptr<const DeferredShape> held = object.shown.deferred;
+  const DeferredShape& deferred = *held;
+  Elastostatic solver(*deferred.model, nullptr, w.context);
+  solver.update(deferred.load);
+  const std::span<const double> first = solver.displacement();
   std::vector<double> shape(first.begin(), first.end());
-  for (const auto& moves : late.moves) {
+  for (const auto& moves : deferred.moves) {
     std::size_t nodes = 0;
     for (const Moves::To& to : moves->all)
       if (to.object == moves->objects[0])
@@ -242,7 +243,7 @@ void find_late_shape(World& w, Object& object) {
   }
   require_bounded(object, shape);
   object.shown.displacement = std::move(shape);
-  object.shown.late.reset();
+  object.shown.deferred.reset();
   object.shown.shaped = true;
 }
 
@@ -258,7 +259,7 @@ std::vector<SweptQuad> swept_areas(World& w) {
       continue;
     for (std::size_t k = 1; k < i.path.size(); ++k) {
       const Pose &from = i.path[k - 1], &to = i.path[k];
-      const double turn = norm(turned(from.turn, i.shape.axis) - turned(to.turn, i.shape.axis)) /
+      const double turn = norm(rotated(from.turn, i.shape.axis) - rotated(to.turn, i.shape.axis)) /
                           std::max(norm(i.shape.axis), 1e-300);
       const auto parts =
           static_cast<std::size_t>(std::clamp(std::ceil(turn / largest_turn), 1.0, 64.0));
@@ -337,11 +338,11 @@ void tear(World& w) {
 /// elastodynamic.
 void find_free_motion(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
-  if (!object.cut.first || object.method != Method::ffe || object.statics->still ||
+  if (!object.cut.first || object.method != Method::ffe || object.statics->solver ||
       (object.load->empty() && !instruments_there(w)))
     return;
   try {
-    (void)still_of(w, object);
+    (void)solver_of(w, object);
     return;
   } catch (const SingularStiffness& error) {
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::loose,
@@ -354,7 +355,7 @@ void find_free_motion(World& w, std::size_t index) {
     w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
                    " s: it goes on elastodynamic, for behind the cut " +
                    w.now.news.cuttings.back().text);
-  if (object.shown.late)
+  if (object.shown.deferred)
     shape_in_step(w, object);
   object.contact = nullptr;
   Motions motions;

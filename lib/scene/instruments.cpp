@@ -37,9 +37,9 @@ void carry(World& w, const Instrument& instrument) {
     const Carrier by{instrument.way, grip.point, object.model().nodes[grip.node].position};
     const Vec3 to = by.at(instrument.way.end);
     load.displacement[grip.node] = to;
-    load.travel.erase(grip.node);
+    load.ramp.erase(grip.node);
     if (instrument.way.end > now)
-      load.travel[grip.node] = {by.at(now), to, now, instrument.way.end, by};
+      load.ramp[grip.node] = {by.at(now), to, now, instrument.way.end, by};
     touch(object);
   }
 }
@@ -180,14 +180,14 @@ void Rule<MoveInstrument>::apply(World& w, const MoveInstrument& c) {
   Instrument& i = w.now.instruments[c.instrument];
   const double now = w.now.clock.time;
   const Pose from = i.way.at(now);
-  i.way = {from, {c.place, c.turn.value_or(from.turn)}, now, now + c.over};
+  i.way = {from, {c.place, c.turn.value_or(from.turn)}, now, now + c.duration};
   carry(w, i);
   note_poses(w);
 }
 void Rule<MoveInstrument>::log(const World&, const MoveInstrument& c, ChangeRow& row) {
   row.what = "move";
   row.vector = c.place;
-  row.duration = c.over;
+  row.duration = c.duration;
 }
 
 void Rule<Grasp>::check(World& w, const Grasp& c) {
@@ -214,7 +214,7 @@ void Rule<Grasp>::apply(World& w, const Grasp& c) {
                                           : vector_at(*object.shown.displacement, node);
     i.grips.push_back({c.object, node, pose.inverse(object.model().nodes[node].position + u)});
     load.displacement[node] = u;
-    load.travel.erase(node);
+    load.ramp.erase(node);
   }
   touch(object);
   if (w.now.clock.time < i.way.end)

@@ -14,16 +14,16 @@ namespace {
 
 /// The elastostatic shape under what acts now; empty: nothing ever touched the object.
 std::span<const double> shape_now(World& w, Object& object) {
-  std::span<const double> still;
-  if (object.statics->still || !object.load->empty()) {
-    update_still(w, object, load_at(*object.load, object.model(), w.now.clock.time));
-    still = still_shape(object);
-    require_bounded(object, still);
+  std::span<const double> u;
+  if (object.statics->solver || !object.load->empty()) {
+    update_solver(w, object, load_at(*object.load, object.model(), w.now.clock.time));
+    u = static_shape(object);
+    require_bounded(object, u);
   }
   const Shown& shown = object.shown;
   if (!shown.touches.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
-    still = *shown.displacement; // instruments among what acts
-  return still;
+    u = *shown.displacement; // instruments among what acts
+  return u;
 }
 
 Vec3 at(std::span<const double> shape, std::size_t i) {
@@ -31,27 +31,27 @@ Vec3 at(std::span<const double> shape, std::size_t i) {
 }
 
 /// Goes on from a shape, at rest; empty: from where it is.
-void set_going(World& w, std::size_t index, std::span<const double> still) {
-  if (still.empty())
+void set_going(World& w, std::size_t index, std::span<const double> u) {
+  if (u.empty())
     return;
   need_body(w, index);
   Object& object = w.now.objects[index];
   std::vector<NodeMotion> motion(object.model().nodes.size());
   for (std::size_t i = 0; i < motion.size(); ++i)
-    motion[i].displacement = at(still, i);
+    motion[i].displacement = at(u, i);
   object.body->moving->set_motion(motion);
   object.body->changed = true;
 }
 
 /// Takes its shape at once. \return mm, by which it jumps
-double stop(World& w, Object& object, std::span<const double> still) {
+double stop(World& w, Object& object, std::span<const double> u) {
   double jump = 0;
   if (object.body == nullptr)
     return jump;
   gather_impulses(w, *object.body);
   const std::span<const NodeMotion> motion = object.body->moving->motion();
   for (std::size_t i = 0; i < motion.size(); ++i)
-    jump = std::max(jump, norm((still.empty() ? Vec3{} : at(still, i)) - motion[i].displacement));
+    jump = std::max(jump, norm((u.empty() ? Vec3{} : at(u, i)) - motion[i].displacement));
   drop_body(w, object.body.get());
   object.body = nullptr;
   return jump;
@@ -64,12 +64,12 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
   if (object.method == c.method)
     return;
   require_support(w, object, Feature::method);
-  const std::span<const double> still = shape_now(w, object);
+  const std::span<const double> u = shape_now(w, object);
   object.contact = nullptr;
   if (c.method == Method::ela) {
-    set_going(w, c.object, still);
+    set_going(w, c.object, u);
   } else {
-    const double jump = stop(w, object, still);
+    const double jump = stop(w, object, u);
     w.now.news.jumps.push_back({c.object, jump});
     w.now.counts.largest_jump = std::max(w.now.counts.largest_jump, jump);
   }

@@ -46,7 +46,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
                 .load = gravity_of(*old.shown.load),
                 .time = old.shown.time,
                 .posed = old.shown.posed};
-  next.came = {.load = gravity_of(*old.came.load), .over = old.came.over};
+  next.came = {.load = gravity_of(*old.came.load), .duration = old.came.duration};
   next.contact = nullptr;
   next.impulses.clear();
   next.cut = {.tear = old.cut.tear};
@@ -94,7 +94,7 @@ public:
       }
     follow(from.pressure, [&](Object& o) -> auto& { return load_of(o).pressure; });
     follow(from.displacement, [&](Object& o) -> auto& { return load_of(o).displacement; });
-    follow(from.travel, [&](Object& o) -> auto& { return load_of(o).travel; });
+    follow(from.ramp, [&](Object& o) -> auto& { return load_of(o).ramp; });
   }
 
 private:
@@ -315,8 +315,8 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   const Object old = w.now.objects[index];
   ElastostaticCounts& spent = pieces[0].statics->spent;
   add_counts(spent, old.statics->spent);
-  if (old.statics->still)
-    add_counts(spent, old.statics->still->counts());
+  if (old.statics->solver)
+    add_counts(spent, old.statics->solver->counts());
   if (old.body != nullptr)
     gather_impulses(w, *old.body);
   move_shown(w.now.objects[index], moves, pieces);

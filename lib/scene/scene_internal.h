@@ -64,8 +64,8 @@ struct Matter {
 /// What an elastostatic object keeps to be quick. It depends on the shapes that were asked of it,
 /// so it is made anew where one of them is taken back.
 struct Statics {
-  std::optional<Elastostatic> still;
-  std::optional<TwoStep> two_step;            // over `still`, made when needed
+  std::optional<Elastostatic> solver;
+  std::optional<TwoStep> two_step;            // over `solver`, made when needed
   std::shared_ptr<ComplianceSource> prepared; // of the cut model, by cut_source
   std::unique_ptr<CutStiffness> stiffness;    // that made them
   ElastostaticCounts spent;                   // of what was renewed
@@ -106,7 +106,7 @@ struct Stages {
 
 /// The shape before cuts that nobody has asked for: it is found when somebody does, from the model
 /// of then.
-struct LateShape {
+struct DeferredShape {
   std::shared_ptr<const Model> model;
   Load load;
   std::vector<std::shared_ptr<const Moves>> moves; // since, one cut each
@@ -119,7 +119,8 @@ struct Shown {
   std::vector<NodeTouch> touches{};
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
-  std::shared_ptr<const LateShape> late{}; // what the displacement is, where it is not shaped
+  std::shared_ptr<const DeferredShape>
+      deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};
   double time = 0;
   bool posed = false; // what is shown is a shape of ffe
@@ -129,7 +130,7 @@ struct Shown {
 struct CameFrom {
   CopyOnWrite<Load> load{};
   std::map<std::uint32_t, Vec3> touched{}; // where nodes stood that instruments pushed
-  double over = 0;                         // s from then to now; 0: there is none
+  double duration = 0;                     // s from then to now; 0: there is none
   std::vector<Vec3> velocity{};            // of nodes, where a cut left no stiffness to find it by
 };
 

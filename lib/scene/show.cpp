@@ -13,8 +13,8 @@ namespace gewebe::simulation {
 namespace {
 
 constexpr double strain_limit = 0.1, turn_limit = 0.2;
-constexpr double most_sizes = 1e6; // of an object, that a node may be displaced by
-constexpr int slow_enough = 10;    // updates in a row, the first ones read and factorise
+constexpr double max_sizes = 1e6; // of an object, that a node may be displaced by
+constexpr int slow_enough = 10;   // updates in a row, the first ones read and factorise
 
 std::string percent(double part) {
   return number_text(std::round(1000 * part) / 10) + " %";
@@ -54,11 +54,11 @@ void update_in_time(World& w, Object& object) {
   const bool watched = w.options.rate > 0 && w.options.warn && displaced > 0;
   int& slow = object.statics->slow;
   if (!watched || slow == slow_enough) {
-    update_still(w, object, *object.shown.load);
+    update_solver(w, object, *object.shown.load);
     return;
   }
   const auto start = std::chrono::steady_clock::now();
-  update_still(w, object, *object.shown.load);
+  update_solver(w, object, *object.shown.load);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   slow = taken.count() * w.options.rate > 1 ? slow + 1 : 0;
   if (slow == slow_enough)
@@ -78,15 +78,15 @@ double displacement_limit(Object& object) {
       box.add(node.position);
     object.matter->size = box.empty() || !(box.longest_side() > 0) ? 1 : box.longest_side();
   }
-  return std::min(most_sizes * object.matter->size, largest_number);
+  return std::min(max_sizes * object.matter->size, largest_number);
 }
 
 /// \param displacement 3 n numbers, of a shape that is found now
 void require_bounded(Object& object, std::span<const double> displacement) {
-  const double most = displacement_limit(object);
+  const double max = displacement_limit(object);
   for (std::size_t k = 0; k < displacement.size(); ++k)
-    if (!(std::abs(displacement[k]) <= most))
-      throw Error("node " + std::to_string(k / 3) + " is displaced by over " + number_text(most) +
+    if (!(std::abs(displacement[k]) <= max))
+      throw Error("node " + std::to_string(k / 3) + " is displaced by over " + number_text(max) +
                   " mm, a million times the size of the object, expected a smaller load or "
                   "timestep");
 }
@@ -94,13 +94,13 @@ void require_bounded(Object& object, std::span<const double> displacement) {
 namespace {
 
 /// Whether it is worth to look at all edges where the largest displacement is this (mm).
-bool may_leave_range(Object& object, double most) {
+bool may_leave_range(Object& object, double max) {
   if (object.matter->shortest_edge == 0)
     object.matter->shortest_edge = shortest_edge(object.model());
   // Ends that move less than this against each other can do no harm; beyond, a look at all edges
   // would cost as much as the shape, so not every time.
-  return !(2 * std::sqrt(3.0) * most <= strain_limit * object.matter->shortest_edge) &&
-         (!(most <= 1.02 * object.range.looked_at) || ++object.range.not_looked >= 64);
+  return !(2 * std::sqrt(3.0) * max <= strain_limit * object.matter->shortest_edge) &&
+         (!(max <= 1.02 * object.range.looked_at) || ++object.range.not_looked >= 64);
 }
 
 /// Once, where the shape that is shown is not to be trusted.
@@ -108,16 +108,16 @@ void warn_of_range(World& w, Object& object) {
   if (object.range.warned)
     return;
   // The range can be left only where something moves far.
-  double most = 0;
+  double max = 0;
   for (const double u : *object.shown.displacement)
-    most = std::max(most, std::abs(u));
-  if (!may_leave_range(object, most))
+    max = std::max(max, std::abs(u));
+  if (!may_leave_range(object, max))
     return;
-  object.range.looked_at = most;
+  object.range.looked_at = max;
   object.range.not_looked = 0;
   const LinearRange range = linear_range(object.model(), *object.shown.displacement);
-  const bool strained = !(range.strain <= strain_limit), turned = !(range.turn <= turn_limit);
-  if (!strained && !turned)
+  const bool strained = !(range.strain <= strain_limit), rotated = !(range.turn <= turn_limit);
+  if (!strained && !rotated)
     return;
   object.range.warned = true;
   const auto& tell = w.options.distrust ? w.options.distrust : w.options.warn;
@@ -138,13 +138,13 @@ void shape(World& w, Object& object) {
   Shown& shown = object.shown;
   if (shown.shaped)
     return;
-  if (shown.late) {
-    at_object(w, object, [&] { find_late_shape(w, object); });
+  if (shown.deferred) {
+    at_object(w, object, [&] { find_deferred_shape(w, object); });
     return;
   }
   at_object(w, object, [&] {
     update_stages(w, object, *shown.load); // as it is, but where a change of method looked ahead
-    const std::span<const double> u = still_shape(object);
+    const std::span<const double> u = static_shape(object);
     require_bounded(object, u);
     shown.displacement.replace().assign(u.begin(), u.end());
   });
@@ -167,27 +167,27 @@ void show(World& w, Object& object) {
   if (meets)
     shape_in_step(w, object); // that it comes from
   Shown& shown = object.shown;
-  shown.late = nullptr;
+  shown.deferred = nullptr;
   leave_shown(w, object);
   shown.forces = {};
-  const bool acted_on = object.statics->still || !object.load->empty();
+  const bool acted_on = object.statics->solver || !object.load->empty();
   if (object.method == Method::ffe && (meets || acted_on))
     shown.load = load_at(*object.load, object.model(), w.now.clock.time);
   if (meets) {
     follow_instruments(w, object);
     shown.shaped = true;
     warn_of_range(w, object);
-    if (object.statics->still)
-      shown.forces = still_forces(object);
+    if (object.statics->solver)
+      shown.forces = static_forces(object);
   } else if (object.method == Method::ffe && acted_on) {
     update_in_time(w, object);
-    shown.forces = still_forces(object);
+    shown.forces = static_forces(object);
     shown.shaped = false; // until somebody asks for it
     // Who never asks is warned too, if the contacts alone may leave the range.
-    double most = 0;
+    double max = 0;
     for (const auto& [node, d] : shown.load->displacement)
-      most = std::max({most, std::abs(d.x), std::abs(d.y), std::abs(d.z)});
-    if (!object.range.warned && may_leave_range(object, most))
+      max = std::max({max, std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    if (!object.range.warned && may_leave_range(object, max))
       shape(w, object);
   } else {
     show_motion(object);

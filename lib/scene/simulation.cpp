@@ -73,7 +73,7 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   need_model(object);
   object.matter->source = {};
   if (method == Method::ffe)
-    make_still(w, object, std::move(source));
+    make_solver(w, object, std::move(source));
   insert(w, std::move(object));
   if (method == Method::ffe)
     return;
@@ -240,8 +240,8 @@ SimulationCounts Simulation::counts() const {
   for (const Object& object : world_->now.objects) {
     const Statics& statics = *object.statics;
     add_counts(all.elastostatic, statics.spent);
-    if (statics.still)
-      add_counts(all.elastostatic, statics.still->counts());
+    if (statics.solver)
+      add_counts(all.elastostatic, statics.solver->counts());
     if (!statics.two_step)
       continue;
     const ElastostaticCounts second = statics.two_step->second_counts();

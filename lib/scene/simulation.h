@@ -82,7 +82,7 @@ struct SimulationCounts {
   double largest_jump = 0;         ///< mm, see MethodJump
   std::uint64_t cuts = 0;          ///< that changed a model
   /// Of elastostatic objects: how their stiffness followed, see CutWay.
-  std::uint64_t cut_corrections = 0, cut_renewals = 0, cut_factors = 0;
+  std::uint64_t cut_woodbury = 0, cut_refactors = 0, cut_factors = 0;
 };
 
 /// What is known of an object without reading it.

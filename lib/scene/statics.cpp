@@ -23,37 +23,37 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
   sum.shape_error = std::max(sum.shape_error, more.shape_error);
 }
 
-void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
-  object.statics->still.emplace(object.model(), std::move(source), w.context,
-                                ElastostaticOptions{.measure_error = w.options.measure_error,
-                                                    .tolerance = w.options.tolerance});
+void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
+  object.statics->solver.emplace(object.model(), std::move(source), w.context,
+                                 ElastostaticOptions{.measure_error = w.options.measure_error,
+                                                     .tolerance = w.options.tolerance});
 }
 
-Elastostatic& still_of(World& w, Object& object) {
+Elastostatic& solver_of(World& w, Object& object) {
   need_model(object);
   Statics& statics = *object.statics;
-  if (statics.still)
-    return *statics.still;
+  if (statics.solver)
+    return *statics.solver;
   statics.ahead = true;
   std::shared_ptr<ComplianceSource> source;
   if (statics.prepared)
     source = std::exchange(statics.prepared, nullptr);
   else if (!object.cut.first && object.matter->source.stiffness)
     source = object.matter->source.stiffness(object.model());
-  make_still(w, object, std::move(source));
-  return *statics.still;
+  make_solver(w, object, std::move(source));
+  return *statics.solver;
 }
 
-void update_still(World& w, Object& object, const Load& load) {
+void update_solver(World& w, Object& object, const Load& load) {
   object.statics->ahead = true;
   update_stages(w, object, load);
 }
 
 void renew(Object& object) {
   Statics& statics = *object.statics;
-  if (statics.still) {
-    add_counts(statics.spent, statics.still->counts());
-    statics.still.reset();
+  if (statics.solver) {
+    add_counts(statics.spent, statics.solver->counts());
+    statics.solver.reset();
   }
   if (statics.two_step) {
     ElastostaticCounts second = statics.two_step->second_counts();
@@ -78,22 +78,22 @@ TwoStep& two_step_of(World& w, Object& object) {
 }
 
 void update_stages(World& w, Object& object, const Load& load) {
-  Elastostatic& still = still_of(w, object);
+  Elastostatic& solver = solver_of(w, object);
   if (object.stages.options)
-    two_step_of(w, object).update(still, load);
+    two_step_of(w, object).update(solver, load);
   else
-    still.update(load);
+    solver.update(load);
 }
 
-std::span<const double> still_shape(Object& object) {
+std::span<const double> static_shape(Object& object) {
   Statics& statics = *object.statics;
-  return statics.two_step ? statics.two_step->displacement(*statics.still)
-                          : statics.still->displacement();
+  return statics.two_step ? statics.two_step->displacement(*statics.solver)
+                          : statics.solver->displacement();
 }
 
-const std::vector<NodeVector>& still_forces(const Object& object) {
+const std::vector<NodeVector>& static_forces(const Object& object) {
   const Statics& statics = *object.statics;
-  return statics.two_step ? statics.two_step->contact_forces() : statics.still->contact_forces();
+  return statics.two_step ? statics.two_step->contact_forces() : statics.solver->contact_forces();
 }
 
 namespace {

@@ -11,8 +11,8 @@ namespace gewebe::simulation {
 
 namespace {
 
-constexpr double same_time = 1e-9;  // of a step's length
-constexpr double most_events = 1e6; // repeated ones in a step
+constexpr double same_time = 1e-9; // of a step's length
+constexpr double max_events = 1e6; // repeated ones in a step
 
 /// A step with more events than anybody waits for is refused before it begins.
 void require_few_events(const World& w, double to) {
@@ -20,7 +20,7 @@ void require_few_events(const World& w, double to) {
   for (const auto& [time, event] : *w.now.events)
     if (event.period > 0 && time <= to)
       count += (to - time) / event.period;
-  if (!(count <= most_events))
+  if (!(count <= max_events))
     throw Error("a step to " + number_text(to) + " s holds " + number_text(std::round(count)) +
                 " repeated events, expected at most a million: a shorter step, or at every with a "
                 "longer time");

@@ -23,7 +23,7 @@ void leave_shown(World& w, Object& object) {
   }
   CameFrom came{.load = std::exchange(shown.load, {}),
                 .touched = {},
-                .over = shown.posed && posed ? now - before : 0,
+                .duration = shown.posed && posed ? now - before : 0,
                 .velocity = {}};
   for (const NodeTouch& t : shown.touches)
     if (posed)
@@ -34,7 +34,7 @@ void leave_shown(World& w, Object& object) {
 
 /// Whether it moved in the last step. Between two steps that show it it stands still.
 bool has_moved(const World& w, const Object& object) {
-  return object.method == Method::ffe && object.came.over > 0 &&
+  return object.method == Method::ffe && object.came.duration > 0 &&
          object.shown.time == w.now.clock.shown;
 }
 
@@ -61,21 +61,21 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
       own.emplace(object.model(), nullptr, w.context);
     if (afresh && object.stages.options)
       own_stages.emplace(object.model(), object.stages.second(), w.context, *object.stages.options);
-    Elastostatic& still = afresh ? *own : still_of(w, object);
+    Elastostatic& solver = afresh ? *own : solver_of(w, object);
     const auto shape_under = [&](const Load& acting) {
       if (!object.stages.options) {
-        still.update(acting);
-        return still.displacement();
+        solver.update(acting);
+        return solver.displacement();
       }
       TwoStep& both = afresh ? *own_stages : two_step_of(w, object);
-      both.update(still, acting);
-      return both.displacement(still);
+      both.update(solver, acting);
+      return both.displacement(solver);
     };
     const std::span<const double> shape = shape_under(load);
     const std::vector<double> before(shape.begin(), shape.end());
     const std::span<const double> after = shape_under(now);
     for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
-      velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.over);
+      velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.duration);
   } catch (const SingularStiffness&) {
     // It hangs loosely, and nobody has asked for a shape since.
   }

@@ -89,9 +89,9 @@ void require_support(const World& w, const Object& object, Feature feature);
 bool feels(const World& w, Object& object, Feature feature);
 
 // statics.cpp: solvers of one step and of two
-Elastostatic& still_of(World& w, Object& object);
-void make_still(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
-void update_still(World& w, Object& object, const Load& load);
+Elastostatic& solver_of(World& w, Object& object);
+void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
+void update_solver(World& w, Object& object, const Load& load);
 /// Forgets what is kept to be quick.
 void renew(Object& object);
 /// Counts add up, errors are the larger ones.
@@ -101,8 +101,8 @@ void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t
                 Object& next);
 void make_whole(const World& w, Object& object);
 void update_stages(World& w, Object& object, const Load& load);
-std::span<const double> still_shape(Object& object);
-const std::vector<NodeVector>& still_forces(const Object& object);
+std::span<const double> static_shape(Object& object);
+const std::vector<NodeVector>& static_forces(const Object& object);
 
 // bodies.cpp: what is tied together and moves as one
 using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
@@ -147,7 +147,7 @@ void add_touches(Object& object);
 
 // cuts.cpp: what they sever and what comes off
 void announce_cut(World& w, std::size_t index);
-void find_late_shape(World& w, Object& object);
+void find_deferred_shape(World& w, Object& object);
 void sweep_blades(World& w);
 void tear(World& w);
 void find_free_motion(World& w, std::size_t index);

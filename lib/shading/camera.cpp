@@ -54,9 +54,9 @@ void orient(Camera& camera, const Vec3& back, const std::optional<Vec3>& up, con
 void orbit(Camera& camera, double azimuth, double elevation) {
   const auto turn = [](Vec3& a, Vec3& b, double degrees) { // from a towards b
     const auto [c, s] = cos_sin(degrees);
-    const Vec3 turned = a * c + b * s;
+    const Vec3 rotated = a * c + b * s;
     b = b * c - a * s;
-    a = turned;
+    a = rotated;
   };
   turn(camera.back, camera.right, azimuth);
   turn(camera.back, camera.up, elevation);

@@ -35,14 +35,13 @@ ColorRamp color_ramp_from_image(const Image& image) {
   return ramp;
 }
 
-Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height,
-              double least, double greatest, const ColorRamp& ramp) {
+Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height, double min,
+              double max, const ColorRamp& ramp) {
   Image image{width, height, 3, {}};
   image.values.reserve(values.size() * 3);
   const std::size_t last = ramp.colors.size() - 1;
   for (const float value : values) {
-    const double share =
-        std::clamp((static_cast<double>(value) - least) / (greatest - least), 0.0, 1.0);
+    const double share = std::clamp((static_cast<double>(value) - min) / (max - min), 0.0, 1.0);
     const double place = share * static_cast<double>(last);
     const std::size_t n = std::min(static_cast<std::size_t>(place), last);
     const auto &a = ramp.colors[n], &b = ramp.colors[std::min(n + 1, last)];

@@ -25,9 +25,9 @@ ColorRamp color_ramp_from_name(std::string_view name);
 /// The pixels of the middle row, from left to right. \throw Error if the image has none
 ColorRamp color_ramp_from_image(const Image& image);
 
-/// The colour of each value: the ramp's first one up to `least`, its last one from `greatest` on.
-/// \pre least < greatest, values.size() == width · height
-Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height,
-              double least, double greatest, const ColorRamp& ramp);
+/// The colour of each value: the ramp's first one up to `min`, its last one from `max` on.
+/// \pre min < max, values.size() == width · height
+Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height, double min,
+              double max, const ColorRamp& ramp);
 
 } // namespace gewebe

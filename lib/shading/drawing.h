@@ -46,7 +46,7 @@ struct Drawing {
   Vec3 rest_origin;
   double rest_scale = 1; ///< > 0
   std::vector<Triangle> triangles;
-  /// Where the triangles of groups 1, 2, … begin, which have looks of their own; group 0 comes
+  /// Where the triangles of groups 1, 2, … begin, which have materials of their own; group 0 comes
   /// first.
   std::vector<std::size_t> group_start;
   std::uint64_t version = 0; ///< of a maker: another one where vertices, frames or triangles are

@@ -6,8 +6,8 @@
 namespace gewebe {
 namespace {
 
-/// v turned about the unit axis n by an angle of this cosine and sine (Rodrigues).
-Vec3 turned(const Vec3& v, const Vec3& n, double cosine, double sine) {
+/// v rotated about the unit axis n by an angle of this cosine and sine (Rodrigues).
+Vec3 rotated(const Vec3& v, const Vec3& n, double cosine, double sine) {
   return v * cosine + cross(n, v) * sine + n * (dot(n, v) * (1 - cosine));
 }
 
@@ -23,13 +23,13 @@ public:
     }
     // The same, or opposite: then half a turn about any axis across.
     sine_ = 0;
-    const int least = std::fabs(from.x) < 0.6 ? 0 : 1;
+    const int smallest = std::fabs(from.x) < 0.6 ? 0 : 1;
     Vec3 other;
-    other[least] = 1;
+    other[smallest] = 1;
     axis_ = cross(from, other);
     axis_ = axis_ / norm(axis_);
   }
-  Vec3 operator()(const Vec3& v) const { return turned(v, axis_, cosine_, sine_); }
+  Vec3 operator()(const Vec3& v) const { return rotated(v, axis_, cosine_, sine_); }
 
 private:
   double cosine_, sine_;
@@ -81,7 +81,7 @@ std::vector<DrawTurn> rest_turns(std::span<const Vec3> rest, std::span<const Vec
       continue;
     const Tilt tilt(rest_normals[p], normals[p]);
     const auto axis = [&](const Vec3& v) {
-      return in_floats(turned(tilt(v), normals[p], sums[p][0] / length, sums[p][1] / length));
+      return in_floats(rotated(tilt(v), normals[p], sums[p][0] / length, sums[p][1] / length));
     };
     turns[p] = {axis({1, 0, 0}), axis({0, 1, 0})};
   }

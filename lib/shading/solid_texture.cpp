@@ -22,20 +22,19 @@ std::vector<std::string_view> split(std::string_view text, char at) {
   return parts;
 }
 
-/// \throw Error unless it is a number from `least` to `most`
-double number(std::string_view key, std::string_view word, double least, double most,
+/// \throw Error unless it is a number from `min` to `max`
+double number(std::string_view key, std::string_view word, double min, double max,
               const char* expected) {
   double value = 0;
   const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (status != std::errc{} || rest != word.data() + word.size() ||
-      !(value >= least && value <= most))
+  if (status != std::errc{} || rest != word.data() + word.size() || !(value >= min && value <= max))
     throw Error(std::string(key) + "='" + std::string(word) + "', expected " + expected);
   return value;
 }
 
-std::uint32_t whole_number(std::string_view key, std::string_view word, double most,
-                           const char* expected, double least = 0) {
-  const double value = number(key, word, least, most, expected);
+std::uint32_t whole_number(std::string_view key, std::string_view word, double max,
+                           const char* expected, double min = 0) {
+  const double value = number(key, word, min, max, expected);
   if (value != std::floor(value))
     throw Error(std::string(key) + "='" + std::string(word) + "', expected " + expected);
   return static_cast<std::uint32_t>(value);
@@ -128,12 +127,12 @@ SolidPlan solid_plan(const SolidTexture& texture, const Vec3& origin, double uni
   plan.roughness = static_cast<float>(texture.roughness);
   plan.width = static_cast<float>(texture.width);
   constexpr double w = 5, x = 2, y = 3, z = 1, length = w * w + x * x + y * y + z * z;
-  const std::array<Vec3, 3> turned{
+  const std::array<Vec3, 3> rotated{
       Vec3{w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
       Vec3{2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
       Vec3{2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
   for (int a = 0; a < 3; ++a) {
-    const Vec3& row = turned[static_cast<std::size_t>(a)];
+    const Vec3& row = rotated[static_cast<std::size_t>(a)];
     for (int b = 0; b < 3; ++b)
       plan.rows[a][b] = static_cast<float>(row[b] / length * (unit / scale));
     const double at = dot(row, origin) / length / scale;

@@ -191,7 +191,7 @@ struct Cell {
   }
 
   /// The greatest value on the ray from t0 to t1.
-  double greatest(const Ray& ray, double t0, double t1) const {
+  double max(const Ray& ray, double t0, double t1) const {
     const auto f = [&](double u) { return value(ray.at(t0 + (t1 - t0) * u)); };
     const double a = f(0), b = f(1.0 / 3), c = f(2.0 / 3), d = f(1);
     double best = std::max(a, d);
@@ -248,7 +248,7 @@ public:
       walk(ray, 1, low, high, part.from, part.to, [&](const Int3& at, double enter, double leave) {
         take(at, leaf);
         if (*std::ranges::max_element(cell_.corner) > best)
-          best = std::max(best, cell_.greatest(ray, enter, leave));
+          best = std::max(best, cell_.max(ray, enter, leave));
       });
     }
     return static_cast<float>(best);
@@ -322,8 +322,8 @@ VolumeView view_volume(const Grid& grid, const VolumeViewOptions& options, const
   view.camera = camera_of(options, box);
   set_extent(view, options, box);
   const ValueSummary& values = grid.summary(context);
-  view.least = static_cast<double>(std::min(values.min, grid.info().background));
-  view.greatest = static_cast<double>(std::max(values.max, grid.info().background));
+  view.min = static_cast<double>(std::min(values.min, grid.info().background));
+  view.max = static_cast<double>(std::max(values.max, grid.info().background));
   require_memory(context, static_cast<double>(view.width) * view.height * sizeof(float),
                  "the picture");
   view.values.resize(std::size_t{view.width} * view.height);

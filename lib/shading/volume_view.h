@@ -31,7 +31,7 @@ struct VolumeViewOptions {
 struct VolumeView {
   std::uint32_t width = 0, height = 0;
   std::vector<float> values;          ///< width · height, rows from the top
-  double least = 0, greatest = 0;     ///< of the volume, background included
+  double min = 0, max = 0;            ///< of the volume, background included
   Camera camera;                      ///< direction, axes and target
   double half_width = 0, half_height; ///< of the picture, mm
 };

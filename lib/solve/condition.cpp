@@ -103,9 +103,9 @@ inverse_norm(std::size_t n,
 }
 
 void require_precision(double condition, bool single) {
-  const double most = 0x1p24;
-  if (single && !(condition <= most))
-    throw Error("the condition " + short_number(condition) + " is beyond " + short_number(most) +
+  const double max = 0x1p24;
+  if (single && !(condition <= max))
+    throw Error("the condition " + short_number(condition) + " is beyond " + short_number(max) +
                 ", what float32 can tell, expected --precision float64");
 }
 
@@ -219,9 +219,9 @@ RigidMotions rigid_motions(const Model& model, const StiffnessMatrix& matrix, co
   }
   // Motions that move nothing here (a turn about a line of nodes) count as none.
   const Eigen::SelfAdjointEigenSolver<Matrix6> mass(b);
-  const double least = 1e-10 * mass.eigenvalues()[5];
+  const double min = 1e-10 * mass.eigenvalues()[5];
   const auto rank = std::count_if(mass.eigenvalues().begin(), mass.eigenvalues().end(),
-                                  [&](double value) { return value > least; });
+                                  [&](double value) { return value > min; });
   const Eigen::MatrixXd basis =
       mass.eigenvectors().rightCols(rank) *
       mass.eigenvalues().tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
@@ -334,9 +334,9 @@ std::optional<FreeMotion> weakest_motion(const Model& model, const StiffnessMatr
     name_rigid(rigid, soft, motion);
   }
   if (alone || !is_rigid) {
-    const std::size_t most = *std::max_element(
+    const std::size_t max = *std::max_element(
         rows.begin(), rows.end(), [&](auto a, auto b) { return std::abs(x[a]) < std::abs(x[b]); });
-    motion.node = static_cast<std::uint32_t>(place_of(matrix, most).node);
+    motion.node = static_cast<std::uint32_t>(place_of(matrix, max).node);
     for (const std::size_t row : rows)
       if (const Place p = place_of(matrix, row); p.node == motion.node)
         motion.direction[p.axis] = x[row];

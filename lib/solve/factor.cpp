@@ -281,7 +281,7 @@ Factor::Factor(const StiffnessMatrix& matrix, const Context& context)
   state_->factorise(matrix, context);
 }
 
-void Factor::renew(const StiffnessMatrix& matrix, const Context& context) {
+void Factor::refactor(const StiffnessMatrix& matrix, const Context& context) {
   state_->factorise(matrix, context);
 }
 
@@ -335,7 +335,7 @@ void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t c
   const std::size_t n = order();
   std::vector<double> x;
   for (std::size_t first = 0; first < columns;) {
-    const std::size_t count = std::min(most_units, columns - first), width = solve_width(count);
+    const std::size_t count = std::min(max_units, columns - first), width = solve_width(count);
     x.assign(n * width, 0.0);
     for (std::size_t k = 0; k < n; ++k) {
       const double* const from = f.data() + first * n + static_cast<std::size_t>(permutation[k]);

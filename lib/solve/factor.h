@@ -57,7 +57,7 @@ public:
   Factor(const StiffnessMatrix& matrix, const Context& context);
   /// The factor of another matrix of the same pattern: what depends on the pattern alone is kept.
   /// \pre made by the constructor above   \throw as it; then the factor is of no use
-  void renew(const StiffnessMatrix& matrix, const Context& context);
+  void refactor(const StiffnessMatrix& matrix, const Context& context);
   /// \throw Error if the arrays contradict each other (every index is checked: they come from
   /// files)
   explicit Factor(FactorData data, CpuLevel cpu = best_cpu_level());
@@ -79,7 +79,7 @@ public:
   void solve(std::span<const double> f, std::span<double> u, std::size_t columns = 1) const;
 
   /// Most columns that solve_units takes at once.
-  static constexpr std::size_t most_units = 24;
+  static constexpr std::size_t max_units = 24;
   /// Columns of K⁻¹ side by side, without the copies that `solve` makes: x[k][c] is the entry of
   /// row permutation[k] in column permutation[places[c]], with the permutation of view(). Returns
   /// how many numbers lie between one k and the next, places.size() rounded up. Otherwise as

@@ -17,12 +17,12 @@ namespace gewebe {
 namespace {
 
 #if defined(__AVX2__)
-inline constexpr std::size_t lanes = 4, most_parts = 3;
+inline constexpr std::size_t lanes = 4, max_parts = 3;
 #else
-inline constexpr std::size_t lanes = 2, most_parts = 2;
+inline constexpr std::size_t lanes = 2, max_parts = 2;
 #endif
 /// A tile: rows of one strip, in so many registers, by so many columns.
-inline constexpr std::size_t strip_rows = lanes * most_parts, tile_columns = 4;
+inline constexpr std::size_t strip_rows = lanes * max_parts, tile_columns = 4;
 static_assert(strip_rows % tile_columns == 0);
 using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
 using Unaligned =
@@ -112,7 +112,7 @@ void square_rows(const Square& s, std::size_t group, std::size_t row) {
 
 /// Cholesky of a group's own square. \return how many of its columns were eliminated
 inline std::size_t corner(const Square& s, std::size_t group, std::size_t count,
-                          const double* least) {
+                          const double* min_pivot) {
   for (std::size_t j = 0; j < count; ++j) {
     double* const column = s.column(group + j) + group;
     for (std::size_t k = 0; k < j; ++k) {
@@ -120,7 +120,7 @@ inline std::size_t corner(const Square& s, std::size_t group, std::size_t count,
       for (std::size_t r = j; r < tile_columns; ++r)
         column[r] = std::fma(-before[r], before[j], column[r]);
     }
-    if (!(column[j] > least[j]) || !std::isfinite(column[j]))
+    if (!(column[j] > min_pivot[j]) || !std::isfinite(column[j]))
       return j;
     column[j] = std::sqrt(column[j]);
     const double reciprocal = 1 / column[j];
@@ -143,7 +143,7 @@ void square_solve(const Square& s, std::size_t group, std::size_t row) {
 }
 
 inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_t count,
-                             const double* least, const FrontScratch& scratch) {
+                             const double* min_pivot, const FrontScratch& scratch) {
   const Square s(count, scratch.square);
   std::fill_n(s.at, s.columns * s.step + s.columns, 0.0);
   for (std::size_t c = 0; c < count; ++c)
@@ -153,16 +153,16 @@ inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_
     std::size_t row = group;
     if (group > 0) {
       for (; row + strip_rows <= s.columns; row += strip_rows)
-        square_rows<most_parts>(s, group, row);
+        square_rows<max_parts>(s, group, row);
       for (; row < s.columns; row += lanes)
         square_rows<1>(s, group, row);
     }
-    const std::size_t done = corner(s, group, own, least + begin + group);
+    const std::size_t done = corner(s, group, own, min_pivot + begin + group);
     if (done < own)
       return group + done;
     row = group + tile_columns;
     for (; row + strip_rows <= s.columns; row += strip_rows)
-      square_solve<most_parts>(s, group, row);
+      square_solve<max_parts>(s, group, row);
     for (; row < s.columns; row += lanes)
       square_solve<1>(s, group, row);
   }
@@ -215,7 +215,7 @@ inline void solve_strip(const FrontArrays& f, std::size_t begin, std::size_t cou
     double* columns[tile_columns];
     for (std::size_t j = 0; j < tile_columns; ++j)
       columns[j] = group + j < count ? packed + (group + j) * strip_rows : unused;
-    Tile<most_parts> tile;
+    Tile<max_parts> tile;
     tile.load(columns);
     tile.lose(packed, strip_rows, square.at + group, square.step, group);
     tile.solve(square.column(group) + group, square.step, square.reciprocal() + group);
@@ -251,7 +251,7 @@ inline void update_corner(double* const* columns, std::ptrdiff_t start, std::siz
   };
   for (std::size_t group = missing / tile_columns * tile_columns; group < strip_rows;
        group += tile_columns) {
-    if constexpr (lanes == tile_columns && most_parts == 3) {
+    if constexpr (lanes == tile_columns && max_parts == 3) {
       if (group == 0)
         lose(group, Tile<3>{});
       else if (group == tile_columns)
@@ -259,7 +259,7 @@ inline void update_corner(double* const* columns, std::ptrdiff_t start, std::siz
       else
         lose(group, Tile<1>{});
     } else {
-      lose(group, Tile<most_parts>{});
+      lose(group, Tile<max_parts>{});
     }
   }
   for (std::size_t j = missing; j < strip_rows; ++j)
@@ -304,7 +304,7 @@ inline void update(const FrontArrays& f, std::size_t begin, std::size_t count,
           double* into[tile_columns];
           for (std::size_t j = 0; j < tile_columns; ++j)
             into[j] = group + j < missing ? unused : columns[c - from][group + j] + start;
-          Tile<most_parts> tile;
+          Tile<max_parts> tile;
           tile.load(into);
           if (group + tile_columns < strip_rows)
             fetch_tile(columns[c - from] + group + tile_columns, start);

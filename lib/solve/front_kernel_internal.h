@@ -43,7 +43,7 @@ struct FrontKernel {
   /// diagonal. Pivots must exceed `least[column]`. \return how many columns were eliminated: fewer
   /// than count, and nothing is to be used, where a pivot did not
   std::size_t (*eliminate)(const FrontArrays& front, std::size_t begin, std::size_t count,
-                           const double* least, const FrontScratch& scratch);
+                           const double* min_pivot, const FrontScratch& scratch);
   /// L of the rows below it, strips [first, last) of strips(rows - begin - count).
   void (*solve)(const FrontArrays& front, std::size_t begin, std::size_t count,
                 const FrontScratch& scratch, std::size_t first, std::size_t last);

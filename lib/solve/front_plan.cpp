@@ -55,7 +55,7 @@ FrontPlan front_plan(const FrontTree& tree, std::span<const double> under, doubl
 
 void UpdateStacks::Size::push(std::uint8_t stack, std::size_t below) {
   now.at(stack) += stacked(below);
-  most.at(stack) = std::max(most.at(stack), now.at(stack));
+  peak.at(stack) = std::max(peak.at(stack), now.at(stack));
 }
 
 void UpdateStacks::Size::pop(std::uint8_t stack, std::size_t below) {
@@ -73,7 +73,7 @@ void UpdateStacks::Size::compute(const FrontPlan& plan, std::span<const Front> f
 
 void UpdateStacks::prepare(const Size& size) {
   for (std::size_t stack = 0; stack < 2; ++stack)
-    (void)memory_.at(stack).reserve(size.most.at(stack), false);
+    (void)memory_.at(stack).reserve(size.peak.at(stack), false);
 }
 
 double* UpdateStacks::push(std::uint8_t stack, std::size_t below) {

@@ -42,13 +42,13 @@ class UpdateStacks {
 public:
   /// Tells without any memory how much a stack needs.
   struct Size {
-    std::array<std::size_t, 2> now{}, most{};
+    std::array<std::size_t, 2> now{}, peak{};
 
     void push(std::uint8_t stack, std::size_t below);
     void pop(std::uint8_t stack, std::size_t below);
     /// A front is computed, after those it is told of before.
     void compute(const FrontPlan& plan, std::span<const Front> fronts, std::size_t f);
-    std::size_t numbers() const { return most[0] + most[1]; }
+    std::size_t numbers() const { return peak[0] + peak[1]; }
   };
 
   void prepare(const Size& size);

@@ -106,7 +106,7 @@ struct FrontalFactor::State {
                 block[entry[free.axis[a]][other.axis[b]]];
       }
     }
-    to.least.clear();
+    to.min_pivot.clear();
     for (std::uint32_t at = first; at < last; ++at) {
       const std::uint32_t node = tree.sequence[at];
       const FreeAxes& free = free_axes(model, node);
@@ -115,7 +115,7 @@ struct FrontalFactor::State {
         for (std::size_t b = a; b < free.count; ++b)
           to.l[(to.row[node] + a) * to.rows + to.row[node] + b] +=
               diagonal[entry[free.axis[a]][free.axis[b]]];
-        to.least.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
+        to.min_pivot.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
       }
     }
   }
@@ -337,8 +337,8 @@ struct FrontalFactor::State {
     return order;
   }
 
-  void renew(const Model& model, std::span<const std::uint32_t> origin,
-             std::span<const std::uint32_t> place, const Context& context) {
+  void refactor(const Model& model, std::span<const std::uint32_t> origin,
+                std::span<const std::uint32_t> place, const Context& context) {
     if (!held_alike(model, origin)) // rows come and go within fronts
       return begin(model, context);
     cpu = context.cpu;
@@ -424,9 +424,9 @@ FrontalFactor::~FrontalFactor() = default;
 FrontalFactor::FrontalFactor(FrontalFactor&&) noexcept = default;
 FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
 
-FrontalWork FrontalFactor::renew(const Model& model, std::span<const std::uint32_t> origin,
-                                 std::span<const std::uint32_t> place, const Context& context) {
-  state_->renew(model, origin, place, context);
+FrontalWork FrontalFactor::refactor(const Model& model, std::span<const std::uint32_t> origin,
+                                    std::span<const std::uint32_t> place, const Context& context) {
+  state_->refactor(model, origin, place, context);
   return state_->work;
 }
 
@@ -456,7 +456,7 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
   const std::size_t order = s.axis_of_row.size(), all = axes();
   std::vector<double> x, work;
   for (std::size_t first = 0; first < columns;) {
-    const std::size_t count = std::min(Factor::most_units, columns - first);
+    const std::size_t count = std::min(Factor::max_units, columns - first);
     const std::size_t width = solve_width(count);
     x.assign(order * width, 0.0);
     work.resize(s.longest * width);
@@ -474,11 +474,11 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
   }
 }
 
-std::vector<FrontalFactor::HalfSolution>
-FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
+std::vector<FrontalFactor::ForwardSolve>
+FrontalFactor::forward_solves(std::span<const std::uint32_t> nodes) const {
   constexpr std::size_t at_once = panel_width;
   const State& s = *state_;
-  std::vector<HalfSolution> all(nodes.size());
+  std::vector<ForwardSolve> all(nodes.size());
   std::vector<double> x, work;
   std::vector<std::uint32_t> fronts;
   for (std::size_t first = 0; first < nodes.size(); first += at_once) {
@@ -500,22 +500,22 @@ FrontalFactor::half_solutions(std::span<const std::uint32_t> nodes) const {
     (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
         s.arrays(), fronts, x.data(), width, work.data());
     for (std::size_t k = 0; k < count; ++k) {
-      HalfSolution& half = all[first + k];
-      if (half.front != none)
-        half.values.reserve(s.to_root[half.front]);
-      for (std::uint32_t f = half.front; f != none; f = s.tree.parent[f])
+      ForwardSolve& solution = all[first + k];
+      if (solution.front != none)
+        solution.values.reserve(s.to_root[solution.front]);
+      for (std::uint32_t f = solution.front; f != none; f = s.tree.parent[f])
         for (auto row = static_cast<std::size_t>(s.super[f]);
              row < static_cast<std::size_t>(s.super[f + std::size_t{1}]); ++row) {
           const double* const values = x.data() + row * width + 3 * k;
-          half.values.push_back({values[0], values[1], values[2]});
+          solution.values.push_back({values[0], values[1], values[2]});
         }
     }
   }
   return all;
 }
 
-std::array<std::array<double, 3>, 3> FrontalFactor::compliance(const HalfSolution& a,
-                                                               const HalfSolution& b) const {
+std::array<std::array<double, 3>, 3> FrontalFactor::compliance(const ForwardSolve& a,
+                                                               const ForwardSolve& b) const {
   std::array<std::array<double, 3>, 3> block{};
   std::uint32_t f = a.front, g = b.front; // to where both ways meet
   while (f != g && f != none && g != none)

@@ -38,8 +38,8 @@ public:
   /// be empty where nodes stayed. Equal to a fresh factor with the same tree, bit by bit; where
   /// nodes are held along other axes than before, it is one.
   /// \throw as the constructor; then the factor is of no use
-  FrontalWork renew(const Model& model, std::span<const std::uint32_t> origin,
-                    std::span<const std::uint32_t> place, const Context& context);
+  FrontalWork refactor(const Model& model, std::span<const std::uint32_t> origin,
+                       std::span<const std::uint32_t> place, const Context& context);
 
   std::size_t axes() const noexcept;    ///< 3 n
   std::size_t entries() const noexcept; ///< doubles in L
@@ -55,18 +55,18 @@ public:
   /// axes() * columns
   void solve(std::span<double> over_axes, std::size_t columns = 1) const;
 
-  /// L⁻¹ of unit loads along the axes of a node: nothing but the way of its front to the root. Two
-  /// of them give a block of C = K⁻¹, for C = L⁻ᵀ L⁻¹: that costs a few hundredths of what columns
-  /// of C do.
-  struct HalfSolution {
+  /// Forward solves: L⁻¹ of unit loads along the axes of a node, nothing but the way of its front
+  /// to the root. Two of them give a block of C = K⁻¹, for C = L⁻ᵀ L⁻¹: that costs a few hundredths
+  /// of what columns of C do.
+  struct ForwardSolve {
     std::uint32_t front = none;                ///< that eliminates the node; none: fixed
     std::vector<std::array<double, 3>> values; ///< by rows of L that the way eliminates, and axis
     static constexpr std::uint32_t none = UINT32_MAX;
   };
-  std::vector<HalfSolution> half_solutions(std::span<const std::uint32_t> nodes) const;
+  std::vector<ForwardSolve> forward_solves(std::span<const std::uint32_t> nodes) const;
   /// C at the axes of one node and of another, [axis of a][axis of b]. \pre both of this factor
-  std::array<std::array<double, 3>, 3> compliance(const HalfSolution& a,
-                                                  const HalfSolution& b) const;
+  std::array<std::array<double, 3>, 3> compliance(const ForwardSolve& a,
+                                                  const ForwardSolve& b) const;
 
 private:
   struct State;

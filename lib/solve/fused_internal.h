@@ -39,10 +39,10 @@ inline Pair magnitude(Pair value) {
 inline Pair lose_fused(Pair sum, Pair a, Pair b) {
   const Pair product = a * b;
   const PairBits zero = (a == 0) | (b == 0); // then nothing is rounded but the sum
-  constexpr double most = 0x1p900, least = 0x1p-900;
+  constexpr double max = 0x1p900, min = 0x1p-900;
   const Pair size = magnitude(product);
-  const PairBits usual = zero | ((size >= least) & (size <= most) & (magnitude(a) <= most) &
-                                 (magnitude(b) <= most) & (magnitude(sum) <= most));
+  const PairBits usual = zero | ((size >= min) & (size <= max) & (magnitude(a) <= max) &
+                                 (magnitude(b) <= max) & (magnitude(sum) <= max));
   Pair ah, al, bh, bl, th, tl, vh, vl, z, e;
   split(a, ah, al);
   split(b, bh, bl);

@@ -55,7 +55,7 @@ struct Gain {
 /// What a thread works with.
 struct Scratch {
   std::vector<std::uint32_t> row;
-  std::vector<double> least;
+  std::vector<double> min_pivot;
   std::vector<Run> runs;
   std::vector<Gain> gains;
   std::vector<double> square, strips;
@@ -147,7 +147,8 @@ void eliminate(Front& front, std::size_t f, const FrontArrays& arrays, Scratch& 
       room(scratch.strips, kernel.strips_size(front.rows, std::min(front.columns, front_block)))};
   for (std::size_t begin = 0; begin < front.columns; begin += front_block) {
     const std::size_t count = std::min(front_block, front.columns - begin);
-    const std::size_t done = kernel.eliminate(arrays, begin, count, scratch.least.data(), space);
+    const std::size_t done =
+        kernel.eliminate(arrays, begin, count, scratch.min_pivot.data(), space);
     if (done < count)
       throw PivotTooSmall{f, begin + done};
     const std::size_t rows = front.rows - begin - count, strips = kernel.strips(rows);
@@ -182,8 +183,8 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
        [&](std::size_t first, std::size_t last) {
          std::fill(front.l + first, front.l + last, 0.0);
        });
-  scratch.least.assign(front.columns, 0.0);
-  task.assemble({f, scratch.row, front.rows, front.l, scratch.least});
+  scratch.min_pivot.assign(front.columns, 0.0);
+  task.assemble({f, scratch.row, front.rows, front.l, scratch.min_pivot});
   gather(task, arrays, plan.children[f], scratch, context);
   for (const std::uint32_t child : plan.children[f])
     if (plan.place[child] != FrontPlan::own)
@@ -194,7 +195,7 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
   front.weakest = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < front.columns; ++c) {
     const double root = front.l[c * front.rows + c];
-    if (const double pivot = root * root / scratch.least[c]; pivot < front.weakest) {
+    if (const double pivot = root * root / scratch.min_pivot[c]; pivot < front.weakest) {
       front.weakest = pivot;
       front.weakest_column = c;
     }

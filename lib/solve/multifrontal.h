@@ -49,7 +49,7 @@ struct FrontAssembly {
   std::span<const std::uint32_t> row; ///< by node, those of this front: where its rows begin
   std::size_t rows = 0;               ///< from one column to the next
   double* l = nullptr;                ///< on and below the diagonal
-  std::vector<double>& least; ///< of each column what its pivot must exceed; 0 if left alone
+  std::vector<double>& min_pivot; ///< of each column what its pivot must exceed; 0 if left alone
 };
 
 /// Thrown where a pivot is too small.

@@ -48,7 +48,7 @@ struct Elastostatic::State {
   // ---- the shape
 
   /// Less than the largest size of an entry of the shape.
-  double least_size(const Load& now) {
+  double min_size(const Load& now) {
     double size = 0;
     for (const auto& entry : now.displacement)
       for (int a = 0; a < 3; ++a)
@@ -59,8 +59,8 @@ struct Elastostatic::State {
     for (const auto& entry : now.force)
       for (int a = 0; a < 3; ++a)
         where.push_back(axis_of(entry.first, a));
-    const double most = largest_size(answer.at(now, where));
-    return std::isfinite(most) ? most : 0;
+    const double max = largest_size(answer.at(now, where));
+    return std::isfinite(max) ? max : 0;
   }
 
   void make_shape(double tolerance) {
@@ -68,7 +68,7 @@ struct Elastostatic::State {
     if (now.displacement.empty()) {
       // Where sums may leave something out, they are made for this load alone.
       if (tolerance > 0 && !answer.known(now) && compliance.columns_pay(nodes_of(now.force))) {
-        const double allowed = tolerance * least_size(now);
+        const double allowed = tolerance * min_size(now);
         u = answer.weight(now.gravity);
         u.resize(compliance.axes(), 0);
         compliance.add(as_vectors(now.force), allowed, u);
@@ -82,7 +82,7 @@ struct Elastostatic::State {
       const bool columns = !by_block || compliance.columns_for_shape(nodes, block.count_shape());
       if (columns && (answer.known(now) || compliance.columns_pay(nodes))) {
         u = answer.whole(now);
-        compliance.add(forces, tolerance * least_size(now), u);
+        compliance.add(forces, tolerance * min_size(now), u);
       } else {
         u = forces_over_axes(model, now);
         for (const NodeVector& contact : forces)
@@ -185,20 +185,20 @@ struct Elastostatic::State {
 
   // ---- for who finds forces by conditions
 
-  ContactSpace space(const Load& now, std::span<const std::uint32_t> nodes) {
+  DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
     update(now);
-    ContactSpace space;
-    space.nodes.assign(nodes.begin(), nodes.end());
+    DelassusOperator delassus;
+    delassus.nodes.assign(nodes.begin(), nodes.end());
     std::vector<std::size_t> where;
     for (const std::uint32_t node : nodes)
       for (int a = 0; a < 3; ++a)
         where.push_back(axis_of(node, a));
     const std::size_t size = where.size();
-    space.compliance.resize(size * size);
+    delassus.compliance.resize(size * size);
     const auto symmetric = [&](const auto& entry) {
       for (std::size_t c = 0; c < size; ++c)
         for (std::size_t r = c; r < size; ++r)
-          space.compliance[c * size + r] = space.compliance[r * size + c] = entry(c, r);
+          delassus.compliance[c * size + r] = delassus.compliance[r * size + c] = entry(c, r);
     };
     const auto node_at = [&](std::size_t row) { return nodes[row / 3]; };
     const auto axis_at = [&](std::size_t row) { return static_cast<int>(row % 3); };
@@ -208,8 +208,8 @@ struct Elastostatic::State {
         return columns.entry(node_at(c), axis_at(c), where[r]);
       });
       for (const std::size_t axis : where)
-        space.free.push_back(u[axis]);
-      return space;
+        delassus.free.push_back(u[axis]);
+      return delassus;
     }
     std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
     for (const auto& entry : now.displacement)
@@ -221,9 +221,9 @@ struct Elastostatic::State {
     symmetric([&](std::size_t c, std::size_t r) {
       return compliance.entry(node_at(c), axis_at(c), where[r]);
     });
-    space.free = answer.at(now, where);
+    delassus.free = answer.at(now, where);
     if (now.displacement.empty())
-      return space;
+      return delassus;
     // The displaced nodes give way to nothing: C - C_ch C_hh⁻¹ C_hc.
     const std::vector<std::size_t> held_axes = block.axes();
     std::vector<double> across(held_axes.size() * size), given;
@@ -240,14 +240,14 @@ struct Elastostatic::State {
         double sum = 0;
         for (std::size_t k = 0; k < given.size(); ++k)
           sum += given[k] * column(r)[k];
-        space.compliance[c * size + r] -= sum;
+        delassus.compliance[c * size + r] -= sum;
         if (r > c)
-          space.compliance[r * size + c] = space.compliance[c * size + r];
+          delassus.compliance[r * size + c] = delassus.compliance[c * size + r];
       }
       for (std::size_t k = 0; k < held_axes.size(); ++k)
-        space.free[c] += column(c)[k] * block.force()[k];
+        delassus.free[c] += column(c)[k] * block.force()[k];
     }
-    return space;
+    return delassus;
   }
 };
 
@@ -270,8 +270,9 @@ const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
   return state_->forces;
 }
 
-ContactSpace Elastostatic::contact_space(const Load& load, std::span<const std::uint32_t> nodes) {
-  return state_->space(load, nodes);
+DelassusOperator Elastostatic::delassus_operator(const Load& load,
+                                                 std::span<const std::uint32_t> nodes) {
+  return state_->delassus_operator(load, nodes);
 }
 
 ElastostaticCounts Elastostatic::counts() const noexcept {

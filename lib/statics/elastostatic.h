@@ -51,7 +51,7 @@ struct ElastostaticOptions {
 
 /// What one must know to find forces at some nodes that have to meet conditions: u = free +
 /// compliance f.
-struct ContactSpace {
+struct DelassusOperator {
   std::vector<std::uint32_t> nodes;
   std::vector<double> compliance; ///< (3 m)², by columns; row 3 k + a is axis a of nodes[k]
   std::vector<double> free;       ///< 3 m
@@ -83,7 +83,7 @@ public:
   /// What contact at these nodes needs: under `load`, its prescribed displacements held, u at
   /// `nodes` is free + compliance f for forces f there. \pre as update; nodes ascending, none of
   /// them displaced by the load   \throw Error as update, and if memory does not hold their columns
-  ContactSpace contact_space(const Load& load, std::span<const std::uint32_t> nodes);
+  DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
 
   ElastostaticCounts counts() const noexcept;
 

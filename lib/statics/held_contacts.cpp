@@ -19,7 +19,7 @@ bool same_nodes(const Map& a, const Map& b) {
 
 } // namespace
 
-void HeldContacts::renew(const Load& now) {
+void HeldContacts::refactor(const Load& now) {
   if (!nodes_.empty() && same_nodes(now.displacement, nodes_))
     return;
   if (spring_blocks_.empty())
@@ -66,7 +66,7 @@ void HeldContacts::shape_under(std::span<const double> f, std::span<const double
 }
 
 std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>& u) {
-  renew(now);
+  refactor(now);
   const std::vector<double> f = forces_over_axes(model_, now);
   std::vector<double> wanted(3 * now.displacement.size()), prescribed(axes_, 0);
   std::size_t k = 0;

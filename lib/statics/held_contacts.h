@@ -36,7 +36,7 @@ public:
   std::uint64_t solves() const noexcept { return solves_; }
 
 private:
-  void renew(const Load& now);
+  void refactor(const Load& now);
   void solve(std::span<double> over_axes, std::size_t columns);
   void shape_under(std::span<const double> f, std::span<const double> prescribed,
                    std::vector<double>& shape);

@@ -19,13 +19,13 @@ namespace {
 
 constexpr double same_direction = 1e-9;
 constexpr double nearly = 0.03; ///< from where on convergence is sped up
-constexpr int most_turns = 300;
+constexpr int max_turns = 300;
 constexpr double fair_direction = 1e-6; ///< that is not worth a warning
-constexpr std::size_t most_new = 256;   ///< nodes that join at once, the deepest
+constexpr std::size_t max_new = 256;    ///< nodes that join at once, the deepest
 constexpr double outside = 1e-9;        ///< of the radius: so deep is not inside
 constexpr double immovable = 1e-12;     ///< of the largest compliance
 constexpr double deep = 1e-6;
-constexpr int most_rounds = 300; ///< until an object agrees
+constexpr int max_rounds = 300; ///< until an object agrees
 
 /// Speeds up the convergence of directions: the next ones are taken where a linear map with the
 /// last changes would not change them. Any directions are fit for a turn.
@@ -74,12 +74,12 @@ private:
 };
 
 /// n·(W n) of one node.
-double give(const ContactSpace& space, std::size_t k, const Vec3& n) {
-  const std::size_t rows = 3 * space.nodes.size();
+double normal_compliance(const DelassusOperator& delassus, std::size_t k, const Vec3& n) {
+  const std::size_t rows = 3 * delassus.nodes.size();
   double sum = 0;
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t b = 0; b < 3; ++b)
-      sum += n[static_cast<int>(a)] * space.compliance[(3 * k + b) * rows + 3 * k + a] *
+      sum += n[static_cast<int>(a)] * delassus.compliance[(3 * k + b) * rows + 3 * k + a] *
              n[static_cast<int>(b)];
   return sum;
 }
@@ -101,11 +101,11 @@ std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches) {
   return touches;
 }
 
-std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t most) {
+std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t max) {
   double parts = 1;
   for (const MovedInstrument& i : instruments)
-    parts = std::max(parts, std::ceil(2 * travel(i.shape, i.before, i.now) / i.shape.radius));
-  return parts < static_cast<double>(most) ? static_cast<std::size_t>(parts) : most;
+    parts = std::max(parts, std::ceil(2 * path_length(i.shape, i.before, i.now) / i.shape.radius));
+  return parts < static_cast<double>(max) ? static_cast<std::size_t>(parts) : max;
 }
 
 StaticContact::StaticContact(const Model& model, std::span<const double> shape,
@@ -139,7 +139,7 @@ void StaticContact::find(const Placed& placed, const std::map<std::uint32_t, Vec
     });
   }
   std::sort(found.begin(), found.end());
-  for (std::size_t k = 0, count = 0; k < found.size() && count < most_new; ++k) {
+  for (std::size_t k = 0, count = 0; k < found.size() && count < max_new; ++k) {
     const auto where = std::lower_bound(inside.begin(), inside.end(), found[k].second);
     if (where == inside.end() || *where != found[k].second) {
       inside.insert(where, found[k].second);
@@ -167,18 +167,18 @@ void StaticContact::part_pinched(const Placed& placed, std::vector<Pair>& pairs,
 }
 
 /// The turns: forces of the pairs and where the nodes then stand.
-void StaticContact::solve(const ContactSpace& space, const Placed& placed,
+void StaticContact::solve(const DelassusOperator& delassus, const Placed& placed,
                           std::span<const std::optional<MovedInstrument>> moved,
                           std::vector<Pair>& pairs, std::span<const double> before,
                           std::vector<Vec3>& at) {
-  const std::size_t m = space.nodes.size();
+  const std::size_t m = delassus.nodes.size();
   std::vector<Vec3> free(m), was(m);
   double largest = 0;
   for (std::size_t k = 0; k < m; ++k) {
-    free[k] = rest(space.nodes[k]) + vector_at(space.free, k);
-    was[k] = rest(space.nodes[k]) + vector_at(before, space.nodes[k]);
+    free[k] = rest(delassus.nodes[k]) + vector_at(delassus.free, k);
+    was[k] = rest(delassus.nodes[k]) + vector_at(before, delassus.nodes[k]);
     for (std::size_t a = 0; a < 3; ++a)
-      largest = std::max(largest, space.compliance[(3 * k + a) * 3 * m + 3 * k + a]);
+      largest = std::max(largest, delassus.compliance[(3 * k + a) * 3 * m + 3 * k + a]);
   }
   const auto ascending = [](const Pair& a, const Pair& b) {
     return a.place != b.place ? a.place < b.place : a.instrument < b.instrument;
@@ -194,9 +194,9 @@ void StaticContact::solve(const ContactSpace& space, const Placed& placed,
         const auto there = std::lower_bound(pairs.begin(), pairs.end(), pair, ascending);
         if (there != pairs.end() && !ascending(pair, *there))
           continue;
-        pair.normal = placed[k]->normal(was[place], inward_[space.nodes[place]]);
-        if (!(give(space, place, pair.normal) > immovable * largest)) {
-          stuck_ = NodeTouch{space.nodes[place], k, {}};
+        pair.normal = placed[k]->normal(was[place], inward_[delassus.nodes[place]]);
+        if (!(normal_compliance(delassus, place, pair.normal) > immovable * largest)) {
+          stuck_ = NodeTouch{delassus.nodes[place], k, {}};
           continue;
         }
         pairs.insert(there, pair);
@@ -206,15 +206,15 @@ void StaticContact::solve(const ContactSpace& space, const Placed& placed,
   };
   for (Pair& pair : pairs)
     pair.normal =
-        placed[pair.instrument]->normal(was[pair.place], inward_[space.nodes[pair.place]]);
+        placed[pair.instrument]->normal(was[pair.place], inward_[delassus.nodes[pair.place]]);
   std::sort(pairs.begin(), pairs.end(), ascending);
   join(was, 0);
   join(free, outside);
-  part_pinched(placed, pairs, space.nodes);
+  part_pinched(placed, pairs, delassus.nodes);
   at = free;
   solved_ = pairs.empty();
   Anderson faster;
-  for (int turn = 0; turn < most_turns && !pairs.empty(); ++turn) {
+  for (int turn = 0; turn < max_turns && !pairs.empty(); ++turn) {
     std::vector<Contact> contacts;
     std::vector<Vec3> guess;
     for (const Pair& pair : pairs) {
@@ -226,7 +226,7 @@ void StaticContact::solve(const ContactSpace& space, const Placed& placed,
                           instrument.friction});
       guess.push_back(pair.force);
     }
-    const ContactForces forces = solve_contacts(space.compliance, m, contacts, guess);
+    const ContactForces forces = solve_contacts(delassus.compliance, m, contacts, guess);
     at = free;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       pairs[i].force = forces.force[i];
@@ -235,29 +235,29 @@ void StaticContact::solve(const ContactSpace& space, const Placed& placed,
       for (std::size_t k = 0; k < m; ++k)
         for (std::size_t b = 0; b < 3; ++b) {
           const double* const column =
-              &space.compliance[(3 * std::size_t{pairs[i].place} + b) * 3 * m + 3 * k];
+              &delassus.compliance[(3 * std::size_t{pairs[i].place} + b) * 3 * m + 3 * k];
           at[k] += pairs[i].force[static_cast<int>(b)] * Vec3{column[0], column[1], column[2]};
         }
     }
-    double turned_by = 0;
+    double normal_change = 0;
     std::vector<Vec3> used, normals;
     for (Pair& pair : pairs) {
       used.push_back(pair.normal);
       normals.push_back(
-          placed[pair.instrument]->normal(at[pair.place], inward_[space.nodes[pair.place]]));
+          placed[pair.instrument]->normal(at[pair.place], inward_[delassus.nodes[pair.place]]));
       if (pair.force == Vec3{})
         used.back() = normals.back(); // no matter
-      turned_by = std::max(turned_by, norm(normals.back() - used.back()));
+      normal_change = std::max(normal_change, norm(normals.back() - used.back()));
     }
-    if (turned_by < nearly)
+    if (normal_change < nearly)
       faster.next(used, normals);
     for (std::size_t i = 0; i < pairs.size(); ++i)
       pairs[i].normal = normals[i];
     const bool joined = join(at, outside);
     if (joined)
       faster = {};
-    solved_ = forces.solved && turned_by <= fair_direction;
-    if (!joined && turned_by <= same_direction)
+    solved_ = forces.solved && normal_change <= fair_direction;
+    if (!joined && normal_change <= same_direction)
       break;
   }
   // Rounding alone may have left a node inside.
@@ -276,15 +276,15 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
                               const Placed& placed,
                               std::span<const std::optional<MovedInstrument>> moved,
                               std::span<const double> before, std::vector<Vec3>& at) {
-  for (int round = 0; round < most_rounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
     std::vector<Pair> pairs;
     if (!nodes.empty()) {
-      const ContactSpace space = object.space(nodes);
+      const DelassusOperator delassus = object.delassus_operator(nodes);
       for (const NodeTouch& t : touches_) {
         const auto place = std::lower_bound(nodes.begin(), nodes.end(), t.node) - nodes.begin();
         pairs.push_back({static_cast<std::uint32_t>(place), t.instrument, {}, t.force});
       }
-      solve(space, placed, moved, pairs, before, at);
+      solve(delassus, placed, moved, pairs, before, at);
     }
     touches_.clear();
     for (const Pair& pair : pairs)
@@ -336,12 +336,12 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
 namespace {
 
 /// One solution for any forces.
-class Still final : public Yielding {
+class ElastostaticYielding final : public Yielding {
 public:
-  Still(const std::function<Elastostatic&()>& still, const Load& load)
-      : still_(still), load_(load) {}
-  ContactSpace space(std::span<const std::uint32_t> nodes) override {
-    return still_().contact_space(load_, nodes);
+  ElastostaticYielding(const std::function<Elastostatic&()>& solver, const Load& load)
+      : solver_(solver), load_(load) {}
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
+    return solver_().delassus_operator(load_, nodes);
   }
   bool push(std::span<const NodeTouch> touches, std::span<const Vec3>) override {
     pushed_ = load_;
@@ -350,22 +350,22 @@ public:
     return true;
   }
   std::span<const double> shape() override {
-    still_().update(pushed_);
-    return still_().displacement();
+    solver_().update(pushed_);
+    return solver_().displacement();
   }
 
 private:
-  const std::function<Elastostatic&()>& still_;
+  const std::function<Elastostatic&()>& solver_;
   const Load& load_;
   Load pushed_;
 };
 
 } // namespace
 
-void StaticContact::update(const std::function<Elastostatic&()>& still, const Load& load,
+void StaticContact::update(const std::function<Elastostatic&()>& solver, const Load& load,
                            std::span<const std::optional<MovedInstrument>> instruments,
                            std::vector<double>& shape, bool last) {
-  Still object(still, load);
+  ElastostaticYielding object(solver, load);
   update(object, load.displacement, instruments, shape, last);
 }
 

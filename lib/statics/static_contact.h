@@ -44,8 +44,8 @@ struct MovedInstrument {
 };
 
 /// The way in parts in which no instrument moves further than half its radius. \return how many, at
-/// most `most`
-std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t most);
+/// most `max`
+std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t max);
 
 /// What gives way to forces of contact.
 class Yielding {
@@ -55,9 +55,9 @@ public:
   Yielding& operator=(const Yielding&) = delete;
   virtual ~Yielding() = default;
   /// Near the forces of the last `push`. \pre nodes ascending, none of them displaced
-  virtual ContactSpace space(std::span<const std::uint32_t> nodes) = 0;
-  /// These forces act now, beside all others. \param at where the last space puts its nodes under
-  /// them \return whether they stand there; else another space is asked for
+  virtual DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) = 0;
+  /// These forces act now, beside all others. \param at where the last operator puts its nodes
+  /// under them \return whether they stand there; else another one is asked for
   virtual bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) = 0;
   /// The shape under them, 3 n displacements.
   virtual std::span<const double> shape() = 0;
@@ -78,7 +78,7 @@ public:
               std::span<const std::optional<MovedInstrument>> instruments,
               std::vector<double>& shape, bool last = true);
   /// Of an elastostatic object, asked for when needed, under `load`. \pre as Elastostatic::update
-  void update(const std::function<Elastostatic&()>& still, const Load& load,
+  void update(const std::function<Elastostatic&()>& solver, const Load& load,
               std::span<const std::optional<MovedInstrument>> instruments,
               std::vector<double>& shape, bool last = true);
   /// From another state: its shape and what is touched in it.
@@ -106,7 +106,7 @@ private:
   bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes, const Placed& placed,
                  std::span<const std::optional<MovedInstrument>> moved,
                  std::span<const double> before, std::vector<Vec3>& at);
-  void solve(const ContactSpace& space, const Placed& placed,
+  void solve(const DelassusOperator& delassus, const Placed& placed,
              std::span<const std::optional<MovedInstrument>> moved, std::vector<Pair>& pairs,
              std::span<const double> before, std::vector<Vec3>& at);
   void part_pinched(const Placed& placed, std::vector<Pair>& pairs,

@@ -27,7 +27,7 @@ using Vector = Eigen::Map<const VectorXd>;
 
 constexpr double contact_tolerance = 1e-6; // as that of Elastostatic
 constexpr double definite = 1e-12;         // least eigenvalue, of A1's
-constexpr int parts_of_s = 16, most_rounds = 200;
+constexpr int parts_of_s = 16, max_rounds = 200;
 
 Vector vector(std::span<const double> values) {
   return {values.data(), static_cast<Index>(values.size())};
@@ -103,11 +103,11 @@ TwoStepContact::TwoStepContact(std::span<const double> first, std::span<const do
   if (eigen.info() != Eigen::Success)
     throw Error("the two stages' compliances have no common eigenvectors, expected finite ones");
   state_->theta = eigen.eigenvalues();
-  const double least = state_->theta[0], most = state_->theta[n - 1];
-  if (!(least > 0))
+  const double min = state_->theta[0], max = state_->theta[n - 1];
+  if (!(min > 0))
     throw Error("the second stage's compliance of the displaced nodes is not positive definite, "
                 "expected fewer nodes or a store with another model");
-  if (!series && !(most < 1 - definite))
+  if (!series && !(max < 1 - definite))
     throw Error("beyond the threshold no force gives these displacements, for the second stage is "
                 "not stiffer than the first in every direction (C1 - C2 is not positive definite "
                 "on the displaced nodes), expected a stiffer one or `series`");
@@ -179,7 +179,7 @@ TwoStepContact::Answer TwoStepContact::solve(const Problem& problem) const {
   // Newton's steps from above; where one leaves the bracket, its middle. At s = 0 the value is -f0.
   double s = high;
   Point p = top;
-  for (int round = 0; round < most_rounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     if (std::abs(p.value) <= 2 * epsilon * problem.threshold || high - low <= epsilon * high)
       break;
@@ -225,7 +225,7 @@ struct TwoStep::State {
     nodes.clear();
   }
 
-  void prepare_contact(const ContactSpace& one, const ContactSpace& two) {
+  void prepare_contact(const DelassusOperator& one, const DelassusOperator& two) {
     if (contact && one.nodes == nodes)
       return;
     forget_contact();
@@ -253,8 +253,8 @@ struct TwoStep::State {
       now.push_back(node);
     Load outer = load;
     outer.displacement.clear();
-    const ContactSpace one = first.contact_space(outer, now),
-                       two = second.contact_space(outer, now);
+    const DelassusOperator one = first.delassus_operator(outer, now),
+                           two = second.delassus_operator(outer, now);
     prepare_contact(one, two);
     if (!contact)
       return false;
@@ -378,8 +378,9 @@ void TwoStep::update(Elastostatic& first, const Load& load) {
   state.shaped = false;
 }
 
-ContactSpace TwoStep::second_space(const Load& load, std::span<const std::uint32_t> nodes) {
-  return state_->second.contact_space(load, nodes);
+DelassusOperator TwoStep::second_delassus_operator(const Load& load,
+                                                   std::span<const std::uint32_t> nodes) {
+  return state_->second.delassus_operator(load, nodes);
 }
 
 void TwoStep::settle(Load load, Answer answer) {

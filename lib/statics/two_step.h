@@ -98,8 +98,8 @@ public:
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
   // ---- for contact, see two_step_contact.h
-  /// As Elastostatic::contact_space, of the second stage.
-  ContactSpace second_space(const Load& load, std::span<const std::uint32_t> nodes);
+  /// As Elastostatic::delassus_operator, of the second stage.
+  DelassusOperator second_delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
   struct Answer {
     Load total;                     ///< all forces, what holds displaced nodes among them
     std::vector<NodeVector> forces; ///< of contact

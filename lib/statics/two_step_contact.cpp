@@ -20,7 +20,7 @@ constexpr int parts_of_s = 16;                   ///< as TwoStepContact
 
 } // namespace
 
-ContactSpace TwoStepYielding::space(std::span<const std::uint32_t> nodes) {
+DelassusOperator TwoStepYielding::delassus_operator(std::span<const std::uint32_t> nodes) {
   const auto [first, both] = stages_();
   if (!std::equal(nodes.begin(), nodes.end(), nodes_.begin(), nodes_.end())) {
     nodes_.assign(nodes.begin(), nodes.end());
@@ -28,14 +28,14 @@ ContactSpace TwoStepYielding::space(std::span<const std::uint32_t> nodes) {
     s_ = 1;
   }
   if (s_ == 1)
-    return first.contact_space(load_, nodes);
+    return first.delassus_operator(load_, nodes);
   if (one_.nodes.empty()) {
     std::vector<std::uint32_t> all = nodes_;
     for (const auto& entry : load_.displacement)
       all.push_back(entry.first);
     std::sort(all.begin(), all.end());
-    one_ = first.contact_space(outer_, all);
-    two_ = both.second_space(outer_, all);
+    one_ = first.delassus_operator(outer_, all);
+    two_ = both.second_delassus_operator(outer_, all);
     rows_.clear();
     held_.clear();
     for (std::size_t row = 0; row < 3 * all.size(); ++row)
@@ -48,7 +48,7 @@ ContactSpace TwoStepYielding::space(std::span<const std::uint32_t> nodes) {
 }
 
 /// Both stages at s, what is displaced held.
-ContactSpace TwoStepYielding::combined() {
+DelassusOperator TwoStepYielding::combined() {
   const bool series = stages_().second.options().series;
   const double a = series ? s_ : 1, b = series ? 1 - s_ : s_ - 1;
   const auto all = static_cast<Index>(one_.free.size());
@@ -78,11 +78,11 @@ ContactSpace TwoStepYielding::combined() {
     of_touch_.assign(of_touch.data(), of_touch.data() + of_touch.size());
     w = (0.5 * (w + w.transpose())).eval();
   }
-  ContactSpace space;
-  space.nodes = nodes_;
-  space.compliance.assign(w.data(), w.data() + w.size());
-  space.free.assign(free.data(), free.data() + free.size());
-  return space;
+  DelassusOperator delassus;
+  delassus.nodes = nodes_;
+  delassus.compliance.assign(w.data(), w.data() + w.size());
+  delassus.free.assign(free.data(), free.data() + free.size());
+  return delassus;
 }
 
 /// What holds the displaced nodes, at s.

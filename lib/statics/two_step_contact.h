@@ -26,14 +26,14 @@ public:
     outer_.displacement.clear();
   }
 
-  ContactSpace space(std::span<const std::uint32_t> nodes) override;
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override;
   bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) override;
   std::span<const double> shape() override;
   /// Whether an s was found for all forces: with friction there may be none.
   bool solved() const noexcept { return solved_; }
 
 private:
-  ContactSpace combined();
+  DelassusOperator combined();
   std::vector<NodeVector> held_forces(std::span<const NodeTouch> touches);
   bool next(double value);
 
@@ -41,8 +41,8 @@ private:
   const Stages& stages_;
   const Load& load_;
   Load outer_;                           ///< without displacements
-  std::vector<std::uint32_t> nodes_;     ///< of the last space
-  ContactSpace one_, two_;               ///< of these and the displaced nodes, by stage
+  std::vector<std::uint32_t> nodes_;     ///< of the last operator
+  DelassusOperator one_, two_;           ///< of these and the displaced nodes, by stage
   std::vector<std::size_t> rows_, held_; ///< of `nodes_`, and of what is displaced, in them
   std::vector<double> of_free_;          ///< held forces without touches
   std::vector<double> of_touch_;         ///< what touches take from them, by columns

@@ -190,9 +190,9 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
 
 /// What a block's faces become before they go to the mesh.
 struct BlockFaces {
-  static constexpr std::size_t most = std::size_t{max_cell_triangles} * leaf_voxels;
-  std::array<Triangle, most + 1> made;
-  std::array<std::uint16_t, most + 1> picked, picked_from; ///< of `made`; of the block's faces
+  static constexpr std::size_t max_made = std::size_t{max_cell_triangles} * leaf_voxels;
+  std::array<Triangle, max_made + 1> made;
+  std::array<std::uint16_t, max_made + 1> picked, picked_from; ///< of `made`; of the block's faces
   std::size_t made_count = 0, picked_count = 0;
 };
 

@@ -9,10 +9,10 @@
 namespace gewebe {
 namespace {
 
-void check_count(std::size_t tetrahedra, std::size_t most) {
-  if (tetrahedra > most)
+void check_count(std::size_t tetrahedra, std::size_t max) {
+  if (tetrahedra > max)
     throw Error(std::to_string(tetrahedra) + " tetrahedra, expected at most " +
-                std::to_string(most));
+                std::to_string(max));
 }
 
 /// Calls visit(low, face) for the faces of all tetrahedra.

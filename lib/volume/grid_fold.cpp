@@ -280,14 +280,14 @@ private:
 /// The largest of the grids that nobody else holds.
 std::optional<std::size_t> choose_base(std::span<const Grid> grids) {
   std::optional<std::size_t> base;
-  openvdb::Index64 most = 0;
+  openvdb::Index64 max = 0;
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (grids[g].native().use_count() != 1 || grids[g].native()->tree.use_count() != 1)
       continue;
     const openvdb::Index64 count = grids[g].native()->tree->leafCount();
-    if (!base || count > most) {
+    if (!base || count > max) {
       base = g;
-      most = count;
+      max = count;
     }
   }
   return base;

@@ -29,9 +29,9 @@ void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, dou
   const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
   Int3 low{}, high{}; // of voxels, whose centres are at the index and a half
   for (int axis = 0; axis < 3; ++axis) {
-    const auto [least, most] = std::minmax({a[axis], b[axis], c[axis]});
-    low[static_cast<std::size_t>(axis)] = ceil_int(least - reach - 0.5);
-    high[static_cast<std::size_t>(axis)] = floor_int(most + reach - 0.5);
+    const auto [min, max] = std::minmax({a[axis], b[axis], c[axis]});
+    low[static_cast<std::size_t>(axis)] = ceil_int(min - reach - 0.5);
+    high[static_cast<std::size_t>(axis)] = floor_int(max + reach - 0.5);
   }
   low[0] = std::max(low[0], first_row);
   high[0] = std::min(high[0], first_row + leaf_dim - 1);

@@ -225,15 +225,15 @@ public:
   }
   double at(const Vec3& world) const {
     const Vec3 p = lattice_.to_index(world);
-    double least = HUGE_VAL;
+    double min = HUGE_VAL;
     if (const auto found = near_.find(cell(p)); found != near_.end())
       for (const std::uint32_t n : found->second)
-        least = test::smaller(least, to(n, p));
-    if (least <= reach)
-      return least;
+        min = test::smaller(min, to(n, p));
+    if (min <= reach)
+      return min;
     for (std::uint32_t n = 0; n < triangles_.size(); ++n)
-      least = test::smaller(least, to(n, p));
-    return least;
+      min = test::smaller(min, to(n, p));
+    return min;
   }
 
 private:
@@ -332,13 +332,13 @@ void bench(const char* name, const TriangleMesh& mesh) {
   const std::vector<Times> times = measure(filters);
 
   // How far rounding goes in `exact` itself: the sums run along another axis.
-  GridTransform turned = lattice;
+  GridTransform rotated = lattice;
   for (std::size_t row = 0; row < 3; ++row) {
-    turned.m[4 * row] = lattice.m[4 * row + 1];
-    turned.m[4 * row + 1] = lattice.m[4 * row + 2];
-    turned.m[4 * row + 2] = lattice.m[4 * row];
+    rotated.m[4 * row] = lattice.m[4 * row + 1];
+    rotated.m[4 * row + 1] = lattice.m[4 * row + 2];
+    rotated.m[4 * row + 2] = lattice.m[4 * row];
   }
-  const Grid other = *exact_coverage(one_thread, mesh, turned, OpenMesh::refuse);
+  const Grid other = *exact_coverage(one_thread, mesh, rotated, OpenMesh::refuse);
   const auto exact = values_of(filters[0].grid);
   const Range range = range_of(mesh, lattice);
   const Distances distances(mesh, lattice);
@@ -350,9 +350,9 @@ void bench(const char* name, const TriangleMesh& mesh) {
                   lattice.voxel_size().x, mesh.triangles.size(), times[n].median, times[n].fastest,
                   times[n].slowest, error, measure);
     };
-    const auto turned_values = values_of(other);
+    const auto rotated_values = values_of(other);
     const auto tested = n == 0 ? std::function<double(const Int3&)>([&](const Int3& v) {
-      return turned_values({v[1], v[2], v[0]});
+      return rotated_values({v[1], v[2], v[0]});
     })
                                : values_of(filter.grid);
     const Error2 fraction = fraction_error(range, tested, exact);

@@ -44,7 +44,7 @@ using namespace gewebe::timing;
 namespace {
 
 constexpr double frame = 1.0 / 60;
-constexpr std::size_t most_contacts = 200;
+constexpr std::size_t max_contacts = 200;
 
 struct Organ {
   std::string name;
@@ -373,11 +373,11 @@ void with_contacts(const Scene& scene, const std::vector<Variant>& variants,
 }
 
 /// The integration step that every object takes when each takes one.
-double least_step(const Scene& scene) {
-  double least = HUGE_VAL;
+double min_step(const Scene& scene) {
+  double min = HUGE_VAL;
   for (const Organ& organ : scene.organs)
-    least = test::smaller(least, safe_step_fraction * safe_step(organ.model));
-  return least;
+    min = test::smaller(min, safe_step_fraction * safe_step(organ.model));
+  return min;
 }
 
 // ---- the same shape from both
@@ -427,8 +427,8 @@ void equal_error(const Organ& organ, const Stored& store) {
   contacts.push_back(nodes.size() - 1);
   contacts.push_back(nodes.size());
   const Context one = with_threads(1);
-  double least = HUGE_VAL;
-  std::size_t least_at = 0;
+  double min = HUGE_VAL;
+  std::size_t min_at = 0;
   for (const std::size_t m : contacts) {
     const Load load = pull(model, nodes, m, size);
     // The reference holds the nodes in the matrix.
@@ -493,9 +493,9 @@ void equal_error(const Organ& organ, const Stored& store) {
     report(stage, off < near ? "elastodynamic to rest" : "elastodynamic; given up after 60 s", x, m,
            {spent, spent, spent}, spent, "ms");
     const double ratio = spent / still_new.median;
-    if (!(ratio >= least))
-      least_at = m;
-    least = test::smaller(least, ratio);
+    if (!(ratio >= min))
+      min_at = m;
+    min = test::smaller(min, ratio);
     (void)std::fprintf(stderr,
                        "%s, %zu contacts: elastostatic %.3f ms new, %.3f ms moved (off by "
                        "%.1e), elastodynamic %.1f ms for %.3f s\n",
@@ -503,7 +503,7 @@ void equal_error(const Organ& organ, const Stored& store) {
                        time);
   }
   (void)std::fprintf(stderr, "%s, equal error: at least %.1f times as fast, at %zu contacts\n",
-                     organ.name.c_str(), least, least_at);
+                     organ.name.c_str(), min, min_at);
 }
 
 /// How far the linear shape is from the non-linear one, where implicit steps come to rest.
@@ -531,7 +531,7 @@ void linearisation(const Organ& organ) {
 void figure_4_9(const Scene& scene, const std::vector<std::size_t>& contacts) {
   const Model& touched = scene.organs[scene.touched].model;
   std::vector<std::uint32_t> nodes = patch(touched);
-  nodes.resize(std::min(nodes.size(), most_contacts));
+  nodes.resize(std::min(nodes.size(), max_contacts));
   const Stored wide(touched, nodes, false), narrow(touched, nodes, true);
   const std::vector<Variant> variants{{"hybrid float64", &wide, 0},
                                       {"hybrid float64 tolerance 1e-3", &wide, 1e-3},
@@ -539,7 +539,7 @@ void figure_4_9(const Scene& scene, const std::vector<std::size_t>& contacts) {
                                       {"hybrid float32 tolerance 1e-3", &narrow, 1e-3}};
   without_load(scene);
   with_contacts(scene, variants, contacts, frame, 1, "cycles of 1/60 s");
-  with_contacts(scene, variants, contacts, least_step(scene), 7, "cycles of one step");
+  with_contacts(scene, variants, contacts, min_step(scene), 7, "cycles of one step");
   if (scene.name == "made organs") {
     equal_error(scene.organs[scene.touched], wide);
     linearisation(scene.organs[scene.touched]);

@@ -183,7 +183,7 @@ void bench_springs(const Model& model, int threads) {
       };
       if (count <= 100) {
         std::optional<WoodburySolver> corrected;
-        rows["correction"].times.push_back(milliseconds([&] {
+        rows["Woodbury"].times.push_back(milliseconds([&] {
           corrected.emplace(stiffness_change(model, now, same, same), solver_of(factor), context);
         }));
         if (round % 10 == 0) {
@@ -192,7 +192,7 @@ void bench_springs(const Model& model, int threads) {
         }
         u = f;
         corrected->solve(u);
-        judge(rows["correction"]);
+        judge(rows["Woodbury"]);
       }
       if (count <= 100) {
         if (expected.empty() && round % 10 == 0) {
@@ -210,25 +210,25 @@ void bench_springs(const Model& model, int threads) {
         judge(row);
         (void)updated.update(true, gone, cut.springs);
       }
-      rows["renewal"].times.push_back(
-          milliseconds([&] { (void)factor.renew(now, {}, {}, context); }));
+      rows["refactorisation"].times.push_back(
+          milliseconds([&] { (void)factor.refactor(now, {}, {}, context); }));
       if (round % 10 == 0) {
         expected = f;
         AxisSolver{Factor(stiffness_matrix(now), context), matrix.row_of_axis}.solve(expected);
         u = f;
         factor.solve(u);
-        judge(rows["renewal"]);
+        judge(rows["refactorisation"]);
       }
-      (void)factor.renew(model, {}, {}, context);
+      (void)factor.refactor(model, {}, {}, context);
       if (round % 5 == 0) {
         Model all = model;
         for (Spring& s : all.springs)
           s.stiffness *= 1.5;
         rows["all fronts"].times.push_back(
-            milliseconds([&] { (void)factor.renew(all, {}, {}, context); }));
-        (void)factor.renew(model, {}, {}, context);
+            milliseconds([&] { (void)factor.refactor(all, {}, {}, context); }));
+        (void)factor.refactor(model, {}, {}, context);
         rows["CHOLMOD factor"].times.push_back(
-            milliseconds([&] { cholmod.renew(stiffness_matrix(now), context); }));
+            milliseconds([&] { cholmod.refactor(stiffness_matrix(now), context); }));
       }
     }
     for (auto& [program, row] : rows)

@@ -2,8 +2,8 @@
 // the forces on the displaced nodes (and the shape) have been answered, by ffe-run on one thread. A
 // patient's colon (a ball where there is no shared data) with and without bending springs, cut at
 // random places, one cut behind the other, while some nodes are held displaced; with and without a
-// store of their columns. The first cut, which makes the factor that others renew, counts apart;
-// where a cut frees something, the organ is there whole again.
+// store of their columns. The first cut, which makes the factor that others refactor in part,
+// counts apart; where a cut frees something, the organ is there whole again.
 //
 // Writes CSV to standard output: stage ("… over …": what stands in the third column), program,
 // springs gone and nodes doubled in the mean, nodes, contacts, median, fastest and 99th percentile
@@ -35,7 +35,7 @@ using namespace gewebe::timing;
 
 namespace {
 
-constexpr int most_cuts = 200, most_runs = 12;
+constexpr int max_cuts = 200, max_runs = 12;
 constexpr double picture = 1000.0 / 60; // ms
 
 [[noreturn]] void fail(const std::string& why) {
@@ -216,7 +216,7 @@ void bench(const Scene& scene, const Kind& kind, double size, std::size_t contac
   std::mt19937 random(7);
   std::vector<double> times, firsts;
   double gone = 0, doubled = 0;
-  for (int run_number = 0; run_number < most_runs && times.size() < most_cuts; ++run_number) {
+  for (int run_number = 0; run_number < max_runs && times.size() < max_cuts; ++run_number) {
     const Served run(scene.tools, scene.folder);
     run.say("object organ organ.ela method=ffe" + std::string(stored ? " store=organ.h5" : "") +
             "\nemit forces\n" + (shapes ? "emit shapes\n" : ""));
@@ -224,7 +224,7 @@ void bench(const Scene& scene, const Kind& kind, double size, std::size_t contac
     run.say("displace organ " + patch(scene, held, contacts) + " 0 0 1\nstep 0.0166\n");
     (void)run.hear();
     bool first = true;
-    for (int attempt = 0; attempt < 2 * most_cuts && times.size() < most_cuts; ++attempt) {
+    for (int attempt = 0; attempt < 2 * max_cuts && times.size() < max_cuts; ++attempt) {
       const std::string cut = "cut organ " + kind.cut(scene, random, size) + "\nstep 0.0166\n";
       Served::Answer answer;
       const double time = milliseconds([&] {

@@ -194,7 +194,8 @@ void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) 
       "MB");
   const double all = all_operations(*factor);
   for (const int threads : {1, 2}) {
-    const Times times = timed([&] { factor->renew(matrix, with_threads(threads)); }, threads, runs);
+    const Times times =
+        timed([&] { factor->refactor(matrix, with_threads(threads)); }, threads, runs);
     say("factor", "gewebe", 0, threads, times, all / times.fastest * 1e-6, "GFLOP/s");
   }
   std::optional<Peer> peer;
@@ -229,7 +230,7 @@ void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) 
 }
 
 /// The most memory that a child process held, in MB, above what it began with.
-double most_memory(const std::function<void()>& work) {
+double peak_memory(const std::function<void()>& work) {
   const pid_t child = fork();
   if (child == 0) {
     work();
@@ -244,27 +245,27 @@ double most_memory(const std::function<void()>& work) {
 
 void bench_memory(std::size_t side) {
   const StiffnessMatrix matrix = stiffness_matrix(test::block_of_material(side));
-  const double nothing = most_memory([] {});
+  const double nothing = peak_memory([] {});
   double ours = 0;
   for (const int threads : {1, 2}) {
-    double most = 0;
+    double max = 0;
     const Times times = timed(
-        [&] { most = most_memory([&] { const Factor f(matrix, with_threads(threads)); }); }, 2, 1);
-    ours = threads == 1 ? most - nothing : ours;
-    report("memory", "gewebe", matrix.order(), 0, threads, times, most - nothing, "MB");
+        [&] { max = peak_memory([&] { const Factor f(matrix, with_threads(threads)); }); }, 2, 1);
+    ours = threads == 1 ? max - nothing : ours;
+    report("memory", "gewebe", matrix.order(), 0, threads, times, max - nothing, "MB");
   }
-  double most = 0;
+  double max = 0;
   const Times times = timed(
       [&] {
-        most = most_memory([&] {
+        max = peak_memory([&] {
           Peer peer(matrix);
           peer.order();
           peer.factorise();
         });
       },
       2, 1);
-  report("memory", "CHOLMOD", matrix.order(), 0, 1, times, most - nothing, "MB");
-  report("memory", "gewebe", matrix.order(), 0, 1, times, ours / (most - nothing),
+  report("memory", "CHOLMOD", matrix.order(), 0, 1, times, max - nothing, "MB");
+  report("memory", "gewebe", matrix.order(), 0, 1, times, ours / (max - nothing),
          "times CHOLMOD's");
 }
 

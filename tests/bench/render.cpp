@@ -38,7 +38,7 @@ constexpr int views = 16;
 struct Scene {
   std::size_t triangles = 0;
   test::OracleScene oracle;
-  Look look;
+  SurfaceMaterial material;
   std::vector<Camera> cameras;
   std::vector<Projection> projections;
   std::map<bool, Drawing> drawings;             ///< with frames, without
@@ -56,9 +56,9 @@ Scene make_scene(std::size_t wanted, bool with_oracle) {
   scene.oracle.base = test::spots(256, 256, 3);
   scene.oracle.structure = test::spots(256, 256, 1);
   scene.oracle.offset = 0.01;
-  scene.look.base = texture_from(*scene.oracle.base);
-  scene.look.structure = texture_from(*scene.oracle.structure);
-  scene.look.background = {0, 0, 0};
+  scene.material.base = texture_from(*scene.oracle.base);
+  scene.material.structure = texture_from(*scene.oracle.structure);
+  scene.material.background = {0, 0, 0};
   CameraOptions view;
   view.view = "iso";
   for (int n = 0; n < views; ++n) {
@@ -112,8 +112,8 @@ void by_cpu(const Scene& scene, int threads) {
     const Context context = with_threads(threads);
     const Drawing& drawing = scene.drawings.at(per_pixel);
     const auto draw = [&](int n) {
-      return render_cpu(drawing, scene.projections[static_cast<std::size_t>(n)], scene.look, side,
-                        side, 1, context);
+      return render_cpu(drawing, scene.projections[static_cast<std::size_t>(n)], scene.material,
+                        side, side, 1, context);
     };
     const Times times = frame_times([&](int n) { (void)draw(n); });
     report(scene, per_pixel ? "cpu" : "cpu by vertex", threads, times, draw(0), per_pixel);
@@ -128,7 +128,7 @@ void by_gl(const Scene& scene, const std::string& suffix) {
       options.mode = mode;
       options.wide = wide;
       const bool per_pixel = mode == GlMode::shader;
-      GlRenderer renderer(gl, scene.look, side, side, options);
+      GlRenderer renderer(gl, scene.material, side, side, options);
       renderer.set_drawing(scene.drawings.at(per_pixel));
       const auto draw = [&](int n) {
         renderer.draw(scene.projections[static_cast<std::size_t>(n)], {});

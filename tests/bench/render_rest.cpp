@@ -32,7 +32,7 @@ constexpr std::uint32_t side = 512;
 struct Scene {
   std::string name;
   test::OracleScene oracle;
-  Look look;
+  SurfaceMaterial material;
   Drawing drawing;
   Projection projection;
   test::OraclePicture picture;
@@ -60,26 +60,26 @@ Scene make_scene(const std::string& name, Paint base, Paint structure) {
       return solid_texture_from_text("veins:scale=10");
     return {};
   };
-  oracle.solid_base = scene.look.solid_base = solid(base);
-  oracle.solid_structure = scene.look.solid_structure = solid(structure);
+  oracle.solid_base = scene.material.solid_base = solid(base);
+  oracle.solid_structure = scene.material.solid_structure = solid(structure);
   if (base == Paint::image || base == Paint::triplanar)
     oracle.base = test::spots(256, 256, 3);
   if (structure == Paint::image || structure == Paint::triplanar)
     oracle.structure = test::spots(256, 256, 1);
   if (oracle.base)
-    scene.look.base = texture_from(*oracle.base);
+    scene.material.base = texture_from(*oracle.base);
   if (oracle.structure)
-    scene.look.structure = texture_from(*oracle.structure);
-  scene.look.rest = oracle.rest;
-  scene.look.color = oracle.color;
-  scene.look.background = {0, 0, 0};
+    scene.material.structure = texture_from(*oracle.structure);
+  scene.material.rest = oracle.rest;
+  scene.material.color = oracle.color;
+  scene.material.background = {0, 0, 0};
   CameraOptions view;
   view.view = "iso";
   const Camera camera = make_camera(view, rest_box(surfaces), side, side);
   DrawingOptions options;
   options.texcoords = base == Paint::image || structure == Paint::image;
   options.structure = structure == Paint::image;
-  options.rest = is_at_rest(scene.look);
+  options.rest = is_at_rest(scene.material);
   options.rest_normals = oracle.rest.triplanar || oracle.solid_structure;
   options.rest_light = options.rest && structure != Paint::none;
   options.per_pixel = true;
@@ -91,7 +91,7 @@ Scene make_scene(const std::string& name, Paint base, Paint structure) {
       make_projection(camera, scene.drawing.box, scene.drawing.origin, scene.drawing.scale);
   scene.picture = test::oracle_picture(oracle, camera, side, side);
   RenderReport report;
-  (void)render_cpu(scene.drawing, scene.projection, scene.look, side, side, 1, {}, &report);
+  (void)render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1, {}, &report);
   scene.covered = static_cast<double>(report.covered);
   return scene;
 }
@@ -120,14 +120,14 @@ void report(const Scene& scene, const std::string& program, int threads, const T
 void by_cpu(const Scene& scene, int threads) {
   const Context context = with_threads(threads);
   const auto draw = [&] {
-    return render_cpu(scene.drawing, scene.projection, scene.look, side, side, 1, context);
+    return render_cpu(scene.drawing, scene.projection, scene.material, side, side, 1, context);
   };
   const Times times = frame_times([&] { (void)draw(); });
   report(scene, "cpu", threads, times, draw());
 }
 
 void by_shader(GlContext& gl, const Scene& scene) {
-  GlRenderer renderer(gl, scene.look, side, side, {});
+  GlRenderer renderer(gl, scene.material, side, side, {});
   renderer.set_drawing(scene.drawing);
   const auto draw = [&] {
     renderer.draw(scene.projection, {});

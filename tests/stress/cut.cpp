@@ -28,7 +28,7 @@ using namespace gewebe;
 namespace {
 
 // Two stable solutions differ by roundings times the condition, so it must leave room below 1e-8.
-constexpr double most_error = 1e-8, most_residual = 1e-13, most_condition = 5e8;
+constexpr double max_error = 1e-8, max_residual = 1e-13, condition_limit = 5e8;
 int passed = 0, failed = 0;
 
 void check(bool good, const std::string& what) {
@@ -88,7 +88,7 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     } catch (const NotPositiveDefinite&) {
       // A part hangs loose.
     }
-    if (!(condition < most_condition)) { // solutions would differ by their condition alone
+    if (!(condition < condition_limit)) { // solutions would differ by their condition alone
       ++refused;
       if (condition < 10 * max_condition || told == 3)
         continue;
@@ -104,10 +104,10 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
       continue;
     }
     worst_condition = test::larger(worst_condition, condition);
-    // Each fourth cut by correction, which on so few nodes is never the cheapest.
+    // Each fourth cut by Woodbury, which on so few nodes is never the cheapest.
     const CutWork work =
         stiffness.cut(now, next->origin, next->place,
-                      done % 4 == 3 ? std::optional(CutWay::correction) : std::nullopt);
+                      done % 4 == 3 ? std::optional(CutWay::woodbury) : std::nullopt);
     const std::shared_ptr<ComplianceSource> compliance = stiffness.compliance();
     const ColumnSource& stored = *compliance->columns();
     ++ways[static_cast<std::size_t>(work.way)];
@@ -119,8 +119,8 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     worst = test::larger(worst, error);
     worst_residual = test::larger(worst_residual, back);
     const std::string which = std::string(name) + ", cut " + std::to_string(done);
-    check(error < most_error, which + ": error " + std::to_string(error));
-    check(back < most_residual, which + ": residual " + std::to_string(back));
+    check(error < max_error, which + ": error " + std::to_string(error));
+    check(back < max_residual, which + ": residual " + std::to_string(back));
     if (done % 20 == 0) { // columns of the store, corrected
       std::vector<double> columns(9 * now->nodes.size()), right(columns.size(), 0);
       const std::size_t k = random() % stored.nodes().size();
@@ -131,7 +131,7 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
       fresh->solve(right, 3);
       const double wrong = test::relative_difference(columns, right);
       worst_column = test::larger(worst_column, wrong);
-      check(wrong < most_error, which + ": a column's error " + std::to_string(wrong));
+      check(wrong < max_error, which + ": a column's error " + std::to_string(wrong));
     }
     if (now->nodes.size() == model->nodes.size()) {
       // A solver of before must not pass.
@@ -142,10 +142,10 @@ void cut_often(const char* name, const TriangleMesh& mesh, int cuts) {
     model = std::move(now);
     ++done;
   }
-  check(std::isfinite(control) && control > most_error,
+  check(std::isfinite(control) && control > max_error,
         std::string(name) + ": the model of before passes as the cut one");
   std::printf(
-      "%s: %zu nodes at the end, %d cuts of %zu springs and copies, %d corrected, %d renewed, "
+      "%s: %zu nodes at the end, %d cuts of %zu springs and copies, %d by Woodbury, %d refactored, "
       "%d afresh, %zu more would leave something loose: error %.2g, column %.2g, residual "
       "%.2g, condition %.2g, control %.2g\n",
       name, model->nodes.size(), cuts, springs, ways[0], ways[1], ways[2], refused, worst,

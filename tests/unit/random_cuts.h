@@ -65,8 +65,8 @@ inline double mean_edge(const Model& model) {
 /// The next one, without what comes off; nothing where nothing comes apart or a fixed node would be
 /// left alone. \param most springs, or edges that a blade crosses
 inline std::optional<CutModel> random_cut(const Model& model, std::mt19937& random,
-                                          std::size_t most) {
-  const std::size_t size = 1 + random() % most;
+                                          std::size_t max) {
+  const std::size_t size = 1 + random() % max;
   Cut cut;
   if (random() % 2 == 0) {
     cut = springs_around(model, static_cast<std::uint32_t>(random() % surface_count(model)), size);

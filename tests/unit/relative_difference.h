@@ -14,12 +14,12 @@ namespace gewebe::test {
 inline double relative_difference(std::span<const double> a, std::span<const double> b) {
   if (a.size() != b.size())
     return HUGE_VAL;
-  double most = 0, size = 0;
+  double max = 0, size = 0;
   for (std::size_t k = 0; k < a.size(); ++k) {
-    most = larger(most, std::abs(a[k] - b[k]));
+    max = larger(max, std::abs(a[k] - b[k]));
     size = larger(size, std::abs(b[k]));
   }
-  return size > 0 ? most / size : most > 0 ? HUGE_VAL : most;
+  return size > 0 ? max / size : max > 0 ? HUGE_VAL : max;
 }
 
 } // namespace gewebe::test

@@ -49,9 +49,9 @@ public:
       : scene_(scene), camera_(camera), width_(width), height_(height) {
     find_frames();
     bound();
-    add_look(scene);
+    add_material(scene);
     for (const OracleScene& other : scene.others)
-      add_look(other);
+      add_material(other);
   }
 
   OraclePixel pixel(double x, double y) const {
@@ -96,22 +96,22 @@ private:
   };
   using Levels = std::vector<Level>;
   /// What a material looks like.
-  struct OwnLook {
+  struct OwnMaterial {
     const OracleScene* scene;
     Levels base, structure, detail, reflection;
   };
   using Key = std::tuple<std::uint32_t, float, float, bool>;
 
-  void add_look(const OracleScene& scene) {
-    OwnLook& look = looks_.emplace_back(OwnLook{&scene, {}, {}, {}, {}});
-    for (const auto& [image, levels] : {std::pair{&scene.base, &look.base},
-                                        {&scene.structure, &look.structure},
-                                        {&scene.detail, &look.detail},
-                                        {&scene.reflection, &look.reflection}})
+  void add_material(const OracleScene& scene) {
+    OwnMaterial& material = materials_.emplace_back(OwnMaterial{&scene, {}, {}, {}, {}});
+    for (const auto& [image, levels] : {std::pair{&scene.base, &material.base},
+                                        {&scene.structure, &material.structure},
+                                        {&scene.detail, &material.detail},
+                                        {&scene.reflection, &material.reflection}})
       if (*image)
         *levels = levels_of(**image, 255, scene_.mipmap);
     if (scene.heights)
-      look.structure = levels_of(
+      material.structure = levels_of(
           DeepImage{scene.heights->width, scene.heights->height, 1, scene.heights->values}, 65535,
           scene_.mipmap);
   }
@@ -240,8 +240,8 @@ private:
         box.add({(dot(d, camera_.right) / depth / camera_.tan_x + 1) / 2 * width_,
                  (1 - dot(d, camera_.up) / depth / camera_.tan_y) / 2 * height_, 0});
       }
-      const auto cell_of = [](double at, double most) {
-        return static_cast<std::size_t>(std::clamp(at, 0.0, most - 1)) / cell;
+      const auto cell_of = [](double at, double max) {
+        return static_cast<std::size_t>(std::clamp(at, 0.0, max - 1)) / cell;
       };
       for (std::size_t row = cell_of(box.min.y - 1, height_);
            row <= cell_of(box.max.y + 1, height_); ++row)
@@ -301,10 +301,11 @@ private:
       dt = scene_.offset * frames_.at(key(hit, 0)).side * dot(l, cross(n, along));
       around = sphere_map(place, n);
     }
-    const OwnLook& look =
-        looks_[scene_.mesh.material.empty() ? 0
-                                            : static_cast<std::size_t>(scene_.mesh.material[hit])];
-    const OracleScene& own = *look.scene;
+    const OwnMaterial& material =
+        materials_[scene_.mesh.material.empty()
+                       ? 0
+                       : static_cast<std::size_t>(scene_.mesh.material[hit])];
+    const OracleScene& own = *material.scene;
     const RestPoint at_rest = rest_point(own, hit, x, y, place, unit(normal));
     nearest.footprint = at_rest.footprint;
     const auto change = scene_.mipmap ? changes(hit, x, y) : std::array<double, 4>{};
@@ -315,24 +316,24 @@ private:
                                      : value(levels, change, s, t, c);
       };
       if (own.base)
-        base *= image(look.base);
+        base *= image(material.base);
       if (own.solid_base)
         base *= at_rest.base[c];
       base = test::smaller(base, 1.0);
       if (own.detail)
-        base = test::smaller(base + image(look.detail), 1.0);
+        base = test::smaller(base + image(material.detail), 1.0);
       if (own.solid_detail)
         base = test::smaller(base + at_rest.detail[c], 1.0);
       if (own.reflection)
-        base = test::smaller(base + texel(look.reflection[0], around[0], around[1], c), 1.0);
+        base = test::smaller(base + texel(material.reflection[0], around[0], around[1], c), 1.0);
       double r = 0.5;
       if (own.solid_structure)
         r = at_rest.relief;
       else if (own.structure && scene_.rest.triplanar)
-        r = projected_relief(look.structure, at_rest);
+        r = projected_relief(material.structure, at_rest);
       else if (own.structure || own.heights)
-        r += 0.5 * (value(look.structure, change, s, t, c) -
-                    value(look.structure, change, s + ds, t + dt, c));
+        r += 0.5 * (value(material.structure, change, s, t, c) -
+                    value(material.structure, change, s + ds, t + dt, c));
       nearest.value[c] =
           scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
     }
@@ -499,7 +500,7 @@ private:
   static constexpr std::size_t cell = 8; // pixels
   std::size_t columns_ = 0;
   std::vector<std::vector<std::size_t>> cells_; // triangles that may be seen in each
-  std::vector<OwnLook> looks_;                  ///< by material
+  std::vector<OwnMaterial> materials_;          ///< by material
 };
 
 using OraclePicture = std::vector<OraclePixel>;

@@ -1,10 +1,10 @@
 #pragma once
-// Textures, surfaces and looks for pictures.
+// Textures, surfaces and materials for pictures.
 
 #include "base/mesh.h"
 #include "render_oracle.h"
 #include "shading/image.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 #include "shading/texture.h"
 
 #include <cmath>
@@ -60,34 +60,34 @@ inline TriangleMesh torus(std::uint32_t around, std::uint32_t across, bool mirro
   return m;
 }
 
-/// The look that an oracle's scene has, before black.
-inline Look look_of(const OracleScene& scene) {
-  Look look;
+/// The material that an oracle's scene has, before black.
+inline SurfaceMaterial material_of(const OracleScene& scene) {
+  SurfaceMaterial material;
   TextureOptions filter;
   filter.filter = scene.mipmap ? TextureFilter::mipmap : TextureFilter::linear;
   if (scene.base)
-    look.base = texture_from(*scene.base, filter);
+    material.base = texture_from(*scene.base, filter);
   if (scene.structure)
-    look.structure = texture_from(*scene.structure, filter);
+    material.structure = texture_from(*scene.structure, filter);
   if (scene.heights)
-    look.structure = texture_from(*scene.heights, filter);
+    material.structure = texture_from(*scene.heights, filter);
   if (scene.detail)
-    look.detail = texture_from(*scene.detail, filter);
+    material.detail = texture_from(*scene.detail, filter);
   filter.sphere = true;
   if (scene.reflection)
-    look.reflection = texture_from(*scene.reflection, filter);
-  look.solid_base = scene.solid_base;
-  look.solid_detail = scene.solid_detail;
-  look.solid_structure = scene.solid_structure;
-  look.rest = scene.rest;
-  look.color = scene.color;
-  look.background = {0, 0, 0};
+    material.reflection = texture_from(*scene.reflection, filter);
+  material.solid_base = scene.solid_base;
+  material.solid_detail = scene.solid_detail;
+  material.solid_structure = scene.solid_structure;
+  material.rest = scene.rest;
+  material.color = scene.color;
+  material.background = {0, 0, 0};
   for (OracleScene other : scene.others) {
     other.rest = scene.rest;
     other.mipmap = scene.mipmap;
-    look.others.push_back(look_of(other));
+    material.others.push_back(material_of(other));
   }
-  return look;
+  return material;
 }
 
 } // namespace gewebe::test

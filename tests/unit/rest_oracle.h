@@ -88,13 +88,13 @@ inline double solid_oracle(const SolidTexture& texture, const Vec3& p, double fo
 
 /// w_a, their sum 1.
 inline std::array<double, 3> triplanar_oracle(const Vec3& n, int sharpness) {
-  const double most = std::max({std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)});
-  if (!(most > 0))
+  const double max = std::max({std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)});
+  if (!(max > 0))
     return {0, 0, 1};
   std::array<double, 3> w{};
   for (int a = 0; a < 3; ++a)
     w[static_cast<std::size_t>(a)] =
-        std::max(0.0, std::pow(std::fabs(n[a]) / most, sharpness) - 1.0 / 256);
+        std::max(0.0, std::pow(std::fabs(n[a]) / max, sharpness) - 1.0 / 256);
   const double sum = w[0] + w[1] + w[2];
   return {w[0] / sum, w[1] / sum, w[2] / sum};
 }

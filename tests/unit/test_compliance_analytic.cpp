@@ -160,13 +160,13 @@ namespace {
 double difference(const Kept& a, const Kept& b) {
   double worst = 0;
   for (std::size_t k = 0; k < a.nodes.size(); ++k) {
-    double most = 0, differ = 0;
+    double max = 0, differ = 0;
     for (std::size_t i = 0; i < a.nodes[k].size(); ++i) {
-      most = test::larger(most, std::abs(b.nodes[k][i]));
+      max = test::larger(max, std::abs(b.nodes[k][i]));
       differ = test::larger(differ, std::abs(a.nodes[k][i] - b.nodes[k][i]));
     }
-    if (most > 0)
-      worst = test::larger(worst, differ / most);
+    if (max > 0)
+      worst = test::larger(worst, differ / max);
   }
   return worst;
 }

@@ -19,15 +19,15 @@ Vec3 place(const Model& model, std::span<const double> u, std::size_t i) {
 
 /// Of the free node that is deepest inside, over the radius.
 double depth(const Model& model, std::span<const double> u, const PlacedInstrument& placed) {
-  double least = HUGE_VAL;
+  double min = HUGE_VAL;
   for (const std::uint32_t i : test::free_nodes(model))
-    least = test::smaller(least, placed.distance(place(model, u, i)));
-  return -least / placed.radius;
+    min = test::smaller(min, placed.distance(place(model, u, i)));
+  return -min / placed.radius;
 }
 
 TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
   const Model model = test::organ(4);
-  Elastostatic still(model, {}, Context{});
+  Elastostatic solver(model, {}, Context{});
   std::vector<double> u(3 * model.nodes.size());
   StaticContact contact(model, u);
   Pose before{middle + Vec3{0.3, 0.2, 28.5}, {}};
@@ -36,7 +36,7 @@ TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
       const InstrumentShape shape{8, {}, friction};
       const Pose now{middle + Vec3{0.3 + friction, 0.2, z}, {}};
       const std::vector<std::optional<MovedInstrument>> moved{MovedInstrument{shape, before, now}};
-      contact.update([&]() -> Elastostatic& { return still; }, {}, moved, u);
+      contact.update([&]() -> Elastostatic& { return solver; }, {}, moved, u);
       before = now;
       const PlacedInstrument placed(shape, now);
       EXPECT_TRUE(contact.solved());
@@ -50,7 +50,7 @@ TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
         EXPECT_LE(drag, friction * push + 1e-6 * norm(t.force));
       }
     }
-  contact.update([&]() -> Elastostatic& { return still; }, {}, {}, u); // gone
+  contact.update([&]() -> Elastostatic& { return solver; }, {}, {}, u); // gone
   EXPECT_TRUE(contact.touches().empty());
   for (const double x : u)
     EXPECT_LT(std::abs(x), 1e-9);

@@ -158,22 +158,22 @@ TEST(ContactSolver, AllConditionsHoldOnAnOrgan) {
 TEST(ContactSolver, TheResidualSeesEachBrokenCondition) {
   const Case c = organ_case(0.3, 3);
   ContactForces f = solve_contacts(c.w, c.m, c.contacts);
-  std::size_t most = 0;
+  std::size_t max = 0;
   for (std::size_t i = 0; i < f.force.size(); ++i)
-    if (norm(f.force[i]) > norm(f.force[most]))
-      most = i;
+    if (norm(f.force[i]) > norm(f.force[max]))
+      max = i;
   const std::vector<Vec3> right = f.force;
   const auto residual = [&] { return contact_residual(c.w, c.m, c.contacts, f.force); };
   EXPECT_LT(residual(), 1e-9);
-  f.force[most] *= 0.9; // too weak: inside
+  f.force[max] *= 0.9; // too weak: inside
   EXPECT_GT(residual(), 1e-2);
   f.force = right;
-  f.force[most] = -f.force[most]; // pulls
+  f.force[max] = -f.force[max]; // pulls
   EXPECT_GT(residual(), 1e-2);
   f.force = right;
-  f.force[most] += 0.5 * cross(c.contacts[most].normal, f.force[most] + Vec3{1, 2, 3}); // sideways
+  f.force[max] += 0.5 * cross(c.contacts[max].normal, f.force[max] + Vec3{1, 2, 3}); // sideways
   EXPECT_GT(residual(), 1e-2);
-  f.force[most].x = NAN;
+  f.force[max].x = NAN;
   EXPECT_FALSE(residual() < 1e9);
 }
 

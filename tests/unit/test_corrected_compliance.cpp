@@ -82,12 +82,11 @@ struct Cut {
     (void)compliance_columns(matrix, axes.factor, check.norm, columns.nodes(), Context{}, afresh);
     if (kept.columns().size() != afresh.columns().size())
       return HUGE_VAL;
-    double most = 0;
+    double max = 0;
     for (std::size_t k = 0; k < afresh.columns().size(); ++k)
-      if (const double e = relative_difference(kept.columns()[k], afresh.columns()[k]);
-          !(e <= most))
-        most = e;
-    return most;
+      if (const double e = relative_difference(kept.columns()[k], afresh.columns()[k]); !(e <= max))
+        max = e;
+    return max;
   }
 
   Model before = organ_ball();
@@ -110,12 +109,12 @@ TEST(CorrectedCompliance, AllColumnsAreCorrectedAndChecked) {
   const CorrectedCompliance made = c.write(columns, kept, context);
   EXPECT_EQ(made.corrected, 3 * columns.nodes().size());
   EXPECT_LT(c.error(columns, kept), 1e-9);
-  double most = 0;
+  double max = 0;
   for (const double residual : kept.residuals())
-    most = test::larger(most, residual);
-  EXPECT_EQ(made.residual, most);
-  EXPECT_GT(most, 0);
-  EXPECT_LE(most, max_backward_error);
+    max = test::larger(max, residual);
+  EXPECT_EQ(made.residual, max);
+  EXPECT_GT(max, 0);
+  EXPECT_LE(max, max_backward_error);
   EXPECT_EQ(progress.size(), (columns.nodes().size() + compliance_block - 1) / compliance_block);
   EXPECT_EQ(progress.back(), 1);
 }

@@ -259,13 +259,13 @@ TEST(Csg, OverflowIsAnError) {
 }
 
 TEST(Csg, OverflowOfOneVoxelOfALeafIsAnError) {
-  const float most = std::numeric_limits<float>::max();
+  const float max = std::numeric_limits<float>::max();
   const auto leaf = [&](std::size_t place) {
     GridBuilder builder{GridInfo{}};
     const std::vector<Int3> origins{{8, -8, 16}};
     for (const LeafRef& ref : builder.add_leaves(Context{}, origins))
       for (std::size_t n = 0; n < leaf_voxels; ++n) {
-        ref.values[n] = n == place ? most : 0.25f + 0.5f * static_cast<float>(n % 2);
+        ref.values[n] = n == place ? max : 0.25f + 0.5f * static_cast<float>(n % 2);
         ref.active[n / 64] |= std::uint64_t{1} << (n % 64);
       }
     return builder.finish(false);
@@ -278,7 +278,7 @@ TEST(Csg, OverflowOfOneVoxelOfALeafIsAnError) {
     EXPECT_NO_THROW(combine(Op::unite, {grid, grid}));
     // Against a tile, too.
     GridBuilder builder{GridInfo{}};
-    builder.add_tile({{8, -8, 16}, 8, most, true});
+    builder.add_tile({{8, -8, 16}, 8, max, true});
     const Grid tile = builder.finish(false);
     EXPECT_THROW(combine(Op::add, {grid, tile}), Error) << place;
     EXPECT_THROW(combine(Op::add, {tile, grid}), Error) << place;

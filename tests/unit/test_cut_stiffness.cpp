@@ -40,7 +40,7 @@ std::vector<double> fresh(const Model& model, std::vector<double> f) {
 } // namespace
 
 TEST(CutStiffness, EveryWayIsThatOfAFreshFactor) {
-  for (const CutWay way : {CutWay::correction, CutWay::renewal, CutWay::fresh}) {
+  for (const CutWay way : {CutWay::woodbury, CutWay::refactor, CutWay::fresh}) {
     const auto model = round_organ(4);
     CutStiffness stiffness(model, nullptr, Context{});
     stiffness.prepare();
@@ -60,7 +60,7 @@ TEST(CutStiffness, ManyCutsInARow) {
   auto model = round_organ(3);
   CutStiffness stiffness(model, nullptr, Context{});
   std::mt19937 random(3);
-  int corrected = 0, renewed = 0;
+  int corrected = 0, refactored = 0;
   for (int done = 0; done < 25;) {
     std::optional<CutModel> next = random_cut(*model, random, 6);
     if (!next)
@@ -73,12 +73,12 @@ TEST(CutStiffness, ManyCutsInARow) {
     } catch (const SingularStiffness&) {
       continue;
     }
-    // On so few nodes a renewal is always cheaper.
+    // On so few nodes a refactorisation is always cheaper.
     const CutWork work =
         stiffness.cut(now, next->origin, next->place,
-                      done % 3 == 0 ? std::optional(CutWay::correction) : std::nullopt);
-    corrected += work.way == CutWay::correction ? 1 : 0;
-    renewed += work.way == CutWay::renewal ? 1 : 0;
+                      done % 3 == 0 ? std::optional(CutWay::woodbury) : std::nullopt);
+    corrected += work.way == CutWay::woodbury ? 1 : 0;
+    refactored += work.way == CutWay::refactor ? 1 : 0;
     std::vector<double> u = f;
     stiffness.compliance()->solve(u, 1);
     ASSERT_LT(relative_difference(u, expected), 1e-8) << done;
@@ -86,7 +86,7 @@ TEST(CutStiffness, ManyCutsInARow) {
     ++done;
   }
   EXPECT_GT(corrected, 0);
-  EXPECT_GT(renewed, 0);
+  EXPECT_GT(refactored, 0);
 }
 
 TEST(CutStiffness, ColumnsOfTheFirstModelServeTheCutOne) {
@@ -142,7 +142,7 @@ TEST(CutStiffness, WhatWasHandedOutBeforeRefuses) {
   const std::shared_ptr<ComplianceSource> before = stiffness.compliance();
   CutModel cut = opened(*model, 4);
   const auto now = std::make_shared<const Model>(std::move(cut.model));
-  (void)stiffness.cut(now, cut.origin, cut.place, CutWay::renewal);
+  (void)stiffness.cut(now, cut.origin, cut.place, CutWay::refactor);
   std::vector<double> f(3 * model->nodes.size(), 1);
   EXPECT_THROW(before->solve(f, 1), Error);
 }

@@ -43,13 +43,13 @@ TEST(NearestPoint, IsTheMinimumOverTheTriangle) {
     ++seen[static_cast<std::size_t>(nearest.feature)];
     const double distance = norm(p - nearest.point);
     constexpr int steps = 40;
-    double least = 1e9;
+    double min = 1e9;
     for (int u = 0; u <= steps; ++u)
       for (int v = 0; u + v <= steps; ++v)
-        least = test::smaller(
-            least, norm(p - a - (b - a) * (u / 1.0 / steps) - (c - a) * (v / 1.0 / steps)));
-    EXPECT_LE(distance, least + 1e-12);
-    EXPECT_GE(distance, least - 0.1);
+        min = test::smaller(
+            min, norm(p - a - (b - a) * (u / 1.0 / steps) - (c - a) * (v / 1.0 / steps)));
+    EXPECT_LE(distance, min + 1e-12);
+    EXPECT_GE(distance, min - 0.1);
     // It lies in the triangle: inside all three edges' half-planes.
     const Vec3 normal = cross(b - a, c - a);
     EXPECT_NEAR(dot(nearest.point - a, normal), 0, 1e-12);
@@ -108,14 +108,14 @@ TEST(DistanceRamp, BandIsTheSearchOverAllTriangles) {
     for (std::int32_t j = -10; j <= 10; ++j)
       for (std::int32_t k = -10; k <= 10; ++k) {
         const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
-        double least = 1e9;
+        double min = 1e9;
         for (const auto& [a, b, c] : mesh.triangles)
-          least = test::smaller(
-              least,
+          min = test::smaller(
+              min,
               norm(p -
                    nearest_on_triangle(p, mesh.points[a], mesh.points[b], mesh.points[c]).point));
         const bool in = inside.contains({i, j, k});
-        EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -least : least, jones_half_width), 1e-7);
+        EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -min : min, jones_half_width), 1e-7);
         sum += at(value, {i, j, k});
       }
   EXPECT_NEAR(report.volume, sum, 1e-9 * sum);

@@ -327,13 +327,13 @@ TEST(ElastodynamicLoad, APulsingForceDrivesAMassAsItShould) {
   EXPECT_FALSE(object.resting());
 }
 
-TEST(ElastodynamicLoad, ATravellingNodeArrivesAndPullsTheOthers) {
+TEST(ElastodynamicLoad, ARampedNodeArrivesAndPullsTheOthers) {
   for (const Integration way : {Integration::semi_implicit, Integration::implicit}) {
     const Model model = two_masses(1, 10, 0.5);
     Elastodynamic object(model, way);
     Load load;
     load.displacement[0] = {-0.5, 0, 0};
-    load.travel[0] = {{}, {-0.5, 0, 0}, 0.25, 1.25};
+    load.ramp[0] = {{}, {-0.5, 0, 0}, 0.25, 1.25};
     object.set_load(load);
     (void)object.advance(0.25, 1e-3, one_thread());
     EXPECT_EQ(object.motion()[0].displacement, Vec3{});

@@ -145,14 +145,14 @@ TEST(Factor, SolvesForABlockOfMaterialAndAShiftedOne) {
   StiffnessMatrix shifted = k;
   for (std::size_t c = 0; c < k.order(); ++c)
     shifted.value[static_cast<std::size_t>(k.column_start[c])] += 0.01 * static_cast<double>(c % 5);
-  factor.renew(shifted, {});
+  factor.refactor(shifted, {});
   factor.solve(f, u);
   EXPECT_LE(backward_error(shifted, stiffness_norm(shifted), u, f), 1e-15);
   EXPECT_FALSE(backward_error(k, stiffness_norm(k), u, f) <= 1e-12);
   EXPECT_TRUE(same_numbers(factor, Factor(shifted, {})));
   shifted.value[static_cast<std::size_t>(k.column_start[1000])] = -1;
   try {
-    factor.renew(shifted, {});
+    factor.refactor(shifted, {});
     ADD_FAILURE();
   } catch (const NotPositiveDefinite& error) {
     EXPECT_LT(error.row(), k.order());
@@ -181,7 +181,7 @@ TEST(Factor, NamesTheSamePivotOnAnyThreads) {
   }
   for (const int count : {1, 2, 3, 7})
     try {
-      factor.renew(k, threads(count));
+      factor.refactor(k, threads(count));
       ADD_FAILURE() << count;
     } catch (const NotPositiveDefinite& error) {
       EXPECT_EQ(static_cast<std::int64_t>(error.row()), l.permutation[0]) << count;

@@ -49,10 +49,10 @@ void by_kernel(const FrontKernel& kernel, const FrontArrays& f, std::size_t part
   std::vector<double> square(kernel.square_size(front_block)),
       strips(kernel.strips_size(f.rows, std::min(f.columns, front_block)));
   const FrontScratch scratch{square.data(), strips.data()};
-  const std::vector<double> least(f.columns);
+  const std::vector<double> min_pivot(f.columns);
   for (std::size_t begin = 0; begin < f.columns; begin += front_block) {
     const std::size_t count = std::min(front_block, f.columns - begin);
-    ASSERT_EQ(kernel.eliminate(f, begin, count, least.data(), scratch), count);
+    ASSERT_EQ(kernel.eliminate(f, begin, count, min_pivot.data(), scratch), count);
     const std::size_t all = kernel.strips(f.rows - begin - count);
     for (std::size_t p = 0; p < parts; ++p)
       kernel.solve(f, begin, count, scratch, all * p / parts, all * (p + 1) / parts);

@@ -182,15 +182,15 @@ TEST(FrontalFactor, FollowsStiffnessesAndComesBackToTheSameBits) {
   Model other = model;
   for (const std::size_t e : near(model, 100, 24))
     other.springs[e].stiffness *= 0.01;
-  const FrontalWork work = factor.renew(other, {}, {}, Context{});
+  const FrontalWork work = factor.refactor(other, {}, {}, Context{});
   EXPECT_GT(work.computed, 0u);
   EXPECT_LT(work.computed, work.fronts / 5) << "a local change";
   EXPECT_LT(work.operations, 0.7 * work.all_operations);
   EXPECT_LT(relative_difference(solved(factor, f), reference(other, f)), 1e-9);
   EXPECT_GT(relative_difference(solved(factor, f), first), 1e-6) << "the change must show";
-  (void)factor.renew(model, {}, {}, Context{});
+  (void)factor.refactor(model, {}, {}, Context{});
   EXPECT_TRUE(same_bits(solved(factor, f), first));
-  EXPECT_EQ(factor.renew(model, {}, {}, Context{}).computed, 0u);
+  EXPECT_EQ(factor.refactor(model, {}, {}, Context{}).computed, 0u);
 }
 
 TEST(FrontalFactor, FollowsWhateverChangesARow) {
@@ -217,11 +217,11 @@ TEST(FrontalFactor, FollowsWhateverChangesARow) {
     change.make(after);
     FrontalFactor factor(before, Context{});
     const std::vector<double> first = solved(factor, f);
-    const FrontalWork work = factor.renew(after, {}, {}, Context{});
+    const FrontalWork work = factor.refactor(after, {}, {}, Context{});
     EXPECT_GT(work.computed, 0U) << change.name;
     EXPECT_LT(relative_difference(solved(factor, f), reference(after, f)), 1e-9) << change.name;
     EXPECT_GT(relative_difference(solved(factor, f), first), 1e-6) << change.name;
-    (void)factor.renew(before, {}, {}, Context{});
+    (void)factor.refactor(before, {}, {}, Context{});
     EXPECT_LT(relative_difference(solved(factor, f), first), 1e-9) << change.name;
   }
 }
@@ -236,7 +236,7 @@ TEST(FrontalFactor, FollowsCutSprings) {
       if (model.springs[e].kind != SpringKind::central)
         model.springs[e].stiffness = 0;
     std::erase_if(model.springs, [](const Spring& s) { return s.stiffness == 0; });
-    (void)factor.renew(model, {}, {}, Context{});
+    (void)factor.refactor(model, {}, {}, Context{});
     const std::vector<double> f = loads(3 * model.nodes.size(), 6);
     ASSERT_LT(relative_difference(solved(factor, f), reference(model, f)), 1e-8) << cut;
   }
@@ -250,7 +250,7 @@ TEST(FrontalFactor, FollowsDoubledNodes) {
     const Doubled now = doubled(model, static_cast<std::uint32_t>(random() % surface_count(model)));
     model = now.model;
     ASSERT_NO_THROW(check_model(model));
-    const FrontalWork work = factor.renew(model, now.origin, now.place, Context{});
+    const FrontalWork work = factor.refactor(model, now.origin, now.place, Context{});
     EXPECT_LT(work.computed, work.fronts / 3);
     ASSERT_EQ(factor.axes(), 3 * model.nodes.size());
     const std::vector<double> f = loads(3 * model.nodes.size(), 8);
@@ -287,9 +287,9 @@ TEST(FrontalFactor, FollowsSpringsThenNodes) {
     Model model = held_cloud(random);
     FrontalFactor factor(model, Context{});
     std::erase_if(model.springs, [&](const Spring& s) { return s.i >= 8 && random() % 3 == 0; });
-    (void)factor.renew(model, {}, {}, Context{});
+    (void)factor.refactor(model, {}, {}, Context{});
     const Doubled next = doubled(model, static_cast<std::uint32_t>(8 + random() % 60));
-    (void)factor.renew(next.model, next.origin, next.place, Context{});
+    (void)factor.refactor(next.model, next.origin, next.place, Context{});
     const std::vector<double> f = loads(3 * next.model.nodes.size(), 5);
     ASSERT_TRUE(relative_difference(solved(factor, f), reference(next.model, f)) < 1e-12) << round;
   }
@@ -300,7 +300,7 @@ TEST(FrontalFactor, NamesTheAxisOfAPivotThatVanishes) {
   FrontalFactor factor(model, Context{});
   std::erase_if(model.springs, [](const Spring& s) { return s.i == 11 || s.j == 11; });
   try {
-    (void)factor.renew(model, {}, {}, Context{});
+    (void)factor.refactor(model, {}, {}, Context{});
     FAIL() << "node 11 hangs at nothing";
   } catch (const NotPositiveDefinite& error) {
     EXPECT_EQ(error.row() / 3, 11u);
@@ -335,13 +335,13 @@ TEST(FrontalFactor, FollowsNodesThatAreGone) {
     s.i = place[s.i];
     s.j = place[s.j];
   }
-  const FrontalWork work = factor.renew(less, origin, place, Context{});
+  const FrontalWork work = factor.refactor(less, origin, place, Context{});
   EXPECT_LT(work.computed, work.fronts);
   const std::vector<double> f = loads(3 * less.nodes.size(), 9);
   EXPECT_LT(relative_difference(solved(factor, f), reference(less, f)), 1e-9);
 }
 
-TEST(FrontalFactor, HalfSolutionsGiveBlocksOfTheCompliance) {
+TEST(FrontalFactor, ForwardSolvesGiveBlocksOfTheCompliance) {
   Model model = round_organ(4);
   model.nodes[70].fixed = fixed_y;
   model.nodes[71].fixed = fixed_all;
@@ -359,8 +359,8 @@ TEST(FrontalFactor, HalfSolutionsGiveBlocksOfTheCompliance) {
                                          static_cast<std::uint32_t>(model.nodes.size() - 1)};
   for (const CpuLevel cpu : {CpuLevel::baseline, best_cpu_level()}) {
     const FrontalFactor factor(model, context_of(1, cpu));
-    const auto halves = factor.half_solutions(nodes);
-    ASSERT_EQ(halves.size(), nodes.size());
+    const auto solutions = factor.forward_solves(nodes);
+    ASSERT_EQ(solutions.size(), nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       std::vector<double> columns(3 * axes);
       for (std::size_t a = 0; a < 3; ++a)
@@ -371,9 +371,9 @@ TEST(FrontalFactor, HalfSolutionsGiveBlocksOfTheCompliance) {
         size = test::larger(size, std::abs(value));
       // One by one they are the same bits.
       const std::array<std::uint32_t, 1> one{nodes[k]};
-      EXPECT_EQ(factor.half_solutions(one)[0].values, halves[k].values);
+      EXPECT_EQ(factor.forward_solves(one)[0].values, solutions[k].values);
       for (std::size_t m = 0; m < nodes.size(); ++m) {
-        const auto block = factor.compliance(halves[k], halves[m]);
+        const auto block = factor.compliance(solutions[k], solutions[m]);
         for (std::size_t a = 0; a < 3; ++a)
           for (std::size_t b = 0; b < 3; ++b) {
             const double error =

@@ -15,8 +15,8 @@ const double half = std::sqrt(0.5);
 
 TEST(Instrument, TurnsAreRotations) {
   const Quaternion quarter = turn_about({0, 0, 2}, 90);
-  EXPECT_LT(norm(turned(quarter, {1, 2, 3}) - Vec3{-2, 1, 3}), 1e-15);
-  EXPECT_LT(norm(turned_back(quarter, turned(quarter, {1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
+  EXPECT_LT(norm(rotated(quarter, {1, 2, 3}) - Vec3{-2, 1, 3}), 1e-15);
+  EXPECT_LT(norm(rotated_back(quarter, rotated(quarter, {1, 2, 3})) - Vec3{1, 2, 3}), 1e-15);
   EXPECT_EQ(unit({0, 0, 0, 1e-200}), (Quaternion{0, 0, 0, 1}));
   EXPECT_EQ(unit({1e300, 0, 0, 0}), Quaternion{});
   const Pose pose{{5, 0, 0}, quarter};
@@ -34,7 +34,7 @@ TEST(Instrument, AWayIsSmoothAndTakesTheShorterTurn) {
   EXPECT_EQ(way.at(9), way.to);
   const Pose middle = way.at(2);
   EXPECT_LT(norm(middle.place - Vec3{1, 0, 0}), 1e-15);
-  EXPECT_LT(norm(turned(middle.turn, {1, 0, 0}) - Vec3{half, half, 0}), 1e-15);
+  EXPECT_LT(norm(rotated(middle.turn, {1, 0, 0}) - Vec3{half, half, 0}), 1e-15);
   EXPECT_LT(norm(way.at(1.01).place), 2e-4); // slow at first
   const PoseWay jump{{}, {{2, 0, 0}, {}}, 1, 1};
   EXPECT_EQ(jump.at(1), jump.to);
@@ -81,7 +81,7 @@ TEST(Instrument, BeyondAnySupportPlaneIsOutside) {
   }
 }
 
-TEST(Instrument, NoPointTravelsFurther) {
+TEST(Instrument, NoPointMovesFurther) {
   const InstrumentShape shape{0.5, {3, 0, 0}, 0};
   for (const double degrees : {0.0, 1.0, 45.0, 179.0, 180.0}) {
     const Pose from{{1, 2, 3}, turn_about({0, 1, 0}, 20)};
@@ -93,19 +93,19 @@ TEST(Instrument, NoPointTravelsFurther) {
       way += norm(now - before);
       before = now;
     }
-    EXPECT_LE(way, travel(shape, from, to) * (1 + 1e-9));
+    EXPECT_LE(way, path_length(shape, from, to) * (1 + 1e-9));
     EXPECT_GE(way, norm(to.place - from.place) / 4);
   }
-  EXPECT_EQ(travel(shape, {}, {}), 0);
+  EXPECT_EQ(path_length(shape, {}, {}), 0);
 }
 
 TEST(Instrument, ACarriedNodeFollowsTheTurn) {
   const Vec3 rest{1, 0, 0};
   const PoseWay way{{}, {{0, 0, 2}, turn_about({0, 0, 1}, 180)}, 0, 1};
-  const Travel travel{{}, {-2, 0, 2}, 0, 1, Carrier{way, rest, rest}};
-  EXPECT_EQ(travel.at(0), Vec3{});
-  EXPECT_EQ(travel.at(1), (Vec3{-2, 0, 2}));
-  const Vec3 middle = rest + travel.at(0.5);
+  const Ramp ramp{{}, {-2, 0, 2}, 0, 1, Carrier{way, rest, rest}};
+  EXPECT_EQ(ramp.at(0), Vec3{});
+  EXPECT_EQ(ramp.at(1), (Vec3{-2, 0, 2}));
+  const Vec3 middle = rest + ramp.at(0.5);
   EXPECT_LT(norm(middle - Vec3{0, 1, 1}), 1e-15); // on the circle, not through its middle
 }
 

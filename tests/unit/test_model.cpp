@@ -191,8 +191,8 @@ TEST(ModelBuild, ResponseDoesNotDependOnTheResolution) {
       by_node.push_back(mean_response(model, 30));
     }
     const auto spread = [](const std::vector<double>& values) {
-      const auto [least, most] = std::minmax_element(values.begin(), values.end());
-      return *most / *least;
+      const auto [min, max] = std::minmax_element(values.begin(), values.end());
+      return *max / *min;
     };
     EXPECT_TRUE(spread(by_area) <= 1.1) << by_area[0] << ' ' << by_area[1] << ' ' << by_area[2];
     EXPECT_GT(spread(by_node), 2); // negative control

@@ -58,7 +58,7 @@ TEST(RenderCamera, EveryViewShowsTheWholeBoxAndFillsThePicture) {
       const Camera camera = make_camera(options, box, w, h);
       EXPECT_NEAR(dot(cross(camera.right, camera.up), camera.back), 1, 1e-12);
       const Projection projection = make_projection(camera, box, {1, 2, 3}, 7);
-      double most = 0;
+      double max = 0;
       for (int c = 0; c < 8; ++c) {
         const Vec3 p{(c & 1) != 0 ? box.max.x : box.min.x, (c & 2) != 0 ? box.max.y : box.min.y,
                      (c & 4) != 0 ? box.max.z : box.min.z};
@@ -66,10 +66,10 @@ TEST(RenderCamera, EveryViewShowsTheWholeBoxAndFillsThePicture) {
         EXPECT_GT(clip[3], projection.near);
         EXPECT_LE(std::fabs(clip[2]), clip[3]) << view;
         for (const std::size_t a : {0U, 1U})
-          most = test::larger(most, std::fabs(clip[a]) / clip[3]);
+          max = test::larger(max, std::fabs(clip[a]) / clip[3]);
       }
-      EXPECT_LT(most, 1);
-      EXPECT_GT(most, 0.9) << view;
+      EXPECT_LT(max, 1);
+      EXPECT_GT(max, 0.9) << view;
     }
 }
 

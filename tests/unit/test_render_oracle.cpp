@@ -116,8 +116,8 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   picture.samples = c.samples;
   picture.width = c.width;
   picture.height = c.height;
-  return make_picture(make_drawing(surfaces, options, {}), camera, test::look_of(c.scene), picture,
-                      {});
+  return make_picture(make_drawing(surfaces, options, {}), camera, test::material_of(c.scene),
+                      picture, {});
 }
 
 /// `name` names the case within its test: modes share its oracle.
@@ -371,16 +371,16 @@ TEST_P(RenderOracle, FlatRampHasItsAnalyticValue) {
     options.per_pixel = GetParam().per_pixel;
     // 30 degrees above the plane, so far that it is the same at every vertex.
     options.light = Vec3{(to_right ? 1 : -1) * std::sqrt(0.75), 0, 0.5} * 1e9;
-    Look look;
-    look.structure = texture_from(ramp);
-    look.color = c.scene.color;
+    SurfaceMaterial material;
+    material.structure = texture_from(ramp);
+    material.color = c.scene.color;
     PictureOptions picture;
     picture.width = picture.height = 64;
     picture.backend = GetParam().backend;
     picture.gl.mode = GetParam().gl;
     picture.gl.wide = GetParam().wide;
     const Image image =
-        make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
+        make_picture(make_drawing(surfaces, options, {}), camera, material, picture, {});
     const double ds = (to_right ? 1 : -1) * 0.2 * std::sqrt(0.75);
     const double r = 0.5 - 0.5 * ds * 256 / 255;
     constexpr std::size_t middle = std::size_t{3} * 64 * 32 + 96;

@@ -81,9 +81,9 @@ TEST(RenderRaster, TopLeftRuleOnPixelCentres) {
   drawing.vertices = {vertex(0.5, 0.5), vertex(4.5, 0.5), vertex(4.5, 4.5), vertex(0.5, 4.5)};
   drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
   EXPECT_EQ(count(drawing, 8, 8), 16U); // rows and columns 0 to 3
-  Look look;
-  look.background = {0, 0, 0};
-  const Image image = render_cpu(drawing, pixels(8, 8), look, 8, 8, 1, {});
+  SurfaceMaterial material;
+  material.background = {0, 0, 0};
+  const Image image = render_cpu(drawing, pixels(8, 8), material, 8, 8, 1, {});
   for (std::size_t y = 0; y < 8; ++y)
     for (std::size_t x = 0; x < 8; ++x)
       EXPECT_EQ(image.values[3 * (8 * y + x)], x < 4 && y < 4 ? 255 : 0) << x << " " << y;
@@ -160,9 +160,9 @@ TEST(RenderRaster, SameBytesForAnyThreadsAndCpu) {
   picture.width = 301;
   picture.height = 203;
   picture.backend = Backend::cpu;
-  Look look;
-  look.others.resize(1);
-  look.others[0].color = {0.8, 0.3, 0.1};
+  SurfaceMaterial material;
+  material.others.resize(1);
+  material.others[0].color = {0.8, 0.3, 0.1};
   for (std::size_t t = 0; t < surfaces[0].mesh.triangles.size(); ++t)
     surfaces[0].mesh.material.push_back(static_cast<std::int32_t>(t / 5 % 2));
   for (const int materials : {1, 2})
@@ -175,8 +175,8 @@ TEST(RenderRaster, SameBytesForAnyThreadsAndCpu) {
         context.threads = std::abs(threads);
         if (threads < 0)
           context.cpu = CpuLevel::baseline;
-        const Image image =
-            make_picture(make_drawing(surfaces, options, context), camera, look, picture, context);
+        const Image image = make_picture(make_drawing(surfaces, options, context), camera, material,
+                                         picture, context);
         if (digest.empty())
           digest = image_digest(image);
         EXPECT_EQ(image_digest(image), digest) << threads << ' ' << materials << ' ' << samples;
@@ -197,17 +197,17 @@ TEST(RenderRaster, WrapsAndFiltersAreThoseOfTheTexture) {
   drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
   for (const TextureWrap wrap : {TextureWrap::repeat, TextureWrap::clamp, TextureWrap::mirror})
     for (const TextureFilter filter : {TextureFilter::linear, TextureFilter::nearest}) {
-      Look look;
-      look.base = texture_from(image, {filter, wrap, false});
+      SurfaceMaterial material;
+      material.base = texture_from(image, {filter, wrap, false});
       for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
         Context context;
         context.cpu = level;
-        const Image picture = render_cpu(drawing, pixels(200, 200), look, 200, 200, 1, context);
-        double most = 0;
+        const Image picture = render_cpu(drawing, pixels(200, 200), material, 200, 200, 1, context);
+        double max = 0;
         for (std::uint32_t y = 0; y < 200; ++y)
           for (std::uint32_t x = 0; x < 200; ++x) {
             const double s = -2 + 5 * (x + 0.5) / 200, t = 3 - 5 * (y + 0.5) / 200;
-            std::array<double, 3> wanted = sample(*look.base, s, t);
+            std::array<double, 3> wanted = sample(*material.base, s, t);
             if (filter == TextureFilter::nearest) {
               const auto inside = [&](double at) {
                 if (wrap == TextureWrap::clamp)
@@ -216,15 +216,14 @@ TEST(RenderRaster, WrapsAndFiltersAreThoseOfTheTexture) {
                 const bool back = wrap == TextureWrap::mirror && std::fmod(std::floor(at), 2) != 0;
                 return back ? 1 - part : part;
               };
-              wanted = texel(*look.base, 0, static_cast<std::uint32_t>(5 * inside(s)),
+              wanted = texel(*material.base, 0, static_cast<std::uint32_t>(5 * inside(s)),
                              static_cast<std::uint32_t>(4 * inside(t)));
             }
             for (std::size_t c = 0; c < 3; ++c)
-              most =
-                  test::larger(most, std::fabs(picture.values[3 * (std::size_t{200} * y + x) + c] -
-                                               255 * wanted[c]));
+              max = test::larger(max, std::fabs(picture.values[3 * (std::size_t{200} * y + x) + c] -
+                                                255 * wanted[c]));
           }
-        EXPECT_LE(most, 0.502) << static_cast<int>(wrap) << static_cast<int>(filter);
+        EXPECT_LE(max, 0.502) << static_cast<int>(wrap) << static_cast<int>(filter);
       }
     }
 }
@@ -235,9 +234,9 @@ TEST(RenderRaster, FourSamplesSmoothOutlinesAndNothingElse) {
   Drawing drawing;
   drawing.vertices = {vertex(-50, -50), vertex(30.5, -50), vertex(30.5, 90), vertex(-50, 90)};
   drawing.triangles = {{0, 1, 2}, {0, 2, 3}};
-  Look look;
-  look.background = {0, 0, 0};
-  const Image image = render_cpu(drawing, pixels(64, 40), look, 64, 40, 4, {});
+  SurfaceMaterial material;
+  material.background = {0, 0, 0};
+  const Image image = render_cpu(drawing, pixels(64, 40), material, 64, 40, 4, {});
   for (std::size_t y = 0; y < 40; ++y)
     for (std::size_t x = 0; x < 64; ++x)
       EXPECT_EQ(image.values[3 * (64 * y + x)], x < 30 ? 255 : x == 30 ? 128 : 0) << x << " " << y;
@@ -282,26 +281,26 @@ TEST(RenderPicture, BackgroundAloneAndLimits) {
   options.height = 3;
   options.supersample = 2;
   options.backend = Backend::cpu;
-  Look look;
-  look.background = {1, 0.5, 0};
+  SurfaceMaterial material;
+  material.background = {1, 0.5, 0};
   const Camera camera = make_camera({}, {}, 5, 3);
-  const Image image = make_picture({}, camera, look, options, {});
+  const Image image = make_picture({}, camera, material, options, {});
   ASSERT_EQ(image.values.size(), 45U);
   EXPECT_EQ(image.values[0], 255);
   EXPECT_EQ(image.values[1], 128);
   EXPECT_EQ(image.values[44], 0);
   options.width = 32768;
   options.supersample = 3;
-  EXPECT_THROW((void)make_picture({}, camera, look, options, {}), Error);
+  EXPECT_THROW((void)make_picture({}, camera, material, options, {}), Error);
   options.supersample = 1;
   options.height = 32768;
   Context small;
   small.max_memory = 1 << 20;
-  EXPECT_THROW((void)make_picture({}, camera, look, options, small), Error);
+  EXPECT_THROW((void)make_picture({}, camera, material, options, small), Error);
   Context stopped;
   stopped.cancelled = [] { return true; };
   options = {};
-  EXPECT_THROW((void)make_picture({}, camera, look, options, stopped), Cancelled);
+  EXPECT_THROW((void)make_picture({}, camera, material, options, stopped), Cancelled);
 }
 
 } // namespace

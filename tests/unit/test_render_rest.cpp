@@ -133,7 +133,7 @@ Image draw(Case& c, Backend backend, Camera& camera, CpuLevel cpu = CpuLevel::av
   Context context;
   context.cpu = test::smaller(context.cpu, cpu);
   return make_picture(make_drawing(surfaces, drawing_options(c.scene, camera), context), camera,
-                      test::look_of(c.scene), picture, context);
+                      test::material_of(c.scene), picture, context);
 }
 
 /// Both backends against the formula.
@@ -351,18 +351,18 @@ TEST(RenderRest, TriplanarOfAPlaneIsTheBoxMapping) {
       DrawingOptions options = drawing_options(c.scene, camera);
       options.rest = options.rest_normals = options.rest_light = false;
       options.texcoords = options.structure = true;
-      Look look = look_of(c.scene);
-      look.rest.triplanar = false;
+      SurfaceMaterial material = material_of(c.scene);
+      material.rest.triplanar = false;
       PictureOptions picture;
       picture.backend = Backend::cpu;
       picture.width = c.width;
       picture.height = c.height;
       const Image box =
-          make_picture(make_drawing(surfaces, options, {}), camera, look, picture, {});
-      int most = 0;
+          make_picture(make_drawing(surfaces, options, {}), camera, material, picture, {});
+      int max = 0;
       for (std::size_t n = 0; n < box.values.size(); ++n)
-        most = test::larger(most, std::abs(box.values[n] - three.values[n]));
-      EXPECT_LE(most, 1) << axis << flip;
+        max = test::larger(max, std::abs(box.values[n] - three.values[n]));
+      EXPECT_LE(max, 1) << axis << flip;
       EXPECT_GT(*std::max_element(box.values.begin(), box.values.end()), 100);
     }
 }
@@ -395,7 +395,7 @@ TEST(RenderRest, ItStaysOnTissueThatMoves) {
       picture.backend = backend;
       picture.width = c.width;
       picture.height = c.height;
-      const Image image = make_picture(drawing, moved, look_of(c.scene), picture, {});
+      const Image image = make_picture(drawing, moved, material_of(c.scene), picture, {});
       std::size_t differ = 0, shown = 0;
       for (std::size_t n = 0; n < image.values.size(); ++n) {
         differ += std::abs(image.values[n] - at_rest.values[n]) > 2 ? 1U : 0U;
@@ -410,7 +410,7 @@ TEST(RenderRest, ItStaysOnTissueThatMoves) {
     picture.backend = Backend::cpu;
     picture.width = c.width;
     picture.height = c.height;
-    const Image image = make_picture(wrong, moved, look_of(c.scene), picture, {});
+    const Image image = make_picture(wrong, moved, material_of(c.scene), picture, {});
     std::size_t differ = 0;
     for (std::size_t n = 0; n < image.values.size(); ++n)
       differ += std::abs(image.values[n] - at_rest.values[n]) > 2 ? 1U : 0U;
@@ -443,7 +443,7 @@ TEST(RenderRest, TurnsAreTheRotation) {
 }
 
 TEST(RenderRest, NoiseHasTheMomentsThatAreStated) {
-  double sum = 0, squares = 0, most = 0, veins = 0, mean = 0;
+  double sum = 0, squares = 0, max = 0, veins = 0, mean = 0;
   std::mt19937 random(3);
   const auto place = [&] {
     const auto one = [&] { return static_cast<double>(random()) / 4294967296.0 * 400 - 200; };
@@ -456,13 +456,13 @@ TEST(RenderRest, NoiseHasTheMomentsThatAreStated) {
     const double value = test::noise_oracle(p, 2, 5);
     sum += value;
     squares += value * value;
-    most = test::larger(most, std::fabs(value));
+    max = test::larger(max, std::fabs(value));
     veins += test::solid_oracle(sharp, p, 0) / count;
     mean += test::solid_oracle(faded, p, 5) / count;
   }
   EXPECT_NEAR(sum / count, 0, 0.01);
   EXPECT_NEAR(std::sqrt(squares / count), 0.27, 0.01);
-  EXPECT_LT(most, 1);
+  EXPECT_LT(max, 1);
   EXPECT_NEAR(veins, mean, 0.1 * mean); // what fades keeps its mean
 }
 
@@ -480,10 +480,10 @@ TEST(RenderRest, FixedFunctionsRefuseAndAutomaticDraws) {
   for (const GlMode mode : {GlMode::passes3, GlMode::passes2, GlMode::passes1}) {
     picture.gl.mode = mode;
     picture.backend = Backend::gl;
-    EXPECT_THROW(make_picture(drawing, camera, look_of(c.scene), picture, {}), Error);
+    EXPECT_THROW(make_picture(drawing, camera, material_of(c.scene), picture, {}), Error);
     picture.backend = Backend::automatic;
     PictureReport report;
-    make_picture(drawing, camera, look_of(c.scene), picture, {}, &report);
+    make_picture(drawing, camera, material_of(c.scene), picture, {}, &report);
     EXPECT_EQ(report.backend, Backend::cpu);
     EXPECT_FALSE(report.gl_failure.empty());
   }

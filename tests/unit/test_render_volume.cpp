@@ -42,7 +42,7 @@ Grid grid_of(const Function& f, int n, const GridTransform& transform, float bac
   return builder.finish();
 }
 
-GridTransform turned(double size) {
+GridTransform rotated(double size) {
   const double c = 0.8 * size, s = 0.6 * size;
   GridTransform t;
   t.m = {c, -s, 0, 0.3, s, c, 0, -0.2, 0, 0, size, 0.1};
@@ -78,7 +78,7 @@ double disc_radius(const VolumeView& view) {
 }
 
 TEST(RenderVolume, SlicesOfABallAreDiscsOfKnownRadius) {
-  for (const GridTransform& transform : {uniform_transform(0.5), turned(0.5)}) {
+  for (const GridTransform& transform : {uniform_transform(0.5), rotated(0.5)}) {
     const Grid grid = grid_of(ball, 24, transform);
     for (const VolumeAxis axis : {VolumeAxis::x, VolumeAxis::y, VolumeAxis::z, VolumeAxis::view}) {
       VolumeViewOptions options = options_of(VolumeMode::slice, axis, 200);
@@ -100,7 +100,7 @@ TEST(RenderVolume, SlicesOfABallAreDiscsOfKnownRadius) {
 TEST(RenderVolume, SlicesAreTheFieldAtThePixels) {
   // Trilinear fields are met exactly but for the values' own rounding.
   const auto f = [](const Vec3& p) { return 10 + p.x - 0.5 * p.y + 0.25 * p.z; };
-  const Grid grid = grid_of(f, 16, turned(1));
+  const Grid grid = grid_of(f, 16, rotated(1));
   VolumeViewOptions options = options_of(VolumeMode::slice, VolumeAxis::view, 64);
   options.camera.view = "iso";
   options.camera.distance = 10; // the picture lies within the volume
@@ -138,7 +138,7 @@ TEST(RenderVolume, MaximaAreThoseOfTheFieldAlongTheRay) {
   const auto rough = [](const Vec3& p) {
     return std::sin(5 * p.x + p.y) + std::sin(7 * p.y - p.z) + std::sin(6 * p.z + 2 * p.x) - 1;
   };
-  for (const GridTransform& transform : {uniform_transform(0.5), turned(0.5)}) {
+  for (const GridTransform& transform : {uniform_transform(0.5), rotated(0.5)}) {
     const Grid grid = grid_of(rough, 8, transform, -0.5F);
     for (const char* side : {"iso", "front"}) {
       VolumeViewOptions options = options_of(VolumeMode::maximum, VolumeAxis::view, 24);
@@ -174,14 +174,14 @@ TEST(RenderVolume, KnownFieldsHaveKnownProjections) {
   builder.add_tile({{-8, -8, -8}, 8, 4.0F, true});
   const Grid tiles = builder.finish();
   view = view_volume(tiles, options_of(VolumeMode::maximum, VolumeAxis::x, 64), {});
-  EXPECT_EQ(view.greatest, 4.0);
+  EXPECT_EQ(view.max, 4.0);
   EXPECT_EQ(std::ranges::max(view.values), 4.0F);
   EXPECT_GT(std::ranges::count(view.values, 2.5F), 100);
   EXPECT_GT(std::ranges::count(view.values, 0.0F), 100);
 }
 
 TEST(RenderVolume, PicturesAreTheSameForAnyNumberOfThreads) {
-  const Grid grid = grid_of(ball, 16, turned(0.5));
+  const Grid grid = grid_of(ball, 16, rotated(0.5));
   Context one, many;
   one.threads = 1;
   many.threads = 3;
@@ -219,7 +219,7 @@ TEST(RenderVolume, RampsAreLinearAndEndAtTheirEnds) {
 }
 
 TEST(RenderVolume, TheLoadedLibrarySeesTheSameAndSaysWhatIsWrong) {
-  const Grid grid = grid_of(ball, 16, turned(0.5));
+  const Grid grid = grid_of(ball, 16, rotated(0.5));
   const ScratchFile file(".vdb");
   Output output(file.path(), {});
   write_volume(output, grid, {});

@@ -52,10 +52,10 @@ Grid linear(const GridTransform& transform) {
 
 TEST(Resample, ReproducesLinearFunctions) {
   // Trilinear and tent on a uniform lattice both do, the tent at whole ratios exactly.
-  GridTransform turned;
-  turned.m = {0.36, -0.48, 0, 0.1, 0.48, 0.36, 0, 0.2, 0, 0, 0.6, 0.3};
+  GridTransform rotated;
+  rotated.m = {0.36, -0.48, 0, 0.1, 0.48, 0.36, 0, 0.2, 0, 0, 0.6, 0.3};
   for (const GridTransform& target : {scaled(0.4, 0.4, 0.4, {0.1, 0, 0}), scaled(2, 2, 2, {}),
-                                      turned, scaled(-0.7, 0.5, 0.9, {0, 0.3, 0})}) {
+                                      rotated, scaled(-0.7, 0.5, 0.9, {0, 0.3, 0})}) {
     const Grid grid = resample({}, linear(scaled(1, 1, 1, {0.25, 0, 0})), target);
     GridAccessor values(grid);
     for (int n = 0; n < 500; ++n) {
@@ -104,26 +104,26 @@ double mass(const Grid& grid) {
 TEST(Resample, AThinSheetKeepsItsMassWhereverItLies) {
   // One voxel thick, brought to three and more: point sampling loses it or makes it three thick.
   for (const double size : {2.0, 3.0, 3.7, 5.0}) {
-    double least = HUGE_VAL, most = 0, least_points = HUGE_VAL, most_points = 0;
+    double min = HUGE_VAL, max = 0, min_points = HUGE_VAL, max_points = 0;
     for (int offset = 0; offset < 8; ++offset) {
       const Grid sheet =
           sample({}, {-20, -20, offset}, {20, 20, offset}, [](int, int, int) { return 1.0; });
       const double kept = mass(resample({}, sheet, uniform_transform(size))) / mass(sheet);
-      least = test::smaller(least, kept);
-      most = test::larger(most, kept);
+      min = test::smaller(min, kept);
+      max = test::larger(max, kept);
       // The negative control: the values at the new centres alone.
       GridAccessor values(sheet);
       double points = 0;
       for (int k = -9; k < 9; ++k)
         points += static_cast<double>(values.value({0, 0, static_cast<int>(k * size)})) * size;
-      least_points = test::smaller(least_points, points);
-      most_points = test::larger(most_points, points);
+      min_points = test::smaller(min_points, points);
+      max_points = test::larger(max_points, points);
     }
     // Exact at whole ratios; else the weights of a centre, divided by their sum, err a little.
     const double tolerance = size == std::floor(size) ? 1e-6 : 0.03;
-    EXPECT_GT(least, 1 - tolerance) << size;
-    EXPECT_LT(most, 1 + tolerance) << size;
-    EXPECT_TRUE(least_points == 0 && most_points >= size) << size;
+    EXPECT_GT(min, 1 - tolerance) << size;
+    EXPECT_LT(max, 1 + tolerance) << size;
+    EXPECT_TRUE(min_points == 0 && max_points >= size) << size;
   }
 }
 

@@ -85,7 +85,7 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(change<SetForce>("force a 1 1 2 3 total period 0.8").period, 0.8);
   EXPECT_EQ(change<SetPressure>("pressure a all -20").pressure.pressure, -20);
   EXPECT_EQ(change<SetPressure>("pressure a all -20 period 2").pressure.period, 2);
-  EXPECT_EQ(change<SetDisplacement>("displace a 1 0 0 1 over 0.25").over, 0.25);
+  EXPECT_EQ(change<SetDisplacement>("displace a 1 0 0 1 over 0.25").duration, 0.25);
   EXPECT_EQ(change<Attach>("attach a 1 b z<3 500").stiffness, 500);
   EXPECT_EQ(said("attach a 1 b z<3 500").other, "b");
   EXPECT_EQ(said("attach a 1 b z<3 500").others.value().text, "z<3");
@@ -116,7 +116,7 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   const auto move = change<MoveInstrument>("move k 1 2 3 quaternion 2 0 0 0 over 0.5");
   EXPECT_EQ(move.place, (Vec3{1, 2, 3}));
   EXPECT_EQ(move.turn, (Quaternion{1, 0, 0, 0}));
-  EXPECT_EQ(move.over, 0.5);
+  EXPECT_EQ(move.duration, 0.5);
   EXPECT_EQ(change<MoveInstrument>("move k 1 2 3 quaternion 0 0 3 4").turn,
             (Quaternion{0, 0, 0.6, 0.8}));
   EXPECT_FALSE(change<MoveInstrument>("move k 1 2 3").turn);

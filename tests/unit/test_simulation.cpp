@@ -296,7 +296,7 @@ TEST(Simulation, RepeatedEventsComeAtEveryMultiple) {
   EXPECT_GT(pulled.x, 0);
 }
 
-TEST(Simulation, ElastostaticObjectsFollowPulsesAndTravel) {
+TEST(Simulation, ElastostaticObjectsFollowPulsesAndRamps) {
   Simulation s(threads(1), {});
   s.add_object("a", organ(), Method::ffe);
   const std::uint32_t node = free_nodes(s.model(0))[3];

@@ -33,12 +33,12 @@ SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
 double depth(const Simulation& s, std::size_t object, const InstrumentShape& shape,
              const Pose& pose) {
   const PlacedInstrument placed(shape, pose);
-  double least = HUGE_VAL;
+  double min = HUGE_VAL;
   const Model& model = s.model(object);
   for (std::size_t i = 0; i < surface_count(model); ++i)
     if (model.nodes[i].fixed == fixed_none)
-      least = test::smaller(least, placed.distance(place(s, object, i)));
-  return -least / shape.radius;
+      min = test::smaller(min, placed.distance(place(s, object, i)));
+  return -min / shape.radius;
 }
 
 /// Both methods, the elastodynamic one by both of its integrations.

@@ -67,9 +67,9 @@ Vec3 momentum(Simulation& s, std::size_t object, double time = 0.01) {
 }
 
 std::vector<double> shape_under(const Model& model, const Load& load) {
-  Elastostatic still(model, {}, one_thread());
-  still.update(load);
-  return {still.displacement().begin(), still.displacement().end()};
+  Elastostatic solver(model, {}, one_thread());
+  solver.update(load);
+  return {solver.displacement().begin(), solver.displacement().end()};
 }
 
 std::vector<double> rate(const std::vector<double>& now, const std::vector<double>& before) {
@@ -364,9 +364,9 @@ TEST(SimulationMomentum, WhatTearsOffGoesOnWithTheStepThatToreIt) {
     s.step(dt);
   };
   pulled(1);
-  CutObject most = lobe_off();
-  std::get<PlaneToCut>(most.what).nodes = cut;
-  s.apply(most);
+  CutObject max = lobe_off();
+  std::get<PlaneToCut>(max.what).nodes = cut;
+  s.apply(max);
   ASSERT_EQ(s.object_count(), 1U);
   for (std::uint32_t& node : lobe)
     node = s.object(0).places[node];

@@ -181,8 +181,8 @@ TEST(SnapLattice, CornersAreThoseOfAPlainSearch) {
 }
 
 /// The points that snap nowhere, as opposed to all their neighbours, which snap to two corners at
-/// most, or to `most` of them.
-std::set<std::uint32_t> plain_fins(const IsoSurface& surface, double epsilon, std::size_t most) {
+/// most, or to `max` of them.
+std::set<std::uint32_t> plain_fins(const IsoSurface& surface, double epsilon, std::size_t max) {
   const std::vector<EdgeCrossing> crossings = edge_crossings(surface);
   std::map<std::uint32_t, std::set<std::uint32_t>> neighbours;
   for (const Triangle& t : surface.mesh.triangles)
@@ -198,7 +198,7 @@ std::set<std::uint32_t> plain_fins(const IsoSurface& surface, double epsilon, st
       all = all && snaps(crossings[q], epsilon);
       corners.insert(corner_of(crossings[q], epsilon));
     }
-    if (all && corners.size() <= most)
+    if (all && corners.size() <= max)
       fins.insert(p);
   }
   return fins;

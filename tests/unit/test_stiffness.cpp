@@ -35,10 +35,10 @@ std::vector<double> spring_forces(const Model& model, const std::vector<double>&
 }
 
 double largest(const std::vector<double>& x) {
-  double most = 0;
+  double max = 0;
   for (const double value : x)
-    most = test::larger(most, std::abs(value));
-  return most;
+    max = test::larger(max, std::abs(value));
+  return max;
 }
 
 /// Central differences of the forces against K u; relative to ‖K u‖.

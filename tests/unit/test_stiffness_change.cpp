@@ -85,10 +85,10 @@ TEST(StiffnessChange, TouchedNodesAreThoseWhoseRowsDiffer) {
   std::size_t changed = 0;
   for (std::size_t i = 0; i < before.nodes.size(); ++i) {
     const std::size_t p = cut.place[i];
-    double most = 0;
+    double max = 0;
     for (std::size_t a = 0; a < 3; ++a)
-      most = test::larger(most, std::abs(f[3 * i + a] - g[3 * p + a]));
-    EXPECT_EQ(most > 1e-9, touched[p] != 0) << i;
+      max = test::larger(max, std::abs(f[3 * i + a] - g[3 * p + a]));
+    EXPECT_EQ(max > 1e-9, touched[p] != 0) << i;
     changed += touched[p];
   }
   EXPECT_GT(changed, 10u);
@@ -181,17 +181,17 @@ TEST(StiffnessChange, ColumnsOfFloat32StayAsExactAsTheyWere) {
   EXPECT_EQ(exact.error_gain(), 1);
   EXPECT_GT(rough.error_gain(), 1);
   std::vector<double> a(3 * change.new_axes), b(a.size());
-  double most = 0;
+  double max = 0;
   for (std::size_t k = 0; k < exact.nodes().size(); ++k) {
     afresh.read(k, b);
     exact.read(k, a);
     EXPECT_LT(relative_difference(a, b), 6e-8);
     rough.read(k, a);
-    most = test::larger(most, relative_difference(a, b));
+    max = test::larger(max, relative_difference(a, b));
   }
-  EXPECT_LT(most, 6e-8 * rough.error_gain());
+  EXPECT_LT(max, 6e-8 * rough.error_gain());
   RecordProperty("gain", std::to_string(rough.error_gain()));
-  RecordProperty("error", std::to_string(most * 1e8));
+  RecordProperty("error", std::to_string(max * 1e8));
 }
 
 TEST(StiffnessChange, ThreadsAndCpusGiveTheSameBytes) {

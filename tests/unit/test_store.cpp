@@ -221,11 +221,11 @@ TEST(Store, BoundsAreNeverBelowTheColumns) {
   bound.read_rows(0, std::span<float>(b));
   for (std::size_t c = 0; c < 6; ++c)
     for (std::size_t k = 0; k < blocks; ++k) {
-      double most = 0;
+      double max = 0;
       for (std::size_t i = k * 768; i < std::min(k * 768 + 768, 3 * n); ++i)
-        most = test::larger(most, std::abs(x[c * 3 * n + i]));
-      EXPECT_GE(b[c * blocks + k], most);
-      EXPECT_LE(b[c * blocks + k], most * (1 + 1e-6));
+        max = test::larger(max, std::abs(x[c * 3 * n + i]));
+      EXPECT_GE(b[c * blocks + k], max);
+      EXPECT_LE(b[c * blocks + k], max * (1 + 1e-6));
     }
 }
 

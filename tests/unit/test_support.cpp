@@ -154,10 +154,10 @@ private:
   bool bends() {
     for (int k = 0; k < 3; ++k)
       scene_.step(0.005);
-    double most = 0;
+    double max = 0;
     for (const double u : scene_.displacement(0))
-      most = test::larger(most, std::abs(u));
-    return most > 0;
+      max = test::larger(max, std::abs(u));
+    return max > 0;
   }
   bool sweep() {
     InstrumentShape edge;

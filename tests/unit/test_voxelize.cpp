@@ -263,12 +263,12 @@ TEST(Voxelize, HalfAVoxelMatters) { // negative control of all comparisons above
 
 TEST(Voxelize, RotatedLatticesSeeTheSameSolid) {
   const TriangleMesh mesh = sphere_mesh(3, 9, {0.1, 0.2, 0.3});
-  GridTransform turned; // quarter turn about z: index (i, j, k) is world (-j, i, k)
-  turned.m = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
+  GridTransform rotated; // quarter turn about z: index (i, j, k) is world (-j, i, k)
+  rotated.m = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
   std::set<Int3> expected;
   for (const Int3& v : voxels(mesh))
     expected.insert({v[1], -v[0], v[2]});
-  EXPECT_EQ(voxels(mesh, turned), expected);
+  EXPECT_EQ(voxels(mesh, rotated), expected);
   GridTransform flat = unit_lattice;
   flat.m[0] = 2;
   EXPECT_THROW(voxels(mesh, flat), Error);

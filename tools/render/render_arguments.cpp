@@ -115,8 +115,8 @@ void complete_light(RenderArguments& a) {
   a.drawing.fill = a.words.fill.value_or(plain ? 0 : 0.35);
   a.tissue_colors = !a.words.color && !plain && !lines;
   const double gray = lines && !plain ? 0.1 : 1;
-  a.look.color = a.words.color.value_or(Vec3{gray, gray, gray});
-  a.look.background = a.words.background.value_or(plain ? Vec3{1, 1, 1} : Vec3{0.8, 0.8, 0.8});
+  a.common.color = a.words.color.value_or(Vec3{gray, gray, gray});
+  a.common.background = a.words.background.value_or(plain ? Vec3{1, 1, 1} : Vec3{0.8, 0.8, 0.8});
   const bool smooth = plain || a.words.msaa != 1; // by other means, or not at all
   a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
 }
@@ -128,17 +128,17 @@ void complete(RenderArguments& a) {
   complete_modes(a);
   complete_camera(a);
   complete_volume(a);
-  const bool laid_on = a.drawing.texcoords || a.look.rest.triplanar;
+  const bool laid_on = a.drawing.texcoords || a.common.rest.triplanar;
   refuse(!laid_on && a.drawing.rest && a.words.uv != "auto",
          "--uv for solid textures alone, which need none, expected no --uv");
   refuse(!laid_on && !a.drawing.rest && (a.words.uv != "auto" || a.mapping.edge),
          "--uv or --uv-scale without texture, expected --texture or --structure");
   refuse(a.words.uv != "auto" && a.words.uv != "box" && !a.drawing.rest && a.mapping.edge,
          "--uv-scale for another mapping, expected --uv box or triplanar");
-  refuse(a.words.uv_sharpness && !a.look.rest.triplanar,
+  refuse(a.words.uv_sharpness && !a.common.rest.triplanar,
          "--uv-sharpness for another mapping, expected --uv triplanar");
   if (a.words.uv_sharpness)
-    a.look.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
+    a.common.rest.sharpness = static_cast<int>(*a.words.uv_sharpness);
   refuse(a.offset_texels && has_solid_structure(a),
          "--offset-texels for a solid structure, which has none, expected --offset");
   if (a.words.uv != "auto" && a.words.uv != "triplanar")

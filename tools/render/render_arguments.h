@@ -4,7 +4,7 @@
 #include "render/picture.h"
 #include "shading/camera.h"
 #include "shading/drawing.h"
-#include "shading/look.h"
+#include "shading/surface_material.h"
 #include "shading/uv.h"
 #include "shading/volume_view.h"
 #include "tools/render/surface_file.h"
@@ -43,7 +43,7 @@ struct RenderArguments {
   std::string surface = "-";
   RenderLayer base, detail, reflection, structure;
   std::map<std::int32_t, RenderMaterial> materials;
-  Look look;                  ///< colours; its textures are read later
+  SurfaceMaterial common;     ///< colours; its textures are read later
   bool tissue_colors = false; ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
   double offset = 0.02;

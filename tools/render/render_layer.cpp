@@ -53,7 +53,7 @@ void complete_layer(RenderArguments& a, const std::string& word, RenderLayer& la
     drawing.rest = true;
     drawing.rest_normals = drawing.rest_normals || !layer.solid || structure;
     drawing.rest_light = drawing.rest_light || structure;
-    a.look.rest.triplanar = a.look.rest.triplanar || !layer.solid;
+    a.common.rest.triplanar = a.common.rest.triplanar || !layer.solid;
     return;
   }
   (layer.options.sphere ? drawing.sphere : drawing.texcoords) = true;
@@ -61,22 +61,22 @@ void complete_layer(RenderArguments& a, const std::string& word, RenderLayer& la
   drawing.texcoords = drawing.texcoords || structure;
 }
 
-void take_textures(Look& look, const RenderLayers& layers, const Context& context) {
+void take_textures(SurfaceMaterial& material, const RenderLayers& layers, const Context& context) {
   const auto& [base, detail, reflection, structure] = layers;
-  take(look.base, look.solid_base, *base, context);
-  take(look.detail, look.solid_detail, *detail, context);
+  take(material.base, material.solid_base, *base, context);
+  take(material.detail, material.solid_detail, *detail, context);
   if (!reflection->path.empty()) {
     Input input(reflection->path);
-    look.reflection = texture_from(read_image(input, context), reflection->options);
+    material.reflection = texture_from(read_image(input, context), reflection->options);
   }
   if (structure->path.empty())
     return;
-  look.structure.reset();
-  look.solid_structure = structure->solid;
-  if (look.solid_structure)
+  material.structure.reset();
+  material.solid_structure = structure->solid;
+  if (material.solid_structure)
     return;
   Input input(structure->path);
-  look.structure = texture_from(read_heights(input, context), structure->options);
+  material.structure = texture_from(read_heights(input, context), structure->options);
 }
 
 } // namespace gewebe::cli

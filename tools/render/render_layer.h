@@ -15,7 +15,7 @@ using RenderLayers = std::array<const RenderLayer*, 4>;
 /// "texture", "detail", "reflection" or "structure". \throw UsageError
 void complete_layer(RenderArguments& arguments, const std::string& word, RenderLayer& layer);
 
-/// Gives `look` those that are there in place of its own. \throw Error with place
-void take_textures(Look& look, const RenderLayers& layers, const Context& context);
+/// Gives `material` those that are there in place of its own. \throw Error with place
+void take_textures(SurfaceMaterial& material, const RenderLayers& layers, const Context& context);
 
 } // namespace gewebe::cli

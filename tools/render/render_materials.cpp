@@ -48,16 +48,17 @@ std::vector<std::string> material_paths(const RenderArguments& a) {
   return paths;
 }
 
-void add_material_looks(Look& look, const RenderArguments& a, const Context& context) {
-  std::vector<Look> others;
+void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
+                         const Context& context) {
+  std::vector<SurfaceMaterial> others;
   for (const auto& [number, material] : a.materials) {
-    Look& own = others.emplace_back(look);
+    SurfaceMaterial& own = others.emplace_back(common);
     take_textures(own,
                   {&material.base, &material.detail, &material.reflection, &material.structure},
                   context);
-    own.color = material.color.value_or(look.color);
+    own.color = material.color.value_or(common.color);
   }
-  look.others = std::move(others);
+  common.others = std::move(others);
 }
 
 namespace {
@@ -68,32 +69,32 @@ Vec3 color_of(const Surface& surface, std::size_t material) {
 }
 
 /// A base from an image has its own colours.
-bool takes_tissue_color(const Look& look) {
-  return !look.base;
+bool takes_tissue_color(const SurfaceMaterial& common) {
+  return !common.base;
 }
 
 } // namespace
 
 TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>& surfaces,
-                           Look& look, DrawingOptions& drawing) {
+                           SurfaceMaterial& common, DrawingOptions& drawing) {
   if (!a.tissue_colors || surfaces.empty())
     return;
   if (!a.materials.empty()) { // as they are numbered there
-    if (takes_tissue_color(look))
-      look.color = color_of(surfaces.front(), 0);
-    auto own = look.others.begin();
+    if (takes_tissue_color(common))
+      common.color = color_of(surfaces.front(), 0);
+    auto own = common.others.begin();
     for (const auto& [number, material] : a.materials) {
       const auto n = static_cast<std::size_t>(number);
       const bool object = a.words.by == "object" && n < surfaces.size();
       if (!material.color && takes_tissue_color(*own))
         own->color = object                 ? color_of(surfaces[n], 0)
-                     : a.words.by == "part" ? look.color
+                     : a.words.by == "part" ? common.color
                                             : color_of(surfaces.front(), n);
       ++own;
     }
     return;
   }
-  if (!takes_tissue_color(look))
+  if (!takes_tissue_color(common))
     return;
   renumbers_ = true;
   for (const Surface& surface : surfaces) {
@@ -109,11 +110,11 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
         colors_.push_back(color);
     }
   }
-  look.color = colors_.front();
+  common.color = colors_.front();
   drawing.group_by = GroupBy::material;
   for (std::size_t n = 1; n < colors_.size(); ++n) {
     drawing.groups.push_back(static_cast<std::int32_t>(n));
-    Look& own = look.others.emplace_back(look);
+    SurfaceMaterial& own = common.others.emplace_back(common);
     own.others.clear();
     own.color = colors_[n];
   }

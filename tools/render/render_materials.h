@@ -19,18 +19,19 @@ bool has_solid_structure(const RenderArguments& arguments);
 /// Their files.
 std::vector<std::string> material_paths(const RenderArguments& arguments);
 
-/// Reads their textures: the looks of the groups 1, 2, … in `look`, which holds what is for all.
+/// Reads their textures: those of the groups 1, 2, … in `common`, which holds what is for all.
 /// \throw Error with place
-void add_material_looks(Look& look, const RenderArguments& arguments, const Context& context);
+void add_group_materials(SurfaceMaterial& common, const RenderArguments& arguments,
+                         const Context& context);
 
-/// Colours of the materials for looks that were given neither colour nor image, see tissue_color().
+/// Colours for materials that were given neither colour nor image, see tissue_color().
 /// Where no number was given there is a group for each colour, whatever `--by` says: the triangles'
 /// materials are numbered anew.
 class TissueColors {
 public:
   /// \param surfaces the first ones that are drawn
-  TissueColors(const RenderArguments& arguments, const std::vector<Surface>& surfaces, Look& look,
-               DrawingOptions& drawing);
+  TissueColors(const RenderArguments& arguments, const std::vector<Surface>& surfaces,
+               SurfaceMaterial& common, DrawingOptions& drawing);
   void number_materials(std::vector<Surface>& surfaces) const;
 
 private:

@@ -12,12 +12,12 @@
 namespace gewebe::cli {
 namespace {
 
-/// The look with its textures; one that was not asked for is not read.
-Look look_of(const RenderArguments& a, const Context& context) {
-  Look look = a.look;
-  take_textures(look, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
-  add_material_looks(look, a, context);
-  return look;
+/// The material with its textures; one that was not asked for is not read.
+SurfaceMaterial material_of(const RenderArguments& a, const Context& context) {
+  SurfaceMaterial material = a.common;
+  take_textures(material, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
+  add_group_materials(material, a, context);
+  return material;
 }
 
 std::vector<PictureOptions> options_of(const RenderArguments& a) {
@@ -37,7 +37,7 @@ std::vector<PictureOptions> options_of(const RenderArguments& a) {
 }
 
 /// The light walked around the target, about what points up in the picture.
-Vec3 turned_light(const Vec3& light, const Camera& camera, double part, bool directional) {
+Vec3 rotated_light(const Vec3& light, const Camera& camera, double part, bool directional) {
   const Vec3 from = directional ? Vec3{} : camera.target, k = camera.up, v = light - from;
   const Vec3 along = k * dot(k, v), across = v - along;
   const auto [cosine, sine] = cos_sin(360 * part);
@@ -48,7 +48,7 @@ Vec3 turned_light(const Vec3& light, const Camera& camera, double part, bool dir
 
 Pictures::Pictures(Run& run, const RenderArguments& arguments)
     : run_(run), arguments_(arguments),
-      look_(run.timed("textures", [&] { return look_of(arguments, run.context()); })),
+      material_(run.timed("textures", [&] { return material_of(arguments, run.context()); })),
       options_(options_of(arguments)), drawing_(arguments.drawing) {}
 
 void Pictures::start(const std::vector<Surface>& surfaces) {
@@ -58,18 +58,21 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   drawing_.light = a.light.value_or(default_light(*camera_));
   first_light_ = drawing_.light;
   drawing_.offset = {a.offset, a.offset};
-  const auto structured = std::ranges::find_if(
-      look_.others, [](const Look& look) { return look.structure.has_value(); });
-  if (const Look& look = look_.structure || structured == look_.others.end() ? look_ : *structured;
-      a.offset_texels && look.structure)
-    drawing_.offset = {*a.offset_texels / look.structure->width(),
-                       *a.offset_texels / look.structure->height()};
-  tissue_.emplace(a, surfaces, look_, drawing_);
+  const auto structured =
+      std::ranges::find_if(material_.others, [](const SurfaceMaterial& material) {
+        return material.structure.has_value();
+      });
+  if (const SurfaceMaterial& material =
+          material_.structure || structured == material_.others.end() ? material_ : *structured;
+      a.offset_texels && material.structure)
+    drawing_.offset = {*a.offset_texels / material.structure->width(),
+                       *a.offset_texels / material.structure->height()};
+  tissue_.emplace(a, surfaces, material_, drawing_);
   if (drawing_.rest)
-    place_at_rest(look_, box_, a.mapping.edge);
+    place_at_rest(material_, box_, a.mapping.edge);
   run_.timed("start", [&] {
     for (const PictureOptions& options : options_)
-      modes_.push_back({std::make_unique<Painter>(look_, options, run_.context()), {}});
+      modes_.push_back({std::make_unique<Painter>(material_, options, run_.context()), {}});
   });
 }
 
@@ -89,7 +92,7 @@ bool Pictures::place(std::uint64_t number) {
   drawing_.camera = *camera_;
   if (a.turn_light) {
     const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
-    drawing_.light = turned_light(first_light_, *camera_, part, drawing_.directional);
+    drawing_.light = rotated_light(first_light_, *camera_, part, drawing_.directional);
   }
   return drawing_.camera.eye != eye || drawing_.light != light;
 }
@@ -191,7 +194,7 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
   return last_;
 }
 
-/// How many triangles have which look; a look that none has is a mistake more likely than not.
+/// How many triangles have which material; one that none has is a mistake more likely than not.
 void Pictures::tell_groups(const Drawing& drawing) {
   if (groups_told_ || arguments_.materials.empty() || drawing.group_start.empty() ||
       drawing.triangles.empty())

@@ -47,7 +47,7 @@ private:
 
   Run& run_;
   const RenderArguments& arguments_;
-  Look look_;
+  SurfaceMaterial material_;
   std::vector<PictureOptions> options_; ///< of the modes to compare, or one
   std::vector<Mode> modes_;
   std::optional<Camera> camera_;

@@ -112,18 +112,18 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
   std::string bytes = run.timed("read", [&] { return input.read_all(context.max_memory); });
   const VolumeView view = run.timed(
       "draw", [&] { return view_volume_bytes(std::move(bytes), input.name(), options, context); });
-  double least = view.least, greatest = view.greatest;
+  double min = view.min, max = view.max;
   if (!a.volume.range.empty()) {
-    least = a.volume.range[0];
-    greatest = a.volume.range[1];
-  } else if (!(least < greatest)) {
+    min = a.volume.range[0];
+    max = a.volume.range[1];
+  } else if (!(min < max)) {
     run.warn(input.name() + ": all values are equal");
-    greatest = least + 1;
+    max = min + 1;
   }
-  Image image = shrunk(colored(view.values, view.width, view.height, least, greatest, ramp), finer);
+  Image image = shrunk(colored(view.values, view.width, view.height, min, max, ramp), finer);
   const auto [low, high] = std::ranges::minmax_element(view.values);
   Stats& stats = run.stats();
-  stats.set("range", std::vector<double>{least, greatest});
+  stats.set("range", std::vector<double>{min, max});
   stats.set("seen", std::vector<double>{static_cast<double>(*low), static_cast<double>(*high)});
   stats.set("looks_at", view.camera.target);
   stats.set("looks_along", view.camera.back * -1.0);

@@ -13,7 +13,7 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
                   const SceneReport& report) {
   const SceneCounts counts = scene.counts();
   const SimulationCounts steps = scene.simulation().counts();
-  const ElastostaticCounts& still = steps.elastostatic;
+  const ElastostaticCounts& statics = steps.elastostatic;
   cli::Stats& stats = run.stats();
   stats.set("commands", counts.commands);
   stats.set("errors", counts.errors);
@@ -36,25 +36,25 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
   stats.set("largest_strain", state.strain);
   if (std::isfinite(state.safe_step))
     stats.set("safe_step", state.safe_step);
-  stats.set("updates", still.updates);
-  stats.set("skipped_unchanged", still.unchanged);
-  stats.set("factors", still.factors);
-  stats.set("solves", still.solves);
-  stats.set("columns_read", still.columns_read);
-  stats.set("shapes", still.shapes);
-  stats.set("terms", still.terms);
-  stats.set("terms_left_out", still.skipped);
+  stats.set("updates", statics.updates);
+  stats.set("skipped_unchanged", statics.unchanged);
+  stats.set("factors", statics.factors);
+  stats.set("solves", statics.solves);
+  stats.set("columns_read", statics.columns_read);
+  stats.set("shapes", statics.shapes);
+  stats.set("terms", statics.terms);
+  stats.set("terms_left_out", statics.skipped);
   if (report.errors) {
-    stats.set("backward_error", still.backward_error);
-    stats.set("shape_error", still.shape_error);
+    stats.set("backward_error", statics.backward_error);
+    stats.set("shape_error", statics.shape_error);
   }
-  stats.set("contact_error", still.contact_error);
+  stats.set("contact_error", statics.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);
   stats.set("largest_jump", steps.largest_jump);
   if (steps.cuts > 0) {
     stats.set("cuts", steps.cuts);
-    stats.set("cut_corrections", steps.cut_corrections);
-    stats.set("cut_renewals", steps.cut_renewals);
+    stats.set("cut_corrections", steps.cut_woodbury);
+    stats.set("cut_renewals", steps.cut_refactors);
     stats.set("cut_factors", steps.cut_factors);
   }
   stats.set("digest", counts.digest);
@@ -69,10 +69,10 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
 }
 
 void require_verified(const ElastostaticCounts& errors, double tolerance) {
-  const auto require = [](const char* what, double error, double most) {
-    if (!(error <= most))
+  const auto require = [](const char* what, double error, double max) {
+    if (!(error <= max))
       throw Error(std::string("the ") + what + " of a shape is " + number_text(error) +
-                  ", expected at most " + number_text(most));
+                  ", expected at most " + number_text(max));
   };
   require("error", errors.shape_error, tolerance);
   // Columns of float32 have one of 1e-7, a wrong solution one of 1.

@@ -10,15 +10,15 @@ namespace gewebe {
 
 namespace {
 
-constexpr double most_volume = 0.1, most_strain = 0.5, most_jump = 0.1;
+constexpr double max_volume = 0.1, max_strain = 0.5, max_jump = 0.1;
 constexpr double farther = 1.1; // than when it was last looked at
 constexpr int at_least_every = 64;
 
 double largest(std::span<const double> values) {
-  double most = 0;
+  double max = 0;
   for (const double value : values)
-    most = std::max(most, std::abs(value));
-  return most;
+    max = std::max(max, std::abs(value));
+  return max;
 }
 
 std::string percent(double share) {
@@ -38,8 +38,8 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
                        const Tell& distrust) {
   for (const MethodJump& jump : simulation.news().jumps) {
     Object& object = objects_[jump.object];
-    const double most = largest(simulation.displacement(jump.object));
-    if (object.jump || !(jump.size > most_jump * most) || !warn)
+    const double max = largest(simulation.displacement(jump.object));
+    if (object.jump || !(jump.size > max_jump * max) || !warn)
       continue;
     object.jump = true;
     warn("object " + simulation.object(jump.object).name + " at " + number_text(simulation.time()) +
@@ -89,12 +89,12 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
   const std::span<const double> u = simulation.displacement(number);
   if (u.size() != 3 * object.nodes)
     return;
-  const double most = largest(u);
+  const double max = largest(u);
   // Less turns no triangle over, and what moves no farther than before does so seldom.
-  if (!(4 * most > object.check->shortest_edge() / 10) ||
-      (most <= farther * object.looked_at && ++object.not_looked < at_least_every))
+  if (!(4 * max > object.check->shortest_edge() / 10) ||
+      (max <= farther * object.looked_at && ++object.not_looked < at_least_every))
     return;
-  object.looked_at = most;
+  object.looked_at = max;
   object.not_looked = 0;
   const ShapeFaults faults = object.check->look(simulation.model(number), u);
   const std::string who =
@@ -105,12 +105,12 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
              (faults.turned == 1 ? " triangle is" : " triangles are") + " turned over, the first " +
              std::to_string(faults.triangle) + ", the shape is not to be trusted there");
   }
-  if (!(std::abs(faults.volume) <= most_volume) && !object.volume && distrust) {
+  if (!(std::abs(faults.volume) <= max_volume) && !object.volume && distrust) {
     object.volume = true;
     distrust(who + "its volume has " + (faults.volume > 0 ? "grown" : "shrunk") + " by " +
              percent(faults.volume) + ", which tissue does not do");
   }
-  if (!(faults.strain <= most_strain) && !object.strain && distrust &&
+  if (!(faults.strain <= max_strain) && !object.strain && distrust &&
       simulation.object(number).method == Method::ela) {
     object.strain = true;
     distrust(who + "the edge " + std::to_string(faults.i) + "-" + std::to_string(faults.j) +

@@ -28,7 +28,7 @@ namespace {
 
 constexpr std::uint64_t longest_line = 1U << 24U; // that is carried out
 constexpr std::uint64_t longest_rest = 1U << 30U; // of one that is not, to be passed over
-constexpr double most_samples = 1e9;
+constexpr double max_samples = 1e9;
 constexpr double default_step = 1.0 / 60;
 
 /// A file that a line names may be wrong in a place of its own: both places count.
@@ -242,7 +242,7 @@ struct SceneRun::State {
     require_object();
     const double start = simulation.time(), span = c.until - start;
     const double exact = span / c.every;
-    if (!(exact <= most_samples))
+    if (!(exact <= max_samples))
       throw Error("over 1e9 steps, expected fewer");
     const auto sample = [&](double time) {
       go_on([&] {

@@ -10,7 +10,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr int least_exponent = -40; // 1 ps
+constexpr int min_exponent = -40; // 1 ps
 
 } // namespace
 
@@ -21,9 +21,9 @@ double StepLatency::now() {
 std::size_t StepLatency::bin(double seconds) {
   int exponent = 0;
   const double half = std::frexp(seconds, &exponent); // 0.5 to 1
-  if (!(seconds > 0) || exponent <= least_exponent)
+  if (!(seconds > 0) || exponent <= min_exponent)
     return 0;
-  const auto power = static_cast<std::size_t>(exponent - least_exponent);
+  const auto power = static_cast<std::size_t>(exponent - min_exponent);
   if (power >= exponents)
     return exponents * parts - 1;
   return power * parts + static_cast<std::size_t>((2 * half - 1) * parts);
@@ -59,7 +59,7 @@ double StepLatency::quantile(double part) const {
     sum += counts_[b];
     if (sum >= wanted) // the bin's upper end
       return std::min(largest_, std::ldexp(1 + static_cast<double>(b % parts + 1) / parts,
-                                           static_cast<int>(b / parts) + least_exponent - 1));
+                                           static_cast<int>(b / parts) + min_exponent - 1));
   }
   return largest_;
 }

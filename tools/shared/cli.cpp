@@ -277,8 +277,8 @@ void Program::operand(const std::string& name, std::string& value, const std::st
 }
 
 void Program::operands(const std::string& name, std::vector<std::string>& values,
-                       const std::string& help, std::size_t at_least) {
-  state_->line.operands.push_back({name, help, nullptr, &values, at_least});
+                       const std::string& help, std::size_t min_count) {
+  state_->line.operands.push_back({name, help, nullptr, &values, min_count});
 }
 
 namespace {

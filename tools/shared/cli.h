@@ -140,7 +140,7 @@ public:
                bool required = false);
   /// All remaining operands, at least `at_least`.
   void operands(const std::string& name, std::vector<std::string>& values, const std::string& help,
-                std::size_t at_least);
+                std::size_t min_count);
   /// Declares --to (kinds that this tool writes) and/or --format (kinds that it reads).
   void output_kinds(const std::vector<Kind>& kinds);
   void input_kinds(const std::vector<Kind>& kinds);

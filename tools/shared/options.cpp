@@ -201,7 +201,7 @@ void CommandLine::take(const std::vector<std::string>& words) {
 
 void CommandLine::check_complete() const {
   for (const Operand& operand : operands)
-    if (operand.count == 0 && operand.at_least > 0)
+    if (operand.count == 0 && operand.min_count > 0)
       refuse(operand.name + " is required");
   if (!unexpected_.empty()) {
     const std::string& wrong = unexpected_.front();
@@ -209,8 +209,8 @@ void CommandLine::check_complete() const {
            suggestion(wrong.substr(0, wrong.find('=')), long_names()));
   }
   for (const Operand& operand : operands)
-    if (operand.count < operand.at_least)
-      refuse("expected at least " + std::to_string(operand.at_least) + " " + operand.name);
+    if (operand.count < operand.min_count)
+      refuse("expected at least " + std::to_string(operand.min_count) + " " + operand.name);
 }
 
 std::string CommandLine::help(const std::string& description) const {
@@ -218,7 +218,7 @@ std::string CommandLine::help(const std::string& description) const {
   std::string text = description + "\nUsage: " + tool + " [OPTIONS]";
   for (const Operand& operand : operands) {
     const std::string name = operand.name + (operand.values != nullptr ? "..." : "");
-    text += operand.at_least > 0 ? " " + name : " [" + name + "]";
+    text += operand.min_count > 0 ? " " + name : " [" + name + "]";
   }
   const auto add_line = [&](const std::string& name, const std::string& help) {
     const std::size_t width = name.size() + 2;
@@ -228,7 +228,7 @@ std::string CommandLine::help(const std::string& description) const {
   text += "\n\nPositionals:\n";
   for (const Operand& operand : operands)
     add_line(operand.name + (operand.values != nullptr ? " ..." : "") +
-                 (operand.at_least > 0 ? " REQUIRED" : ""),
+                 (operand.min_count > 0 ? " REQUIRED" : ""),
              operand.help);
   text += "\nOptions:\n";
   for (const auto& spec : specs)

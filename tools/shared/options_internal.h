@@ -50,7 +50,7 @@ struct Operand {
   std::string name, help;
   std::string* value = nullptr;               ///< one, or
   std::vector<std::string>* values = nullptr; ///< all that remain
-  std::size_t at_least = 0;
+  std::size_t min_count = 0;
   std::size_t count = 0; ///< given
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Blocks of the compliance between a few nodes from half solutions of a factor that follows cuts:
+// Blocks of the compliance between a few nodes from forward solves with a factor that follows cuts:
 // what forces at contacts need, without a column of C.
 
 #include "compliance/compliance_source.h"
@@ -14,10 +14,10 @@
 
 namespace gewebe {
 
-class HalfBlocks {
+class ForwardBlocks {
 public:
   /// \param check called before the factor is read; throws where it is no longer that of the model
-  HalfBlocks(std::shared_ptr<const FrontalFactor> factor, std::function<void()> check);
+  ForwardBlocks(std::shared_ptr<const FrontalFactor> factor, std::function<void()> check);
 
   /// Prepares blocks between these nodes and all that were needed before; those may be forgotten.
   void need(std::span<const std::uint32_t> nodes);
@@ -27,7 +27,7 @@ public:
 private:
   std::shared_ptr<const FrontalFactor> factor_;
   std::function<void()> check_;
-  std::unordered_map<std::uint32_t, FrontalFactor::HalfSolution> half_;
+  std::unordered_map<std::uint32_t, FrontalFactor::ForwardSolve> solves_;
 };
 
 } // namespace gewebe

@@ -18,7 +18,7 @@ namespace gewebe {
 
 /// Absent textures are neither read nor computed with: without base the colour alone, without
 /// structure r = 0.5, which leaves the base as it is.
-struct Look {
+struct SurfaceMaterial {
   std::optional<Texture> base;
   std::optional<Texture> detail;     ///< added to the base
   std::optional<Texture> reflection; ///< added to both; of what surrounds the surface
@@ -27,35 +27,38 @@ struct Look {
   RestMapping rest;         ///< of textures on the shape at rest
   Vec3 color{1, 1, 1};      ///< factor of the base, 0 … 1
   Vec3 background{1, 1, 1}; ///< 0 … 1
-  std::vector<Look> others; ///< of groups 1, 2, … of a drawing; their backgrounds don't count
+  std::vector<SurfaceMaterial>
+      others; ///< of groups 1, 2, … of a drawing; their backgrounds don't count
 };
 
-/// \pre group <= look.others.size()
-inline const Look& look_of_group(const Look& look, std::size_t group) {
-  return group == 0 ? look : look.others[group - 1];
+/// \pre group <= material.others.size()
+inline const SurfaceMaterial& material_of_group(const SurfaceMaterial& material,
+                                                std::size_t group) {
+  return group == 0 ? material : material.others[group - 1];
 }
 
 /// Whether an image lies on the surface by three projections.
-inline bool is_triplanar(const Look& look, const std::optional<Texture>& image) {
-  return look.rest.triplanar && image && !image->options.sphere;
+inline bool is_triplanar(const SurfaceMaterial& material, const std::optional<Texture>& image) {
+  return material.rest.triplanar && image && !image->options.sphere;
 }
 /// Whether some texture is one of the shape at rest, which the fixed functions can't draw.
-inline bool is_at_rest(const Look& look) {
-  return look.solid_base || look.solid_detail || look.solid_structure ||
-         is_triplanar(look, look.base) || is_triplanar(look, look.detail) ||
-         is_triplanar(look, look.reflection) || is_triplanar(look, look.structure);
+inline bool is_at_rest(const SurfaceMaterial& material) {
+  return material.solid_base || material.solid_detail || material.solid_structure ||
+         is_triplanar(material, material.base) || is_triplanar(material, material.detail) ||
+         is_triplanar(material, material.reflection) || is_triplanar(material, material.structure);
 }
 
-/// Completes `look.rest`, and scales of solid textures that are left open: a quarter of its edge.
-/// So for all groups.
-inline void place_at_rest(Look& look, const Box3& rest_box, std::optional<double> edge) {
+/// Completes `material.rest`, and scales of solid textures that are left open: a quarter of its
+/// edge. So for all groups.
+inline void place_at_rest(SurfaceMaterial& material, const Box3& rest_box,
+                          std::optional<double> edge) {
   const RestMapping mapping = rest_mapping(rest_box, edge);
-  look.rest.start = mapping.start;
-  look.rest.edge = mapping.edge;
-  for (auto* solid : {&look.solid_base, &look.solid_detail, &look.solid_structure})
+  material.rest.start = mapping.start;
+  material.rest.edge = mapping.edge;
+  for (auto* solid : {&material.solid_base, &material.solid_detail, &material.solid_structure})
     if (*solid && !(*solid)->scale)
       (*solid)->scale = mapping.edge / 4;
-  for (Look& other : look.others)
+  for (SurfaceMaterial& other : material.others)
     place_at_rest(other, rest_box, edge);
 }
 

@@ -1,0 +1,38 @@
+#include "compliance/forward_blocks.h"
+
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t max_kept = 1024; ///< nodes; some 50 kB each on 10,000 nodes
+
+} // namespace
+
+ForwardBlocks::ForwardBlocks(std::shared_ptr<const FrontalFactor> factor,
+                             std::function<void()> check)
+    : factor_(std::move(factor)), check_(std::move(check)) {}
+
+void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
+  std::vector<std::uint32_t> missing;
+  for (const std::uint32_t node : nodes)
+    if (!solves_.contains(node))
+      missing.push_back(node);
+  if (missing.empty())
+    return;
+  check_();
+  if (solves_.size() + missing.size() > max_kept) {
+    solves_.clear();
+    missing.assign(nodes.begin(), nodes.end());
+  }
+  std::vector<FrontalFactor::ForwardSolve> solved = factor_->forward_solves(missing);
+  for (std::size_t k = 0; k < missing.size(); ++k)
+    solves_[missing[k]] = std::move(solved[k]);
+}
+
+ComplianceBlock ForwardBlocks::block(std::uint32_t node, std::uint32_t other) const {
+  return factor_->compliance(solves_.at(node), solves_.at(other));
+}
+
+} // namespace gewebe
