@@ -2,6 +2,7 @@
 
 #include "formats/stream/file_names.h"
 #include "tools/store/store_making.h"
+#include "tools/store/store_merging.h"
 #include "tools/store/store_update.h"
 
 #include <array>

@@ -9,7 +9,9 @@
 #include "tools/run/event_log.h"
 #include "tools/run/scene_checks.h"
 #include "tools/run/scene_record.h"
+#include "tools/run/scene_result.h"
 #include "tools/run/step_latency.h"
+#include "tools/run/undelivered.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +19,6 @@
 #include <istream>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -34,20 +35,6 @@ constexpr double default_step = 1.0 / 60;
 /// A file that a line names may be wrong in a place of its own: both places count.
 std::string with_place(const Error& error) {
   return (error.place().empty() ? "" : error.place() + ": ") + error.what();
-}
-
-/// A failure of what takes answers, results and logs is no fault of the line.
-struct Undelivered {
-  std::exception_ptr error;
-};
-
-template <class Work>
-void deliver(Work&& work) {
-  try {
-    work();
-  } catch (const Error&) {
-    throw Undelivered{std::current_exception()};
-  }
 }
 
 /// A file of an object, read late, is the fault of the line that named it.
@@ -76,17 +63,20 @@ struct SceneRun::State {
   SceneCounts counts;
   Digest digest;
   std::uint64_t line = 0, steps = 0;
-  std::size_t in_result = 0;                // objects that the result knows
   std::map<std::string, std::string> lists; // node lists that the line named
   std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
   std::uint64_t first_error = 0;
   std::string first_error_text;
   SceneChecks checks;
+  std::optional<SceneResult> result;
   std::vector<std::string> stores; ///< by object; "" where it has none
   std::vector<std::string> models; ///< files that objects were made of
 
   State(std::string n, const Context& context, SceneOptions o)
-      : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {}
+      : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {
+    if (options.result != nullptr)
+      result.emplace(*options.result);
+  }
 
   SimulationOptions simulation_options() {
     SimulationOptions s;
@@ -230,11 +220,11 @@ struct SceneRun::State {
   void go_on(Step&& step) {
     require_object();
     const std::size_t objects = simulation.object_count(); // before parts come off
-    for (std::size_t i = 0;
-         options.result != nullptr && options.result->wants_models() && i < objects; ++i)
-      (void)simulation.first_model(i); // a file that is wrong fails the step
+    if (result)
+      result->need_models(simulation, objects); // a file that is wrong fails the step
     step();
-    first_frame(objects);
+    if (result)
+      result->first_frame(simulation, objects);
     answer();
   }
 
@@ -258,56 +248,9 @@ struct SceneRun::State {
       sample(c.until); // which refuses a past one
   }
 
-  /// What the result must know of new objects, and of those that were cut since the last frame.
-  void add_results(std::size_t objects, bool cut) {
-    static const Model none;
-    const bool models_too = options.result->wants_models();
-    for (; in_result < objects; ++in_result) {
-      const Model& model = models_too ? simulation.first_model(in_result) : none;
-      const bool part = std::any_of(
-          simulation.news().cuttings.begin(), simulation.news().cuttings.end(),
-          [&](const Cutting& c) { return c.kind == Cutting::Kind::part && c.part == in_result; });
-      deliver([&] {
-        if (part)
-          options.result->add_part(simulation.object(in_result).name, model);
-        else
-          options.result->add_object(simulation.object(in_result).name, model);
-      });
-    }
-    if (!cut || !models_too)
-      return;
-    std::set<std::size_t> changed;
-    for (const Cutting& c : simulation.news().cuttings)
-      if (c.kind == Cutting::Kind::cut || c.kind == Cutting::Kind::restored)
-        changed.insert(c.object);
-    for (const std::size_t object : changed)
-      deliver([&] {
-        options.result->change_object(object, simulation.model(object),
-                                      simulation.object(object).first_nodes);
-      });
-  }
-
   void require_object() const {
     if (simulation.object_count() == 0)
       throw Error("there is no object, expected an object command first");
-  }
-
-  /// What the result must know of these first objects, and the frame before anything moves.
-  void first_frame(std::size_t objects) {
-    if (options.result == nullptr)
-      return;
-    add_results(objects, false);
-    if (counts.frames > 0)
-      return;
-    std::vector<std::vector<double>> rest;
-    std::vector<FrameObject> frame;
-    for (std::size_t i = 0; i < objects; ++i)
-      rest.emplace_back(simulation.object(i).known ? 3 * simulation.first_model(i).nodes.size()
-                                                   : 0);
-    for (const std::vector<double>& one : rest)
-      frame.push_back({one, {}});
-    deliver([&] { options.result->add_frame(0, frame); });
-    ++counts.frames;
   }
 
   void answer() {
@@ -327,16 +270,8 @@ struct SceneRun::State {
         options.events->cutting(simulation, c);
     if (options.latency != nullptr)
       deliver([&] { options.latency->answered(steps, simulation.time()); });
-    if (options.result != nullptr) {
-      add_results(simulation.object_count(), true);
-      const bool shapes = options.result->wants_models();
-      std::vector<FrameObject> frame;
-      for (std::size_t i = 0; i < simulation.object_count(); ++i)
-        frame.push_back({shapes ? simulation.displacement(i) : std::span<const double>(),
-                         simulation.contact_forces(i)});
-      deliver([&] { options.result->add_frame(simulation.time(), frame); });
-      ++counts.frames;
-    }
+    if (result)
+      result->frame(simulation);
     simulation.take_news();
     if (options.measure)
       deliver([&] { measure(); });
@@ -451,7 +386,8 @@ void SceneRun::finish() {
         throw first_error().value_or(
             Error("no command, expected object, step or another, see scene(5)"));
       s.require_object();
-      s.first_frame(s.simulation.object_count());
+      if (s.result)
+        s.result->first_frame(s.simulation, s.simulation.object_count());
     });
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
@@ -486,6 +422,7 @@ const Simulation& SceneRun::simulation() const {
 
 SceneCounts SceneRun::counts() const {
   SceneCounts counts = state_->counts;
+  counts.frames = state_->result ? state_->result->frames() : 0;
   counts.digest = state_->digest.hex();
   return counts;
 }

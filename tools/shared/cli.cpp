@@ -6,16 +6,15 @@
 #include "formats/stream/program_start.h"
 #include "tools/shared/messages.h"
 #include "tools/shared/options_internal.h"
+#include "tools/shared/progress_bar.h"
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <fstream>
-#include <mutex>
 #include <sys/stat.h>
 #include <type_traits>
 #include <unistd.h>
@@ -23,11 +22,6 @@
 
 namespace gewebe::cli {
 namespace {
-
-double now_seconds() {
-  const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(since_start).count();
-}
 
 /// What nobody can catch: thrown where a library is loaded or a thread of one begins.
 [[noreturn]] void end_suddenly() {
@@ -64,52 +58,6 @@ std::uint64_t available_memory() {
   if (limit != UINT64_MAX && used < limit)
     available = std::min(available, limit - used);
   return available;
-}
-
-/// A bar with rate and remaining time on standard error.
-class ProgressBar {
-public:
-  ProgressBar(std::string tool, bool at_once)
-      : tool_(std::move(tool)), start_(now_seconds()), quiet_until_(at_once ? 0 : start_ + 1) {}
-  ~ProgressBar() {
-    if (drawn_)
-      (void)std::fputs("\r\033[K", stderr);
-  }
-  ProgressBar(const ProgressBar&) = delete;
-  ProgressBar& operator=(const ProgressBar&) = delete;
-
-  void update(double done) {
-    const std::lock_guard lock(mutex_);
-    const double now = now_seconds();
-    if (done < last_)
-      start_ = now; // a new phase
-    last_ = done;
-    if (now < quiet_until_ || now < next_)
-      return;
-    next_ = now + 0.1;
-    drawn_ = true;
-    const double elapsed = now - start_;
-    const double rate = elapsed > 0 ? done / elapsed : 0;
-    const double left = rate > 0 ? (1 - done) / rate : 0;
-    std::string bar(30, '.');
-    std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(30 * std::clamp(done, 0.0, 1.0)), '#');
-    (void)std::fprintf(stderr, "\r%s [%s] %3.0f %%  %.1f %%/s  %.0f s left\033[K", tool_.c_str(),
-                       bar.c_str(), 100 * done, 100 * rate, left);
-  }
-
-private:
-  std::string tool_;
-  std::mutex mutex_;
-  double start_, quiet_until_, next_ = 0, last_ = 0;
-  bool drawn_ = false;
-};
-
-bool progress_wanted(const std::string& mode) {
-  if (mode != "auto")
-    return mode == "always";
-  struct stat info {};
-  const bool piped = ::fstat(1, &info) == 0 && S_ISFIFO(info.st_mode);
-  return ::isatty(2) != 0 && !piped;
 }
 
 void write_text(const std::string& path, const std::string& text) {
@@ -151,32 +99,6 @@ Run::Timer::Timer(Run& run, std::string_view name)
     : run_(run), name_(name), start_(now_seconds()) {}
 Run::Timer::~Timer() {
   run_.stats_.seconds(name_, now_seconds() - start_);
-}
-
-// ---- OptionRef
-
-namespace {
-Spec& spec_of(void* spec) {
-  return *static_cast<Spec*>(spec);
-}
-} // namespace
-
-OptionRef& OptionRef::positive() {
-  spec_of(spec_).must_be_positive = true;
-  return *this;
-}
-OptionRef& OptionRef::range(double min, double max) {
-  spec_of(spec_).min = min;
-  spec_of(spec_).max = max;
-  return *this;
-}
-OptionRef& OptionRef::one_of(std::vector<std::string> words) {
-  spec_of(spec_).choices = std::move(words);
-  return *this;
-}
-OptionRef& OptionRef::count(std::size_t n) {
-  spec_of(spec_).list_count = n;
-  return *this;
 }
 
 // ---- Program
@@ -253,19 +175,6 @@ template OptionRef Program::option(Text, std::string&, Text, Text);
 template OptionRef Program::option(Text, std::vector<double>&, Text, Text);
 template OptionRef Program::option(Text, Vec3&, Text, Text);
 template OptionRef Program::option(Text, std::optional<Vec3>&, Text, Text);
-
-OptionRef& OptionRef::numbered(std::function<std::string&(std::int32_t)> value_of) {
-  spec_of(spec_).set_numbered = [value_of = std::move(value_of)](
-                                    std::int32_t n, std::string_view word) { value_of(n) = word; };
-  return *this;
-}
-
-OptionRef& OptionRef::numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of) {
-  Spec& spec = spec_of(spec_);
-  spec.set_numbered = [&spec, value_of = std::move(value_of)](
-                          std::int32_t n, std::string_view word) { spec.read(word, value_of(n)); };
-  return *this;
-}
 
 void Program::flag(const std::string& names, bool& value, const std::string& help) {
   state_->add(names, "", help).flag = &value;

@@ -1,6 +1,7 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/number_text.h"
+#include "tools/shared/cli.h"
 #include "tools/shared/options_internal.h"
 
 #include <algorithm>
@@ -237,6 +238,45 @@ std::string CommandLine::help(const std::string& description) const {
              spec->help +
                  (spec->default_text.empty() ? "" : " (default " + spec->default_text + ")"));
   return text + "\n";
+}
+
+// ---- OptionRef
+
+namespace {
+Spec& spec_of(void* spec) {
+  return *static_cast<Spec*>(spec);
+}
+} // namespace
+
+OptionRef& OptionRef::positive() {
+  spec_of(spec_).must_be_positive = true;
+  return *this;
+}
+OptionRef& OptionRef::range(double min, double max) {
+  spec_of(spec_).min = min;
+  spec_of(spec_).max = max;
+  return *this;
+}
+OptionRef& OptionRef::one_of(std::vector<std::string> words) {
+  spec_of(spec_).choices = std::move(words);
+  return *this;
+}
+OptionRef& OptionRef::count(std::size_t n) {
+  spec_of(spec_).list_count = n;
+  return *this;
+}
+
+OptionRef& OptionRef::numbered(std::function<std::string&(std::int32_t)> value_of) {
+  spec_of(spec_).set_numbered = [value_of = std::move(value_of)](
+                                    std::int32_t n, std::string_view word) { value_of(n) = word; };
+  return *this;
+}
+
+OptionRef& OptionRef::numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of) {
+  Spec& spec = spec_of(spec_);
+  spec.set_numbered = [&spec, value_of = std::move(value_of)](
+                          std::int32_t n, std::string_view word) { spec.read(word, value_of(n)); };
+  return *this;
 }
 
 } // namespace gewebe::cli

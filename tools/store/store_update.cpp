@@ -7,6 +7,7 @@
 #include "model/cut_origin.h"
 #include "solve/condition.h"
 #include "tools/store/store_making.h"
+#include "tools/store/store_merging.h"
 
 #include <memory>
 
