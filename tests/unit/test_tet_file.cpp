@@ -2,6 +2,7 @@
 // read, what is broken is one error.
 
 #include "base/error.h"
+#include "formats/mesh/ply.h"
 #include "formats/tetrahedra/tet_file.h"
 #include "scratch.h"
 #include "tet_fixtures.h"
@@ -133,6 +134,13 @@ TEST(TetFile, PlyShowsTheBoundaryAsFaces) {
       "element vertex 27\nproperty double x\nproperty double y\nproperty double z\n"
       "element face 48\nproperty list uchar int vertex_indices\n"
       "element tetrahedron 48\nproperty list uchar int vertex_indices\nend_header\n"));
+  const TetBoundary surface = boundary(mesh);
+  const TriangleMesh seen = read_ply(bytes, "m");
+  EXPECT_EQ(seen.points, mesh.points);
+  ASSERT_EQ(seen.triangles.size(), surface.mesh.triangles.size());
+  for (std::size_t f = 0; f < seen.triangles.size(); ++f)
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(seen.triangles[f][k], surface.node[surface.mesh.triangles[f][k]]);
   EXPECT_FALSE(holds_tetrahedra("ply\nformat ascii 1.0\nelement face 3\nend_header\n\nelement "
                                 "tetrahedron 1",
                                 Kind::ply));
@@ -234,16 +242,17 @@ TEST(TetFile, GmshByHand) {
   EXPECT_EQ(tet_mesh_from_bytes(text, "m", Kind::msh).tetrahedra.size(), 2U);
 }
 
+const char* const gmsh4 =
+    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+    "$Entities\n1 0 0 2\n1 0 0 0 0\n4 0 0 0 1 1 1 2 9 8 0\n5 0 0 0 1 1 1 0 0\n$EndEntities\n"
+    "$Nodes\n2 5 3 99\n0 1 0 1\n10\n0 0 0\n3 4 1 4\n3\n4\n5\n99\n1 0 0 .1 .2 .3\n0 1 0 0 0 0\n"
+    "0 0 1 0 0 0\n1 1 1.5 0 0 0\n$EndNodes\n"
+    "$Elements\n3 3 1 3\n0 1 15 1\n1 10\n3 4 4 1\n2 10 3 4 5\n3 5 4 1\n3 3 4 5 99\n$EndElements\n"
+    "$NodeData\nanything 1 2 3\n$EndNodeData\n";
+
 TEST(TetFile, Gmsh4ByHand) {
-  const std::string text =
-      "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
-      "$Entities\n1 0 0 2\n1 0 0 0 0\n4 0 0 0 1 1 1 2 9 8 0\n5 0 0 0 1 1 1 0 0\n$EndEntities\n"
-      "$Nodes\n2 5 3 99\n0 1 0 1\n10\n0 0 0\n3 4 1 4\n3\n4\n5\n99\n1 0 0 .1 .2 .3\n0 1 0 0 0 0\n"
-      "0 0 1 0 0 0\n1 1 1.5 0 0 0\n$EndNodes\n"
-      "$Elements\n3 3 1 3\n0 1 15 1\n1 10\n3 4 4 1\n2 10 3 4 5\n3 5 4 1\n3 3 4 5 99\n$EndElements\n"
-      "$NodeData\nanything 1 2 3\n$EndNodeData\n";
   TetReadStats stats;
-  const TetMesh mesh = tet_mesh_from_bytes(text, "m", Kind::msh, &stats);
+  const TetMesh mesh = tet_mesh_from_bytes(gmsh4, "m", Kind::msh, &stats);
   EXPECT_EQ(stats.skipped_elements, 1U);
   EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}, {1, 2, 3, 4}}));
   EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{9, 0}));
@@ -305,15 +314,16 @@ TEST(TetFile, TetgenByHand) {
   EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{6}));
 }
 
+const char* const by_hand_ply =
+    "ply\nformat ascii 1.0\nelement tetrahedron 1\nproperty uchar material\n"
+    "property list uchar uint vertex_index\nproperty float quality\nelement vertex 4\n"
+    "property float z\nproperty float y\nproperty float x\nproperty float nx\n"
+    "element edge 1\nproperty int a\nend_header\n3 4 0 1 2 3 0.5\n0 0 0 1\n0 0 1 1\n0 1 0 1\n"
+    "1 0 0 1\n5\n";
+
 TEST(TetFile, PlyByHand) {
-  const std::string text =
-      "ply\nformat ascii 1.0\nelement tetrahedron 1\nproperty uchar material\n"
-      "property list uchar uint vertex_index\nproperty float quality\nelement vertex 4\n"
-      "property float z\nproperty float y\nproperty float x\nproperty float nx\n"
-      "element edge 1\nproperty int a\nend_header\n3 4 0 1 2 3 0.5\n0 0 0 1\n0 0 1 1\n0 1 0 1\n"
-      "1 0 0 1\n5\n";
   TetReadStats stats;
-  const TetMesh mesh = tet_mesh_from_bytes(text, "m", Kind::ply, &stats);
+  const TetMesh mesh = tet_mesh_from_bytes(by_hand_ply, "m", Kind::ply, &stats);
   EXPECT_EQ(stats.skipped_elements, 1U);
   EXPECT_EQ(stats.skipped_properties, 2U);
   EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{3}));
@@ -556,6 +566,12 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
             "m:12: 500000 nodes in 153 bytes, expected a count that fits");
   EXPECT_EQ(gmsh("1.5e0", "1e999"), "m:17: \"1e999\", expected z, a finite number");
 
+  const std::string ours = tet_mesh_bytes(strange(), Kind::msh);
+  EXPECT_EQ(complaint(replaced(ours, "2 4 2 0 1 2 5 4 3", "2 4 2 0 1 2 5 4 7"), Kind::msh),
+            "m:16: an element with node 7, which is not there");
+  EXPECT_EQ(complaint(replaced(gmsh4, "3 3 1 3\n", "3 4 1 3\n"), Kind::msh),
+            "m:32: 3 elements in blocks, expected 4");
+
   const auto in_medit = [](const char* from, const char* to) {
     return complaint(replaced(medit, from, to), Kind::medit);
   };
@@ -567,6 +583,7 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
             "m:18: Hexahedra, expected tetrahedra of 4 or 10 nodes in the usual order");
   EXPECT_EQ(in_medit("End\n", "TetrahedraP2 1\n1 2 3 4 1 2 3 4 1 2 0"),
             "m:20: tetrahedra of 4 and of 10 nodes, expected one order");
+  EXPECT_EQ(in_medit("End\n", "End\nEnd\n"), "m:20: words after End, expected the end");
   EXPECT_EQ(in_medit("Vertices 4", "Vertices 4000000000"),
             "m:6: 4000000000 vertices in 155 bytes, expected a count that fits");
 
@@ -585,6 +602,8 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
   EXPECT_EQ(in_vtu("NumberOfPoints='6'", "NumberOfPoints='4'"), "m:9: more than 12 numbers");
   EXPECT_EQ(in_vtu("NumberOfPoints='6'", "NumberOfPoints='4000000000'"),
             "m:9: 12000000000 numbers in 163 bytes, expected a count that fits");
+  EXPECT_EQ(in_vtu("4\n3\n2\n", "4\n6\n2\n"), "m: cell 2: point 6, expected 0 to below 6");
+  EXPECT_EQ(in_vtu("4\n3\n2\n", "4\n-1\n2\n"), "m: cell 2: point -1, expected 0 to below 6");
   EXPECT_EQ(in_vtu("LittleEndian", "MiddleEndian"),
             "m:2: byte_order \"MiddleEndian\", expected LittleEndian or BigEndian");
   EXPECT_EQ(in_vtu("version='1.0'", "compressor='vtkLZ4DataCompressor'"),
@@ -602,6 +621,10 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
   const std::string ply = tet_mesh_bytes(strange(), Kind::ply);
   EXPECT_EQ(complaint(replaced(ply, "tetrahedron 2", "tetrahedron 3"), Kind::ply),
             "m: byte 491: 3 elements \"tetrahedron\" in 34 bytes, expected a count that fits");
+  EXPECT_EQ(complaint(replaced(by_hand_ply, "3 4 0 1 2 3", "3 4 0 1 2 4"), Kind::ply),
+            "m:15: a vertex is no integer from 0 to below 4");
+  EXPECT_EQ(complaint(replaced(by_hand_ply, "3 4 0 1 2 3", "-3 4 0 1 2 3"), Kind::ply),
+            "m:15: material is no integer from 0 to below 2147483648");
   EXPECT_EQ(complaint(replaced(ply, "element tetrahedron", "element other"), Kind::ply),
             "m: a PLY file without the element tetrahedron, expected that");
 }
