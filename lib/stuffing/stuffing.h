@@ -1,0 +1,62 @@
+#pragma once
+// From a volume to tetrahedra: isosurface stuffing.
+
+#include "base/context.h"
+#include "tetrahedra/tet_mesh.h"
+#include "volume/grid.h"
+
+#include <cstdint>
+#include <optional>
+
+namespace gewebe {
+
+/// A cut point nearer to a lattice point than this share of its edge is warped to. With these two
+/// shares every dihedral angle of every stencil lies between stuffing_angle_min and -_max; the
+/// enumeration is tests/unit/test_stuffing_angles.cpp.
+inline constexpr double stuffing_alpha_long = 0.285, stuffing_alpha_short = 0.3985;
+/// Degrees.
+inline constexpr double stuffing_angle_min = 10.7, stuffing_angle_max = 164.8;
+
+struct StuffingOptions {
+  std::optional<double> isovalue; ///< in place of the grid's own
+  /// Distance in mm of lattice points along an axis; nothing: the edge of a cube as large as a
+  /// voxel.
+  std::optional<double> cell;
+};
+
+struct StuffingReport {
+  double cell = 0;                 ///< mm
+  std::uint64_t surface_nodes = 0; ///< the first so many points lie on the boundary
+  std::uint64_t cut_nodes = 0;     ///< of these, in the middle of an edge of the lattice
+  std::uint64_t warped = 0;        ///< of these, lattice points that were moved onto the surface
+  std::uint64_t refused_warps = 0; ///< where a warp would have joined sheets of the boundary
+  double largest_shift = 0;        ///< of a boundary node from the surface because of that, mm
+};
+
+/// The solid inside the isosurface as tetrahedra (Labelle and Shewchuk, Isosurface Stuffing: Fast
+/// Tetrahedral Meshes with Good Dihedral Angles, 2007): a body-centred cubic lattice; where the
+/// surface cuts one of its edges close to a lattice point, that point is moved there; what is left
+/// is cut by stencils. Inside is value > isovalue, for a level set value < isovalue, in between
+/// voxel centres by trilinear interpolation; cut points are roots of that along the edge (one,
+/// where there are several).
+///
+/// The lattice of a grid with cubic voxels has its axes and its origin, so that with `cell` at the
+/// voxel's edge lattice points are voxel centres; that of any other grid has the axes of the world.
+/// What is smaller than a cell can be lost.
+///
+/// Every dihedral angle lies between stuffing_angle_min and stuffing_angle_max, every tetrahedron
+/// has a positive volume, the boundary is a closed 2-manifold (or several). To keep it one, a warp
+/// after which the tetrahedra at a point would not make a ball or half a ball is taken back, and
+/// cut points near that point are moved away from it along their edges, to alpha at most.
+///
+/// Nodes on the boundary come first, then those inside, each in the order of blocks of 8³ cells by
+/// (i, j, k); the mesh does not depend on the number of threads. Work and memory follow the solid.
+///
+/// \throw Error if the transform is singular or not finite; if the grid is exact only near another
+/// isovalue (band_isovalue); if its background is inside, so that nothing bounds the solid; if a
+/// value at or beside the surface is not finite; if `cell` isn't finite and above 0; if indices
+/// come near the limits of 32 bits; beyond context.max_memory
+TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
+              StuffingReport* report = nullptr);
+
+} // namespace gewebe

@@ -1,0 +1,259 @@
+#include "stuffing/warp_internal.h"
+
+#include "base/disjoint_sets.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "volume/field.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gewebe {
+namespace {
+
+constexpr std::size_t grain = 1024;
+
+/// Fills in all but cuts and warps.
+void gather(const Context& context, const StuffingBlocks& blocks,
+            std::vector<SurfacePoint>& points) {
+  parallel_blocks(context, blocks.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const StuffingBlock& block = blocks[n];
+      std::uint32_t next = block.first_surface;
+      for_each_point(block.surface.set(), [&](unsigned word, unsigned bit) {
+        SurfacePoint& point = points[next++];
+        point.block = static_cast<std::uint32_t>(n);
+        point.word = static_cast<std::uint16_t>(word);
+        point.bit = static_cast<std::uint16_t>(bit);
+        point.inside = block.in(word, bit);
+        const unsigned kind = word / 8;
+        for (unsigned d = 0; d < bcc::directions; ++d) {
+          const Int3 step = bcc::place_step(kind, d);
+          const PlaceInBlock there =
+              locate(block, bcc::kind_after(kind, d),
+                     {static_cast<int>(word % 8) + step[0], static_cast<int>(bit / 8) + step[1],
+                      static_cast<int>(bit % 8) + step[2]});
+          point.neighbours[d] = SurfacePoint::none;
+          if (there.block == StuffingBlock::none)
+            continue;
+          const StuffingBlock& other = blocks[there.block];
+          if (other.surface.contains(there.word, there.bit))
+            point.neighbours[d] = other.surface_point(there.word, there.bit);
+        }
+      });
+    }
+  });
+}
+
+/// Where value - isovalue changes sign between a place inside (share 0) and one outside (1), in the
+/// grid's index space. Regula falsi in the Illinois form (Dowell and Jarratt 1971), every third
+/// step a bisection, so that a field with a jump ends as well.
+class CutFinder {
+public:
+  CutFinder(const Grid& grid, const StuffingLattice& lattice)
+      : field_(grid), isovalue_(lattice.isovalue), sign_(lattice.below ? -1 : 1) {}
+
+  double excess(const Vec3& index) { return sign_ * (field_.value(index) - isovalue_); }
+
+  double find(const Vec3& inside, const Vec3& outside, double excess_inside) {
+    constexpr double tolerance = 1e-9; // of the edge
+    double low = 0, high = 1, at_low = excess_inside, at_high = excess(outside);
+    if (!std::isfinite(at_low) || !std::isfinite(at_high))
+      throw Error("the volume has a value beside the surface that is not finite");
+    int side = 0;
+    double share = 1;
+    for (int round = 1; high - low > tolerance && round < 100; ++round) {
+      share =
+          round % 3 == 0 ? (low + high) / 2 : low + (high - low) * (at_low / (at_low - at_high));
+      if (!(share > low) || !(share < high))
+        break;
+      const double here = excess(inside + (outside - inside) * share);
+      if (here == 0)
+        return share;
+      if (here > 0) {
+        if (std::fabs(share - low) < tolerance)
+          return share;
+        low = share;
+        at_low = here;
+        if (side > 0)
+          at_high /= 2;
+        side = 1;
+      } else {
+        if (std::fabs(high - share) < tolerance)
+          return share;
+        high = share;
+        at_high = here;
+        if (side < 0)
+          at_low /= 2;
+        side = -1;
+      }
+    }
+    return at_low == -at_high ? (low + high) / 2
+                              : low + (high - low) * (at_low / (at_low - at_high));
+  }
+
+private:
+  Field field_;
+  double isovalue_, sign_;
+};
+
+void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& lattice,
+               const StuffingBlocks& blocks, SurfacePoints& surface) {
+  std::vector<SurfacePoint>& points = surface.points;
+  parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
+    CutFinder finder(grid, lattice);
+    for (std::size_t n = begin; n < end; ++n) {
+      SurfacePoint& point = points[n];
+      if (!point.inside)
+        continue;
+      const Vec3 place = bcc::position(point_at(blocks[point.block], point.word, point.bit));
+      const Vec3 index = lattice.to_index.to_world(place);
+      const double excess = finder.excess(index);
+      for (unsigned d = 0; d < bcc::directions; ++d)
+        if (surface.other_side(point, d))
+          point.cuts[d] =
+              finder.find(index, lattice.to_index.to_world(place + bcc::step(d)), excess);
+    }
+  });
+  // The other ends see the same cuts.
+  parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      SurfacePoint& point = points[n];
+      for (unsigned d = 0; d < bcc::directions; ++d)
+        if (!point.inside && surface.other_side(point, d))
+          point.cuts[d] = 1 - points[point.neighbours[d]].cuts[bcc::opposite(d)];
+    }
+  });
+}
+
+/// The direction of the nearest cut point that is nearer than alpha, or SurfacePoint::stays.
+std::uint8_t violated(const SurfacePoints& surface, const SurfacePoint& point) {
+  double least = HUGE_VAL;
+  std::uint8_t result = SurfacePoint::stays;
+  for (unsigned d = 0; d < bcc::directions; ++d) {
+    if (!surface.is_cut(point, d) || !(point.cuts[d] < bcc::alpha(d)))
+      continue;
+    const double distance = point.cuts[d] * (bcc::is_long(d) ? 1 : std::sqrt(0.75));
+    if (distance < least) {
+      least = distance;
+      result = static_cast<std::uint8_t>(d);
+    }
+  }
+  return result;
+}
+
+/// Points of one colour have no edge in common: corners and centres by the parity of their sum.
+unsigned colour(const StuffingBlocks& blocks, const SurfacePoint& point) {
+  const bcc::Point place = point_at(blocks[point.block], point.word, point.bit);
+  return 2 * place.kind +
+         (static_cast<unsigned>(place.place[0] + place.place[1] + place.place[2]) & 1U);
+}
+
+void warp(const Context& context, const StuffingBlocks& blocks, SurfacePoints& surface) {
+  std::vector<SurfacePoint>& points = surface.points;
+  for (unsigned turn = 0; turn < 4; ++turn)
+    parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        if (colour(blocks, points[n]) == turn)
+          points[n].warp = violated(surface, points[n]);
+    });
+}
+
+/// Takes warps back until no point is pinched. It ends, for without any warp none is.
+void keep_manifold(const Context& context, SurfacePoints& surface) {
+  std::vector<SurfacePoint>& points = surface.points;
+  std::vector<std::uint32_t> asked;
+  for (std::size_t n = 0; n < points.size(); ++n)
+    if (points[n].warped())
+      asked.push_back(static_cast<std::uint32_t>(n));
+  while (!asked.empty()) {
+    std::vector<std::uint8_t> pinched(asked.size());
+    parallel_blocks(context, asked.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        pinched[n] = meeting(surface.link_signs(points[asked[n]])) == Meeting::pinched;
+    });
+    std::vector<std::uint32_t> next;
+    for (std::size_t n = 0; n < asked.size(); ++n)
+      if (pinched[n] != 0) {
+        points[asked[n]].warp = SurfacePoint::stays;
+        points[asked[n]].refused = true;
+      }
+    for (std::size_t n = 0; n < asked.size(); ++n)
+      if (pinched[n] != 0)
+        for (const std::uint32_t neighbour : points[asked[n]].neighbours)
+          if (neighbour != SurfacePoint::none && points[neighbour].warped())
+            next.push_back(neighbour);
+    std::sort(next.begin(), next.end());
+    next.erase(std::unique(next.begin(), next.end()), next.end());
+    asked.swap(next);
+  }
+}
+
+} // namespace
+
+LinkSigns SurfacePoints::link_signs(const SurfacePoint& point) const {
+  LinkSigns signs;
+  for (unsigned d = 0; d < bcc::directions; ++d) {
+    const std::uint32_t n = point.neighbours[d];
+    if (n != SurfacePoint::none && points[n].warped())
+      continue;
+    const bool in = n == SurfacePoint::none ? point.inside : points[n].inside;
+    (in ? signs.inside : signs.outside) |= 1U << d;
+  }
+  return signs;
+}
+
+// The link of a point is a sphere of 24 triangles. With the signs of its corners it falls into a
+// part inside and one outside; the inside is half a ball just if both parts are connected (then the
+// curve between them is one), where two triangles are connected across an edge, not at a point.
+Meeting meeting(const LinkSigns& signs) {
+  const auto is = [](std::uint32_t set, unsigned d) { return (set >> d & 1) != 0; };
+  if (signs.inside == 0)
+    return Meeting::nothing;
+  std::array<bool, 24> has_inside{}, has_outside{};
+  for (std::size_t f = 0; f < 24; ++f)
+    for (const std::uint8_t d : bcc::link.faces[f]) {
+      has_inside[f] = has_inside[f] || is(signs.inside, d);
+      has_outside[f] = has_outside[f] || is(signs.outside, d);
+    }
+  DisjointSets inner(24), outer(24);
+  int inner_parts = 0, outer_parts = 0;
+  for (std::size_t f = 0; f < 24; ++f) {
+    inner_parts += has_inside[f] ? 1 : 0;
+    outer_parts += !has_inside[f] || has_outside[f] ? 1 : 0;
+  }
+  for (const bcc::Link::Edge& edge : bcc::link.edges) {
+    const bool in = is(signs.inside, edge.ends[0]) || is(signs.inside, edge.ends[1]);
+    const bool out = is(signs.outside, edge.ends[0]) || is(signs.outside, edge.ends[1]);
+    const bool on = !in && !out; // then each side is what lies beyond
+    const bool beyond0 = is(signs.inside, edge.beyond[0]),
+               beyond1 = is(signs.inside, edge.beyond[1]);
+    if (in || (on && beyond0 && beyond1))
+      inner_parts -= inner.join(edge.faces[0], edge.faces[1]) ? 1 : 0;
+    if (out || (on && !beyond0 && !beyond1))
+      outer_parts -= outer.join(edge.faces[0], edge.faces[1]) ? 1 : 0;
+  }
+  if (inner_parts != 1 || outer_parts > 1)
+    return Meeting::pinched;
+  return outer_parts == 0 ? Meeting::interior : Meeting::boundary;
+}
+
+SurfacePoints warp_lattice(const Context& context, const Grid& grid, const StuffingLattice& lattice,
+                           const StuffingBlocks& blocks) {
+  SurfacePoints surface;
+  if (blocks.empty())
+    return surface;
+  Context quiet = context;
+  quiet.progress = nullptr;
+  const std::size_t count = blocks.back().first_surface + size(blocks.back().surface.set());
+  require_memory(context, static_cast<double>(count) * sizeof(SurfacePoint),
+                 "the lattice points beside the surface");
+  surface.points.resize(count);
+  gather(quiet, blocks, surface.points);
+  find_cuts(quiet, grid, lattice, blocks, surface);
+  warp(quiet, blocks, surface);
+  keep_manifold(quiet, surface);
+  return surface;
+}
+
+} // namespace gewebe
