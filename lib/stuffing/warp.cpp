@@ -1,9 +1,8 @@
 #include "stuffing/warp_internal.h"
 
 #include "base/disjoint_sets.h"
-#include "base/error.h"
 #include "base/parallel.h"
-#include "volume/field.h"
+#include "stuffing/cut_finder_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -44,58 +43,6 @@ void gather(const Context& context, const StuffingBlocks& blocks,
     }
   });
 }
-
-/// Where value - isovalue changes sign between a place inside (share 0) and one outside (1), in the
-/// grid's index space. Regula falsi in the Illinois form (Dowell and Jarratt 1971), every third
-/// step a bisection, so that a field with a jump ends as well.
-class CutFinder {
-public:
-  CutFinder(const Grid& grid, const StuffingLattice& lattice)
-      : field_(grid), isovalue_(lattice.isovalue), sign_(lattice.below ? -1 : 1) {}
-
-  double excess(const Vec3& index) { return sign_ * (field_.value(index) - isovalue_); }
-
-  double find(const Vec3& inside, const Vec3& outside, double excess_inside) {
-    constexpr double tolerance = 1e-9; // of the edge
-    double low = 0, high = 1, at_low = excess_inside, at_high = excess(outside);
-    if (!std::isfinite(at_low) || !std::isfinite(at_high))
-      throw Error("the volume has a value beside the surface that is not finite");
-    int side = 0;
-    double share = 1;
-    for (int round = 1; high - low > tolerance && round < 100; ++round) {
-      share =
-          round % 3 == 0 ? (low + high) / 2 : low + (high - low) * (at_low / (at_low - at_high));
-      if (!(share > low) || !(share < high))
-        break;
-      const double here = excess(inside + (outside - inside) * share);
-      if (here == 0)
-        return share;
-      if (here > 0) {
-        if (std::fabs(share - low) < tolerance)
-          return share;
-        low = share;
-        at_low = here;
-        if (side > 0)
-          at_high /= 2;
-        side = 1;
-      } else {
-        if (std::fabs(high - share) < tolerance)
-          return share;
-        high = share;
-        at_high = here;
-        if (side < 0)
-          at_low /= 2;
-        side = -1;
-      }
-    }
-    return at_low == -at_high ? (low + high) / 2
-                              : low + (high - low) * (at_low / (at_low - at_high));
-  }
-
-private:
-  Field field_;
-  double isovalue_, sign_;
-};
 
 void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& lattice,
                const StuffingBlocks& blocks, SurfacePoints& surface) {

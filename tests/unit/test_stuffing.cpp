@@ -1,0 +1,260 @@
+#include "stuffing/stuffing.h"
+
+#include "base/error.h"
+#include "stuffing/surface_distance.h"
+#include "stuffing/warp_internal.h"
+#include "tests/unit/surface_scenes.h"
+#include "tetrahedra/boundary.h"
+#include "tetrahedra/check.h"
+#include "tetrahedra/components.h"
+#include "tetrahedra/quality.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+#include <span>
+
+namespace gewebe {
+namespace {
+
+using namespace scenes;
+
+constexpr double pi = std::numbers::pi;
+
+GridInfo level_set(const GridTransform& transform, float background) {
+  GridInfo info;
+  info.transform = transform;
+  info.level_set = true;
+  info.background = background;
+  return info;
+}
+
+/// Exact distance to a ball, or to a torus about the z axis, in voxels of `size`.
+Grid ball(double radius, double size, const Vec3& center = {0.13, -0.21, 0.07}) {
+  const int reach = static_cast<int>(std::ceil(radius / size)) + 3;
+  return sample(level_set(uniform_transform(size), 9), {-reach, -reach, -reach},
+                {reach, reach, reach}, [&](int i, int j, int k) {
+                  return norm(Vec3{i * size, j * size, k * size} - center) - radius;
+                });
+}
+Grid torus(double large, double small, double size) {
+  const int reach = static_cast<int>(std::ceil((large + small) / size)) + 3;
+  return sample(level_set(uniform_transform(size), 9), {-reach, -reach, -reach},
+                {reach, reach, reach}, [&](int i, int j, int k) {
+                  const double x = i * size, y = j * size, z = k * size;
+                  return std::hypot(std::hypot(x, y) - large, z) - small;
+                });
+}
+
+/// What stuff() promises of any mesh.
+void expect_kept(const TetMesh& mesh, const StuffingReport& report) {
+  check_mesh(mesh);
+  const TetReport found = examine_tetrahedra(mesh);
+  EXPECT_TRUE(found.sound());
+  EXPECT_EQ(found.inverted.count, 0U);
+  EXPECT_EQ(found.unused_points.count, 0U);
+  EXPECT_TRUE(found.manifold_boundary());
+  const TetBoundary surface = boundary(mesh);
+  ASSERT_EQ(surface.node.size(), report.surface_nodes);
+  for (std::size_t n = 0; n < surface.node.size(); ++n)
+    ASSERT_EQ(surface.node[n], n);
+  if (mesh.tetrahedra.empty())
+    return;
+  const TetQuality quality = tet_quality(mesh, surface);
+  EXPECT_GE(quality.smallest_angle, stuffing_angle_min);
+  EXPECT_LE(quality.largest_angle, stuffing_angle_max);
+  EXPECT_GT(quality.smallest_volume, 0);
+  EXPECT_EQ(report.cut_nodes + report.warped, report.surface_nodes);
+}
+
+TetMesh stuffed(const Grid& grid, const StuffingOptions& options = {}, int threads = 1,
+                StuffingReport* out = nullptr) {
+  Context context;
+  context.threads = threads;
+  StuffingReport report;
+  TetMesh mesh = stuff(context, grid, options, &report);
+  expect_kept(mesh, report);
+  if (out != nullptr)
+    *out = report;
+  return mesh;
+}
+
+TEST(Stuffing, VolumeAndDistanceConvergeWithTheSquareOfTheCell) {
+  struct Shape {
+    Grid grid;
+    double volume;
+    std::int64_t euler;
+  };
+  const std::vector<Shape> shapes{{ball(5, 0.125), 4 * pi / 3 * 125, 2},
+                                  {torus(5, 2, 0.125), 2 * pi * pi * 5 * 4, 0}};
+  for (const Shape& shape : shapes) {
+    std::vector<double> errors, distances;
+    for (const double cell : {1.0, 0.5, 0.25}) {
+      const TetMesh mesh = stuffed(shape.grid, {{}, cell});
+      const TriangleMesh surface = boundary(mesh).mesh;
+      EXPECT_EQ(topology(surface).euler, shape.euler);
+      const SurfaceDistance distance = surface_distance({}, shape.grid, {{}, cell}, surface);
+      EXPECT_EQ(distance.beyond_cell, 0U);
+      errors.push_back(std::fabs(volume(mesh) / shape.volume - 1));
+      EXPECT_LT(distance.largest, 0.16 * cell * cell);
+      distances.push_back(distance.mean);
+    }
+    for (std::size_t n = 1; n < errors.size(); ++n) {
+      EXPECT_GT(errors[n - 1] / errors[n], 3.2) << n;
+      EXPECT_GT(distances[n - 1] / distances[n], 3.2) << n;
+    }
+    EXPECT_LT(errors.back(), 0.004);
+  }
+}
+
+TEST(Stuffing, AnythingKeepsTheBoundsAndAManifold) {
+  // Noise of two values, noise in between, and waves, on straight, mirrored and sheared axes.
+  std::uint64_t refused = 0;
+  for (std::uint32_t seed = 0; seed < 24; ++seed) {
+    std::mt19937 random(seed);
+    const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    GridInfo info;
+    if (seed % 3 == 1)
+      info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
+    if (seed % 3 == 2)
+      info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
+    const double share = 0.2 + 0.6 * uniform();
+    const Grid grid = sample(info, {-8, 0, 0}, {7, 7, 9}, [&](int i, int j, int k) -> double {
+      switch (seed / 3 % 3) {
+      case 0:
+        return uniform() < share ? 1 : 0;
+      case 1:
+        return uniform() + share - 0.5;
+      default:
+        return 0.5 + 0.5 * std::sin(i * 0.9 + seed) * std::cos(j * 1.1) * std::sin(k * 0.8 + 1) +
+               0.1 * (uniform() - 0.5);
+      }
+    });
+    StuffingOptions options;
+    if (seed % 4 != 0)
+      options.cell = 0.45 + uniform();
+    StuffingReport report;
+    const TetMesh one = stuffed(grid, options, 1, &report);
+    const TetMesh two = stuffed(grid, options, 2);
+    EXPECT_EQ(one.tetrahedra, two.tetrahedra);
+    EXPECT_EQ(one.points, two.points);
+    refused += report.refused_warps;
+  }
+  EXPECT_GT(refused, 100U); // the scenes ask for it
+}
+
+TEST(Stuffing, WarpsThatPinchAreSeen) {
+  const auto signs = [](std::initializer_list<unsigned> inside,
+                        std::initializer_list<unsigned> outside) {
+    LinkSigns result;
+    for (const unsigned d : inside)
+      result.inside |= 1U << d;
+    for (const unsigned d : outside)
+      result.outside |= 1U << d;
+    return result;
+  };
+  const LinkSigns all{(1U << bcc::directions) - 1, 0};
+  EXPECT_EQ(meeting(all), Meeting::interior);
+  EXPECT_EQ(meeting({}), Meeting::nothing);
+  EXPECT_EQ(meeting({0, all.inside}), Meeting::nothing);
+  // Half of the sphere above the plane z = 0, with the four points in the plane on the surface.
+  EXPECT_EQ(meeting(signs({5, 10, 11, 12, 13}, {4, 6, 7, 8, 9})), Meeting::boundary);
+  // One corner inside; two opposite ones: the boundary is two cones.
+  EXPECT_EQ(meeting({1U, all.inside & ~1U}), Meeting::boundary);
+  EXPECT_EQ(meeting({3U, all.inside & ~3U}), Meeting::pinched);
+  // Outside at two opposite corners, nothing between: a tunnel that touches itself.
+  EXPECT_EQ(meeting({all.inside & ~3U, 3U}), Meeting::pinched);
+  // Two short directions that share no face, in a surrounding on the surface.
+  EXPECT_EQ(meeting(signs({6, 13}, {})), Meeting::pinched);
+  // They share an edge.
+  EXPECT_EQ(meeting(signs({6, 7}, {})), Meeting::boundary);
+}
+
+TEST(Stuffing, ALatticeOnVoxelCentresHasItsCutsWhereValuesSay) {
+  // A plane between voxels: each point of the boundary lies on it, since long edges are linear and
+  // short ones see a trilinear function that depends on one axis.
+  const double height = 3.3;
+  const Grid grid = sample(GridInfo{}, {0, 0, 0}, {15, 15, 7},
+                           [&](int, int, int k) { return 0.5 + (height - k) / 8.0; });
+  StuffingReport report;
+  const TetMesh mesh = stuffed(grid, {}, 1, &report);
+  std::size_t near = 0;
+  for (const Vec3& p : std::span(mesh.points).first(report.surface_nodes))
+    if (p.x > 1 && p.x < 14 && p.y > 1 && p.y < 14 && p.z > 2) {
+      EXPECT_NEAR(p.z, height, 1e-6); // values are float
+      ++near;
+    }
+  EXPECT_GT(near, 300U);
+}
+
+TEST(Stuffing, ComponentsStayApartAndAreCounted) {
+  const Grid grid = sample(level_set(uniform_transform(0.5), 9), {-8, -8, -8}, {40, 8, 8},
+                           [](int i, int j, int k) {
+                             const Vec3 p{i * 0.5, j * 0.5, k * 0.5};
+                             return std::min(norm(p) - 2, norm(p - Vec3{12, 0, 0}) - 3);
+                           });
+  TetMesh mesh = stuffed(grid);
+  EXPECT_EQ(component_count(mesh), 2U);
+  const double all = volume(mesh);
+  const TetComponentReport report = keep_components(mesh, {1, 0});
+  EXPECT_EQ(report.kept, 1U);
+  EXPECT_EQ(report.dropped, 1U);
+  EXPECT_EQ(component_count(mesh), 1U);
+  EXPECT_NEAR(report.dropped_volume, 4 * pi / 3 * 8, 2);
+  EXPECT_NEAR(volume(mesh) + report.dropped_volume, all, 1e-9 * all);
+  EXPECT_EQ(examine_tetrahedra(mesh).unused_points.count, 0U);
+}
+
+TEST(Stuffing, EmptyAndTiles) {
+  EXPECT_TRUE(stuffed(sample(GridInfo{}, {0, 0, 0}, {7, 7, 7}, [](int, int, int) {
+                return 0.2;
+              })).tetrahedra.empty());
+  // Tiles make the mesh that leaves make.
+  const auto block = [](bool tiles) {
+    return sample(
+        GridInfo{}, {0, 0, 0}, {23, 15, 15}, [](int, int, int) { return 1.0; }, tiles);
+  };
+  const TetMesh with = stuffed(block(true)), without = stuffed(block(false));
+  EXPECT_FALSE(with.tetrahedra.empty());
+  EXPECT_EQ(with.points, without.points);
+  EXPECT_EQ(with.tetrahedra, without.tetrahedra);
+  // A voxel's share of the ramp between the values lies on each side.
+  EXPECT_NEAR(volume(with), 24 * 16 * 16, 0.02 * 24 * 16 * 16);
+}
+
+std::string complaint(const Grid& grid, const StuffingOptions& options = {}) {
+  try {
+    stuff({}, grid, options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Stuffing, WhatItCannotServeIsRefused) {
+  const auto cube = [](GridInfo info, double value) {
+    return sample(
+        info, {0, 0, 0}, {7, 7, 7}, [&](int, int, int) { return value; }, false);
+  };
+  EXPECT_NE(complaint(cube({}, NAN)).find("not finite"), std::string::npos);
+  EXPECT_NE(complaint(cube({}, HUGE_VAL)).find("not finite"), std::string::npos);
+  GridInfo info;
+  info.background = 1;
+  EXPECT_NE(complaint(cube(info, 0)).find("background is inside"), std::string::npos);
+  info = {};
+  info.transform.m[0] = 0;
+  EXPECT_NE(complaint(cube(info, 1)).find("singular"), std::string::npos);
+  info = {};
+  info.band_isovalue = 0.3;
+  EXPECT_NE(complaint(cube(info, 1)).find("--band"), std::string::npos);
+  for (const double cell : std::vector<double>{0, -1, NAN, HUGE_VAL})
+    EXPECT_NE(complaint(cube({}, 1), {{}, cell}).find("a cell of"), std::string::npos);
+  EXPECT_NE(complaint(cube({}, 1), {{}, 1e-12}).find("larger --cell"), std::string::npos);
+  Context little;
+  little.max_memory = 100000;
+  EXPECT_THROW(stuff(little, ball(5, 0.25), {}), Error);
+}
+
+} // namespace
+} // namespace gewebe
