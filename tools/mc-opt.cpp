@@ -187,8 +187,9 @@ void work_solid(cli::Run& run, const Arguments& arguments) {
   stats.set("largest_shift", report.largest_shift);
   run.say(std::to_string(mesh.tetrahedra.size()) + " tetrahedra, " +
           std::to_string(mesh.points.size()) + " points");
-  warn_if_empty(run, mesh.tetrahedra.empty());
-  if (!mesh.tetrahedra.empty() && prepared.before)
+  const bool comparable = prepared.before && prepared.before->components > 0;
+  warn_if_empty(run, mesh.tetrahedra.empty() && !comparable);
+  if (comparable)
     compare_topology(run, arguments.cell ? "--cell" : "--resample", *prepared.before,
                      topology(boundary(mesh).mesh));
   if (!arguments.components.empty()) {

@@ -93,7 +93,7 @@ struct BlockPoints {
   static constexpr unsigned at(unsigned kind, unsigned i, unsigned j, unsigned k) {
     return ((kind * dim + i) * dim + j) * dim + k;
   }
-  std::array<std::int8_t, count> sign{};
+  std::array<int, count> sign{};
   std::array<std::uint32_t, count> node{};    ///< where the sign isn't -1
   std::array<std::uint32_t, count> surface{}; ///< number of the surface point
 };
@@ -124,7 +124,8 @@ void gather(const StuffingBlocks& blocks, const SurfacePoints& surface, const No
             } else if (!surface.points[point].inside)
               continue;
           }
-          points.sign[n] = static_cast<std::int8_t>(points.sign[n] == 0 ? 0 : 1);
+          if (points.sign[n] != 0)
+            points.sign[n] = 1;
           points.node[n] =
               nodes.first_inner[place.block] + nodes.inner[place.block].rank(place.word, place.bit);
         }

@@ -24,8 +24,9 @@ double distance(CutFinder& finder, const StuffingLattice& lattice, const GridTra
   const double here = finder.excess(index(0));
   if (here == 0)
     return 0;
-  for (double reach = lattice.cell / 64; reach <= lattice.cell; reach *= 2)
-    for (const double t : {reach, -reach}) {
+  for (int halvings = 6; halvings >= 0; --halvings)
+    for (const double sign : {1.0, -1.0}) {
+      const double reach = std::ldexp(lattice.cell, -halvings), t = sign * reach;
       const double there = finder.excess(index(t));
       if ((here > 0) == (there > 0))
         continue;
