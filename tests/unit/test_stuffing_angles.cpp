@@ -10,6 +10,7 @@
 #include "stuffing/bcc_internal.h"
 #include "stuffing/stencils_internal.h"
 #include "stuffing/stuffing.h"
+#include "tests/unit/larger.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +61,7 @@ double least(const Bernstein<N>& a) {
   double result = HUGE_VAL;
   for (const auto& row : a.c)
     for (const double value : row)
-      result = std::min(result, value);
+      result = test::smaller(result, value);
   return result;
 }
 
@@ -261,8 +262,8 @@ Extremes angles(const Stencil& cut, const StencilTetrahedra& tetrahedra,
     }
     for (std::size_t f = 0; f < 4; ++f)
       for (std::size_t g = 0; g < f; ++g) {
-        result.least = std::min(result.least, angle(p, f, g));
-        result.largest = std::max(result.largest, angle(p, f, g));
+        result.least = test::smaller(result.least, angle(p, f, g));
+        result.largest = test::larger(result.largest, angle(p, f, g));
       }
   }
   return result;
@@ -296,8 +297,8 @@ TEST(StuffingAngles, TheBetterOfTwoCutsKeepsThemByFar) {
       const Extremes one = angles(cut, cut.tetrahedra, shares),
                      other = angles(cut, cut.other, shares);
       const Extremes& taken = one.least >= other.least ? one : other;
-      all.least = std::min(all.least, taken.least);
-      all.largest = std::max(all.largest, taken.largest);
+      all.least = test::smaller(all.least, taken.least);
+      all.largest = test::larger(all.largest, taken.largest);
     }
     EXPECT_GT(all.least, stuffing_angle_min + 1);
     EXPECT_LT(all.largest, stuffing_angle_max - 1);
