@@ -1,7 +1,7 @@
 // Cuts: what they sever when they take effect, what comes off, what it means for the methods.
 
 #include "base/vector_at.h"
-#include "compliance/cut_stiffness.h"
+#include "cutting/cut_stiffness.h"
 #include "scene/rules_internal.h"
 #include "solve/condition.h"
 

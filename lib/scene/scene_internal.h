@@ -4,7 +4,7 @@
 // (factors, columns, running sums) stands beside it: see Statics and Body.
 
 #include "base/copy_on_write.h"
-#include "compliance/cut_stiffness.h"
+#include "cutting/cut_stiffness.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/static_contact.h"

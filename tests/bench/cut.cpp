@@ -7,9 +7,9 @@
 // percentile in ms, a figure and its unit.
 
 #include "compliance/axis_solver.h"
-#include "compliance/cut_stiffness.h"
-#include "compliance/stiffness_change.h"
-#include "compliance/woodbury.h"
+#include "cutting/cut_stiffness.h"
+#include "cutting/stiffness_change.h"
+#include "cutting/woodbury.h"
 #include "model/build.h"
 #include "solve/stiffness.h"
 #include "tests/bench/timing.h"

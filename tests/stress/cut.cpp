@@ -4,7 +4,7 @@
 // held before the cut. Argument: how many cuts (default 200).
 
 #include "compliance/axis_solver.h"
-#include "compliance/cut_stiffness.h"
+#include "cutting/cut_stiffness.h"
 #include "model/build.h"
 #include "solve/condition.h"
 #include "solve/stiffness.h"

@@ -1,6 +1,6 @@
 // The columns that a cut model takes over, as they go to a store.
 
-#include "compliance/corrected_compliance.h"
+#include "cutting/corrected_compliance.h"
 
 #include "base/error.h"
 #include "compliance/compliance_columns.h"

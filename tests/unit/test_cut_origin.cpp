@@ -3,7 +3,7 @@
 #include "model/cut_origin.h"
 
 #include "base/error.h"
-#include "compliance/stiffness_change.h"
+#include "cutting/stiffness_change.h"
 #include "model/cut.h"
 #include "stiffness_models.h"
 

@@ -1,6 +1,6 @@
 // The stiffness of an object that is cut: whichever way it is followed, equal to a fresh one.
 
-#include "compliance/cut_stiffness.h"
+#include "cutting/cut_stiffness.h"
 
 #include "compliance/axis_solver.h"
 #include "mesh_fixtures.h"

@@ -1,11 +1,11 @@
 // What a cut changes: against matrices, factors and columns made afresh.
 
-#include "compliance/stiffness_change.h"
+#include "cutting/stiffness_change.h"
 
 #include "compliance/compliance_columns.h"
-#include "compliance/corrected_columns.h"
-#include "compliance/woodbury.h"
 #include "cut_models.h"
+#include "cutting/corrected_columns.h"
+#include "cutting/woodbury.h"
 #include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"

@@ -1,8 +1,8 @@
 #include "tools/store/store_update.h"
 
 #include "compliance/axis_solver.h"
-#include "compliance/corrected_columns.h"
-#include "compliance/corrected_compliance.h"
+#include "cutting/corrected_columns.h"
+#include "cutting/corrected_compliance.h"
 #include "formats/model/ela.h"
 #include "model/cut_origin.h"
 #include "solve/condition.h"

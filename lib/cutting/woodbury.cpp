@@ -1,4 +1,4 @@
-#include "compliance/woodbury.h"
+#include "cutting/woodbury.h"
 
 #include "base/error.h"
 #include "base/parallel.h"

@@ -1,7 +1,7 @@
 #pragma once
 // The body of response_sum_*.cpp, each of which compiles it for its instruction set.
 
-#include "compliance/response_sum.h"
+#include "cutting/response_sum.h"
 
 namespace gewebe {
 namespace {

@@ -1,9 +1,9 @@
-#include "compliance/corrected_columns.h"
+#include "cutting/corrected_columns.h"
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "compliance/costs.h"
-#include "compliance/response_sum.h"
+#include "cutting/response_sum.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include "base/context.h"
 #include "compliance/compliance_source.h"
-#include "compliance/woodbury.h"
+#include "cutting/woodbury.h"
 #include "model/model.h"
 #include "solve/frontal_factor.h"
 

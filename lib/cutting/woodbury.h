@@ -2,7 +2,7 @@
 // A cut model solved with the factor of the model before.
 
 #include "base/context.h"
-#include "compliance/stiffness_change.h"
+#include "cutting/stiffness_change.h"
 
 #include <cstddef>
 #include <memory>

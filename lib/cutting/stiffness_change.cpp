@@ -1,4 +1,4 @@
-#include "compliance/stiffness_change.h"
+#include "cutting/stiffness_change.h"
 
 #include "base/error.h"
 #include "base/parallel.h"

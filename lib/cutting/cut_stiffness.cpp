@@ -1,9 +1,9 @@
-#include "compliance/cut_stiffness.h"
+#include "cutting/cut_stiffness.h"
 
 #include "base/error.h"
-#include "compliance/corrected_columns.h"
 #include "compliance/costs.h"
 #include "compliance/forward_blocks.h"
+#include "cutting/corrected_columns.h"
 #include "model/cut.h"
 #include "solve/condition.h"
 #include "solve/factor.h"

@@ -1,4 +1,4 @@
-#include "compliance/corrected_compliance.h"
+#include "cutting/corrected_compliance.h"
 
 #include "base/error.h"
 #include "compliance/compliance_columns.h"

@@ -4,7 +4,7 @@
 
 #include "base/columns.h"
 #include "base/context.h"
-#include "compliance/stiffness_change.h"
+#include "cutting/stiffness_change.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "compliance/response_sum_body_internal.h"
+#include "cutting/response_sum_body_internal.h"
 
 namespace gewebe {
 

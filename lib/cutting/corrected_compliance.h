@@ -5,7 +5,7 @@
 #include "base/columns.h"
 #include "base/context.h"
 #include "compliance/axis_solver.h"
-#include "compliance/corrected_columns.h"
+#include "cutting/corrected_columns.h"
 #include "solve/stiffness.h"
 
 #include <cstddef>
