@@ -15,6 +15,10 @@ bool states_its_unit(Kind kind) {
   return kind == Kind::gltf || kind == Kind::glb || kind == Kind::dae;
 }
 
+bool has_tetrahedra(Kind kind) {
+  return kind == Kind::vtu || kind == Kind::msh || kind == Kind::medit || kind == Kind::tetgen;
+}
+
 std::string list(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words)
@@ -35,11 +39,13 @@ bool contains(const std::vector<Kind>& kinds, Kind kind) {
 
 void check_readable(const Input& input, const MeshReadOptions& options) {
   if (!contains(readable_mesh_kinds(), options.kind))
-    throw Error(input.name(), (options.kind == Kind::unknown
-                                   ? std::string("the format is not known")
-                                   : std::string(kind_name(options.kind)) + " is no mesh") +
-                                  ", expected one of " + list(readable_mesh_kinds()) +
-                                  " by content, suffix or --format");
+    throw Error(
+        input.name(),
+        (options.kind == Kind::unknown
+             ? std::string("the format is not known")
+             : std::string(kind_name(options.kind)) +
+                   (has_tetrahedra(options.kind) ? " is a tetrahedral mesh" : " is no mesh")) +
+            ", expected one of " + list(readable_mesh_kinds()) + " by content, suffix or --format");
   if (!options.unit.empty()) {
     millimetres_per(options.unit);
     if (states_its_unit(options.kind))

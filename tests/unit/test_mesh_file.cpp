@@ -441,6 +441,8 @@ TEST(MeshFile, ComplaintsNameTheFile) {
   const std::string unknown = put(folder / "m.xyz", "1 2 3\n");
   EXPECT_NE(complaint([&] { read(unknown); }).find("expected one of ply, obj"), std::string::npos);
   EXPECT_NE(complaint([&] { read(put(folder / "m.glb", "glTF")); }), "");
+  const std::string solid = put(folder / "m.mesh", "MeshVersionFormatted 2\n");
+  EXPECT_TRUE(complaint([&] { read(solid); }).starts_with(solid + ": medit is a tetrahedral mesh"));
 }
 
 TEST(MeshFile, EveryPrefixOfSmallFilesEndsInOrder) {
