@@ -83,7 +83,7 @@ public:
   /// Columns of K⁻¹ side by side, without the copies that `solve` makes: x[k][c] is the entry of
   /// row permutation[k] in column permutation[places[c]], with the permutation of view(). Returns
   /// how many numbers lie between one k and the next, places.size() rounded up. Otherwise as
-  /// `solve`, with the same bits. \pre at most most_units places
+  /// `solve`, with the same bits. \pre at most max_units places
   std::size_t solve_units(std::span<const std::int64_t> places, std::vector<double>& x) const;
 
 private:
