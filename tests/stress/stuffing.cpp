@@ -4,12 +4,12 @@
 // comes first, no unused node. Argument: number of scenes (default 2000).
 
 #include "stuffing/stuffing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
 #include "tetrahedra/quality.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <exception>
@@ -78,9 +78,9 @@ void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) 
   }
   totals.tetrahedra += mesh.tetrahedra.size();
   totals.refused += report.refused_warps;
-  totals.smallest = std::min(totals.smallest, quality.smallest_angle);
-  totals.largest = std::max(totals.largest, quality.largest_angle);
-  totals.shift = std::max(totals.shift, report.largest_shift / report.cell);
+  totals.smallest = test::smaller(totals.smallest, quality.smallest_angle);
+  totals.largest = test::larger(totals.largest, quality.largest_angle);
+  totals.shift = test::larger(totals.shift, report.largest_shift / report.cell);
 }
 
 int run(std::uint32_t scenes) {

@@ -1,6 +1,7 @@
 #include "stuffing/stuffing.h"
 
 #include "base/error.h"
+#include "stuffing/materials.h"
 #include "stuffing/surface_distance.h"
 #include "stuffing/warp_internal.h"
 #include "tests/unit/surface_scenes.h"
@@ -204,6 +205,27 @@ TEST(Stuffing, ComponentsStayApartAndAreCounted) {
   EXPECT_NEAR(report.dropped_volume, 4 * pi / 3 * 8, 2);
   EXPECT_NEAR(volume(mesh) + report.dropped_volume, all, 1e-9 * all);
   EXPECT_EQ(examine_tetrahedra(mesh).unused_points.count, 0U);
+}
+
+TEST(Stuffing, MaterialsFollowTheirVolumes) {
+  TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.5});
+  const Grid tumour = ball(2, 0.2, {0.3, 0, 0}), core = ball(1, 0.3, {0.3, 0, 0});
+  const std::vector<Grid> volumes{tumour, core};
+  set_materials({}, volumes, mesh);
+  ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    Vec3 centroid;
+    for (const std::uint32_t corner : mesh.tetrahedra[t])
+      centroid += mesh.points[corner] / 4;
+    const double r = norm(centroid - Vec3{0.3, 0, 0});
+    if (std::fabs(r - 1) > 0.05 && std::fabs(r - 2) > 0.05) {
+      ASSERT_EQ(mesh.material[t], r < 1 ? 2 : r < 2 ? 1 : 0) << r;
+    }
+  }
+  const TetQuality quality = tet_quality(mesh);
+  ASSERT_EQ(quality.materials.size(), 3U);
+  EXPECT_NEAR(quality.materials[1].volume, 4 * pi / 3 * 7, 1.5);
+  EXPECT_NEAR(quality.materials[2].volume, 4 * pi / 3, 0.5);
 }
 
 TEST(Stuffing, EmptyAndTiles) {

@@ -1,0 +1,38 @@
+#include "tools/mesh/mesh_arguments.h"
+
+#include "base/error.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "tools/shared/surface_choice.h"
+
+#include <algorithm>
+
+namespace gewebe {
+
+void check(const MeshArguments& arguments) {
+  component_choice(arguments.components);
+  box_of(arguments.box);
+  if (!arguments.tets && arguments.cell)
+    throw UsageError("--cell is for --tets, expected both (--resample gives a surface's spacing)");
+  if (!arguments.tets && !arguments.materials.empty())
+    throw UsageError("--materials is for --tets, expected both");
+  const auto refuse = [&](bool given, const char* option) {
+    if (arguments.tets && given)
+      throw UsageError(std::string(option) + " is for surfaces, expected it without --tets");
+  };
+  refuse(arguments.epsilon.has_value(), "--epsilon");
+  refuse(!arguments.place.empty(), "--place");
+  refuse(arguments.rounds > 0, "--regularize");
+  refuse(arguments.normals, "--normals");
+  refuse(arguments.self_intersections, "--self-intersections");
+}
+
+std::vector<Kind> writable_kinds() {
+  std::vector<Kind> kinds = writable_mesh_kinds();
+  for (const Kind kind : writable_tet_kinds())
+    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
+      kinds.push_back(kind);
+  return kinds;
+}
+
+} // namespace gewebe

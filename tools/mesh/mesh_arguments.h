@@ -1,0 +1,27 @@
+#pragma once
+// What mc-opt is asked for.
+
+#include "formats/stream/kind.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+
+struct MeshArguments {
+  std::string volume = "-", place, components, materials;
+  std::optional<double> isovalue, voxel, epsilon, cell;
+  std::vector<double> box; // x0 y0 z0 x1 y1 z1
+  std::int64_t rounds = 0;
+  bool tets = false, normals = false, self_intersections = false;
+};
+
+/// \throw UsageError for options that don't go together
+void check(const MeshArguments& arguments);
+
+/// The kinds of surfaces and of tetrahedra.
+std::vector<Kind> writable_kinds();
+
+} // namespace gewebe

@@ -1,0 +1,78 @@
+#include "formats/mesh/mesh_file.h"
+#include "surface/gradient_normals.h"
+#include "surface/marching_cubes.h"
+#include "surface/regularize.h"
+#include "surface/snapping.h"
+#include "tools/mesh/mesh_work.h"
+#include "tools/mesh/prepared_volume.h"
+#include "tools/shared/surface_choice.h"
+#include "tools/shared/surface_report.h"
+
+#include <string>
+
+namespace gewebe {
+namespace {
+
+/// What the options ask for beyond the snapped mesh.
+void refine(cli::Run& run, const MeshArguments& arguments, const Grid& grid, double isovalue,
+            TriangleMesh& mesh) {
+  const Context& context = run.context();
+  cli::Stats& stats = run.stats();
+  if (!arguments.components.empty()) {
+    const ComponentReport report = keep_components(mesh, component_choice(arguments.components));
+    warn_of_components(run, report.kept, report.dropped);
+    stats.set("components_dropped", report.dropped);
+    stats.set("points_dropped", report.dropped_points);
+    stats.set("triangles_dropped", report.dropped_triangles);
+    stats.set("volume_dropped", report.dropped_volume);
+    stats.set("largest_dropped", report.largest_dropped);
+    stats.set("points", mesh.points.size());
+    stats.set("triangles", mesh.triangles.size());
+  }
+  if (arguments.rounds > 0) {
+    const RegularizeReport report = run.timed("regularize", [&] {
+      return regularize(context, grid, isovalue, mesh, {static_cast<int>(arguments.rounds)});
+    });
+    stats.set("edges_flipped", report.flips);
+    stats.set("moves", report.moves);
+    stats.set("moves_refused", report.refused_moves);
+    stats.set("points_kept", report.kept_points);
+  }
+  if (arguments.normals)
+    stats.set("normals_of_faces", run.timed("normals", [&] {
+      return gradient_normals(context, grid, mesh).from_faces;
+    }));
+}
+
+} // namespace
+
+void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
+  const Kind kind = output_kind(run.to(), run.output(), Kind::ply, writable_mesh_kinds());
+  Output output(run.output(), run.output_options(is_binary(kind)));
+  Input input(arguments.volume);
+  const Context& context = run.context();
+  const PreparedVolume prepared = prepare(run, arguments, input);
+  const IsoSurface surface = at(input.name(), [&] {
+    return run.timed("marching_cubes", [&] {
+      return marching_cubes_to_snap(context, prepared.grid, arguments.isovalue);
+    });
+  });
+  SnapOptions options;
+  options.epsilon = arguments.epsilon.value_or(options.epsilon);
+  options.place =
+      arguments.place == "corner" ? SnapOptions::Place::corner : SnapOptions::Place::mean;
+  SnapResult snapped = run.timed("snap", [&] { return snap(context, surface, options); });
+  cli::report_meshing(run.stats(), prepared.grid, surface, snapped.report);
+  run.say(std::to_string(snapped.report.points_before) + " points, " +
+          std::to_string(snapped.report.points_after) + " after snapping");
+  warn_if_empty(run, snapped.mesh.triangles.empty());
+  if (!snapped.mesh.triangles.empty() && prepared.before)
+    compare_topology(run, "--resample", *prepared.before, topology(snapped.mesh));
+  refine(run, arguments, prepared.grid, prepared.isovalue, snapped.mesh);
+  run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
+  output.commit();
+  if (run.stats_wanted())
+    run.timed("examine", [&] { report_surface(run, snapped.mesh, arguments.self_intersections); });
+}
+
+} // namespace gewebe

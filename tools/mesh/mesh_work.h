@@ -1,0 +1,14 @@
+#pragma once
+// What mc-opt does.
+
+#include "tools/mesh/mesh_arguments.h"
+#include "tools/shared/cli.h"
+
+namespace gewebe {
+
+/// The isosurface as triangles.
+void mesh_surface(cli::Run& run, const MeshArguments& arguments);
+/// What lies inside as tetrahedra.
+void mesh_solid(cli::Run& run, const MeshArguments& arguments);
+
+} // namespace gewebe

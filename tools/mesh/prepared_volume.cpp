@@ -1,0 +1,75 @@
+#include "tools/mesh/prepared_volume.h"
+
+#include "formats/volume/volume_file.h"
+#include "surface/marching_cubes.h"
+#include "tools/shared/distrust.h"
+#include "tools/shared/surface_choice.h"
+#include "volume/crop.h"
+#include "volume/resample.h"
+
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+namespace {
+
+/// Of the surface that is asked for, on the volume as it came.
+Topology topology_of(const Context& context, const Grid& grid, const MeshArguments& arguments) {
+  if (arguments.box.empty())
+    return topology(marching_cubes(context, grid, arguments.isovalue).mesh);
+  const double isovalue = arguments.isovalue.value_or(default_isovalue(grid.info()));
+  const Grid part = crop(context, grid, box_of(arguments.box), isovalue);
+  return topology(marching_cubes(context, part, arguments.isovalue).mesh);
+}
+
+} // namespace
+
+void compare_topology(cli::Run& run, const char* option, const Topology& before,
+                      const Topology& after) {
+  run.stats().set("components_before", before.components);
+  run.stats().set("euler_before", before.euler);
+  if (before == after)
+    return;
+  cli::distrust(run, "mc-opt",
+                std::string(option) + " changes the surface from " +
+                    std::to_string(before.components) +
+                    (before.components == 1 ? " component" : " components") + " and Euler number " +
+                    std::to_string(before.euler) + " to " + std::to_string(after.components) +
+                    " and " + std::to_string(after.euler) + ", expected the same of finer " +
+                    (option == std::string_view("--cell") ? "cells" : "voxels"));
+}
+
+void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped) {
+  run.say(std::to_string(dropped) + " components dropped, " + std::to_string(kept) + " kept");
+  if (kept == 0 && dropped > 0)
+    run.warn("no component is as large as --components asks");
+}
+
+PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input) {
+  const Context& context = run.context();
+  PreparedVolume result;
+  result.grid = run.timed("read", [&] { return read_volume(input, context); });
+  result.isovalue = arguments.isovalue.value_or(default_isovalue(result.grid.info()));
+  at(input.name(), [&] {
+    if (arguments.voxel || arguments.cell)
+      result.before =
+          run.timed("topology", [&] { return topology_of(context, result.grid, arguments); });
+    if (arguments.voxel)
+      result.grid = run.timed("resample", [&] {
+        return resample(context, result.grid, uniform_transform(*arguments.voxel));
+      });
+    if (!arguments.box.empty())
+      result.grid = run.timed("crop", [&] {
+        return crop(context, result.grid, box_of(arguments.box), result.isovalue);
+      });
+  });
+  return result;
+}
+
+void warn_if_empty(cli::Run& run, bool empty) {
+  if (empty)
+    cli::distrust(run, "mc-opt",
+                  "the surface is empty: no value lies across the isovalue from another");
+}
+
+} // namespace gewebe

@@ -1,0 +1,29 @@
+#pragma once
+// The volume that mc-opt meshes, and what it says of its surface.
+
+#include "formats/stream/stream.h"
+#include "mesh/components.h"
+#include "tools/mesh/mesh_arguments.h"
+#include "tools/shared/cli.h"
+#include "volume/grid.h"
+
+#include <optional>
+
+namespace gewebe {
+
+/// The volume as it is meshed, and the topology of its surface as it came where that may change.
+struct PreparedVolume {
+  Grid grid;
+  double isovalue = 0;
+  std::optional<Topology> before;
+};
+
+PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input);
+
+/// Warns where `option` changed the topology.
+void compare_topology(cli::Run& run, const char* option, const Topology& before,
+                      const Topology& after);
+void warn_if_empty(cli::Run& run, bool empty);
+void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped);
+
+} // namespace gewebe
