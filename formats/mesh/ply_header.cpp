@@ -1,5 +1,5 @@
-#include "base/error.h"
 #include "formats/mesh/ply_header.h"
+#include "base/error.h"
 
 #include <algorithm>
 #include <array>
