@@ -1,58 +1,22 @@
 #include "formats/mesh/obj_stl.h"
 
 #include "base/error.h"
+#include "formats/stream/pieces.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <string>
-#include <type_traits>
 #include <unordered_map>
 #include <vector>
 
 namespace gewebe {
 namespace {
 
-using Sink = std::function<void(std::string_view)>;
-
-// Collects small pieces into large ones.
-class Buffer {
-public:
-  explicit Buffer(const Sink& sink) : sink_(sink) {}
-
-  Buffer& operator<<(std::string_view text) {
-    bytes_ += text;
-    if (bytes_.size() >= piece)
-      flush();
-    return *this;
-  }
-  template <class Number>
-    requires std::is_arithmetic_v<Number>
-  Buffer& operator<<(Number value) {
-    std::array<char, 32> text;
-    const char* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-    return *this << std::string_view(text.data(), static_cast<std::size_t>(end - text.data()));
-  }
-  template <class T>
-  void put(const T& value) {
-    *this << std::string_view(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  void flush() {
-    sink_(bytes_);
-    bytes_.clear();
-  }
-
-private:
-  static constexpr std::size_t piece = 1 << 18;
-  const Sink& sink_;
-  std::string bytes_;
-};
-
 // Writes each distinct pair s t once, in order of first use; gives the number of each corner's,
 // from 1.
-std::vector<std::array<std::uint32_t, 3>> write_texcoords(const TriangleMesh& mesh, Buffer& out) {
+std::vector<std::array<std::uint32_t, 3>> write_texcoords(const TriangleMesh& mesh, Pieces& out) {
   std::vector<std::array<std::uint32_t, 3>> numbers(mesh.texcoords.size());
   std::unordered_map<std::uint64_t, std::uint32_t> seen;
   for (std::size_t t = 0; t < mesh.texcoords.size(); ++t)
@@ -80,7 +44,7 @@ float single(double value) {
 } // namespace
 
 void write_obj(const TriangleMesh& mesh, const Sink& sink) {
-  Buffer out(sink);
+  Pieces out(sink);
   out << "# gewebe_mesh, millimetres\n";
   for (const Vec3& p : mesh.points)
     out << "v " << p.x << " " << p.y << " " << p.z << "\n";
@@ -111,7 +75,7 @@ void write_stl(const TriangleMesh& mesh, const Sink& sink) {
   if (mesh.triangles.size() > UINT32_MAX)
     throw Error(std::to_string(mesh.triangles.size()) + " triangles, expected at most " +
                 std::to_string(UINT32_MAX) + " in an STL file");
-  Buffer out(sink);
+  Pieces out(sink);
   std::array<char, 80> head{}; // must not begin with "solid"
   const std::string_view title = "binary STL by gewebe, millimetres";
   std::copy(title.begin(), title.end(), head.begin());

@@ -10,15 +10,6 @@
 namespace gewebe {
 namespace tet {
 
-std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text.substr(0, 40))
-    out += c >= ' ' && c <= '~' ? c : '?';
-  if (text.size() > 40)
-    out += "...";
-  return out + '"';
-}
-
 void Words::fail(const std::string& what) const {
   const std::string_view before = bytes_.substr(0, std::min(last_, bytes_.size()));
   throw Error(name_ + ":" + std::to_string(1 + std::ranges::count(before, '\n')), what);
@@ -170,7 +161,7 @@ void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& op
   beside.commit();
 }
 
-void write_to(const TetMesh& mesh, Kind kind, const tet::Sink& sink) {
+void write_to(const TetMesh& mesh, Kind kind, const Sink& sink) {
   if (kind == Kind::ply)
     tet::write_ply(mesh, sink);
   else if (kind == Kind::vtu)

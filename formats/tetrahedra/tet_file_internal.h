@@ -2,6 +2,8 @@
 // What the readers and writers of tetrahedral meshes share.
 
 #include "base/error.h"
+#include "formats/mesh/ply_header.h"
+#include "formats/stream/pieces.h"
 #include "formats/tetrahedra/tet_file.h"
 
 #include <array>
@@ -22,8 +24,6 @@ namespace gewebe::tet {
 
 static_assert(std::endian::native == std::endian::little, "the codecs copy little-endian memory");
 
-using Sink = std::function<void(std::string_view)>;
-
 TetMesh read_ply(std::string_view bytes, const std::string& name, TetReadStats& stats);
 TetMesh read_vtu(std::string_view bytes, const std::string& name, TetReadStats& stats);
 TetMesh read_msh(std::string_view bytes, const std::string& name, TetReadStats& stats);
@@ -36,8 +36,7 @@ void write_medit(const TetMesh& mesh, const Sink& sink);
 void write_node(const TetMesh& mesh, const Sink& sink);
 void write_ele(const TetMesh& mesh, const Sink& sink);
 
-/// A word as messages show it.
-std::string quoted(std::string_view text);
+using ply::quoted;
 
 /// Words of a text, apart by blanks and line ends; where `comment` stands at the start of a word,
 /// the rest of the line is one. A NUL stands for no comments.
@@ -115,42 +114,6 @@ public:
 private:
   std::array<std::uint32_t, 10> nodes_{};
   std::size_t size_ = 4;
-};
-
-/// Collects text and bytes into large pieces.
-class Pieces {
-public:
-  explicit Pieces(const Sink& sink) : sink_(sink) {}
-  Pieces(const Pieces&) = delete;
-  Pieces& operator=(const Pieces&) = delete;
-
-  Pieces& operator<<(std::string_view text) {
-    bytes_ += text;
-    if (bytes_.size() >= piece)
-      flush();
-    return *this;
-  }
-  /// The shortest text that reads back exactly.
-  template <class Number>
-    requires std::is_arithmetic_v<Number>
-  Pieces& operator<<(Number value) {
-    std::array<char, 32> text;
-    const char* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-    return *this << std::string_view(text.data(), static_cast<std::size_t>(end - text.data()));
-  }
-  template <class T>
-  void put(const T& value) {
-    *this << std::string_view(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  void flush() {
-    sink_(bytes_);
-    bytes_.clear();
-  }
-
-private:
-  static constexpr std::size_t piece = 1 << 18;
-  const Sink& sink_;
-  std::string bytes_;
 };
 
 } // namespace gewebe::tet
