@@ -1,5 +1,6 @@
 // mc-opt: volume -> triangle mesh of its isosurface, or tetrahedra of what lies inside.
 
+#include "stuffing/stuffing.h"
 #include "tools/mesh/mesh_arguments.h"
 #include "tools/mesh/mesh_work.h"
 #include "tools/shared/cli.h"
@@ -42,6 +43,10 @@ int main(int argc, char** argv) {
       .option("--cell", arguments.cell, "S",
               "with --tets: cells of S mm, each of 12 tetrahedra (default: the voxel)")
       .positive();
+  program
+      .option("--grade", arguments.grade, "G",
+              "with --tets: cells double inwards up to G times, the boundary stays (default 0)")
+      .range(0, stuffing_grade_max);
   program.option("--materials", arguments.materials, "VDB[,VDB...]",
                  "with --tets: material 1, 2 … where the volume's inside is, else 0");
   program.output_kinds(writable_kinds());

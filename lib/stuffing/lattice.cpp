@@ -180,36 +180,18 @@ void link_blocks(StuffingBlocks& blocks) {
                             block.origin[2] + leaf_dim * z});
 }
 
-/// Word i of the points of `kind` at a step of -1, 0 or 1 along each axis from those of a block.
-std::uint64_t shifted_word(const StuffingBlocks& blocks, const StuffingBlock& block, unsigned kind,
-                           int i, const Int3& step) {
-  constexpr std::uint64_t column = 0x0101010101010101U;
-  const int slice = i + step[0];
-  const int x = slice < 0 ? -1 : slice >= leaf_dim ? 1 : 0;
-  const auto word = [&](int y, int z) -> std::uint64_t {
-    const std::uint32_t n = block.neighbours[static_cast<std::size_t>(9 * x + 3 * y + z + 13)];
-    return n == StuffingBlock::none ? 0
-                                    : blocks[n].inside[8 * kind + static_cast<unsigned>(slice & 7)];
-  };
-  const auto row = [&](int y) {
-    if (step[2] == 0)
-      return word(y, 0);
-    return step[2] > 0 ? (word(y, 0) >> 1 & ~(column << 7)) | (word(y, 1) & column) << 7
-                       : (word(y, 0) << 1 & ~column) | (word(y, -1) >> 7 & column);
-  };
-  if (step[1] == 0)
-    return row(0);
-  return step[1] > 0 ? row(0) >> 8 | row(1) << 56 : row(0) << 8 | row(-1) >> 56;
-}
-
 void find_surface(const StuffingBlocks& blocks, StuffingBlock& block) {
+  const auto inside_word = [](const StuffingBlock& there, unsigned word) {
+    return there.inside[word];
+  };
   PointSet surface{};
   for (unsigned w = 0; w < 16; ++w) {
     const unsigned kind = w / 8;
     std::uint64_t differs = 0;
     for (unsigned d = 0; d < bcc::directions; ++d)
       differs |= block.inside[w] ^ shifted_word(blocks, block, bcc::kind_after(kind, d),
-                                                static_cast<int>(w % 8), bcc::place_step(kind, d));
+                                                static_cast<int>(w % 8), bcc::place_step(kind, d),
+                                                inside_word);
     surface[w] = differs;
   }
   block.surface = PointRanks(surface);

@@ -107,6 +107,32 @@ inline PlaceInBlock locate(const StuffingBlock& block, unsigned kind, const Int3
           static_cast<unsigned>((place[1] & 7) << 3 | (place[2] & 7))};
 }
 
+/// Word i of a set of the points of `kind` at a step of -1, 0 or 1 along each axis from those of a
+/// block. \param word_of called with a block and a number of word \return 0 bits for points of
+/// blocks that are not there
+template <class WordOf>
+std::uint64_t shifted_word(const StuffingBlocks& blocks, const StuffingBlock& block, unsigned kind,
+                           int i, const Int3& step, WordOf&& word_of) {
+  constexpr std::uint64_t column = 0x0101010101010101U;
+  const int slice = i + step[0];
+  const int x = slice < 0 ? -1 : slice >= leaf_dim ? 1 : 0;
+  const auto word = [&](int y, int z) -> std::uint64_t {
+    const std::uint32_t n = block.neighbours[static_cast<std::size_t>(9 * x + 3 * y + z + 13)];
+    return n == StuffingBlock::none
+               ? 0
+               : word_of(blocks[n], 8 * kind + static_cast<unsigned>(slice & 7));
+  };
+  const auto row = [&](int y) {
+    if (step[2] == 0)
+      return word(y, 0);
+    return step[2] > 0 ? (word(y, 0) >> 1 & ~(column << 7)) | (word(y, 1) & column) << 7
+                       : (word(y, 0) << 1 & ~column) | (word(y, -1) >> 7 & column);
+  };
+  if (step[1] == 0)
+    return row(0);
+  return step[1] > 0 ? row(0) >> 8 | row(1) << 56 : row(0) << 8 | row(-1) >> 56;
+}
+
 /// \throw Error if a value that is looked at is not finite; if indices come near the limits of 32
 /// bits; beyond context.max_memory
 StuffingBlocks stuffing_blocks(const Context& context, const Grid& grid,

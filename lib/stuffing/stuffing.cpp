@@ -3,7 +3,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "stuffing/bcc_internal.h"
+#include "stuffing/grading_internal.h"
 #include "stuffing/lattice_internal.h"
+#include "stuffing/numbering_internal.h"
 #include "stuffing/stencils_internal.h"
 #include "stuffing/warp_internal.h"
 
@@ -11,6 +13,7 @@
 #include <bit>
 #include <cmath>
 #include <memory>
+#include <string>
 
 // Based on: Labelle and Shewchuk, Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral
 // Angles, 2007.
@@ -19,73 +22,6 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t blocks_at_once = 8;
-
-/// Numbers of the mesh's nodes.
-struct Nodes {
-  /// Of surface points: where they lie on the boundary the first is the point's own; then those of
-  /// its cuts, by direction.
-  std::vector<std::uint32_t> first;
-  std::vector<std::uint16_t> cuts; ///< directions with a cut node, of points inside
-  std::vector<Meeting> meeting;    ///< of warped points
-  std::vector<PointRanks> inner;   ///< by block: nodes inside
-  std::vector<std::uint32_t> first_inner;
-  std::uint32_t on_surface = 0, all = 0;
-
-  std::uint32_t cut(std::uint32_t point, unsigned direction) const {
-    return first[point] +
-           static_cast<std::uint32_t>(std::popcount(cuts[point] & ((1U << direction) - 1)));
-  }
-};
-
-Nodes number_nodes(const Context& context, const StuffingBlocks& blocks,
-                   const SurfacePoints& surface) {
-  const std::vector<SurfacePoint>& points = surface.points;
-  Nodes nodes;
-  nodes.first.resize(points.size());
-  nodes.cuts.resize(points.size());
-  nodes.meeting.resize(points.size(), Meeting::nothing);
-  parallel_blocks(context, points.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      if (points[n].warped())
-        nodes.meeting[n] = meeting(surface.link_signs(points[n]));
-      else if (points[n].inside)
-        for (unsigned d = 0; d < bcc::directions; ++d)
-          if (surface.is_cut(points[n], d))
-            nodes.cuts[n] = static_cast<std::uint16_t>(nodes.cuts[n] | 1U << d);
-    }
-  });
-  std::uint64_t count = 0;
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    nodes.first[n] = static_cast<std::uint32_t>(count);
-    count += nodes.meeting[n] == Meeting::boundary
-                 ? 1
-                 : static_cast<std::uint32_t>(std::popcount(nodes.cuts[n]));
-  }
-  nodes.on_surface = static_cast<std::uint32_t>(count);
-  nodes.inner.resize(blocks.size());
-  nodes.first_inner.resize(blocks.size());
-  parallel_blocks(context, blocks.size(), 32, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-      PointSet set = blocks[b].inside;
-      std::uint32_t n = blocks[b].first_surface;
-      for_each_point(blocks[b].surface.set(), [&](unsigned word, unsigned bit) {
-        const std::uint64_t here = std::uint64_t{1} << bit;
-        if (points[n].warped())
-          set[word] = nodes.meeting[n] == Meeting::interior ? set[word] | here : set[word] & ~here;
-        ++n;
-      });
-      nodes.inner[b] = PointRanks(set);
-    }
-  });
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    nodes.first_inner[b] = static_cast<std::uint32_t>(count);
-    count += size(nodes.inner[b].set());
-    if (count >= UINT32_MAX)
-      throw Error("the mesh has more than 2^32 - 2 nodes, expected a larger --cell");
-  }
-  nodes.all = static_cast<std::uint32_t>(count);
-  return nodes;
-}
 
 /// The points of a block's cells, those on its far sides included.
 struct BlockPoints {
@@ -98,7 +34,7 @@ struct BlockPoints {
   std::array<std::uint32_t, count> surface{}; ///< number of the surface point
 };
 
-void gather(const StuffingBlocks& blocks, const SurfacePoints& surface, const Nodes& nodes,
+void gather(const StuffingBlocks& blocks, const SurfacePoints& surface, const StuffingNodes& nodes,
             const StuffingBlock& block, BlockPoints& points) {
   unsigned n = 0;
   for (unsigned kind = 0; kind < 2; ++kind)
@@ -145,10 +81,12 @@ double least_angle_cosine(const std::array<Vec3, 4>& p) {
   return largest;
 }
 
-/// The tetrahedra of a block's cells, by cell, then as in bcc::cell_tetrahedra, then by stencil.
+/// The tetrahedra of a block's cells, by cell, then as in bcc::cell_tetrahedra, then by stencil;
+/// with a grading those between leaves in their place.
 class BlockCutter {
 public:
-  explicit BlockCutter(const Nodes& nodes) : nodes_(nodes) {
+  BlockCutter(const Grading& grading, const StuffingNodes& nodes)
+      : grading_(grading), nodes_(nodes) {
     for (unsigned n = 0; n < bcc::cell_points; ++n) {
       const bcc::Point point = bcc::cell_point(n);
       offset_[n] = BlockPoints::at(point.kind, static_cast<unsigned>(point.place[0]),
@@ -157,31 +95,25 @@ public:
     }
   }
 
-  /// Calls visit(stencil, tetrahedron of the cell, its four points) for what isn't outside.
-  template <class Visit>
-  void for_each(const BlockPoints& points, Visit&& visit) const {
+  /// Calls cut(stencil, tetrahedron of the cell, its four points) for what isn't outside, and
+  /// whole(nodes) for a tetrahedron between leaves that aren't both single cells.
+  template <class Cut, class Whole>
+  void for_each(const StuffingBlock& block, const BlockPoints& points, Cut&& cut,
+                Whole&& whole) const {
+    const bool fine = grading_.none() || grading_.is_fine(block);
     for (unsigned i = 0; i < leaf_dim; ++i)
       for (unsigned j = 0; j < leaf_dim; ++j)
         for (unsigned k = 0; k < leaf_dim; ++k) {
           const unsigned base = BlockPoints::at(0, i, j, k);
-          const bool even = ((i + j + k) & 1) == 0; // so is the sum of a block's origin
           int inside = 0;
           for (const unsigned offset : offset_)
             inside += points.sign[base + offset] > 0 ? 1 : 0;
           if (inside == 0)
             continue;
-          for (std::size_t t = 0; t < 12; ++t) {
-            std::array<unsigned, 4> at{};
-            std::array<int, 4> signs{};
-            for (std::size_t c = 0; c < 4; ++c) {
-              at[c] = base + offset_[bcc::cell_tetrahedra[t][c]];
-              signs[c] = points.sign[at[c]];
-            }
-            const unsigned octant = bcc::cell_tetrahedra[t][2] - 4U;
-            const Stencil& cut = stencil(signs, even, even == ((std::popcount(octant) & 1) == 0));
-            if (cut.count != 0)
-              visit(cut, t, at);
-          }
+          if (fine)
+            cut_cell(points, i, j, k, 0, 3, cut);
+          else
+            cut_leaf(block, points, i, j, k, cut, whole);
         }
   }
 
@@ -198,7 +130,69 @@ public:
   }
 
 private:
-  const Nodes& nodes_;
+  /// Those round the long edges from a cell's centre along axes begin … end - 1.
+  template <class Cut>
+  void cut_cell(const BlockPoints& points, unsigned i, unsigned j, unsigned k, std::size_t begin,
+                std::size_t end, Cut&& cut) const {
+    const unsigned base = BlockPoints::at(0, i, j, k);
+    const bool even = ((i + j + k) & 1) == 0; // so is the sum of a block's origin
+    for (std::size_t t = 4 * begin; t < 4 * end; ++t) {
+      std::array<unsigned, 4> at{};
+      std::array<int, 4> signs{};
+      for (std::size_t c = 0; c < 4; ++c) {
+        at[c] = base + offset_[bcc::cell_tetrahedra[t][c]];
+        signs[c] = points.sign[at[c]];
+      }
+      const unsigned octant = bcc::cell_tetrahedra[t][2] - 4U;
+      const Stencil& of = stencil(signs, even, even == ((std::popcount(octant) & 1) == 0));
+      if (of.count != 0)
+        cut(of, t, at);
+    }
+  }
+
+  template <class Cut, class Whole>
+  void cut_leaf(const StuffingBlock& block, const BlockPoints& points, unsigned i, unsigned j,
+                unsigned k, Cut&& cut, Whole&& whole) const {
+    const Int3 cell{static_cast<int>(i), static_cast<int>(j), static_cast<int>(k)};
+    const unsigned level = grading_.level(block, cell);
+    if (((i | j | k) & ((1U << level) - 1)) != 0)
+      return;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      Int3 next = cell;
+      ++next[axis];
+      if (level == 0 && grading_.level(block, next) == 0) {
+        cut_cell(points, i, j, k, axis, axis + 1, cut);
+        continue;
+      }
+      for_each_between(
+          grading_, block, cell, axis,
+          [&](const Int3& corner) {
+            return find(block, {0, corner}).is_node;
+          },
+          [&](const LatticeTetrahedron& tetrahedron) {
+            Tetrahedron result{};
+            for (std::size_t n = 0; n < 4; ++n)
+              result[n] = find(block, tetrahedron[n]).number;
+            whole(result);
+          });
+    }
+  }
+
+  struct Found {
+    bool is_node = false;
+    std::uint32_t number = 0;
+  };
+  Found find(const StuffingBlock& block, const bcc::Point& point) const {
+    const PlaceInBlock place = locate(block, point.kind, point.place);
+    if (place.block == StuffingBlock::none)
+      return {};
+    const PointRanks& inner = nodes_.inner[place.block];
+    return {inner.contains(place.word, place.bit),
+            nodes_.first_inner[place.block] + inner.rank(place.word, place.bit)};
+  }
+
+  const Grading& grading_;
+  const StuffingNodes& nodes_;
   std::array<unsigned, bcc::cell_points> offset_{};
 };
 
@@ -219,8 +213,8 @@ const StencilTetrahedra& better(const Stencil& cut, std::size_t t,
 }
 
 void write_points(const Context& context, const StuffingLattice& lattice,
-                  const StuffingBlocks& blocks, const SurfacePoints& surface, const Nodes& nodes,
-                  std::vector<Vec3>& points, double& largest_shift) {
+                  const StuffingBlocks& blocks, const SurfacePoints& surface,
+                  const StuffingNodes& nodes, std::vector<Vec3>& points, double& largest_shift) {
   std::vector<double> shifts((blocks.size() + blocks_at_once - 1) / blocks_at_once);
   parallel_blocks(context, blocks.size(), blocks_at_once, [&](std::size_t begin, std::size_t end) {
     double& shift = shifts[begin / blocks_at_once];
@@ -260,18 +254,22 @@ void write_points(const Context& context, const StuffingLattice& lattice,
 }
 
 void write_tetrahedra(const Context& context, const StuffingLattice& lattice,
-                      const StuffingBlocks& blocks, const SurfacePoints& surface,
-                      const Nodes& nodes, TetMesh& mesh) {
+                      const StuffingBlocks& blocks, const Grading& grading,
+                      const SurfacePoints& surface, const StuffingNodes& nodes, TetMesh& mesh) {
   Context quiet = context;
   quiet.progress = nullptr;
-  const BlockCutter cutter(nodes);
+  const BlockCutter cutter(grading, nodes);
   std::vector<std::uint64_t> first(blocks.size() + 1);
   parallel_blocks(quiet, blocks.size(), blocks_at_once, [&](std::size_t begin, std::size_t end) {
     const auto points = std::make_unique<BlockPoints>();
     for (std::size_t b = begin; b < end; ++b) {
       gather(blocks, surface, nodes, blocks[b], *points);
-      cutter.for_each(*points, [&](const Stencil& cut, std::size_t,
-                                   const std::array<unsigned, 4>&) { first[b + 1] += cut.count; });
+      cutter.for_each(
+          blocks[b], *points,
+          [&](const Stencil& cut, std::size_t, const std::array<unsigned, 4>&) {
+            first[b + 1] += cut.count;
+          },
+          [&](const Tetrahedron&) { ++first[b + 1]; });
     }
   });
   for (std::size_t b = 0; b < blocks.size(); ++b)
@@ -289,16 +287,20 @@ void write_tetrahedra(const Context& context, const StuffingLattice& lattice,
         continue;
       gather(blocks, surface, nodes, blocks[b], *points);
       Tetrahedron* next = mesh.tetrahedra.data() + first[b];
+      const auto add = [&](Tetrahedron tetrahedron) {
+        if (mirrored)
+          std::swap(tetrahedron[2], tetrahedron[3]);
+        *next++ = tetrahedron;
+      };
       cutter.for_each(
-          *points, [&](const Stencil& cut, std::size_t t, const std::array<unsigned, 4>& at) {
+          blocks[b], *points,
+          [&](const Stencil& cut, std::size_t t, const std::array<unsigned, 4>& at) {
             const StencilTetrahedra& tetrahedra =
                 cut.choice ? better(cut, t, at, *points, cutter, mesh.points) : cut.tetrahedra;
-            for (std::size_t n = 0; n < cut.count; ++n, ++next) {
-              *next = cutter.nodes_of(tetrahedra[n], t, at, *points);
-              if (mirrored)
-                std::swap((*next)[2], (*next)[3]);
-            }
-          });
+            for (std::size_t n = 0; n < cut.count; ++n)
+              add(cutter.nodes_of(tetrahedra[n], t, at, *points));
+          },
+          add);
     }
   });
 }
@@ -307,18 +309,22 @@ void write_tetrahedra(const Context& context, const StuffingLattice& lattice,
 
 TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
               StuffingReport* report) {
+  if (options.grade > stuffing_grade_max)
+    throw Error("a grade of " + std::to_string(options.grade) + ", expected 0 to " +
+                std::to_string(stuffing_grade_max));
   const StuffingLattice lattice = stuffing_lattice(grid, options.isovalue, options.cell);
   const StuffingBlocks blocks = stuffing_blocks(context, grid, lattice);
   const SurfacePoints surface = warp_lattice(context, grid, lattice, blocks);
   Context quiet = context;
   quiet.progress = nullptr;
-  const Nodes nodes = number_nodes(quiet, blocks, surface);
+  const Grading grading = grade_blocks(quiet, blocks, options.grade);
+  const StuffingNodes nodes = number_nodes(quiet, blocks, grading, surface);
   require_memory(context, static_cast<double>(nodes.all) * sizeof(Vec3), "the nodes");
   TetMesh mesh;
   mesh.points.resize(nodes.all);
   double shift = 0;
   write_points(quiet, lattice, blocks, surface, nodes, mesh.points, shift);
-  write_tetrahedra(context, lattice, blocks, surface, nodes, mesh);
+  write_tetrahedra(context, lattice, blocks, grading, surface, nodes, mesh);
   if (report != nullptr) {
     *report = {};
     report->cell = lattice.cell;

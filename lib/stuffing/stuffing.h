@@ -17,11 +17,17 @@ inline constexpr double stuffing_alpha_long = 0.285, stuffing_alpha_short = 0.39
 /// Degrees.
 inline constexpr double stuffing_angle_min = 10.7, stuffing_angle_max = 164.8;
 
+/// Inside cells can be up to 2^3 times as large.
+inline constexpr unsigned stuffing_grade_max = 3;
+
 struct StuffingOptions {
   std::optional<double> isovalue; ///< in place of the grid's own
   /// Distance in mm of lattice points along an axis; nothing: the edge of a cube as large as a
   /// voxel.
   std::optional<double> cell;
+  /// How often cells double inwards, 0 … stuffing_grade_max. What touches a point with an edge to
+  /// the other side stays as it is with 0, so that the boundary is the same, triangle by triangle.
+  unsigned grade = 0;
 };
 
 struct StuffingReport {
@@ -49,12 +55,18 @@ struct StuffingReport {
 /// after which the tetrahedra at a point would not make a ball or half a ball is taken back, and
 /// cut points near that point are moved away from it along their edges, to alpha at most.
 ///
+/// With `grade` the inside is an octree whose leaves double inwards, of neighbours across a face or
+/// an edge by one step at most (section 3 of the paper). Between them stand halves of tetrahedra,
+/// halves of pyramids and path tetrahedra, with dihedral angles of 45 to 120 degrees, so that the
+/// bounds hold as without.
+///
 /// Nodes on the boundary come first, then those inside, each in the order of blocks of 8³ cells by
 /// (i, j, k); the mesh does not depend on the number of threads. Work and memory follow the solid.
 ///
 /// \throw Error if the transform is singular or not finite; if the grid is exact only near another
 /// isovalue (band_isovalue); if its background is inside, so that nothing bounds the solid; if a
-/// value at or beside the surface is not finite; if `cell` isn't finite and above 0; if indices
+/// value at or beside the surface is not finite; if `cell` isn't finite and above 0; if
+/// `grade` is above its maximum; if indices
 /// come near the limits of 32 bits; beyond context.max_memory
 TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
               StuffingReport* report = nullptr);

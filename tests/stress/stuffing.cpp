@@ -1,7 +1,7 @@
 // Strains isosurface stuffing: random scenes of balls, noise and noise of few values (many of them
-// at the isovalue), on straight, mirrored and sheared axes, each at four sizes of cells. What holds
-// of every mesh: bounds of angles, positive volumes, a boundary that is a closed 2-manifold and
-// comes first, no unused node. Argument: number of scenes (default 2000).
+// at the isovalue), on straight, mirrored and sheared axes, each at four sizes of cells, with all
+// grades. What holds of every mesh: bounds of angles, positive volumes, a boundary that is a closed
+// 2-manifold and comes first, no unused node. Argument: number of scenes (default 2000).
 
 #include "stuffing/stuffing.h"
 #include "tests/unit/larger.h"
@@ -55,7 +55,7 @@ struct Totals {
 
 void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) {
   StuffingReport report;
-  const TetMesh mesh = stuff({}, grid, {{}, cell}, &report);
+  const TetMesh mesh = stuff({}, grid, {{}, cell, seed % (stuffing_grade_max + 1)}, &report);
   ++totals.meshes;
   if (mesh.tetrahedra.empty()) {
     ++totals.empty;

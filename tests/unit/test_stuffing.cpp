@@ -4,6 +4,7 @@
 #include "stuffing/materials.h"
 #include "stuffing/surface_distance.h"
 #include "stuffing/warp_internal.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
@@ -12,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
 #include <random>
 #include <span>
@@ -81,6 +83,16 @@ TetMesh stuffed(const Grid& grid, const StuffingOptions& options = {}, int threa
   return mesh;
 }
 
+/// The triangles of the boundary, each from its least corner.
+std::vector<Triangle> boundary_triangles(const TetMesh& mesh) {
+  std::vector<Triangle> triangles = boundary(mesh).mesh.triangles;
+  for (Triangle& triangle : triangles)
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()),
+                triangle.end());
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
+}
+
 TEST(Stuffing, VolumeAndDistanceConvergeWithTheSquareOfTheCell) {
   struct Shape {
     Grid grid;
@@ -143,6 +155,114 @@ TEST(Stuffing, AnythingKeepsTheBoundsAndAManifold) {
     refused += report.refused_warps;
   }
   EXPECT_GT(refused, 100U); // the scenes ask for it
+}
+
+TEST(Stuffing, AGradedSolidHasTheSameBoundaryAndCoarserCellsInside) {
+  const Grid grid = ball(5, 0.125);
+  StuffingReport fine;
+  const TetMesh uniform = stuffed(grid, {{}, 0.2}, 1, &fine);
+  const auto first = [&](const TetMesh& mesh) {
+    return std::vector<Vec3>(mesh.points.begin(),
+                             mesh.points.begin() + static_cast<std::ptrdiff_t>(fine.surface_nodes));
+  };
+  std::size_t before = uniform.tetrahedra.size();
+  double largest = 0;
+  for (const unsigned grade : {1U, 2U, 3U}) {
+    const TetMesh mesh = stuffed(grid, {{}, 0.2, grade});
+    EXPECT_EQ(first(mesh), first(uniform)) << grade;
+    EXPECT_EQ(boundary_triangles(mesh), boundary_triangles(uniform)) << grade;
+    EXPECT_NEAR(volume(mesh), volume(uniform), 1e-11 * volume(uniform)) << grade;
+    EXPECT_LT(mesh.tetrahedra.size(), before) << grade;
+    before = mesh.tetrahedra.size();
+    double here = 0;
+    for (const auto& [a, b, c, d] : mesh.tetrahedra)
+      here = test::larger(
+          here, tetrahedron_volume(mesh.points[a], mesh.points[b], mesh.points[c], mesh.points[d]));
+    EXPECT_GT(here, largest) << grade;
+    largest = here;
+  }
+  // Cells of 8 have tetrahedra of 8^3 / 12.
+  EXPECT_NEAR(largest, 512 * 0.008 / 12, 1e-12);
+  EXPECT_LT(before, uniform.tetrahedra.size() / 2);
+  EXPECT_THROW(stuff({}, grid, {{}, 0.2, 4}), Error);
+}
+
+TEST(Stuffing, GradedWavesKeepTheBoundsAndTheirBoundary) {
+  for (std::uint32_t seed = 0; seed < 6; ++seed) {
+    std::mt19937 random(seed);
+    GridInfo info;
+    if (seed % 3 == 1)
+      info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
+    if (seed % 3 == 2)
+      info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
+    const Grid grid = sample(info, {-9, 0, 0}, {9, 19, 19}, [&](int i, int j, int k) {
+      const double noise = static_cast<double>(random()) / 4294967296.0 - 0.5;
+      return 0.6 + 0.5 * std::sin(i * 0.31 + seed) * std::cos(j * 0.34) * std::sin(k * 0.29 + 1) +
+             0.15 * noise;
+    });
+    StuffingOptions options{{}, 0.48 + 0.02 * seed};
+    const TetMesh fine = stuffed(grid, options, 2);
+    options.grade = 1 + seed / 2;
+    const TetMesh graded = stuffed(grid, options, 1), again = stuffed(grid, options, 2);
+    EXPECT_EQ(graded.tetrahedra, again.tetrahedra);
+    EXPECT_EQ(graded.points, again.points);
+    EXPECT_LT(graded.tetrahedra.size(), 0.9 * static_cast<double>(fine.tetrahedra.size()));
+    EXPECT_EQ(boundary_triangles(graded), boundary_triangles(fine));
+    EXPECT_NEAR(volume(graded), volume(fine), 1e-10 * volume(fine));
+  }
+}
+
+/// The corners of tetrahedra with one of the first `surface` points.
+std::vector<std::array<std::array<double, 3>, 4>> at_boundary(const TetMesh& mesh,
+                                                              std::size_t surface) {
+  std::vector<std::array<std::array<double, 3>, 4>> result;
+  for (const Tetrahedron& tetrahedron : mesh.tetrahedra) {
+    if (*std::min_element(tetrahedron.begin(), tetrahedron.end()) >= surface)
+      continue;
+    auto& corners = result.emplace_back();
+    for (std::size_t n = 0; n < 4; ++n) {
+      const Vec3& p = mesh.points[tetrahedron[n]];
+      corners[n] = {p.x, p.y, p.z};
+    }
+    std::sort(corners.begin(), corners.end());
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+TEST(Stuffing, AGradedSolidKeepsRoundSinglePointsWhatIsThere) {
+  // Lattice points stand at every voxel with three even or three odd indices; all next to one
+  // outside are moved.
+  std::mt19937 random(5);
+  const Grid grid = sample({}, {0, 0, 0}, {40, 40, 40},
+                           [&](int, int, int) { return random() % 400 == 0 ? -1 : 0.51; });
+  const TetMesh fine = stuffed(grid, {{}, 2.0}, 2), graded = stuffed(grid, {{}, 2.0, 1}, 2);
+  EXPECT_LT(graded.tetrahedra.size(), 0.99 * static_cast<double>(fine.tetrahedra.size()));
+  EXPECT_EQ(boundary_triangles(graded), boundary_triangles(fine));
+  const std::size_t surface = boundary(fine).node.size();
+  EXPECT_EQ(at_boundary(graded, surface), at_boundary(fine, surface));
+}
+
+TEST(Stuffing, BetweenLeavesAnglesAreOf45To120Degrees) {
+  // All tetrahedra without a node on the boundary.
+  const TetMesh mesh = stuffed(ball(5, 0.125), {{}, 0.2, 3});
+  StuffingReport report;
+  stuff({}, ball(5, 0.125), {{}, 0.2, 3}, &report);
+  TetMesh inner = mesh;
+  std::erase_if(inner.tetrahedra, [&](const Tetrahedron& tetrahedron) {
+    return *std::min_element(tetrahedron.begin(), tetrahedron.end()) < report.surface_nodes;
+  });
+  // Leave out those of single cells, which may be warped.
+  const double single = 0.2 * 0.2 * 0.2 / 12;
+  std::erase_if(inner.tetrahedra, [&](const Tetrahedron& t) {
+    const double size = tetrahedron_volume(inner.points[t[0]], inner.points[t[1]],
+                                           inner.points[t[2]], inner.points[t[3]]);
+    return size < single * 1.5 && std::fabs(size / single - 0.5) > 1e-9;
+  });
+  EXPECT_GT(inner.tetrahedra.size(), 1000U);
+  const TetQuality quality = tet_quality(inner, boundary(inner));
+  EXPECT_NEAR(quality.smallest_angle, 45, 1e-6);
+  EXPECT_LT(quality.largest_angle, 120 + 1e-6);
 }
 
 TEST(Stuffing, WarpsThatPinchAreSeen) {

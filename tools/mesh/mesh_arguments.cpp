@@ -14,6 +14,8 @@ void check(const MeshArguments& arguments) {
   box_of(arguments.box);
   if (!arguments.tets && arguments.cell)
     throw UsageError("--cell is for --tets, expected both (--resample gives a surface's spacing)");
+  if (!arguments.tets && arguments.grade != 0)
+    throw UsageError("--grade is for --tets, expected both");
   if (!arguments.tets && !arguments.materials.empty())
     throw UsageError("--materials is for --tets, expected both");
   const auto refuse = [&](bool given, const char* option) {

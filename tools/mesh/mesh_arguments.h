@@ -14,7 +14,7 @@ struct MeshArguments {
   std::string volume = "-", place, components, materials;
   std::optional<double> isovalue, voxel, epsilon, cell;
   std::vector<double> box; // x0 y0 z0 x1 y1 z1
-  std::int64_t rounds = 0;
+  std::int64_t rounds = 0, grade = 0;
   bool tets = false, normals = false, self_intersections = false;
 };
 

@@ -50,7 +50,8 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   Output output(run.output(), run.output_options(is_binary(kind)));
   Input input(arguments.volume);
   const PreparedVolume prepared = prepare(run, arguments, input);
-  const StuffingOptions options{prepared.isovalue, arguments.cell};
+  const StuffingOptions options{prepared.isovalue, arguments.cell,
+                                static_cast<unsigned>(arguments.grade)};
   StuffingReport report;
   TetMesh mesh = at(input.name(), [&] {
     return run.timed("stuff",
