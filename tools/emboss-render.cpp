@@ -1,10 +1,11 @@
-// emboss-render: mesh, model, result or volume -> picture.
+// emboss-render: mesh, tetrahedra, model, result or volume -> picture.
 
 #include "base/digest.h"
 #include "formats/image/image_file.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_pictures.h"
 #include "tools/render/render_volume.h"
+#include "tools/render/solid_surface.h"
 #include "tools/render/surface_file.h"
 #include "tools/shared/cli.h"
 
@@ -17,7 +18,9 @@ using namespace gewebe;
 namespace {
 
 std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions& options) {
-  std::vector<Surface> surfaces = read_surfaces(input, options, run.context());
+  SolidReport solid;
+  std::vector<Surface> surfaces = read_surfaces(input, options, run.context(), &solid);
+  tell_solid(run, input.name(), options, solid);
   run.stats().set("surfaces", std::uint64_t{surfaces.size()});
   run.stats().set("triangles", triangle_count(surfaces));
   if (triangle_count(surfaces) == 0)
@@ -118,14 +121,15 @@ int main(int argc, char** argv) {
   // Mesa reads these when EGL starts: no talk, and textures filtered in floats instead of 8 bits.
   (void)::setenv("EGL_LOG_LEVEL", "fatal", 0);
   (void)::setenv("GALLIVM_PERF", "no_aos_sampling,no_filter_hacks", 0);
-  cli::Program p("emboss-render",
-                 "Draws a mesh, a model or a result with embossed textures, or a volume.");
+  cli::Program p(
+      "emboss-render",
+      "Draws a mesh, tetrahedra, a model or a result with embossed textures, or a volume.");
   cli::RenderArguments a;
   declare(p, a);
   p.output_kinds(picture_kinds());
   std::vector<Kind> kinds = readable_surface_kinds();
   kinds.push_back(Kind::vdb);
   p.input_kinds(kinds);
-  p.operand("SURFACE", a.surface, "the mesh, model, result of a run, or volume");
+  p.operand("SURFACE", a.surface, "the mesh, tetrahedra, model, result of a run, or volume");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
 }

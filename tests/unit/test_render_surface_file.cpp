@@ -1,17 +1,22 @@
-// What can be drawn: meshes, models, frames of a run.
+// What can be drawn: meshes, models, frames of a run, tetrahedra.
 
 #include "base/error.h"
 #include "formats/model/ela.h"
 #include "formats/results/results_writer.h"
+#include "formats/tetrahedra/tet_file.h"
 #include "model/build.h"
 #include "model_meshes.h"
 #include "scratch.h"
+#include "tet_fixtures.h"
+#include "tetrahedra/boundary.h"
 #include "tools/render/surface_file.h"
 
 #include <gtest/gtest.h>
 
 #include <cstdio>
 #include <fstream>
+#include <optional>
+#include <utility>
 
 namespace gewebe {
 namespace {
@@ -21,10 +26,11 @@ Model ball_model() {
   return build_model(mesh, {}, {}).model;
 }
 
-std::vector<Surface> read(const std::string& path, SurfaceReadOptions options) {
+std::vector<Surface> read(const std::string& path, SurfaceReadOptions options,
+                          SolidReport* solid = nullptr) {
   Input input(path);
   options.kind = input_kind(input.peek(4096), path, "");
-  return read_surfaces(input, options, {});
+  return read_surfaces(input, options, {}, solid);
 }
 
 TEST(RenderSurfaceFile, ModelsAreDrawnWithoutTheirCentralNodes) {
@@ -81,6 +87,111 @@ TEST(RenderSurfaceFile, FramesOfARunComeWithTheirRest) {
   EXPECT_EQ(rest_box(last).max, rest_box(chosen).max);
   const std::string path = file.path();
   (void)std::remove((path.substr(0, path.size() - 3) + ".xdmf").c_str());
+}
+
+// A file of each kind, given up with both of TetGen's.
+class SolidFile {
+public:
+  SolidFile(const TetMesh& mesh, Kind kind, const std::string& suffix) : file_(suffix) {
+    Output::Options options;
+    options.binary = is_binary(kind);
+    Output output(file_.path(), options);
+    write_tet_mesh(output, mesh, kind, options);
+    output.commit();
+    if (kind == Kind::tetgen)
+      beside_ = file_.path().substr(0, file_.path().size() - suffix.size()) + ".ele";
+  }
+  ~SolidFile() {
+    if (!beside_.empty())
+      (void)std::remove(beside_.c_str());
+  }
+  SolidFile(const SolidFile&) = delete;
+  SolidFile& operator=(const SolidFile&) = delete;
+  const std::string& path() const { return file_.path(); }
+
+private:
+  ScratchFile file_;
+  std::string beside_;
+};
+
+TEST(RenderSurfaceFile, TetrahedraAreDrawnByTheirBoundary) {
+  const TetMesh mesh = test::odd_tetrahedra(false, true);
+  const TriangleMesh outside = boundary(mesh).mesh;
+  for (const auto& [kind, suffix] :
+       {std::pair(Kind::ply, ".ply"), std::pair(Kind::vtu, ".vtu"), std::pair(Kind::msh, ".msh"),
+        std::pair(Kind::msh4, ".msh"), std::pair(Kind::medit, ".mesh"),
+        std::pair(Kind::tetgen, ".node")}) {
+    const SolidFile file(mesh, kind, suffix);
+    SolidReport report;
+    const std::vector<Surface> surfaces = read(file.path(), {}, &report);
+    ASSERT_EQ(surfaces.size(), 1U);
+    EXPECT_EQ(surfaces[0].mesh.points, outside.points) << suffix;
+    EXPECT_EQ(surfaces[0].mesh.triangles, outside.triangles);
+    EXPECT_EQ(surfaces[0].mesh.material, outside.material);
+    EXPECT_TRUE(surfaces[0].rest.empty() && surfaces[0].mesh.part.empty());
+    EXPECT_EQ(report.tetrahedra, mesh.tetrahedra.size());
+    EXPECT_EQ(report.curved_edges, 0U);
+    SurfaceReadOptions options;
+    options.unit = "cm";
+    EXPECT_EQ(read(file.path(), options)[0].mesh.points[3], outside.points[3] * 10);
+    options.frame = 0;
+    EXPECT_THROW((void)read(file.path(), options), UsageError);
+  }
+  TetMesh quadratic = test::odd_tetrahedra(true, true);
+  quadratic.points[quadratic.middles[0][0]] += Vec3{0, 0, 0.01};
+  SolidReport report;
+  EXPECT_EQ(read(SolidFile(quadratic, Kind::vtu, ".vtu").path(), {}, &report)[0].mesh.triangles,
+            outside.triangles);
+  EXPECT_EQ(report.curved_edges, 1U);
+}
+
+TEST(RenderSurfaceFile, TheCutIsAPartWithPointsOfItsOwn) {
+  const SolidFile file(test::box_tetrahedra(2, 3, 4), Kind::vtu, ".vtu");
+  SurfaceReadOptions options;
+  options.clip = ClipPlane{{0, 0, 1.5}, {0, 0, 2}};
+  SolidReport report;
+  const TriangleMesh mesh = read(file.path(), options, &report)[0].mesh;
+  check_mesh(mesh);
+  EXPECT_EQ(report.tetrahedra, 144U);
+  EXPECT_EQ(report.tetrahedra_cut, 36U);
+  EXPECT_EQ(report.tetrahedra_removed, 72U);
+  EXPECT_NEAR(report.cut_area, 6, 1e-14);
+  ASSERT_EQ(mesh.part.size(), mesh.triangles.size());
+  std::vector<int> parts(mesh.points.size());
+  std::uint64_t cut = 0;
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
+    cut += mesh.part[f] == 1 ? 1 : 0;
+    for (const std::uint32_t corner : mesh.triangles[f]) {
+      parts[corner] |= 1 << mesh.part[f];
+      if (mesh.part[f] == 1) {
+        EXPECT_NEAR(mesh.points[corner].z, 1.5, 1e-15);
+      }
+    }
+  }
+  EXPECT_EQ(report.cut_triangles, cut);
+  for (const int of : parts)
+    EXPECT_TRUE(of == 1 || of == 2) << of;
+  options.clip = ClipPlane{{0, 0, 1.5}, {0, 0, 0}};
+  EXPECT_THROW((void)read(file.path(), options), Error);
+  options.clip = ClipPlane{{0, 0, 0}, {0, 0, 1}};
+  EXPECT_THROW((void)read(file.path(), options), Error); // takes all away
+  options.clip = ClipPlane{{0, 0, 4}, {0, 0, 1}};
+  EXPECT_EQ(read(file.path(), options, &report)[0].mesh.triangles.size(), 104U);
+  EXPECT_EQ(report.tetrahedra_cut + report.tetrahedra_removed + report.cut_triangles, 0U);
+  const ScratchFile model(".ela");
+  std::ofstream(model.path()) << ela_text(ball_model());
+  EXPECT_THROW((void)read(model.path(), options), UsageError);
+}
+
+TEST(RenderSurfaceFile, BrokenTetrahedraAreNotDrawn) {
+  TetMesh mesh = test::box_tetrahedra(1, 1, 1);
+  std::swap(mesh.tetrahedra[2][0], mesh.tetrahedra[2][1]);
+  for (const auto& clip : {std::optional<ClipPlane>(), std::optional(ClipPlane{{}, {0, 0, -1}})}) {
+    SurfaceReadOptions options;
+    options.clip = clip;
+    EXPECT_THROW((void)read(SolidFile(mesh, Kind::vtu, ".vtu").path(), options), Error);
+    EXPECT_THROW((void)read(SolidFile({}, Kind::vtu, ".vtu").path(), options), Error);
+  }
 }
 
 } // namespace

@@ -121,8 +121,17 @@ void complete_light(RenderArguments& a) {
   a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
 }
 
+void complete_clip(RenderArguments& a) {
+  const std::vector<double>& w = a.words.clip;
+  if (w.empty())
+    return;
+  a.reading.clip = ClipPlane{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
+  refuse(a.reading.clip->normal == Vec3{}, "--clip: expected another normal than 0");
+}
+
 void complete(RenderArguments& a) {
   complete_light(a);
+  complete_clip(a);
   complete_textures(a);
   complete_materials(a);
   complete_modes(a);
@@ -226,6 +235,9 @@ void declare(Program& p, RenderArguments& a) {
            "frame of the light: vertex, pixel; auto: as the mode can")
       .one_of({"auto", "vertex", "pixel"});
   p.option("--compare", a.words.compare, "MODES", "side by side, such as 3,2,1,shader,cpu");
+  p.option("--clip", a.words.clip, "X,Y,Z,NX,NY,NZ",
+           "of tetrahedra: cut them open; what lies on that side of a point goes")
+      .count(6);
   p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
       .range(-1, 1e15);

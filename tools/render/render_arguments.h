@@ -68,6 +68,7 @@ struct RenderArguments {
     std::int64_t msaa = 1, rgb_scale = 2;
     std::optional<Vec3> light_direction, color, background;
     std::optional<double> shade, fill;
+    std::vector<double> clip;                ///< point and normal
     std::optional<std::int64_t> supersample; ///< nothing: what is fit for a surface
     bool plain = false;
     std::optional<std::int64_t> uv_sharpness;

@@ -4,6 +4,8 @@
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/results/results.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "tools/render/solid_surface.h"
 
 #include <algorithm>
 #include <charconv>
@@ -89,6 +91,9 @@ std::vector<std::int64_t> result_frames(const Input& input, const std::string& w
 const std::vector<Kind>& readable_surface_kinds() {
   static const std::vector<Kind> kinds = [] {
     std::vector<Kind> all = readable_mesh_kinds();
+    for (const Kind kind : readable_tet_kinds())
+      if (std::ranges::find(all, kind) == all.end()) // PLY is both
+        all.push_back(kind);
     all.push_back(Kind::ela);
     all.push_back(Kind::hdf5);
     return all;
@@ -101,12 +106,22 @@ const std::vector<std::string>& surface_unit_names() {
 }
 
 std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
-                                   const Context& context) {
+                                   const Context& context, SolidReport* solid) {
   const bool is_result = options.kind == Kind::hdf5, is_model = options.kind == Kind::ela;
   refuse(!is_result && (!options.object.empty() || options.frame), input,
          "--object or --frame for no result of a run, expected neither");
   refuse((is_result || is_model) && !options.unit.empty(), input,
          "--unit for what is in mm, expected no --unit");
+  const bool is_solid = holds_tetrahedra(input.peek(4096), options.kind);
+  refuse(
+      !is_solid && options.clip, input,
+      "--clip for what has no tetrahedra, expected a tetrahedral mesh (mc-opt --tets makes one)");
+  if (is_solid) {
+    SolidReport unused;
+    std::vector<Surface> surfaces;
+    surfaces.push_back(read_solid(input, options, solid == nullptr ? unused : *solid));
+    return surfaces;
+  }
   if (is_result)
     return read_frame(input, options);
   if (is_model) {

@@ -1,10 +1,11 @@
 #pragma once
-// Whatever has a surface to draw: a mesh, a model, a frame of a run.
+// Whatever has a surface to draw: a mesh, a model, a frame of a run, tetrahedra.
 
 #include "base/context.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
 #include "shading/drawing.h"
+#include "tetrahedra/clip.h"
 
 #include <cstdint>
 #include <optional>
@@ -18,9 +19,18 @@ struct SurfaceReadOptions {
   std::string unit;                  ///< of a mesh, as in MeshReadOptions
   std::string object;                ///< of a result, by name; "": all
   std::optional<std::int64_t> frame; ///< of a result, from 0; -1 is the last one, and the default
+  std::optional<ClipPlane> clip;     ///< of tetrahedra
 };
 
-/// Mesh kinds, ela and h5.
+/// What was found in a tetrahedral mesh; all 0 of anything else.
+struct SolidReport {
+  std::uint64_t tetrahedra = 0, curved_edges = 0;
+  std::uint64_t tetrahedra_cut = 0, tetrahedra_removed = 0; ///< by the plane
+  std::uint64_t cut_triangles = 0;
+  double cut_area = 0; ///< mm²
+};
+
+/// Kinds of meshes and of tetrahedral ones, ela and h5.
 const std::vector<Kind>& readable_surface_kinds();
 
 /// The words of --unit.
@@ -31,10 +41,11 @@ const std::vector<std::string>& surface_unit_names();
 /// \throw Error with place if there are no such frames; UsageError if it is none of these words
 std::vector<std::int64_t> result_frames(const Input& input, const std::string& word);
 
-/// The surfaces of `input` in mm, in order; those of a result with their points at rest.
+/// The surfaces of `input` in mm, in order; those of a result with their points at rest. A PLY with
+/// the element tetrahedron is tetrahedra, whatever faces it has (solid_surface.h).
 /// \throw Error with place, also if a result comes by a pipe, or has no such object or frame;
 /// UsageError for options that the kind has no use for
 std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,
-                                   const Context& context);
+                                   const Context& context, SolidReport* solid = nullptr);
 
 } // namespace gewebe

@@ -1,0 +1,103 @@
+#include "tools/render/solid_surface.h"
+
+#include "base/error.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "tetrahedra/boundary.h"
+#include "tetrahedra/check.h"
+#include "tetrahedra/clip.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+double area(const TriangleMesh& mesh, std::span<const Triangle> triangles) {
+  double sum = 0;
+  for (const auto& [a, b, c] : triangles)
+    sum += norm(cross(mesh.points[b] - mesh.points[a], mesh.points[c] - mesh.points[a])) / 2;
+  return sum;
+}
+
+/// Gives the triangles from `begin` points of their own, in place of those that others use too.
+void part_from(TriangleMesh& mesh, std::size_t begin) {
+  std::vector<std::uint32_t> own(mesh.points.size());
+  std::iota(own.begin(), own.end(), 0U);
+  for (const Triangle& triangle : std::span(mesh.triangles).first(begin))
+    for (const std::uint32_t corner : triangle)
+      own[corner] = UINT32_MAX;
+  for (Triangle& triangle : std::span(mesh.triangles).subspan(begin))
+    for (std::uint32_t& corner : triangle) {
+      std::uint32_t& number = own[corner];
+      if (number == UINT32_MAX) {
+        number = static_cast<std::uint32_t>(mesh.points.size());
+        mesh.points.push_back(mesh.points[corner]);
+      }
+      corner = number;
+    }
+  mesh.part.assign(begin, 0);
+  mesh.part.resize(mesh.triangles.size(), 1);
+}
+
+TriangleMesh cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
+  TetClip left = clip_tetrahedra(mesh, plane);
+  if (left.mesh.triangles.empty())
+    throw Error("--clip takes all of it away, expected a plane with some on the side that its "
+                "normal points away from");
+  const auto cut = std::span(left.mesh.triangles).subspan(left.cut_begin);
+  report.tetrahedra_cut = left.tetrahedra_cut;
+  report.tetrahedra_removed = left.tetrahedra_removed;
+  report.cut_triangles = cut.size();
+  report.cut_area = area(left.mesh, cut);
+  part_from(left.mesh, left.cut_begin);
+  return std::move(left.mesh);
+}
+
+} // namespace
+
+Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report) {
+  report = {};
+  TetReadOptions reading;
+  reading.kind = options.kind;
+  if (!options.unit.empty())
+    reading.scale = millimetres_per(options.unit);
+  const TetMesh mesh = read_tet_mesh(input, reading);
+  return at(input.name(), [&] {
+    const TetReport found = examine_tetrahedra(mesh);
+    require_sound(found);
+    report.tetrahedra = found.tetrahedra;
+    report.curved_edges = found.curved_edges.count;
+    Surface surface;
+    surface.mesh = options.clip ? cut_open(mesh, *options.clip, report) : boundary(mesh).mesh;
+    return surface;
+  });
+}
+
+namespace cli {
+
+void tell_solid(Run& run, const std::string& name, const SurfaceReadOptions& options,
+                const SolidReport& report) {
+  if (report.tetrahedra == 0)
+    return;
+  run.stats().set("tetrahedra", report.tetrahedra);
+  if (report.curved_edges > 0)
+    run.warn(name + ": " + std::to_string(report.curved_edges) +
+             " curved edges are drawn straight");
+  if (!options.clip)
+    return;
+  run.stats().set("tetrahedra_cut", report.tetrahedra_cut);
+  run.stats().set("tetrahedra_removed", report.tetrahedra_removed);
+  run.stats().set("cut_triangles", report.cut_triangles);
+  run.stats().set("cut_area", report.cut_area);
+  if (report.tetrahedra_cut + report.tetrahedra_removed == 0)
+    run.warn(name + ": --clip takes nothing away");
+}
+
+} // namespace cli
+} // namespace gewebe

@@ -1,0 +1,26 @@
+#pragma once
+// What is drawn of a tetrahedral mesh: its boundary, whole or cut open.
+
+#include "base/context.h"
+#include "formats/stream/stream.h"
+#include "shading/drawing.h"
+#include "tools/render/surface_file.h"
+#include "tools/shared/cli.h"
+
+namespace gewebe {
+
+/// The boundary of the tetrahedra of `input`, in mm, with their materials. Where options.clip is
+/// given, what is left of it is part 0 and the faces of the cut are part 1, which has points of its
+/// own, so that the rim is an edge. Quadratic tetrahedra are drawn by their corners.
+/// \throw Error with place: what read_tet_mesh, require_sound and clip_tetrahedra refuse; a plane
+/// that takes all away
+Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report);
+
+namespace cli {
+/// Into the stats, with warnings of edges that are drawn straight and a plane that takes nothing
+/// away; nothing where there are no tetrahedra.
+void tell_solid(Run& run, const std::string& name, const SurfaceReadOptions& options,
+                const SolidReport& report);
+} // namespace cli
+
+} // namespace gewebe
