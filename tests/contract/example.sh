@@ -74,6 +74,26 @@ test_solid_is_lit_from_the_side_of_the_light() {
   [[ $(ls solid) == Makefile ]] || fail 'clean left files' "$(ls solid)"
 }
 
+# A tumour inside is not to be seen from outside, and is where the organ is cut open.
+test_solid_mesh_shows_its_tumour_where_it_is_cut() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  unset MAKEFLAGS MAKELEVEL
+  mkdir solid-mesh cholecystectomy
+  cp "$GEWEBE_ROOT"/examples/solid-mesh/{Makefile,tumour.particles} solid-mesh
+  cp "$GEWEBE_ROOT"/examples/cholecystectomy/liver.particles cholecystectomy
+  make -s -C solid-mesh SIZE=96 VOXEL=5 CELL=8 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  cd solid-mesh || fail 'no folder'
+  # Of the looks of the organ and of the tumour, how many triangles have which.
+  looks() { emboss-render --backend cpu --size 8 --color 1=1,1,0 --stats=stats "$@" solid.vtu -o /dev/null 2>/dev/null && sed 's/.*"triangles_by_look":\[\([0-9,]*\)\].*/\1/' stats; }
+  [[ $(looks) == *[1-9]*,0 ]] || fail 'the tumour reaches the surface, or nothing is there' "$(looks)"
+  # shellcheck disable=SC2046 # two words
+  [[ $(looks $(sed -n 's/^CUT = //p' Makefile)) == *,[1-9][0-9]* ]] || fail 'the cut misses the tumour'
+  ! cmp -s whole.png open.png || fail 'the cut is not to be seen'
+  rm stats
+  make -s clean
+  [[ $(echo *) == 'Makefile tumour.particles' ]] || fail 'clean left files' "$(ls)"
+}
+
 # One organ by every filter, small: fractions keep its volume, pictures differ.
 test_antialias_draws_every_filter() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
