@@ -309,6 +309,34 @@ test_a_sequence_renews_only_what_changed() {
   fi
 }
 
+# The cut of a solid has the area that VTK finds, of planes through nodes too.
+test_vtk_cuts_solids_as_we_do() {
+  python3 -c 'import vtk' 2>/dev/null || skip 'no VTK for python3'
+  metaball2vol --voxel 0.5 "$GEWEBE_ROOT/tests/golden/in/five.particles" | mc-opt --tets -o in.vtu
+  local plane
+  for plane in 2,0,-1,1,1,0.3 0,0,0,0,0,1 0,0,0,-3,0,0 0.5,-0.25,1,0.3,-1,0.7; do
+    emboss-render --backend cpu --size 8 --clip=$plane --stats="$plane.json" in.vtu -o /dev/null
+  done
+  cat >in.py <<'END'
+import glob, json, vtk
+from vtk.util.numpy_support import vtk_to_numpy
+reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName('in.vtu'); reader.Update()
+def area(p):
+    plane = vtk.vtkPlane(); plane.SetOrigin(*p[:3])
+    plane.SetNormal(*(x / sum(y * y for y in p[3:]) ** 0.5 for x in p[3:]))
+    cut = vtk.vtkCutter(); cut.SetCutFunction(plane); cut.SetInputData(reader.GetOutput())
+    sizes = vtk.vtkCellSizeFilter(); sizes.SetInputConnection(cut.GetOutputPort()); sizes.Update()
+    return vtk_to_numpy(sizes.GetOutput().GetCellData().GetArray('Area')).sum()
+names = glob.glob('*.json')
+assert len(names) == 4
+for name in names:
+    ours, p = json.load(open(name))['cut_area'], [float(x) for x in name[:-5].split(',')]
+    assert 100 < ours < 200 and abs(area(p) / ours - 1) < 1e-6, (name, area(p), ours)
+    assert abs(area([x + 0.1 * n for x, n in zip(p, p[3:])] + p[3:]) / ours - 1) > 1e-5, 'any other plane would do'
+END
+  python3 in.py
+}
+
 # What is broken in a mesh gives a right picture or one clear line.
 test_degenerate_input() {
   local backend backends=(cpu) many
