@@ -71,6 +71,13 @@ inline Vec3 position(const Point& point) {
   return {point.place[0] + half, point.place[1] + half, point.place[2] + half};
 }
 
+/// Points of one colour have no edge in common: corners and centres by the parity of their sum.
+inline constexpr unsigned colours = 4;
+constexpr unsigned colour(const Point& point) {
+  return 2 * point.kind +
+         (static_cast<unsigned>(point.place[0] + point.place[1] + point.place[2]) & 1U);
+}
+
 // ---- what lies round a centre
 
 /// The points of a cell: its centre, the next centres along x, y, z, its 8 corners by octant.

@@ -9,16 +9,17 @@ namespace gewebe {
 namespace {
 
 /// Cells that may be part of a larger leaf: nothing of their own, and of the tetrahedra that they
-/// share with the next cells, lies at a point with an edge to the other side. Word i, bit 8 j + k.
+/// share with the next cells, lies at a point with an edge to the other side or to another
+/// material. Word i, bit 8 j + k.
 using CellSet = std::array<std::uint64_t, 8>;
 CellSet quiet_cells(const StuffingBlocks& blocks, const StuffingBlock& block) {
   const auto at_surface = [](const StuffingBlock& there, unsigned word) {
-    return there.surface.set()[word];
+    return there.surface.set()[word] | there.interface.set()[word];
   };
   CellSet quiet{};
   for (int i = 0; i < leaf_dim; ++i) {
     const auto centres = static_cast<unsigned>(8 + i);
-    std::uint64_t loud = ~block.inside[centres] | block.surface.set()[centres];
+    std::uint64_t loud = ~block.inside[centres] | at_surface(block, centres);
     for (unsigned d = 0; d < bcc::directions; ++d)
       loud |=
           shifted_word(blocks, block, bcc::kind_after(1, d), i, bcc::place_step(1, d), at_surface);

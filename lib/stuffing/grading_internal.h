@@ -34,8 +34,8 @@ struct BlockLevels {
 ///
 /// Labelle and Shewchuk 2007, section 3: a leaf is a cube, of neighbours across a face or an edge
 /// one is at most twice as large as the other. All points of the lattice with an edge to the other
-/// side have but leaves of one cell round them, so that what is warped or cut is as on a lattice
-/// that isn't graded.
+/// side or another material have but leaves of one cell round them, so that what is warped or cut
+/// is as on a lattice that isn't graded.
 struct Grading {
   unsigned levels = 0;             ///< of the largest leaf; 0: nothing here is asked for
   std::vector<BlockLevels> blocks; ///< empty where levels == 0

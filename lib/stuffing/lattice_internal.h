@@ -71,10 +71,16 @@ struct StuffingBlock {
   PointSet inside{};
   PointRanks surface; ///< points with an edge to the other side
   std::uint32_t first_surface = 0;
+  PointRanks interface; ///< points inside with an edge to another material, where that was asked
+  std::uint32_t first_interface = 0;
 
   /// \pre it is in `surface`
   std::uint32_t surface_point(unsigned word, unsigned bit) const {
     return first_surface + surface.rank(word, bit);
+  }
+  /// \pre it is in `interface`
+  std::uint32_t interface_point(unsigned word, unsigned bit) const {
+    return first_interface + interface.rank(word, bit);
   }
   bool in(unsigned word, unsigned bit) const { return (inside[word] >> bit & 1) != 0; }
 };

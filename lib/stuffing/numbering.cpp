@@ -4,9 +4,13 @@
 #include "base/parallel.h"
 
 namespace gewebe {
+namespace {
+constexpr const char* too_many = "the mesh has more than 2^32 - 2 nodes, expected a larger --cell";
+} // namespace
 
 StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
-                           const Grading& grading, const SurfacePoints& surface) {
+                           const Grading& grading, const SurfacePoints& surface,
+                           const MaterialInterface& interface) {
   const std::vector<SurfacePoint>& points = surface.points;
   StuffingNodes nodes;
   nodes.first.resize(points.size());
@@ -54,7 +58,19 @@ StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
     nodes.first_inner[b] = static_cast<std::uint32_t>(count);
     count += size(nodes.inner[b].set());
     if (count >= UINT32_MAX)
-      throw Error("the mesh has more than 2^32 - 2 nodes, expected a larger --cell");
+      throw Error(too_many);
+  }
+  for (const InterfacePoint& point : interface.points) {
+    std::uint16_t cuts = 0;
+    for (unsigned d = 0; d < bcc::directions; ++d)
+      if (interface.is_cut(point, d) &&
+          point.material < interface.points[point.neighbours[d]].material)
+        cuts = static_cast<std::uint16_t>(cuts | 1U << d);
+    nodes.first_interface.push_back(static_cast<std::uint32_t>(count));
+    nodes.interface_cuts.push_back(cuts);
+    count += static_cast<std::uint32_t>(std::popcount(cuts));
+    if (count >= UINT32_MAX)
+      throw Error(too_many);
   }
   nodes.all = static_cast<std::uint32_t>(count);
   return nodes;

@@ -4,6 +4,7 @@
 
 #include "base/context.h"
 #include "stuffing/grading_internal.h"
+#include "stuffing/interface_internal.h"
 #include "stuffing/lattice_internal.h"
 #include "stuffing/warp_internal.h"
 
@@ -23,15 +24,24 @@ struct StuffingNodes {
   std::vector<PointRanks> inner;   ///< by block: nodes inside
   std::vector<std::uint32_t> first_inner;
   std::uint32_t on_surface = 0, all = 0;
+  /// Of interface points: the first node of the cuts of which it is the end of the smaller
+  /// material.
+  std::vector<std::uint32_t> first_interface;
+  std::vector<std::uint16_t> interface_cuts; ///< directions
 
   std::uint32_t cut(std::uint32_t point, unsigned direction) const {
     return first[point] +
            static_cast<std::uint32_t>(std::popcount(cuts[point] & ((1U << direction) - 1)));
   }
+  std::uint32_t interface_cut(std::uint32_t point, unsigned direction) const {
+    return first_interface[point] + static_cast<std::uint32_t>(std::popcount(
+                                        interface_cuts[point] & ((1U << direction) - 1)));
+  }
 };
 
 /// \throw Error if there are more than 2^32 - 2
 StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
-                           const Grading& grading, const SurfacePoints& surface);
+                           const Grading& grading, const SurfacePoints& surface,
+                           const MaterialInterface& interface);
 
 } // namespace gewebe

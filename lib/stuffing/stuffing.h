@@ -6,6 +6,7 @@
 #include "volume/grid.h"
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 namespace gewebe {
@@ -20,6 +21,15 @@ inline constexpr double stuffing_angle_min = 10.7, stuffing_angle_max = 164.8;
 /// Inside cells can be up to 2^3 times as large.
 inline constexpr unsigned stuffing_grade_max = 3;
 
+/// The material at a place of the world, mm; for one thread. It may throw Error.
+using MaterialAt = std::function<std::int32_t(const Vec3&)>;
+/// Makes one for a thread.
+using MaterialSource = std::function<MaterialAt()>;
+
+/// The interface between two materials followed by cuts has smaller angles than the boundary, where
+/// a quadrilateral of cuts has one diagonal for both sides. By sampling, in the same test.
+inline constexpr double stuffing_interface_angle_min = 8.4;
+
 struct StuffingOptions {
   std::optional<double> isovalue; ///< in place of the grid's own
   /// Distance in mm of lattice points along an axis; nothing: the edge of a cube as large as a
@@ -28,15 +38,23 @@ struct StuffingOptions {
   /// How often cells double inwards, 0 … stuffing_grade_max. What touches a point with an edge to
   /// the other side stays as it is with 0, so that the boundary is the same, triangle by triangle.
   unsigned grade = 0;
+  MaterialSource materials = {}; ///< nothing: the mesh has none
+  /// Do faces follow the interface between materials? Else a tetrahedron has the material of its
+  /// centroid, so that the interface runs along faces of the lattice.
+  bool follow_interface = false;
 };
 
 struct StuffingReport {
-  double cell = 0;                 ///< mm
-  std::uint64_t surface_nodes = 0; ///< the first so many points lie on the boundary
-  std::uint64_t cut_nodes = 0;     ///< of these, in the middle of an edge of the lattice
-  std::uint64_t warped = 0;        ///< of these, lattice points that were moved onto the surface
-  std::uint64_t refused_warps = 0; ///< where a warp would have joined sheets of the boundary
-  double largest_shift = 0;        ///< of a boundary node from the surface because of that, mm
+  double cell = 0;                    ///< mm
+  std::uint64_t surface_nodes = 0;    ///< the first so many points lie on the boundary
+  std::uint64_t cut_nodes = 0;        ///< of these, in the middle of an edge of the lattice
+  std::uint64_t warped = 0;           ///< of these, lattice points that were moved onto the surface
+  std::uint64_t refused_warps = 0;    ///< where a warp would have joined sheets of the boundary
+  double largest_shift = 0;           ///< of a boundary node from the surface because of that, mm
+  std::uint64_t interface_cuts = 0;   ///< nodes where an interface that is followed cuts an edge
+  std::uint64_t interface_warped = 0; ///< lattice points that were moved onto it
+  std::uint64_t interface_kept =
+      0; ///< that it comes to instead: at the boundary, at a third material
 };
 
 /// The solid inside the isosurface as tetrahedra (Labelle and Shewchuk, Isosurface Stuffing: Fast
@@ -60,8 +78,15 @@ struct StuffingReport {
 /// halves of pyramids and path tetrahedra, with dihedral angles of 45 to 120 degrees, so that the
 /// bounds hold as without.
 ///
-/// Nodes on the boundary come first, then those inside, each in the order of blocks of 8³ cells by
-/// (i, j, k); the mesh does not depend on the number of threads. Work and memory follow the solid.
+/// With `follow_interface` the inside is cut by the same stencils on both sides of an interface
+/// between two materials, which so share their faces; lattice points close to it are moved onto it.
+/// The boundary is that of the mesh without materials. Where the interface comes to points beside
+/// the boundary, or three materials meet, it runs along faces of the lattice. The least angle is
+/// stuffing_interface_angle_min.
+///
+/// Nodes on the boundary come first, then lattice points inside, then nodes on interfaces, each in
+/// the order of blocks of 8³ cells by (i, j, k); the mesh does not depend on the number of threads.
+/// Work and memory follow the solid.
 ///
 /// \throw Error if the transform is singular or not finite; if the grid is exact only near another
 /// isovalue (band_isovalue); if its background is inside, so that nothing bounds the solid; if a

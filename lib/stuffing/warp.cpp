@@ -89,19 +89,12 @@ std::uint8_t violated(const SurfacePoints& surface, const SurfacePoint& point) {
   return result;
 }
 
-/// Points of one colour have no edge in common: corners and centres by the parity of their sum.
-unsigned colour(const StuffingBlocks& blocks, const SurfacePoint& point) {
-  const bcc::Point place = point_at(blocks[point.block], point.word, point.bit);
-  return 2 * place.kind +
-         (static_cast<unsigned>(place.place[0] + place.place[1] + place.place[2]) & 1U);
-}
-
 void warp(const Context& context, const StuffingBlocks& blocks, SurfacePoints& surface) {
   std::vector<SurfacePoint>& points = surface.points;
-  for (unsigned turn = 0; turn < 4; ++turn)
+  for (unsigned turn = 0; turn < bcc::colours; ++turn)
     parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n)
-        if (colour(blocks, points[n]) == turn)
+        if (bcc::colour(point_at(blocks[points[n].block], points[n].word, points[n].bit)) == turn)
           points[n].warp = violated(surface, points[n]);
     });
 }

@@ -306,5 +306,37 @@ TEST(StuffingAngles, TheBetterOfTwoCutsKeepsThemByFar) {
   EXPECT_EQ(stencils, 8);
 }
 
+TEST(StuffingAngles, OneDiagonalServesBothSidesOfAnInterface) {
+  // As above, with the stencil of what lies beyond: it has the choice too, and its first way has
+  // the diagonal of the first way here. The least is at ends of the ranges, 8.51.
+  constexpr int steps = 12;
+  const double a = stuffing_alpha_short, width = 1 - 2 * a;
+  const std::array<int, 4> signs{1, 1, -1, -1}, beyond{-1, -1, 1, 1};
+  const Stencil &here = stencil(signs, true, true), &there = stencil(beyond, true, true);
+  ASSERT_TRUE(here.choice && there.choice);
+  Extremes all;
+  for (int n = 0; n < (steps + 1) * (steps + 1) * (steps + 1) * (steps + 1); ++n) {
+    std::array<std::array<double, 4>, 4> shares{};
+    int rest = n;
+    for (const unsigned i : {0U, 1U})
+      for (const unsigned j : {2U, 3U}) {
+        shares[i][j] = a + width * (rest % (steps + 1)) / steps;
+        shares[j][i] = 1 - shares[i][j];
+        rest /= steps + 1;
+      }
+    const auto both = [&](bool other) {
+      const Extremes one = angles(here, other ? here.other : here.tetrahedra, shares),
+                     two = angles(there, other ? there.other : there.tetrahedra, shares);
+      return Extremes{test::smaller(one.least, two.least), test::larger(one.largest, two.largest)};
+    };
+    const Extremes one = both(false), other = both(true);
+    const Extremes& taken = one.least >= other.least ? one : other;
+    all.least = test::smaller(all.least, taken.least);
+    all.largest = test::larger(all.largest, taken.largest);
+  }
+  EXPECT_GT(all.least, stuffing_interface_angle_min);
+  EXPECT_LT(all.largest, stuffing_angle_max - 1);
+}
+
 } // namespace
 } // namespace gewebe
