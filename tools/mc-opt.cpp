@@ -47,8 +47,11 @@ int main(int argc, char** argv) {
       .option("--grade", arguments.grade, "G",
               "with --tets: cells double inwards up to G times, the boundary stays (default 0)")
       .range(0, stuffing_grade_max);
-  program.option("--materials", arguments.materials, "VDB[,VDB...]",
-                 "with --tets: material 1, 2 … where the volume's inside is, else 0");
+  program.option("--materials", arguments.materials, "LABELS|VDB[,VDB...]",
+                 "with --tets: material by the label of a label volume; or 1, 2 … where a volume's "
+                 "inside is, else 0");
+  program.option("--label", arguments.labels, "L[-M][,L...]",
+                 "with --materials LABELS: these labels alone, each tetrahedron the nearest");
   program.output_kinds(writable_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");
   program.check([&] { check(arguments); });

@@ -127,9 +127,9 @@ int main(int argc, char** argv) {
   p.option("--dim", a.dim, "N", "voxels along the longest side of the mesh's box")
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
-  p.option("--label", a.labels, "L[,L...]",
-           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels; list: which "
-           "there are");
+  p.option("--label", a.labels, "L[-M][,L...]",
+           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels together; list: "
+           "which there are");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.antialias, "FILTER",

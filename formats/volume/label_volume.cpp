@@ -11,6 +11,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <functional>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -36,10 +38,10 @@ T swapped(T value) {
 /// Counts labels and says which are wanted: small ones from a table, others by hashing.
 class Counter {
 public:
-  explicit Counter(const std::vector<std::int64_t>& labels) : labels_(labels) {
-    std::sort(labels_.begin(), labels_.end());
-    for (const std::int64_t label : labels_)
-      if (label >= 0 && label < table_size)
+  explicit Counter(const std::vector<LabelRange>& labels) : labels_(labels) {
+    for (const LabelRange& range : labels)
+      for (std::int64_t label = std::max(range.first, std::int64_t{0});
+           label <= std::min(range.last, table_size - 1); ++label)
         wanted_[static_cast<std::size_t>(label)] = 1;
   }
 
@@ -51,7 +53,9 @@ public:
     std::uint64_t& number = others_[label];
     if (++number == 1 && others_.size() > 100000)
       throw Error("more than 100000 different values, expected labels");
-    return std::binary_search(labels_.begin(), labels_.end(), label);
+    return std::any_of(labels_.begin(), labels_.end(), [&](const LabelRange& range) {
+      return label >= range.first && label <= range.last;
+    });
   }
 
   std::vector<std::pair<std::int64_t, std::uint64_t>> result() const {
@@ -65,7 +69,7 @@ public:
 
 private:
   static constexpr std::int64_t table_size = 65536;
-  std::vector<std::int64_t> labels_;
+  const std::vector<LabelRange>& labels_;
   std::vector<char> wanted_ = std::vector<char>(table_size);
   std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(table_size);
   std::unordered_map<std::int64_t, std::uint64_t> others_;
@@ -91,15 +95,18 @@ std::string value_text(T stored, const VoxelLayout& layout) {
   return text.data();
 }
 
-/// Rows of voxels of type T to bits.
+/// What becomes of a row of labels.
+using TakeRow = std::function<void(std::span<const std::int64_t> row)>;
+
+/// Rows of voxels of type T to labels.
 template <class T>
-std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayout& layout,
-                      const Context& context, Counter& counter, LabelMask& mask) {
+void convert(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+             const Context& context, const TakeRow& take) {
   const std::size_t length = static_cast<std::size_t>(layout.size[0]);
   const std::size_t rows =
       static_cast<std::size_t>(layout.size[1]) * static_cast<std::size_t>(layout.size[2]);
   std::vector<T> row(length);
-  std::uint64_t set = 0;
+  std::vector<std::int64_t> labels(length);
   for (std::size_t r = 0; r < rows; ++r) {
     if (r % 1024 == 0 && context.cancelled && context.cancelled())
       throw Cancelled();
@@ -108,9 +115,6 @@ std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayo
       throw Error(name, "ends after " + std::to_string(r * length * sizeof(T) + got) + " of " +
                             std::to_string(rows * length * sizeof(T)) + " bytes of voxels (" +
                             size_text(layout.size) + ")");
-    // Grows as the bytes come, so that a header's claim alone takes no memory.
-    mask.bits.resize(mask.bits.size() + mask.row_words());
-    std::uint64_t* const words = mask.bits.data() + (mask.bits.size() - mask.row_words());
     for (std::size_t i = 0; i < length; ++i) {
       const T stored =
           layout.big_endian != (std::endian::native == std::endian::big) ? swapped(row[i]) : row[i];
@@ -120,19 +124,15 @@ std::uint64_t convert(ByteSource& data, const std::string& name, const VoxelLayo
                               std::to_string(r % static_cast<std::size_t>(layout.size[1])) + ", " +
                               std::to_string(r / static_cast<std::size_t>(layout.size[1])) +
                               ") is " + value_text(stored, layout) + ", expected whole numbers");
-      const bool wanted = at(name, [&] { return counter.count(*label); });
-      set += wanted ? 1 : 0;
-      words[i >> 6] |= static_cast<std::uint64_t>(wanted) << (i & 63);
+      labels[i] = *label;
     }
+    at(name, [&] { take(labels); });
   }
-  return set;
 }
 
-std::uint64_t convert_any(ByteSource& data, const std::string& name, const VoxelLayout& layout,
-                          const Context& context, Counter& counter, LabelMask& mask) {
-  const auto as = [&]<class T>(T) {
-    return convert<T>(data, name, layout, context, counter, mask);
-  };
+void convert_any(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                 const Context& context, const TakeRow& take) {
+  const auto as = [&]<class T>(T) { convert<T>(data, name, layout, context, take); };
   switch (layout.type) {
   case ScalarType::i8:
     return as(std::int8_t{});
@@ -155,7 +155,40 @@ std::uint64_t convert_any(ByteSource& data, const std::string& name, const Voxel
   case ScalarType::f64:
     return as(double{});
   }
-  return 0;
+}
+
+// Both grow as the bytes come, so that a header's claim alone takes no memory.
+
+/// Appends a row of bits, of the labels that are wanted; returns how many.
+std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter, LabelMask& mask) {
+  mask.bits.resize(mask.bits.size() + mask.row_words());
+  std::uint64_t* const words = mask.bits.data() + (mask.bits.size() - mask.row_words());
+  std::uint64_t set = 0;
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const bool wanted = counter.count(row[i]);
+    set += wanted ? 1 : 0;
+    words[i >> 6] |= static_cast<std::uint64_t>(wanted) << (i & 63);
+  }
+  return set;
+}
+
+/// Appends a row of runs, of all labels or of those that are wanted.
+void append_runs(const LabelRequest& request, std::span<const std::int64_t> row, Counter& counter,
+                 LabelRuns& labels) {
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const bool wanted = counter.count(row[i]) || request.labels.empty();
+    const std::int64_t label = wanted ? row[i] : 0;
+    if (label < 0 || label > INT32_MAX)
+      throw Error("has label " + std::to_string(label) + ", expected 0 to " +
+                  std::to_string(INT32_MAX));
+    if (i == 0 || label != labels.runs.back().label)
+      labels.runs.push_back({0, static_cast<std::int32_t>(label)});
+    labels.runs.back().end = static_cast<std::int32_t>(i + 1);
+  }
+  labels.rows.push_back(labels.runs.size());
+  // A vector that grows holds the old content too.
+  require_memory(request.context,
+                 24.0 * static_cast<double>(labels.runs.size() + labels.rows.size()), "the labels");
 }
 
 /// "0 to 4, 7, 9 to 12", of long lists the beginning.
@@ -195,13 +228,24 @@ LabelVolume read_any(ByteSource& source, const std::string& name, const LabelReq
     volume = read_meta_image(*bytes, request);
   else
     throw Error(name, "is no label volume, expected NIfTI, NRRD or MetaImage");
-  for (const std::int64_t label : request.labels)
-    if (!std::binary_search(volume.labels.begin(), volume.labels.end(),
-                            std::pair<std::int64_t, std::uint64_t>(label, 0),
-                            [](const auto& a, const auto& b) { return a.first < b.first; }))
-      throw Error(name, "has no label " + std::to_string(label) + ", expected some of " +
-                            list_of(volume.labels));
+  for (const LabelRange& range : request.labels)
+    if (std::none_of(volume.labels.begin(), volume.labels.end(), [&](const auto& label) {
+          return label.first >= range.first && label.first <= range.last;
+        }))
+      throw Error(name, "has no label " + std::to_string(range.first) +
+                            (range.last == range.first ? "" : " to " + std::to_string(range.last)) +
+                            ", expected some of " + list_of(volume.labels));
   return volume;
+}
+
+AllLabels all_of(ByteSource& source, const std::string& name, const std::vector<LabelRange>& labels,
+                 const Context& context, bool side_files) {
+  AllLabels result;
+  LabelVolume volume =
+      read_any(source, name, {labels, context, LabelCheck(), side_files, &result.voxels});
+  result.format = std::move(volume.format);
+  result.warnings = std::move(volume.warnings);
+  return result;
 }
 
 } // namespace
@@ -246,7 +290,14 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
       request.check(volume.mask);
   });
   Counter counter(request.labels);
-  volume.voxels = convert_any(data, name, layout, request.context, counter, volume.mask);
+  if (request.all != nullptr)
+    *request.all = {layout.size, layout.transform, {}, {0}};
+  convert_any(data, name, layout, request.context, [&](std::span<const std::int64_t> row) {
+    if (request.all != nullptr)
+      append_runs(request, row, counter, *request.all);
+    else
+      volume.voxels += append_bits(row, counter, volume.mask);
+  });
   char more = 0;
   if (data.read(&more, 1) != 0)
     throw Error(name, "goes on after its " + size_text(layout.size) + " voxels, expected its end");
@@ -364,18 +415,31 @@ std::int64_t whole_of(const std::string& place, std::string_view word) {
 
 // ---- the readers
 
-LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
+LabelVolume read_label_volume(Input& input, const std::vector<LabelRange>& labels,
                               const Context& context, const LabelCheck& check) {
   (void)input.peek(1); // says that it is empty
   StreamBytes source(input.stream(), input.name());
-  return read_any(source, input.name(), {labels, context, check, input.name() != "-"});
+  return read_any(source, input.name(), {labels, context, check, input.name() != "-", nullptr});
+}
+
+AllLabels read_all_labels(Input& input, const std::vector<LabelRange>& labels,
+                          const Context& context) {
+  (void)input.peek(1); // says that it is empty
+  StreamBytes source(input.stream(), input.name());
+  return all_of(source, input.name(), labels, context, input.name() != "-");
 }
 
 LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
-                                    const std::vector<std::int64_t>& labels, const Context& context,
+                                    const std::vector<LabelRange>& labels, const Context& context,
                                     const LabelCheck& check) {
   MemoryBytes source(bytes);
-  return read_any(source, name, {labels, context, check, false});
+  return read_any(source, name, {labels, context, check, false, nullptr});
+}
+
+AllLabels all_labels_from_bytes(std::string_view bytes, const std::string& name,
+                                const std::vector<LabelRange>& labels, const Context& context) {
+  MemoryBytes source(bytes);
+  return all_of(source, name, labels, context, false);
 }
 
 bool is_label_volume(std::string_view first_bytes) {

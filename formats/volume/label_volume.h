@@ -1,7 +1,8 @@
 #pragma once
 // Label volumes of radiology: NIfTI-1 and -2 (.nii, .nii.gz, pairs .hdr/.img), NRRD (.nrrd, .nhdr;
 // raw and gzip) and MetaImage (.mha, .mhd; raw and zlib). What is read is which voxels have one of
-// the wanted labels, one bit a voxel, and where they lie in the world: mm, RAS.
+// the wanted labels, one bit a voxel, or the labels of all voxels as runs, and where they lie in
+// the world: mm, RAS.
 //
 // A reader of our own on zlib. Debian 12 has three libraries. nifticlib 3 (1.8 MB) opens files by
 // name alone, so no pipe; it warns on standard error and reads a file that is cut off as zeros, and
@@ -19,6 +20,7 @@
 #include "base/context.h"
 #include "formats/stream/stream.h"
 #include "labels/label_mask.h"
+#include "labels/label_runs.h"
 
 #include <cstdint>
 #include <functional>
@@ -28,6 +30,11 @@
 #include <vector>
 
 namespace gewebe {
+
+/// Labels that are wanted: one where both are equal, or those in between that the volume holds.
+struct LabelRange {
+  std::int64_t first = 0, last = 0;
+};
 
 struct LabelVolume {
   LabelMask mask;           ///< of the wanted labels
@@ -45,17 +52,31 @@ using LabelCheck = std::function<void(const LabelMask& without_bits)>;
 /// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
 /// Compression is told by its bytes. Values must be whole numbers, in whatever type they are kept.
 /// \throw Error with the place if it is none of the three, is cut off or goes on beyond its end, if
-/// a value is no whole number, if the affine is singular, if one of `labels` doesn't occur (the
-/// message names those that do), if the mask or the voxels unpacked would need more than
+/// a value is no whole number, if the affine is singular, if none of a range of `labels` occurs
+/// (the message names those that do), if the mask or the voxels unpacked would need more than
 /// context.max_memory, or what `check` throws
-LabelVolume read_label_volume(Input& input, const std::vector<std::int64_t>& labels,
+LabelVolume read_label_volume(Input& input, const std::vector<LabelRange>& labels,
                               const Context& context, const LabelCheck& check = {});
 
 /// The same for bytes that are there already; `name` is for messages. Files of two parts are
 /// refused.
 LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& name,
-                                    const std::vector<std::int64_t>& labels, const Context& context,
+                                    const std::vector<LabelRange>& labels, const Context& context,
                                     const LabelCheck& check = {});
+
+struct AllLabels {
+  LabelRuns voxels;
+  std::string format; ///< as above
+  std::vector<std::string> warnings;
+};
+
+/// Reads the same files for the labels of all voxels; those that `labels`, where there are any, do
+/// not want become 0. \throw Error as read_label_volume, and if a wanted label is below 0 or above
+/// 2^31 - 1, or the runs would need more than context.max_memory
+AllLabels read_all_labels(Input& input, const std::vector<LabelRange>& labels,
+                          const Context& context);
+AllLabels all_labels_from_bytes(std::string_view bytes, const std::string& name,
+                                const std::vector<LabelRange>& labels, const Context& context);
 
 /// Are these first bytes (the more the better, up to 4096) those of a label volume, compressed or
 /// not?

@@ -98,10 +98,11 @@ struct VoxelLayout {
 
 /// What a reader is asked.
 struct LabelRequest {
-  const std::vector<std::int64_t>& labels;
+  const std::vector<LabelRange>& labels;
   const Context& context;
   const LabelCheck& check;
   bool side_files; ///< whether the name is that of a file, beside which others may be opened
+  LabelRuns* all;  ///< receives all labels in place of the mask's bits; nullptr: bits are wanted
 };
 
 /// Reads the voxels to the end of `data`, which is called `name`. Fills all but format and

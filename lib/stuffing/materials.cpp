@@ -5,33 +5,81 @@
 #include "volume/field.h"
 
 #include <cmath>
+#include <cstddef>
 
 namespace gewebe {
+namespace {
 
-void set_materials(const Context& context, std::span<const Grid> volumes, TetMesh& mesh) {
-  for (const Grid& volume : volumes) {
-    const double determinant = volume.info().transform.determinant();
-    if (!std::isfinite(determinant) || determinant == 0)
-      throw Error("the transform of a volume of materials is singular, expected an invertible map");
+void check_transform(const GridTransform& transform) {
+  const double determinant = transform.determinant();
+  if (!std::isfinite(determinant) || determinant == 0)
+    throw Error("the transform of a volume of materials is singular, expected an invertible map");
+}
+
+Vec3 centroid(const TetMesh& mesh, std::size_t t) {
+  const auto& [a, b, c, d] = mesh.tetrahedra[t];
+  return (mesh.points[a] + mesh.points[b] + mesh.points[c] + mesh.points[d]) / 4;
+}
+
+/// As set_materials says. \pre transform is invertible
+std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t reach) {
+  const Vec3 index = labels.transform.to_index(place);
+  Int3 voxel{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double x = std::floor(index[static_cast<int>(a)] + 0.5);
+    if (!(x >= -reach && x < static_cast<double>(labels.size[a]) + reach)) // NaN is outside
+      return 0;
+    voxel[a] = static_cast<std::int32_t>(x);
   }
-  mesh.material.assign(mesh.tetrahedra.size(), 0);
-  for (std::size_t n = 0; n < volumes.size(); ++n) {
-    const GridInfo& info = volumes[n].info();
-    const double isovalue = info.level_set ? 0 : info.isovalue;
-    parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      Field field(volumes[n]);
-      for (std::size_t t = begin; t < end; ++t) {
-        const auto& [a, b, c, d] = mesh.tetrahedra[t];
-        const Vec3 centroid =
-            (mesh.points[a] + mesh.points[b] + mesh.points[c] + mesh.points[d]) / 4;
-        const double value = field.value(info.transform.to_index(centroid));
-        if (!std::isfinite(value))
-          throw Error("a volume of materials has a value that is not finite");
-        if (info.level_set ? value < isovalue : value > isovalue)
-          mesh.material[t] = static_cast<std::int32_t>(n + 1);
+  std::int32_t nearest = labels.at(voxel);
+  if (nearest != 0)
+    return nearest;
+  double least = HUGE_VAL;
+  for (std::int32_t k = voxel[2] - reach; k <= voxel[2] + reach; ++k)
+    for (std::int32_t j = voxel[1] - reach; j <= voxel[1] + reach; ++j)
+      for (std::int32_t i = voxel[0] - reach; i <= voxel[0] + reach; ++i) {
+        const std::int32_t label = labels.at({i, j, k});
+        if (label == 0)
+          continue;
+        const Vec3 apart =
+            labels.transform.to_world(
+                {static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}) -
+            place;
+        if (dot(apart, apart) < least) {
+          least = dot(apart, apart);
+          nearest = label;
+        }
       }
-    });
-  }
+  return nearest;
+}
+
+} // namespace
+
+void set_material(const Context& context, const Grid& volume, std::int32_t number, TetMesh& mesh) {
+  const GridInfo& info = volume.info();
+  check_transform(info.transform);
+  const double isovalue = info.level_set ? 0 : info.isovalue;
+  mesh.material.resize(mesh.tetrahedra.size());
+  parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    Field field(volume);
+    for (std::size_t t = begin; t < end; ++t) {
+      const double value = field.value(info.transform.to_index(centroid(mesh, t)));
+      if (!std::isfinite(value))
+        throw Error("a value is not finite, expected numbers where the tetrahedra are");
+      if (info.level_set ? value < isovalue : value > isovalue)
+        mesh.material[t] = number;
+    }
+  });
+}
+
+void set_materials(const Context& context, const LabelRuns& labels, TetMesh& mesh,
+                   std::int32_t reach) {
+  check_transform(labels.transform);
+  mesh.material.resize(mesh.tetrahedra.size());
+  parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      mesh.material[t] = label_at(labels, centroid(mesh, t), reach);
+  });
 }
 
 } // namespace gewebe

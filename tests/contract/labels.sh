@@ -155,3 +155,156 @@ E2
   grep -qx 'voxelize: in.nii.gz: ends after 0 of 4096000000 bytes of voxels (1600 x 1600 x 1600)' message || fail "$(<message)"
   rm in.nii.gz out message
 }
+
+# Tetrahedra with the labels of a volume as materials against that volume, read by numpy alone: each has the label of
+# the voxel at its centroid (RULE own), or of the nearest one with a label (nearest); the volume of each label is that
+# of its voxels but for TOLERANCE. Labels that touch share faces, and the mesh has no boundary between them: no face of
+# one tetrahedron alone lies among voxels of the labels, and none is in three.
+check_materials() { # MESH.mesh LABELS.nii.gz RULE TOLERANCE LABEL...
+  cat >materials.py <<'END'
+import gzip, struct, sys
+import numpy as np
+
+name, volume, rule, tolerance, *wanted = sys.argv[1:]
+wanted = [int(w) for w in wanted]
+raw = gzip.open(volume).read()
+size = struct.unpack_from('<3h', raw, 42)
+kind = {2: np.uint8, 4: np.int16, 8: np.int32, 512: np.uint16}[struct.unpack_from('<h', raw, 70)[0]]
+assert struct.unpack_from('<h', raw, 254)[0] > 0, 'no sform'
+affine = np.vstack([np.frombuffer(raw, '<f4', 12, 280).reshape(3, 4).astype(float), [0, 0, 0, 1]])
+offset = int(struct.unpack_from('<f', raw, 108)[0])
+labels = np.frombuffer(raw, kind, size[0] * size[1] * size[2], offset).reshape(size, order='F').astype(int)
+
+text = open(name).read()
+def table(key, columns):
+    begin = text.index('\n' + key + '\n') + len(key) + 2
+    begin = text.index('\n', begin)
+    end = min(n for n in (text.find(w, begin) for w in ('Vert', 'Tetra', 'Tri', 'End')) if n >= 0)
+    return np.fromstring(text[begin:end], sep=' ').reshape(-1, columns)
+points = table('Vertices', 4)[:, :3]
+rows = table('Tetrahedra', 5).astype(int)
+corners, material = rows[:, :4] - 1, rows[:, 4]
+
+inverse = np.linalg.inv(affine)
+padded = np.pad(labels, 6)
+def voxels(p):
+    """Which voxel of `padded` a place is in, and whether that is clear."""
+    index = p @ inverse[:3, :3].T + inverse[:3, 3]
+    whole = np.clip(np.floor(index + 0.5).astype(int), -3, np.array(size) + 2)
+    return whole + 6, np.abs(index - np.floor(index) - 0.5).min(1) > 1e-9
+centroids = points[corners].mean(1)
+at, clear = voxels(centroids)
+expected = padded[tuple(at.T)]
+if rule == 'nearest':
+    other = ~np.isin(expected, wanted)
+    least = np.full((len(wanted), other.sum()), np.inf) # distance of each label
+    for offset in np.ndindex(7, 7, 7):
+        voxel = at[other] + np.array(offset) - 3
+        label = padded[tuple(voxel.T)]
+        d = np.linalg.norm((voxel - 6) @ affine[:3, :3].T + affine[:3, 3] - centroids[other], axis=1)
+        for n, w in enumerate(wanted):
+            least[n] = np.where(label == w, np.minimum(d, least[n]), least[n])
+    assert other.sum() > 0 and least.min(0).max() < np.inf
+    expected[other] = np.array(wanted)[least.argmin(0)]
+    order = np.sort(np.vstack([least, np.full(other.sum(), 1e9)]), 0)
+    clear[other] &= order[1] - order[0] > 1e-6
+assert clear.mean() > 0.99
+bad = (expected != material)[clear].sum()
+assert bad == 0, '%d of %d tetrahedra have another material than the label of their voxel' % (bad, len(material))
+
+p = points[corners]
+volumes = np.einsum('ij,ij->i', np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0]) / 6
+voxel = abs(np.linalg.det(affine[:3, :3]))
+share = np.isin(material, wanted).mean()
+print('share of tetrahedra with these labels: %.4f' % share)
+for w in wanted:
+    ratio = volumes[material == w].sum() / ((labels == w).sum() * voxel)
+    print('label %d: %d tetrahedra, volume %+.2f %%' % (w, (material == w).sum(), 100 * (ratio - 1)))
+    assert abs(ratio - 1) <= float(tolerance), ratio
+assert share >= (0.95 if rule == 'own' else 1), share
+
+faces = np.sort(np.concatenate([corners[:, [k for k in range(4) if k != o]] for o in range(4)]), 1)
+owner = np.tile(np.arange(len(corners)), 4)
+key = (faces[:, 0] * len(points) + faces[:, 1]) * len(points) + faces[:, 2]
+order = np.argsort(key, kind='stable')
+same = key[order][1:] == key[order][:-1]
+assert not (same[1:] & same[:-1]).any(), 'a face in three tetrahedra'
+a, b = material[owner[order][:-1][same]], material[owner[order][1:][same]]
+for low, high in [(v, w) for v in wanted for w in wanted if v < w]:
+    touching = sum((np.moveaxis(labels, axis, 0)[:-1] == v)[(np.moveaxis(labels, axis, 0)[1:] == w)].sum()
+                   for axis in range(3) for v, w in ((low, high), (high, low)))
+    shared = ((np.minimum(a, b) == low) & (np.maximum(a, b) == high)).sum()
+    print('labels %d and %d: %d faces of voxels, %d of tetrahedra' % (low, high, touching, shared))
+    assert (shared > 0) == (touching > 0)
+
+single = np.ones(len(order), bool)
+single[1:] &= ~same
+single[:-1] &= ~same
+middle, _ = voxels(points[faces[order][single]].mean(1))
+union = np.isin(padded, wanted)
+inside = np.ones(single.sum(), bool)
+for i in (-1, 0, 1):
+    for j in (-1, 0, 1):
+        for k in (-1, 0, 1):
+            inside &= union[tuple((middle + [i, j, k]).T)]
+assert inside.sum() == 0, '%d faces of the boundary lie within the labels' % inside.sum()
+END
+  python3 -c 'import numpy' 2>/dev/null || skip 'no numpy for python3'
+  python3 materials.py "$@" || fail "materials of $*"
+  rm materials.py
+}
+
+test_materials_of_the_liver() {
+  local data=$GEWEBE_SHARED/data/ts_abdomen_seg_3mm.nii.gz
+  [[ -f $data ]] || skip 'no data'
+  voxelize --label 5 "$data" | mc-opt -q --tets --cell 4 --materials "$data" -o liver.mesh 2>/dev/null
+  check_materials liver.mesh "$data" own 0.03 5
+}
+
+# Cells of 4 mm over voxels of 3 mm: gallbladder, liver, stomach, colon, each pair of three touching.
+test_materials_of_touching_organs() {
+  local data=$GEWEBE_SHARED/data/ts_abdomen_seg_3mm.nii.gz labels
+  [[ -f $data ]] || skip 'no data'
+  for labels in 4,5 5,6,20; do
+    voxelize --label $labels "$data" |
+      mc-opt -q --tets --cell 4 --materials "$data" --label $labels -o organs.mesh 2>/dev/null
+    # shellcheck disable=SC2086 # words
+    check_materials organs.mesh "$data" nearest 0.01 ${labels//,/ }
+    rm organs.mesh
+  done
+}
+
+# Labels on axes that are turned, mirrored, oblong and a little oblique; two of them touch, and a third fills a corner.
+test_materials_of_turned_labels() {
+  python3 -c 'import numpy' 2>/dev/null || skip 'no numpy for python3'
+  python3 - <<'END'
+import gzip, struct
+import numpy as np
+size = (40, 36, 24)
+i, j, k = np.meshgrid(*map(np.arange, size), indexing='ij')
+labels = np.zeros(size, np.uint8)
+labels[((i - 17) / 13) ** 2 + ((j - 17) / 12) ** 2 + ((k - 11) / 8) ** 2 < 1] = 4
+labels[(labels == 4) & (i + j > 38)] = 7
+labels[(labels == 4) & (k < 8) & (j < 14)] = 9
+c, s = np.cos(0.4), np.sin(0.4)
+turn = np.array([[c, -s, 0], [s * c, c * c, -s], [s * s, s * c, c]])
+matrix = turn @ np.diag([-1.5, 1.2, 2.0]) @ np.array([[1, 0.002, 0], [0, 1, 0], [0.001, 0, 1]])
+head = bytearray(352)
+struct.pack_into('<i', head, 0, 348)
+struct.pack_into('<8h', head, 40, 3, *size, 1, 1, 1, 1)
+struct.pack_into('<hh', head, 70, 2, 8)
+struct.pack_into('<8f', head, 76, 1, 1.5, 1.2, 2, 0, 0, 0, 0)
+struct.pack_into('<f', head, 108, 352)
+head[123] = 2
+struct.pack_into('<h', head, 254, 1)
+for row in range(3):
+    struct.pack_into('<4f', head, 280 + 16 * row, *matrix[row], (-31, 52, 170)[row])
+head[344:348] = b'n+1\0'
+open('in.nii.gz', 'wb').write(gzip.compress(bytes(head) + labels.tobytes(order='F')))
+END
+  voxelize --label 4,7,9 in.nii.gz | mc-opt --tets --cell 1.2 --materials in.nii.gz -o in.mesh
+  check_materials in.mesh in.nii.gz own 0.1 4 7 9
+  voxelize --label 4-9 in.nii.gz | mc-opt --tets --cell 1.2 --materials in.nii.gz --label 4-9 -o in.mesh
+  check_materials in.mesh in.nii.gz nearest 0.03 4 7 9
+  rm in.nii.gz in.mesh
+}

@@ -1,5 +1,5 @@
-// Any bytes as a label volume: an Error or a mask, never a crash, and no memory beyond the limit;
-// small ones become a density too.
+// Any bytes as a label volume: an Error, or a mask and runs, never a crash, and no memory beyond
+// the limit; small ones become a density too.
 
 #include "base/error.h"
 #include "formats/volume/label_volume.h"
@@ -18,13 +18,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   context.max_memory = std::uint64_t{64} << 20U;
   (void)is_label_volume(bytes.substr(0, 4096));
   try {
-    const LabelVolume volume = label_volume_from_bytes(bytes, "fuzz", {3}, context);
+    const LabelVolume volume = label_volume_from_bytes(bytes, "fuzz", {{3, 3}}, context);
     const Int3& n = volume.mask.size;
     if (volume.mask.bits.size() != volume.mask.row(0, n[2]) || volume.voxels == 0)
       std::abort();
     if (std::int64_t{n[0]} * n[1] * n[2] < 4096)
       (void)label_density(context, volume.mask, {}).digest();
   } catch (const Error&) { // what bad input is for
+  }
+  try {
+    const LabelRuns all = all_labels_from_bytes(bytes, "fuzz", {}, context).voxels;
+    if (all.rows.size() !=
+            static_cast<std::size_t>(all.size[1]) * static_cast<std::size_t>(all.size[2]) + 1 ||
+        all.rows.back() != all.runs.size() || all.runs.back().end != all.size[0])
+      std::abort();
+  } catch (const Error&) {
   }
   return 0;
 }

@@ -128,11 +128,11 @@ std::string gzipped(const std::string& bytes) {
   return deflated(bytes, 31);
 }
 
-LabelVolume read(const std::string& bytes, const std::vector<std::int64_t>& labels = {9}) {
+LabelVolume read(const std::string& bytes, const std::vector<LabelRange>& labels = {{9, 9}}) {
   return label_volume_from_bytes(bytes, "test", labels, {});
 }
 
-std::string message(const std::string& bytes, const std::vector<std::int64_t>& labels = {9}) {
+std::string message(const std::string& bytes, const std::vector<LabelRange>& labels = {{9, 9}}) {
   try {
     (void)read(bytes, labels);
   } catch (const Error& error) {
@@ -154,6 +154,18 @@ void expect_sample(const std::string& bytes) {
   for (std::size_t n = 0; n < 12; ++n)
     EXPECT_NEAR(volume.mask.transform.m[n], affine[n], 1e-12) << n;
   EXPECT_TRUE(volume.warnings.empty());
+  const AllLabels all = all_labels_from_bytes(bytes, "test", {}, {});
+  EXPECT_EQ(all.format, volume.format);
+  EXPECT_EQ(all.voxels.size, size);
+  EXPECT_EQ(all.voxels.transform, volume.mask.transform);
+  const std::vector<std::int32_t> expected = voxels<std::int32_t>();
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 5; ++i)
+        EXPECT_EQ(all.voxels.at({i, j, k}), expected[static_cast<std::size_t>(i + 5 * (j + 4 * k))])
+            << i << " " << j << " " << k;
+  for (const Int3& beyond : {Int3{5, 3, 2}, Int3{-1, 0, 0}, Int3{0, 4, 0}, Int3{0, 0, -1}})
+    EXPECT_EQ(all.voxels.at(beyond), 0);
 }
 
 std::string nifti_of_bytes() {
@@ -256,7 +268,26 @@ TEST(LabelVolume, SpacesOfNrrd) {
 }
 
 TEST(LabelVolume, UnknownLabelNamesThoseThereAre) {
-  EXPECT_EQ(message(nifti_of_bytes(), {9, 8}), "test: has no label 8, expected some of 0, 9, 200");
+  EXPECT_EQ(message(nifti_of_bytes(), {{9, 9}, {8, 8}}),
+            "test: has no label 8, expected some of 0, 9, 200");
+  EXPECT_EQ(message(nifti_of_bytes(), {{0, 0}, {10, 199}}),
+            "test: has no label 10 to 199, expected some of 0, 9, 200");
+}
+
+TEST(LabelVolume, RangesAreOfWhatThereIs) {
+  EXPECT_EQ(read(nifti_of_bytes(), {{1, 199}}).voxels, 2U);
+  EXPECT_EQ(read(nifti_of_bytes(), {{-5, 8}}).voxels, 57U);
+  EXPECT_EQ(read(nifti_of_bytes(), {{9, INT64_MAX}, {200, 200}}).voxels, 3U);
+  EXPECT_EQ(read(nifti_of_bytes(), {{INT64_MIN, INT64_MAX}}).voxels, 60U);
+  // Beyond the table of small ones.
+  std::vector<double> values = voxels<double>();
+  values[7] = 70000;
+  values[8] = 70002;
+  values[11] = -3;
+  const std::string bytes = nifti_2(raw(values), false);
+  EXPECT_EQ(read(bytes, {{70000, 70001}, {-3, -1}}).voxels, 2U);
+  EXPECT_EQ(read(bytes, {{201, 70000}, {70001, 70002}}).voxels, 2U);
+  EXPECT_EQ(read(bytes, {{70001, 80000}}).voxels, 1U);
 }
 
 TEST(LabelVolume, EveryTruncatedPrefixIsRefused) {
@@ -280,6 +311,50 @@ TEST(LabelVolume, DamagedCompressedDataIsRefused) {
   EXPECT_NE(message(bytes), "");
 }
 
+TEST(LabelVolume, AllLabelsAreNumbersOf31Bits) {
+  const auto complaint = [](double value) {
+    std::vector<double> values = voxels<double>();
+    values[7] = value;
+    try {
+      (void)all_labels_from_bytes(nifti_2(raw(values), false), "test", {}, {});
+    } catch (const Error& error) {
+      return error.place() + ": " + error.what();
+    }
+    return std::string();
+  };
+  EXPECT_EQ(complaint(0x1p31 - 1), "");
+  EXPECT_EQ(complaint(0x1p31), "test: has label 2147483648, expected 0 to 2147483647");
+  EXPECT_EQ(complaint(-1), "test: has label -1, expected 0 to 2147483647");
+  EXPECT_EQ(complaint(0.5), "test: voxel (2, 1, 0) is 0.5, expected whole numbers");
+}
+
+TEST(LabelVolume, LabelsThatAreNotWantedAreNone) {
+  std::vector<double> values = voxels<double>();
+  values[7] = -3;
+  const std::string bytes = nifti_2(raw(values), false);
+  const LabelRuns some = all_labels_from_bytes(bytes, "test", {{100, 300}}, {}).voxels;
+  EXPECT_EQ(some.at({0, 0, 0}), 200);
+  EXPECT_EQ(some.at({1, 2, 1}), 0);
+  EXPECT_EQ(some.at({2, 1, 0}), 0);
+  EXPECT_EQ(some.runs.size(), 13U); // a row each, and what is behind the voxel of 200
+  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {{1, 8}}, {}), Error);
+  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {{-3, -3}}, {}), Error);
+}
+
+TEST(LabelVolume, RunsOfAllLabelsKeepToTheMemory) {
+  // Every voxel another label than the one before it.
+  std::vector<std::uint8_t> values(200 * 200 * 20);
+  for (std::size_t n = 0; n < values.size(); ++n)
+    values[n] = static_cast<std::uint8_t>(n % 2);
+  std::string bytes = "NRRD0005\ndimension: 3\nsizes: 200 200 20\ntype: uchar\nencoding: raw\n" +
+                      lps + "\n" + raw(values);
+  Context context;
+  context.max_memory = 10000000;
+  EXPECT_THROW((void)all_labels_from_bytes(bytes, "test", {}, context), Error);
+  context.max_memory = 30000000;
+  EXPECT_EQ(all_labels_from_bytes(bytes, "test", {}, context).voxels.runs.size(), values.size());
+}
+
 TEST(LabelVolume, ValuesThatAreNoLabelsAreRefused) {
   for (const float bad : {0.5F, NAN, HUGE_VALF, 1e30F}) {
     std::vector<float> values = voxels<float>();
@@ -296,7 +371,7 @@ TEST(LabelVolume, HugeClaimsTakeNoMemory) {
   h.put<std::int16_t>(40, {3, 30000, 30000, 30000});
   Context context;
   context.max_memory = std::uint64_t{1} << 30U;
-  EXPECT_THROW((void)label_volume_from_bytes(h.bytes, "test", {9}, context), Error);
+  EXPECT_THROW((void)label_volume_from_bytes(h.bytes, "test", {{9, 9}}, context), Error);
   EXPECT_THROW((void)read(h.bytes), Error); // the bytes end first
 }
 
@@ -313,7 +388,7 @@ TEST(LabelVolume, WhatItsSizeRulesOutIsRefusedBeforeAVoxelIsUnpacked) {
   };
   for (const std::string& bytes : {h.bytes, gzipped(h.bytes)}) // no voxel follows
     try {
-      (void)label_volume_from_bytes(bytes, "test", {9}, {}, check);
+      (void)label_volume_from_bytes(bytes, "test", {{9, 9}}, {}, check);
       ADD_FAILURE() << "not refused";
     } catch (const Error& error) {
       EXPECT_STREQ(error.what(), "too large");
@@ -342,8 +417,8 @@ TEST(LabelVolume, FilesOfTwoParts) {
     std::ofstream(data.path()) << raw(voxels<std::uint8_t>());
   }
   Input input(header.path());
-  EXPECT_EQ(read_label_volume(input, {9}, {}).voxels, 2U);
+  EXPECT_EQ(read_label_volume(input, {{9, 9}}, {}).voxels, 2U);
   std::ofstream(data.path()) << "short";
   Input again(header.path());
-  EXPECT_THROW((void)read_label_volume(again, {9}, {}), Error);
+  EXPECT_THROW((void)read_label_volume(again, {{9, 9}}, {}), Error);
 }

@@ -15,9 +15,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
 #include <random>
 #include <span>
+#include <utility>
+#include <vector>
 
 namespace gewebe {
 namespace {
@@ -258,17 +262,21 @@ TEST(Stuffing, ComponentsStayApartAndAreCounted) {
   EXPECT_EQ(examine_tetrahedra(mesh).unused_points.count, 0U);
 }
 
+Vec3 centroid_of(const TetMesh& mesh, std::size_t t) {
+  Vec3 sum;
+  for (const std::uint32_t corner : mesh.tetrahedra[t])
+    sum += mesh.points[corner] / 4;
+  return sum;
+}
+
 TEST(Stuffing, MaterialsFollowTheirVolumes) {
   TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.5});
   const Grid tumour = ball(2, 0.2, {0.3, 0, 0}), core = ball(1, 0.3, {0.3, 0, 0});
-  const std::vector<Grid> volumes{tumour, core};
-  set_materials({}, volumes, mesh);
+  set_material({}, tumour, 1, mesh);
+  set_material({}, core, 2, mesh);
   ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
-    Vec3 centroid;
-    for (const std::uint32_t corner : mesh.tetrahedra[t])
-      centroid += mesh.points[corner] / 4;
-    const double r = norm(centroid - Vec3{0.3, 0, 0});
+    const double r = norm(centroid_of(mesh, t) - Vec3{0.3, 0, 0});
     if (std::fabs(r - 1) > 0.05 && std::fabs(r - 2) > 0.05) {
       ASSERT_EQ(mesh.material[t], r < 1 ? 2 : r < 2 ? 1 : 0) << r;
     }
@@ -277,6 +285,123 @@ TEST(Stuffing, MaterialsFollowTheirVolumes) {
   ASSERT_EQ(quality.materials.size(), 3U);
   EXPECT_NEAR(quality.materials[1].volume, 4 * pi / 3 * 7, 1.5);
   EXPECT_NEAR(quality.materials[2].volume, 4 * pi / 3, 0.5);
+}
+
+/// Labels of a box of voxels from a function of the voxel.
+template <class Label>
+LabelRuns labels_of(const Int3& size, const GridTransform& transform, Label label) {
+  LabelRuns all{size, transform, {}, {0}};
+  for (int k = 0; k < size[2]; ++k)
+    for (int j = 0; j < size[1]; ++j) {
+      for (int i = 0; i < size[0]; ++i)
+        if (i == 0 || label(i, j, k) != label(i - 1, j, k))
+          all.runs.push_back({i + 1, label(i, j, k)});
+        else
+          ++all.runs.back().end;
+      all.rows.push_back(all.runs.size());
+    }
+  return all;
+}
+
+TEST(Stuffing, MaterialsAreTheLabelsOfTheNearestVoxels) {
+  // Turned, mirrored and oblong voxels over a part of the ball.
+  GridTransform lattice;
+  const double c = std::cos(0.5), s = std::sin(0.5);
+  lattice.m = {c * 0.9, -s * 1.3, 0, -2, s * 0.9, c * 1.3, 0, -3, 0, 0, -0.7, 2.5};
+  const Int3 size{6, 5, 7};
+  const auto label = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 4; };
+  const LabelRuns labels = labels_of(size, lattice, label);
+  TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.8});
+  set_materials({}, labels, mesh);
+  ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
+  std::array<int, 4> seen{};
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const Vec3 p = centroid_of(mesh, t);
+    // The nearest of all centres, and of those round the box, whose label is 0.
+    std::vector<std::pair<double, int>> near;
+    for (int k = -1; k <= size[2]; ++k)
+      for (int j = -1; j <= size[1]; ++j)
+        for (int i = -1; i <= size[0]; ++i) {
+          const bool within =
+              i >= 0 && i < size[0] && j >= 0 && j < size[1] && k >= 0 && k < size[2];
+          near.emplace_back(norm(lattice.to_world({1.0 * i, 1.0 * j, 1.0 * k}) - p),
+                            within ? label(i, j, k) : 0);
+        }
+    std::partial_sort(near.begin(), near.begin() + 2, near.end());
+    if (near[1].first - near[0].first > 1e-9) {
+      const int expected = near[0].second;
+      ASSERT_EQ(mesh.material[t], expected) << t;
+      ++seen[static_cast<std::size_t>(expected)];
+    }
+  }
+  for (const int count : seen)
+    EXPECT_GT(count, 200);
+}
+
+TEST(Stuffing, MaterialsOfObliqueLabels) {
+  // Faces of voxels divide the labels: the plane i = 5½, along the second and the third axis.
+  GridTransform lattice;
+  lattice.m = {-1, 0.3, 0.1, 4, 0.2, 1.2, -0.2, -6, 0, 0.1, 1.1, -7};
+  const LabelRuns labels =
+      labels_of({12, 12, 14}, lattice, [](int i, int, int) { return i < 6 ? 1 : 2147483647; });
+  TetMesh mesh = stuffed(ball(3, 0.25), {{}, 0.5});
+  set_materials({}, labels, mesh);
+  const Vec3 on_plane = lattice.to_world({5.5, 0, 0});
+  const Vec3 across = cross({0.3, 1.2, 0.1}, {0.1, -0.2, 1.1});
+  std::array<int, 2> seen{};
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const bool low =
+        dot(centroid_of(mesh, t) - on_plane, across) > 0; // the first axis points to -x
+    ASSERT_EQ(mesh.material[t], low ? 1 : 2147483647) << t;
+    ++seen[low ? 0 : 1];
+  }
+  EXPECT_GT(seen[0], 1000);
+  EXPECT_GT(seen[1], 1000);
+
+  LabelRuns flat = labels;
+  flat.transform.m[0] = flat.transform.m[4] = 0;
+  EXPECT_THROW(set_materials({}, flat, mesh), Error);
+}
+
+TEST(Stuffing, MaterialsOfTheNearestLabel) {
+  GridTransform lattice;
+  const double c = std::cos(0.5), s = std::sin(0.5);
+  lattice.m = {c * 0.9, -s * 1.3, 0, -4, s * 0.9, c * 1.3, 0, -5, 0, 0, -0.7, 4};
+  const Int3 size{9, 8, 11};
+  const auto label = [](int i, int j, int k) {
+    return (i * 7 + j * 5 + k * 3) % 29 == 0 ? 1 + (i + j) % 3 : 0;
+  };
+  const LabelRuns labels = labels_of(size, lattice, label);
+  const TetMesh mesh = stuffed(ball(7, 0.25), {{}, 1.5});
+  for (const int reach : {0, 1, 2}) {
+    TetMesh with = mesh;
+    set_materials({}, labels, with, reach);
+    std::array<int, 4> seen{};
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+      const Vec3 p = centroid_of(mesh, t), index = lattice.to_index(p);
+      // All labelled voxels by their distances, the voxel itself before all.
+      std::vector<std::pair<double, int>> near{{1e9, 0}, {1e9, 0}};
+      bool clear = true;
+      for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j)
+          for (int i = 0; i < size[0]; ++i) {
+            const Vec3 centre{1.0 * i, 1.0 * j, 1.0 * k}, apart = index - centre;
+            const double steps =
+                std::max({std::fabs(apart.x), std::fabs(apart.y), std::fabs(apart.z)});
+            clear = clear && std::fabs(steps - reach - 0.5) > 1e-9;
+            if (label(i, j, k) != 0 && steps < reach + 0.5)
+              near.emplace_back(steps < 0.5 ? 0 : norm(lattice.to_world(centre) - p),
+                                label(i, j, k));
+          }
+      std::partial_sort(near.begin(), near.begin() + 2, near.end());
+      if (clear && (near[1].first == 1e9 || near[1].first - near[0].first > 1e-9)) {
+        ASSERT_EQ(with.material[t], near[0].second) << t << " " << reach;
+        ++seen[static_cast<std::size_t>(near[0].second)];
+      }
+    }
+    for (const int count : seen)
+      EXPECT_GT(count, 10) << reach;
+  }
 }
 
 TEST(Stuffing, EmptyAndTiles) {

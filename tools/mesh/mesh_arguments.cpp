@@ -3,7 +3,9 @@
 #include "base/error.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
+#include "tools/shared/cli.h"
 #include "tools/shared/surface_choice.h"
+#include "tools/shared/voxelize_labels.h"
 
 #include <algorithm>
 
@@ -18,6 +20,10 @@ void check(const MeshArguments& arguments) {
     throw UsageError("--grade is for --tets, expected both");
   if (!arguments.tets && !arguments.materials.empty())
     throw UsageError("--materials is for --tets, expected both");
+  if (!arguments.labels.empty() && arguments.materials.empty())
+    throw UsageError("--label is for --materials, expected both");
+  if (!arguments.labels.empty())
+    (void)labels_from_text(arguments.labels, "whole numbers");
   const auto refuse = [&](bool given, const char* option) {
     if (arguments.tets && given)
       throw UsageError(std::string(option) + " is for surfaces, expected it without --tets");
@@ -27,6 +33,22 @@ void check(const MeshArguments& arguments) {
   refuse(arguments.rounds > 0, "--regularize");
   refuse(arguments.normals, "--normals");
   refuse(arguments.self_intersections, "--self-intersections");
+  std::vector<std::string> inputs = material_paths(arguments);
+  inputs.push_back(arguments.volume);
+  cli::check_one_pipe(inputs);
+}
+
+std::vector<std::string> material_paths(const MeshArguments& arguments) {
+  const std::string& text = arguments.materials;
+  std::vector<std::string> paths;
+  for (std::size_t begin = 0; begin <= text.size() && !text.empty();) {
+    const std::size_t comma = std::min(text.find(',', begin), text.size());
+    paths.push_back(text.substr(begin, comma - begin));
+    if (paths.back().empty())
+      throw UsageError("--materials: '" + text + "', expected files between commas");
+    begin = comma + 1;
+  }
+  return paths;
 }
 
 std::vector<Kind> writable_kinds() {

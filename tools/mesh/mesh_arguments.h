@@ -11,7 +11,7 @@
 namespace gewebe {
 
 struct MeshArguments {
-  std::string volume = "-", place, components, materials;
+  std::string volume = "-", place, components, materials, labels;
   std::optional<double> isovalue, voxel, epsilon, cell;
   std::vector<double> box; // x0 y0 z0 x1 y1 z1
   std::int64_t rounds = 0, grade = 0;
@@ -20,6 +20,9 @@ struct MeshArguments {
 
 /// \throw UsageError for options that don't go together
 void check(const MeshArguments& arguments);
+
+/// The files of --materials. \throw UsageError if one has no name
+std::vector<std::string> material_paths(const MeshArguments& arguments);
 
 /// The kinds of surfaces and of tetrahedra.
 std::vector<Kind> writable_kinds();

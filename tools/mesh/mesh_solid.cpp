@@ -1,4 +1,6 @@
+#include "base/error.h"
 #include "formats/tetrahedra/tet_file.h"
+#include "formats/volume/label_volume.h"
 #include "formats/volume/volume_file.h"
 #include "stuffing/materials.h"
 #include "stuffing/stuffing.h"
@@ -10,8 +12,9 @@
 #include "tools/mesh/prepared_volume.h"
 #include "tools/shared/surface_choice.h"
 #include "tools/shared/tet_report.h"
+#include "tools/shared/voxelize_labels.h"
 
-#include <algorithm>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -31,16 +34,46 @@ void compare_surface(cli::Run& run, const PreparedVolume& prepared, const Stuffi
   run.stats().set("beyond_cell", distance.beyond_cell);
 }
 
-/// Of the volumes of a list of paths between commas.
-void read_materials(const Context& context, const std::string& paths, TetMesh& mesh) {
-  std::vector<Grid> volumes;
-  for (std::size_t begin = 0; begin <= paths.size();) {
-    const std::size_t comma = std::min(paths.find(',', begin), paths.size());
-    Input input(paths.substr(begin, comma - begin));
-    volumes.push_back(read_volume(input, context));
-    begin = comma + 1;
+/// With --label: how many voxels away from a tetrahedron its label may be. The smooth surface of
+/// labels lies within a voxel of them, a coarse cell's edge some more.
+constexpr std::int32_t label_reach = 3;
+
+/// The volumes of --materials, opened before the work: one of labels, or any number of others.
+struct MaterialVolumes {
+  explicit MaterialVolumes(const MeshArguments& arguments) {
+    const std::vector<std::string> paths = material_paths(arguments);
+    for (const std::string& path : paths) {
+      Input& input = inputs.emplace_back(path);
+      labels = is_label_volume(input.peek(4096));
+      if (labels && paths.size() > 1)
+        throw Error(input.name(), "is a label volume, expected it alone in --materials");
+      if (!labels && !arguments.labels.empty())
+        throw Error(input.name(), "is no label volume, expected one for --label");
+    }
+    if (!arguments.labels.empty())
+      wanted = labels_from_text(arguments.labels, "whole numbers");
   }
-  set_materials(context, volumes, mesh);
+  std::vector<Input> inputs;
+  bool labels = false;
+  std::vector<LabelRange> wanted; ///< of the labels; empty: all
+};
+
+void set_materials(cli::Run& run, MaterialVolumes& volumes, TetMesh& mesh) {
+  const Context& context = run.context();
+  std::int32_t number = 0;
+  for (Input& input : volumes.inputs) {
+    if (volumes.labels) {
+      const AllLabels labels = read_all_labels(input, volumes.wanted, context);
+      for (const std::string& warning : labels.warnings)
+        run.warn(warning);
+      at(input.name(), [&] {
+        set_materials(context, labels.voxels, mesh, volumes.wanted.empty() ? 0 : label_reach);
+      });
+    } else {
+      const Grid volume = read_volume(input, context);
+      at(input.name(), [&] { set_material(context, volume, ++number, mesh); });
+    }
+  }
 }
 
 } // namespace
@@ -49,6 +82,7 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   const Kind kind = output_kind(run.to(), run.output(), Kind::ply, writable_tet_kinds());
   Output output(run.output(), run.output_options(is_binary(kind)));
   Input input(arguments.volume);
+  MaterialVolumes materials(arguments);
   const PreparedVolume prepared = prepare(run, arguments, input);
   const StuffingOptions options{prepared.isovalue, arguments.cell,
                                 static_cast<unsigned>(arguments.grade)};
@@ -57,8 +91,8 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
     return run.timed("stuff",
                      [&] { return stuff(run.context(), prepared.grid, options, &report); });
   });
-  if (!arguments.materials.empty())
-    run.timed("materials", [&] { read_materials(run.context(), arguments.materials, mesh); });
+  if (!materials.inputs.empty())
+    run.timed("materials", [&] { set_materials(run, materials, mesh); });
   cli::Stats& stats = run.stats();
   stats.set("cell", report.cell);
   stats.set("cut_nodes", report.cut_nodes);

@@ -13,15 +13,21 @@
 
 namespace gewebe {
 
-std::vector<std::int64_t> labels_from_text(const std::string& text) {
-  std::vector<std::int64_t> labels;
+std::vector<LabelRange> labels_from_text(const std::string& text, const char* expected) {
+  std::vector<LabelRange> labels;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t comma = std::min(text.find(',', begin), text.size());
     const std::string_view word = std::string_view(text).substr(begin, comma - begin);
-    const auto [rest, status] =
-        std::from_chars(word.data(), word.data() + word.size(), labels.emplace_back());
-    if (status != std::errc{} || rest != word.data() + word.size())
-      throw UsageError("--label: '" + std::string(word) + "', expected whole numbers, or list");
+    const char* const end = word.data() + word.size();
+    LabelRange& range = labels.emplace_back();
+    std::from_chars_result read = std::from_chars(word.data(), end, range.first);
+    range.last = range.first;
+    if (read.ec == std::errc{} && read.ptr != end && *read.ptr == '-')
+      read = std::from_chars(read.ptr + 1, end, range.last);
+    if (read.ec != std::errc{} || read.ptr != end)
+      throw UsageError("--label: '" + std::string(word) + "', expected " + expected);
+    if (range.last < range.first)
+      throw UsageError("--label: '" + std::string(word) + "', expected the smaller number first");
     begin = comma + 1;
   }
   return labels;
@@ -51,8 +57,8 @@ void list_labels(cli::Run& run, const std::string& path) {
   run.stats().set("spacing", spacing);
 }
 
-void voxelize_labels(cli::Run& run, const std::string& path,
-                     const std::vector<std::int64_t>& labels, std::optional<double> voxel) {
+void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<LabelRange>& labels,
+                     std::optional<double> voxel) {
   (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
   Output output(run.output(), run.output_options(true));
   Input input(path);

@@ -1,17 +1,19 @@
 #pragma once
 // voxelize --label: the density of labels of a radiological volume.
 
+#include "formats/volume/label_volume.h"
 #include "tools/shared/cli.h"
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace gewebe {
 
-/// The numbers of --label. \throw UsageError if one is no whole number
-std::vector<std::int64_t> labels_from_text(const std::string& text);
+/// The numbers and ranges of --label, "3,5-7"; `expected` is what a message asks for. \throw
+/// UsageError if one is no whole number, or a range goes downwards
+std::vector<LabelRange> labels_from_text(const std::string& text,
+                                         const char* expected = "whole numbers, or list");
 
 /// Writes what labels the volume `path` holds: a line each, the label, its voxels, its volume in
 /// mm³.
@@ -19,7 +21,7 @@ void list_labels(cli::Run& run, const std::string& path);
 
 /// Reads the label volume `path`, writes the density of `labels` with voxels of edge `voxel`
 /// (absent: the smallest spacing), reports.
-void voxelize_labels(cli::Run& run, const std::string& path,
-                     const std::vector<std::int64_t>& labels, std::optional<double> voxel);
+void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<LabelRange>& labels,
+                     std::optional<double> voxel);
 
 } // namespace gewebe
