@@ -50,6 +50,10 @@ int main(int argc, char** argv) {
   program.option("--materials", arguments.materials, "LABELS|VDB[,VDB...]",
                  "with --tets: material by the label of a label volume; or 1, 2 … where a volume's "
                  "inside is, else 0");
+  program
+      .option("--interface", arguments.interface, "HOW",
+              "with --materials: faces of the lattice (stair, default), or cut (follow)")
+      .one_of({"stair", "follow"});
   program.option("--label", arguments.labels, "L[-M][,L...]",
                  "with --materials LABELS: these labels alone, each tetrahedron the nearest");
   program.output_kinds(writable_kinds());

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <memory>
 
 namespace gewebe {
 namespace {
@@ -21,7 +22,7 @@ Vec3 centroid(const TetMesh& mesh, std::size_t t) {
   return (mesh.points[a] + mesh.points[b] + mesh.points[c] + mesh.points[d]) / 4;
 }
 
-/// As set_materials says. \pre transform is invertible
+/// As label_source says. \pre transform is invertible
 std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t reach) {
   const Vec3 index = labels.transform.to_index(place);
   Int3 voxel{};
@@ -55,30 +56,32 @@ std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t r
 
 } // namespace
 
-void set_material(const Context& context, const Grid& volume, std::int32_t number, TetMesh& mesh) {
-  const GridInfo& info = volume.info();
-  check_transform(info.transform);
-  const double isovalue = info.level_set ? 0 : info.isovalue;
-  mesh.material.resize(mesh.tetrahedra.size());
-  parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    Field field(volume);
-    for (std::size_t t = begin; t < end; ++t) {
-      const double value = field.value(info.transform.to_index(centroid(mesh, t)));
+MaterialSource inside_source(const Grid& volume) {
+  check_transform(volume.info().transform);
+  return [&volume]() -> MaterialAt {
+    const auto field = std::make_shared<Field>(volume);
+    return [field, info = volume.info()](const Vec3& place) -> std::int32_t {
+      const double value = field->value(info.transform.to_index(place));
       if (!std::isfinite(value))
         throw Error("a value is not finite, expected numbers where the tetrahedra are");
-      if (info.level_set ? value < isovalue : value > isovalue)
-        mesh.material[t] = number;
-    }
-  });
+      return info.level_set ? value < 0 : value > info.isovalue;
+    };
+  };
 }
 
-void set_materials(const Context& context, const LabelRuns& labels, TetMesh& mesh,
-                   std::int32_t reach) {
+MaterialSource label_source(const LabelRuns& labels, std::int32_t reach) {
   check_transform(labels.transform);
+  return [&labels, reach]() -> MaterialAt {
+    return [&labels, reach](const Vec3& place) { return label_at(labels, place, reach); };
+  };
+}
+
+void set_materials(const Context& context, const MaterialSource& source, TetMesh& mesh) {
   mesh.material.resize(mesh.tetrahedra.size());
   parallel_blocks(context, mesh.tetrahedra.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    const MaterialAt material_at_place = source();
     for (std::size_t t = begin; t < end; ++t)
-      mesh.material[t] = label_at(labels, centroid(mesh, t), reach);
+      mesh.material[t] = material_at_place(centroid(mesh, t));
   });
 }
 

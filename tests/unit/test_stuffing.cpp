@@ -269,11 +269,30 @@ Vec3 centroid_of(const TetMesh& mesh, std::size_t t) {
   return sum;
 }
 
+/// 1, 2, … inside the last of the volumes that holds a place.
+MaterialSource layers(const std::vector<Grid>& volumes) {
+  std::vector<MaterialSource> sources;
+  for (const Grid& volume : volumes)
+    sources.push_back(inside_source(volume));
+  return [sources] {
+    std::vector<MaterialAt> inside;
+    for (const MaterialSource& source : sources)
+      inside.push_back(source());
+    return [inside](const Vec3& place) {
+      std::int32_t material = 0;
+      for (std::size_t n = 0; n < inside.size(); ++n)
+        material = inside[n](place) != 0 ? static_cast<std::int32_t>(n + 1) : material;
+      return material;
+    };
+  };
+}
+
 TEST(Stuffing, MaterialsFollowTheirVolumes) {
   TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.5});
-  const Grid tumour = ball(2, 0.2, {0.3, 0, 0}), core = ball(1, 0.3, {0.3, 0, 0});
-  set_material({}, tumour, 1, mesh);
-  set_material({}, core, 2, mesh);
+  std::vector<Grid> volumes;
+  volumes.push_back(ball(2, 0.2, {0.3, 0, 0}));
+  volumes.push_back(ball(1, 0.3, {0.3, 0, 0}));
+  set_materials({}, layers(volumes), mesh);
   ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     const double r = norm(centroid_of(mesh, t) - Vec3{0.3, 0, 0});
@@ -312,7 +331,7 @@ TEST(Stuffing, MaterialsAreTheLabelsOfTheNearestVoxels) {
   const auto label = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 4; };
   const LabelRuns labels = labels_of(size, lattice, label);
   TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.8});
-  set_materials({}, labels, mesh);
+  set_materials({}, label_source(labels), mesh);
   ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
   std::array<int, 4> seen{};
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
@@ -345,7 +364,7 @@ TEST(Stuffing, MaterialsOfObliqueLabels) {
   const LabelRuns labels =
       labels_of({12, 12, 14}, lattice, [](int i, int, int) { return i < 6 ? 1 : 2147483647; });
   TetMesh mesh = stuffed(ball(3, 0.25), {{}, 0.5});
-  set_materials({}, labels, mesh);
+  set_materials({}, label_source(labels), mesh);
   const Vec3 on_plane = lattice.to_world({5.5, 0, 0});
   const Vec3 across = cross({0.3, 1.2, 0.1}, {0.1, -0.2, 1.1});
   std::array<int, 2> seen{};
@@ -360,7 +379,7 @@ TEST(Stuffing, MaterialsOfObliqueLabels) {
 
   LabelRuns flat = labels;
   flat.transform.m[0] = flat.transform.m[4] = 0;
-  EXPECT_THROW(set_materials({}, flat, mesh), Error);
+  EXPECT_THROW(set_materials({}, label_source(flat), mesh), Error);
 }
 
 TEST(Stuffing, MaterialsOfTheNearestLabel) {
@@ -375,7 +394,7 @@ TEST(Stuffing, MaterialsOfTheNearestLabel) {
   const TetMesh mesh = stuffed(ball(7, 0.25), {{}, 1.5});
   for (const int reach : {0, 1, 2}) {
     TetMesh with = mesh;
-    set_materials({}, labels, with, reach);
+    set_materials({}, label_source(labels, reach), with);
     std::array<int, 4> seen{};
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
       const Vec3 p = centroid_of(mesh, t), index = lattice.to_index(p);

@@ -20,6 +20,8 @@ void check(const MeshArguments& arguments) {
     throw UsageError("--grade is for --tets, expected both");
   if (!arguments.tets && !arguments.materials.empty())
     throw UsageError("--materials is for --tets, expected both");
+  if (!arguments.interface.empty() && arguments.materials.empty())
+    throw UsageError("--interface is for --materials, expected both");
   if (!arguments.labels.empty() && arguments.materials.empty())
     throw UsageError("--label is for --materials, expected both");
   if (!arguments.labels.empty())

@@ -1,0 +1,69 @@
+#include "tools/mesh/material_volumes.h"
+
+#include "base/error.h"
+#include "formats/volume/volume_file.h"
+#include "stuffing/materials.h"
+#include "tools/shared/voxelize_labels.h"
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+/// With --label: how many voxels away from a tetrahedron its label may be. The smooth surface of
+/// labels lies within a voxel of them, a coarse cell's edge some more.
+constexpr std::int32_t label_reach = 3;
+
+} // namespace
+
+MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
+  const std::vector<std::string> paths = material_paths(arguments);
+  for (const std::string& path : paths) {
+    Input& input = inputs.emplace_back(path);
+    is_labels = is_label_volume(input.peek(4096));
+    if (is_labels && paths.size() > 1)
+      throw Error(input.name(), "is a label volume, expected it alone in --materials");
+    if (!is_labels && !arguments.labels.empty())
+      throw Error(input.name(), "is no label volume, expected one for --label");
+  }
+  if (!arguments.labels.empty())
+    wanted = labels_from_text(arguments.labels, "whole numbers");
+}
+
+void MaterialVolumes::read(cli::Run& run) {
+  for (Input& input : inputs)
+    if (is_labels) {
+      AllLabels all = read_all_labels(input, wanted, run.context());
+      for (const std::string& warning : all.warnings)
+        run.warn(warning);
+      labels = std::move(all.voxels);
+    } else
+      volumes.push_back(read_volume(input, run.context()));
+}
+
+MaterialSource MaterialVolumes::source() const {
+  if (inputs.empty())
+    return {};
+  if (is_labels)
+    return at(inputs.front().name(),
+              [&] { return label_source(labels, wanted.empty() ? 0 : label_reach); });
+  std::vector<MaterialSource> sources;
+  for (std::size_t n = 0; n < volumes.size(); ++n)
+    sources.push_back(at(inputs[n].name(), [&] { return inside_source(volumes[n]); }));
+  return [this, sources]() -> MaterialAt {
+    std::vector<MaterialAt> inside;
+    for (const MaterialSource& source : sources)
+      inside.push_back(source());
+    return [this, inside](const Vec3& place) {
+      std::int32_t material = 0;
+      for (std::size_t n = 0; n < inside.size(); ++n)
+        if (at(inputs[n].name(), [&] { return inside[n](place); }) != 0)
+          material = static_cast<std::int32_t>(n + 1);
+      return material;
+    };
+  };
+}
+
+} // namespace gewebe

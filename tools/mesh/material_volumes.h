@@ -1,0 +1,31 @@
+#pragma once
+// The volumes that tell where the materials of a solid are.
+
+#include "formats/stream/stream.h"
+#include "formats/volume/label_volume.h"
+#include "labels/label_runs.h"
+#include "stuffing/stuffing.h"
+#include "tools/mesh/mesh_arguments.h"
+#include "tools/shared/cli.h"
+#include "volume/grid.h"
+
+#include <vector>
+
+namespace gewebe {
+
+/// The volumes of --materials, opened before the work: one of labels, or any number of others.
+struct MaterialVolumes {
+  /// \throw UsageError, Error if they don't go together
+  explicit MaterialVolumes(const MeshArguments& arguments);
+  void read(cli::Run& run);
+  /// Nothing where there are none. \pre read
+  MaterialSource source() const;
+
+  std::vector<Input> inputs;
+  bool is_labels = false;
+  std::vector<LabelRange> wanted; ///< of the labels; empty: all
+  LabelRuns labels;
+  std::vector<Grid> volumes;
+};
+
+} // namespace gewebe
