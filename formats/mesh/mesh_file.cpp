@@ -26,26 +26,19 @@ std::string list(const std::vector<std::string>& words) {
   return text;
 }
 
-std::string list(const std::vector<Kind>& kinds) {
-  std::vector<std::string> words;
-  for (const Kind kind : kinds)
-    words.emplace_back(kind_name(kind));
-  return list(words);
-}
-
 bool contains(const std::vector<Kind>& kinds, Kind kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
 }
 
 void check_readable(const Input& input, const MeshReadOptions& options) {
   if (!contains(readable_mesh_kinds(), options.kind))
-    throw Error(
-        input.name(),
-        (options.kind == Kind::unknown
-             ? std::string("the format is not known")
-             : std::string(kind_name(options.kind)) +
-                   (has_tetrahedra(options.kind) ? " is a tetrahedral mesh" : " is no mesh")) +
-            ", expected one of " + list(readable_mesh_kinds()) + " by content, suffix or --format");
+    throw Error(input.name(), (options.kind == Kind::unknown
+                                   ? std::string("the format is not known")
+                                   : std::string(kind_name(options.kind)) +
+                                         (has_tetrahedra(options.kind) ? " is a tetrahedral mesh"
+                                                                       : " is no mesh")) +
+                                  ", expected one of " + kind_list(readable_mesh_kinds()) +
+                                  " by content, suffix or --format");
   if (!options.unit.empty()) {
     millimetres_per(options.unit);
     if (states_its_unit(options.kind))
@@ -90,16 +83,6 @@ TriangleMesh read_unwelded(Input& input, const MeshReadOptions& options, MeshRea
   return mesh;
 }
 
-void scale_points(TriangleMesh& mesh, double scale) {
-  if (scale == 1)
-    return;
-  for (std::size_t p = 0; p < mesh.points.size(); ++p) {
-    mesh.points[p] *= scale;
-    if (!is_finite(mesh.points[p]))
-      throw Error("point " + std::to_string(p) + " is not finite in mm, expected less");
-  }
-}
-
 std::uint64_t count_parts(const TriangleMesh& mesh) {
   if (mesh.triangles.empty())
     return 0;
@@ -139,6 +122,16 @@ double millimetres_per(std::string_view unit) {
   throw UsageError("unit " + std::string(unit) + ", expected one of " + list(mesh_unit_names()));
 }
 
+void scale_points(std::vector<Vec3>& points, double scale) {
+  if (scale == 1)
+    return;
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    points[p] *= scale;
+    if (!is_finite(points[p]))
+      throw Error("point " + std::to_string(p) + " is not finite in mm, expected less");
+  }
+}
+
 const std::vector<std::string>& weld_names() {
   static const std::vector<std::string> names{"auto", "all", "part", "none"};
   return names;
@@ -161,7 +154,7 @@ TriangleMesh read_mesh(Input& input, const MeshReadOptions& options, MeshReadSta
   return at(input.name(), [&] {
     MeshReadStats counts;
     TriangleMesh mesh = read_unwelded(input, options, counts);
-    scale_points(mesh, scale_of(options));
+    scale_points(mesh.points, scale_of(options));
     WeldOptions welding;
     welding.mode = options.weld.value_or(options.kind == Kind::ply ? Weld::none : Weld::borders);
     welding.drop_unused = options.drop_unused;
@@ -177,7 +170,7 @@ void write_mesh(Output& output, const TriangleMesh& mesh, Kind kind) {
   if (!contains(writable_mesh_kinds(), kind))
     throw UsageError(output.name(), std::string(kind_name(kind)) +
                                         " is not written, expected one of " +
-                                        list(writable_mesh_kinds()));
+                                        kind_list(writable_mesh_kinds()));
   const auto sink = [&](std::string_view piece) { output.write(piece); };
   at(output.name(), [&] {
     if (kind == Kind::ply)

@@ -24,6 +24,9 @@ const std::vector<std::string>& mesh_unit_names();
 /// \throw UsageError if `unit` is none of them
 double millimetres_per(std::string_view unit);
 
+/// \throw Error, naming the point, if a coordinate is not finite afterwards
+void scale_points(std::vector<Vec3>& points, double scale);
+
 /// The words of --weld: "auto", "all", "part", "none". Nothing for "auto" and "".
 /// \throw UsageError if `word` is none of them
 std::optional<Weld> weld_from_name(std::string_view word);

@@ -1,4 +1,5 @@
 #include "base/error.h"
+#include "base/number_text.h"
 #include "formats/mesh/ply.h"
 #include "formats/mesh/ply_source.h"
 #include "mesh/triangulate.h"
@@ -39,12 +40,14 @@ public:
   TriangleMesh read(PlyStats& stats) {
     for (const Element& element : header_.elements) {
       check_room(element);
-      if (element.name == "vertex")
+      if (element.name == "vertex") {
         read_vertices(element);
-      else if (element.name == "face")
+      } else if (element.name == "face") {
         read_faces(element);
-      else
-        skip_element(element, stats);
+      } else {
+        ++stats.skipped_elements;
+        skip_element(source_, element);
+      }
       if (element.name == "vertex" || element.name == "face")
         stats.skipped_properties += static_cast<std::uint64_t>(
             std::count_if(element.properties.begin(), element.properties.end(),
@@ -73,23 +76,6 @@ private:
                    std::to_string(UINT32_MAX));
   }
 
-  std::size_t list_size(const Property& property) {
-    const double count = source_.value(*property.count_type);
-    if (!(count >= 0 && count <= UINT32_MAX && count == std::floor(count)))
-      source_.fail("a list of " + number(count) + " values, expected a count from 0");
-    const std::size_t size = static_cast<std::size_t>(count);
-    if (size > source_.left() / Source::min_size(property.type))
-      source_.fail("a list of " + std::to_string(size) + " values in " +
-                   std::to_string(source_.left()) + " bytes, expected a count that fits");
-    return size;
-  }
-
-  static std::string number(double value) {
-    std::array<char, 32> text;
-    const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() ? std::string(text.data(), end) : "?";
-  }
-
   double finite(const Property& property) {
     const double value = source_.value(property.type);
     if (!std::isfinite(value))
@@ -106,24 +92,8 @@ private:
   std::int32_t whole(const Property& property) {
     const double value = source_.value(property.type);
     if (!(value >= 0 && value <= INT32_MAX && value == std::floor(value)))
-      source_.fail(property.name + " is " + number(value) + ", expected an integer from 0");
+      source_.fail(property.name + " is " + number_text(value) + ", expected an integer from 0");
     return static_cast<std::int32_t>(value);
-  }
-
-  void skip(const Property& property) {
-    source_.skip(property.type, property.count_type ? list_size(property) : 1);
-  }
-
-  void skip_element(const Element& element, PlyStats& stats) {
-    ++stats.skipped_elements;
-    if (element.properties.empty())
-      return;
-    for (std::uint64_t i = 0; i < element.count; ++i) {
-      source_.begin_record(element);
-      for (const Property& property : element.properties)
-        skip(property);
-      source_.end_record();
-    }
   }
 
   void read_vertices(const Element& element) {
@@ -159,7 +129,7 @@ private:
           normal.z = finite(property);
           break;
         default:
-          skip(property);
+          skip_property(source_, property);
         }
       }
       source_.end_record();
@@ -207,7 +177,7 @@ private:
           faces_.material.push_back(whole(property));
           break;
         default:
-          skip(property);
+          skip_property(source_, property);
         }
       }
       source_.end_record();
@@ -227,21 +197,21 @@ private:
   }
 
   std::size_t read_indices(const Property& property) {
-    const std::size_t size = list_size(property);
+    const std::size_t size = list_size(source_, property);
     if (size < 3)
       source_.fail("a face with " + std::to_string(size) + " corners, expected at least 3");
     for (std::size_t k = 0; k < size; ++k) {
       const double index = source_.value(property.type);
       if (!(index >= 0 && index < vertex_count() && index == std::floor(index)))
-        source_.fail("a face with corner " + number(index) + ", expected an index below " +
-                     number(vertex_count()));
+        source_.fail("a face with corner " + number_text(index) + ", expected an index below " +
+                     number_text(vertex_count()));
       faces_.corners.push_back(static_cast<std::uint32_t>(index));
     }
     return size;
   }
 
   std::size_t read_texcoords(const Property& property) {
-    const std::size_t size = list_size(property);
+    const std::size_t size = list_size(source_, property);
     for (std::size_t k = 0; k < size; ++k)
       faces_.texcoords.push_back(finite_float(source_.value(property.type), property));
     return size;

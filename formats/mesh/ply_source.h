@@ -10,6 +10,8 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -173,5 +175,37 @@ private:
   std::size_t at_, line_;
   std::string_view rest_; // of the line, from a word on
 };
+
+// What both readers, of surfaces and of tetrahedra, do with the numbers.
+
+/// The size of a list, which the bytes left can hold. \pre property.count_type
+template <class Source>
+std::size_t list_size(Source& source, const Property& property) {
+  const double count = source.value(*property.count_type);
+  if (!(count >= 0 && count <= UINT32_MAX && count == std::floor(count)))
+    source.fail("a list of " + number_text(count) + " values, expected a count from 0");
+  const std::size_t size = static_cast<std::size_t>(count);
+  if (size > source.left() / Source::min_size(property.type))
+    source.fail("a list of " + std::to_string(size) + " values in " +
+                std::to_string(source.left()) + " bytes, expected a count that fits");
+  return size;
+}
+
+template <class Source>
+void skip_property(Source& source, const Property& property) {
+  source.skip(property.type, property.count_type ? list_size(source, property) : 1);
+}
+
+template <class Source>
+void skip_element(Source& source, const Element& element) {
+  if (element.properties.empty())
+    return;
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    source.begin_record(element);
+    for (const Property& property : element.properties)
+      skip_property(source, property);
+    source.end_record();
+  }
+}
 
 } // namespace gewebe::ply

@@ -35,16 +35,6 @@ constexpr std::array<std::pair<Kind, std::string_view>, 22> names{{
     {Kind::csv, "csv"},
 }};
 
-std::string list_names(const std::vector<Kind>& kinds) {
-  std::string text;
-  for (const Kind kind : kinds) {
-    if (!text.empty())
-      text += ", ";
-    text += kind_name(kind);
-  }
-  return text;
-}
-
 /// The suffix of a path that names a kind, though none of ours: a letter, then up to four letters
 /// and digits. Empty for what people call files whose kind is said elsewhere.
 std::string_view foreign_suffix(std::string_view path) {
@@ -100,6 +90,16 @@ std::string_view kind_name(Kind kind) {
     if (value == kind)
       return name;
   return "unknown";
+}
+
+std::string kind_list(const std::vector<Kind>& kinds) {
+  std::string text;
+  for (const Kind kind : kinds) {
+    if (!text.empty())
+      text += ", ";
+    text += kind_name(kind);
+  }
+  return text;
 }
 
 Kind kind_from_name(std::string_view name) {
@@ -186,11 +186,11 @@ Kind output_kind(std::string_view to, std::string_view path, Kind fallback,
     kind = suffix;
   } else if (const std::string_view foreign = foreign_suffix(path); !foreign.empty()) {
     throw UsageError(std::string(path) + ": cannot write ." + std::string(foreign) +
-                     ", expected --to or a suffix of " + list_names(writable));
+                     ", expected --to or a suffix of " + kind_list(writable));
   }
   if (std::ranges::find(writable, kind) == writable.end()) {
     const std::string asked = to.empty() ? std::string(kind_name(kind)) : std::string(to);
-    throw UsageError("cannot write " + asked + ", expected one of " + list_names(writable));
+    throw UsageError("cannot write " + asked + ", expected one of " + kind_list(writable));
   }
   return kind;
 }

@@ -36,6 +36,8 @@ enum class Kind {
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …
 std::string_view kind_name(Kind kind);
+/// "ply, vtu", for messages.
+std::string kind_list(const std::vector<Kind>& kinds);
 /// The kind of that name ("mesh" is ply; the suffix .mesh is medit), or unknown.
 Kind kind_from_name(std::string_view name);
 /// The kind that a file name's suffix stands for, or unknown. Case does not matter.

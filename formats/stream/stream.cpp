@@ -368,7 +368,7 @@ struct Output::State final : std::streambuf {
   Options options;
   int fd = -1, slot = -1;
   mode_t mode = 0;
-  bool existed = false, kept = false;
+  bool existed = false, kept = false, prepared = false;
   bool found = false; ///< the part held something
   FileUse use;
   std::vector<char> buffer = std::vector<char>(buffer_bytes);
@@ -448,26 +448,31 @@ bool Output::part() const {
   return state_->options.part && !state_->temporary.empty();
 }
 
-void Output::commit() {
+void Output::prepare() {
   State& state = *state_;
+  if (state.prepared)
+    return;
   state.flush_buffer();
   if (state.fd < 0)
     state.open_direct(); // nothing was written, but the reader of a FIFO waits
-  if (state.temporary.empty()) {
-    const int fd = state.fd;
-    state.fd = -1;
-    if (::close(fd) != 0)
+  if (!state.temporary.empty()) {
+    if (state.found && ::fchmod(state.fd, state.mode) != 0)
+      state.fail("cannot set the mode");
+    if (state.options.sync && ::fsync(state.fd) != 0)
       state.fail("cannot write");
-    return;
   }
-  if (state.found && ::fchmod(state.fd, state.mode) != 0)
-    state.fail("cannot set the mode");
-  if (state.options.sync && ::fsync(state.fd) != 0)
-    state.fail("cannot write");
   const int fd = state.fd;
   state.fd = -1;
   if (::close(fd) != 0)
     state.fail("cannot write");
+  state.prepared = true;
+}
+
+void Output::commit() {
+  State& state = *state_;
+  prepare();
+  if (state.temporary.empty())
+    return;
   if (state.options.keep_unchanged && state.existed && same_bytes(state.temporary, state.target)) {
     state.kept = false;
     return; // the destructor removes the temporary file

@@ -77,6 +77,9 @@ public:
   bool part() const;
   /// Flushes, checks, closes, renames. \throw Error
   void commit();
+  /// All of it but the rename, for files that belong together: `commit` then has no more to write.
+  /// \throw Error
+  void prepare();
 
 private:
   struct State;

@@ -1,6 +1,7 @@
 #include "formats/tetrahedra/tet_file.h"
 
 #include "base/number_text.h"
+#include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file_internal.h"
 #include "tetrahedra/check.h"
 
@@ -112,13 +113,6 @@ TetMesh Tetrahedra::take_unless_zero() {
 
 namespace {
 
-std::string list(const std::vector<Kind>& kinds) {
-  std::string text;
-  for (const Kind kind : kinds)
-    text += (text.empty() ? "" : ", ") + std::string(kind_name(kind));
-  return text;
-}
-
 bool contains(const std::vector<Kind>& kinds, Kind kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
 }
@@ -158,6 +152,9 @@ void write_tetgen(Output& output, const TetMesh& mesh, const Output::Options& op
   };
   tet::write_node(mesh, nodes ? to(output) : to(beside));
   tet::write_ele(mesh, nodes ? to(beside) : to(output));
+  // Both are whole before either has its name.
+  beside.prepare();
+  output.prepare();
   beside.commit();
 }
 
@@ -174,17 +171,7 @@ void write_to(const TetMesh& mesh, Kind kind, const Sink& sink) {
     tet::write_medit(mesh, sink);
   else
     throw UsageError(std::string(kind_name(kind)) + " is not written, expected one of " +
-                     list(writable_tet_kinds()));
-}
-
-void scale_points(TetMesh& mesh, double scale) {
-  if (scale == 1)
-    return;
-  for (std::size_t p = 0; p < mesh.points.size(); ++p) {
-    mesh.points[p] *= scale;
-    if (!is_finite(mesh.points[p]))
-      throw Error("point " + std::to_string(p) + " is not finite in mm, expected less");
-  }
+                     kind_list(writable_tet_kinds()));
 }
 
 } // namespace
@@ -224,7 +211,7 @@ TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kin
     else
       throw Error((kind == Kind::unknown ? std::string("the format is not known")
                                          : std::string(kind_name(kind)) + " has no tetrahedra") +
-                  ", expected one of " + list(readable_tet_kinds()) +
+                  ", expected one of " + kind_list(readable_tet_kinds()) +
                   " by content, suffix or --format");
     check_mesh(mesh);
     return mesh;
@@ -238,7 +225,7 @@ TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats*
     mesh = read_tetgen(input);
   else
     mesh = tet_mesh_from_bytes(input.read_all(), input.name(), options.kind, &counts);
-  at(input.name(), [&] { scale_points(mesh, options.scale); });
+  at(input.name(), [&] { scale_points(mesh.points, options.scale); });
   if (options.drop_unused)
     counts.dropped_points = drop_unused_points(mesh);
   if (stats != nullptr)

@@ -45,7 +45,8 @@ TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats*
 
 /// Writes the mesh, given in mm, as `kind`; the caller commits. Reading it gives the same mesh bit
 /// for bit, but for a material that is 0 everywhere, for which Medit has no other word than none.
-/// TetGen's other file goes beside the output's and is committed here, with the options `beside`.
+/// TetGen's other file goes beside the output's, with the options `beside`, and is committed here
+/// once both are whole, so that only a rename that fails leaves one without the other.
 /// \pre check_mesh(mesh) passes   \throw Error with place: TetGen on a pipe, too many points for
 /// the format; UsageError if the kind is not writable
 void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind,

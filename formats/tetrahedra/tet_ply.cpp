@@ -30,12 +30,14 @@ public:
     bool has_tetrahedra = false;
     for (const Element& element : header_.elements) {
       check_room(element);
-      if (element.name == "vertex")
+      if (element.name == "vertex") {
         read_vertices(element);
-      else if (element.name == "tetrahedron")
+      } else if (element.name == "tetrahedron") {
         read_tetrahedra(element);
-      else
-        skip_element(element);
+      } else {
+        stats_.skipped_elements += element.name == "face" ? 0 : 1;
+        skip_element(source_, element);
+      }
       has_tetrahedra = has_tetrahedra || element.name == "tetrahedron";
     }
     source_.finish();
@@ -69,29 +71,6 @@ private:
     return static_cast<std::uint64_t>(value);
   }
 
-  void skip(const Property& property) {
-    std::uint64_t size = 1;
-    if (property.count_type) {
-      size = whole(*property.count_type, UINT32_MAX, "a list's size");
-      if (size > source_.left() / Source::min_size(property.type))
-        source_.fail("a list of " + std::to_string(size) + " values in " +
-                     std::to_string(source_.left()) + " bytes, expected a count that fits");
-    }
-    source_.skip(property.type, size);
-  }
-
-  void skip_element(const Element& element) {
-    stats_.skipped_elements += element.name == "face" ? 0 : 1;
-    if (element.properties.empty())
-      return;
-    for (std::uint64_t i = 0; i < element.count; ++i) {
-      source_.begin_record(element);
-      for (const Property& property : element.properties)
-        skip(property);
-      source_.end_record();
-    }
-  }
-
   void read_vertices(const Element& element) {
     for (const auto& [use, axis] :
          {std::pair(Use::x, "x"), std::pair(Use::y, "y"), std::pair(Use::z, "z")})
@@ -105,7 +84,7 @@ private:
       source_.begin_record(element);
       for (const Property& property : element.properties) {
         if (property.use != Use::x && property.use != Use::y && property.use != Use::z) {
-          skip(property);
+          skip_property(source_, property);
           continue;
         }
         const double value = source_.value(property.type);
@@ -135,7 +114,7 @@ private:
       source_.begin_record(element);
       for (const Property& property : element.properties) {
         if (is_nodes(property)) {
-          size = whole(*property.count_type, UINT32_MAX, "a list's size");
+          size = list_size(source_, property);
           if (size != 4 && size != 10)
             source_.fail("a tetrahedron of " + std::to_string(size) +
                          " vertices, expected 4 or 10");
@@ -145,7 +124,7 @@ private:
           material = static_cast<std::int64_t>(
               whole(property.type, std::uint64_t{INT32_MAX} + 1, "material"));
         } else {
-          skip(property);
+          skip_property(source_, property);
         }
       }
       source_.end_record();

@@ -246,3 +246,25 @@ END
   python3 check.py
   rm -r other check.py log cube* linear* quadratic*
 }
+
+# A disk that fills up, here a limit on sizes between those of the two files, leaves both files of TetGen as they were.
+test_a_failure_leaves_neither_of_tetgens_files() {
+  echo 0 0 0 6 | metaball2vol --voxel 1 -o in.vdb
+  mc-opt --tets in.vdb -o in.node
+  local small large name file
+  small=$(stat -c %s in.node) large=$(stat -c %s in.ele)
+  ((small < large - 2048)) || fail "sizes $small and $large"
+  for name in out.node out.ele; do
+    (ulimit -f $(((small + 1023) / 1024)) && expect_failure 1 mc-opt mc-opt --tets in.vdb -o $name)
+    [[ -z $(find . -name '*out*') ]] || fail "-o $name left" "$(find .)"
+    echo old >out.node
+    echo older >out.ele
+    (ulimit -f $(((small + 1023) / 1024)) && expect_failure 1 mc-opt mc-opt --tets in.vdb -o $name)
+    [[ $(<out.node) == old && $(<out.ele) == older ]] || fail "-o $name changed a file"
+    rm out.node out.ele
+  done
+  mc-opt --tets in.vdb -o out.ele
+  for file in node ele; do
+    cmp in.$file out.$file
+  done
+}

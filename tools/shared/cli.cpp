@@ -191,13 +191,6 @@ void Program::operands(const std::string& name, std::vector<std::string>& values
 }
 
 namespace {
-std::string kind_list(const std::vector<Kind>& kinds) {
-  std::string text;
-  for (const Kind kind : kinds)
-    text += (text.empty() ? "" : ", ") + std::string(kind_name(kind));
-  return text;
-}
-
 std::vector<std::string> kind_words(const std::vector<Kind>& kinds) {
   std::vector<std::string> words;
   for (const Kind kind : kinds)
