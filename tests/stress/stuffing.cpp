@@ -49,13 +49,31 @@ Grid turned(const Grid& grid, std::uint32_t seed) {
 }
 
 struct Totals {
-  std::uint64_t meshes = 0, empty = 0, tetrahedra = 0, refused = 0, failed = 0;
-  double smallest = 180, largest = 0, shift = 0; ///< degrees, and cells
+  std::uint64_t meshes = 0, empty = 0, tetrahedra = 0, refused = 0, interface_cuts = 0, failed = 0;
+  double smallest = 180, smallest_followed = 180, largest = 0, shift = 0; ///< degrees, and cells
 };
+
+/// Two to four materials in cubes of `width` mm, by chance.
+MaterialSource materials(std::uint32_t seed, double width) {
+  return [seed, width] {
+    return [seed, width](const Vec3& place) -> std::int32_t {
+      std::uint32_t hash = seed;
+      for (int a = 0; a < 3; ++a)
+        hash = (hash ^ static_cast<std::uint32_t>(std::lround(place[a] / width) + 100000)) *
+               2654435761U;
+      return static_cast<std::int32_t>((hash >> 16) % (2 + seed % 3));
+    };
+  };
+}
 
 void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) {
   StuffingReport report;
-  const TetMesh mesh = stuff({}, grid, {{}, cell, seed % (stuffing_grade_max + 1)}, &report);
+  StuffingOptions options{{}, cell, seed % (stuffing_grade_max + 1)};
+  if (seed / 4 % 2 != 0) {
+    options.materials = materials(seed, cell * (1 + seed % 7));
+    options.follow_interface = true;
+  }
+  const TetMesh mesh = stuff({}, grid, options, &report);
   ++totals.meshes;
   if (mesh.tetrahedra.empty()) {
     ++totals.empty;
@@ -67,10 +85,12 @@ void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) 
   bool first = surface.node.size() == report.surface_nodes;
   for (std::size_t n = 0; first && n < surface.node.size(); ++n)
     first = surface.node[n] == n;
-  const bool good = found.sound() && found.unused_points.count == 0 && found.manifold_boundary() &&
-                    first && quality.smallest_volume > 0 &&
-                    quality.smallest_angle >= stuffing_angle_min &&
-                    quality.largest_angle <= stuffing_angle_max;
+  const bool good =
+      found.sound() && found.unused_points.count == 0 && found.manifold_boundary() && first &&
+      quality.smallest_volume > 0 &&
+      quality.smallest_angle >=
+          (options.follow_interface ? stuffing_interface_angle_min : stuffing_angle_min) &&
+      quality.largest_angle <= stuffing_angle_max;
   if (!good) {
     ++totals.failed;
     std::printf("scene %u, cell %g: FAILED (angles %.3f to %.3f)\n", seed, cell,
@@ -78,7 +98,9 @@ void examine(const Grid& grid, double cell, std::uint32_t seed, Totals& totals) 
   }
   totals.tetrahedra += mesh.tetrahedra.size();
   totals.refused += report.refused_warps;
-  totals.smallest = test::smaller(totals.smallest, quality.smallest_angle);
+  double& smallest = options.follow_interface ? totals.smallest_followed : totals.smallest;
+  smallest = test::smaller(smallest, quality.smallest_angle);
+  totals.interface_cuts += report.interface_cuts;
   totals.largest = test::larger(totals.largest, quality.largest_angle);
   totals.shift = test::larger(totals.shift, report.largest_shift / report.cell);
 }
@@ -93,12 +115,13 @@ int run(std::uint32_t scenes) {
     for (const double cells : {0.5, 1.0, 1.0 * factor, 2.0 * factor})
       examine(grid, cells * voxel, seed, totals);
   }
-  std::printf("%llu meshes (%llu empty), %llu tetrahedra, angles %.3f to %.3f, %llu warps refused, "
-              "shift at most %.3f cells, %llu failed\n",
+  std::printf("%llu meshes (%llu empty), %llu tetrahedra, angles %.3f (%.3f with %llu cuts between "
+              "materials) to %.3f, %llu warps refused, shift at most %.3f cells, %llu failed\n",
               static_cast<unsigned long long>(totals.meshes),
               static_cast<unsigned long long>(totals.empty),
-              static_cast<unsigned long long>(totals.tetrahedra), totals.smallest, totals.largest,
-              static_cast<unsigned long long>(totals.refused), totals.shift,
+              static_cast<unsigned long long>(totals.tetrahedra), totals.smallest,
+              totals.smallest_followed, static_cast<unsigned long long>(totals.interface_cuts),
+              totals.largest, static_cast<unsigned long long>(totals.refused), totals.shift,
               static_cast<unsigned long long>(totals.failed));
   return totals.failed == 0 ? 0 : 1;
 }
