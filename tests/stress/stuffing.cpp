@@ -1,7 +1,8 @@
-// Strains isosurface stuffing: random scenes of balls, noise and noise of few values (many of them
-// at the isovalue), on straight, mirrored and sheared axes, each at four sizes of cells, with all
-// grades. What holds of every mesh: bounds of angles, positive volumes, a boundary that is a closed
-// 2-manifold and comes first, no unused node. Argument: number of scenes (default 2000).
+// Strains isosurface stuffing: random scenes of balls, noise and noise of few values (many of
+// them at the isovalue), on straight, mirrored and sheared axes, each at four sizes of cells,
+// with all grades, half of them with materials whose interfaces are followed. What holds of
+// every mesh: bounds of angles, positive volumes, a boundary that is a closed 2-manifold and
+// comes first, no unused node. Argument: number of scenes (default 2000).
 
 #include "stuffing/stuffing.h"
 #include "tests/unit/larger.h"
