@@ -1,6 +1,5 @@
 #include "stuffing/cutter_internal.h"
 
-#include <bit>
 #include <utility>
 
 namespace gewebe {
@@ -57,24 +56,22 @@ void BlockCutter::gather(std::size_t block, BlockPoints& points) const {
         }
 }
 
-void BlockCutter::choose(const BlockPoints& points, bool even, CutTetrahedron& tetrahedron) const {
-  std::array<int, 4> signs{};
+void BlockCutter::choose(const BlockPoints& points, std::array<int, 4> signs, bool even, bool even2,
+                         CutTetrahedron& tetrahedron) const {
   bool outside = false;
   std::optional<std::int32_t> smaller, larger;
   for (std::size_t c = 0; c < 4; ++c) {
     const unsigned at = tetrahedron.at[c];
-    signs[c] = points.sign[at];
     outside = outside || signs[c] < 0;
-    if (parts_.follows() && signs[c] > 0 && points.material[at]) {
-      if (!smaller || *points.material[at] < *smaller)
-        smaller = points.material[at];
-      if (!larger || *points.material[at] > *larger)
-        larger = points.material[at];
-    }
+    if (signs[c] <= 0 || !points.material[at])
+      continue;
+    if (!smaller || *points.material[at] < *smaller)
+      smaller = points.material[at];
+    if (!larger || *points.material[at] > *larger)
+      larger = points.material[at];
   }
-  const unsigned octant = bcc::cell_tetrahedra[tetrahedron.number][2] - 4U;
-  const bool even2 = even == ((std::popcount(octant) & 1) == 0);
   tetrahedron.material = smaller;
+  tetrahedron.beyond = nullptr;
   if (outside || smaller == larger) {
     tetrahedron.stencil = &stencil(signs, even, even2);
     return;

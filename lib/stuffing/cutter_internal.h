@@ -10,6 +10,7 @@
 #include "stuffing/warp_internal.h"
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -97,18 +98,29 @@ private:
                 std::size_t end, Cut&& cut) const {
     const unsigned base = BlockPoints::at(0, i, j, k);
     const bool even = ((i + j + k) & 1) == 0; // so is the sum of a block's origin
+    const bool follows = parts_.follows();
+    CutTetrahedron tetrahedron;
     for (std::size_t t = 4 * begin; t < 4 * end; ++t) {
-      CutTetrahedron tetrahedron;
-      tetrahedron.number = t;
-      for (std::size_t c = 0; c < 4; ++c)
+      std::array<int, 4> signs{};
+      for (std::size_t c = 0; c < 4; ++c) {
         tetrahedron.at[c] = base + offset_[bcc::cell_tetrahedra[t][c]];
-      choose(points, even, tetrahedron);
-      if (tetrahedron.stencil->count != 0)
+        signs[c] = points.sign[tetrahedron.at[c]];
+      }
+      const unsigned octant = bcc::cell_tetrahedra[t][2] - 4U;
+      const bool even2 = even == ((std::popcount(octant) & 1) == 0);
+      if (follows)
+        choose(points, signs, even, even2, tetrahedron);
+      else
+        tetrahedron.stencil = &stencil(signs, even, even2);
+      if (tetrahedron.stencil->count != 0) {
+        tetrahedron.number = t;
         cut(tetrahedron);
+      }
     }
   }
-  /// Fills in stencils and materials.
-  void choose(const BlockPoints& points, bool even, CutTetrahedron& tetrahedron) const;
+  /// Fills in stencils and materials where an interface is followed.
+  void choose(const BlockPoints& points, std::array<int, 4> signs, bool even, bool even2,
+              CutTetrahedron& tetrahedron) const;
 
   template <class Cut, class Whole>
   void cut_leaf(const StuffingBlock& block, const BlockPoints& points, unsigned i, unsigned j,
