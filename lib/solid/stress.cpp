@@ -1,0 +1,91 @@
+#include "solid/stress.h"
+
+#include <cstddef>
+
+namespace gewebe {
+
+namespace {
+
+SymmetricBlock symmetric_part(const SolidBlock& g) {
+  return {g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2, g[4], (g[5] + g[7]) / 2, g[8]};
+}
+
+Vec3 at_node(std::span<const double> u, std::uint32_t node) {
+  const std::size_t axis = 3 * std::size_t{node};
+  return {u[axis], u[axis + 1], u[axis + 2]};
+}
+
+} // namespace
+
+std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
+                                         std::span<const SolidMaterial> materials,
+                                         std::span<const SolidElement> elements,
+                                         std::span<const double> u, const Vec3& acceleration) {
+  std::vector<CornerTensors> strains(elements.size());
+  std::array<Vec3, 10> values;
+  const std::size_t count = mesh.middles.empty() ? 4 : 10;
+  for (std::size_t t = 0; t < elements.size(); ++t) {
+    for (std::size_t a = 0; a < count; ++a)
+      values[a] = at_node(u, a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4]);
+    const std::size_t material =
+        mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
+    const auto gradients =
+        displacement_gradients(elements[t], std::span<const Vec3>(values).first(count),
+                               materials[material].density * acceleration);
+    for (std::size_t p = 0; p < 4; ++p)
+      strains[t][p] = symmetric_part(gradients[p]);
+  }
+  return strains;
+}
+
+std::vector<CornerTensors> solid_stresses(std::span<const SolidElement> elements,
+                                          std::span<const CornerTensors> strains) {
+  std::vector<CornerTensors> stresses(elements.size());
+  for (std::size_t t = 0; t < elements.size(); ++t)
+    for (std::size_t p = 0; p < 4; ++p) {
+      const SymmetricBlock& strain = strains[t][p];
+      const double volumetric = elements[t].material.lambda * (strain[0] + strain[3] + strain[5]);
+      for (std::size_t k = 0; k < 6; ++k)
+        stresses[t][p][k] =
+            2 * elements[t].material.mu * strain[k] + (k == 0 || k == 3 || k == 5 ? volumetric : 0);
+    }
+  return stresses;
+}
+
+SymmetricBlock tensor_at(const CornerTensors& tensors, const std::array<double, 4>& coordinates) {
+  SymmetricBlock result{};
+  for (std::size_t p = 0; p < 4; ++p)
+    for (std::size_t k = 0; k < 6; ++k)
+      result[k] += coordinates[p] * tensors[p][k];
+  return result;
+}
+
+std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
+                                          std::span<const SolidElement> elements,
+                                          std::span<const CornerTensors> tensors) {
+  std::vector<SymmetricBlock> sums(mesh.points.size());
+  std::vector<double> volumes(mesh.points.size());
+  const auto add = [&](std::uint32_t node, std::size_t t, const SymmetricBlock& tensor) {
+    volumes[node] += elements[t].volume;
+    for (std::size_t k = 0; k < 6; ++k)
+      sums[node][k] += elements[t].volume * tensor[k];
+  };
+  for (std::size_t t = 0; t < elements.size(); ++t) {
+    for (std::size_t a = 0; a < 4; ++a)
+      add(mesh.tetrahedra[t][a], t, tensors[t][a]);
+    if (mesh.middles.empty())
+      continue;
+    for (std::size_t k = 0; k < 6; ++k) {
+      std::array<double, 4> coordinates{};
+      for (const std::size_t end : tetrahedron_edges[k])
+        coordinates[end] = 0.5;
+      add(mesh.middles[t][k], t, tensor_at(tensors[t], coordinates));
+    }
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    for (double& value : sums[i])
+      value = volumes[i] > 0 ? value / volumes[i] : 0;
+  return sums;
+}
+
+} // namespace gewebe

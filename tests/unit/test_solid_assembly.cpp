@@ -1,0 +1,329 @@
+// A solid put together: its matrix against dense sums, solved patch tests, masses, loads, springs
+// beside it, any number of threads.
+
+#include "base/error.h"
+#include "solid/assembly.h"
+#include "solid/stress.h"
+#include "solve/factor.h"
+#include "tet_fixtures.h"
+#include "tetrahedra/boundary.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+const std::vector<SolidMaterial> two{{2500, 0.3, 1.1e-3}, {400, 0.499, 0.9e-3}};
+
+/// A box 2 × 2 × 2 whose inner nodes stand anywhere.
+TetMesh distorted(bool quadratic, bool materials) {
+  TetMesh mesh = test::box_tetrahedra(3, 3, 3, 2.0 / 3);
+  for (Vec3& p : mesh.points)
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = std::abs(p[axis] - 2) < 1e-9 ? 2 : p[axis];
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> shift(-0.12, 0.12);
+  for (Vec3& p : mesh.points)
+    for (int axis = 0; axis < 3; ++axis)
+      if (p[axis] > 0.1 && p[axis] < 1.9)
+        p[axis] += shift(random);
+  if (quadratic)
+    make_quadratic(mesh);
+  if (materials)
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+      mesh.material.push_back(t % 3 == 0);
+  return mesh;
+}
+
+bool on_boundary(const Vec3& p) {
+  return p.x == 0 || p.x == 2 || p.y == 0 || p.y == 2 || p.z == 0 || p.z == 2;
+}
+
+Vec3 of_axes(const std::vector<double>& u, std::size_t i) {
+  return {u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+}
+
+double largest(const std::vector<double>& v) {
+  double most = 0;
+  for (const double x : v)
+    most = std::fmax(most, std::abs(x));
+  return most;
+}
+
+TEST(SolidAssembly, MatrixMultipliesAsItsElementsDo) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> any(-1, 1);
+  for (const bool quadratic : {false, true}) {
+    const TetMesh mesh = distorted(quadratic, true);
+    const auto elements = solid_elements(mesh, two);
+    std::vector<std::uint8_t> fixed(3 * mesh.points.size());
+    for (std::uint8_t& f : fixed)
+      f = random() % 5 == 0;
+    const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    std::vector<double> u(fixed.size()), f(fixed.size()), x, y(k.order());
+    for (std::size_t axis = 0; axis < u.size(); ++axis)
+      u[axis] = fixed[axis] != 0 ? 0 : any(random);
+    for (const std::int64_t axis : k.axis_of_row)
+      x.push_back(u[static_cast<std::size_t>(axis)]);
+    multiply(k, x, y);
+    multiply_solid(mesh, elements, u, f);
+    for (std::size_t r = 0; r < y.size(); ++r)
+      EXPECT_NEAR(y[r], f[static_cast<std::size_t>(k.axis_of_row[r])], 1e-13 * largest(f));
+    for (std::size_t c = 0; c < k.order(); ++c) {
+      EXPECT_EQ(k.row[static_cast<std::size_t>(k.column_start[c])], static_cast<std::int64_t>(c));
+      for (auto at = k.column_start[c] + 1; at < k.column_start[c + 1]; ++at)
+        EXPECT_LT(k.row[static_cast<std::size_t>(at - 1)], k.row[static_cast<std::size_t>(at)]);
+    }
+    EXPECT_THROW(solid_stiffness(mesh, elements, std::vector<std::uint8_t>(fixed.size(), 1)),
+                 Error);
+  }
+}
+
+TEST(SolidAssembly, AnyNumberOfThreadsGivesTheSameBytes) {
+  TetMesh mesh = test::box_tetrahedra(5, 4, 12, 0.3);
+  make_quadratic(mesh);
+  const auto with = [&](int threads) {
+    Context context;
+    context.threads = threads;
+    return solid_stiffness(mesh, solid_elements(mesh, two, context), {}, context);
+  };
+  const StiffnessMatrix one = with(1), five = with(5);
+  EXPECT_TRUE(test::same_bytes(one.value, five.value));
+  EXPECT_TRUE(test::same_bytes(one.row, five.row));
+  EXPECT_EQ(one.column_start, five.column_start);
+}
+
+/// Boundary nodes displaced by a linear function; inner nodes follow it.
+TEST(SolidAssembly, PatchTestIsSolved) {
+  const std::array<Vec3, 3> gradient{
+      {{3e-3, -2e-3, 5e-3}, {7e-3, 1e-3, -4e-3}, {-6e-3, 2e-3, 2e-3}}};
+  for (const bool quadratic : {false, true})
+    for (const double poisson : {0.0, 0.3, 0.4999}) {
+      const TetMesh mesh = distorted(quadratic, false);
+      const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
+      const auto elements = solid_elements(mesh, material);
+      std::vector<std::uint8_t> fixed(3 * mesh.points.size());
+      std::vector<double> exact(fixed.size()), u(fixed.size()), f(fixed.size());
+      for (std::size_t axis = 0; axis < fixed.size(); ++axis) {
+        const Vec3& p = mesh.points[axis / 3];
+        exact[axis] = dot(gradient[axis % 3], p);
+        fixed[axis] = on_boundary(p);
+        u[axis] = on_boundary(p) ? exact[axis] : 0;
+      }
+      const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+      multiply_solid(mesh, elements, u, f);
+      for (double& value : f)
+        value = -value;
+      std::vector<double> moved(fixed.size());
+      solve_axes(k, Factor(k, {}), f, moved);
+      for (std::size_t axis = 0; axis < u.size(); ++axis)
+        EXPECT_NEAR(u[axis] + moved[axis], exact[axis], 1e-12 * largest(exact));
+      const auto strains = solid_strains(mesh, material, elements, exact);
+      const auto stresses = solid_stresses(elements, strains);
+      const auto [lambda, mu] = elasticity(2500, poisson);
+      for (const SymmetricBlock& at_node : nodal_tensors(mesh, elements, stresses)) {
+        EXPECT_NEAR(at_node[0], lambda * 6e-3 + 2 * mu * 3e-3, 1e-12 * (lambda + mu));
+        EXPECT_NEAR(at_node[1], mu * 5e-3, 1e-12 * (lambda + mu));
+        EXPECT_NEAR(at_node[4], mu * -2e-3, 1e-12 * (lambda + mu));
+      }
+    }
+}
+
+TEST(SolidAssembly, MassesArePositiveAndComplete) {
+  for (const bool quadratic : {false, true}) {
+    const TetMesh mesh = distorted(quadratic, true);
+    const auto masses = solid_masses(mesh, two);
+    double expected = 0;
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+      const Tetrahedron& c = mesh.tetrahedra[t];
+      expected += two[static_cast<std::size_t>(mesh.material[t])].density *
+                  tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
+                                     mesh.points[c[3]]);
+    }
+    double total = 0;
+    for (const double m : masses) {
+      EXPECT_GT(m, 0);
+      total += m;
+    }
+    EXPECT_NEAR(total, expected, 1e-14 * expected);
+  }
+  // One element: the diagonal of the consistent mass is in the proportion 6 : 32.
+  TetMesh one;
+  one.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  one.tetrahedra = {{0, 1, 2, 3}};
+  make_quadratic(one);
+  const auto masses = solid_masses(one, two);
+  for (std::size_t i = 0; i < 10; ++i)
+    EXPECT_NEAR(masses[i], 1.1e-3 / 6 * (i < 4 ? 6 : 32) / 216, 1e-18);
+}
+
+struct Sums {
+  Vec3 force, moment;
+};
+Sums sums(const TetMesh& mesh, const std::vector<double>& load) {
+  Sums s;
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    s.force += of_axes(load, i);
+    s.moment += cross(mesh.points[i], of_axes(load, i));
+  }
+  return s;
+}
+void expect_near(const Vec3& a, const Vec3& b, double scale) {
+  EXPECT_LE(norm(a - b), 1e-12 * scale) << a.x << ' ' << a.y << ' ' << a.z;
+}
+
+TEST(SolidAssembly, LoadsAddUpToTheirForceAndMoment) {
+  for (const bool quadratic : {false, true}) {
+    TetMesh mesh = distorted(quadratic, false);
+    const auto elements = solid_elements(mesh, two);
+    const Vec3 g{100, -200, -9810};
+    const double mass = 8 * two[0].density;
+    const Sums weight = sums(mesh, gravity_load(mesh, two, elements, g));
+    expect_near(weight.force, mass * g, mass * norm(g));
+    expect_near(weight.moment, cross({1, 1, 1}, mass * g), mass * norm(g));
+
+    const TetBoundary faces = boundary(mesh);
+    std::vector<std::uint32_t> all(faces.mesh.triangles.size()), right;
+    std::iota(all.begin(), all.end(), 0U);
+    for (const std::uint32_t k : all) {
+      bool in_plane = true;
+      for (const std::uint32_t c : faces.mesh.triangles[k])
+        in_plane = in_plane && faces.mesh.points[c].x == 2;
+      if (in_plane)
+        right.push_back(k);
+    }
+    const Sums pressed = sums(mesh, pressure_load(mesh, faces, right, 50));
+    expect_near(pressed.force, {-200, 0, 0}, 200);
+    expect_near(pressed.moment, cross({2, 1, 1}, {-200, 0, 0}), 200);
+    const Sums pulled = sums(mesh, traction_load(mesh, faces, right, {7, -5, 3}));
+    expect_near(pulled.force, {28, -20, 12}, 30);
+    expect_near(pulled.moment, cross({2, 1, 1}, {28, -20, 12}), 30);
+    const Sums closed = sums(mesh, pressure_load(mesh, faces, all, 50));
+    expect_near(closed.force, {}, 200);
+    expect_near(closed.moment, {}, 200);
+  }
+}
+
+/// A pressure all around has an answer without shear: u = -p/(3 lambda + 2 mu) x.
+TEST(SolidAssembly, PressureAllAroundShrinksTheBodyEvenly) {
+  for (const bool quadratic : {false, true})
+    for (const double poisson : {0.3, 0.499}) {
+      const TetMesh mesh = distorted(quadratic, false);
+      const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
+      const auto elements = solid_elements(mesh, material);
+      const TetBoundary faces = boundary(mesh);
+      std::vector<std::uint32_t> all(faces.mesh.triangles.size());
+      std::iota(all.begin(), all.end(), 0U);
+      const auto load = pressure_load(mesh, faces, all, 50);
+      const double shrink = 50 * (1 - 2 * poisson) / 2500;
+      std::vector<double> u(load.size()), f(load.size());
+      for (std::size_t axis = 0; axis < u.size(); ++axis)
+        u[axis] = -shrink * mesh.points[axis / 3][static_cast<int>(axis % 3)];
+      multiply_solid(mesh, elements, u, f);
+      for (std::size_t axis = 0; axis < u.size(); ++axis)
+        EXPECT_NEAR(f[axis], load[axis], 1e-11 * largest(load));
+    }
+}
+
+/// Standing in a box without friction under its weight: u_z is quadratic, and so found exactly,
+/// with the pressure that grows downwards, at any nu.
+TEST(SolidAssembly, WeightInABoxIsFoundExactly) {
+  for (const double poisson : {0.3, 0.499}) {
+    const TetMesh mesh = distorted(true, false);
+    const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
+    const auto elements = solid_elements(mesh, material);
+    const Vec3 g{0, 0, -9810};
+    const auto [lambda, mu] = elasticity(2500, poisson);
+    const double weight = 1e-3 * 9810, modulus = lambda + 2 * mu;
+    std::vector<std::uint8_t> fixed(3 * mesh.points.size());
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+      const Vec3& p = mesh.points[i];
+      fixed[3 * i] = p.x == 0 || p.x == 2;
+      fixed[3 * i + 1] = p.y == 0 || p.y == 2;
+      fixed[3 * i + 2] = p.z == 0;
+    }
+    const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    std::vector<double> u(fixed.size());
+    solve_axes(k, Factor(k, {}), gravity_load(mesh, material, elements, g), u);
+    const double most = weight / modulus * 2;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+      const double z = mesh.points[i].z;
+      expect_near(of_axes(u, i), {0, 0, -weight / modulus * (2 * z - z * z / 2)}, most);
+    }
+    const auto stresses = nodal_tensors(
+        mesh, elements, solid_stresses(elements, solid_strains(mesh, material, elements, u, g)));
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+      EXPECT_NEAR(stresses[i][5], -weight * (2 - mesh.points[i].z), 1e-9 * 2 * weight);
+  }
+}
+
+TEST(SolidAssembly, WhatItCannotUseIsRefusedByName) {
+  const auto refuses = [](const TetMesh& mesh, const std::vector<SolidMaterial>& materials,
+                          const std::string& expected) {
+    try {
+      solid_elements(mesh, materials);
+      ADD_FAILURE() << "took it, expected: " << expected;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+    }
+  };
+  TetMesh mesh = distorted(true, false);
+  mesh.points[mesh.middles[0][3]].x += 0.01;
+  refuses(mesh, two, "tetrahedron 0 has a node away from the middle");
+  mesh = distorted(false, true);
+  mesh.material[4] = 2;
+  refuses(mesh, two, "tetrahedron 4 is of material 2");
+  mesh = distorted(false, false);
+  std::swap(mesh.tetrahedra[7][0], mesh.tetrahedra[7][1]);
+  refuses(mesh, two, "tetrahedron 7 has no positive volume");
+  mesh = distorted(false, false);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refuses(mesh, {{1e4, 0.5, 1e-3}}, "Poisson's ratio");
+  refuses(mesh, {{nan, 0.3, 1e-3}}, "Young's modulus");
+  refuses(mesh, {{1e4, 0.3, 0}}, "density");
+  refuses(mesh, {{1e4, 0.3, nan}}, "density");
+}
+
+/// A spring along x between two nodes of a solid: its stiffness adds.
+TEST(SolidAssembly, SpringsAndSolidsAdd) {
+  const TetMesh mesh = distorted(true, false);
+  const auto elements = solid_elements(mesh, two);
+  Model model;
+  model.materials.resize(1);
+  for (const Vec3& p : mesh.points)
+    model.nodes.push_back({.position = p, .mass = 1});
+  for (std::uint32_t i = 0; i + 1 < mesh.points.size(); i += 2)
+    model.springs.push_back({.i = i,
+                             .j = i + 1,
+                             .stiffness = 100.0 + i,
+                             .rest = norm(mesh.points[i] - mesh.points[i + 1])});
+  std::vector<std::uint8_t> fixed(3 * mesh.points.size());
+  fixed[0] = fixed[1] = fixed[2] = 1;
+  const StiffnessMatrix both =
+      sum(solid_stiffness(mesh, elements, fixed), stiffness_matrix(model, fixed));
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::vector<double> u(fixed.size()), f(u.size()), g(u.size()), x, y(both.order());
+  for (std::size_t axis = 3; axis < u.size(); ++axis)
+    x.push_back(u[axis] = any(random));
+  multiply(both, x, y);
+  multiply_solid(mesh, elements, u, f);
+  multiply_stiffness(model, u, g);
+  for (std::size_t r = 0; r < y.size(); ++r)
+    EXPECT_NEAR(y[r], f[r + 3] + g[r + 3], 1e-13 * largest(f));
+  EXPECT_GT(largest(g), 0.01 * largest(f));
+  EXPECT_THROW(sum(both, stiffness_matrix(model)), Error);
+}
+
+} // namespace
+} // namespace gewebe
