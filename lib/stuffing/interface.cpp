@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace gewebe {
@@ -22,17 +23,6 @@ constexpr std::array<std::uint32_t, bcc::directions> make_rings() {
 }
 constexpr std::array<std::uint32_t, bcc::directions> rings = make_rings();
 
-Int3 place_in_block(const bcc::Point& point, const StuffingBlock& block) {
-  return {point.place[0] - block.origin[0], point.place[1] - block.origin[1],
-          point.place[2] - block.origin[2]};
-}
-PlaceInBlock neighbour(const StuffingBlock& block, unsigned word, unsigned bit,
-                       unsigned direction) {
-  const bcc::Point point = point_at(block, word, bit);
-  const Int3 place = place_in_block(point, block), step = bcc::place_step(point.kind, direction);
-  return locate(block, bcc::kind_after(point.kind, direction),
-                {place[0] + step[0], place[1] + step[1], place[2] + step[2]});
-}
 bool is_inside(const StuffingBlocks& blocks, const PlaceInBlock& place) {
   return place.block != StuffingBlock::none && blocks[place.block].in(place.word, place.bit);
 }
@@ -208,12 +198,18 @@ void keep_one_corner(const StuffingBlocks& blocks, const SurfacePoints& surface,
 BlockMaterials materials_of(const Context& context, const StuffingLattice& lattice,
                             const StuffingBlocks& blocks, const MaterialSource& source) {
   BlockMaterials materials(blocks.size());
+  constexpr std::size_t points_of_block = std::size_t{16} * 64;
+  const auto with_inside =
+      std::count_if(blocks.begin(), blocks.end(),
+                    [](const StuffingBlock& block) { return size(block.inside) != 0; });
+  require_memory(context, static_cast<double>(with_inside) * points_of_block * sizeof(std::int32_t),
+                 "the materials of lattice points");
   parallel_blocks(context, blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
     const MaterialAt material_at_place = source();
     for (std::size_t b = begin; b < end; ++b) {
       if (size(blocks[b].inside) == 0)
         continue;
-      materials[b].resize(std::size_t{16} * 64);
+      materials[b].resize(points_of_block);
       for_each_point(blocks[b].inside, [&](unsigned word, unsigned bit) {
         materials[b][64 * std::size_t{word} + bit] = material_at_place(
             lattice.to_world.to_world(bcc::position(point_at(blocks[b], word, bit))));

@@ -113,6 +113,16 @@ inline PlaceInBlock locate(const StuffingBlock& block, unsigned kind, const Int3
           static_cast<unsigned>((place[1] & 7) << 3 | (place[2] & 7))};
 }
 
+/// Where the neighbour of a block's point in a direction lies.
+inline PlaceInBlock neighbour(const StuffingBlock& block, unsigned word, unsigned bit,
+                              unsigned direction) {
+  const unsigned kind = word / 8;
+  const Int3 step = bcc::place_step(kind, direction);
+  return locate(block, bcc::kind_after(kind, direction),
+                {static_cast<int>(word % 8) + step[0], static_cast<int>(bit / 8) + step[1],
+                 static_cast<int>(bit % 8) + step[2]});
+}
+
 /// Word i of a set of the points of `kind` at a step of -1, 0 or 1 along each axis from those of a
 /// block. \param word_of called with a block and a number of word \return 0 bits for points of
 /// blocks that are not there

@@ -25,13 +25,8 @@ void gather(const Context& context, const StuffingBlocks& blocks,
         point.word = static_cast<std::uint16_t>(word);
         point.bit = static_cast<std::uint16_t>(bit);
         point.inside = block.in(word, bit);
-        const unsigned kind = word / 8;
         for (unsigned d = 0; d < bcc::directions; ++d) {
-          const Int3 step = bcc::place_step(kind, d);
-          const PlaceInBlock there =
-              locate(block, bcc::kind_after(kind, d),
-                     {static_cast<int>(word % 8) + step[0], static_cast<int>(bit / 8) + step[1],
-                      static_cast<int>(bit % 8) + step[2]});
+          const PlaceInBlock there = neighbour(block, word, bit, d);
           point.neighbours[d] = SurfacePoint::none;
           if (there.block == StuffingBlock::none)
             continue;
