@@ -5,6 +5,7 @@
 #include "solid/assembly.h"
 #include "solid/stress.h"
 #include "solve/factor.h"
+#include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 
@@ -30,7 +31,8 @@ TetMesh distorted(bool quadratic, bool materials) {
   TetMesh mesh = test::box_tetrahedra(3, 3, 3, 2.0 / 3);
   for (Vec3& p : mesh.points)
     for (int axis = 0; axis < 3; ++axis)
-      p[axis] = std::abs(p[axis] - 2) < 1e-9 ? 2 : p[axis];
+      if (std::abs(p[axis] - 2) < 1e-9)
+        p[axis] = 2;
   std::mt19937 random(5);
   std::uniform_real_distribution<double> shift(-0.12, 0.12);
   for (Vec3& p : mesh.points)
@@ -56,7 +58,7 @@ Vec3 of_axes(const std::vector<double>& u, std::size_t i) {
 double largest(const std::vector<double>& v) {
   double most = 0;
   for (const double x : v)
-    most = std::fmax(most, std::abs(x));
+    most = test::larger(most, std::abs(x));
   return most;
 }
 
