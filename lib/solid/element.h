@@ -13,8 +13,8 @@
 // elements have as many constraints of volume as displacements; the mean alone (mean dilatation,
 // B-bar) doesn't lock, but its displacements are of order 2 and not 3. The bubble sets the three
 // slopes of the pressure in each element free, and the order stays 3 at any nu < 1/2. At nu = 0.499
-// tests/unit/test_solid_validation.cpp finds 2.98; in its place a plain element had 2.5 and the mean
-// 1.6 on the same meshes. The mean is softer: nearer where a corner is singular. Only the part
+// tests/unit/test_solid_validation.cpp finds 2.98; in its place a plain element had 2.5 and the
+// mean 1.6 on the same meshes. The mean is softer: nearer where a corner is singular. Only the part
 // lambda (div u)² is projected, so that no motion but the rigid ones is free of energy.
 //
 // Sources: Hughes, Generalization of selective integration procedures, 1980, and Simo, Taylor,
