@@ -298,5 +298,39 @@ TEST(SolidValidation, NafemsLe10) {
   EXPECT_NEAR(at_d, -5.38, 0.01 * 5.38);
 }
 
+// A beam of silicone (Dragon Skin 10, 100 x 30 x 30 mm), clamped at an end: Dubied et al.,
+// Sim-to-Real for Soft Robots using Differentiable FEM, IEEE RA-L 2022, who fitted E to it. Droop
+// of their three markers under the beam's own weight, means of two trials; small strains leave out
+// that the beam turns.
+TEST(SolidValidation, ASiliconeBeamDroopsAsMeasured) {
+  struct Marker {
+    Vec3 place;
+    double measured;
+  };
+  const std::array<Marker, 3> markers{
+      {{{100, 15, 30}, 6.68}, {{100, 0, 25}, 6.555}, {{100, 30, 5}, 6.25}}};
+  const auto droops = [&](bool quadratic) {
+    Solid beam(test::box_tetrahedra(20, 6, 6, 5), quadratic, {263824, 0.499, 1.07e-3});
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
+    const std::vector<double> u =
+        beam.solve(gravity_load(beam.mesh, beam.materials, beam.elements, {0, 0, -9807.09}));
+    std::array<double, 3> result{};
+    for (std::size_t n = 0; n < 3; ++n)
+      result[n] = -u[3 * beam.node_at(markers[n].place) + 2];
+    return result;
+  };
+  const std::array<double, 3> droop = droops(true), locked = droops(false);
+  double mean = 0, measured = 0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    EXPECT_NEAR(droop[n], markers[n].measured, 0.08 * markers[n].measured) << n;
+    EXPECT_LT(locked[n], 0.25 * markers[n].measured) << n;
+    mean += droop[n] / 3;
+    measured += markers[n].measured / 3;
+  }
+  EXPECT_NEAR(mean, measured, 0.04 * measured);
+  EXPECT_NEAR(droop[1], 6.75, 0.01 * 6.75); // COMSOL
+}
+
 } // namespace
 } // namespace gewebe
