@@ -4,7 +4,6 @@
 #include "base/parallel.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace gewebe {
 namespace {
@@ -132,22 +131,6 @@ void keep_in_place(const Context& context, MaterialInterface& interface) {
   });
   for (std::size_t n = 0; n < points.size(); ++n)
     points[n].on = points[n].on || comes[n] != 0;
-}
-
-/// The direction of the nearest cut that is nearer than alpha.
-std::uint8_t violated(const MaterialInterface& interface, const InterfacePoint& point) {
-  double least = HUGE_VAL;
-  std::uint8_t result = InterfacePoint::stays;
-  for (unsigned d = 0; d < bcc::directions; ++d) {
-    if (!interface.is_cut(point, d) || !(point.cuts[d] < bcc::alpha(d)))
-      continue;
-    const double distance = point.cuts[d] * (bcc::is_long(d) ? 1 : std::sqrt(0.75));
-    if (distance < least) {
-      least = distance;
-      result = static_cast<std::uint8_t>(d);
-    }
-  }
-  return result;
 }
 
 void warp(const Context& context, const StuffingBlocks& blocks, MaterialInterface& interface) {

@@ -91,8 +91,8 @@ struct StuffingReport {
 /// \throw Error if the transform is singular or not finite; if the grid is exact only near another
 /// isovalue (band_isovalue); if its background is inside, so that nothing bounds the solid; if a
 /// value at or beside the surface is not finite; if `cell` isn't finite and above 0; if
-/// `grade` is above its maximum; if indices
-/// come near the limits of 32 bits; beyond context.max_memory
+/// `grade` is above its maximum; if indices come near the limits of 32 bits; beyond
+/// context.max_memory; what `materials` throws
 TetMesh stuff(const Context& context, const Grid& grid, const StuffingOptions& options,
               StuffingReport* report = nullptr);
 

@@ -5,7 +5,6 @@
 #include "stuffing/cut_finder_internal.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace gewebe {
 namespace {
@@ -66,22 +65,6 @@ void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& 
           point.cuts[d] = 1 - points[point.neighbours[d]].cuts[bcc::opposite(d)];
     }
   });
-}
-
-/// The direction of the nearest cut point that is nearer than alpha, or SurfacePoint::stays.
-std::uint8_t violated(const SurfacePoints& surface, const SurfacePoint& point) {
-  double least = HUGE_VAL;
-  std::uint8_t result = SurfacePoint::stays;
-  for (unsigned d = 0; d < bcc::directions; ++d) {
-    if (!surface.is_cut(point, d) || !(point.cuts[d] < bcc::alpha(d)))
-      continue;
-    const double distance = point.cuts[d] * (bcc::is_long(d) ? 1 : std::sqrt(0.75));
-    if (distance < least) {
-      least = distance;
-      result = static_cast<std::uint8_t>(d);
-    }
-  }
-  return result;
 }
 
 void warp(const Context& context, const StuffingBlocks& blocks, SurfacePoints& surface) {

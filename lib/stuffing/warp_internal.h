@@ -8,6 +8,7 @@
 #include "volume/grid.h"
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -50,6 +51,24 @@ struct SurfacePoints {
   }
   LinkSigns link_signs(const SurfacePoint& point) const;
 };
+
+/// The direction of the nearest cut of a point that is nearer than alpha, or SurfacePoint::stays.
+/// \param cuts tells which edges are cut: SurfacePoints, MaterialInterface
+template <class Cuts, class Point>
+std::uint8_t violated(const Cuts& cuts, const Point& point) {
+  double least = HUGE_VAL;
+  std::uint8_t result = SurfacePoint::stays;
+  for (unsigned d = 0; d < bcc::directions; ++d) {
+    if (!cuts.is_cut(point, d) || !(point.cuts[d] < bcc::alpha(d)))
+      continue;
+    const double distance = point.cuts[d] * (bcc::is_long(d) ? 1 : std::sqrt(0.75));
+    if (distance < least) {
+      least = distance;
+      result = static_cast<std::uint8_t>(d);
+    }
+  }
+  return result;
+}
 
 /// How the inside meets a point that lies on the surface.
 enum class Meeting {

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
@@ -26,6 +27,16 @@ inline GridInfo level_set(const GridTransform& transform, float background) {
   info.transform = transform;
   info.level_set = true;
   info.background = background;
+  return info;
+}
+
+/// Straight, turned and mirrored, or sheared axes.
+inline GridInfo turned_axes(std::uint32_t seed) {
+  GridInfo info;
+  if (seed % 3 == 1)
+    info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
+  if (seed % 3 == 2)
+    info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
   return info;
 }
 

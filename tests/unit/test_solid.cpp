@@ -263,13 +263,7 @@ TEST(Solid, AnotherFrameGivesTheSameElement) {
 
 /// A box whose inner nodes stand anywhere, its volume 8.
 TetMesh distorted(bool quadratic) {
-  TetMesh mesh = test::box_tetrahedra(3, 3, 3, 2.0 / 3);
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> shift(-0.12, 0.12);
-  for (Vec3& p : mesh.points)
-    for (int axis = 0; axis < 3; ++axis)
-      if (p[axis] > 0.1 && p[axis] < 1.9)
-        p[axis] += shift(random);
+  TetMesh mesh = test::distorted_box();
   if (quadratic)
     make_quadratic(mesh);
   return mesh;

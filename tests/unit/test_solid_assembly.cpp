@@ -28,17 +28,7 @@ const std::vector<SolidMaterial> two{{2500, 0.3, 1.1e-3}, {400, 0.499, 0.9e-3}};
 
 /// A box 2 × 2 × 2 whose inner nodes stand anywhere.
 TetMesh distorted(bool quadratic, bool materials) {
-  TetMesh mesh = test::box_tetrahedra(3, 3, 3, 2.0 / 3);
-  for (Vec3& p : mesh.points)
-    for (int axis = 0; axis < 3; ++axis)
-      if (std::abs(p[axis] - 2) < 1e-9)
-        p[axis] = 2;
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> shift(-0.12, 0.12);
-  for (Vec3& p : mesh.points)
-    for (int axis = 0; axis < 3; ++axis)
-      if (p[axis] > 0.1 && p[axis] < 1.9)
-        p[axis] += shift(random);
+  TetMesh mesh = test::distorted_box();
   if (quadratic)
     make_quadratic(mesh);
   if (materials)

@@ -62,11 +62,7 @@ TEST(Stuffing, AnythingKeepsTheBoundsAndAManifold) {
   for (std::uint32_t seed = 0; seed < 24; ++seed) {
     std::mt19937 random(seed);
     const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
-    GridInfo info;
-    if (seed % 3 == 1)
-      info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
-    if (seed % 3 == 2)
-      info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
+    const GridInfo info = turned_axes(seed);
     const double share = 0.2 + 0.6 * uniform();
     const Grid grid = sample(info, {-8, 0, 0}, {7, 7, 9}, [&](int i, int j, int k) -> double {
       switch (seed / 3 % 3) {
@@ -125,11 +121,7 @@ TEST(Stuffing, AGradedSolidHasTheSameBoundaryAndCoarserCellsInside) {
 TEST(Stuffing, GradedWavesKeepTheBoundsAndTheirBoundary) {
   for (std::uint32_t seed = 0; seed < 6; ++seed) {
     std::mt19937 random(seed);
-    GridInfo info;
-    if (seed % 3 == 1)
-      info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
-    if (seed % 3 == 2)
-      info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
+    const GridInfo info = turned_axes(seed);
     const Grid grid = sample(info, {-9, 0, 0}, {9, 19, 19}, [&](int i, int j, int k) {
       const double noise = static_cast<double>(random()) / 4294967296.0 - 0.5;
       return 0.6 + 0.5 * std::sin(i * 0.31 + seed) * std::cos(j * 0.34) * std::sin(k * 0.29 + 1) +

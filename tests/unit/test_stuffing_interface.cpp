@@ -120,11 +120,7 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
   std::uint64_t cuts = 0, warped = 0, kept = 0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
     std::mt19937 random(seed);
-    GridInfo info;
-    if (seed % 3 == 1)
-      info.transform.m = {0, -0.7, 0, 2, 0.7, 0, 0, -3, 0, 0, -0.7, 1};
-    if (seed % 3 == 2)
-      info.transform.m = {0.5, 0.1, 0, 3, 0, 0.9, 0.05, -2, 0.02, 0, 1.4, 1};
+    const GridInfo info = turned_axes(seed);
     const Grid grid = sample(info, {-8, 0, 0}, {7, 7, 9}, [&](int i, int j, int k) {
       return 0.7 + 0.5 * std::sin(i * 0.5 + seed) * std::cos(j * 0.6) * std::sin(k * 0.4 + 1);
     });

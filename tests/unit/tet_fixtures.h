@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <random>
 #include <vector>
 
 namespace gewebe::test {
@@ -36,6 +38,22 @@ inline TetMesh box_tetrahedra(std::uint32_t nx, std::uint32_t ny, std::uint32_t 
                                          : Tetrahedron{corner, b, a, c});
         } while (std::next_permutation(axes.begin(), axes.end()));
       }
+  return mesh;
+}
+
+/// A box 2 × 2 × 2 whose inner nodes stand anywhere.
+inline TetMesh distorted_box() {
+  TetMesh mesh = box_tetrahedra(3, 3, 3, 2.0 / 3);
+  for (Vec3& p : mesh.points)
+    for (int axis = 0; axis < 3; ++axis)
+      if (std::abs(p[axis] - 2) < 1e-9)
+        p[axis] = 2;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> shift(-0.12, 0.12);
+  for (Vec3& p : mesh.points)
+    for (int axis = 0; axis < 3; ++axis)
+      if (p[axis] > 0.1 && p[axis] < 1.9)
+        p[axis] += shift(random);
   return mesh;
 }
 
