@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "solid/assembly_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,14 +14,6 @@ namespace {
 
 /// Of edges' lengths, that middles may stand away from the middle.
 constexpr double straight = 1e-3;
-
-std::size_t nodes_of(const TetMesh& mesh) {
-  return mesh.middles.empty() ? 4 : 10;
-}
-
-std::uint32_t node_of(const TetMesh& mesh, std::size_t t, std::size_t a) {
-  return a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4];
-}
 
 std::size_t material_of(const TetMesh& mesh, std::size_t t) {
   return mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
@@ -37,30 +30,30 @@ struct Uses {
 };
 
 Uses uses_of(const TetMesh& mesh) {
-  const std::size_t count = nodes_of(mesh);
+  const std::size_t count = solid_nodes(mesh);
   Uses uses;
   uses.start.resize(mesh.points.size() + 1);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     for (std::size_t a = 0; a < count; ++a)
-      ++uses.start[std::size_t{node_of(mesh, t, a)} + 1];
+      ++uses.start[std::size_t{solid_node(mesh, t, a)} + 1];
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     uses.start[i + 1] += uses.start[i];
   uses.at.resize(uses.start.back());
   std::vector<std::size_t> fill(uses.start.begin(), uses.start.end() - 1);
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     for (std::size_t a = 0; a < count; ++a)
-      uses.at[fill[node_of(mesh, t, a)]++] = 10 * t + a;
+      uses.at[fill[solid_node(mesh, t, a)]++] = 10 * t + a;
   return uses;
 }
 
 /// The nodes from i on that share a tetrahedron with node i, ascending, i among them.
 void neighbours(const TetMesh& mesh, const Uses& uses, std::size_t i,
                 std::vector<std::uint32_t>& found) {
-  const std::size_t count = nodes_of(mesh);
+  const std::size_t count = solid_nodes(mesh);
   found.assign(1, static_cast<std::uint32_t>(i));
   for (std::size_t k = uses.start[i]; k < uses.start[i + 1]; ++k)
     for (std::size_t b = 0; b < count; ++b)
-      if (const std::uint32_t j = node_of(mesh, uses.at[k] / 10, b); j > i)
+      if (const std::uint32_t j = solid_node(mesh, uses.at[k] / 10, b); j > i)
         found.push_back(j);
   std::ranges::sort(found);
   const auto repeated = std::ranges::unique(found);
@@ -129,8 +122,16 @@ std::vector<SolidElement> solid_elements(const TetMesh& mesh,
 
 StiffnessMatrix solid_stiffness(const TetMesh& mesh, std::span<const SolidElement> elements,
                                 std::span<const std::uint8_t> fixed, const Context& context) {
+  return assembled_matrix(
+      mesh,
+      [&](std::size_t t, std::size_t a, std::size_t b) { return block(mesh, elements[t], a, b); },
+      fixed, context);
+}
+
+StiffnessMatrix assembled_matrix(const TetMesh& mesh, const BlockOf& block_of,
+                                 std::span<const std::uint8_t> fixed, const Context& context) {
   StiffnessMatrix matrix;
-  const std::size_t nodes = mesh.points.size(), count = nodes_of(mesh);
+  const std::size_t nodes = mesh.points.size(), count = solid_nodes(mesh);
   number_axes(nodes, fixed, matrix);
   const Uses uses = uses_of(mesh);
 
@@ -166,10 +167,10 @@ StiffnessMatrix solid_stiffness(const TetMesh& mesh, std::span<const SolidElemen
       for (std::size_t k = uses.start[i]; k < uses.start[i + 1]; ++k) {
         const std::size_t t = uses.at[k] / 10, a = uses.at[k] % 10;
         for (std::size_t b = 0; b < count; ++b)
-          if (const std::uint32_t j = node_of(mesh, t, b); j >= i) {
+          if (const std::uint32_t j = solid_node(mesh, t, b); j >= i) {
             const auto at =
                 static_cast<std::size_t>(std::ranges::lower_bound(near, j) - near.begin());
-            const SolidBlock added = block(mesh, elements[t], b, a);
+            const SolidBlock added = block_of(t, b, a);
             for (std::size_t n = 0; n < 9; ++n)
               blocks[at][n] += added[n];
           }
@@ -222,13 +223,13 @@ StiffnessMatrix sum(const StiffnessMatrix& a, const StiffnessMatrix& b) {
 void multiply_solid(const TetMesh& mesh, std::span<const SolidElement> elements,
                     std::span<const double> u, std::span<double> f) {
   std::ranges::fill(f, 0.0);
-  const std::size_t count = nodes_of(mesh);
+  const std::size_t count = solid_nodes(mesh);
   for (std::size_t t = 0; t < elements.size(); ++t)
     for (std::size_t a = 0; a < count; ++a)
       for (std::size_t b = 0; b < count; ++b) {
         const SolidBlock k = block(mesh, elements[t], a, b);
-        const std::size_t row = 3 * std::size_t{node_of(mesh, t, a)},
-                          column = 3 * std::size_t{node_of(mesh, t, b)};
+        const std::size_t row = 3 * std::size_t{solid_node(mesh, t, a)},
+                          column = 3 * std::size_t{solid_node(mesh, t, b)};
         for (std::size_t i = 0; i < 3; ++i)
           f[row + i] +=
               k[3 * i] * u[column] + k[3 * i + 1] * u[column + 1] + k[3 * i + 2] * u[column + 2];
@@ -243,8 +244,8 @@ std::vector<double> solid_masses(const TetMesh& mesh, std::span<const SolidMater
     const double mass = materials[material_of(mesh, t)].density *
                         tetrahedron_volume(mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]],
                                            mesh.points[c[3]]);
-    for (std::size_t a = 0; a < nodes_of(mesh); ++a)
-      masses[node_of(mesh, t, a)] += mass * (!quadratic ? 1.0 / 4 : a < 4 ? 1.0 / 36 : 4.0 / 27);
+    for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
+      masses[solid_node(mesh, t, a)] += mass * (!quadratic ? 1.0 / 4 : a < 4 ? 1.0 / 36 : 4.0 / 27);
   }
   return masses;
 }
@@ -253,13 +254,13 @@ std::vector<double> gravity_load(const TetMesh& mesh, std::span<const SolidMater
                                  std::span<const SolidElement> elements, const Vec3& acceleration) {
   std::vector<double> load(3 * mesh.points.size());
   std::array<Vec3, 10> force;
-  const std::size_t count = nodes_of(mesh);
+  const std::size_t count = solid_nodes(mesh);
   for (std::size_t t = 0; t < elements.size(); ++t) {
     body_load(elements[t], materials[material_of(mesh, t)].density * acceleration,
               std::span(force).first(count));
     for (std::size_t a = 0; a < count; ++a)
       for (int axis = 0; axis < 3; ++axis)
-        load[3 * std::size_t{node_of(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
+        load[3 * std::size_t{solid_node(mesh, t, a)} + static_cast<std::size_t>(axis)] +=
             force[a][axis];
   }
   return load;
