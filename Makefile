@@ -65,6 +65,7 @@ endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
 BENCH_SRC := $(wildcard tests/bench/*.cpp)
+VALIDATE_SRC := $(wildcard tests/validate/*.cpp)
 # What others may include.
 PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
@@ -76,6 +77,7 @@ UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
 STRESS := $(STRESS_SRC:tests/stress/%.cpp=$(BUILD)/stress_%)
 FUZZ := $(FUZZ_SRC:tests/fuzz/%.cpp=$(BUILD)/%)
 BENCH := $(BENCH_SRC:tests/bench/%.cpp=$(BUILD)/bench_%)
+VALIDATE := $(if $(VALIDATE_SRC),$(BUILD)/validate)
 ARCHIVE := $(BUILD)/libgewebe.a
 SHARED := $(BUILD)/obj/tools/shared.a
 # What reads volumes, for a program that seldom does: loaded when one comes (formats/volume/volume_plugin.h).
@@ -83,7 +85,7 @@ PLUGIN := $(BUILD)/gewebe-volume.so
 PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 
 obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
-OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) tests/fuzz/replay.cpp)
+OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(VALIDATE_SRC) tests/fuzz/replay.cpp)
 
 # --- Packages ---------------------------------------------------------------------------------------
 
@@ -94,9 +96,10 @@ sets_golden-update := build check
 sets_stress := build check
 sets_demo := build
 sets_bench := build bench
+sets_validate := build
 sets_lint := build check lint
 SETS ?= $(sort $(foreach goal,$(MAKECMDGOALS),$(sets_$(goal))) $(if $(filter fuzz,$(config)),fuzz))
-ifneq ($(filter check golden-update stress demo bench lint,$(MAKECMDGOALS)),)
+ifneq ($(filter check golden-update stress demo bench validate lint,$(MAKECMDGOALS)),)
 ifneq ($(DEPS),no)
 FIRST := deps
 endif
@@ -185,6 +188,9 @@ $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/uni
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS) $(CHECK_LIBS) $(BENCH_LIBS)
 
+$(BUILD)/validate: $(call obj,$(VALIDATE_SRC) tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
+	$(LINK) $(LIBS)
+
 # libFuzzer brings its own main; elsewhere replay.cpp runs the files of the corpus.
 ifeq ($(config),fuzz)
 $(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(SHARED) $(ARCHIVE)
@@ -219,6 +225,11 @@ bench: $(BENCH) $(TOOLS) | $(FIRST)
 	@test -n '$(BENCH)' || { echo 'bench: tests/bench has no programs yet' >&2; exit 1; }
 	@for program in $(BENCH); do $$program > $$program.csv.part && mv $$program.csv.part $$program.csv && \
 	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
+
+# PAGE says where the page goes: examples/validate holds one. S=WORD makes the section of that name alone.
+PAGE ?= $(BUILD)/validation
+validate: $(VALIDATE) | $(FIRST)
+	@$(VALIDATE) '$(PAGE)' $(S)
 
 # The example's own Makefile is a user's: it finds the programs in the PATH.
 demo: $(TOOLS) | $(FIRST)
@@ -314,15 +325,16 @@ help:
 	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
+	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
 	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
 	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, library, headers, gewebe.pc'
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo
-	@echo 'demo, check, golden-update, stress, bench and lint install their packages first; DEPS=no turns that off.'
+	@echo 'demo, check, golden-update, stress, bench, validate and lint install their packages first; DEPS=no turns that off.'
 	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
 
 FORCE:
 
 .DELETE_ON_ERROR:
-.PHONY: all deps check golden-update stress bench demo lint install uninstall clean help FORCE
+.PHONY: all deps check golden-update stress bench validate demo lint install uninstall clean help FORCE

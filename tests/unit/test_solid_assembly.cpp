@@ -6,6 +6,7 @@
 #include "solid/stress.h"
 #include "solve/factor.h"
 #include "tests/unit/larger.h"
+#include "tests/unit/solid_bodies.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 
@@ -35,10 +36,6 @@ TetMesh distorted(bool quadratic, bool materials) {
     for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
       mesh.material.push_back(t % 3 == 0);
   return mesh;
-}
-
-bool on_boundary(const Vec3& p) {
-  return p.x == 0 || p.x == 2 || p.y == 0 || p.y == 2 || p.z == 0 || p.z == 2;
 }
 
 Vec3 of_axes(const std::vector<double>& u, std::size_t i) {
@@ -97,31 +94,13 @@ TEST(SolidAssembly, AnyNumberOfThreadsGivesTheSameBytes) {
 
 /// Boundary nodes displaced by a linear function; inner nodes follow it.
 TEST(SolidAssembly, PatchTestIsSolved) {
-  const std::array<Vec3, 3> gradient{
-      {{3e-3, -2e-3, 5e-3}, {7e-3, 1e-3, -4e-3}, {-6e-3, 2e-3, 2e-3}}};
   for (const bool quadratic : {false, true})
     for (const double poisson : {0.0, 0.3, 0.4999}) {
-      const TetMesh mesh = distorted(quadratic, false);
-      const std::vector<SolidMaterial> material{{2500, poisson, 1e-3}};
-      const auto elements = solid_elements(mesh, material);
-      std::vector<std::uint8_t> fixed(3 * mesh.points.size());
-      std::vector<double> exact(fixed.size()), u(fixed.size()), f(fixed.size());
-      for (std::size_t axis = 0; axis < fixed.size(); ++axis) {
-        const Vec3& p = mesh.points[axis / 3];
-        exact[axis] = dot(gradient[axis % 3], p);
-        fixed[axis] = on_boundary(p);
-        u[axis] = on_boundary(p) ? exact[axis] : 0;
-      }
-      const StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
-      multiply_solid(mesh, elements, u, f);
-      for (double& value : f)
-        value = -value;
-      std::vector<double> moved(fixed.size());
-      solve_axes(k, Factor(k, {}), f, moved);
-      for (std::size_t axis = 0; axis < u.size(); ++axis)
-        EXPECT_NEAR(u[axis] + moved[axis], exact[axis], 1e-12 * largest(exact));
-      const auto strains = solid_strains(mesh, material, elements, exact);
-      const auto stresses = solid_stresses(elements, strains);
+      const test::SolidCase patch = test::patch(quadratic, poisson);
+      EXPECT_LE(figure(patch), 1e-12);
+      const auto& [mesh, materials, elements, fixed] = patch.solid;
+      const auto stresses =
+          solid_stresses(elements, solid_strains(mesh, materials, elements, patch.given));
       const auto [lambda, mu] = elasticity(2500, poisson);
       for (const SymmetricBlock& at_node : nodal_tensors(mesh, elements, stresses)) {
         EXPECT_NEAR(at_node[0], lambda * 6e-3 + 2 * mu * 3e-3, 1e-12 * (lambda + mu));
