@@ -14,6 +14,8 @@
 
 namespace gewebe {
 
+class CompressedColumns;
+
 class ColumnSource {
 public:
   ColumnSource() = default;
@@ -30,6 +32,8 @@ public:
   /// Reads the columns of nodes()[k]. \pre out.size() == 9 n \throw Error if they can't be read or
   /// are damaged
   virtual void read(std::size_t k, std::span<double> out) const = 0;
+  /// Themselves, if sums and entries of them come for less than whole columns; or null.
+  virtual const CompressedColumns* compressed() const { return nullptr; }
   /// Whether they are kept as float32, so that nothing is lost by read_single.
   virtual bool single() const { return false; }
   /// As read. \pre single()

@@ -1,11 +1,13 @@
 #pragma once
 // The inner loop of elastostatics: a sum of columns of the compliance matrix. Compiled once per CPU
 // level; every level gives the same bits, for there is no fused multiplication and each row is
-// summed in the order of the columns. Columns may be float32: they are widened, the sum is double.
+// summed in the order of the columns. Columns may be float32 or small integers: they are widened,
+// the sum is double.
 
 #include "base/cpu.h"
 
 #include <cstddef>
+#include <cstdint>
 
 namespace gewebe {
 
@@ -18,9 +20,17 @@ void column_sum_baseline(const double* const* column, const double* factor, std:
                          double* sum, std::size_t begin, std::size_t end);
 void column_sum_baseline(const float* const* column, const double* factor, std::size_t count,
                          double* sum, std::size_t begin, std::size_t end);
+void column_sum_baseline(const std::int16_t* const* column, const double* factor, std::size_t count,
+                         double* sum, std::size_t begin, std::size_t end);
+void column_sum_baseline(const std::int8_t* const* column, const double* factor, std::size_t count,
+                         double* sum, std::size_t begin, std::size_t end);
 void column_sum_avx2(const double* const* column, const double* factor, std::size_t count,
                      double* sum, std::size_t begin, std::size_t end);
 void column_sum_avx2(const float* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end);
+void column_sum_avx2(const std::int16_t* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end);
+void column_sum_avx2(const std::int8_t* const* column, const double* factor, std::size_t count,
                      double* sum, std::size_t begin, std::size_t end);
 
 template <class Entry>

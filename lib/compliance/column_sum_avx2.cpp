@@ -12,4 +12,14 @@ void column_sum_avx2(const float* const* column, const double* factor, std::size
   add_all(column, factor, count, sum, begin, end);
 }
 
+void column_sum_avx2(const std::int16_t* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
+void column_sum_avx2(const std::int8_t* const* column, const double* factor, std::size_t count,
+                     double* sum, std::size_t begin, std::size_t end) {
+  add_all(column, factor, count, sum, begin, end);
+}
+
 } // namespace gewebe

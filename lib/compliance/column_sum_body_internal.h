@@ -8,6 +8,8 @@ namespace {
 
 using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
 using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
+using FourShort = std::int16_t __attribute__((vector_size(8), aligned(2), may_alias));
+using FourByte = std::int8_t __attribute__((vector_size(4), aligned(1), may_alias));
 
 inline const Four& four(const double* at) {
   return *reinterpret_cast<const Four*>(at);
@@ -21,6 +23,12 @@ inline void load(const double* at, Four& to) {
 }
 inline void load(const float* at, Four& to) {
   to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
+}
+inline void load(const std::int16_t* at, Four& to) {
+  to = __builtin_convertvector(*reinterpret_cast<const FourShort*>(at), Four);
+}
+inline void load(const std::int8_t* at, Four& to) {
+  to = __builtin_convertvector(*reinterpret_cast<const FourByte*>(at), Four);
 }
 
 template <int Width, class Entry>

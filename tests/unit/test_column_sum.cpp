@@ -2,6 +2,7 @@
 #include "compliance/column_sum.h"
 
 #include <cmath>
+#include <cstdint>
 #include <gtest/gtest.h>
 #include <random>
 #include <vector>
@@ -19,7 +20,7 @@ std::vector<double> sum_at(CpuLevel level, std::size_t count, std::size_t begin,
   std::vector<double> factor, sum(rows, 0.5);
   for (auto& column : columns) {
     for (std::size_t r = 0; r < rows; ++r)
-      column.push_back(static_cast<Entry>(normal(random)));
+      column.push_back(static_cast<Entry>(90 + 5 * normal(random)));
     pointers.push_back(column.data());
     factor.push_back(normal(random));
   }
@@ -44,6 +45,8 @@ void same_at_every_level() {
 TEST(ColumnSum, IsTheSameAtEveryLevelOfCpu) {
   same_at_every_level<double>();
   same_at_every_level<float>();
+  same_at_every_level<std::int16_t>();
+  same_at_every_level<std::int8_t>();
 }
 
 TEST(ColumnSum, IsThePlainSum) {

@@ -1,0 +1,88 @@
+#pragma once
+// Columns of the compliance C that take a twentieth of their room or less, every entry within a
+// bound, evaluated as they are.
+//
+// Nodes are put into clusters by their places (compliance/node_clusters.h), those that have columns
+// apart from the rest. A block of C between two clusters is smooth unless they touch, and a sum of
+// few crosses of small integers (compliance/crosses.h). C is symmetric: of two blocks that mirror
+// each other one is kept. The blocks of a cluster with itself and with all clusters behind it make
+// a chunk, which is loaded when one of them is first needed.
+
+#include "base/columns.h"
+#include "base/context.h"
+#include "compliance/crosses.h"
+#include "compliance/node_clusters.h"
+#include "contact/load.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// What is known of compressed columns without any of their numbers.
+struct CompressedLayout {
+  NodeClusters clusters;         ///< of all n nodes
+  std::size_t with_columns = 0;  ///< the first so many clusters are of the nodes with columns
+  std::vector<CrossCount> count; ///< by block: chunk by chunk, cluster by cluster
+  double relative = 0;           ///< the bound that was asked for, over the largest entry of C
+  double bound = 0;              ///< what any entry may be wrong by, mm for 1e-6 N
+};
+
+/// \throw Error if it contradicts itself or isn't of `nodes` nodes: it may come from a file
+void check_layout(const CompressedLayout& layout, std::size_t nodes);
+/// Bytes of each chunk. \pre check_layout passed
+std::vector<std::uint64_t> chunk_sizes(const CompressedLayout& layout);
+/// A chunk as bytes: scales, then int16, then int8, little-endian.
+std::vector<std::uint8_t> bytes_of(const Crosses& chunk);
+
+/// Asked for the bytes of a chunk once at most.
+using ChunkReader = std::function<std::vector<std::uint8_t>(std::size_t chunk)>;
+
+/// Not to be used from several threads at once.
+class CompressedColumns final : public ColumnSource {
+public:
+  /// \pre check_layout passed
+  CompressedColumns(CompressedLayout layout, ChunkReader reader);
+
+  const CompressedLayout& layout() const noexcept { return layout_; }
+  std::size_t node_count() const override { return cluster_.size(); }
+  const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
+  /// Puts a node's columns together. \throw what the reader throws, as all below
+  void read(std::size_t k, std::span<double> out) const override;
+  const CompressedColumns* compressed() const override { return this; }
+
+  bool has(std::uint32_t node) const { return cluster_[node] < layout_.with_columns; }
+  /// C between a node that has columns and any other, [axis][axis of the other]; that of the two
+  /// in the other order is its transpose, bit by bit.
+  std::array<std::array<double, 3>, 3> block(std::uint32_t node, std::uint32_t other) const;
+  /// u += C f over all 3 n axes, for forces at nodes that have columns. The same bytes for any
+  /// number of threads.
+  void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
+  /// Numbers that a sum with forces at these nodes takes from memory.
+  double numbers(std::span<const std::uint32_t> nodes) const;
+
+  std::uint64_t chunks_read() const noexcept { return chunks_read_; }
+
+private:
+  const Crosses& chunk(std::size_t index) const;
+  CrossView view(std::size_t chunk, std::size_t cluster) const;
+
+  struct BlockPlace {
+    std::size_t scale = 0, wide = 0, narrow = 0;
+  };
+  CompressedLayout layout_;
+  ChunkReader reader_;
+  std::vector<std::uint32_t> nodes_;           ///< that have columns
+  std::vector<std::uint32_t> cluster_, place_; ///< of a node, and where in that
+  std::vector<BlockPlace> at_;                 ///< of each block in its chunk
+  std::vector<double> row_numbers_;            ///< of a cluster's blocks with all others
+  mutable std::vector<std::optional<Crosses>> chunks_;
+  mutable std::uint64_t chunks_read_ = 0;
+};
+
+} // namespace gewebe
