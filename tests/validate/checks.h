@@ -85,5 +85,7 @@ Section constant_strain();
 Section manufactured();
 Section benchmarks();
 Section peers();
+Section silicone();
+Section organs();
 
 } // namespace gewebe::validate

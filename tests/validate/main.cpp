@@ -19,10 +19,12 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 4> all{{{"patch", constant_strain},
+  const std::array<std::pair<std::string, Section (*)()>, 6> all{{{"patch", constant_strain},
                                                                   {"order", manufactured},
                                                                   {"benchmarks", benchmarks},
-                                                                  {"peers", peers}}};
+                                                                  {"peers", peers},
+                                                                  {"beam", silicone},
+                                                                  {"organs", organs}}};
   if (count < 2) {
     (void)std::fputs("usage: validate FOLDER [SECTION…]\n", stderr);
     return 2;

@@ -165,10 +165,7 @@ void print(const Section& section) {
     const auto [what, reference, figure, error, bound, unknowns, memory, time] = columns(c);
     std::printf(
         "  %-8s %s: %s (expected %s), error %s, bound %s; %s unknowns, factor %s MB, %s s\n",
-        c.skipped    ? "skipped"
-        : c.passes() ? "passed"
-                     : "FAILED",
-        what.c_str(), figure.c_str(), reference.c_str(), error.c_str(), bound.c_str(),
+        verdict(c), what.c_str(), figure.c_str(), reference.c_str(), error.c_str(), bound.c_str(),
         unknowns.c_str(), memory.c_str(), time.c_str());
   }
   (void)std::fflush(stdout);
