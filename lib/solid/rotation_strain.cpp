@@ -2,95 +2,13 @@
 
 #include "base/error.h"
 #include "solid/assembly_internal.h"
+#include "solid/warp_kernel_internal.h"
 #include "tetrahedra/boundary.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace gewebe {
-
-namespace {
-
-using Matrix = std::array<double, 9>;
-
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix c;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-  return c;
-}
-
-/// aᵀ b
-Matrix transposed_product(const Matrix& a, const Matrix& b) {
-  Matrix c;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      c[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
-  return c;
-}
-
-Vec3 product(const Matrix& a, const Vec3& v) {
-  return {a[0] * v.x + a[1] * v.y + a[2] * v.z, a[3] * v.x + a[4] * v.y + a[5] * v.z,
-          a[6] * v.x + a[7] * v.y + a[8] * v.z};
-}
-
-Matrix symmetric_part(const Matrix& m) {
-  const double xy = (m[1] + m[3]) / 2, xz = (m[2] + m[6]) / 2, yz = (m[5] + m[7]) / 2;
-  return {m[0], xy, xz, xy, m[4], yz, xz, yz, m[8]};
-}
-
-/// a + factor vᵀ w
-void add_outer(Matrix& a, const Vec3& v, const Vec3& w, double factor) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      a[static_cast<std::size_t>(3 * i + j)] += factor * v[i] * w[j];
-}
-
-/// What belongs to w in a sum over the entries of m and of v -> w × v.
-Vec3 twice_axial(const Matrix& m) {
-  return {m[7] - m[5], m[2] - m[6], m[3] - m[1]};
-}
-
-/// (1 - cos a) / a² and (a - sin a) / a³ of the angle a, as power series of its square.
-struct Angle {
-  double second, third;
-};
-Angle terms(double square) {
-  Angle t{0, 0};
-  for (int k = 11; k >= 0; --k) {
-    const double even = (2 * k + 1) * (2 * k + 2), odd = (2 * k + 2) * (2 * k + 3);
-    t.second = (1 - square * t.second) / even;
-    t.third = (1 - square * t.third) / odd;
-  }
-  return t;
-}
-
-} // namespace
-
-/// What a triangle's displacements stand for.
-struct RotationStrain::Gradient {
-  Vec3 w;
-  Angle angle{};
-  Matrix strain{};
-
-  /// R(w)
-  Matrix rotation() const {
-    const double s = dot(w, w), first = 1 - s * angle.third, diagonal = 1 - s * angle.second;
-    Matrix r{diagonal,     -first * w.z, first * w.y, first * w.z, diagonal,
-             -first * w.x, -first * w.y, first * w.x, diagonal};
-    add_outer(r, w, w, angle.second);
-    return r;
-  }
-  /// I + E + E² / 2
-  Matrix stretch() const {
-    Matrix m = product(strain, strain);
-    for (std::size_t k = 0; k < 9; ++k)
-      m[k] = strain[k] + m[k] / 2 + (k % 4 == 0 ? 1 : 0);
-    return m;
-  }
-};
 
 namespace {
 
@@ -99,89 +17,79 @@ Vec3 at(std::span<const double> v, std::uint32_t node) {
   return {v[k], v[k + 1], v[k + 2]};
 }
 
-/// Of values at a triangle's nodes, along it.
-template <class Triangle>
-Matrix along(const Triangle& t, std::span<const double> values) {
-  const Vec3 first = at(values, t.node[0]);
-  Matrix m{};
-  add_outer(m, at(values, t.node[1]) - first, t.gradient[0], 1);
-  add_outer(m, at(values, t.node[2]) - first, t.gradient[1], 1);
-  return m;
-}
-
-/// Adds area m ∇N of each node.
-template <class Triangle>
-void add_divergence(const Triangle& t, const Matrix& m, std::span<double> sum) {
-  const std::array<Vec3, 2> parts{product(m, t.gradient[0]) * t.area,
-                                  product(m, t.gradient[1]) * t.area};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    sum[3 * std::size_t{t.node[0]} + k] -= parts[0][axis] + parts[1][axis];
-    sum[3 * std::size_t{t.node[1]} + k] += parts[0][axis];
-    sum[3 * std::size_t{t.node[2]} + k] += parts[1][axis];
-  }
-}
-
 } // namespace
 
-RotationStrain::Gradient RotationStrain::gradient(const Triangle& t,
-                                                  std::span<const double> local) {
-  Matrix h = along(t, local);
-  // Its normal turns with the surface.
-  const Vec3 tilt{t.normal.x * h[0] + t.normal.y * h[3] + t.normal.z * h[6],
-                  t.normal.x * h[1] + t.normal.y * h[4] + t.normal.z * h[7],
-                  t.normal.x * h[2] + t.normal.y * h[5] + t.normal.z * h[8]};
-  add_outer(h, tilt, t.normal, -1);
-  Gradient g;
-  g.w = twice_axial(h) / 2;
-  g.angle = terms(dot(g.w, g.w));
-  g.strain = symmetric_part(h);
-  return g;
-}
-
-void RotationStrain::list_triangles(const TetMesh& mesh) {
+void RotationStrain::list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed) {
   const TetBoundary faces = boundary(mesh);
-  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+  place_.assign(mesh.points.size(), none);
+  std::vector<std::uint32_t> middles;
+  for (const std::uint32_t i : faces.node)
+    nodes_.push_back(i);
+  for (const auto& of_triangle : faces.middles)
+    middles.insert(middles.end(), of_triangle.begin(), of_triangle.end());
+  std::ranges::sort(nodes_);
+  std::ranges::sort(middles);
+  middles.erase(std::ranges::unique(middles).begin(), middles.end());
+  corners_ = nodes_.size();
+  nodes_.insert(nodes_.end(), middles.begin(), middles.end());
+  for (std::uint32_t s = 0; s < nodes_.size(); ++s)
+    place_[nodes_[s]] = s;
+
+  middles_.resize(middles.size());
+  std::vector<std::uint8_t> seen(middles.size());
+  for (std::uint32_t k = 0; k < faces.mesh.triangles.size(); ++k) {
     Triangle t;
-    t.node = {a, b, c};
-    const Vec3 u = mesh.points[b] - mesh.points[a], v = mesh.points[c] - mesh.points[a],
-               n = cross(u, v);
+    for (std::size_t c = 0; c < 3; ++c)
+      t.node[c] = place_[faces.node[faces.mesh.triangles[k][c]]];
+    const Vec3& origin = mesh.points[nodes_[t.node[0]]];
+    const Vec3 u = mesh.points[nodes_[t.node[1]]] - origin,
+               v = mesh.points[nodes_[t.node[2]]] - origin, n = cross(u, v);
     t.area = norm(n) / 2;
     t.normal = n / norm(n);
     t.gradient = {cross(v, n) / dot(n, n), cross(n, u) / dot(n, n)};
     triangles_.push_back(t);
-  };
-  for (std::size_t k = 0; k < faces.mesh.triangles.size(); ++k) {
-    const auto [i, j, l] = faces.mesh.triangles[k];
-    const std::uint32_t a = faces.node[i], b = faces.node[j], c = faces.node[l];
-    if (mesh.middles.empty()) {
-      add(a, b, c);
-    } else {
-      const auto [ab, bc, ca] = faces.middles[k];
-      add(a, ab, ca);
-      add(ab, b, bc);
-      add(ca, bc, c);
-      add(ab, bc, ca);
+    for (std::size_t c = 0; !faces.middles.empty() && c < 3; ++c) {
+      const std::uint32_t s = place_[faces.middles[k][c]];
+      Middle& m = middles_[s - corners_];
+      if (seen[s - corners_] == 0)
+        m = {s, t.node[c], t.node[(c + 1) % 3], {k, k}};
+      m.triangle[1] = k;
+      seen[s - corners_] = 1;
     }
   }
-  place_.assign(mesh.points.size(), none);
-  for (const Triangle& t : triangles_)
-    for (const std::uint32_t i : t.node)
-      place_[i] = 0;
-  for (std::uint32_t i = 0; i < place_.size(); ++i)
-    if (place_[i] != none) {
-      place_[i] = static_cast<std::uint32_t>(nodes_.size());
-      nodes_.push_back(i);
-    }
-  for (Triangle& t : triangles_)
-    for (std::uint32_t& i : t.node)
-      i = place_[i];
+  middle_groups_.assign((middles_.size() + 3) / 4, {});
+  for (std::size_t n = 0; n < 4 * middle_groups_.size(); ++n) {
+    // The last one fills the group up.
+    const Middle& m = middles_[std::min(n, middles_.size() - 1)];
+    MiddleGroup& group = middle_groups_[n / 4];
+    group.node[n % 4] = m.node;
+    group.a[n % 4] = m.a;
+    group.b[n % 4] = m.b;
+    for (std::size_t k = 0; k < 2; ++k)
+      group.triangle[k][n % 4] = m.triangle[k];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      group.free[axis][n % 4] =
+          fixed.empty() || fixed[3 * std::size_t{nodes_[m.node]} + axis] == 0 ? 1 : 0;
+  }
 
-  start_.resize(nodes_.size() + 1);
+  groups_.assign((triangles_.size() + 3) / 4, {});
+  for (std::size_t n = 0; n < triangles_.size(); ++n) {
+    TriangleGroup& group = groups_[n / 4];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int axis = static_cast<int>(k);
+      group.node[k][n % 4] = triangles_[n].node[k];
+      group.gradient[0][k][n % 4] = triangles_[n].gradient[0][axis];
+      group.gradient[1][k][n % 4] = triangles_[n].gradient[1][axis];
+      group.normal[k][n % 4] = triangles_[n].normal[axis];
+    }
+    group.area[n % 4] = triangles_[n].area;
+  }
+
+  start_.resize(corners_ + 1);
   for (const Triangle& t : triangles_)
     for (const std::uint32_t i : t.node)
       ++start_[std::size_t{i} + 1];
-  for (std::size_t i = 0; i < nodes_.size(); ++i)
+  for (std::size_t i = 0; i < corners_; ++i)
     start_[i + 1] += start_[i];
   at_.resize(start_.back());
   std::vector<std::size_t> fill(start_.begin(), start_.end() - 1);
@@ -195,11 +103,11 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
     return !fixed.empty() && fixed[3 * std::size_t{nodes_[i]} + axis] != 0;
   };
   bool alike = true;
-  for (std::size_t i = 0; i < nodes_.size(); ++i)
+  for (std::size_t i = 0; i < corners_; ++i)
     alike = alike && held(i, 0) == held(i, 1) && held(i, 0) == held(i, 2);
   for (std::size_t axis = 0; axis < (alike ? 1 : 3); ++axis) {
     // Each part of the surface must stand somewhere.
-    std::vector<std::uint8_t> reached(nodes_.size());
+    std::vector<std::uint8_t> reached(corners_);
     std::vector<std::uint32_t> stack;
     const auto reach = [&](std::uint32_t i) {
       if (reached[i] == 0) {
@@ -207,7 +115,7 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
         stack.push_back(i);
       }
     };
-    for (std::uint32_t i = 0; i < nodes_.size(); ++i)
+    for (std::uint32_t i = 0; i < corners_; ++i)
       if (held(i, axis))
         reach(i);
     while (!stack.empty()) {
@@ -218,14 +126,14 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
           reach(j);
     }
     if (!std::ranges::all_of(reached, [](std::uint8_t r) { return r != 0; }))
-      throw Error("a part of a solid's surface has no fixed node, expected one to build its shape "
-                  "from");
+      throw Error("a part of a solid's surface has no fixed corner, expected one to build its "
+                  "shape from");
 
     Laplacian laplacian;
-    laplacian.row.assign(nodes_.size(), -1);
+    laplacian.row.assign(corners_, -1);
     StiffnessMatrix matrix; // scalar: the first axis of each node
-    matrix.row_of_axis.assign(3 * nodes_.size(), -1);
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
+    matrix.row_of_axis.assign(3 * corners_, -1);
+    for (std::size_t i = 0; i < corners_; ++i)
       if (!held(i, axis)) {
         laplacian.row[i] = static_cast<std::int64_t>(matrix.axis_of_row.size());
         matrix.row_of_axis[3 * i] = laplacian.row[i];
@@ -264,8 +172,9 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
 }
 
 RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement> elements,
-                               std::span<const std::uint8_t> fixed, const Context& context) {
-  list_triangles(mesh);
+                               std::span<const std::uint8_t> fixed, const Context& context)
+    : cpu_(context.cpu) {
+  list_triangles(mesh, fixed);
   factor_surface(fixed, context);
 
   // The scalar Laplacian of the volume on the first axis of each node.
@@ -299,79 +208,106 @@ RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement
   between_ = assembled_matrix(mesh, laplacian, first_axis, context);
 }
 
+RotationStrain::~RotationStrain() = default;
+RotationStrain::RotationStrain(RotationStrain&&) noexcept = default;
+RotationStrain& RotationStrain::operator=(RotationStrain&&) noexcept = default;
+
 void RotationStrain::solve(std::span<const double> f, std::span<double> y) const {
-  std::ranges::fill(y, 0.0);
   std::vector<double> right, found;
   for (std::size_t k = 0; k < axes_.size(); ++k) {
     const Laplacian& l = axes_[k];
-    if (l.order == 0)
-      continue;
     const std::size_t first = k, count = axes_.size() == 1 ? 3 : 1;
     right.resize(count * l.order);
     found.resize(right.size());
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
+    for (std::size_t i = 0; i < corners_; ++i)
       for (std::size_t c = 0; l.row[i] >= 0 && c < count; ++c)
         right[c * l.order + static_cast<std::size_t>(l.row[i])] = f[3 * i + first + c];
-    l.factor->solve(right, found, count);
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
-      for (std::size_t c = 0; l.row[i] >= 0 && c < count; ++c)
-        y[3 * i + first + c] = found[c * l.order + static_cast<std::size_t>(l.row[i])];
+    if (l.factor)
+      l.factor->solve(right, found, count);
+    for (std::size_t i = 0; i < corners_; ++i)
+      for (std::size_t c = 0; c < count; ++c)
+        y[3 * i + first + c] =
+            l.row[i] >= 0 ? found[c * l.order + static_cast<std::size_t>(l.row[i])] : 0;
   }
 }
 
 void RotationStrain::deform(std::span<const double> local, std::span<double> u) const {
-  std::vector<double> divergence(u.size());
-  for (const Triangle& t : triangles_) {
-    const Gradient g = gradient(t, local);
-    Matrix wanted = product(g.rotation(), g.stretch());
-    for (std::size_t k = 0; k < 9; k += 4)
-      wanted[k] -= 1;
-    add_divergence(t, wanted, divergence);
-  }
+  const WarpKernel& kernel = warp_kernel(cpu_);
+  std::vector<double> divergence(3 * corners_), w(12 * groups_.size());
+  kernel.ask(groups_.data(), groups_.size(), local.data(), divergence.data(), w.data());
   solve(divergence, u);
+  kernel.turn_middles(middle_groups_.data(), middle_groups_.size(), w.data(), local.data(),
+                      u.data());
 }
 
 void RotationStrain::spread(std::span<const double> f, std::span<double> y) const {
-  solve(f, y);
+  std::vector<double> on_corners(f.begin(), f.begin() + static_cast<std::ptrdiff_t>(3 * corners_));
+  for (const Middle& m : middles_)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double half = f[3 * std::size_t{m.node} + axis] / 2;
+      on_corners[3 * std::size_t{m.a} + axis] += half;
+      on_corners[3 * std::size_t{m.b} + axis] += half;
+      y[3 * std::size_t{m.node} + axis] = 2 * half;
+    }
+  solve(on_corners, y);
 }
 
 void RotationStrain::take_back(std::span<const double> local, std::span<const double> y,
                                std::span<double> forces) const {
   std::ranges::fill(forces, 0.0);
-  for (const Triangle& t : triangles_) {
-    const Gradient g = gradient(t, local);
-    // Of F = R S, dF = R [v] S + R dS with v = dw - second w × dw + third w × (w × dw).
-    const Matrix back = transposed_product(g.rotation(), along(t, y)), stretch = g.stretch();
-    const Vec3 moment = twice_axial(product(back, stretch)), turned = cross(g.w, moment),
-               of_w = moment + turned * g.angle.second + cross(g.w, turned) * g.angle.third;
-    const Matrix even = symmetric_part(back), product_of = product(even, g.strain);
-    Matrix m;
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j)
-        m[3 * i + j] = even[3 * i + j] + (product_of[3 * i + j] + product_of[3 * j + i]) / 2;
-    m[1] -= of_w.z / 2;
-    m[2] += of_w.y / 2;
-    m[3] += of_w.z / 2;
-    m[5] -= of_w.x / 2;
-    m[6] -= of_w.y / 2;
-    m[7] += of_w.x / 2;
-    add_outer(m, t.normal, product(m, t.normal), -1); // the normal turns with the surface
-    add_divergence(t, m, forces);
+  warp_kernel(cpu_).take_back(groups_.data(), groups_.size(), local.data(), y.data(),
+                              forces.data());
+  for (const Middle& m : middles_) {
+    const Vec3 f = at(y, m.node);
+    if (f == Vec3{})
+      continue;
+    const std::array<double, 9> r = rotation(local, m.node);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double turned = r[i] * f.x + r[3 + i] * f.y + r[6 + i] * f.z;
+      forces[3 * std::size_t{m.node} + i] = turned;
+      forces[3 * std::size_t{m.a} + i] -= turned / 2;
+      forces[3 * std::size_t{m.b} + i] -= turned / 2;
+    }
   }
+}
+
+/// curl of u with the gradient Σ u ∇Nᵀ - tilt normalᵀ.
+Vec3 RotationStrain::twice_w(const Triangle& t, std::span<const double> local) {
+  const Vec3 first = at(local, t.node[0]), b = at(local, t.node[1]) - first,
+             c = at(local, t.node[2]) - first,
+             tilt = t.gradient[0] * dot(t.normal, b) + t.gradient[1] * dot(t.normal, c);
+  return cross(t.gradient[0], b) + cross(t.gradient[1], c) - cross(t.normal, tilt);
 }
 
 std::array<double, 9> RotationStrain::rotation(std::span<const double> local,
                                                std::uint32_t node) const {
-  Gradient mean;
-  double area = 0;
-  for (std::size_t k = start_[node]; k < start_[std::size_t{node} + 1]; ++k) {
-    const Triangle& t = triangles_[at_[k]];
-    mean.w += gradient(t, local).w * t.area;
-    area += t.area;
+  Vec3 w;
+  if (node < corners_) {
+    double area = 0;
+    for (std::size_t k = start_[node]; k < start_[std::size_t{node} + 1]; ++k) {
+      const Triangle& t = triangles_[at_[k]];
+      w += twice_w(t, local) * (t.area / 2);
+      area += t.area;
+    }
+    w = w / area;
+  } else {
+    for (const std::uint32_t t : middles_[node - corners_].triangle)
+      w += twice_w(triangles_[t], local) / 4;
   }
-  mean.w = mean.w / area;
-  mean.angle = terms(dot(mean.w, mean.w));
-  return mean.rotation();
+  // By the quaternion of an eighth of the angle, doubled three times.
+  const Vec3 eighth = w / 16;
+  const double s = dot(eighth, eighth);
+  double real = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56)));
+  Vec3 v = eighth * (1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72))));
+  for (int k = 0; k < 3; ++k) {
+    v = v * (2 * real);
+    real = 2 * real * real - 1;
+  }
+  return {1 - 2 * (v.y * v.y + v.z * v.z), 2 * (v.x * v.y - real * v.z),
+          2 * (v.x * v.z + real * v.y),    2 * (v.x * v.y + real * v.z),
+          1 - 2 * (v.x * v.x + v.z * v.z), 2 * (v.y * v.z - real * v.x),
+          2 * (v.x * v.z - real * v.y),    2 * (v.y * v.z + real * v.x),
+          1 - 2 * (v.x * v.x + v.y * v.y)};
 }
 
 std::vector<double> RotationStrain::on_surface(std::span<const double> load) const {

@@ -8,17 +8,19 @@
 // through controllable dynamic deformation, IEEE TVCG 17(7), 2011, who do it in the volume). Here
 // it is done on the surface alone: nothing pulls at a free surface, so that its normal stays at
 // right angles and the tilt of the surface is the rotation. Against the same in the volume it
-// changes displacements of a beam bent by 45 degrees by 0.1 % of the largest. Faces of quadratic
-// elements are four plane triangles.
+// changes displacements of a beam bent by 45 degrees by 0.1 % of the largest. Faces are triangles
+// of their corners; middles of quadratic elements' edges stand as far from the middle of the
+// corners as they do under small strains, turned with the triangles at their edge.
 //
 // Differentiated and transposed, the map takes forces on the deformed surface back to forces on the
 // one at rest that do the same work: what a load does in the local frames, lever arms included,
 // for solid/rotation_warp.h.
 //
-// Angles are sums of powers, good to rounding up to half a turn and to 1e-3 up to a whole one. The
-// same bytes everywhere.
+// Angles are sums of powers, good to rounding up to a quarter of a turn, to 1e-9 up to half of one,
+// to 1e-5 up to a whole one. The same bytes everywhere.
 
 #include "base/context.h"
+#include "base/cpu.h"
 #include "base/vec3.h"
 #include "solid/assembly.h"
 #include "solve/factor.h"
@@ -34,17 +36,26 @@
 
 namespace gewebe {
 
+struct TriangleGroup;
+struct MiddleGroup;
+
 class RotationStrain {
 public:
   /// Costs the factors of two Laplacians, on the surface (three, if axes are fixed at different
   /// nodes) and inside, together a few hundredths of K's. \pre as solid_stiffness
-  /// \throw Error if a part of the surface has no fixed node along an axis to be built from, as
-  /// that of a cavity; Cancelled
+  /// \throw Error if a part of the surface has no corner that is fixed along an axis, to be built
+  /// from, as that of a cavity; Cancelled
   RotationStrain(const TetMesh& mesh, std::span<const SolidElement> elements,
                  std::span<const std::uint8_t> fixed, const Context& context = {});
 
-  /// The nodes of the surface, ascending; everything below counts them in this order.
+  ~RotationStrain();
+  RotationStrain(RotationStrain&&) noexcept;
+  RotationStrain& operator=(RotationStrain&&) noexcept;
+
+  /// The nodes of the surface, corners ascending, then middles ascending; everything below counts
+  /// them in this order.
   const std::vector<std::uint32_t>& nodes() const noexcept { return nodes_; }
+  std::size_t corners() const noexcept { return corners_; }
   static constexpr std::uint32_t none = UINT32_MAX;
   /// Where a node of the mesh stands among them, or none.
   const std::vector<std::uint32_t>& place() const noexcept { return place_; }
@@ -53,14 +64,15 @@ public:
   /// solution of the surface's Laplacian. \pre spans have 3 entries for each node
   void deform(std::span<const double> local, std::span<double> u) const;
 
-  /// y of forces f on the surface: the solution of the Laplacian, linear, once for each f.
+  /// y of forces f on the surface: the solution of the Laplacian at corners, f itself at middles;
+  /// linear, once for each f.
   void spread(std::span<const double> f, std::span<double> y) const;
   /// The forces that do, under any change of `local`, the work that f = of spread's do under the
   /// change of deform(local). One pass over triangles. 0 on fixed axes is not promised.
   void take_back(std::span<const double> local, std::span<const double> y,
                  std::span<double> forces) const;
 
-  /// R at a node: of the mean w of its triangles, by their areas.
+  /// R at a node: of the mean w of its triangles, by their areas at corners.
   std::array<double, 9> rotation(std::span<const double> local, std::uint32_t node) const;
 
   /// Loads of all 3 n axes of the mesh put on the surface: those inside move onto it as if the
@@ -74,20 +86,28 @@ private:
     Vec3 normal;
     double area = 0;
   };
+  struct Middle {
+    std::uint32_t node = 0, a = 0, b = 0;
+    std::array<std::uint32_t, 2> triangle{};
+  };
   struct Laplacian {
     std::vector<std::int64_t> row; ///< of each node, or -1
     std::size_t order = 0;
     std::optional<Factor> factor; ///< none where no node is free
   };
-  struct Gradient;
-  static Gradient gradient(const Triangle& t, std::span<const double> local);
   void solve(std::span<const double> f, std::span<double> y) const;
-  void list_triangles(const TetMesh& mesh);
+  void list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed);
+  static Vec3 twice_w(const Triangle& t, std::span<const double> local);
   void factor_surface(std::span<const std::uint8_t> fixed, const Context& context);
 
   std::vector<std::uint32_t> nodes_, place_;
   std::vector<Triangle> triangles_;
-  std::vector<std::size_t> start_; ///< of each node's triangles
+  std::vector<TriangleGroup> groups_; ///< the same
+  std::vector<Middle> middles_;       ///< by their nodes
+  std::vector<MiddleGroup> middle_groups_;
+  std::size_t corners_ = 0;
+  CpuLevel cpu_;
+  std::vector<std::size_t> start_; ///< of each corner's triangles
   std::vector<std::uint32_t> at_;
   std::vector<Laplacian> axes_;         ///< one for all axes, or one for each
   std::optional<Factor> inside_;        ///< of the Laplacian on inner nodes, if there are any

@@ -1,5 +1,8 @@
 #include "solid/rotation_warp.h"
 
+#include "base/error.h"
+#include "solid/warp_kernel_internal.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
@@ -7,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <string>
 #include <utility>
 
 namespace gewebe {
@@ -78,35 +82,6 @@ FixedPoint fixed_point(const std::function<Vector(const Vector&)>& map, Vector s
   return result;
 }
 
-/// Σ coefficients × columns.
-void combine(const WarpColumns& columns, std::span<const double> coefficients, Vector& u) {
-  std::ranges::fill(u, 0.0);
-  for (std::size_t c = 0; c < coefficients.size(); ++c) {
-    const float* const column = columns.values.data() + c * u.size();
-    for (std::size_t k = 0; k < u.size(); ++k)
-      u[k] += coefficients[c] * static_cast<double>(column[k]);
-  }
-}
-
-/// What combination of columns is there after forces g: that one whose work with every column is
-/// theirs.
-Vector project(const WarpColumns& columns, std::span<const double> g) {
-  const std::size_t count = 3 * columns.nodes.size();
-  Vector moved(count);
-  for (std::size_t c = 0; c < count; ++c) {
-    const float* const column = columns.values.data() + c * g.size();
-    std::array<double, 4> sums{}; // in a fixed order, side by side
-    std::size_t k = 0;
-    for (; k + 4 <= g.size(); k += 4)
-      for (std::size_t lane = 0; lane < 4; ++lane)
-        sums[lane] += g[k + lane] * static_cast<double>(column[k + lane]);
-    for (; k < g.size(); ++k)
-      sums[0] += g[k] * static_cast<double>(column[k]);
-    moved[c] = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-  }
-  return moved;
-}
-
 /// columns.inverse times v: forces at the nodes that displace them so.
 Vector forces_for(const WarpColumns& columns, std::span<const double> v) {
   Vector q(v.size());
@@ -121,9 +96,31 @@ Vector forces_for(const WarpColumns& columns, std::span<const double> v) {
 RotationWarp::RotationWarp(const TetMesh& mesh, std::span<const SolidElement> elements,
                            std::span<const std::uint8_t> fixed, const StiffnessMatrix& matrix,
                            const Factor& factor, const Context& context)
-    : surface_(mesh, elements, fixed, context), matrix_(matrix), factor_(factor) {}
+    : surface_(mesh, elements, fixed, context), matrix_(matrix), factor_(factor),
+      kernel_(warp_kernel(context.cpu)) {}
 
-WarpedShape RotationWarp::shape(std::span<const double> load, const WarpOptions& options) const {
+void RotationWarp::combine(const WarpColumns& columns, std::span<const double> coefficients,
+                           std::size_t nodes, std::span<double> u) const {
+  kernel_.combine(columns.values.data(), 3 * surface_.nodes().size(), 3 * nodes,
+                  coefficients.data(), coefficients.size(), u.data());
+}
+
+std::vector<double> RotationWarp::project(const WarpColumns& columns,
+                                          std::span<const double> forces) const {
+  const std::size_t rows = 3 * surface_.nodes().size();
+  Vector moved(3 * columns.nodes.size());
+  kernel_.project(columns.values.data(), rows, 3 * surface_.corners(), forces.data(), moved.size(),
+                  moved.data());
+  for (const std::uint32_t node : columns.nodes)
+    for (std::size_t k = 3 * std::size_t{node};
+         node >= surface_.corners() && k < 3 * std::size_t{node} + 3; ++k)
+      for (std::size_t c = 0; c < moved.size(); ++c)
+        moved[c] += forces[k] * static_cast<double>(columns.values[c * rows + k]);
+  return moved;
+}
+
+WarpedShape RotationWarp::shape(std::span<const double> load, std::span<const double> start,
+                                const WarpOptions& options) const {
   const std::vector<std::uint32_t>& nodes = surface_.nodes();
   const Vector on_surface = surface_.on_surface(load);
   Vector y(on_surface.size()), forces(y.size()), local(load.begin(), load.end()), all(load.size());
@@ -142,9 +139,10 @@ WarpedShape RotationWarp::shape(std::span<const double> load, const WarpOptions&
       local[3 * std::size_t{nodes[k / 3]} + k % 3] += forces[k] - on_surface[k];
     return solved();
   };
-  FixedPoint found = fixed_point(round, solved(), options);
-  WarpedShape shape{Vector(found.x.size()), std::move(local), found.change, found.rounds};
-  surface_.deform(found.x, shape.u);
+  FixedPoint found =
+      fixed_point(round, start.empty() ? solved() : Vector(start.begin(), start.end()), options);
+  WarpedShape shape{Vector(found.x.size()), std::move(found.x), found.change, found.rounds};
+  surface_.deform(shape.local, shape.u);
   return shape;
 }
 
@@ -156,6 +154,11 @@ WarpColumns RotationWarp::columns(std::span<const std::uint32_t> nodes) const {
   columns.values.resize(rows * count);
   Eigen::MatrixXd own(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(count));
   Vector load(matrix_.row_of_axis.size()), u(load.size());
+  for (const std::uint32_t node : nodes)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (matrix_.row_of_axis[3 * std::size_t{surface[node]} + axis] < 0)
+        throw Error("node " + std::to_string(surface[node]) +
+                    " is fixed, expected one that forces move");
   for (std::size_t c = 0; c < count; ++c) {
     const std::size_t axis = 3 * std::size_t{surface[nodes[c / 3]]} + c % 3;
     load[axis] = 1;
@@ -186,13 +189,13 @@ WarpedShape RotationWarp::shape(const WarpColumns& columns, std::span<const doub
   surface_.spread(f, y);
   FixedPoint found = fixed_point(
       [&](const Vector& q) {
-        combine(columns, q, u);
+        combine(columns, q, surface_.corners(), u);
         surface_.take_back(u, y, forces);
         return forces_for(columns, project(columns, forces));
       },
       start.empty() ? Vector(load.begin(), load.end()) : Vector(start.begin(), start.end()),
       options);
-  combine(columns, found.x, u);
+  combine(columns, found.x, surface_.nodes().size(), u);
   WarpedShape shape{Vector(rows), std::move(found.x), found.change, found.rounds};
   surface_.deform(u, shape.u);
   return shape;
@@ -216,13 +219,13 @@ WarpedForces RotationWarp::forces(const WarpColumns& columns, std::span<const do
   // Linear displacements of the nodes, corrected in their frames by what is missing.
   Vector local(targets.begin(), targets.end());
   if (!start.empty()) {
-    combine(columns, start, u);
+    combine(columns, start, surface_.nodes().size(), u);
     for (std::size_t k = 0; k < count; ++k)
       local[k] = u[3 * std::size_t{columns.nodes[k / 3]} + k % 3];
   }
   FixedPoint found = fixed_point(
       [&](const Vector& v) {
-        combine(columns, forces_for(columns, v), u);
+        combine(columns, forces_for(columns, v), surface_.nodes().size(), u);
         surface_.deform(u, x);
         Vector missing(count);
         for (std::size_t k = 0; k < count; ++k)
@@ -237,7 +240,7 @@ WarpedForces RotationWarp::forces(const WarpColumns& columns, std::span<const do
   result.shape.local = forces_for(columns, found.x);
   result.shape.change = found.change;
   result.shape.rounds = found.rounds;
-  combine(columns, result.shape.local, u);
+  combine(columns, result.shape.local, surface_.nodes().size(), u);
   result.shape.u.resize(rows);
   surface_.deform(u, result.shape.u);
 

@@ -1,0 +1,53 @@
+#pragma once
+// The inner loops of solid/rotation_strain.h and solid/rotation_warp.h: triangles four at a time,
+// and columns. Compiled once per CPU level; every level gives the same bits.
+
+#include "base/cpu.h"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace gewebe {
+
+/// Four triangles side by side; those that fill up the last group are all 0.
+struct TriangleGroup {
+  std::uint32_t node[3][4];
+  double gradient[2][3][4]; ///< of the second and third shape function, 1/mm, by axis
+  double normal[3][4];
+  double area[4];
+};
+
+/// Four middles of edges, between the nodes a and b of two triangles.
+struct MiddleGroup {
+  std::uint32_t node[4], a[4], b[4];
+  std::uint32_t triangle[2][4];
+  double free[3][4]; ///< 1, or 0 along an axis that is held
+};
+
+struct WarpKernel {
+  /// Adds area (R (I + E + E² / 2) - I) ∇N to the nodes of each triangle: what asks the surface to
+  /// become what `local` stands for. Puts w of triangle t to w[3 t].
+  void (*ask)(const TriangleGroup* groups, std::size_t count, const double* local,
+              double* divergence, double* w);
+  /// Middles of edges whose ends are displaced by u: as far from the middle of those as in `local`,
+  /// turned by the triangles' mean w.
+  void (*turn_middles)(const MiddleGroup* groups, std::size_t count, const double* w,
+                       const double* local, double* u);
+  /// Adds the transposed derivative of the same by `local`, times y.
+  void (*take_back)(const TriangleGroup* groups, std::size_t count, const double* local,
+                    const double* y, double* forces);
+  /// sum[k] = Σ factor[c] columns[stride c + k] of the first `rows` k.
+  void (*combine)(const float* columns, std::size_t stride, std::size_t rows, const double* factor,
+                  std::size_t count, double* sum);
+  /// product[c] = Σ columns[stride c + k] by[k] over the first `rows` k.
+  void (*project)(const float* columns, std::size_t stride, std::size_t rows, const double* by,
+                  std::size_t count, double* product);
+};
+
+extern const WarpKernel warp_kernel_baseline, warp_kernel_avx2;
+
+inline const WarpKernel& warp_kernel(CpuLevel level) {
+  return level == CpuLevel::baseline ? warp_kernel_baseline : warp_kernel_avx2;
+}
+
+} // namespace gewebe
