@@ -12,6 +12,7 @@
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -371,6 +372,64 @@ TEST(RotationWarp, EveryProcessorGivesTheSameBytes) {
     const auto forces = beam.warp.forces(columns, targets).forces;
     EXPECT_TRUE(std::isfinite(forces[0]));
     EXPECT_EQ(forces, other.forces(columns, targets).forces);
+  }
+}
+
+TEST(RotationStrain, MiddlesTurnWithTheirTriangles) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> any(-1, 1);
+  // Triangles 0 to 3, nodes 0 and 1 the ends of the edges, 2 to 5 their middles.
+  MiddleGroup group{};
+  std::array<double, 12> w{};
+  std::array<double, 18> local{}, u{};
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    group.node[k] = 2 + k;
+    group.b[k] = 1;
+    group.triangle[0][k] = k;
+    group.triangle[1][k] = (k + 1) % 4;
+    group.free[0][k] = group.free[1][k] = 1;
+    group.free[2][k] = k == 3 ? 0 : 1;
+  }
+  for (double& x : w)
+    x = 1.7 * any(random);
+  for (double& x : local)
+    x = any(random);
+  for (std::size_t k = 0; k < 6; ++k)
+    u[k] = any(random);
+  for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
+    warp_kernel(level).turn_middles(&group, 1, w.data(), local.data(), u.data());
+    const auto vector = [](const auto& values, std::size_t n) {
+      return Eigen::Vector3d(values[3 * n], values[3 * n + 1], values[3 * n + 2]);
+    };
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector3d axis = (vector(w, k) + vector(w, (k + 1) % 4)) / 2,
+                            off = vector(local, 2 + k) - (vector(local, 0) + vector(local, 1)) / 2;
+      Eigen::Vector3d expected =
+          (vector(u, 0) + vector(u, 1)) / 2 +
+          Eigen::AngleAxisd(axis.norm(), axis.normalized()).toRotationMatrix() * off;
+      if (k == 3)
+        expected.z() = 0;
+      EXPECT_LE((vector(u, 2 + k) - expected).norm(), 1e-10) << k;
+    }
+  }
+}
+
+/// The rotation in a surface that turns by its displacements' curl.
+TEST(RotationStrain, RotationsAreThoseOfTheCurl) {
+  const Beam beam(2, true, {1e5, 0.45, 1e-3});
+  const RotationStrain& surface = beam.warp.surface();
+  const Eigen::Vector3d w(0.4, -0.9, 0.7);
+  std::vector<double> u;
+  for (const std::uint32_t i : surface.nodes()) {
+    const Vec3& p = beam.mesh.points[i];
+    const Eigen::Vector3d v = w.cross(Eigen::Vector3d(p.x, p.y, p.z));
+    u.insert(u.end(), {v.x() + 0.3 * p.x, v.y() - 0.2 * p.y, v.z()}); // strains besides
+  }
+  const Eigen::Matrix3d expected = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
+  for (std::uint32_t s = 0; s < surface.nodes().size(); ++s) {
+    const auto r = surface.rotation(u, s);
+    for (int k = 0; k < 9; ++k)
+      EXPECT_NEAR(r[static_cast<std::size_t>(k)], expected(k / 3, k % 3), 1e-10) << s;
   }
 }
 
