@@ -105,6 +105,7 @@ public:
                   " words");
   }
 
+  bool at_end() const { return at_ == line_end_; }
   bool starts_with_letter() const { return *at_ >= 'a' && *at_ <= 'z'; }
   std::string_view peek_word() const {
     Reader copy = *this;
@@ -251,7 +252,9 @@ private:
       m.young = in_.number<double>("Young's modulus");
       m.thickness = in_.number<double>("thickness");
       m.damping_ratio = in_.number<double>("damping ratio");
-      in_.end_line(6);
+      if (!in_.at_end())
+        m.poisson = in_.number<double>("Poisson's ratio");
+      in_.end_line(7);
       model_.materials.push_back(std::move(m));
       check_.material(i);
     }
@@ -345,12 +348,25 @@ private:
   }
 
   void tetrahedra() {
-    const std::size_t n = optional_count(8, 0, nullptr);
+    const std::size_t n = optional_count(10, 0, nullptr);
     model_.tetrahedra.reserve(n);
+    bool quadratic = false;
     for (std::size_t i = 0; i < n; ++i) {
       element(i);
       model_.tetrahedra.push_back(corners<4>());
-      in_.end_line(4);
+      auto word = in_.number<std::uint32_t>("material");
+      if (i == 0)
+        quadratic = !in_.at_end();
+      if (quadratic) {
+        EdgeMiddles& middles = model_.middles.emplace_back();
+        middles[0] = word;
+        for (std::size_t m = 1; m < 6; ++m)
+          middles[m] = in_.number<std::uint32_t>("middle");
+        word = in_.number<std::uint32_t>("material");
+      }
+      in_.end_line(quadratic ? 11 : 5);
+      model_.tetrahedron_material.push_back(
+          static_cast<std::int32_t>(std::min(word, static_cast<std::uint32_t>(INT32_MAX))));
       check_.tetrahedron(i);
     }
     next_section();
@@ -452,7 +468,7 @@ void emit_model(const Sink& sink, const Model& m, const Context& context) {
     const Material& k = m.materials[i];
     sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
          number_text(k.young) + " " + number_text(k.thickness) + " " +
-         number_text(k.damping_ratio) + "\n");
+         number_text(k.damping_ratio) + (k.poisson ? " " + number_text(*k.poisson) : "") + "\n");
   }
   emit(sink, context, "nodes", m.nodes.size(), [&](std::size_t i, LineWriter& line) {
     const Node& n = m.nodes[i];
@@ -481,7 +497,10 @@ void emit_model(const Sink& sink, const Model& m, const Context& context) {
     emit(sink, context, "tetrahedra", m.tetrahedra.size(), [&](std::size_t i, LineWriter& line) {
       for (const std::uint32_t corner : m.tetrahedra[i])
         line.number(corner);
-      line.end();
+      if (!m.middles.empty())
+        for (const std::uint32_t middle : m.middles[i])
+          line.number(middle);
+      line.number(m.tetrahedron_material[i]).end();
     });
   sink("end\n");
 }

@@ -126,6 +126,16 @@ std::uint64_t stiffness_hash(const Model& model) {
   digest.add(static_cast<std::uint64_t>(model.springs.size()));
   for (const Spring& s : model.springs)
     add_values(s.i, s.j, s.stiffness, s.rest);
+  if (!model.tetrahedra.empty()) { // else the hash of springs stays what it was
+    digest.add(static_cast<std::uint64_t>(model.tetrahedra.size()));
+    digest.add(model.tetrahedra);
+    digest.add(static_cast<std::uint64_t>(model.middles.size()));
+    digest.add(model.middles);
+    for (const std::int32_t number : model.tetrahedron_material) {
+      const Material& m = model.materials[static_cast<std::size_t>(number)];
+      add_values(m.young, m.poisson.value_or(-1), m.density);
+    }
+  }
   return digest.value();
 }
 

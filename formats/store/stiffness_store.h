@@ -53,7 +53,8 @@ struct StiffnessSizes {
 };
 
 /// XXH3-64 of what K and gravity depend on: rest positions, masses and constraints of the nodes,
-/// stiffness and rest length of the springs. Neither names nor damping count.
+/// stiffness and rest length of the springs, nodes and elasticity and density of the tetrahedra.
+/// Neither names nor damping count.
 std::uint64_t stiffness_hash(const Model& model);
 
 /// XXH3-64 of rest positions and constraints of the nodes: what the two stages of an object share.

@@ -10,6 +10,9 @@
 namespace gewebe {
 
 using Triangle = std::array<std::uint32_t, 3>;
+using Tetrahedron = std::array<std::uint32_t, 4>;
+/// Nodes in the middles of a tetrahedron's edges 01, 12, 02, 03, 13, 23 (VTK's order).
+using EdgeMiddles = std::array<std::uint32_t, 6>;
 
 /// A triangle mesh. Faces are counter-clockwise seen from outside (the side of lower density).
 /// An optional array is either empty or has the size given here.

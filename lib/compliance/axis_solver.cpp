@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "contact/load.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "solve/stiffness.h"
 

@@ -1,6 +1,7 @@
 #include "compliance/load_answer.h"
 
 #include "base/vector_at.h"
+#include "solid/model_stiffness.h"
 
 #include <utility>
 
@@ -16,9 +17,7 @@ constexpr std::uint64_t max_increments = 1000;
 std::vector<double> forces_over_axes(const Model& model, const Load& load) {
   std::vector<double> f(3 * model.nodes.size(), 0);
   if (load.gravity != Vec3{})
-    for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a)
-        f[axis_of(i, a)] = model.nodes[i].mass * load.gravity[a];
+    f = weight_of(model, load.gravity);
   for (const auto& [node, force] : load.force)
     for (int a = 0; a < 3; ++a)
       f[axis_of(node, a)] += force[a];

@@ -70,12 +70,13 @@ struct Ramp {
 /// Nodes without a force have none, nodes without a displacement are free. Where both are given the
 /// displacement holds, and its support carries the force too.
 struct Load {
-  std::map<std::uint32_t, Vec3> force{};            ///< 1e-6 N
-  std::map<std::uint32_t, Vec3> displacement{};     ///< from rest, mm
-  Vec3 gravity{};                                   ///< mm/s²
-  std::map<std::uint32_t, double> force_period{};   ///< of the forces that pulse, s
-  std::map<std::uint32_t, NodePressure> pressure{}; ///< on a third of each triangle at the node
-  std::map<std::uint32_t, Ramp> ramp{};             ///< of displaced nodes that are on their way
+  std::map<std::uint32_t, Vec3> force{};          ///< 1e-6 N
+  std::map<std::uint32_t, Vec3> displacement{};   ///< from rest, mm
+  Vec3 gravity{};                                 ///< mm/s²
+  std::map<std::uint32_t, double> force_period{}; ///< of the forces that pulse, s
+  std::map<std::uint32_t, NodePressure>
+      pressure{};                       ///< on a third of each triangle at the node (load_at)
+  std::map<std::uint32_t, Ramp> ramp{}; ///< of displaced nodes that are on their way
 
   bool operator==(const Load&) const = default;
   bool empty() const {

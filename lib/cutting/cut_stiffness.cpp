@@ -5,6 +5,7 @@
 #include "compliance/forward_blocks.h"
 #include "cutting/corrected_columns.h"
 #include "model/cut.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "solve/factor.h"
 #include "solve/stiffness.h"

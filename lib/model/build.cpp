@@ -108,6 +108,8 @@ public:
     if (model_.materials.empty())
       throw Error("no material, expected at least one");
     model_.name = model_.materials[0].name;
+    for (Material& material : model_.materials)
+      material.poisson.reset(); // springs know none
     areas_and_materials();
     surface_nodes();
     edge_springs();

@@ -55,6 +55,8 @@ void ModelChecker::material(std::size_t i) const {
   require_not_negative(m.young, "young");
   require_positive(m.thickness, "thickness");
   require_not_negative(m.damping_ratio, "damping ratio");
+  if (m.poisson && !(*m.poisson >= 0 && *m.poisson < 0.5))
+    throw Error("Poisson's ratio is " + number_text(*m.poisson) + ", expected 0 to below 0.5");
 }
 
 void ModelChecker::begin_nodes(std::size_t count) {
@@ -158,15 +160,15 @@ void ModelChecker::spring(std::size_t i) {
   }
 }
 
-void ModelChecker::corners(const std::uint32_t* index, int count) const {
-  for (int a = 0; a < count; ++a) {
+void ModelChecker::corners(std::span<const std::uint32_t> index) const {
+  for (std::size_t a = 0; a < index.size(); ++a) {
     if (index[a] >= node_count_)
       throw Error("node " + std::to_string(index[a]) + " does not exist, expected 0 to " +
                   std::to_string(node_count_ - 1));
     if (index[a] >= first_central_)
       throw Error("corner " + std::to_string(index[a]) +
                   " is a central node, expected a surface node");
-    for (int b = 0; b < a; ++b)
+    for (std::size_t b = 0; b < a; ++b)
       if (index[a] == index[b])
         throw Error("corner " + std::to_string(index[a]) +
                     " stands twice, expected different corners");
@@ -174,7 +176,7 @@ void ModelChecker::corners(const std::uint32_t* index, int count) const {
 }
 
 void ModelChecker::triangle(std::size_t i) const {
-  corners(model_.triangles[i].data(), 3);
+  corners(model_.triangles[i]);
 }
 
 void ModelChecker::texcoord(std::size_t i) const {
@@ -183,7 +185,23 @@ void ModelChecker::texcoord(std::size_t i) const {
 }
 
 void ModelChecker::tetrahedron(std::size_t i) const {
-  corners(model_.tetrahedra[i].data(), 4);
+  const Tetrahedron& t = model_.tetrahedra[i];
+  std::vector<std::uint32_t> nodes(t.begin(), t.end());
+  if (!model_.middles.empty())
+    nodes.insert(nodes.end(), model_.middles[i].begin(), model_.middles[i].end());
+  corners(nodes);
+  const std::int32_t material = model_.tetrahedron_material[i];
+  if (material < 0 || static_cast<std::size_t>(material) >= model_.materials.size())
+    throw Error("material " + std::to_string(material) + " does not exist, expected 0 to " +
+                std::to_string(model_.materials.size() - 1));
+  const Material& m = model_.materials[static_cast<std::size_t>(material)];
+  if (!m.poisson)
+    throw Error("material " + std::to_string(material) + " has no Poisson's ratio, expected one");
+  require_positive(m.young, "young of an element's material");
+  const auto at = [&](std::size_t a) { return model_.nodes[t[a]].position; };
+  const Vec3 p = at(1) - at(0), q = at(2) - at(0), r = at(3) - at(0);
+  if (!(dot(cross(p, q), r) > 0))
+    throw Error("the tetrahedron has no positive volume, expected its nodes in VTK's order");
 }
 
 } // namespace gewebe

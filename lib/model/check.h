@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,7 @@ public:
   void tetrahedron(std::size_t i) const;
 
 private:
-  void corners(const std::uint32_t* index, int count) const;
+  void corners(std::span<const std::uint32_t> index) const;
 
   const Model& model_;
   std::size_t node_count_ = 0;

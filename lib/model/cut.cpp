@@ -464,24 +464,6 @@ private:
       if (!model_.texcoords.empty())
         result_.model.texcoords.push_back(model_.texcoords[t]);
     }
-    std::vector<Pair> apart;
-    for (const std::size_t s : cut_.springs)
-      apart.push_back({model_.springs[s].i, model_.springs[s].j});
-    std::sort(apart.begin(), apart.end());
-    for (const Tetrahedron& t : model_.tetrahedra) {
-      bool whole = true;
-      Vec3 middle;
-      for (std::size_t a = 0; a < 4; ++a) {
-        middle += 0.25 * model_.nodes[t[a]].position;
-        for (std::size_t b = 0; b < a; ++b)
-          whole = whole && !std::binary_search(apart.begin(), apart.end(), ordered(t[a], t[b]));
-      }
-      if (!whole)
-        continue;
-      Tetrahedron& to = result_.model.tetrahedra.emplace_back();
-      for (std::size_t a = 0; a < 4; ++a)
-        to[a] = copy_towards(t[a], middle, none - 1);
-    }
   }
 
   void keep_left() {
@@ -558,6 +540,9 @@ void require_held(const Model& before, const CutModel& cut) {
 }
 
 CutModel cut_model(const Model& model, const Cut& cut) {
+  if (!model.tetrahedra.empty())
+    throw Error("the model holds " + std::to_string(model.tetrahedra.size()) +
+                " tetrahedra, expected springs and triangles alone to cut");
   return Cutter(model, cut).work();
 }
 

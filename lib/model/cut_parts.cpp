@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t none = CutModel::gone;
 
-/// The set of each node, connected by springs, triangles and tetrahedra; returns how many.
+/// The set of each node, connected by springs and triangles; returns how many.
 std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
   DisjointSets sets(model.nodes.size());
   for (const Spring& s : model.springs)
@@ -22,9 +22,6 @@ std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
     sets.join(t[0], t[1]);
     sets.join(t[0], t[2]);
   }
-  for (const Tetrahedron& t : model.tetrahedra)
-    for (std::size_t a = 1; a < 4; ++a)
-      sets.join(t[0], t[a]);
   return sets.number(set);
 }
 
@@ -67,12 +64,6 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
     m.triangles.push_back(t);
     if (!model.texcoords.empty())
       m.texcoords.push_back(model.texcoords[k]);
-  }
-  for (Tetrahedron t : model.tetrahedra) {
-    for (std::uint32_t& corner : t)
-      corner = place[corner];
-    if (t[0] != none)
-      m.tetrahedra.push_back(t);
   }
   return part;
 }

@@ -46,7 +46,7 @@ struct Held {
 
 std::vector<Hinged> hinged_components(const Model& model) {
   const Components parts = components(model);
-  const std::size_t surface = surface_count(model);
+  const std::size_t surface = body_count(model);
   std::vector<Held> held(parts.count);
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     Held& h = held[parts.of_node[i]];

@@ -29,6 +29,8 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
     m.young = values.young.value_or(m.young);
     m.thickness = values.thickness.value_or(m.thickness);
     m.damping_ratio = values.damping_ratio.value_or(m.damping_ratio);
+    if (values.poisson)
+      m.poisson = values.poisson;
   }
 }
 

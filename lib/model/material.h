@@ -27,7 +27,7 @@ struct MaterialChoice {
 
 /// What replaces the values of materials.
 struct MaterialOverrides {
-  std::optional<double> density, young, thickness, damping_ratio;
+  std::optional<double> density, young, thickness, damping_ratio, poisson;
 };
 void override_materials(std::vector<Material>& materials, const MaterialOverrides& values);
 

@@ -13,26 +13,30 @@ namespace gewebe {
 namespace {
 
 constexpr std::string_view presets =
-    R"(# Materials: name, density in g/mm3, Young's modulus in Pa, thickness in mm, damping ratio.
+    R"(# Materials: name, density in g/mm3, Young's modulus in Pa, thickness in mm, damping ratio, Poisson's
+# ratio.
 #
 # They set the order of magnitude; tissue varies by factors between people and, being non-linear,
 # with its stretch. The damping ratio is a choice: motion dies within a few swings.
 #
+# Poisson's ratio: soft tissue is full of water and hardly changes its volume (Fung, Biomechanics:
+# Mechanical Properties of Living Tissues, 1993); 0.49 leaves it some.
+#
 # Soft, and as heavy as water.
-generic      0.001    10000   5  0.2
+generic      0.001    10000   5  0.2  0.49
 # Density: ICRU Report 46, 1992. Young's modulus: healthy, by transient elastography, Roulot et al.,
 # J Hepatol 48, 2008. 10 mm is no wall but the shell that is as heavy as the organ, for 1.5 kg on
 # 0.15 m2.
-liver        0.00106   5500  10  0.2
+liver        0.00106   5500  10  0.2  0.49
 # Some hundred kPa in tension: Karimi et al., J Med Eng Technol 41, 2017. A healthy wall is at most
 # 3 mm thick in ultrasound. Density as of the liver.
-gallbladder  0.00106 250000   3  0.2
+gallbladder  0.00106 250000   3  0.2  0.49
 # 30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006. The myometrium
 # is one to two centimetres thick. Density as of the liver.
-uterus       0.00106  30000  15  0.2
+uterus       0.00106  30000  15  0.2  0.49
 )";
 
-constexpr const char* form = ", expected name density young thickness damping_ratio";
+constexpr const char* form = ", expected name density young thickness damping_ratio [poisson]";
 
 /// Calls visit(number, line with its end, words) for each line that is not blank or a comment
 /// alone.
@@ -65,7 +69,7 @@ bool bad_in_name(char c) {
 }
 
 Material material_of(const std::vector<std::string_view>& words) {
-  if (words.size() != 5)
+  if (words.size() != 5 && words.size() != 6)
     throw Error(std::to_string(words.size()) + (words.size() == 1 ? " word" : " words") + form);
   Material m;
   m.name = words[0];
@@ -89,6 +93,14 @@ Material material_of(const std::vector<std::string_view>& words) {
         !(zero ? *value >= 0 : *value > 0))
       throw Error(quoted(word) + " is no " + name + ", expected a finite number " +
                   (zero ? "of 0 or more" : "above 0"));
+  }
+  if (words.size() == 6) {
+    const std::string_view word = words[5];
+    double value = 0;
+    const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (status != std::errc{} || rest != word.data() + word.size() || !(value >= 0 && value < 0.5))
+      throw Error(quoted(word) + " is no Poisson's ratio, expected 0 to below 0.5");
+    m.poisson = value;
   }
   return m;
 }

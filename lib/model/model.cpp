@@ -58,16 +58,54 @@ void check_model(const Model& model) {
   check_each("triangle", model.triangles.size(), [&](std::size_t i) { checker.triangle(i); });
   require_size("texcoords", model.texcoords.size(), model.triangles.size());
   check_each("texcoord", model.texcoords.size(), [&](std::size_t i) { checker.texcoord(i); });
+  require_size("middles", model.middles.size(), model.tetrahedra.size());
+  if (model.tetrahedron_material.size() != model.tetrahedra.size())
+    throw Error(std::to_string(model.tetrahedron_material.size()) +
+                " materials of tetrahedra, expected " + std::to_string(model.tetrahedra.size()));
   check_each("tetrahedron", model.tetrahedra.size(),
              [&](std::size_t i) { checker.tetrahedron(i); });
 }
 
-std::size_t surface_count(const Model& model) {
+std::size_t body_count(const Model& model) {
   std::size_t first = model.nodes.size();
   for (const Node& n : model.nodes)
     if (n.central >= 0)
       first = std::min(first, static_cast<std::size_t>(n.central));
   return first;
+}
+
+namespace {
+
+/// One past the last corner of a triangle.
+std::size_t corner_count(const Model& model) {
+  std::size_t count = 0;
+  for (const Triangle& triangle : model.triangles)
+    for (const std::uint32_t corner : triangle)
+      count = std::max(count, std::size_t{corner} + 1);
+  return count;
+}
+
+/// One past the last node below `bodies` that no tetrahedron has.
+std::size_t loose_count(const Model& model, std::size_t bodies) {
+  std::vector<std::uint8_t> used(model.nodes.size());
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (const std::uint32_t corner : t)
+      used[corner] = 1;
+  for (const EdgeMiddles& middles : model.middles)
+    for (const std::uint32_t middle : middles)
+      used[middle] = 1;
+  while (bodies > 0 && used[bodies - 1] != 0)
+    --bodies;
+  return bodies;
+}
+
+} // namespace
+
+std::size_t surface_count(const Model& model) {
+  const std::size_t bodies = body_count(model);
+  if (model.tetrahedra.empty())
+    return bodies;
+  return std::max(corner_count(model), loose_count(model, bodies));
 }
 
 std::size_t spring_count(const Model& model, SpringKind kind) {
@@ -86,15 +124,21 @@ Components components(const Model& model) {
       break;
     sets.join(s.i, s.j);
   }
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (std::size_t a = 1; a < 4; ++a)
+      sets.join(t[0], t[a]);
+  for (std::size_t t = 0; t < model.middles.size(); ++t)
+    for (const std::uint32_t middle : model.middles[t])
+      sets.join(model.tetrahedra[t][0], middle);
   Components result;
   result.of_node.resize(model.nodes.size());
-  const std::size_t surface = surface_count(model);
-  for (std::uint32_t i = 0; i < surface; ++i) {
+  const std::size_t bodies = body_count(model);
+  for (std::uint32_t i = 0; i < bodies; ++i) {
     const std::uint32_t r = sets.find(i);
     result.of_node[i] = r == i ? result.count++ : result.of_node[r];
   }
   std::vector<bool> named(model.nodes.size());
-  for (std::size_t i = 0; i < surface; ++i) {
+  for (std::size_t i = 0; i < bodies; ++i) {
     if (model.nodes[i].central < 0)
       continue;
     const auto central = static_cast<std::size_t>(model.nodes[i].central);
@@ -106,9 +150,9 @@ Components components(const Model& model) {
 }
 
 double total_mass(const Model& model) {
-  const std::size_t surface = surface_count(model);
+  const std::size_t bodies = body_count(model);
   double sum = 0;
-  for (std::size_t i = 0; i < surface; ++i)
+  for (std::size_t i = 0; i < bodies; ++i)
     sum += model.nodes[i].mass;
   return sum;
 }
@@ -218,6 +262,14 @@ std::string model_digest(const Model& model) {
   digest.add(model.texcoords);
   add_count(model.tetrahedra.size());
   digest.add(model.tetrahedra);
+  // What models of springs lack is not part of theirs.
+  if (!model.tetrahedra.empty()) {
+    add_count(model.middles.size());
+    digest.add(model.middles);
+    digest.add(model.tetrahedron_material);
+    for (const Material& m : model.materials)
+      add_values(m.poisson.value_or(-1));
+  }
   return digest.hex();
 }
 

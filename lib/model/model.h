@@ -12,14 +12,15 @@
 //   - a node's material exists; its central is -1 or the index of a node behind it; every node from
 //   the
 //     first one so named to the last is named, and its own central is -1
-//   - `normals`, `texcoords`, `tetrahedra` are empty or complete: one normal per node (0 for
-//   central
-//     nodes), six coordinates per triangle
+//   - `normals`, `texcoords` are empty or complete: one normal per node (0 for central nodes), six
+//   coordinates per triangle
 //   - a spring has i < j, springs ascend strictly by (kind, i, j), no pair occurs under two kinds,
 //   and
 //     its ends are at different places; a spring of kind central joins a node to its own central
 //     node, the other kinds join no central node
-//   - triangles and tetrahedra have different corners, none of them a central node
+//   - triangles and tetrahedra have different nodes, none of them a central node; a tetrahedron has
+//   a positive volume, a material, which exists and has a Poisson's ratio, and with one of them all
+//   have middles
 
 #include "base/mesh.h"
 #include "base/vec3.h"
@@ -36,10 +37,11 @@ namespace gewebe {
 
 struct Material {
   std::string name;
-  double density = 1e-3;      ///< g/mm³
-  double young = 1e4;         ///< Young's modulus, Pa
-  double thickness = 1;       ///< of the wall that the surface stands for, mm
-  double damping_ratio = 0.2; ///< of a spring with its two masses; 1 is critical
+  double density = 1e-3;         ///< g/mm³
+  double young = 1e4;            ///< Young's modulus, Pa
+  double thickness = 1;          ///< of the wall that the surface stands for, mm
+  double damping_ratio = 0.2;    ///< of a spring with its two masses; 1 is critical
+  std::optional<double> poisson; ///< Poisson's ratio, 0 to below 1/2; springs know none
 
   bool operator==(const Material&) const = default;
 };
@@ -82,17 +84,19 @@ struct Spring {
   bool operator==(const Spring&) const = default;
 };
 
-using Tetrahedron = std::array<std::uint32_t, 4>;
-
 struct Model {
   std::string name;
   std::vector<Material> materials;
   std::vector<Node> nodes;
   std::vector<Vec3> normals; ///< optional, one per node
   std::vector<Spring> springs;
-  std::vector<Triangle> triangles;              ///< counter-clockwise seen from outside
+  /// Counter-clockwise seen from outside; those of quadratic elements are four on each face, so
+  /// that middles are corners of triangles.
+  std::vector<Triangle> triangles;
   std::vector<std::array<double, 6>> texcoords; ///< optional, per triangle s0 t0 s1 t1 s2 t2
-  std::vector<Tetrahedron> tetrahedra;          ///< optional
+  std::vector<Tetrahedron> tetrahedra;          ///< optional: finite elements
+  std::vector<EdgeMiddles> middles; ///< optional, one per tetrahedron: quadratic elements
+  std::vector<std::int32_t> tetrahedron_material; ///< one per tetrahedron
 
   bool operator==(const Model&) const = default;
 };
@@ -100,21 +104,29 @@ struct Model {
 /// \throw Error naming the first element that breaks an invariant of this header
 void check_model(const Model& model);
 
-/// Number S of the nodes that are no central nodes. \pre the invariants hold
+/// The nodes that are no central nodes: those of the surface, then those inside a solid. \pre the
+/// invariants hold
+std::size_t body_count(const Model& model);
+
+/// Number S of the first nodes, among which all those of the surface are: of a model without
+/// tetrahedra body_count(); else up to the last corner of a triangle and the last node that no
+/// tetrahedron has, so that a model whose nodes inside don't come last has some of them among the
+/// S. \pre the invariants hold
 std::size_t surface_count(const Model& model);
 
 /// Springs of one kind. \pre the invariants hold
 std::size_t spring_count(const Model& model, SpringKind kind);
 
-/// The part of each node: nodes joined by springs of kind edge share one, numbered from 0 by their
-/// smallest node; a central node has the part of the first node that it is named by.
+/// The part of each node: nodes joined by springs of kind edge or a tetrahedron share one, numbered
+/// from 0 by their smallest node; a central node has the part of the first node that it is named
+/// by.
 struct Components {
   std::vector<std::uint32_t> of_node;
   std::uint32_t count = 0;
 };
 Components components(const Model& model);
 
-/// Sum of the masses of the surface nodes, g.
+/// Sum of the masses of the nodes that are no central nodes, g.
 double total_mass(const Model& model);
 
 /// For each node the largest step h in s of semi-implicit Euler with explicit damping for which

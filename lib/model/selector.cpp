@@ -55,8 +55,9 @@ struct Word {
   std::string_view name;
   Op op;
 };
-constexpr std::array<Word, 4> words{{{"all", Op::all},
+constexpr std::array<Word, 5> words{{{"all", Op::all},
                                      {"surface", Op::surface},
+                                     {"inside", Op::inside},
                                      {"central", Op::central},
                                      {"boundary", Op::boundary}}};
 
@@ -304,22 +305,25 @@ using Flags = std::vector<std::uint8_t>;
 /// What evaluation needs to know of a model, found out once and only where asked for.
 class Evaluator {
 public:
-  Evaluator(const Model& model, const Selector& selector, const LoadNodeList& load)
-      : model_(model), surface_(surface_count(model)) {
+  Evaluator(const Model& model, const Selector& selector, const LoadNodeList& load,
+            SelectorScope scope)
+      : model_(model), surface_(surface_count(model)), body_(body_count(model)),
+        scope_(scope == SelectorScope::body ? body_ : surface_) {
     ranges_.reserve(selector.steps.size());
     for (const Selector::Step& step : selector.steps) {
       ranges_.push_back(step.op == Op::file ? load_ranges(step.file_name, load) : step.ranges);
       if (step.op == Op::central || step.op == Op::all)
         scope_ = model.nodes.size();
+      if (step.op == Op::inside)
+        scope_ = std::max(scope_, body_);
       for (const auto& [first, last] : ranges_.back()) {
         if (last >= model.nodes.size())
           throw Error("node " + std::to_string(last) + " does not exist, expected 0 to " +
                       std::to_string(model.nodes.size() - 1));
-        if (last >= surface_)
-          scope_ = model.nodes.size();
+        if (last >= scope_)
+          scope_ = last < body_ ? body_ : model.nodes.size();
       }
     }
-    scope_ = std::max(scope_, surface_);
   }
 
   std::vector<std::uint32_t> run(const Selector& selector) {
@@ -381,8 +385,10 @@ private:
       return range(0, scope_);
     case Op::surface:
       return range(0, surface_);
+    case Op::inside:
+      return range(surface_, body_);
     case Op::central:
-      return range(surface_, scope_);
+      return range(body_, scope_);
     case Op::boundary:
       return boundary();
     case Op::box:
@@ -458,8 +464,8 @@ private:
   }
 
   const Model& model_;
-  std::size_t surface_;
-  std::size_t scope_ = 0; ///< nodes below this one are considered
+  std::size_t surface_, body_;
+  std::size_t scope_; ///< nodes below this one are considered
   std::vector<NodeRanges> ranges_;
   Components components_;
 };
@@ -509,10 +515,10 @@ std::string nearest_to(const Model& model, const Selector& selector) {
 } // namespace
 
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
-                                        const LoadNodeList& load) {
+                                        const LoadNodeList& load, SelectorScope scope) {
   std::vector<std::uint32_t> selected;
   try {
-    selected = Evaluator(model, selector, load).run(selector);
+    selected = Evaluator(model, selector, load, scope).run(selector);
   } catch (const Error& error) {
     if (!error.place().empty())
       throw;

@@ -26,6 +26,7 @@ struct Selector {
     logical_not, // of the results before
     all,
     surface,
+    inside,
     central,
     boundary,
     box,
@@ -61,12 +62,20 @@ std::vector<std::string> node_list_names(const Selector& selector);
 /// Returns the text of the node list that a selector names as @NAME. It may throw Error.
 using LoadNodeList = std::function<std::string(const std::string& name)>;
 
+/// What a selector ranges over that names nothing else.
+enum class SelectorScope : std::uint8_t {
+  surface, ///< what can be touched
+  body,    ///< nodes inside a solid too
+};
+
 /// The selected nodes, ascending; never empty. Evaluated on rest positions. A selector that names
-/// central nodes (by `central`, `all` or their numbers) ranges over all nodes, any other one over
-/// the surface. \pre the invariants of model.h hold \throw Error if it selects nothing, or names a
+/// central nodes (by `central`, `all` or their numbers) ranges over all nodes, one that names nodes
+/// inside a solid (by `inside` or their numbers) over all but the central ones, any other one over
+/// the scope. \pre the invariants of model.h hold \throw Error if it selects nothing, or names a
 /// node or a component that the model does not have; of a node list file with place "NAME:LINE"
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
-                                        const LoadNodeList& load = nullptr);
+                                        const LoadNodeList& load = nullptr,
+                                        SelectorScope scope = SelectorScope::surface);
 
 /// Numbers and ranges (7-9), separated by blanks, commas or line ends; `#` starts a comment.
 /// \throw Error, place "NAME:LINE"

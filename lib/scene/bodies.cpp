@@ -175,6 +175,9 @@ void need_body(World& w, std::size_t object) {
   if (w.now.objects[object].body != nullptr)
     return;
   need_model(w.now.objects[object]);
+  if (!w.now.objects[object].model().tetrahedra.empty())
+    throw Error("object " + w.now.objects[object].name() + " " +
+                std::string(gap(Way::solid, Feature::method)->text));
   w.now.bodies.push_back(make_body(w, {object}));
 }
 

@@ -1,6 +1,7 @@
 // The solvers of elastostatic objects: of one step, of two, made when they are needed.
 
 #include "scene/rules_internal.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 #include "statics/second_stage.h"
 

@@ -30,6 +30,8 @@ bool goes(const Object& object, Way way) {
     return object.cut.first == nullptr;
   case Way::cut:
     return object.cut.first != nullptr;
+  case Way::solid:
+    return object.matter->known && !object.model().tetrahedra.empty();
   }
   return false;
 }

@@ -16,11 +16,13 @@ enum class Way : std::uint8_t {
   two_step,
   two_step_stored, ///< its second stage known by its stiffness alone
   whole,
-  cut
+  cut,
+  solid ///< of tetrahedra, or with some
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
-    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut};
+    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
+    Way::solid};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -55,6 +57,11 @@ inline constexpr std::array gaps{
         "has a second stage of its store, expected two-step with the model of that, stage=FILE"},
     Gap{Way::two_step_stored, Feature::blade, false,
         "has a second stage of its store and not its model: it is not cut"},
+    Gap{Way::solid, Feature::cut, true,
+        "holds tetrahedra, expected springs and triangles alone to cut"},
+    Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
+    Gap{Way::solid, Feature::method, true,
+        "holds tetrahedra, whose motion is not simulated, expected ffe"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

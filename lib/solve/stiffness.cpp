@@ -129,7 +129,7 @@ StiffnessMatrix assemble(const Model& model, std::span<const Block> blocks,
 
 } // namespace
 
-StiffnessMatrix stiffness_matrix(const Model& model, std::span<const std::uint8_t> fixed) {
+StiffnessMatrix spring_stiffness(const Model& model, std::span<const std::uint8_t> fixed) {
   std::vector<Block> blocks(model.springs.size());
   for (std::size_t e = 0; e < blocks.size(); ++e)
     blocks[e] = stiffness_block(model, model.springs[e]);
@@ -159,12 +159,6 @@ void multiply_spring(const Spring& s, const SymmetricBlock& block, std::span<con
 
 } // namespace
 
-void multiply_stiffness(const Model& model, std::span<const double> u, std::span<double> f) {
-  std::fill(f.begin(), f.end(), 0.0);
-  for (const Spring& s : model.springs)
-    multiply_spring(s, stiffness_block(model, s), u, f);
-}
-
 std::vector<SymmetricBlock> stiffness_blocks(const Model& model) {
   std::vector<SymmetricBlock> blocks;
   blocks.reserve(model.springs.size());
@@ -173,8 +167,8 @@ std::vector<SymmetricBlock> stiffness_blocks(const Model& model) {
   return blocks;
 }
 
-void multiply_stiffness(const Model& model, std::span<const SymmetricBlock> blocks,
-                        std::span<const double> u, std::span<double> f) {
+void multiply_springs(const Model& model, std::span<const SymmetricBlock> blocks,
+                      std::span<const double> u, std::span<double> f) {
   std::fill(f.begin(), f.end(), 0.0);
   for (std::size_t k = 0; k < blocks.size(); ++k)
     multiply_spring(model.springs[k], blocks[k], u, f);

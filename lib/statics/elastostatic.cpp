@@ -5,6 +5,7 @@
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
 #include "compliance/load_answer.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 #include "statics/held_contacts.h"
 
@@ -23,6 +24,7 @@ struct Elastostatic::State {
   Compliance compliance;
   ElastostaticCounts counts;
   std::optional<double> norm; // of K, for backward errors
+  std::optional<StiffnessOperator> stiffness;
   LoadAnswer answer;          // beside displacements
   ForcesAt block;
   HeldContacts held;
@@ -124,13 +126,15 @@ struct Elastostatic::State {
         counts.shape_error = std::max(counts.shape_error, worst / size);
       std::swap(taken, u);
     }
-    if (!norm)
+    if (!norm) {
       norm = stiffness_norm(stiffness_matrix(model));
+      stiffness.emplace(model);
+    }
     std::vector<double> f = forces_over_axes(model, now), product(u.size(), 0);
     for (const NodeVector& contact : forces)
       for (int a = 0; a < 3; ++a)
         f[axis_of(contact.node, a)] += contact.value[a];
-    multiply_stiffness(model, u, product);
+    stiffness->multiply(u, product);
     double residual = 0, load_size = 0;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)

@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "compliance/load_answer.h"
+#include "solid/model_stiffness.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,8 +23,8 @@ bool same_nodes(const Map& a, const Map& b) {
 void HeldContacts::refactor(const Load& now) {
   if (!nodes_.empty() && same_nodes(now.displacement, nodes_))
     return;
-  if (spring_blocks_.empty())
-    spring_blocks_ = stiffness_blocks(model_);
+  if (!stiffness_)
+    stiffness_.emplace(model_, context_);
   held_.reset();
   nodes_.clear();
   columns_.reset();
@@ -56,7 +57,7 @@ void HeldContacts::solve(std::span<double> over_axes, std::size_t columns) {
 void HeldContacts::shape_under(std::span<const double> f, std::span<const double> prescribed,
                                std::vector<double>& shape) {
   std::vector<double> product(axes_, 0);
-  multiply_stiffness(model_, spring_blocks_, prescribed, product);
+  stiffness_->multiply(prescribed, product);
   shape.resize(axes_);
   for (std::size_t r = 0; r < axes_; ++r)
     shape[r] = (f.empty() ? 0 : f[r]) - product[r];
@@ -117,7 +118,7 @@ std::vector<NodeVector> HeldContacts::meet(const Load& now, std::vector<double>&
     for (int a = 0; a < 3; ++a)
       shape[axis_of(node, a)] = d[a];
   std::vector<double> product(axes_, 0);
-  multiply_stiffness(model_, spring_blocks_, shape, product);
+  stiffness_->multiply(shape, product);
   std::vector<NodeVector> forces;
   for (const auto& entry : now.displacement) {
     Vec3 force;

@@ -7,7 +7,7 @@
 #include "compliance/shape_modes.h"
 #include "contact/load.h"
 #include "model/model.h"
-#include "solve/stiffness.h"
+#include "solid/model_stiffness.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -44,7 +44,7 @@ private:
   const Model& model_;
   const Context& context_;
   std::size_t axes_; ///< 3 n
-  std::vector<SymmetricBlock> spring_blocks_;
+  std::optional<StiffnessOperator> stiffness_;
   std::map<std::uint32_t, Vec3> nodes_;
   std::optional<AxisSolver> held_; ///< none where nothing is free
   std::optional<ColumnCache> columns_;

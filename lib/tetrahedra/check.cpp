@@ -276,18 +276,19 @@ std::uint64_t drop_unused_points(TetMesh& mesh) {
   return dropped;
 }
 
-TetRepair repair_tetrahedra(TetMesh& mesh) {
+TetRepair repair_tetrahedra(TetMesh& mesh, const TetRepairOptions& options) {
   TetRepair done;
   const std::vector<bool> again = repeated(mesh, TetFaces(mesh.points.size(), mesh.tetrahedra));
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     const int at = side(mesh, mesh.tetrahedra[t]);
-    if (at == 0 || again[t]) {
-      ++(at == 0 ? done.dropped_flat : done.dropped_duplicates);
+    if ((options.flat && at == 0) || (options.duplicates && again[t])) {
+      ++(options.flat && at == 0 ? done.dropped_flat : done.dropped_duplicates);
       continue;
     }
     Tetrahedron corners = mesh.tetrahedra[t];
-    if (at < 0) {
+    const bool turn = options.turn && at < 0;
+    if (turn) {
       ++done.turned;
       std::swap(corners[0], corners[1]);
     }
@@ -296,7 +297,7 @@ TetRepair repair_tetrahedra(TetMesh& mesh) {
       mesh.material[kept] = mesh.material[t];
     if (!mesh.middles.empty()) {
       EdgeMiddles middles = mesh.middles[t];
-      if (at < 0) {
+      if (turn) {
         std::swap(middles[1], middles[2]); // of 12 and 02
         std::swap(middles[3], middles[4]); // of 03 and 13
       }

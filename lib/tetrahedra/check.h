@@ -74,9 +74,14 @@ struct TetRepair {
   std::uint64_t dropped_points = 0;     ///< unused, with those that only dropped ones used
 };
 
+/// What is to be mended.
+struct TetRepairOptions {
+  bool turn = true, flat = true, duplicates = true;
+};
+
 /// Turns, drops and renumbers. Tetrahedra and points keep their order. What is left may still not
 /// be sound: overlapping faces and split edges stay. \pre check_mesh(mesh) passes
-TetRepair repair_tetrahedra(TetMesh& mesh);
+TetRepair repair_tetrahedra(TetMesh& mesh, const TetRepairOptions& options = {});
 
 /// Removes the points that are neither corner nor middle; returns how many.
 std::uint64_t drop_unused_points(TetMesh& mesh);

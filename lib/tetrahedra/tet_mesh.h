@@ -10,10 +10,6 @@
 
 namespace gewebe {
 
-using Tetrahedron = std::array<std::uint32_t, 4>;
-/// Nodes in the middles of a tetrahedron's edges 01, 12, 02, 03, 13, 23 (VTK's order).
-using EdgeMiddles = std::array<std::uint32_t, 6>;
-
 /// A tetrahedral mesh. Tetrahedra have a positive volume, (b - a) × (c - a) · (d - a) > 0, where a
 /// checked mesh is asked for. An optional array is either empty or has the size given here.
 struct TetMesh {

@@ -20,6 +20,7 @@
 #include "formats/store/stiffness_store_writer.h"
 #include "model/build.h"
 #include "scene/simulation.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

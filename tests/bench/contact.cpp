@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "compliance/column_sum.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"

@@ -11,6 +11,7 @@
 #include "cutting/stiffness_change.h"
 #include "cutting/woodbury.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/larger.h"

@@ -7,6 +7,7 @@
 // the command line choose among product, front, net, blocks, memory.
 
 #include "solve/factor.h"
+#include "solid/model_stiffness.h"
 #include "solve/multifrontal.h"
 #include "solve/stiffness.h"
 #include "tests/bench/blas.h"

@@ -10,6 +10,7 @@
 #include "compliance/compliance_columns.h"
 #include "dynamics/relaxation.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tests/bench/blas.h"
 #include "tests/bench/timing.h"

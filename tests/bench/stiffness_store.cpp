@@ -10,6 +10,7 @@
 #include "formats/store/stiffness_store_writer.h"
 #include "model/build.h"
 #include "model/primitive.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/scratch.h"

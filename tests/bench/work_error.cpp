@@ -10,6 +10,7 @@
 
 #include "dynamics/elastodynamic.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"

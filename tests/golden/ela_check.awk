@@ -10,9 +10,10 @@ left == 0 { # the head of a section
   if (!($1 in words) || NF != 2 || $2 !~ /^[0-9]+$/) fail("no section: " $0)
   section = $1; count[section] = left = $2; next
 }
+section == "tetrahedra" && (NF == 5 || NF == 11) { left--; next }
 section != "materials" && NF != words[section] { fail(NF " words in " section) }
 section == "springs" { kind[$3]++; if ($1 >= $2 || $2 >= count["nodes"]) fail("nodes of spring " $0) }
 section == "triangles" && ($1 >= count["nodes"] || $2 >= count["nodes"] || $3 >= count["nodes"]) { fail("corner") }
 { left-- }
-BEGIN { split("materials 6 nodes 8 normals 3 springs 6 triangles 3 texcoords 6 tetrahedra 4", w); for (i = 1; i < 14; i += 2) words[w[i]] = w[i + 1] }
+BEGIN { split("materials 6 nodes 8 normals 3 springs 6 triangles 3 texcoords 6 tetrahedra 5", w); for (i = 1; i < 14; i += 2) words[w[i]] = w[i + 1] }
 END { if (!bad) { if (!ended) { print "no end"; exit 1 } print count["nodes"], kind["e"] + 0, kind["b"] + 0, kind["c"] + 0, count["triangles"] } }

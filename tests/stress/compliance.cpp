@@ -5,6 +5,7 @@
 
 #include "compliance/compliance_columns.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"

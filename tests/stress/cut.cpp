@@ -6,6 +6,7 @@
 #include "compliance/axis_solver.h"
 #include "cutting/cut_stiffness.h"
 #include "model/build.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "solve/stiffness.h"
 #include "statics/elastostatic.h"

@@ -8,6 +8,7 @@
 #include "base/number_text.h"
 #include "model/build.h"
 #include "model/primitive.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/scratch.h"

@@ -5,6 +5,7 @@
 #include "dynamics/relaxation.h"
 #include "larger.h"
 #include "mesh_fixtures.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

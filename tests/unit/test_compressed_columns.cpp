@@ -8,6 +8,7 @@
 #include "cutting/corrected_columns.h"
 #include "made_columns.h"
 #include "solid/assembly.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "solve/factor.h"
 #include "stuffing/stuffing.h"

@@ -1,5 +1,6 @@
 // Condition estimates against known spectra; what moves freely is named rightly.
 
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 
 #include "stiffness_models.h"

@@ -2,6 +2,7 @@
 
 #include "larger.h"
 #include "sim_models.h"
+#include "solid/model_stiffness.h"
 #include "solve/factor.h"
 #include "solve/stiffness.h"
 #include "statics/elastostatic.h"

@@ -8,6 +8,7 @@
 #include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 
 #include <gtest/gtest.h>

@@ -8,6 +8,7 @@
 #include "model/cut_select.h"
 #include "model_meshes.h"
 #include "sim_models.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 #include "stiffness_models.h"
 

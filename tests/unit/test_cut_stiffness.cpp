@@ -7,6 +7,7 @@
 #include "model/cut_select.h"
 #include "random_cuts.h"
 #include "relative_difference.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 #include "tests/bench/memory_columns.h"

@@ -21,7 +21,9 @@ Model rich_model() {
   options.material = parse_material_choice("liver,1=gallbladder");
   options.bend = options.normals = true;
   Model model = build_model(mesh, options, Context{}).model;
-  model.tetrahedra = {{0, 1, 2, 4}, {0, 1, 3, 5}};
+  model.materials[0].poisson = 0.25;
+  model.tetrahedra = {{0, 2, 5, 4}, {0, 3, 4, 5}};
+  model.tetrahedron_material = {0, 0};
   model.name = "two balls, Größe 1";
   return model;
 }
@@ -177,7 +179,10 @@ TEST(Ela, EachFaultHasItsLine) {
        "17: section 'triangles', expected 'texcoords', 'tetrahedra' or 'end'"},
       {"end\n", "texcoords 1\n0 0 0 0 0 0\ntexcoords 1\n0 0 0 0 0 0\nend\n",
        "19: section 'texcoords', expected 'tetrahedra' or 'end'"},
-      {"end\n", "tetrahedra 1\n0 1 2 0\nend\n", "18: "},
+      {"end\n", "tetrahedra 1\n0 1 2 0 0\nend\n", "18: corner 0 stands twice"},
+      {"end\n", "tetrahedra 1\n0 1 2\nend\n", "18: "},
+      {"1 0.2\n", "1 0.2 0.5\n", "4: Poisson's ratio is 0.5, expected 0 to below 0.5"},
+      {"1 0.2\n", "1 0.2 0.4 1\n", "4: surplus word '1', expected 7 words"},
       {"0 1 e 10", "0 4 e 10", "11: node 4 does not exist, expected 0 to 3"},
       {"0 1 e 10", "-1 1 e 10", "11: '-1' is no node"},
       {"0 1 e 10", "1 0 e 10", "11: spring 1 0, expected the smaller node first"},
@@ -197,7 +202,7 @@ TEST(Ela, EachFaultHasItsLine) {
        "17: '0' is no section, expected 'texcoords', 'tetrahedra' or 'end'"},
       {"end\n", "texcoords 2\n0 0 0 0 0 0\n0 0 0 0 0 0\nend\n",
        "17: 2 texcoords, expected as many as triangles, 1"},
-      {"end\n", "tetrahedra 1\n0 1 2 2\nend\n", "18: corner 2 stands twice"},
+      {"end\n", "tetrahedra 1\n0 1 2 3 0\nend\n", "18: corner 3 is a central node"},
       {"end\n", "end 1\n", "17: surplus word '1'"},
       {"end\n", "end\nend\n", "18: 'end' behind 'end', expected nothing"},
       {"end\n", "end", "17: the last line has no end"},
@@ -210,6 +215,68 @@ TEST(Ela, EachFaultHasItsLine) {
   EXPECT_EQ(complaint(""), "1: no model, expected 'ela_expl 1'");
   EXPECT_NE(complaint(std::string("ela_expl 1\nname \"a\0b\"\n", 21)), "");
   EXPECT_NE(complaint("\xff\xfe e\n"), "");
+}
+
+const std::string element = "ela_expl 1\n"
+                            "name \"t\"\n"
+                            "materials 2\n"
+                            "0 \"gel\" 0.001 1000 1 0.2 0.49\n"
+                            "1 \"wire\" 0.001 1000 1 0.2\n"
+                            "nodes 10\n"
+                            "0 0 0 1 0 - -1 0\n"
+                            "2 0 0 1 0 - -1 0\n"
+                            "0 2 0 1 0 - -1 0\n"
+                            "0 0 2 1 0 - -1 0\n"
+                            "1 0 0 1 0 - -1 0\n"
+                            "1 1 0 1 0 - -1 0\n"
+                            "0 1 0 1 0 - -1 0\n"
+                            "0 0 1 1 0 - -1 0\n"
+                            "1 0 1 1 0 - -1 0\n"
+                            "0 1 1 1 0 - -1 0\n"
+                            "springs 0\n"
+                            "triangles 0\n"
+                            "tetrahedra 1\n"
+                            "0 1 2 3 4 5 6 7 8 9 0\n"
+                            "end\n";
+
+TEST(Ela, ReadsElementsOfBothOrders) {
+  const Model quadratic = parse_ela(element, "M");
+  EXPECT_EQ(quadratic.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}}));
+  EXPECT_EQ(quadratic.middles, (std::vector<EdgeMiddles>{{4, 5, 6, 7, 8, 9}}));
+  EXPECT_EQ(quadratic.tetrahedron_material, std::vector<std::int32_t>{0});
+  EXPECT_EQ(quadratic.materials[0].poisson, 0.49);
+  EXPECT_FALSE(quadratic.materials[1].poisson.has_value());
+  EXPECT_EQ(ela_text(quadratic), element);
+  const std::string text = replaced(element, "3 4 5 6 7 8 9 0\n", "3 0\n");
+  const Model linear = parse_ela(text, "M");
+  EXPECT_TRUE(linear.middles.empty());
+  EXPECT_EQ(ela_text(linear), text);
+}
+
+TEST(Ela, ErrorsOfElements) {
+  struct Case {
+    const char *from, *to, *expected;
+  };
+  const Case cases[] = {
+      {"0 1 2 3 4", "0 2 1 3 4", "20: the tetrahedron has no positive volume"},
+      {"8 9 0\n", "8 9 1\n", "20: material 1 has no Poisson's ratio"},
+      {"8 9 0\n", "8 9 2\n", "20: material 2 does not exist"},
+      {"8 9 0\n", "8 9 -1\n", "20: '-1' is no material"},
+      {"8 9 0\n", "8 9 4294967295\n", "20: material 2147483647 does not exist"},
+      {"8 9 0\n", "8 8 0\n", "20: corner 8 stands twice"},
+      {"8 9 0\n", "8 10 0\n", "20: node 10 does not exist"},
+      {"8 9 0\n", "8 9\n", "20: "},
+      {"8 9 0\n", "8 9 0 0\n", "20: surplus word '0', expected 11 words"},
+      {"tetrahedra 1", "tetrahedra 2", "21: "},
+      {"0.001 1000 1 0.2 0.49", "0.001 0 1 0.2 0.49", "20: young of an element's material"},
+      {"0.2 0.49", "0.2 -0.1", "4: Poisson's ratio is -0.1"},
+      {"0.2 0.49", "0.2 nan", "4: 'nan' is no Poisson's ratio"},
+  };
+  for (const Case& c : cases) {
+    const std::string text = complaint(replaced(element, c.from, c.to));
+    EXPECT_EQ(text.substr(0, std::strlen(c.expected)), c.expected) << text;
+    EXPECT_NE(text.find("expected"), std::string::npos) << text;
+  }
 }
 
 TEST(Ela, TenThousandNodesTakeAHundredthOfASecond) {

@@ -5,6 +5,7 @@
 #include "larger.h"
 #include "random_nets.h"
 #include "sim_models.h"
+#include "solid/model_stiffness.h"
 #include "solve/factor.h"
 
 #include <cmath>

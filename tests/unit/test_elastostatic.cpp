@@ -3,6 +3,7 @@
 #include "dynamics/elastodynamic.h"
 #include "larger.h"
 #include "sim_models.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 #include "statics/elastostatic.h"
 #include "statics/linear_range.h"

@@ -1,5 +1,6 @@
 // The factor: C = K⁻¹ to rounding, from any thread, taken apart and put together again.
 
+#include "solid/model_stiffness.h"
 #include "solve/factor.h"
 
 #include "compliance/compliance_columns.h"

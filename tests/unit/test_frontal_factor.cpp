@@ -1,6 +1,7 @@
 // The factor that follows changes: equal to a fresh one, by its solutions and, with the same tree,
 // by its bits; cheap where a change is local.
 
+#include "solid/model_stiffness.h"
 #include "solve/frontal_factor.h"
 
 #include "compliance/axis_solver.h"

@@ -14,18 +14,18 @@ namespace {
 TEST(ModelMaterials, TheTableOfPresetsSaysWhatTheyAre) {
   EXPECT_EQ(parse_material_table(preset_table(), "presets"), material_presets());
   EXPECT_EQ(material_named("liver", material_presets()),
-            (Material{"liver", 1.06e-3, 5500, 10, 0.2}));
+            (Material{"liver", 1.06e-3, 5500, 10, 0.2, 0.49}));
   EXPECT_EQ(BuildOptions{}.material.materials[0].name, "generic");
 }
 
 TEST(ModelMaterials, ATableReplacesAndAddsWhateverItsLineEnds) {
   for (const char* const end : {"", "\n", "\r\n", " # last"}) {
-    const std::string more = std::string("# head\n\n generic 1 2 3 0\t\nbone 4 5e9 6 7") + end;
+    const std::string more = std::string("# head\n\n generic 1 2 3 0\t\nbone 4 5e9 6 7 0.3") + end;
     const std::string merged = merged_tables(preset_table(), more);
     const std::vector<Material> all = parse_material_table(merged, "t");
     EXPECT_EQ(all.size(), material_presets().size() + 1);
-    EXPECT_EQ(material_named("generic", all), (Material{"generic", 1, 2, 3, 0}));
-    EXPECT_EQ(material_named("bone", all), (Material{"bone", 4, 5e9, 6, 7}));
+    EXPECT_EQ(material_named("generic", all), (Material{"generic", 1, 2, 3, 0, {}}));
+    EXPECT_EQ(material_named("bone", all), (Material{"bone", 4, 5e9, 6, 7, 0.3}));
     EXPECT_EQ(material_named("uterus", all), material_named("uterus", material_presets()));
     EXPECT_EQ(parse_material_choice("1=bone", all).materials[0].density, 1);
   }

@@ -664,7 +664,14 @@ TEST(ModelCheck, EachInvariantIsGuarded) {
          [&](Model& m) { m.triangles[1][0] = static_cast<std::uint32_t>(central); });
   expect("texcoords", [](Model& m) { m.texcoords.pop_back(); });
   expect("texture", [](Model& m) { m.texcoords[7][5] = NAN; });
-  expect("tetrahedron 0", [](Model& m) { m.tetrahedra = {{0, 1, 2, 2}}; });
+  expect("tetrahedron 0", [](Model& m) {
+    m.tetrahedra = {{0, 1, 2, 2}};
+    m.tetrahedron_material = {0};
+  });
+  expect("0 materials of tetrahedra", [](Model& m) { m.tetrahedra = {{0, 1, 2, 3}}; });
+  expect("middles", [](Model& m) { m.middles.resize(1); });
+  expect("Poisson's ratio", [](Model& m) { m.materials[0].poisson = 0.5; });
+  expect("Poisson's ratio", [](Model& m) { m.materials[0].poisson = NAN; });
 }
 
 TEST(ModelDigest, SeesEveryField) {
@@ -689,7 +696,23 @@ TEST(ModelDigest, SeesEveryField) {
   change([](Model& m) { m.springs[2].rest *= 1.0000001; });
   change([](Model& m) { std::swap(m.triangles[0], m.triangles[1]); });
   change([](Model& m) { m.texcoords[0][0] = 1; });
-  change([](Model& m) { m.tetrahedra = {{0, 1, 2, 3}}; });
+  const auto element = [](Model& m) {
+    m.tetrahedra = {{0, 1, 2, 3}};
+    m.tetrahedron_material = {0};
+  };
+  change(element);
+  change([&](Model& m) {
+    element(m);
+    m.tetrahedron_material = {1};
+  });
+  change([&](Model& m) {
+    element(m);
+    m.materials[0].poisson = 0.3;
+  });
+  change([&](Model& m) {
+    element(m);
+    m.middles = {{4, 5, 6, 7, 8, 9}};
+  });
 }
 
 // ---- real organs

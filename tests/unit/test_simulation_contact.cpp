@@ -2,6 +2,7 @@
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
+#include "solid/model_stiffness.h"
 #include "stiffness_models.h"
 
 #include <algorithm>

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "solid/assembly.h"
+#include "solid/model_stiffness.h"
 #include "solid/stress.h"
 #include "solve/factor.h"
 #include "tests/unit/larger.h"

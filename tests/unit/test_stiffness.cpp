@@ -1,5 +1,6 @@
 // K, and what follows from it: symmetry, springs' forces, reactions.
 
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 
 #include "base/digest.h"

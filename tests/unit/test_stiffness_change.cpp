@@ -9,6 +9,7 @@
 #include "larger.h"
 #include "made_columns.h"
 #include "relative_difference.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

@@ -9,6 +9,7 @@
 #include "formats/stream/raw_file_internal.h"
 #include "larger.h"
 #include "scratch.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

@@ -6,6 +6,7 @@
 #include "larger.h"
 #include "scene/support.h"
 #include "simulation_scenes.h"
+#include "solid/model_stiffness.h"
 #include "solve/stiffness.h"
 
 #include <algorithm>
@@ -32,6 +33,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::cut};
   case Way::whole:
     return {Way::elastostatic, Way::whole};
+  case Way::solid:
+    return {Way::elastostatic, Way::whole, Way::solid};
   default:
     return {way, Way::whole};
   }
@@ -51,17 +54,36 @@ Model stiffer(Model model) {
   return model;
 }
 
+/// Its surface filled with tetrahedra that meet in the middle.
+Model solid(Model model) {
+  model.springs.clear();
+  model.materials[0].poisson = 0.4;
+  const auto surface = static_cast<std::uint32_t>(surface_count(model));
+  Vec3 middle;
+  for (std::uint32_t i = 0; i < surface; ++i) {
+    middle += model.nodes[i].position / surface;
+    model.nodes[i].central = -1;
+  }
+  model.nodes.resize(surface);
+  model.nodes.push_back({.position = middle, .mass = 1});
+  model.normals.clear();
+  for (const Triangle& t : model.triangles)
+    model.tetrahedra.push_back({t[1], t[0], t[2], surface});
+  model.tetrahedron_material.assign(model.tetrahedra.size(), 0);
+  return model;
+}
+
 class Pair {
 public:
   Pair(Way way, std::vector<std::string>& warnings)
-      : model_(test::organ(3)), way_(way),
+      : model_(way == Way::solid ? solid(test::organ(3)) : test::organ(3)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
     const bool moves =
         way == Way::explicit_motion || way == Way::implicit_motion || way == Way::attached;
     const Integration integration =
         way == Way::implicit_motion ? Integration::implicit : Integration::semi_implicit;
     scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration);
-    Model beside = model_;
+    Model beside = test::organ(3);
     for (Node& n : beside.nodes)
       n.position.x += 100;
     scene_.add_object("p", std::move(beside), Method::ela, {}, integration);

@@ -412,6 +412,23 @@ TEST(TetRepair, TurnsAndDropsWhatWasPlanted) {
   }
 }
 
+TEST(TetRepair, DoesWhatIsAskedForAlone) {
+  TetMesh mesh = regular();
+  mesh.tetrahedra.push_back(mesh.tetrahedra[0]);
+  std::swap(mesh.tetrahedra[0][0], mesh.tetrahedra[0][1]);
+  mesh.points.insert(mesh.points.end(), {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 1, 0}});
+  mesh.tetrahedra.push_back({4, 5, 6, 7});
+  const auto left = [&](TetRepairOptions options) {
+    TetMesh copy = mesh;
+    (void)repair_tetrahedra(copy, options);
+    const TetReport found = examine_tetrahedra(copy);
+    return std::array{found.inverted.count, found.flat.count, found.duplicates.count};
+  };
+  EXPECT_EQ(left({true, false, false}), (std::array<std::uint64_t, 3>{0, 1, 1}));
+  EXPECT_EQ(left({false, true, false}), (std::array<std::uint64_t, 3>{1, 0, 1}));
+  EXPECT_EQ(left({false, false, true}), (std::array<std::uint64_t, 3>{1, 1, 0}));
+}
+
 TEST(TetRepair, PutsMiddlesWhereTheirEdgesAre) {
   TetMesh mesh = regular();
   make_quadratic(mesh);

@@ -3,6 +3,7 @@
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
+#include "solid/model_stiffness.h"
 #include "statics/two_step.h"
 
 #include "compliance/compliance_source.h"

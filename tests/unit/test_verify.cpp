@@ -4,6 +4,7 @@
 
 #include "compliance/compliance_columns.h"
 #include "larger.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "stiffness_models.h"
 

@@ -125,7 +125,7 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
   if (is_result)
     return read_frame(input, options);
   if (is_model) {
-    const Model model = read_spring_model(input, context);
+    const Model model = read_ela(input, context);
     std::vector<Surface> surfaces = one(surface_mesh(model));
     for (const Material& material : model.materials)
       surfaces[0].materials.push_back(material.name);

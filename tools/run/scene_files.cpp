@@ -70,7 +70,7 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
     if (!S_ISREG(facts_of(path).st_mode)) // it may have no end, and memory has one
       reading.max_memory = std::min(reading.max_memory, longest_piped);
     Input input(path, false);
-    return read_spring_model(input, reading);
+    return read_ela(input, reading);
   };
   files.store = [resolve](const std::string& name, const Model& model) {
     const auto store = std::make_shared<StiffnessStore>(resolve(name));

@@ -54,6 +54,13 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--density", a.values.density, "D", "g/mm3, instead of the material's").positive();
   p.option("--young", a.values.young, "E", "Young's modulus in Pa, instead of the material's")
       .positive();
+  p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
+  p.option("--cell", a.cell, "S", "edge of the cells that fill it, in mm").positive();
+  p.option("--poisson", a.values.poisson, "NU",
+           "of tetrahedra: Poisson's ratio, instead of the material's")
+      .range(0, 0.4999999);
+  p.option("--order", a.order, "N", "of tetrahedra: linear elements (1) or quadratic ones")
+      .range(1, 2);
   p.option("--thickness", a.values.thickness, "H", "of the wall in mm, instead of the material's")
       .positive();
   p.option("--damping-ratio", a.values.damping_ratio, "Z", "of a spring, instead of the material's")
@@ -82,6 +89,7 @@ void complete(ModelArguments& a) {
          "--bend-stiffness without --bend, expected both");
   refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
          "--fix-axes without --fix, expected both");
+  refuse(a.cell && !a.solid, "--cell without --solid, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
   a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });

@@ -8,6 +8,7 @@
 #include "model/selector.h"
 #include "tools/shared/cli.h"
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -22,7 +23,9 @@ struct ModelArguments {
   std::optional<Selector> fixed;
   std::optional<Primitive> matrix;
   std::optional<double> dt;
-  bool scale_mass = false, list_materials = false;
+  std::int64_t order = 2; ///< of finite elements
+  std::optional<double> cell; ///< of the lattice that fills a surface
+  bool solid = false, scale_mass = false, list_materials = false;
 };
 
 /// The options of a program, to be told into `a`.

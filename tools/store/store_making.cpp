@@ -4,6 +4,7 @@
 #include "dynamics/relaxation.h"
 #include "formats/model/ela.h"
 #include "model/selector.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 
 #include <algorithm>
@@ -49,9 +50,12 @@ Prepared prepare(const std::string& path, const StoreArguments& a, const Context
   Prepared p;
   p.name = input.name();
   const double start = seconds();
-  p.model = read_spring_model(input, context);
+  p.model = read_ela(input, context);
   p.read = seconds() - start;
   at(p.name, [&] {
+    if (a.method != "direct" && !p.model.tetrahedra.empty())
+      throw Error("holds tetrahedra, which --method " + a.method +
+                  " doesn't simulate, expected --method direct");
     p.nodes = touched_nodes(p.model, a);
     p.matrix = stiffness_matrix(p.model);
     p.assemble = seconds() - start - p.read;

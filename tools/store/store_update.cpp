@@ -5,6 +5,7 @@
 #include "cutting/corrected_compliance.h"
 #include "formats/model/ela.h"
 #include "model/cut_origin.h"
+#include "solid/model_stiffness.h"
 #include "solve/condition.h"
 #include "tools/store/store_making.h"
 #include "tools/store/store_merging.h"

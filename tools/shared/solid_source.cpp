@@ -1,0 +1,126 @@
+#include "tools/shared/solid_source.h"
+
+#include "base/number_text.h"
+#include "formats/mesh/mesh_file.h"
+#include "formats/tetrahedra/tet_file.h"
+#include "solid/solid_model.h"
+#include "stuffing/stuffing.h"
+#include "tetrahedra/check.h"
+#include "voxelize/distance_ramp.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace gewebe::cli {
+
+namespace {
+
+void refuse(bool wrong, const char* what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+/// Options of springs say nothing of tetrahedra.
+void refuse_others(const ModelArguments& a) {
+  BuildOptions plain;
+  plain.material = a.build.material;
+  plain.drag_rate = a.build.drag_rate;
+  plain.normals = a.build.normals;
+  refuse(a.build != plain || a.values.thickness || a.values.damping_ratio || a.dt,
+         "a model of tetrahedra, expected no option of springs and no --dt");
+}
+
+/// Options of surfaces neither.
+void refuse_surfaces(const ModelArguments& a) {
+  refuse(a.weld != "auto", "the input holds tetrahedra, expected no --weld");
+  refuse((a.repairs.weld || a.repairs.holes) && a.repair != "all",
+         "the input holds tetrahedra, expected --repair orientation, duplicates or degenerate");
+}
+
+/// Turns and drops what was asked for, and tells what.
+void repair(Run& run, const std::string& name, TetMesh& mesh, const RepairOptions& asked) {
+  const TetRepair done = repair_tetrahedra(
+      mesh, {.turn = asked.orientation, .flat = asked.degenerate, .duplicates = asked.duplicates});
+  const auto tell = [&](const char* key, std::uint64_t count, const char* text) {
+    run.stats().set(key, count);
+    if (count > 0)
+      run.say(name + ": " + std::to_string(count) + " " + text);
+  };
+  tell("repaired_turned", done.turned, "inverted tetrahedra were turned");
+  tell("repaired_flat", done.dropped_flat, "flat tetrahedra were left out");
+  tell("repaired_duplicates", done.dropped_duplicates, "tetrahedra that stood twice were left out");
+}
+
+Model model_of(Run& run, TetMesh mesh, const ModelArguments& a) {
+  return run.timed("build", [&] {
+    return solid_model(std::move(mesh),
+                       {.material = a.build.material,
+                        .quadratic = a.order == 2,
+                        .drag_rate = a.build.drag_rate,
+                        .normals = a.build.normals},
+                       run.context());
+  });
+}
+
+constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
+constexpr double usual_tetrahedra = 10000; // without a grade
+constexpr unsigned usual_grade = 1;
+constexpr double voxels_per_cell = 2;
+constexpr double told_loss = 0.02; // of the volume
+
+} // namespace
+
+Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
+  refuse_others(a);
+  refuse_surfaces(a);
+  TetReadOptions options;
+  options.kind = kind;
+  if (!a.unit.empty())
+    options.scale = millimetres_per(a.unit);
+  TetMesh mesh = run.timed("read", [&] { return read_tet_mesh(input, options); });
+  return at(input.name(), [&] {
+    if (!a.repair.empty())
+      repair(run, input.name(), mesh, a.repairs);
+    const TetReport found = examine_tetrahedra(mesh);
+    require_sound(found);
+    run.stats().set("dropped_points", found.unused_points.count);
+    return model_of(run, std::move(mesh), a);
+  });
+}
+
+Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh,
+                     const ModelArguments& a) {
+  refuse_others(a);
+  refuse(
+      !a.build.material.of_part.empty(),
+      "--solid has one material, expected no PART=NAME: mc-opt --tets --materials makes several");
+  const double volume = std::abs(signed_volume(mesh));
+  const double cell = a.cell.value_or(std::cbrt(tetrahedra_per_cell * volume / usual_tetrahedra));
+  return at(name, [&] {
+    if (!(cell > 0 && std::isfinite(cell)))
+      throw Error("the surface has no volume, expected a closed one");
+    const Grid grid = run.timed("voxelize", [&] {
+      return jones_density(run.context(), mesh, uniform_transform(cell / voxels_per_cell),
+                           OpenMesh::refuse, nullptr, VoxelRule::parity);
+    });
+    TetMesh tets = run.timed("stuff", [&] {
+      return stuff(run.context(), grid, {.isovalue = {}, .cell = cell, .grade = usual_grade});
+    });
+    if (tets.tetrahedra.empty())
+      throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
+    const double filled = gewebe::volume(tets);
+    run.stats().set("cell", cell);
+    run.stats().set("volume_surface", volume);
+    run.stats().set("volume", filled);
+    run.say(name + ": " + std::to_string(tets.tetrahedra.size()) + " tetrahedra of cells of " +
+            number_text(cell) + " mm");
+    if (!(std::abs(filled - volume) <= told_loss * volume))
+      run.warn(name + ": cells of " + number_text(cell) + " mm change the volume by " +
+               number_text(std::round(1000 * (filled - volume) / volume) / 10) +
+               " %, expected a smaller --cell");
+    return model_of(run, std::move(tets), a);
+  });
+}
+
+} // namespace gewebe::cli
