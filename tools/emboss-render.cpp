@@ -3,6 +3,7 @@
 #include "base/digest.h"
 #include "formats/image/image_file.h"
 #include "tools/render/render_arguments.h"
+#include "tools/render/render_field.h"
 #include "tools/render/render_pictures.h"
 #include "tools/render/render_volume.h"
 #include "tools/render/solid_surface.h"
@@ -57,7 +58,7 @@ std::string numbered(const std::string& pattern, std::int64_t n) {
   return name;
 }
 
-void work(cli::Run& run, const cli::RenderArguments& a) {
+void work(cli::Run& run, cli::RenderArguments a) {
   const Kind to = output_kind(run.to(), run.output(), Kind::png, picture_kinds());
   const bool sequence = !a.frames.empty() || a.turn || a.turn_light;
   const bool many = sequence && run.output().find('%') != std::string::npos;
@@ -65,7 +66,7 @@ void work(cli::Run& run, const cli::RenderArguments& a) {
   if (!many)
     one.emplace(run.output(), run.output_options(true));
   Input input(a.surface);
-  SurfaceReadOptions reading = a.reading;
+  SurfaceReadOptions& reading = a.reading;
   reading.kind = input_kind(input.peek(4096), a.surface, run.format());
   check_kind(a, input, reading.kind);
   if (reading.kind == Kind::vdb) {
@@ -84,6 +85,8 @@ void work(cli::Run& run, const cli::RenderArguments& a) {
     for (std::int64_t n = 0; n < count; ++n)
       frames.push_back(n);
   }
+  if (reading.kind == Kind::hdf5)
+    take_field(run, a, input, a.frames.empty() ? std::vector{reading.frame.value_or(-1)} : frames);
   cli::Pictures pictures(run, a);
   Digest digest;
   Image picture;

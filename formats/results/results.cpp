@@ -4,6 +4,7 @@
 #include "formats/store/hdf5_internal.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -71,6 +72,57 @@ std::optional<ShapeGroup> shape_in_frame(const hdf5::Group& objects, const std::
   return found;
 }
 
+/// The group of an object. \throw Error naming those there are
+hdf5::Group object_group(const std::string& path, const hdf5::Group& objects,
+                         const std::string& object) {
+  if (objects.has(object))
+    return objects.group(object);
+  std::string list;
+  for (const std::string& name : object_names(objects))
+    list += (list.empty() ? "" : ", ") + name;
+  throw Error(path, "there is no object '" + object + "', expected " +
+                        (list.empty() ? "one, but there is none" : "one of " + list));
+}
+
+/// The first `count` points of a shape in a frame, or all; at rest, and displaced.
+struct FramePoints {
+  std::vector<Vec3> rest, moved;
+  std::vector<double> lengths; ///< of the displacements
+};
+FramePoints read_points(const std::string& path, const ShapeGroup& shape, std::size_t frame,
+                        bool surface) {
+  const hdf5::Group& group = shape.group;
+  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
+  const std::uint64_t n = rows_of_three(points);
+  const auto of_surface = group.number<std::uint64_t>("surface_nodes");
+  if (of_surface > n)
+    group.fail("has " + std::to_string(of_surface) + " nodes on the surface, expected at most " +
+               std::to_string(n));
+  const hdf5::Dataset displacement = group.dataset("displacement", hdf5::Number::float32);
+  displacement.require_shape({displacement.rows(), n, 3});
+  if (frame - shape.first >= displacement.rows())
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(shape.first + displacement.rows() - 1));
+  std::vector<double> rest(3 * n);
+  std::vector<float> moved(3 * n);
+  points.read_rows(0, std::span<double>(rest));
+  displacement.read_rows(frame - shape.first, std::span<float>(moved));
+  FramePoints result;
+  const std::uint64_t count = surface ? of_surface : n;
+  result.rest.reserve(count);
+  result.moved.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const p = &rest[3 * i];
+    const float* const u = &moved[3 * i];
+    result.rest.push_back({p[0], p[1], p[2]});
+    result.lengths.push_back(
+        norm({static_cast<double>(u[0]), static_cast<double>(u[1]), static_cast<double>(u[2])}));
+    result.moved.push_back({p[0] + static_cast<double>(u[0]), p[1] + static_cast<double>(u[1]),
+                            p[2] + static_cast<double>(u[2])});
+  }
+  return result;
+}
+
 } // namespace
 
 ResultIndex read_result_index(const std::string& path) {
@@ -88,13 +140,7 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
                                   std::size_t frame) {
   const hdf5::File file = open_checked(path);
   const hdf5::Group objects = file.root().group("objects");
-  if (!objects.has(object)) {
-    std::string list;
-    for (const std::string& name : object_names(objects))
-      list += (list.empty() ? "" : ", ") + name;
-    throw Error(path, "there is no object '" + object + "', expected " +
-                          (list.empty() ? "one, but there is none" : "one of " + list));
-  }
+  const hdf5::Group whole = object_group(path, objects, object);
   const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
   if (!shape) {
     ResultSurface none;
@@ -102,34 +148,10 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
     return none;
   }
   const hdf5::Group& group = shape->group;
-  const std::uint64_t begin = shape->first;
-  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
-  const std::uint64_t n = rows_of_three(points);
-  const auto surface = group.number<std::uint64_t>("surface_nodes");
-  if (surface > n)
-    group.fail("has " + std::to_string(surface) + " nodes on the surface, expected at most " +
-               std::to_string(n));
-  const hdf5::Dataset displacement = group.dataset("displacement", hdf5::Number::float32);
-  displacement.require_shape({displacement.rows(), n, 3});
-  if (frame - begin >= displacement.rows())
-    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
-                          std::to_string(begin + displacement.rows() - 1));
-
-  std::vector<double> rest(3 * n);
-  std::vector<float> moved(3 * n);
-  points.read_rows(0, std::span<double>(rest));
-  displacement.read_rows(frame - begin, std::span<float>(moved));
+  FramePoints points = read_points(path, *shape, frame, true);
   ResultSurface result;
-  result.rest.reserve(surface);
-  result.mesh.points.reserve(surface);
-  for (std::size_t i = 0; i < surface; ++i) {
-    const double* const p = &rest[3 * i];
-    const float* const u = &moved[3 * i];
-    result.rest.push_back({p[0], p[1], p[2]});
-    result.mesh.points.push_back({p[0] + static_cast<double>(u[0]),
-                                  p[1] + static_cast<double>(u[1]),
-                                  p[2] + static_cast<double>(u[2])});
-  }
+  result.rest = std::move(points.rest);
+  result.mesh.points = std::move(points.moved);
 
   const hdf5::Dataset triangles = group.dataset("triangles", hdf5::Number::uint32);
   const std::uint64_t count = rows_of_three(triangles);
@@ -150,10 +172,70 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
   }
   if (group.has("material"))
     result.mesh.material = group.read<std::int32_t>("material", count);
-  if (const hdf5::Group whole = objects.group(object); whole.has("materials"))
+  if (whole.has("materials"))
     result.materials = whole.read_texts("materials");
   at(path, [&] { check_mesh(result.mesh); });
   return result;
+}
+
+ResultSolid read_result_solid(const std::string& path, const std::string& object,
+                              std::size_t frame) {
+  const hdf5::File file = open_checked(path);
+  const hdf5::Group objects = file.root().group("objects");
+  const hdf5::Group whole = object_group(path, objects, object);
+  ResultSolid result;
+  const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
+  if (!shape) {
+    result.there = false;
+    return result;
+  }
+  const hdf5::Group& group = shape->group;
+  if (!group.has("tetrahedra"))
+    throw Error(path, "object '" + object + "' has no tetrahedra, expected a solid of them");
+  FramePoints points = read_points(path, *shape, frame, false);
+  result.rest = std::move(points.rest);
+  TetMesh& mesh = result.mesh;
+  mesh.points = std::move(points.moved);
+  const hdf5::Dataset tetrahedra = group.dataset("tetrahedra", hdf5::Number::uint32);
+  const std::uint64_t count = tetrahedra.rows(),
+                      nodes = tetrahedra.shape().size() == 2 ? tetrahedra.shape()[1] : 0;
+  if (nodes != 4 && nodes != 10)
+    tetrahedra.fail("has another shape, expected rows of 4 or of 10 numbers");
+  std::vector<std::uint32_t> numbers(nodes * count);
+  tetrahedra.read_rows(0, std::span<std::uint32_t>(numbers));
+  mesh.tetrahedra.resize(count);
+  mesh.middles.resize(nodes == 10 ? count : 0);
+  for (std::size_t t = 0; t < count; ++t) {
+    std::copy_n(&numbers[nodes * t], 4, mesh.tetrahedra[t].begin());
+    if (nodes == 10)
+      std::copy_n(&numbers[nodes * t + 4], 6, mesh.middles[t].begin());
+  }
+  mesh.material = group.read<std::int32_t>("tetrahedron_material", count);
+  if (whole.has("materials"))
+    result.materials = whole.read_texts("materials");
+  at(path, [&] { check_mesh(mesh); });
+  return result;
+}
+
+const std::vector<std::string>& result_field_names() {
+  static const std::vector<std::string> names{"displacement"};
+  return names;
+}
+
+std::vector<double> read_result_values(const std::string& path, const std::string& object,
+                                       std::size_t frame, const std::string& field) {
+  const hdf5::File file = open_checked(path);
+  const hdf5::Group objects = file.root().group("objects");
+  (void)object_group(path, objects, object);
+  const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
+  if (!shape)
+    return {};
+  std::vector<double> values = read_points(path, *shape, frame, false).lengths;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw Error(path, "the " + field + " of node " + std::to_string(i) + " of object '" + object +
+                            "' is not finite");
+  return values;
 }
 
 } // namespace gewebe

@@ -4,6 +4,7 @@
 
 #include "base/mesh.h"
 #include "base/vec3.h"
+#include "tetrahedra/tet_mesh.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -31,5 +32,25 @@ struct ResultSurface {
 };
 ResultSurface read_result_surface(const std::string& path, const std::string& object,
                                   std::size_t frame);
+
+/// An object's tetrahedra in one frame. A mesh that is displaced may have turned ones.
+struct ResultSolid {
+  TetMesh mesh;                       ///< displaced points: all nodes of the object
+  std::vector<Vec3> rest;             ///< as many
+  std::vector<std::string> materials; ///< names
+  bool there = true;                  ///< false: a part that came off later, the mesh is empty
+};
+/// \throw Error as read_result_surface, and if the object has no tetrahedra
+ResultSolid read_result_solid(const std::string& path, const std::string& object,
+                              std::size_t frame);
+
+/// The fields of a result: "displacement", its length in mm.
+const std::vector<std::string>& result_field_names();
+
+/// The value of a field at each node of the object in one frame, central nodes too; none where it
+/// is not there yet. \throw Error as read_result_surface, and if the object has no such field then;
+/// if a value is not finite
+std::vector<double> read_result_values(const std::string& path, const std::string& object,
+                                       std::size_t frame, const std::string& field);
 
 } // namespace gewebe

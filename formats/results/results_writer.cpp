@@ -102,8 +102,8 @@ public:
       }
       cut.write("origin", from);
       object.displacement = add_shape(cut, model);
-      object.shapes.push_back({"/objects/" + object.name + "/cuts/" + number, model.nodes.size(),
-                               model.triangles.size(), frames_});
+      object.shapes.push_back(
+          shape_of(model, "/objects/" + object.name + "/cuts/" + number, frames_));
     });
   }
 
@@ -141,11 +141,21 @@ public:
   }
 
 private:
-  /// Triangles and displacements of an object in some frames.
+  /// Elements and displacements of an object in some frames.
   struct Shape {
     std::string path;
-    std::uint64_t nodes = 0, triangles = 0, first = 0; ///< frame
+    std::uint64_t first = 0; ///< frame
+    std::uint64_t nodes = 0, triangles = 0, tetrahedra = 0;
+    bool quadratic = false;
   };
+  static Shape shape_of(const Model& model, const std::string& path, std::uint64_t first) {
+    return {path,
+            first,
+            model.nodes.size(),
+            model.triangles.size(),
+            model.tetrahedra.size(),
+            !model.middles.empty()};
+  }
   struct Object {
     std::string name;
     hdf5::Group group;
@@ -173,7 +183,7 @@ private:
                         std::move(frame),
                         std::move(node),
                         std::move(force),
-                        {{"/objects/" + name, model.nodes.size(), model.triangles.size(), first}},
+                        {shape_of(model, "/objects/" + name, first)},
                         std::nullopt});
     return objects_.back();
   }
@@ -202,6 +212,19 @@ private:
     }
     if (!mesh.material.empty())
       group.write("material", mesh.material);
+    if (!model.tetrahedra.empty()) {
+      const std::uint64_t nodes = model.middles.empty() ? 4 : 10;
+      std::vector<std::uint32_t> elements;
+      elements.reserve(nodes * model.tetrahedra.size());
+      for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
+        elements.insert(elements.end(), model.tetrahedra[t].begin(), model.tetrahedra[t].end());
+        if (nodes == 10)
+          elements.insert(elements.end(), model.middles[t].begin(), model.middles[t].end());
+      }
+      group.write("tetrahedra", std::span<const std::uint32_t>(elements),
+                  {model.tetrahedra.size(), nodes});
+      group.write("tetrahedron_material", model.tetrahedron_material);
+    }
     const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
     return group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
   }
@@ -246,6 +269,15 @@ private:
            xml_text(name_) + ":" + path + "</DataItem>\n";
   }
 
+  std::string topology(const char* type, const std::string& path, std::uint64_t count,
+                       std::uint64_t nodes) {
+    const std::string n = std::to_string(count);
+    return std::string("<Topology TopologyType=\"") + type + "\" NumberOfElements=\"" + n +
+           "\">\n" +
+           array(path, n + " " + std::to_string(nodes), R"(NumberType="UInt" Precision="4")") +
+           "</Topology>\n";
+  }
+
   std::string grid(const Object& object, std::uint64_t frame) {
     std::size_t which = 0;
     while (which + 1 < object.shapes.size() && object.shapes[which + 1].first <= frame)
@@ -254,14 +286,20 @@ private:
     const std::uint64_t end =
         which + 1 < object.shapes.size() ? object.shapes[which + 1].first : frames_;
     const std::string& group = shape.path;
-    const std::string n = std::to_string(shape.nodes), t = std::to_string(shape.triangles);
+    const std::string n = std::to_string(shape.nodes);
     std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
-    if (shape.triangles > 0)
-      text += "<Topology TopologyType=\"Triangle\" NumberOfElements=\"" + t + "\">\n" +
-              array(group + "/triangles", t + " 3", R"(NumberType="UInt" Precision="4")") +
-              "</Topology>\n";
-    else
+    if (shape.tetrahedra > 0) { // nodes are in VTK's order, which is that of its reader
+      text += topology(shape.quadratic ? "Tetrahedron_10" : "Tetrahedron", group + "/tetrahedra",
+                       shape.tetrahedra, shape.quadratic ? 10 : 4);
+      text += "<Attribute Name=\"material\" AttributeType=\"Scalar\" Center=\"Cell\">\n" +
+              array(group + "/tetrahedron_material", std::to_string(shape.tetrahedra),
+                    R"(NumberType="Int" Precision="4")") +
+              "</Attribute>\n";
+    } else if (shape.triangles > 0) {
+      text += topology("Triangle", group + "/triangles", shape.triangles, 3);
+    } else {
       text += "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"" + n + "\"/>\n";
+    }
     text += "<Geometry GeometryType=\"XYZ\">\n" +
             array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
             "</Geometry>\n<Attribute Name=\"displacement\" AttributeType=\"Vector\" "

@@ -193,13 +193,18 @@ private:
   }
 
   /// On the line between the ends, from the nearer one.
-  Vec3 place_of(Corner corner) const {
+  ClipPoint origin_of(Corner corner) const {
     if (!is_crossing(corner))
-      return mesh_.points[corner];
+      return {static_cast<std::uint32_t>(corner), static_cast<std::uint32_t>(corner), 0};
     auto [near, far] = ends_of(corner);
     if (!(std::fabs(distance_[near]) <= std::fabs(distance_[far])))
       std::swap(near, far);
-    const double share = distance_[near] / (distance_[near] - distance_[far]);
+    return {near, far, distance_[near] / (distance_[near] - distance_[far])};
+  }
+  Vec3 place_of(const ClipPoint& point) const {
+    const auto& [near, far, share] = point;
+    if (near == far)
+      return mesh_.points[near];
     const Vec3 place = mesh_.points[near] + (mesh_.points[far] - mesh_.points[near]) * share;
     if (!is_finite(place))
       throw Error("the edge from point " + std::to_string(near) + " to " + std::to_string(far) +
@@ -220,8 +225,11 @@ private:
                   std::to_string(UINT32_MAX));
     TriangleMesh& mesh = result_.mesh;
     mesh.points.reserve(corners.size());
-    for (const Corner corner : corners)
-      mesh.points.push_back(place_of(corner));
+    result_.origin.reserve(corners.size());
+    for (const Corner corner : corners) {
+      result_.origin.push_back(origin_of(corner));
+      mesh.points.push_back(place_of(result_.origin.back()));
+    }
     mesh.triangles.reserve(triangles_.size());
     const auto number = [&](Corner corner) {
       return static_cast<std::uint32_t>(std::ranges::lower_bound(corners, corner) -

@@ -94,4 +94,32 @@ void make_quadratic(TetMesh& mesh) {
   mesh.middles = std::move(middles);
 }
 
+TetMesh linear_parts(TetMesh mesh) {
+  if (mesh.middles.empty())
+    return mesh;
+  // Nodes 0 to 3 are the corners, 4 to 9 the middles in the order of EdgeMiddles.
+  constexpr std::array<std::array<std::uint8_t, 4>, 8> parts{{{0, 4, 6, 7},
+                                                              {4, 1, 5, 8},
+                                                              {6, 5, 2, 9},
+                                                              {7, 8, 9, 3},
+                                                              {6, 8, 4, 5},
+                                                              {6, 8, 5, 9},
+                                                              {6, 8, 9, 7},
+                                                              {6, 8, 7, 4}}};
+  TetMesh result;
+  result.points = std::move(mesh.points);
+  result.tetrahedra.reserve(8 * mesh.tetrahedra.size());
+  result.material.reserve(8 * mesh.material.size());
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const auto node = [&](std::uint8_t k) {
+      return k < 4 ? mesh.tetrahedra[t][k] : mesh.middles[t][k - 4U];
+    };
+    for (const auto& [a, b, c, d] : parts)
+      result.tetrahedra.push_back({node(a), node(b), node(c), node(d)});
+    if (!mesh.material.empty())
+      result.material.insert(result.material.end(), 8, mesh.material[t]);
+  }
+  return result;
+}
+
 } // namespace gewebe

@@ -31,4 +31,10 @@ NodeOrder order_nodes(TetMesh& mesh);
 /// corners, or too many nodes
 void make_quadratic(TetMesh& mesh);
 
+/// Linear tetrahedra on the nodes of a quadratic mesh: each becomes eight, one at each corner and
+/// four about the line between the middles of edges 02 and 13, so that each face becomes four
+/// triangles as a model's surface has them. A linear mesh stays as it is.
+/// \pre check_mesh(mesh) passes
+TetMesh linear_parts(TetMesh mesh);
+
 } // namespace gewebe

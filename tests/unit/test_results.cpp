@@ -5,6 +5,8 @@
 #include "formats/store/hdf5_internal.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "solid/solid_model.h"
+#include "tet_fixtures.h"
 
 #include <algorithm>
 #include <array>
@@ -402,6 +404,122 @@ TEST(Results, TheXdmfOfACutObjectNamesTheRowsOfEachFrame) {
   }
   EXPECT_EQ(told, (std::vector<std::pair<std::string, double>>{
                       {"o", 0}, {"o", 1}, {"o", 2}, {"o", 3}, {"o.1", -3}, {"o", 4}, {"o.1", -4}}));
+}
+
+/// A box of 12 tetrahedra of two materials.
+Model solid_box(bool quadratic) {
+  TetMesh mesh = test::box_tetrahedra(2, 1, 1, 5);
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+    mesh.material.push_back(t >= 6 ? 1 : 0);
+  SolidModelOptions options;
+  options.material = {{{.name = "gel", .poisson = 0.4}, {.name = "stone", .poisson = 0.2}}, {0, 1}};
+  options.quadratic = quadratic;
+  return solid_model(std::move(mesh), options, {});
+}
+
+TEST(Results, SolidsAreWrittenAndRead) {
+  const ScratchFolder folder;
+  for (const bool quadratic : {false, true}) {
+    const Model solid = solid_box(quadratic), springs = test::two_masses();
+    const std::string path = folder / (quadratic ? "ten.h5" : "four.h5");
+    write(Kind::hdf5, path, solid, springs);
+    const ResultSolid read = read_result_solid(path, "z-a", 1);
+    const TetMesh at_rest = element_mesh(solid);
+    EXPECT_TRUE(read.there);
+    EXPECT_EQ(read.mesh.tetrahedra, at_rest.tetrahedra);
+    EXPECT_EQ(read.mesh.middles, at_rest.middles);
+    EXPECT_EQ(read.mesh.middles.empty(), !quadratic);
+    EXPECT_EQ(read.mesh.material, at_rest.material);
+    EXPECT_EQ(read.rest, at_rest.points);
+    EXPECT_EQ(read.materials, (std::vector<std::string>{"gel", "stone"}));
+    ASSERT_EQ(read.mesh.points.size(), at_rest.points.size());
+    for (std::size_t i = 0; i < at_rest.points.size(); ++i) {
+      const double k = 3 * static_cast<double>(i);
+      EXPECT_EQ(read.mesh.points[i], at_rest.points[i] + Vec3(k / 8, (k + 1) / 8, (k + 2) / 8));
+    }
+    EXPECT_EQ(read_result_solid(path, "z-a", 0).mesh.points, at_rest.points);
+    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "b", 1); }),
+              path + ": object 'b' has no tetrahedra, expected a solid of them");
+    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "z-a", 3); }),
+              path + ": there is no frame 3, expected 0 to 2");
+    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "none", 1); }),
+              path + ": there is no object 'none', expected one of z-a, b");
+    const std::string xdmf = bytes_of(folder / (quadratic ? "ten.xdmf" : "four.xdmf"));
+    const std::string topology = "<Topology TopologyType=\"";
+    EXPECT_NE(xdmf.find(topology + (quadratic ? "Tetrahedron_10\"" : "Tetrahedron\"") +
+                        " NumberOfElements=\"12\">\n<DataItem Format=\"HDF\" Dimensions=\"12 " +
+                        (quadratic ? "10" : "4")),
+              std::string::npos)
+        << xdmf;
+    EXPECT_EQ(xdmf.find(topology + "Triangle"), std::string::npos);
+  }
+}
+
+/// A file by hand, of a solid with one tetrahedron.
+struct HandMade {
+  std::vector<std::uint32_t> tetrahedra{0, 1, 2, 3};
+  hdf5::Shape shape{1, 4};
+  std::vector<std::int32_t> material{0};
+
+  void write(const std::string& path) const {
+    hdf5::File file = hdf5::File::create(path);
+    file.root().set("format", "gewebe_results");
+    file.root().set("version", std::uint32_t{1});
+    file.root().write("time", std::vector<double>{0});
+    hdf5::Group objects = file.root().create_group("objects");
+    hdf5::Group o = objects.create_group("o");
+    o.set("order", std::uint32_t{0});
+    o.set("surface_nodes", std::uint64_t{4});
+    const std::vector<double> points{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    o.write("points", std::span<const double>(points), {4, 3});
+    const std::vector<std::uint32_t> faces{0, 2, 1};
+    o.write("triangles", std::span<const std::uint32_t>(faces), {1, 3});
+    const std::vector<float> u(12);
+    o.write("displacement", std::span<const float>(u), {1, 4, 3});
+    o.write("tetrahedra", std::span<const std::uint32_t>(tetrahedra), shape);
+    o.write("tetrahedron_material", material);
+    file.close();
+  }
+};
+
+TEST(Results, TetrahedraThatAreWrongAreNamed) {
+  const ScratchFolder folder;
+  const std::string path = folder / "hand.h5";
+  const auto of = [&](const HandMade& made) {
+    made.write(path);
+    return complaint([&] { (void)read_result_solid(path, "o", 0); });
+  };
+  const std::vector<std::uint32_t> ten{0, 1, 2, 3, 0, 0, 0, 0, 0, 4};
+  EXPECT_EQ(of({}), "");
+  EXPECT_EQ(of({.tetrahedra = {0, 1, 2, 4}}),
+            path + ": tetrahedron 0 has corner 4, expected an index below 4");
+  EXPECT_EQ(of({.tetrahedra = ten, .shape = {1, 10}}),
+            path + ": tetrahedron 0 has an edge's middle 4, expected an index below 4");
+  EXPECT_EQ(of({.tetrahedra = {0, 1, 2}, .shape = {1, 3}}),
+            path + ": '/objects/o/tetrahedra': has another shape, expected rows of 4 or of 10 "
+                   "numbers");
+  EXPECT_EQ(of({.shape = {4}}),
+            path + ": '/objects/o/tetrahedra': has another shape, expected rows of 4 or of 10 "
+                   "numbers");
+  EXPECT_NE(of({.material = {0, 0}}).find("'/objects/o/tetrahedron_material': "),
+            std::string::npos);
+  EXPECT_EQ(of({.material = {-1}}), path + ": tetrahedron 0 has material -1, expected 0 or more");
+}
+
+TEST(Results, DamagedSolidsAreErrorsOrSound) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5", copy = folder / "copy.h5";
+  write(Kind::hdf5, path, solid_box(true), test::two_masses());
+  const std::string whole = bytes_of(path);
+  std::size_t errors = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 1 + whole.size() / 400) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 0x15);
+    std::ofstream(copy, std::ios::binary) << changed;
+    errors +=
+        complaint([&] { check_mesh(read_result_solid(copy, "z-a", 1).mesh); }).empty() ? 0 : 1;
+  }
+  EXPECT_GT(errors, 0U);
 }
 
 TEST(Results, ACutThatKeepsTheNodesHasThemInTheirPlaces) {

@@ -9,6 +9,7 @@
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
 #include "tetrahedra/clip.h"
+#include "tetrahedra/order.h"
 
 #include <gtest/gtest.h>
 
@@ -333,6 +334,47 @@ TEST(TetClip, PointsDoNotDependOnTheOrderOfTetrahedra) {
   EXPECT_TRUE(test::same_bytes(one.mesh.points, other.mesh.points));
   EXPECT_EQ(one.cut_begin, other.cut_begin);
   EXPECT_NEAR(cut_area(one), cut_area(other), 1e-12);
+}
+
+TEST(TetClip, PointsTellBetweenWhichNodesTheyStand) {
+  const TetMesh mesh = test::distorted_box();
+  const TetClip left = clip_tetrahedra(mesh, {{1, 1, 1}, {1, 2, -0.5}});
+  ASSERT_EQ(left.origin.size(), left.mesh.points.size());
+  std::size_t crossings = 0;
+  for (std::size_t k = 0; k < left.origin.size(); ++k) {
+    const auto& [a, b, share] = left.origin[k];
+    const Vec3 place = mesh.points[a] + (mesh.points[b] - mesh.points[a]) * share;
+    EXPECT_EQ(place, left.mesh.points[k]);
+    EXPECT_GE(share, 0);
+    EXPECT_LE(share, 0.5); // from the nearer one
+    crossings += a != b ? 1 : 0;
+  }
+  EXPECT_GT(crossings, 20U);
+}
+
+TEST(TetClip, QuadraticTetrahedraBecomeEightOfTheirNodes) {
+  TetMesh mesh = test::distorted_box();
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+    mesh.material.push_back(t % 3 == 0);
+  EXPECT_EQ(linear_parts(mesh).tetrahedra, mesh.tetrahedra); // linear already
+  make_quadratic(mesh);
+  const TetMesh parts = linear_parts(mesh);
+  check_mesh(parts);
+  EXPECT_EQ(parts.points, mesh.points);
+  EXPECT_TRUE(parts.middles.empty());
+  ASSERT_EQ(parts.tetrahedra.size(), 8 * mesh.tetrahedra.size());
+  const auto volume_of = [](const TetMesh& of, std::size_t t) {
+    const auto& [a, b, c, d] = of.tetrahedra[t];
+    return tetrahedron_volume(of.points[a], of.points[b], of.points[c], of.points[d]);
+  };
+  for (std::size_t t = 0; t < parts.tetrahedra.size(); ++t) {
+    EXPECT_NEAR(volume_of(parts, t) / volume_of(mesh, t / 8), 0.125, 1e-12);
+    EXPECT_EQ(parts.material[t], mesh.material[t / 8]);
+  }
+  const TetReport report = examine_tetrahedra(parts);
+  EXPECT_TRUE(report.sound()); // they meet face to face
+  EXPECT_TRUE(report.manifold_boundary());
+  EXPECT_EQ(report.boundary_triangles, 4 * examine_tetrahedra(mesh).boundary_triangles);
 }
 
 TEST(TetClip, PlanesWithoutDirectionAreRefused) {

@@ -2,6 +2,7 @@
 
 #include "shading/color_ramp.h"
 #include "tools/render/render_camera.h"
+#include "tools/render/render_field.h"
 #include "tools/render/render_layer.h"
 #include "tools/render/render_materials.h"
 #include "tools/render/render_volume.h"
@@ -158,6 +159,7 @@ void complete(RenderArguments& a) {
     a.drawing.directional = true;
     refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
   }
+  complete_field(a);
   refuse(!a.frames.empty() && a.reading.frame.has_value(),
          "--frame and --frames, expected one of them");
   std::vector<std::string> inputs{a.surface};
@@ -236,7 +238,7 @@ void declare(Program& p, RenderArguments& a) {
       .one_of({"auto", "vertex", "pixel"});
   p.option("--compare", a.words.compare, "MODES", "side by side, such as 3,2,1,shader,cpu");
   p.option("--clip", a.words.clip, "X,Y,Z,NX,NY,NZ",
-           "of tetrahedra: cut them open; what lies on that side of a point goes")
+           "of tetrahedra, solids: cut them open; what lies on that side of a point goes")
       .count(6);
   p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
@@ -246,6 +248,7 @@ void declare(Program& p, RenderArguments& a) {
   p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
       .range(1, 100000);
   p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
+  declare_field(p, a);
   declare_volume(p, a);
   p.check([&a] { complete(a); });
 }

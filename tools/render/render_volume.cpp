@@ -34,6 +34,13 @@ double place_of(const std::string& word) {
   return place;
 }
 
+void refuse(bool wrong, const Input& input, const std::string& what) {
+  if (wrong)
+    throw UsageError(input.name(), what);
+}
+
+} // namespace
+
 ColorRamp ramp_of(const std::string& word, const Context& context) {
   if (is_ramp_name(word))
     return color_ramp_from_name(word);
@@ -42,20 +49,13 @@ ColorRamp ramp_of(const std::string& word, const Context& context) {
   return at(input.name(), [&] { return color_ramp_from_image(image); });
 }
 
-void refuse(bool wrong, const Input& input, const std::string& what) {
-  if (wrong)
-    throw UsageError(input.name(), what);
-}
-
-} // namespace
-
 void declare_volume(Program& p, RenderArguments& a) {
   p.option("--slice", a.volume.slice, "AXIS=MM",
            "of a volume: across x, y, z or view, at a place or in the middle");
   p.option("--maximum", a.volume.maximum, "AXIS",
            "of a volume: the greatest values along x, y, z, or view (the default)");
   p.option("--ramp", a.volume.ramp, "RAMP",
-           "colours of its values: gray, heat, rainbow, or an image");
+           "colours of its values or a field's: gray, heat, rainbow, or an image");
   p.option("--range", a.volume.range, "A,B", "values with the first and last colour, else all")
       .count(2);
 }
@@ -82,10 +82,15 @@ void complete_volume(RenderArguments& a) {
 
 void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
   const RenderVolume& v = a.volume;
+  const bool field = !a.reading.field.empty();
   if (kind != Kind::vdb)
-    return refuse(!v.slice.empty() || !v.maximum.empty() || !v.ramp.empty() || !v.range.empty(),
+    return refuse(!v.slice.empty() || !v.maximum.empty() ||
+                      (!field && (!v.ramp.empty() || !v.range.empty())),
                   input,
-                  "--slice, --maximum, --ramp or --range for no volume, expected none of them");
+                  field ? "--slice or --maximum for no volume, expected neither"
+                        : "--slice, --maximum, --ramp or --range for no volume, expected none of "
+                          "them (--ramp and --range with --field too)");
+  refuse(field, input, "--field for a volume, expected --ramp alone");
   refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
          "a texture for a volume, expected --ramp or none");
   refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||

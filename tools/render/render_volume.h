@@ -3,6 +3,7 @@
 
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
+#include "shading/color_ramp.h"
 #include "shading/image.h"
 #include "tools/render/render_arguments.h"
 #include "tools/shared/cli.h"
@@ -15,6 +16,9 @@ void declare_volume(Program& program, RenderArguments& arguments);
 void complete_volume(RenderArguments& arguments);
 /// \throw UsageError for options that an input of that kind has no use for
 void check_kind(const RenderArguments& arguments, const Input& input, Kind kind);
+
+/// The ramp of a name, or of an image. \throw Error with place
+ColorRamp ramp_of(const std::string& word, const Context& context);
 
 /// The picture of the volume. \throw Error with place
 Image volume_picture(Run& run, const RenderArguments& arguments, Input& input);

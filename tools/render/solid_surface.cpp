@@ -25,41 +25,54 @@ double area(const TriangleMesh& mesh, std::span<const Triangle> triangles) {
   return sum;
 }
 
-/// Gives the triangles from `begin` points of their own, in place of those that others use too.
-void part_from(TriangleMesh& mesh, std::size_t begin) {
+/// Gives the triangles of the cut points of their own, in place of those that others use too.
+void part_cut(TetClip& clip) {
+  TriangleMesh& mesh = clip.mesh;
   std::vector<std::uint32_t> own(mesh.points.size());
   std::iota(own.begin(), own.end(), 0U);
-  for (const Triangle& triangle : std::span(mesh.triangles).first(begin))
+  for (const Triangle& triangle : std::span(mesh.triangles).first(clip.cut_begin))
     for (const std::uint32_t corner : triangle)
       own[corner] = UINT32_MAX;
-  for (Triangle& triangle : std::span(mesh.triangles).subspan(begin))
+  for (Triangle& triangle : std::span(mesh.triangles).subspan(clip.cut_begin))
     for (std::uint32_t& corner : triangle) {
       std::uint32_t& number = own[corner];
       if (number == UINT32_MAX) {
         number = static_cast<std::uint32_t>(mesh.points.size());
         mesh.points.push_back(mesh.points[corner]);
+        clip.origin.push_back(clip.origin[corner]);
       }
       corner = number;
     }
-  mesh.part.assign(begin, 0);
+  mesh.part.assign(clip.cut_begin, 0);
   mesh.part.resize(mesh.triangles.size(), 1);
 }
 
-TriangleMesh cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
-  TetClip left = clip_tetrahedra(mesh, plane);
-  if (left.mesh.triangles.empty())
-    throw Error("--clip takes all of it away, expected a plane with some on the side that its "
-                "normal points away from");
-  const auto cut = std::span(left.mesh.triangles).subspan(left.cut_begin);
-  report.tetrahedra_cut = left.tetrahedra_cut;
-  report.tetrahedra_removed = left.tetrahedra_removed;
-  report.cut_triangles = cut.size();
-  report.cut_area = area(left.mesh, cut);
-  part_from(left.mesh, left.cut_begin);
-  return std::move(left.mesh);
+} // namespace
+
+void examine_solid(const TetMesh& mesh, SolidReport& report) {
+  const TetReport found = examine_tetrahedra(mesh);
+  require_sound(found);
+  report.tetrahedra += found.tetrahedra;
+  report.curved_edges += found.curved_edges.count;
 }
 
-} // namespace
+TetClip cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
+  TetClip left = clip_tetrahedra(mesh, plane);
+  const auto cut = std::span(left.mesh.triangles).subspan(left.cut_begin);
+  report.tetrahedra_cut += left.tetrahedra_cut;
+  report.tetrahedra_removed += left.tetrahedra_removed;
+  report.cut_triangles += cut.size();
+  report.cut_area += area(left.mesh, cut);
+  part_cut(left);
+  return left;
+}
+
+TriangleMesh open_mesh(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report) {
+  TetClip left = cut_open(mesh, plane, report);
+  if (left.mesh.triangles.empty())
+    throw Error(takes_all_away);
+  return std::move(left.mesh);
+}
 
 Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report) {
   report = {};
@@ -69,12 +82,9 @@ Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport&
     reading.scale = millimetres_per(options.unit);
   const TetMesh mesh = read_tet_mesh(input, reading);
   return at(input.name(), [&] {
-    const TetReport found = examine_tetrahedra(mesh);
-    require_sound(found);
-    report.tetrahedra = found.tetrahedra;
-    report.curved_edges = found.curved_edges.count;
+    examine_solid(mesh, report);
     Surface surface;
-    surface.mesh = options.clip ? cut_open(mesh, *options.clip, report) : boundary(mesh).mesh;
+    surface.mesh = options.clip ? open_mesh(mesh, *options.clip, report) : boundary(mesh).mesh;
     return surface;
   });
 }

@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "formats/stream/stream.h"
 #include "shading/drawing.h"
+#include "tetrahedra/clip.h"
 #include "tools/render/surface_file.h"
 #include "tools/shared/cli.h"
 
@@ -15,6 +16,19 @@ namespace gewebe {
 /// \throw Error with place: what read_tet_mesh, require_sound and clip_tetrahedra refuse; a plane
 /// that takes all away
 Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report);
+
+/// Adds to the report. \throw Error if require_sound refuses
+void examine_solid(const TetMesh& mesh, SolidReport& report);
+/// What the plane leaves of tetrahedra, quadratic ones taken by their corners: parts and points as
+/// above. Adds to the report; a mesh without points where nothing is left.
+/// \pre as for clip_tetrahedra   \throw Error as it
+TetClip cut_open(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report);
+/// The mesh of that. \throw Error too if nothing is left
+TriangleMesh open_mesh(const TetMesh& mesh, const ClipPlane& plane, SolidReport& report);
+
+inline constexpr const char* takes_all_away =
+    "--clip takes all of it away, expected a plane with some on the side that its normal points "
+    "away from";
 
 namespace cli {
 /// Into the stats, with warnings of edges that are drawn straight and a plane that takes nothing

@@ -5,6 +5,9 @@
 #include "formats/model/ela.h"
 #include "formats/results/results.h"
 #include "formats/tetrahedra/tet_file.h"
+#include "solid/solid_model.h"
+#include "tetrahedra/order.h"
+#include "tools/render/result_surfaces.h"
 #include "tools/render/solid_surface.h"
 
 #include <algorithm>
@@ -20,34 +23,21 @@ std::vector<Surface> one(TriangleMesh mesh) {
   return surfaces;
 }
 
-std::vector<Surface> read_frame(const Input& input, const SurfaceReadOptions& options) {
-  const std::string& path = input.name();
-  if (path == "-")
-    throw Error(path, "a result comes by a pipe, expected the name of its file");
-  const ResultIndex index = read_result_index(path);
-  const auto frames = static_cast<std::int64_t>(index.times.size());
-  const std::int64_t frame = options.frame.value_or(-1);
-  if (frame < -1 || frame >= frames || frames == 0)
-    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
-                          std::to_string(frames - 1));
-  std::vector<Surface> surfaces;
-  const std::vector<std::string> names =
-      options.object.empty() ? index.objects : std::vector<std::string>{options.object};
-  for (const std::string& name : names) {
-    const std::int64_t which = frame < 0 ? frames - 1 : frame;
-    ResultSurface read = read_result_surface(path, name, static_cast<std::size_t>(which));
-    if (read.there || !options.object.empty())
-      surfaces.push_back({std::move(read.mesh), std::move(read.rest), std::move(read.materials)});
-  }
-  return surfaces;
-}
-
 std::int64_t whole_number(const Input& input, const std::string& word, const std::string& part) {
   std::int64_t value = 0;
   const auto [rest, status] = std::from_chars(part.data(), part.data() + part.size(), value);
   if (status != std::errc{} || rest != part.data() + part.size())
     throw UsageError(input.name(), "--frames: '" + word + "', expected all, K, A:B or A:B:STEP");
   return value;
+}
+
+constexpr const char* no_tetrahedra =
+    "--clip for what has no tetrahedra, expected a tetrahedral mesh (mc-opt --tets makes one)";
+
+TriangleMesh open_model(const Model& model, const ClipPlane& plane, SolidReport& report) {
+  TetMesh mesh = element_mesh(model);
+  examine_solid(mesh, report);
+  return open_mesh(linear_parts(std::move(mesh)), plane, report);
 }
 
 void refuse(bool wrong, const Input& input, const char* what) {
@@ -113,20 +103,25 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
   refuse((is_result || is_model) && !options.unit.empty(), input,
          "--unit for what is in mm, expected no --unit");
   const bool is_solid = holds_tetrahedra(input.peek(4096), options.kind);
-  refuse(
-      !is_solid && options.clip, input,
-      "--clip for what has no tetrahedra, expected a tetrahedral mesh (mc-opt --tets makes one)");
+  refuse(!is_solid && !is_result && !is_model && options.clip, input, no_tetrahedra);
+  refuse(!is_result && !options.field.empty(), input,
+         "--field for no result of a run, expected no --field");
+  SolidReport unused;
+  SolidReport& report = solid == nullptr ? unused : *solid;
+  report = {};
   if (is_solid) {
-    SolidReport unused;
     std::vector<Surface> surfaces;
-    surfaces.push_back(read_solid(input, options, solid == nullptr ? unused : *solid));
+    surfaces.push_back(read_solid(input, options, report));
     return surfaces;
   }
   if (is_result)
-    return read_frame(input, options);
+    return read_result_surfaces(input, options, report);
   if (is_model) {
     const Model model = read_ela(input, context);
-    std::vector<Surface> surfaces = one(surface_mesh(model));
+    refuse(model.tetrahedra.empty() && options.clip, input, no_tetrahedra);
+    std::vector<Surface> surfaces = one(
+        options.clip ? at(input.name(), [&] { return open_model(model, *options.clip, report); })
+                     : surface_mesh(model));
     for (const Material& material : model.materials)
       surfaces[0].materials.push_back(material.name);
     return surfaces;

@@ -7,6 +7,7 @@
 #include "shading/drawing.h"
 #include "tetrahedra/clip.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -20,6 +21,9 @@ struct SurfaceReadOptions {
   std::string object;                ///< of a result, by name; "": all
   std::optional<std::int64_t> frame; ///< of a result, from 0; -1 is the last one, and the default
   std::optional<ClipPlane> clip;     ///< of tetrahedra
+  std::string field;                 ///< of a result, of result_field_names(); "": none
+  std::optional<std::array<double, 2>>
+      field_range; ///< the values of the ramp's ends, if there is one
 };
 
 /// What was found in a tetrahedral mesh; all 0 of anything else.
@@ -41,8 +45,9 @@ const std::vector<std::string>& surface_unit_names();
 /// \throw Error with place if there are no such frames; UsageError if it is none of these words
 std::vector<std::int64_t> result_frames(const Input& input, const std::string& word);
 
-/// The surfaces of `input` in mm, in order; those of a result with their points at rest. A PLY with
-/// the element tetrahedron is tetrahedra, whatever faces it has (solid_surface.h).
+/// The surfaces of `input` in mm, in order; those of a result with their points at rest
+/// (result_surfaces.h). A PLY with the element tetrahedron is tetrahedra, whatever faces it has
+/// (solid_surface.h); a model is where options.clip is given.
 /// \throw Error with place, also if a result comes by a pipe, or has no such object or frame;
 /// UsageError for options that the kind has no use for
 std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& options,

@@ -1,0 +1,157 @@
+# Results of solids: other programs read their tetrahedra, pictures show them cut open.
+# shellcheck shell=bash disable=SC2317 # functions are called by name
+
+need() {
+  local tool
+  for tool in "$@"; do
+    command -v "$tool" >/dev/null || skip "no $tool"
+  done
+}
+
+# gel.ela: a block 40 × 10 × 10 mm of quadratic elements, of two materials, held at x = 0; bend.scene bends it.
+solid_scene() {
+  cat >block.py <<'P'
+nx, ny, nz, h = 8, 2, 2, 5
+number = lambda i, j, k: 1 + i + (nx + 1) * (j + (ny + 1) * k)
+print('MeshVersionFormatted 2\nDimension 3\nVertices', (nx + 1) * (ny + 1) * (nz + 1))
+for k in range(nz + 1):
+    for j in range(ny + 1):
+        for i in range(nx + 1):
+            print(i * h, j * h, k * h, 0)
+rows = []
+from itertools import permutations
+for k in range(nz):
+    for j in range(ny):
+        for i in range(nx):
+            for order in permutations(range(3)):
+                at = [i, j, k]
+                corners = [number(*at)]
+                for axis in order:
+                    at[axis] += 1
+                    corners.append(number(*at))
+                if (order[0] + 1) % 3 != order[1]:
+                    corners[1], corners[2] = corners[2], corners[1]
+                rows.append((*corners, 1 + (2 * k >= nz)))
+print('Tetrahedra', len(rows))
+for row in rows:
+    print(*row)
+print('End')
+P
+  python3 block.py >block.mesh
+  exp2ela -q --order "${1:-2}" --material liver,1=liver,2=uterus --fix 'x<0.001' --name gel block.mesh -o gel.ela
+  printf '%s\n' 'object gel gel.ela method=ffe' 'displace gel x>39.999 0 0 -4' 'step 1' 'step 1' >bend.scene
+  rm block.py block.mesh
+}
+
+test_h5py_reads_the_tetrahedra() {
+  local python
+  need ffe-run exp2ela
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  solid_scene
+  ffe-run -q bend.scene -o run.h5
+  cat >in.py <<'P'
+import h5py, numpy
+with h5py.File('run.h5') as f:
+    o = f['objects/gel']
+    t, m, p = o['tetrahedra'][:], o['tetrahedron_material'][:], o['points'][:]
+    assert t.shape == (192, 10) and t.max() < len(p) and sorted(set(m)) == [0, 1], (t.shape, set(m))
+    a, b, c, d = (p[t[:, k]] for k in range(4))
+    volume = numpy.einsum('ij,ij->i', numpy.cross(b - a, c - a), d - a) / 6
+    assert volume.min() > 0 and abs(volume.sum() - 4000) < 1e-9, volume.sum()
+    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
+        assert abs(p[t[:, 4 + k]] - (p[t[:, i]] + p[t[:, j]]) / 2).max() < 1e-12, k
+    assert (numpy.unique(m[(p[t[:, :4]].mean(1)[:, 2] > 5)]) == [1]).all()
+    assert o['displacement'].shape == (3, len(p), 3) and o['displacement'][1, :, 2].min() < -3.9
+P
+  "$python" in.py
+  rm in.py run.h5 run.xdmf gel.ela bend.scene
+}
+
+test_vtk_reads_the_tetrahedra() {
+  need ffe-run exp2ela
+  python3 -c 'import vtk; vtk.vtkXdmfReader' 2>/dev/null || skip 'no VTK with XDMF for python3'
+  local order
+  for order in 1 2; do
+    solid_scene "$order"
+    ffe-run -q bend.scene -o run.h5
+    cat >in.py <<'P'
+import sys, vtk
+quadratic = sys.argv[1] == '2'
+r = vtk.vtkXdmfReader(); r.SetFileName('run.xdmf'); r.UpdateInformation(); r.UpdateTimeStep(1)
+it = r.GetOutputDataObject(0).NewIterator()
+grid = it.GetCurrentDataObject()
+assert grid.GetNumberOfCells() == 192, grid
+types = {grid.GetCellType(c) for c in range(192)}
+assert types == {24 if quadratic else 10}, types
+quality = vtk.vtkMeshQuality(); quality.SetInputData(grid); quality.SetTetQualityMeasureToVolume()
+corners = {}
+total = 0
+for c in range(192):
+    ids = grid.GetCell(c).GetPointIds()
+    p = [grid.GetPoint(ids.GetId(k)) for k in range(ids.GetNumberOfIds())]
+    total += vtk.vtkTetra.ComputeVolume(*p[:4])
+    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))[:len(p) - 4]):
+        assert max(abs(x - (a + b) / 2) for x, a, b in zip(p[4 + k], p[i], p[j])) < 1e-9, (c, k)
+assert abs(total - 4000) < 1e-6, total
+m = grid.GetCellData().GetArray('material')
+assert {m.GetTuple1(c) for c in range(192)} == {0, 1}
+u = grid.GetPointData().GetArray('displacement')
+assert min(u.GetTuple(k)[2] for k in range(grid.GetNumberOfPoints())) < -3.9
+P
+    python3 in.py $order
+    rm run.h5 run.xdmf gel.ela bend.scene in.py
+  done
+}
+
+# The cut of the bent block is where the plane is, has the colours of both materials, and is filled.
+test_results_are_cut_open_as_they_are_bent() {
+  need ffe-run exp2ela emboss-render
+  solid_scene
+  ffe-run -q bend.scene -o run.h5
+  # Across the middle: 10 × 10 mm at rest; along the beam: 40 × 10.
+  local area
+  emboss-render --backend cpu --size 64 --frame 0 --clip 21,0,0,1,0,0 --stats=rest.json run.h5 -o rest.png
+  area=$(sed 's/.*"cut_area":\([0-9.e+-]*\).*/\1/' rest.json)
+  awk -v a="$area" 'BEGIN { exit !(a > 99.999 && a < 100.001) }' || fail "area $area of the cut at rest, expected 100"
+  emboss-render --backend cpu --size 64 --clip 0,5,0,0,1,0 --stats=bent.json run.h5 -o bent.png
+  area=$(sed 's/.*"cut_area":\([0-9.e+-]*\).*/\1/' bent.json)
+  awk -v a="$area" 'BEGIN { exit !(a > 390 && a < 410) }' || fail "area $area of the cut of the bent block, expected 400 or so"
+  # A plane above the held end, which the bent end has left: all that it took at rest stays.
+  emboss-render --backend cpu --size 64 --clip 39,0,7,1,0,1 --frame 0 --stats=rest.json run.h5 -o rest.png
+  emboss-render --backend cpu --size 64 --clip 39,0,7,1,0,1 --stats=bent.json run.h5 -o bent.png
+  grep -q '"tetrahedra_cut":[1-9]' rest.json || fail "$(<rest.json)"
+  [[ $(sed 's/.*"cut_area":\([0-9.]*\).*/\1/' rest.json) != "$(sed 's/.*"cut_area":\([0-9.]*\).*/\1/' bent.json)" ]] ||
+    fail 'the bent block is cut as it was at rest'
+  # The model at rest is cut as frame 0 is.
+  emboss-render --backend cpu --size 64 --clip 21,0,0,1,0,0 --to rgb gel.ela -o model.rgb
+  emboss-render --backend cpu --size 64 --clip 21,0,0,1,0,0 --frame 0 --to rgb run.h5 | cmp - model.rgb
+  expect_failure 1 emboss-render emboss-render --backend cpu --clip=-1,0,0,1,0,0 run.h5 -o none.png
+  rm ./*.json ./*.png model.rgb run.h5 run.xdmf gel.ela bend.scene
+}
+
+test_results_show_a_field_on_the_cut() {
+  need ffe-run exp2ela emboss-render
+  solid_scene
+  ffe-run -q bend.scene -o run.h5
+  # Seen from the side that is cut away, values of the displacement grow from the held end.
+  emboss-render --backend cpu --size 90x30 --plain --supersample 1 --orbit 180,0 --clip 0,5,0,0,-1,0 --field displacement --ramp gray --range 0,4 \
+    --stats=field.json --to rgb run.h5 -o field.rgb
+  cat >in.py <<'P'
+import sys
+raw = open('field.rgb', 'rb').read()
+w, h = 90, 30
+pixels = raw[-3 * w * h:]
+row = [pixels[3 * (w * 14 + x)] for x in range(w)]
+inner = [v for v in row if v != 255]
+assert len(inner) > 60, row
+assert all(b >= a - 1 for a, b in zip(inner, inner[1:])), inner
+assert inner[0] < 20 and inner[-1] > 200, inner
+P
+  python3 in.py
+  emboss-render --backend cpu --size 48 --field displacement --stats=auto.json run.h5 -o auto.png
+  grep -q '"range":\[0\.0,4\.0\]' auto.json || fail "$(<auto.json)"
+  expect_failure 2 emboss-render emboss-render --backend cpu --field displacement --color 1,0,0 run.h5 -o none.png
+  expect_failure 2 emboss-render emboss-render --backend cpu --field displacement gel.ela -o none.png
+  expect_failure 2 emboss-render emboss-render --backend cpu --field pressure run.h5 -o none.png
+  rm ./*.json ./*.png field.rgb in.py run.h5 run.xdmf gel.ela bend.scene
+}

@@ -1,0 +1,133 @@
+#include "tools/render/result_surfaces.h"
+
+#include "base/error.h"
+#include "formats/results/results.h"
+#include "tetrahedra/order.h"
+#include "tools/render/solid_surface.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+constexpr std::uint32_t ramp_width = 1024;
+
+struct Frame {
+  std::string path;
+  std::vector<std::string> objects;
+  std::size_t number = 0;
+};
+
+Frame frame_of(const Input& input, const std::string& object, std::int64_t frame) {
+  const std::string& path = input.name();
+  if (path == "-")
+    throw Error(path, "a result comes by a pipe, expected the name of its file");
+  ResultIndex index = read_result_index(path);
+  const auto frames = static_cast<std::int64_t>(index.times.size());
+  if (frame < -1 || frame >= frames || frames == 0)
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(frames - 1));
+  return {path, object.empty() ? std::move(index.objects) : std::vector<std::string>{object},
+          static_cast<std::size_t>(frame < 0 ? frames - 1 : frame)};
+}
+
+/// Texture coordinates of values, one a point.
+void lay_on(TriangleMesh& mesh, std::span<const double> values,
+            const std::array<double, 2>& range) {
+  const auto place = [&](std::uint32_t point) {
+    const double share = (values[point] - range[0]) / (range[1] - range[0]);
+    return static_cast<float>((std::clamp(share, 0.0, 1.0) * (ramp_width - 1) + 0.5) / ramp_width);
+  };
+  mesh.texcoords.clear();
+  mesh.texcoords.reserve(mesh.triangles.size());
+  for (const auto& [a, b, c] : mesh.triangles)
+    mesh.texcoords.push_back({place(a), 0.5F, place(b), 0.5F, place(c), 0.5F});
+}
+
+Surface open_solid(const Frame& frame, const std::string& object, const SurfaceReadOptions& options,
+                   const std::vector<double>& values, SolidReport& report) {
+  ResultSolid read = read_result_solid(frame.path, object, frame.number);
+  Surface surface;
+  if (!read.there)
+    return surface;
+  return at(frame.path, [&] {
+    TetMesh mesh = std::move(read.mesh);
+    mesh.points.swap(read.rest); // displaced it may have turned tetrahedra
+    examine_solid(mesh, report);
+    mesh.points.swap(read.rest);
+    TetClip left = cut_open(linear_parts(std::move(mesh)), *options.clip, report);
+    surface.mesh = std::move(left.mesh);
+    surface.materials = std::move(read.materials);
+    surface.rest.reserve(left.origin.size());
+    std::vector<double> at_points;
+    for (const auto& [a, b, share] : left.origin) {
+      surface.rest.push_back(read.rest[a] + (read.rest[b] - read.rest[a]) * share);
+      if (!values.empty())
+        at_points.push_back(values[a] + (values[b] - values[a]) * share);
+    }
+    if (!values.empty())
+      lay_on(surface.mesh, at_points, *options.field_range);
+    return std::move(surface);
+  });
+}
+
+} // namespace
+
+std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
+                                          SolidReport& report) {
+  const Frame frame = frame_of(input, options.object, options.frame.value_or(-1));
+  report = {};
+  std::vector<Surface> surfaces;
+  for (const std::string& object : frame.objects) {
+    std::vector<double> values;
+    if (options.field_range)
+      values = read_result_values(frame.path, object, frame.number, options.field);
+    if (options.clip) {
+      Surface left = open_solid(frame, object, options, values, report);
+      if (!left.mesh.triangles.empty())
+        surfaces.push_back(std::move(left));
+      continue;
+    }
+    ResultSurface read = read_result_surface(frame.path, object, frame.number);
+    if (!read.there && options.object.empty())
+      continue;
+    if (read.there && options.field_range)
+      lay_on(read.mesh, values, *options.field_range);
+    surfaces.push_back({std::move(read.mesh), std::move(read.rest), std::move(read.materials)});
+  }
+  if (options.clip && surfaces.empty())
+    throw Error(frame.path, takes_all_away);
+  return surfaces;
+}
+
+std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOptions& options,
+                                         const std::vector<std::int64_t>& frames) {
+  std::array<double, 2> range{0, 0};
+  bool any = false;
+  for (const std::int64_t number : frames) {
+    const Frame frame = frame_of(input, options.object, number);
+    for (const std::string& object : frame.objects)
+      for (const double value :
+           read_result_values(frame.path, object, frame.number, options.field)) {
+        range = any ? std::array{std::min(range[0], value), std::max(range[1], value)}
+                    : std::array{value, value};
+        any = true;
+      }
+  }
+  return range;
+}
+
+Texture ramp_texture(const ColorRamp& ramp) {
+  std::vector<float> values;
+  for (std::uint32_t x = 0; x < ramp_width; ++x)
+    values.push_back(static_cast<float>(x));
+  TextureOptions options;
+  options.wrap = TextureWrap::clamp;
+  return texture_from(colored(values, ramp_width, 1, 0, ramp_width - 1, ramp), options);
+}
+
+} // namespace gewebe

@@ -1,0 +1,34 @@
+#pragma once
+// What is drawn of a frame of a run: surfaces, solids cut open at their deformed shape, and values
+// of a field as texture coordinates of a ramp.
+
+#include "formats/stream/stream.h"
+#include "shading/color_ramp.h"
+#include "shading/drawing.h"
+#include "shading/texture.h"
+#include "tools/render/surface_file.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+/// Objects in the order of the scene. With options.clip those that are cut as read_solid() does, at
+/// the displaced places of their nodes, quadratic elements as the eight of linear_parts(); the
+/// report sums them up. With options.field each corner has its value's place in ramp_texture():
+/// where an edge is cut it is interpolated linearly along it.
+/// \throw Error with place: a pipe, no such frame, object or field; with a plane also an object
+/// without tetrahedra, one that is not sound at rest, and a plane that takes all of all away
+std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
+                                          SolidReport& report);
+
+/// The least and the greatest value of options.field at any node of the drawn objects in some
+/// frames (-1 is the last). \throw Error as above
+std::array<double, 2> result_field_range(const Input& input, const SurfaceReadOptions& options,
+                                         const std::vector<std::int64_t>& frames);
+
+/// A ramp as the base texture of what has such coordinates.
+Texture ramp_texture(const ColorRamp& ramp);
+
+} // namespace gewebe
