@@ -108,12 +108,13 @@ void RotationWarp::combine(const WarpColumns& columns, std::span<const double> c
 std::vector<double> RotationWarp::project(const WarpColumns& columns,
                                           std::span<const double> forces) const {
   const std::size_t rows = 3 * surface_.nodes().size();
-  Vector moved(3 * columns.nodes.size());
-  kernel_.project(columns.values.data(), rows, 3 * surface_.corners(), forces.data(), moved.size(),
-                  moved.data());
+  Vector moved(columns.count());
+  const bool everywhere = !columns.loads.empty();
+  kernel_.project(columns.values.data(), rows, everywhere ? rows : 3 * surface_.corners(),
+                  forces.data(), moved.size(), moved.data());
   for (const std::uint32_t node : columns.nodes)
     for (std::size_t k = 3 * std::size_t{node};
-         node >= surface_.corners() && k < 3 * std::size_t{node} + 3; ++k)
+         !everywhere && node >= surface_.corners() && k < 3 * std::size_t{node} + 3; ++k)
       for (std::size_t c = 0; c < moved.size(); ++c)
         moved[c] += forces[k] * static_cast<double>(columns.values[c * rows + k]);
   return moved;
@@ -146,29 +147,43 @@ WarpedShape RotationWarp::shape(std::span<const double> load, std::span<const do
   return shape;
 }
 
-WarpColumns RotationWarp::columns(std::span<const std::uint32_t> nodes) const {
+WarpColumns RotationWarp::columns(std::span<const std::uint32_t> nodes,
+                                  std::span<const double> loads) const {
   WarpColumns columns;
   columns.nodes.assign(nodes.begin(), nodes.end());
   const std::vector<std::uint32_t>& surface = surface_.nodes();
-  const std::size_t rows = 3 * surface.size(), count = 3 * nodes.size();
+  const std::size_t axes = matrix_.row_of_axis.size(), rows = 3 * surface.size();
+  for (std::size_t k = 0; k < loads.size(); k += axes)
+    columns.loads.push_back(surface_.on_surface(loads.subspan(k, axes)));
+  const std::size_t of_nodes = 3 * nodes.size(), count = columns.count();
+  const auto axis_of = [&](std::size_t c) {
+    return 3 * std::size_t{surface[nodes[c / 3]]} + c % 3;
+  };
+  for (std::size_t c = 0; c < of_nodes; ++c)
+    if (matrix_.row_of_axis[axis_of(c)] < 0)
+      throw Error("node " + std::to_string(axis_of(c) / 3) +
+                  " is fixed, expected one that forces move");
   columns.values.resize(rows * count);
   Eigen::MatrixXd own(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(count));
-  Vector load(matrix_.row_of_axis.size()), u(load.size());
-  for (const std::uint32_t node : nodes)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (matrix_.row_of_axis[3 * std::size_t{surface[node]} + axis] < 0)
-        throw Error("node " + std::to_string(surface[node]) +
-                    " is fixed, expected one that forces move");
+  Vector load(axes), u(axes);
   for (std::size_t c = 0; c < count; ++c) {
-    const std::size_t axis = 3 * std::size_t{surface[nodes[c / 3]]} + c % 3;
-    load[axis] = 1;
+    std::ranges::fill(load, 0.0);
+    if (c < of_nodes)
+      load[axis_of(c)] = 1;
+    else
+      std::ranges::copy(loads.subspan((c - of_nodes) * axes, axes), load.begin());
     solve_axes(matrix_, factor_, load, u);
-    load[axis] = 0;
     for (std::size_t k = 0; k < rows; ++k)
       columns.values[c * rows + k] = static_cast<float>(u[3 * std::size_t{surface[k / 3]} + k % 3]);
-    for (std::size_t r = 0; r < count; ++r)
-      own(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
-          u[3 * std::size_t{surface[nodes[r / 3]]} + r % 3];
+    for (std::size_t r = 0; r < count; ++r) {
+      double work = 0;
+      if (r < of_nodes)
+        work = u[axis_of(r)];
+      else
+        for (std::size_t axis = 0; axis < axes; ++axis)
+          work += u[axis] * loads[(r - of_nodes) * axes + axis];
+      own(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = work;
+    }
   }
   const Eigen::MatrixXd inverse =
       Eigen::LDLT<Eigen::MatrixXd>(own).solve(Eigen::MatrixXd::Identity(own.rows(), own.cols()));
@@ -182,16 +197,24 @@ WarpColumns RotationWarp::columns(std::span<const std::uint32_t> nodes) const {
 
 WarpedShape RotationWarp::shape(const WarpColumns& columns, std::span<const double> load,
                                 std::span<const double> start, const WarpOptions& options) const {
-  const std::size_t rows = 3 * surface_.nodes().size();
+  const std::size_t rows = 3 * surface_.nodes().size(), of_nodes = 3 * columns.nodes.size();
   Vector f(rows), y(rows), u(rows), forces(rows);
-  for (std::size_t k = 0; k < load.size(); ++k)
+  for (std::size_t k = 0; k < of_nodes; ++k)
     f[3 * std::size_t{columns.nodes[k / 3]} + k % 3] = load[k];
+  for (std::size_t n = 0; n < columns.loads.size(); ++n)
+    for (std::size_t k = 0; k < rows; ++k)
+      f[k] += load[of_nodes + n] * columns.loads[n][k];
   surface_.spread(f, y);
   FixedPoint found = fixed_point(
       [&](const Vector& q) {
         combine(columns, q, surface_.corners(), u);
         surface_.take_back(u, y, forces);
-        return forces_for(columns, project(columns, forces));
+        for (std::size_t k = 0; k < rows; ++k) // what turning changes
+          forces[k] -= f[k];
+        Vector next = forces_for(columns, project(columns, forces));
+        for (std::size_t k = 0; k < next.size(); ++k)
+          next[k] += load[k];
+        return next;
       },
       start.empty() ? Vector(load.begin(), load.end()) : Vector(start.begin(), start.end()),
       options);

@@ -49,11 +49,15 @@ struct WarpOptions {
   double tolerance = 1e-3; ///< of a round's change over the largest displacement
 };
 
-/// Columns of K⁻¹ for some nodes of the surface, at the nodes of the surface: what a store has.
+/// Columns of K⁻¹ for some nodes of the surface, at the nodes of the surface: what a store has. And
+/// what whole loads, as gravity's along an axis, displace there, as further columns.
 struct WarpColumns {
-  std::vector<std::uint32_t> nodes; ///< among RotationStrain::nodes()
-  std::vector<float> values;        ///< 3 columns for each node, one behind the other
-  std::vector<double> inverse;      ///< of the columns' entries at the nodes themselves, by rows
+  std::vector<std::uint32_t> nodes;       ///< among RotationStrain::nodes()
+  std::vector<std::vector<double>> loads; ///< on_surface
+  std::vector<float> values;              ///< 3 columns for each node, one for each load
+  std::vector<double> inverse;            ///< of the work of each column's load in each, by rows
+
+  std::size_t count() const noexcept { return 3 * nodes.size() + loads.size(); }
 };
 
 /// A shape, and how far the last round still changed it.
@@ -91,13 +95,16 @@ public:
   WarpedShape shape(std::span<const double> load, std::span<const double> start = {},
                     const WarpOptions& options = {}) const;
 
-  /// By three solutions with K's factor for each node. \throw Error if one is fixed along an axis
-  WarpColumns columns(std::span<const std::uint32_t> nodes) const;
+  /// By three solutions with K's factor for each node, one for each load on the 3 n axes, where
+  /// loads are one behind the other. \throw Error if a node is fixed along an axis
+  WarpColumns columns(std::span<const std::uint32_t> nodes,
+                      std::span<const double> loads = {}) const;
 
-  /// Under loads on the columns' nodes, 3 numbers each, by the columns alone: the least energy that
-  /// their combinations have. A round costs two passes over the columns at corners and one over
-  /// triangles; all of it a pass over the columns, as a linear shape, and two solutions of the
-  /// surface's Laplacian. Near the start, as from step to step, one round does.
+  /// Under loads on the columns' nodes, 3 numbers each, and factors of their loads, by the columns
+  /// alone: the least energy that their combinations have. A round costs two passes over the
+  /// columns at corners (one of them at all nodes, if there are loads) and one over triangles; all
+  /// of it a pass over the columns, as a linear shape, and two solutions of the surface's
+  /// Laplacian. Near the start, as from step to step, one round does.
   WarpedShape shape(const WarpColumns& columns, std::span<const double> load,
                     std::span<const double> start = {}, const WarpOptions& options = {}) const;
 
@@ -112,7 +119,8 @@ private:
   /// Σ coefficients × columns at the first nodes.
   void combine(const WarpColumns& columns, std::span<const double> coefficients, std::size_t nodes,
                std::span<double> u) const;
-  /// The work with each column of forces on corners and on the columns' nodes.
+  /// The work with each column of forces on corners and on the columns' nodes, or on the surface
+  /// where the columns have loads.
   std::vector<double> project(const WarpColumns& columns, std::span<const double> forces) const;
 
   RotationStrain surface_;
