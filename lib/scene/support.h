@@ -20,9 +20,8 @@ enum class Way : std::uint8_t {
   solid ///< of tetrahedra, or with some
 };
 inline constexpr std::array all_ways{
-    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
-    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
-    Way::solid};
+    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic, Way::two_step,
+    Way::two_step_stored, Way::whole,           Way::cut,      Way::solid};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {

@@ -25,7 +25,7 @@ struct Elastostatic::State {
   ElastostaticCounts counts;
   std::optional<double> norm; // of K, for backward errors
   std::optional<StiffnessOperator> stiffness;
-  LoadAnswer answer;          // beside displacements
+  LoadAnswer answer; // beside displacements
   ForcesAt block;
   HeldContacts held;
   bool by_block = false; // how the present load is met

@@ -23,7 +23,7 @@ struct ModelArguments {
   std::optional<Selector> fixed;
   std::optional<Primitive> matrix;
   std::optional<double> dt;
-  std::int64_t order = 2; ///< of finite elements
+  std::int64_t order = 2;     ///< of finite elements
   std::optional<double> cell; ///< of the lattice that fills a surface
   bool solid = false, scale_mass = false, list_materials = false;
 };
