@@ -62,7 +62,7 @@ void work(cli::Run& run, const StoreArguments& a) {
   std::optional<StiffnessStore> before_cut;
   if (!a.update.empty())
     before_cut.emplace(a.update);
-  options.part = a.touched.has_value() && !first;
+  options.part = a.touched.has_value() && !a.compress && !first;
   if (in_place || first)
     allow_in_place(path);
   Output output(path, options);

@@ -3,6 +3,7 @@
 #include "base/crc32c.h"
 #include "base/digest.h"
 #include "base/error.h"
+#include "compliance/compressed_columns.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_internal.h"
 
@@ -83,6 +84,11 @@ StiffnessFacts read_facts(const hdf5::Group& root, const std::string& name) {
   const std::string precision = group.text("precision");
   facts.single = precision == "float32";
   require(group, facts.single || precision == "float64", "its precision");
+  if (group.has(store::compressed)) {
+    require(group, !group.has("columns"), "it has columns of two kinds");
+    facts.compressed = group.group(store::compressed).number<double>("relative");
+    require(group, std::isfinite(facts.compressed) && facts.compressed > 0, "its bound");
+  }
   facts.method = read_method(group);
   return facts;
 }
@@ -223,8 +229,15 @@ StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
   StiffnessSizes sizes;
   sizes.matrix = object.group("K").dataset("x", hdf5::Number::float64).rows();
   sizes.factor = object.group("L").dataset("x", hdf5::Number::float64).rows();
-  if (object.has("columns"))
+  if (object.has("columns")) {
     sizes.touched = object.group("columns").dataset("nodes", hdf5::Number::uint32).rows();
+    sizes.column_bytes = sizes.touched * 9 * facts.nodes * (facts.single ? 4 : 8);
+  }
+  if (object.has(store::compressed)) {
+    const hdf5::Group compressed = object.group(store::compressed);
+    sizes.touched = compressed.number<std::uint64_t>("touched");
+    sizes.column_bytes = compressed.dataset("values", hdf5::Number::uint8).rows();
+  }
   return sizes;
 }
 
@@ -311,10 +324,73 @@ private:
   hdf5::Dataset values_;
 };
 
+/// Of a group of compressed columns.
+CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& facts) {
+  CompressedLayout layout;
+  layout.relative = facts.compressed;
+  layout.bound = group.number<double>("bound");
+  layout.clusters.node = read_checked<std::uint32_t>(group, "order", facts.nodes);
+  layout.clusters.first = read_checked<std::uint32_t>(group, "first");
+  layout.with_columns = group.number<std::uint64_t>("chunks");
+  const std::vector<std::uint32_t> counts = read_checked<std::uint32_t>(group, "count");
+  require(group, counts.size() % 2 == 0, "its blocks");
+  for (std::size_t k = 0; k < counts.size(); k += 2)
+    layout.count.push_back({counts[k], counts[k + 1]});
+  try {
+    check_layout(layout, facts.nodes);
+  } catch (const Error& error) {
+    group.fail(std::string("is damaged: ") + error.what());
+  }
+  require(group,
+          group.number<std::uint64_t>("touched") == layout.clusters.first[layout.with_columns],
+          "its number of nodes");
+  return layout;
+}
+
+/// Reads chunks of compressed columns; keeps the file open.
+class ChunkFile {
+public:
+  ChunkFile(std::shared_ptr<const void> keep, const hdf5::Group& group,
+            const CompressedLayout& layout)
+      : keep_(std::move(keep)), size_(chunk_sizes(layout)),
+        crc_(read_checked<std::uint32_t>(group, "crc32c", size_.size())),
+        values_(group.dataset("values", hdf5::Number::uint8)) {
+    std::uint64_t end = 0;
+    for (const std::uint64_t size : size_) {
+      start_.push_back(end);
+      end += size;
+      require(group, end <= values_.rows(), "its chunks");
+    }
+    values_.require_shape({end});
+  }
+
+  std::vector<std::uint8_t> read(std::size_t chunk) const {
+    std::vector<std::uint8_t> bytes(size_[chunk]);
+    if (!bytes.empty())
+      values_.read_rows(start_[chunk], std::span<std::uint8_t>(bytes));
+    if (crc32c(bytes) != crc_[chunk])
+      values_.fail("chunk " + std::to_string(chunk) + " is damaged: its checksum does not hold");
+    return bytes;
+  }
+
+private:
+  std::shared_ptr<const void> keep_;
+  std::vector<std::uint64_t> size_, start_;
+  std::vector<std::uint32_t> crc_;
+  hdf5::Dataset values_;
+};
+
 } // namespace
 
 std::unique_ptr<ColumnSource> StiffnessStore::columns(const StiffnessFacts& facts) const {
   const hdf5::Group object = group_of(state_->file.root(), facts.group);
+  if (object.has(store::compressed)) {
+    const hdf5::Group group = object.group(store::compressed);
+    CompressedLayout layout = read_layout(group, facts);
+    const auto file = std::make_shared<const ChunkFile>(state_, group, layout);
+    return std::make_unique<CompressedColumns>(
+        std::move(layout), [file](std::size_t chunk) { return file->read(chunk); });
+  }
   if (!object.has("columns"))
     return nullptr;
   return std::make_unique<StoredColumns>(state_, object.group("columns"), facts);

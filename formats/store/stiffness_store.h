@@ -37,6 +37,7 @@ struct StiffnessFacts {
   double condition = 0;    ///< estimate of cond₁(K)
   double residual = 0;     ///< largest backward error seen of the checks made
   bool single = false;     ///< columns are float32
+  double compressed = 0;   ///< what entries of compressed columns may be wrong by, over the largest
   StiffnessMethod method{};
 };
 
@@ -50,6 +51,7 @@ struct StiffnessSizes {
   std::uint64_t matrix = 0;  ///< numbers in the lower triangle of K
   std::uint64_t factor = 0;  ///< numbers in L
   std::uint64_t touched = 0; ///< nodes with columns
+  std::uint64_t column_bytes = 0;
 };
 
 /// XXH3-64 of what K and gravity depend on: rest positions, masses and constraints of the nodes,
@@ -90,7 +92,8 @@ public:
   StiffnessMatrix matrix(const StiffnessFacts& facts) const;
   /// Its order is facts.order. \throw Error if it is damaged
   Factor factor(const StiffnessFacts& facts) const;
-  /// Null where the object has none. They may outlive the store. \throw Error if they are damaged
+  /// Null where the object has none. They may outlive the store. Those that are compressed are read
+  /// chunk by chunk. \throw Error if they are damaged
   std::unique_ptr<ColumnSource> columns(const StiffnessFacts& facts) const;
 
 private:

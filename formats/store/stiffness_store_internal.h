@@ -10,6 +10,8 @@ inline constexpr const char* format = "gewebe stiffness store";
 inline constexpr std::int64_t version = 1;
 /// The group of an object's second matrix, in its group.
 inline constexpr const char* second_stage = "stage2";
+/// The group of an object's compressed columns, in its group.
+inline constexpr const char* compressed = "compressed";
 /// A bound of magnitude stands for the rows of so many nodes.
 inline constexpr std::uint64_t bound_nodes = 256;
 

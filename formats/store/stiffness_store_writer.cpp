@@ -316,8 +316,10 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
                                                        const Factor& factor,
                                                        std::span<const std::uint32_t> nodes) {
   State& s = *state_;
-  require_disk(s.output, stiffness_store_bytes(matrix, factor, nodes.size(), facts.single) -
-                             static_cast<double>(s.data.stored()));
+  const bool plain = !nodes.empty() && facts.compressed == 0;
+  require_disk(s.output,
+               stiffness_store_bytes(matrix, factor, plain ? nodes.size() : 0, facts.single) -
+                   static_cast<double>(s.data.stored()));
   const std::string group = facts.group.empty() ? hdf5::link_name(facts.object) : facts.group;
   s.object = create_object(s.file, group);
   s.single = facts.single;
@@ -330,9 +332,9 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
   s.together = facts.method.name == "direct" ? compliance_block : 1;
   s.missing.clear();
   s.damaged.clear();
-  s.sums.resize(nodes.size(), facts.nodes);
-  if (nodes.empty())
-    return {};
+  s.sums.resize(plain ? nodes.size() : 0, facts.nodes);
+  if (!plain)
+    return {nodes.begin(), nodes.end()};
   s.columns = s.object->create_group("columns");
   write_checked(*s.columns, "nodes", nodes);
   const hdf5::Dataset values =
@@ -363,6 +365,42 @@ void StiffnessStoreWriter::write(std::size_t k, std::span<const double> columns,
                                  "expected float64");
   }
   s.write(s.missing[k], std::span<const float>(s.row), residual);
+}
+
+void StiffnessStoreWriter::write_compressed(const CompressedMade& columns) {
+  State& s = *state_;
+  const CompressedLayout& layout = columns.layout;
+  hdf5::Group group = s.object->create_group(store::compressed);
+  group.set("relative", layout.relative);
+  group.set("bound", layout.bound);
+  group.set("chunks", std::uint64_t{layout.with_columns});
+  group.set("touched", std::uint64_t{layout.clusters.first[layout.with_columns]});
+  write_checked<std::uint32_t>(group, "order", layout.clusters.node);
+  write_checked<std::uint32_t>(group, "first", layout.clusters.first);
+  std::vector<std::uint32_t> counts, crc;
+  for (const CrossCount& count : layout.count) {
+    counts.push_back(count.wide);
+    counts.push_back(count.narrow);
+  }
+  write_checked<std::uint32_t>(group, "count", counts);
+  std::uint64_t size = 0, at = 0;
+  std::vector<std::uint64_t> digests;
+  for (const std::vector<std::uint8_t>& chunk : columns.chunks) {
+    crc.push_back(crc32c(chunk));
+    digests.push_back(digest_of(chunk.data(), chunk.size()));
+    size += chunk.size();
+  }
+  require_disk(s.output, static_cast<double>(size));
+  write_checked<std::uint32_t>(group, "crc32c", crc);
+  hdf5::Dataset values = group.create_dataset("values", hdf5::Number::uint8, {size});
+  for (const std::vector<std::uint8_t>& chunk : columns.chunks) {
+    if (!chunk.empty())
+      values.write_rows(at, std::span<const std::uint8_t>(chunk));
+    at += chunk.size();
+  }
+  s.digest.add(layout.clusters.node);
+  s.digest.add(counts);
+  s.digest.add(digests);
 }
 
 double StiffnessStoreWriter::end(double residual) {

@@ -2,6 +2,7 @@
 // Makes a stiffness store; stiffness_store(5).
 
 #include "base/columns.h"
+#include "compliance/column_compression.h"
 #include "formats/store/stiffness_store.h"
 #include "formats/stream/stream.h"
 #include "solve/factor.h"
@@ -34,7 +35,8 @@ public:
   ~StiffnessStoreWriter() override;
 
   /// Begins an object. `facts.group` may be empty: it follows from the name. `nodes`, ascending,
-  /// are those that shall have columns; none makes an object without columns. Returns those of them
+  /// are those that shall have columns; none makes an object without columns, and where they will
+  /// come compressed, room for them is taken later. Returns those of them
   /// whose columns are still to come: all, or what FILE.part doesn't hold. \throw Error too if the
   /// disk has no room, the group is there already, or FILE.part is of another model or was begun
   /// with other options
@@ -42,6 +44,9 @@ public:
                                    const Factor& factor, std::span<const std::uint32_t> nodes);
   /// k counts what begin() returned. \throw Error too if a number doesn't fit float32
   void write(std::size_t k, std::span<const double> columns, double residual) override;
+  /// Columns of an object for which facts.compressed was set. Neither FILE.part nor its journal
+  /// know of them.
+  void write_compressed(const CompressedMade& columns);
   /// After an object's last column; `residual` is the largest backward error of all other checks
   /// made. Returns the largest of all.
   double end(double residual);

@@ -1,10 +1,12 @@
 #include "compliance/compliance.h"
 
 #include "base/vector_at.h"
+#include "compliance/compressed_columns.h"
 #include "compliance/costs.h"
 #include "compliance/forward_blocks.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace gewebe {
@@ -26,6 +28,7 @@ std::vector<std::uint32_t> nodes_of(std::span<const NodeVector> forces) {
 Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> source,
                        const Context& context, bool bounded)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
+      compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
       context_(context),
       cache_(
           model.nodes.size(), source_->columns(),
@@ -56,11 +59,37 @@ void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
 ComplianceBlock Compliance::block(std::uint32_t node, std::uint32_t other) const {
   if (const ForwardBlocks* const blocks = source_->blocks(); blocks != nullptr)
     return blocks->block(node, other);
+  if (compressed(node))
+    return compressed_->block(node, other);
   ComplianceBlock block{};
   for (int a = 0; a < 3; ++a)
     for (std::size_t b = 0; b < 3; ++b)
       block[static_cast<std::size_t>(a)][b] = entry(node, a, 3 * std::size_t{other} + b);
   return block;
+}
+
+bool Compliance::compressed(std::uint32_t node) const {
+  return compressed_ != nullptr && compressed_->has(node);
+}
+
+void Compliance::need(std::span<const std::uint32_t> nodes) {
+  if (compressed_ == nullptr)
+    return cache_.need(nodes);
+  std::vector<std::uint32_t> others;
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(others),
+               [&](std::uint32_t node) { return !compressed(node); });
+  cache_.need(others);
+}
+
+std::size_t Compliance::capacity() const noexcept {
+  return compressed_ == nullptr ? cache_.capacity()
+                                : std::max(cache_.capacity(), compressed_->nodes().size());
+}
+
+double Compliance::entry(std::uint32_t node, int axis, std::size_t row) const {
+  if (!compressed(node))
+    return cache_.entry(node, axis, row);
+  return compressed_->entry(node, axis, row);
 }
 
 void Compliance::add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
@@ -79,6 +108,11 @@ bool Compliance::stored(std::span<const std::uint32_t> nodes) const {
 }
 
 bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
+  const auto count =
+      std::count_if(nodes.begin(), nodes.end(), [&](std::uint32_t i) { return compressed(i); });
+  if (count > 0) // a sum is of one kind
+    return count == std::ssize(nodes) &&
+           costs::compressed_pay(compressed_->numbers(nodes), source_->entries());
   const ColumnSource* const columns = source_->columns();
   const bool single = columns != nullptr && columns->single();
   const std::size_t max = costs::nodes_worth_a_solve(source_->entries(), axes_, single);
@@ -100,6 +134,10 @@ void Compliance::add(std::span<const NodeVector> forces, double allowed, std::sp
     return;
   const std::vector<std::uint32_t> nodes = nodes_of(forces);
   if (columns_pay(nodes)) {
+    if (compressed_ != nullptr && compressed(nodes.front())) {
+      compressed_->add(forces, context_, u);
+      return;
+    }
     need(nodes);
     cache_.add(forces, allowed, context_, u);
     return;

@@ -39,14 +39,13 @@ public:
 
   // ---- rows
 
-  /// Brings columns to memory. \pre at most capacity() nodes \throw Error if they can't be read
-  void need(std::span<const std::uint32_t> nodes) { cache_.need(nodes); }
+  /// Brings columns to memory, but for compressed ones. \pre at most capacity() nodes
+  /// \throw Error if they can't be read
+  void need(std::span<const std::uint32_t> nodes);
   /// How many nodes' columns fit in memory.
-  std::size_t capacity() const noexcept { return cache_.capacity(); }
+  std::size_t capacity() const noexcept;
   /// C at a row and a node's axis. \pre the node was needed; 0 where the axis is fixed
-  double entry(std::uint32_t node, int axis, std::size_t row) const {
-    return cache_.entry(node, axis, row);
-  }
+  double entry(std::uint32_t node, int axis, std::size_t row) const;
   /// values += C f at these rows, by columns. \pre columns_pay for the nodes of the forces; one
   /// value for each row
   void add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
@@ -78,8 +77,11 @@ public:
   const ColumnCache& cache() const noexcept { return cache_; }
 
 private:
+  bool compressed(std::uint32_t node) const;
+
   std::size_t axes_;
   std::shared_ptr<ComplianceSource> source_;
+  const CompressedColumns* compressed_; ///< of the source, or null
   Context context_;
   ColumnCache cache_;
   std::uint64_t solves_ = 0;

@@ -172,18 +172,28 @@ CrossView CompressedColumns::view(std::size_t chunk_index, std::size_t cluster) 
 
 std::array<std::array<double, 3>, 3> CompressedColumns::block(std::uint32_t node,
                                                               std::uint32_t other) const {
-  // In one order, so that both have the same bits.
-  const auto before = [&](std::uint32_t i) { return std::pair(cluster_[i], place_[i]); };
-  const bool turned = before(other) < before(node);
+  const bool turned = is_before(other, node);
   const std::uint32_t first = turned ? other : node, second = turned ? node : other;
   std::array<double, 9> sum{};
   add_entries(view(cluster_[first], cluster_[second]), 3 * std::size_t{place_[first]},
-              3 * std::size_t{place_[second]}, sum.data());
+              3 * std::size_t{place_[second]}, 3, sum.data());
   std::array<std::array<double, 3>, 3> block{};
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t c = 0; c < 3; ++c)
       block[r][c] = turned ? sum[3 * c + r] : sum[3 * r + c];
   return block;
+}
+
+double CompressedColumns::entry(std::uint32_t node, int axis, std::size_t row) const {
+  const auto other = static_cast<std::uint32_t>(row / 3);
+  const std::size_t own = 3 * std::size_t{place_[node]} + static_cast<std::size_t>(axis);
+  const std::size_t its = 3 * std::size_t{place_[other]} + row % 3;
+  const bool turned = is_before(other, node);
+  const std::uint32_t first = turned ? other : node, second = turned ? node : other;
+  double sum = 0;
+  add_entries(view(cluster_[first], cluster_[second]), turned ? its : own, turned ? own : its, 1,
+              &sum);
+  return sum;
 }
 
 void CompressedColumns::add(std::span<const NodeVector> forces, const Context& context,

@@ -60,15 +60,24 @@ public:
   /// C between a node that has columns and any other, [axis][axis of the other]; that of the two
   /// in the other order is its transpose, bit by bit.
   std::array<std::array<double, 3>, 3> block(std::uint32_t node, std::uint32_t other) const;
+  /// One entry of it, bit by bit: a row's displacement under a force along an axis of the node.
+  double entry(std::uint32_t node, int axis, std::size_t row) const;
   /// u += C f over all 3 n axes, for forces at nodes that have columns. The same bytes for any
   /// number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
 
+  /// A chunk as it was read.
+  std::vector<std::uint8_t> chunk_bytes(std::size_t index) const { return bytes_of(chunk(index)); }
+
   std::uint64_t chunks_read() const noexcept { return chunks_read_; }
 
 private:
+  /// C is taken with the first of two nodes first, so that both orders have the same bits.
+  bool is_before(std::uint32_t a, std::uint32_t b) const {
+    return cluster_[a] < cluster_[b] || (cluster_[a] == cluster_[b] && place_[a] < place_[b]);
+  }
   const Crosses& chunk(std::size_t index) const;
   CrossView view(std::size_t chunk, std::size_t cluster) const;
 

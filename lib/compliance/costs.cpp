@@ -22,6 +22,11 @@ std::size_t max_in_block(bool stored) {
   return stored ? 400 : 32;
 }
 
+bool compressed_pay(double numbers, std::size_t entries) {
+  // A solve reads L twice, from memory; small integers take an eighth of that and are widened.
+  return numbers <= 4 * static_cast<double>(entries);
+}
+
 bool columns_pay_for_shapes(std::size_t nodes, bool stored, int shapes) {
   // One node's columns cost as much as a solve; more of them pay when a second shape comes.
   return (stored || nodes <= max_in_block(false)) && (nodes == 1 || shapes > 1);

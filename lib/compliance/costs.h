@@ -20,6 +20,10 @@ inline constexpr std::size_t worth_threads = 1000000;
 /// L \param single whether the columns are float32
 std::size_t nodes_worth_a_solve(std::size_t entries, std::size_t axes, bool single);
 
+/// Whether a sum of compressed columns costs less than a solve. \param numbers that it takes
+/// \param entries doubles of L
+bool compressed_pay(double numbers, std::size_t entries);
+
 /// Whether columns of nodes whose forces came from blocks are to be had for a shape. \param nodes
 /// how many \param stored whether all have columns, stored or in memory \param shapes how many were
 /// asked for with these nodes, this one among them

@@ -212,14 +212,14 @@ std::size_t in_triangle(std::size_t i, std::size_t j) {
 
 template <class T>
 void add_entries_of(const CrossView& b, const T* from, const double* scale, std::size_t count,
-                    std::size_t row, std::size_t column, double* to) {
+                    std::size_t row, std::size_t column, std::size_t size, double* to) {
   const std::size_t stride = b.stride();
   for (std::size_t k = 0; k < count; ++k, from += stride)
-    for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t r = 0; r < size; ++r) {
       const double by = b.symmetric ? scale[k] : scale[k] * static_cast<double>(from[row + r]);
-      for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t c = 0; c < size; ++c) {
         const std::size_t at = b.symmetric ? in_triangle(row + r, column + c) : b.rows + column + c;
-        to[3 * r + c] += by * static_cast<double>(from[at]);
+        to[size * r + c] += by * static_cast<double>(from[at]);
       }
     }
 }
@@ -273,10 +273,11 @@ CrossCount append_crosses(std::span<double> rest, std::size_t rows, bool symmetr
   return symmetric ? append_triangle(rest, rows, bound, to) : peeling.run(to);
 }
 
-void add_entries(const CrossView& block, std::size_t row, std::size_t column, double* to) {
-  add_entries_of(block, block.wide, block.scale, block.count.wide, row, column, to);
+void add_entries(const CrossView& block, std::size_t row, std::size_t column, std::size_t size,
+                 double* to) {
+  add_entries_of(block, block.wide, block.scale, block.count.wide, row, column, size, to);
   add_entries_of(block, block.narrow, block.scale + block.count.wide, block.count.narrow, row,
-                 column, to);
+                 column, size, to);
 }
 
 void add_product(const CrossView& block, bool transposed, std::span<const CrossLoad> x,

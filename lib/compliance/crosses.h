@@ -59,9 +59,10 @@ struct CrossLoad {
   double value = 0;
 };
 
-/// The sum of scale u[row + r] v[column + c] over the crosses, for r, c < 3, to be added to
-/// to[3 r + c].
-void add_entries(const CrossView& block, std::size_t row, std::size_t column, double* to);
+/// Adds the sum of scale u[row + r] v[column + c] over the crosses to to[size r + c], for r, c <
+/// size.
+void add_entries(const CrossView& block, std::size_t row, std::size_t column, std::size_t size,
+                 double* to);
 
 /// y += B x, or Bᵀ x with `transposed`, for a vector x of few numbers.
 /// \pre y.size() is the number of rows, or of columns

@@ -40,8 +40,9 @@ std::string number(double value) {
 /// Compares the columns of one node with those that conjugate gradients find.
 class Recomputed {
 public:
-  Recomputed(const StiffnessMatrix& matrix, const Context& context)
-      : matrix_(matrix), context_(context), load_(matrix.order()), x_(matrix.order()) {}
+  Recomputed(const StiffnessMatrix& matrix, double tolerance, double bound, const Context& context)
+      : matrix_(matrix), tolerance_(tolerance), bound_(bound), context_(context),
+        load_(matrix.order()), x_(matrix.order()) {}
 
   /// Along `solved` anew, or the next axis that is free. `columns` as base/columns.h has them.
   void compare(std::uint32_t node, std::size_t solved, std::span<const double> columns,
@@ -67,18 +68,21 @@ public:
         difference =
             larger(difference,
                    std::fabs(column[static_cast<std::size_t>(matrix_.axis_of_row[r])] - x_[r]));
+      const double tolerance = tolerance_ + bound_ / largest(x_);
       difference /= largest(x_);
       ++result.recomputed;
-      if (!(difference <= result.tolerance))
+      result.tolerance = std::max(result.tolerance, tolerance);
+      if (!(difference <= tolerance))
         throw Error("the columns of node " + std::to_string(node) + " differ by " +
                     number(difference) + " from those of conjugate gradients, expected at most " +
-                    number(result.tolerance));
+                    number(tolerance));
       result.difference = std::max(result.difference, difference);
     }
   }
 
 private:
   const StiffnessMatrix& matrix_;
+  double tolerance_, bound_; ///< of what is compared, and of each entry
   const Context& context_;
   std::vector<double> load_, x_;
 };
@@ -94,7 +98,8 @@ std::vector<std::size_t> spread(std::size_t nodes, std::size_t count) {
 void verify_stored(const ColumnSource& columns, std::span<const std::size_t> chosen,
                    Recomputed& again, Verification& result, const Context& context) {
   const std::size_t axes = 3 * columns.node_count(), count = columns.nodes().size();
-  std::vector<std::vector<double>> kept; // of the chosen nodes
+  const double tolerance = result.tolerance; // entries that mirror each other have no other bound
+  std::vector<std::vector<double>> kept;     // of the chosen nodes
   for (const std::size_t k : chosen) {
     kept.emplace_back(3 * axes);
     columns.read(k, kept.back());
@@ -116,10 +121,10 @@ void verify_stored(const ColumnSource& columns, std::span<const std::size_t> cho
         for (std::size_t b = 0; b < 3; ++b) {
           const double difference =
               std::fabs(read[a * axes + 3 * j + b] - kept[c][b * axes + 3 * i + a]);
-          if (!(difference <= result.tolerance * scale))
+          if (!(difference <= tolerance * scale))
             throw Error("the columns of nodes " + std::to_string(i) + " and " + std::to_string(j) +
                         " aren't symmetric: they differ by " + number(difference / scale) +
-                        ", expected at most " + number(result.tolerance));
+                        ", expected at most " + number(tolerance));
           if (difference > 0)
             result.asymmetry = std::max(result.asymmetry, difference / scale);
         }
@@ -177,7 +182,7 @@ Verification verify_compliance(const StiffnessMatrix& matrix, const Factor& fact
   result.tolerance =
       10 * options.condition * rounding + options.method_error +
       (options.single ? 2 * static_cast<double>(std::numeric_limits<float>::epsilon()) : 0);
-  Recomputed again(matrix, context);
+  Recomputed again(matrix, result.tolerance, options.bound, context);
   if (columns != nullptr) {
     verify_stored(*columns, spread(columns->nodes().size(), options.samples), again, result,
                   context);

@@ -1,6 +1,7 @@
 // Any bytes as a stiffness store: an Error or arrays that can be used, never a crash.
 
 #include "base/error.h"
+#include "compliance/compressed_columns.h"
 #include "formats/store/stiffness_store.h"
 
 #include <cstddef>
@@ -18,6 +19,9 @@ void use(const gewebe::StiffnessStore& store, const gewebe::StiffnessFacts& fact
     std::vector<double> row(9 * columns->node_count());
     for (std::size_t k = 0; k < columns->nodes().size(); ++k)
       columns->read(k, row);
+    if (const auto* const compressed = columns->compressed())
+      for (const std::uint32_t node : columns->nodes())
+        (void)compressed->block(node, 0);
   }
 }
 

@@ -3,6 +3,7 @@
 #include "formats/store/stiffness_store.h"
 
 #include "base/crc32c.h"
+#include "compliance/column_compression.h"
 #include "compliance/compliance_columns.h"
 #include "formats/store/hdf5_internal.h"
 #include "formats/store/stiffness_store_writer.h"
@@ -43,7 +44,7 @@ void write_bytes(const std::string& path, const Bytes& bytes) {
 
 std::uint64_t write_store(const std::string& path, const Model& model,
                           const std::vector<std::uint32_t>& nodes, bool single = false,
-                          int threads = 1) {
+                          int threads = 1, double compressed = 0) {
   const StiffnessMatrix k = stiffness_matrix(model);
   StiffnessFacts facts;
   StiffnessCheck check;
@@ -55,12 +56,28 @@ std::uint64_t write_store(const std::string& path, const Model& model,
   facts.norm = check.norm;
   facts.condition = check.condition;
   facts.single = single;
+  facts.compressed = compressed;
   Output output(path, {});
   StiffnessStoreWriter writer(output);
   writer.begin(facts, k, factor, nodes);
   Context context;
   context.threads = threads;
-  const double residual = compliance_columns(k, factor, check.norm, nodes, context, writer);
+  double residual = 0;
+  if (compressed > 0) {
+    std::vector<Vec3> positions;
+    for (const Node& node : model.nodes)
+      positions.push_back(node.position);
+    const CompressedMade made = compress_columns(
+        positions, nodes, compressed,
+        [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+          return compliance_columns(k, factor, check.norm, of, context, sink);
+        },
+        context);
+    writer.write_compressed(made);
+    residual = made.residual;
+  } else {
+    residual = compliance_columns(k, factor, check.norm, nodes, context, writer);
+  }
   writer.end(std::max(residual, check.residual));
   writer.close();
   output.commit();
@@ -187,6 +204,97 @@ TEST(Store, GivesBackTheSameBits) {
                   single ? static_cast<double>(static_cast<float>(b[i])) : b[i]);
     }
   }
+}
+
+TEST(Store, CompressedColumnsAreWithinTheirBoundAndReadByChunk) {
+  const Model model = model_of(ball(3));
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < model.nodes.size(); i += i % 4 == 0 ? 2 : 1)
+    nodes.push_back(i);
+  const ScratchFile plain(".h5"), small(".h5"), again(".h5");
+  write_store(plain.path(), model, nodes);
+  const std::uint64_t digest = write_store(small.path(), model, nodes, false, 1, 1e-3);
+  EXPECT_EQ(write_store(again.path(), model, nodes, false, 5, 1e-3), digest);
+  EXPECT_EQ(bytes_of(small.path()), bytes_of(again.path()));
+  EXPECT_NE(write_store(again.path(), model, nodes, false, 5, 1e-4), digest);
+  const StiffnessStore of_plain(plain.path()), of_small(small.path());
+  const StiffnessFacts facts = of_small.facts(model);
+  EXPECT_EQ(facts.compressed, 1e-3);
+  const StiffnessSizes sizes = of_small.sizes(facts);
+  EXPECT_EQ(sizes.touched, nodes.size());
+  EXPECT_LT(sizes.column_bytes, of_plain.sizes(of_plain.facts(model)).column_bytes / 4);
+  const auto exact = of_plain.columns(of_plain.facts(model));
+  const auto columns = of_small.columns(facts);
+  ASSERT_NE(columns->compressed(), nullptr);
+  EXPECT_EQ(exact->compressed(), nullptr);
+  ASSERT_EQ(columns->nodes(), nodes);
+  std::vector<double> row(9 * model.nodes.size()), expected(row);
+  double worst = 0, most = 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    columns->read(k, row);
+    exact->read(k, expected);
+    for (std::size_t r = 0; r < row.size(); ++r) {
+      worst = test::larger(worst, std::abs(row[r] - expected[r]));
+      most = test::larger(most, std::abs(expected[r]));
+    }
+  }
+  EXPECT_LE(worst, 1e-3 * most);
+  EXPECT_LE(columns->compressed()->layout().bound, 1e-3 * most);
+  const auto fresh = of_small.columns(facts);
+  (void)fresh->compressed()->block(nodes.back(), nodes.front());
+  EXPECT_EQ(fresh->compressed()->chunks_read(), 1U);
+}
+
+TEST(Store, CompressedColumnsThatContradictThemselvesAreRefused) {
+  const Model model = small_model();
+  const ScratchFile file(".h5");
+  const auto write = [&](auto&& spoil) {
+    StiffnessCheck check;
+    const StiffnessMatrix k = stiffness_matrix(model);
+    const Factor factor = checked_factor(model, k, {}, check);
+    StiffnessFacts facts;
+    facts.object = "x";
+    facts.hash = stiffness_hash(model);
+    facts.nodes = model.nodes.size();
+    facts.order = k.order();
+    facts.norm = check.norm;
+    facts.condition = check.condition;
+    facts.compressed = 1e-3;
+    const std::vector<std::uint32_t> nodes{1, 3, 4};
+    std::vector<Vec3> positions;
+    for (const Node& node : model.nodes)
+      positions.push_back(node.position);
+    CompressedMade made =
+        compress_columns(positions, nodes, 1e-3,
+                         [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+                           return compliance_columns(k, factor, check.norm, of, {}, sink);
+                         },
+                         {});
+    spoil(made);
+    Output output(file.path(), {});
+    StiffnessStoreWriter writer(output);
+    writer.begin(facts, k, factor, nodes);
+    writer.write_compressed(made);
+    writer.end(0);
+    writer.close();
+    output.commit();
+    return refusal(file.path());
+  };
+  EXPECT_EQ(write([](CompressedMade&) {}), "accepted");
+  const auto says = [&](auto&& spoil, const char* what) {
+    const std::string said = write(spoil);
+    EXPECT_NE(said.find(what), std::string::npos) << said;
+  };
+  says([](CompressedMade& m) { m.layout.clusters.node[0] = m.layout.clusters.node[1]; },
+       "their nodes");
+  says([](CompressedMade& m) { m.layout.clusters.node.pop_back(); }, "has shape");
+  says([](CompressedMade& m) { --m.layout.clusters.first.back(); }, "their clusters");
+  says([](CompressedMade& m) { m.layout.count.pop_back(); }, "their blocks");
+  says([](CompressedMade& m) { ++m.layout.count[0].narrow; }, "its chunks");
+  says([](CompressedMade& m) { m.layout.count[1].wide = 1U << 31; }, "their blocks");
+  says([](CompressedMade& m) { m.chunks[0].push_back(0); }, "has shape");
+  says([](CompressedMade& m) { m.layout.bound = 0; }, "their bound");
+  says([](CompressedMade& m) { m.layout.relative = NAN; }, "its bound");
 }
 
 TEST(Store, ColumnsOutliveTheStoreAndMayBeAbsent) {
@@ -324,35 +432,39 @@ TEST(Store, WhatIsNoStoreIsRefusedByName) {
 }
 
 TEST(Store, EveryBeginningOfAFileIsRefused) {
-  const ScratchFile file(".h5");
-  write_store(file.path(), small_model(), {1});
-  const Bytes whole = bytes_of(file.path());
-  EXPECT_NO_THROW(contents(StiffnessStore(whole, "whole")));
-  for (std::size_t size = 0; size < whole.size(); size += size < 128 ? 1 : 97)
-    EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), size), "cut")), Error) << size;
-  EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), whole.size() - 1), "cut")), Error);
+  for (const double compressed : {0.0, 1e-3}) {
+    const ScratchFile file(".h5");
+    write_store(file.path(), small_model(), {1}, false, 1, compressed);
+    const Bytes whole = bytes_of(file.path());
+    EXPECT_NO_THROW(contents(StiffnessStore(whole, "whole")));
+    for (std::size_t size = 0; size < whole.size(); size += size < 128 ? 1 : 97)
+      EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), size), "cut")), Error) << size;
+    EXPECT_THROW(contents(StiffnessStore(std::span(whole.data(), whole.size() - 1), "cut")), Error);
+  }
 }
 
 TEST(Store, EveryFlippedBitIsFoundOrHarmless) {
-  const ScratchFile file(".h5");
-  write_store(file.path(), small_model(), {1});
-  Bytes bytes = bytes_of(file.path());
-  const std::vector<double> expected = contents(StiffnessStore(bytes, "whole"));
-  std::size_t refused = 0, tried = 0;
-  for (std::size_t i = 0; i < bytes.size(); i += 7) {
-    const auto bit = static_cast<std::uint8_t>(1U << (i % 8));
-    bytes[i] ^= bit;
-    ++tried;
-    try {
-      EXPECT_EQ(contents(StiffnessStore(bytes, "flipped")), expected) << i;
-    } catch (const Error&) {
-      ++refused;
+  for (const double compressed : {0.0, 1e-3}) {
+    const ScratchFile file(".h5");
+    write_store(file.path(), small_model(), {1}, false, 1, compressed);
+    Bytes bytes = bytes_of(file.path());
+    const std::vector<double> expected = contents(StiffnessStore(bytes, "whole"));
+    std::size_t refused = 0, tried = 0;
+    for (std::size_t i = 0; i < bytes.size(); i += 7) {
+      const auto bit = static_cast<std::uint8_t>(1U << (i % 8));
+      bytes[i] ^= bit;
+      ++tried;
+      try {
+        EXPECT_EQ(contents(StiffnessStore(bytes, "flipped")), expected) << i;
+      } catch (const Error&) {
+        ++refused;
+      }
+      bytes[i] ^= bit;
     }
-    bytes[i] ^= bit;
+    // The rest lies between the arrays and in the bounds, which are not read here.
+    EXPECT_GT(refused, tried * 3 / 4);
+    EXPECT_EQ(contents(StiffnessStore(bytes, "whole")), expected);
   }
-  // The rest lies between the arrays and in the bounds, which are not read here.
-  EXPECT_GT(refused, tried * 3 / 4);
-  EXPECT_EQ(contents(StiffnessStore(bytes, "whole")), expected);
 }
 
 TEST(Store, ArraysOfOtherSizesAreRefused) {

@@ -1,5 +1,7 @@
 #include "tools/store/store_arguments.h"
 
+#include "compliance/column_compression.h"
+
 #include <charconv>
 
 namespace gewebe {
@@ -27,6 +29,7 @@ void refuse(bool given, const char* option, const char* beside) {
 /// What makes no columns takes none of the options that say how.
 void refuse_making(const StoreArguments& a, const char* beside) {
   refuse(a.columns != "none", "--columns", beside);
+  refuse(a.compress.has_value(), "--compress", beside);
   refuse(a.method != "direct", "--method", beside);
   refuse(!a.shard_text.empty(), "--shard", beside);
   refuse(a.stage != 1, "--stage", beside);
@@ -50,6 +53,8 @@ void declare(cli::Program& p, StoreArguments& a) {
   p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none");
   p.option("--precision", a.precision, "TYPE", "of the columns: float64, float32")
       .one_of({"float64", "float32"});
+  p.option("--compress", a.compress, "E", "keep columns within E of the largest displacement")
+      .range(min_relative, 0.1);
   p.option("--method", a.method, "METHOD", "of the columns: direct, relax, relax-fixed")
       .one_of({"direct", "relax", "relax-fixed"});
   p.option("--force", a.force, "F", "that pulls at a node in a relaxation, 1e-6 N").positive();
@@ -93,6 +98,13 @@ void complete(StoreArguments& a) {
     return;
   }
   check_method(a);
+  if (a.compress) {
+    if (a.columns == "none")
+      throw UsageError("--compress is for columns, expected --columns");
+    refuse(a.method != "direct", "--method", "--compress");
+    refuse(a.precision != "float64", "--precision", "--compress");
+    refuse(!a.shard_text.empty(), "--shard", "--compress");
+  }
   if (!a.shard_text.empty())
     a.shard = shard_of(a.shard_text);
   refuse(a.stage == 2 && a.shard.count > 1, "--shard", "--stage 2");

@@ -17,6 +17,7 @@ struct StoreArguments {
   std::string columns = "none", precision = "float64", method = "direct", shard_text;
   std::string update, before; ///< the store of the model before a cut, and that model
   std::optional<double> force, threshold;
+  std::optional<double> compress; ///< bound of compressed columns
   std::optional<std::int64_t> steps;
   std::int64_t stage = 1, jobs = 1;
   bool info = false, verify = false, merge = false;

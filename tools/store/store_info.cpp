@@ -1,6 +1,7 @@
 #include "tools/store/store_info.h"
 
 #include "base/digest.h"
+#include "compliance/compressed_columns.h"
 #include "compliance/verify.h"
 
 #include <algorithm>
@@ -25,10 +26,12 @@ Verification verify_object(const StiffnessStore& store, const StiffnessFacts& fa
   const StiffnessMatrix matrix = store.matrix(facts);
   const Factor factor = store.factor(facts);
   const std::unique_ptr<ColumnSource> columns = store.columns(facts);
+  const CompressedColumns* const compressed = columns ? columns->compressed() : nullptr;
+  const double bound = compressed != nullptr ? compressed->layout().bound : 0;
   // A relaxation that came to rest.
   const double method_error = facts.method.name == "direct" ? 0 : 1e-6;
   return verify_compliance(matrix, factor, columns.get(),
-                           {facts.condition, facts.single, method_error, recomputed_nodes},
+                           {facts.condition, facts.single, method_error, bound, recomputed_nodes},
                            context);
 }
 
@@ -44,8 +47,6 @@ std::vector<StiffnessFacts> all_facts(const StiffnessStore& store) {
 }
 
 std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
-  const double column_bytes =
-      static_cast<double>(sizes.touched * 9 * facts.nodes) * (facts.single ? 4 : 8);
   const bool second = facts.group.find('/') != std::string::npos;
   std::string text = "object " + facts.object + (second ? " stage 2" : "") + "\n";
   const auto line = [&](const char* key, const std::string& value) {
@@ -58,7 +59,9 @@ std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
   line("factor_nonzeros", std::to_string(sizes.factor));
   line("factor_mb", number("%.1f", static_cast<double>(sizes.factor) * 8e-6));
   line("touched_nodes", std::to_string(sizes.touched));
-  line("columns_mb", number("%.1f", column_bytes * 1e-6));
+  line("columns_mb", number("%.1f", static_cast<double>(sizes.column_bytes) * 1e-6));
+  if (facts.compressed > 0)
+    line("compressed", number("%.6g", facts.compressed));
   line("method", facts.method.name);
   if (facts.method.force > 0)
     line("force", number("%.6g", facts.method.force));

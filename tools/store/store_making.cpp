@@ -1,5 +1,6 @@
 #include "tools/store/store_making.h"
 
+#include "compliance/column_compression.h"
 #include "compliance/compliance_columns.h"
 #include "dynamics/relaxation.h"
 #include "formats/model/ela.h"
@@ -119,10 +120,28 @@ StiffnessFacts facts_of(const Prepared& p, const StoreArguments& a) {
   facts.norm = p.check.norm;
   facts.condition = p.check.condition;
   facts.single = a.precision == "float32";
+  facts.compressed = a.compress.value_or(0);
   facts.method = method_of(a);
   if (a.touched)
     require_precision(facts.condition, facts.single);
   return facts;
+}
+
+/// Columns of clusters of nodes, compressed as they come. \return their residual
+double compress(cli::Run& run, const Prepared& p, double relative, StiffnessStoreWriter& writer) {
+  std::vector<Vec3> positions;
+  for (const Node& node : p.model.nodes)
+    positions.push_back(node.position);
+  Context quiet = run.context();
+  quiet.progress = nullptr;
+  const auto columns_of = [&](std::span<const std::uint32_t> nodes, ColumnSink& sink) {
+    return compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, quiet, sink);
+  };
+  const CompressedMade made = run.timed("columns", [&] {
+    return compress_columns(positions, p.nodes, relative, columns_of, run.context());
+  });
+  run.timed("write", [&] { writer.write_compressed(made); });
+  return made.residual;
 }
 
 /// The group of the second stage of the object that the model belongs to.
@@ -192,8 +211,12 @@ void add_models(cli::Run& run, const StoreArguments& a, const StiffnessStore* st
       const auto missing =
           run.timed("write", [&] { return writer.begin(facts, p.matrix, *p.factor, p.nodes); });
       report_kept(run, writer);
-      compute(run, p, facts.method, missing, writer);
-      const double residual = run.timed("write", [&] { return writer.end(p.check.residual); });
+      double residual = p.check.residual;
+      if (facts.compressed > 0)
+        residual = std::max(residual, compress(run, p, facts.compressed, writer));
+      else
+        compute(run, p, facts.method, missing, writer);
+      residual = run.timed("write", [&] { return writer.end(residual); });
       add(totals, facts, p.matrix, *p.factor, p.nodes.size(), residual);
     });
   }

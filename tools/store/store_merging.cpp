@@ -2,6 +2,7 @@
 
 #include "base/columns.h"
 #include "base/error.h"
+#include "compliance/column_compression.h"
 #include "tools/store/store_making.h"
 
 #include <algorithm>
@@ -14,6 +15,13 @@
 namespace gewebe {
 
 namespace {
+
+CompressedMade chunks_of(const CompressedColumns& columns) {
+  CompressedMade made{columns.layout(), {}, 0};
+  for (std::size_t k = 0; k < made.layout.with_columns; ++k)
+    made.chunks.push_back(columns.chunk_bytes(k));
+  return made;
+}
 
 /// One object of one or several stores, of which each holds some columns.
 void join_object(const std::vector<const StiffnessStore*>& stores, const std::string& group,
@@ -28,9 +36,9 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
     StiffnessMatrix k = store->matrix(f);
     Factor l = store->factor(f);
     const auto same = [&](const StiffnessFacts& g) {
-      return f.hash == g.hash && f.single == g.single && f.method == g.method && f.norm == g.norm &&
-             f.condition == g.condition && k.value == matrix->value &&
-             std::ranges::equal(l.view().x, factor->view().x);
+      return f.hash == g.hash && f.single == g.single && f.compressed == g.compressed &&
+             f.method == g.method && f.norm == g.norm && f.condition == g.condition &&
+             k.value == matrix->value && std::ranges::equal(l.view().x, factor->view().x);
     };
     if (!facts.empty() && !same(facts.front()))
       throw Error(store->path(), "'" + f.object + "' is of another model than in " +
@@ -55,6 +63,14 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
   for (const StiffnessFacts& f : facts)
     residual = std::max(residual, f.residual);
   const std::vector<std::uint32_t> missing = writer.begin(facts.front(), *matrix, *factor, nodes);
+  if (facts.front().compressed > 0) {
+    if (stores.size() > 1)
+      throw Error(stores.front()->path(),
+                  "'" + facts.front().object + "' has compressed columns, expected plain ones");
+    writer.write_compressed(chunks_of(*sources.front()->compressed()));
+    add(totals, facts.front(), *matrix, *factor, nodes.size(), writer.end(residual));
+    return;
+  }
   std::vector<double> columns(9 * facts.front().nodes);
   std::size_t k = 0; // of the missing
   for (const auto& source : sources)

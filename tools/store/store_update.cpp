@@ -105,6 +105,8 @@ void update_store(cli::Run& run, const StoreArguments& a, const StiffnessStore& 
   if (facts.method.name != "direct")
     throw Error(store.path(), "'" + facts.object + "' has columns of method " + facts.method.name +
                                   ", expected direct ones");
+  if (facts.compressed > 0)
+    throw Error(store.path(), "'" + facts.object + "' has compressed columns, expected plain ones");
   const CutObject cut = prepare(run, a.inputs[0]);
   for (const std::string& group : store.objects()) {
     if (group == facts.group) {
