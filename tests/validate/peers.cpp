@@ -231,12 +231,12 @@ void compare(Section& section, PeerElement element, const std::string& name) {
 Section peers() {
   Section section{
       "Equal elements of another program",
-      "scikit-fem builds the same matrix on the same mesh, and solves it: linear elements, and "
-      "ours, whose "
-      "weak form (quadratic displacements and a bubble, discontinuous linear pressure) is written "
-      "down there "
-      "anew and condensed. A box of distorted tetrahedra of two materials, one of them nearly "
-      "incompressible, held on one side, under a traction on the other.",
+      "scikit-fem builds the same matrix on the same mesh: of linear elements, of plain "
+      "quadratic ones, and of ours, whose weak form (quadratic displacements and a bubble, "
+      "discontinuous linear pressure) is written down there anew and condensed. A box of "
+      "distorted tetrahedra of two materials, one of them nearly incompressible, held on "
+      "one side, under a traction on the other." +
+          (peer_name().empty() ? "" : " The peer on this page: " + peer_name() + "."),
       {},
       {}};
   compare(section, PeerElement::linear, "linear");

@@ -70,7 +70,7 @@ Section silicone() {
       "beam turns and so are "
       "judged under its weight alone; a Neo-Hookean solid (`lib/solid/hyperelastic_statics.h`) "
       "turns, and carries the "
-      "markers with its end. The reference is the mean of two trials; these differ by up to 2 %.",
+      "markers with its end. The reference is the mean of two trials; these differ by up to 2.2 %.",
       {},
       {}};
   const std::string source =
