@@ -123,6 +123,25 @@ FramePoints read_points(const std::string& path, const ShapeGroup& shape, std::s
   return result;
 }
 
+std::vector<double> read_von_mises(const std::string& path, const ShapeGroup& shape,
+                                   const std::string& object, std::size_t frame) {
+  const std::uint64_t n = rows_of_three(shape.group.dataset("points", hdf5::Number::float64));
+  const bool any = shape.group.has("fields");
+  const auto first =
+      any ? shape.group.group("fields").number<std::uint64_t>("first_frame") : std::uint64_t{0};
+  if (!any || frame < first)
+    throw Error(path, "object '" + object + "' has no stress in frame " + std::to_string(frame) +
+                          ", expected a scene with 'emit stress " + object + "' before it");
+  const hdf5::Dataset set = shape.group.group("fields").dataset("von_mises", hdf5::Number::float32);
+  set.require_shape({set.rows(), n});
+  if (frame - first >= set.rows())
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected " +
+                          std::to_string(first) + " to " + std::to_string(first + set.rows() - 1));
+  std::vector<float> values(n);
+  set.read_rows(frame - first, std::span<float>(values));
+  return {values.begin(), values.end()};
+}
+
 } // namespace
 
 ResultIndex read_result_index(const std::string& path) {
@@ -218,7 +237,7 @@ ResultSolid read_result_solid(const std::string& path, const std::string& object
 }
 
 const std::vector<std::string>& result_field_names() {
-  static const std::vector<std::string> names{"displacement"};
+  static const std::vector<std::string> names{"displacement", "von-mises"};
   return names;
 }
 
@@ -230,7 +249,9 @@ std::vector<double> read_result_values(const std::string& path, const std::strin
   const std::optional<ShapeGroup> shape = shape_in_frame(objects, object, frame);
   if (!shape)
     return {};
-  std::vector<double> values = read_points(path, *shape, frame, false).lengths;
+  std::vector<double> values = field == "von-mises"
+                                   ? read_von_mises(path, *shape, object, frame)
+                                   : read_points(path, *shape, frame, false).lengths;
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i]))
       throw Error(path, "the " + field + " of node " + std::to_string(i) + " of object '" + object +

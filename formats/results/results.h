@@ -44,7 +44,8 @@ struct ResultSolid {
 ResultSolid read_result_solid(const std::string& path, const std::string& object,
                               std::size_t frame);
 
-/// The fields of a result: "displacement", its length in mm.
+/// The fields of a result: "displacement", its length in mm; "von-mises", the equivalent stress of
+/// the mean tensor at a node in Pa, where the scene emitted stress.
 const std::vector<std::string>& result_field_names();
 
 /// The value of a field at each node of the object in one frame, central nodes too; none where it

@@ -45,16 +45,66 @@ std::string xml_text(const std::string& text) {
   return result;
 }
 
-std::vector<float> in_single(std::span<const double> values) {
+std::vector<float> in_single(std::span<const double> values, const char* what, const char* unit) {
   std::vector<float> result(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     result[i] = static_cast<float>(values[i]);
     if (!std::isfinite(result[i]))
-      throw Error("a displacement of " + number_text(values[i]) +
-                  " mm does not fit single precision, expected a smaller one");
+      throw Error(std::string(what) + " of " + number_text(values[i]) + unit +
+                  " does not fit single precision, expected a smaller one");
   }
   return result;
 }
+
+/// Those of a solid, as they grow.
+struct FieldSets {
+  hdf5::Dataset stress, strain, von_mises, element_stress, element_strain, element_von_mises;
+  std::uint64_t first = 0; ///< frame
+
+  FieldSets(hdf5::Group group, std::uint64_t nodes, std::uint64_t elements, std::uint64_t from)
+      : stress(tensors(group, "stress", nodes)), strain(tensors(group, "strain", nodes)),
+        von_mises(numbers(group, "von_mises", nodes)),
+        element_stress(tensors(group, "element_stress", elements)),
+        element_strain(tensors(group, "element_strain", elements)),
+        element_von_mises(numbers(group, "element_von_mises", elements)), first(from) {
+    group.set("first_frame", from);
+  }
+
+  void append(const SolidFields& fields) {
+    add(stress, fields.node_stress, "a stress", " Pa");
+    add(strain, fields.node_strain, "a strain", "");
+    add_von_mises(von_mises, fields.node_stress);
+    add(element_stress, fields.element_stress, "a stress", " Pa");
+    add(element_strain, fields.element_strain, "a strain", "");
+    add_von_mises(element_von_mises, fields.element_stress);
+  }
+
+private:
+  static hdf5::Dataset tensors(hdf5::Group& group, const char* name, std::uint64_t count) {
+    return group.create_growing(name, hdf5::Number::float32, {count, 6}, chunk(6 * count));
+  }
+  static hdf5::Dataset numbers(hdf5::Group& group, const char* name, std::uint64_t count) {
+    return group.create_growing(name, hdf5::Number::float32, {count}, chunk(count));
+  }
+  static std::uint64_t chunk(std::uint64_t row) {
+    return std::max<std::uint64_t>(1, 65536 / (4 * row));
+  }
+  static void add(hdf5::Dataset& to, const std::vector<SymmetricBlock>& tensors, const char* what,
+                  const char* unit) {
+    std::vector<double> values;
+    values.reserve(6 * tensors.size());
+    for (const SymmetricBlock& tensor : tensors)
+      values.insert(values.end(), tensor.begin(), tensor.end());
+    to.append(std::span<const float>(in_single(values, what, unit)));
+  }
+  static void add_von_mises(hdf5::Dataset& to, const std::vector<SymmetricBlock>& stresses) {
+    std::vector<double> values;
+    values.reserve(stresses.size());
+    for (const SymmetricBlock& stress : stresses)
+      values.push_back(gewebe::von_mises(stress));
+    to.append(std::span<const float>(in_single(values, "a stress", " Pa")));
+  }
+};
 
 class Hdf5Result final : public ResultWriter {
 public:
@@ -113,8 +163,14 @@ public:
       times_.push_back(time);
       for (std::size_t i = 0; i < objects.size(); ++i) {
         Object& to = objects_.at(i);
-        const std::vector<float> u = in_single(objects[i].displacement);
+        const std::vector<float> u = in_single(objects[i].displacement, "a displacement", " mm");
         to.displacement.append(std::span<const float>(u));
+        if (const SolidFields* const fields = objects[i].fields) {
+          if (!to.fields)
+            to.fields.emplace(to.group.create_group("fields"), fields->node_stress.size(),
+                              fields->element_stress.size(), frames_);
+          to.fields->append(*fields);
+        }
         const std::span<const NodeVector> forces = objects[i].forces;
         if (forces.empty())
           continue;
@@ -162,6 +218,7 @@ private:
     hdf5::Dataset displacement, frame, node, force;
     std::vector<Shape> shapes;
     std::optional<hdf5::Group> cuts;
+    std::optional<FieldSets> fields;
   };
 
   Object& begin(const std::string& name, const Model& model, std::uint64_t first) {
@@ -184,6 +241,7 @@ private:
                         std::move(node),
                         std::move(force),
                         {shape_of(model, "/objects/" + name, first)},
+                        std::nullopt,
                         std::nullopt});
     return objects_.back();
   }
@@ -269,6 +327,20 @@ private:
            xml_text(name_) + ":" + path + "</DataItem>\n";
   }
 
+  /// One of the rows of an array, whose shape is `dimensions`, one or two numbers.
+  std::string rows(const char* name, const char* type, const char* center, const std::string& path,
+                   std::uint64_t row, std::uint64_t count, const std::string& dimensions) {
+    const bool two = dimensions.find(' ') != std::string::npos;
+    return std::string("<Attribute Name=\"") + name + "\" AttributeType=\"" + type +
+           "\" Center=\"" + center + "\">\n<DataItem ItemType=\"HyperSlab\" Dimensions=\"" +
+           dimensions + "\">\n<DataItem Format=\"XML\" Dimensions=\"3 " + (two ? "3" : "2") +
+           "\">" + std::to_string(row) + (two ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") + dimensions +
+           "</DataItem>\n" +
+           array(path, std::to_string(count) + " " + dimensions,
+                 R"(NumberType="Float" Precision="4")") +
+           "</DataItem>\n</Attribute>\n";
+  }
+
   std::string topology(const char* type, const std::string& path, std::uint64_t count,
                        std::uint64_t nodes) {
     const std::string n = std::to_string(count);
@@ -302,13 +374,24 @@ private:
     }
     text += "<Geometry GeometryType=\"XYZ\">\n" +
             array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
-            "</Geometry>\n<Attribute Name=\"displacement\" AttributeType=\"Vector\" "
-            "Center=\"Node\">\n<DataItem ItemType=\"HyperSlab\" Dimensions=\"" +
-            n + " 3\">\n<DataItem Format=\"XML\" Dimensions=\"3 3\">" +
-            std::to_string(frame - shape.first) + " 0 0 1 1 1 1 " + n + " 3</DataItem>\n" +
-            array(group + "/displacement", std::to_string(end - shape.first) + " " + n + " 3",
-                  R"(NumberType="Float" Precision="4")") +
-            "</DataItem>\n</Attribute>\n</Grid>\n";
+            "</Geometry>\n" +
+            rows("displacement", "Vector", "Node", group + "/displacement", frame - shape.first,
+                 end - shape.first, n + " 3");
+    if (object.fields && frame >= object.fields->first) {
+      const auto field = [&](const char* name, const char* set, bool tensor, bool of_nodes) {
+        const std::string count = of_nodes ? n : std::to_string(shape.tetrahedra);
+        text += rows(name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
+                     group + "/fields/" + set, frame - object.fields->first,
+                     end - object.fields->first, tensor ? count + " 6" : count);
+      };
+      field("stress", "stress", true, true);
+      field("strain", "strain", true, true);
+      field("von_mises", "von_mises", false, true);
+      field("element_stress", "element_stress", true, false);
+      field("element_strain", "element_strain", true, false);
+      field("element_von_mises", "element_von_mises", false, false);
+    }
+    text += "</Grid>\n";
     return text;
   }
 

@@ -6,6 +6,7 @@
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
 #include "model/model.h"
+#include "solid/stress.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +21,8 @@ namespace gewebe {
 struct FrameObject {
   std::span<const double> displacement; ///< 3 n numbers
   std::span<const NodeVector> forces;   ///< at displaced nodes
+  /// Of a solid, where they are asked for: from one frame on in all; such an object doesn't change.
+  const SolidFields* fields = nullptr;
 };
 
 class ResultWriter {

@@ -27,6 +27,11 @@ struct ChangeCommand {
 struct EmitModelCommand {
   std::string object, file;
 };
+/// Answers tell stresses of a solid from now on, at these nodes or all; results hold them.
+struct EmitStressCommand {
+  std::string object;
+  std::optional<Selector> nodes;
+};
 struct StepCommand {
   std::optional<double> dt; ///< >= 0
 };
@@ -40,7 +45,8 @@ struct SyncCommand {};
 struct Command {
   std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
   bool every = false;       ///< at every multiple of it
-  std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, StepCommand, RunCommand, SyncCommand>
+  std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, EmitStressCommand, StepCommand,
+               RunCommand, SyncCommand>
       what;
 };
 

@@ -56,7 +56,8 @@ void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
 
 } // namespace
 
-std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
+std::string binary_answer(const Simulation& simulation, std::uint64_t step,
+                          std::span<const StressAnswer> stresses) {
   std::string bytes;
   for (const MethodJump& jump : simulation.news().jumps) {
     append_head(bytes, {FrameKind::jump, static_cast<std::uint32_t>(jump.object), step, 1});
@@ -89,6 +90,18 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step) {
     bytes.reserve(bytes.size() + 12 * nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append_single(bytes, nodes[k].position + vector_at(u, k));
+  }
+  for (const StressAnswer& of : stresses) {
+    const auto object = static_cast<std::uint32_t>(of.object);
+    append_head(bytes, {FrameKind::nodes, object, step, of.nodes.size()});
+    for (const std::uint32_t node : of.nodes)
+      append(bytes, node);
+    append_head(bytes, {FrameKind::stress, object, step, 7 * of.nodes.size()});
+    for (const std::uint32_t node : of.nodes) {
+      for (const double value : of.stress[node])
+        append_single(bytes, value);
+      append_single(bytes, von_mises(of.stress[node]));
+    }
   }
   for (std::uint32_t k = 0;
        simulation.settings().emits.instruments && k < simulation.instrument_count(); ++k) {

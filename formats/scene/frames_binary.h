@@ -1,9 +1,11 @@
 #pragma once
 // What a scene answers to a step, as binary frames: scene(5). All numbers are little-endian.
 
+#include "formats/scene/scene_answer.h"
 #include "scene/simulation.h"
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -25,6 +27,8 @@ enum class FrameKind : std::uint32_t {
   loose = 9,      ///< 1 uint32, its nodes: the object goes on elastodynamic, for K is singular
   restored = 10,  ///< 1 uint32, its nodes: the model is as it came
   triangles = 11, ///< 3 uint32 of each triangle, where they have changed
+  stress =
+      12, ///< 7 float32 of each node: the tensor, von Mises's stress; those of the frame before
 };
 
 /// The head of each frame, without gaps: 28 bytes.
@@ -36,9 +40,11 @@ struct FrameHead {
 };
 
 /// The frames that answer a step: jump, then what cutting did, triangles, then nodes and forces,
-/// then shapes of all objects, then instruments, as far as the scene emits them, then done. \pre as
-/// text_answer \throw Error where a number does not fit single precision
-std::string binary_answer(const Simulation& simulation, std::uint64_t step);
+/// then shapes of all objects, then nodes and stresses, then instruments, as far as the scene emits
+/// them, then done. \pre as text_answer
+/// \throw Error where a number does not fit single precision
+std::string binary_answer(const Simulation& simulation, std::uint64_t step,
+                          std::span<const StressAnswer> stresses = {});
 
 /// The frame that answers sync: done alone.
 std::string binary_sync(const Simulation& simulation, std::uint64_t step);

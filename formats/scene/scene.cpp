@@ -293,6 +293,13 @@ What parse_emit(Words& in) {
       in.fail("an empty name of a file");
     return c;
   }
+  if (word == "stress") {
+    EmitStressCommand c;
+    c.object = in.name();
+    if (!in.done())
+      c.nodes = in.nodes();
+    return c;
+  }
   if (word != "shapes" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
   return ChangeCommand{.change = Emit{word == "forces", word == "instruments"}};
@@ -409,7 +416,8 @@ const std::array<Verb, 22>& verbs() {
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
       {"two-step", "two-step NAME f0 [series] [stage=FILE.ela], f0 positive", true, parse_two_step},
-      {"emit", "emit shapes|forces|instruments, or emit model NAME FILE", true, parse_emit},
+      {"emit", "emit shapes|forces|instruments, emit stress NAME [NODES], or emit model NAME FILE",
+       true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
@@ -501,8 +509,10 @@ std::optional<Command> parse_scene_line(std::string_view line) {
     words.erase(words.begin(), words.begin() + (command.every ? 2 : 1));
   }
   command.what = parse_command(std::move(words), command.at.has_value());
-  if (command.at && std::holds_alternative<EmitModelCommand>(command.what))
-    throw Error("emit model behind at T, expected it between steps");
+  const bool model = std::holds_alternative<EmitModelCommand>(command.what);
+  if (command.at && (model || std::holds_alternative<EmitStressCommand>(command.what)))
+    throw Error(std::string("emit ") + (model ? "model" : "stress") +
+                " behind at T, expected it between steps");
   return command;
 }
 

@@ -74,7 +74,8 @@ bool topology_changed(const Simulation& simulation, std::size_t object) {
   });
 }
 
-std::string text_answer(const Simulation& simulation, std::uint64_t step) {
+std::string text_answer(const Simulation& simulation, std::uint64_t step,
+                        std::span<const StressAnswer> stresses) {
   std::string text = "step " + std::to_string(step) + " ";
   append(text, simulation.time());
   text += '\n';
@@ -111,6 +112,20 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step) {
     text += "shapes " + simulation.object(i).name + " " + std::to_string(nodes.size()) + "\n";
     for (std::size_t k = 0; k < nodes.size(); ++k)
       append(text, nodes[k].position + vector_at(u, k), '\n');
+  }
+  for (const StressAnswer& of : stresses) {
+    text += "stress " + simulation.object(of.object).name + " " + std::to_string(of.nodes.size()) +
+            "\n";
+    for (const std::uint32_t node : of.nodes) {
+      text += std::to_string(node);
+      for (const double value : of.stress[node]) {
+        text += ' ';
+        append(text, value + 0.0); // -0 as 0
+      }
+      text += ' ';
+      append(text, von_mises(of.stress[node]));
+      text += '\n';
+    }
   }
   if (simulation.settings().emits.instruments)
     text += instrument_reply(simulation);

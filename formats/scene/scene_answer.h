@@ -2,9 +2,11 @@
 // What a scene answers to a step, as text: scene(5).
 
 #include "scene/simulation.h"
+#include "solid/stress.h"
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -15,10 +17,18 @@ std::string cutting_line(const Simulation& simulation, const Cutting& cutting);
 /// Whether its triangles are others since the last answer.
 bool topology_changed(const Simulation& simulation, std::size_t object);
 
+/// What `emit stress` tells of an object.
+struct StressAnswer {
+  std::size_t object = 0;
+  std::span<const std::uint32_t> nodes;   ///< ascending
+  std::span<const SymmetricBlock> stress; ///< of all nodes of the object, Pa
+};
+
 /// The answer to a step, from "step K T" to "done": jumps of objects that changed their method,
-/// what cutting did, forces and shapes as far as the scene emits them. \pre the models of all
-/// objects are known where shapes are emitted
-std::string text_answer(const Simulation& simulation, std::uint64_t step);
+/// what cutting did, forces, shapes and stresses as far as the scene emits them. \pre the models of
+/// all objects are known where shapes are emitted
+std::string text_answer(const Simulation& simulation, std::uint64_t step,
+                        std::span<const StressAnswer> stresses = {});
 
 /// "sync T": where the scene is.
 std::string text_sync(const Simulation& simulation);

@@ -1,5 +1,6 @@
 #include "solid/stress.h"
 
+#include <cmath>
 #include <cstddef>
 
 namespace gewebe {
@@ -86,6 +87,34 @@ std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
     for (double& value : sums[i])
       value = volumes[i] > 0 ? value / volumes[i] : 0;
   return sums;
+}
+
+double von_mises(const SymmetricBlock& stress) {
+  const auto& [xx, xy, xz, yy, yz, zz] = stress;
+  const double a = xx - yy, b = yy - zz, c = zz - xx;
+  return std::sqrt((a * a + b * b + c * c) / 2 + 3 * (xy * xy + yz * yz + xz * xz));
+}
+
+namespace {
+
+std::vector<SymmetricBlock> in_the_middle(std::span<const CornerTensors> tensors) {
+  std::vector<SymmetricBlock> result;
+  result.reserve(tensors.size());
+  for (const CornerTensors& of : tensors)
+    result.push_back(tensor_at(of, {0.25, 0.25, 0.25, 0.25}));
+  return result;
+}
+
+} // namespace
+
+SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+                         std::span<const SolidElement> elements, std::span<const double> u,
+                         const Vec3& acceleration) {
+  const std::vector<CornerTensors> strains =
+      solid_strains(mesh, materials, elements, u, acceleration);
+  const std::vector<CornerTensors> stresses = solid_stresses(elements, strains);
+  return {in_the_middle(strains), nodal_tensors(mesh, elements, strains), in_the_middle(stresses),
+          nodal_tensors(mesh, elements, stresses)};
 }
 
 } // namespace gewebe

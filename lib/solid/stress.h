@@ -41,4 +41,17 @@ std::vector<SymmetricBlock> nodal_tensors(const TetMesh& mesh,
                                           std::span<const SolidElement> elements,
                                           std::span<const CornerTensors> tensors);
 
+/// Von Mises's equivalent stress: of a tension alone that tension, of a pressure on all sides 0.
+double von_mises(const SymmetricBlock& stress);
+
+/// What a shape is asked for: in the middle of each element, and means at each node.
+struct SolidFields {
+  std::vector<SymmetricBlock> element_strain, node_strain;
+  std::vector<SymmetricBlock> element_stress, node_stress; ///< Pa
+};
+/// \pre as for solid_strains
+SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+                         std::span<const SolidElement> elements, std::span<const double> u,
+                         const Vec3& acceleration = {});
+
 } // namespace gewebe

@@ -155,3 +155,88 @@ P
   expect_failure 2 emboss-render emboss-render --backend cpu --field pressure run.h5 -o none.png
   rm ./*.json ./*.png field.rgb in.py run.h5 run.xdmf gel.ela bend.scene
 }
+
+# bar.ela: the block without lateral strain's coupling (nu = 0), hanging at x = 0, of density 1e-3 g/mm3.
+hanging_bar() {
+  solid_scene
+  exp2ela -q --order 2 --young 5000 --poisson 0 --density 1e-3 --fix 'x<0.001' --name bar "$GEWEBE_ROOT/tests/golden/in/cube.ply" --solid --cell 5 -o bar.ela
+}
+
+# A body under its weight along x: the stress xx grows to density * g * height at its top, exactly.
+test_stress_of_a_hanging_body() {
+  need ffe-run exp2ela
+  hanging_bar
+  printf '%s\n' 'object bar bar.ela method=ffe' 'emit stress bar x<0.001' 'gravity 9810 0 0' 'step 1' 'emit stress bar' \
+    'at 1.5 gravity 0 0 0' 'step 1' >hang.scene
+  ffe-run hang.scene -o run.h5 --record again.scene --events events.csv >answers
+  grep -q '^1,emit,bar,[0-9 -]*,.*"stress"$' events.csv || fail 'no event' "$(<events.csv)"
+  ffe-run again.scene | cmp - answers
+  # density g height = 1e-3 g/mm3 * 9810 mm/s2 * 10 mm = 98.1 Pa on the top nodes, and all others 0.
+  awk '/^stress/ { ++n; next } /^(step|done)/ { next } n == 1 {
+      ++k; for (c = 2; c <= 8; ++c) { e = (c == 2 || c == 8 ? 98.1 : 0) - $c; if (!(e < 1e-6 && e > -1e-6)) { print "stress", $0; exit 1 } } }
+    n == 2 { ++all; for (c = 2; c <= 8; ++c) if (!($c < 1e-6 && $c > -1e-6)) { print "left", $0; exit 1 } }
+    END { if (!(n == 2 && k > 8 && all > 4 * k)) { print n, k, all; exit 1 } }' answers || fail 'another stress'
+  ffe-run --binary hang.scene >binary
+  python3 - <<'P'
+import struct
+data, at, kinds = open('binary', 'rb').read(), 0, []
+while at < len(data):
+    magic, kind, obj, step, count = struct.unpack_from('<IIIQQ', data, at)
+    assert magic == 0x46425747
+    if kind == 12 and step == 1:
+        values = struct.unpack_from('<%df' % count, data, at + 28)
+        assert count % 7 == 0 and all(abs(v - 98.1) < 1e-4 for v in values[0::7] + values[6::7]), values
+        assert len(nodes) == count // 7
+    if kind == 2:
+        nodes = struct.unpack_from('<%dI' % count, data, at + 28)
+    kinds.append(kind)
+    at += 28 + 4 * count
+assert kinds == [2, 12, 3, 2, 12, 3], kinds
+P
+  local python
+  if python=$(python_with_h5py) || has_module h5py; then
+    cat >in.py <<'P'
+import h5py, numpy
+with h5py.File('run.h5') as f:
+    o, g = f['objects/bar'], f['objects/bar/fields']
+    x = o['points'][:, 0]
+    assert g.attrs['first_frame'] == 0 and g['stress'].shape == (3, len(x), 6), g['stress'].shape
+    assert not g['stress'][0].any() and abs(g['stress'][2]).max() < 1e-4
+    expected = 98.1 * (1 - x / 10)
+    assert abs(g['stress'][1][:, 0] - expected).max() < 1e-3 and abs(g['von_mises'][1] - expected).max() < 1e-3
+    assert abs(g['strain'][1][:, 0] - expected / 5000).max() < 1e-6 and abs(g['strain'][1][:, 1:]).max() < 1e-6
+    middle = x[o['tetrahedra'][:, :4]].mean(1)
+    assert abs(g['element_stress'][1][:, 0] - 98.1 * (1 - middle / 10)).max() < 1e-3
+    assert abs(g['element_von_mises'][1] - 98.1 * (1 - middle / 10)).max() < 1e-3
+    assert abs(g['element_strain'][1][:, 0] - 98.1 * (1 - middle / 10) / 5000).max() < 1e-6
+P
+    "$python" in.py
+  fi
+  rm -f in.py answers binary events.csv ./*.scene ./*.ela run.h5 run.xdmf
+}
+
+# What a failed step would have done to gravity is not in the stress of the next.
+test_stress_after_a_step_that_was_taken_back() {
+  need ffe-run exp2ela
+  hanging_bar
+  printf '%s\n' 'object bar bar.ela method=ffe' 'emit stress bar 0' 'gravity 9810 0 0' 'step 1' 'at 1.5 gravity 0 0 1e300' 'step 1' \
+    'force bar 5 0 0 0' >hang.scene
+  ffe-run --serve hang.scene >answers 2>/dev/null || true
+  grep -q '^error 6' answers || fail "$(<answers)"
+  printf '%s\n' 'gravity 9810 0 0' 'step 0.1' >>hang.scene
+  ffe-run --serve hang.scene 2>/dev/null >answers || true
+  [[ $(grep -c '^stress bar 1$' answers) == 2 ]] || fail "$(<answers)"
+  [[ $(grep -A1 '^stress' answers | grep '^0 ' | sort -u | wc -l) == 1 ]] || fail "$(<answers)"
+  rm -f answers ./*.scene ./*.ela
+}
+
+test_stress_fields_are_seen_and_refused() {
+  need ffe-run exp2ela emboss-render
+  solid_scene
+  sed -i 's/^step 1$/step 1\nemit stress gel/' bend.scene
+  ffe-run -q bend.scene -o run.h5
+  emboss-render --backend cpu --size 48 --clip 0,5,0,0,1,0 --field von-mises --stats=auto.json run.h5 -o auto.png
+  sed 's/.*"range":\[\([0-9.]*\),\([0-9.]*\)\].*/\1 \2/' auto.json | awk '{ exit !($1 >= 0 && $1 < 200 && $2 > 800 && $2 < 5000) }' || fail "$(<auto.json)"
+  expect_failure 1 emboss-render emboss-render --backend cpu --frame 0 --field von-mises run.h5 -o none.png
+  rm -f auto.* run.h5 run.xdmf bend.scene gel.ela
+}

@@ -266,7 +266,9 @@ private:
     }
   }
   void command() {
-    if (one_in(40)) {
+    if (one_in(80)) {
+      line("emit stress " + object().name + (one_in(2) ? " all" : ""));
+    } else if (one_in(40)) {
       line("emit " + of(std::vector<std::string>{"shapes", "forces", "instruments", "all"}));
     } else if (one_in(60)) {
       line("renew " + object().name);

@@ -455,6 +455,59 @@ TEST(Results, SolidsAreWrittenAndRead) {
   }
 }
 
+TEST(Results, FieldsBeginWhereTheyAreAskedFor) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  const Model solid = solid_box(true);
+  const std::size_t n = solid.nodes.size(), m = solid.tetrahedra.size();
+  const std::vector<double> u(3 * n, 0.5);
+  SolidFields fields{std::vector<SymmetricBlock>(m), std::vector<SymmetricBlock>(n),
+                     std::vector<SymmetricBlock>(m), std::vector<SymmetricBlock>(n)};
+  {
+    const std::unique_ptr<ResultWriter> result = open_result(Kind::hdf5, path, {.binary = true});
+    result->add_object("o", solid);
+    result->add_frame(0, std::vector<FrameObject>{{u, {}}});
+    for (const double factor : {1.0, 2.0}) {
+      for (std::size_t i = 0; i < n; ++i) {
+        fields.node_stress[i] = {factor * static_cast<double>(i), 0, 0, 0, 0, 0};
+        fields.node_strain[i] = {0, 0, 0, 0, factor, 0};
+      }
+      for (std::size_t t = 0; t < m; ++t)
+        fields.element_stress[t] = {0, 0, 0, 0, 0, -factor * static_cast<double>(t)};
+      result->add_frame(factor, std::vector<FrameObject>{{u, {}, &fields}});
+    }
+    result->commit();
+  }
+  for (const std::size_t frame : {1U, 2U}) {
+    const std::vector<double> values = read_result_values(path, "o", frame, "von-mises");
+    ASSERT_EQ(values.size(), n);
+    for (std::size_t i = 0; i < n; ++i)
+      EXPECT_EQ(values[i], static_cast<double>(frame * i));
+  }
+  EXPECT_EQ(complaint([&] { (void)read_result_values(path, "o", 0, "von-mises"); }),
+            path + ": object 'o' has no stress in frame 0, expected a scene with 'emit stress o' "
+                   "before it");
+  EXPECT_EQ(complaint([&] { (void)read_result_values(path, "o", 3, "von-mises"); }),
+            path + ": there is no frame 3, expected 1 to 2");
+  EXPECT_EQ(read_result_values(path, "o", 0, "displacement"),
+            std::vector<double>(n, norm(Vec3{0.5, 0.5, 0.5})));
+  const hdf5::File file = hdf5::File::open(path);
+  const hdf5::Group group = file.root().group("objects").group("o").group("fields");
+  EXPECT_EQ(group.number<std::uint64_t>("first_frame"), 1U);
+  const auto row = [&](const char* name, std::size_t count) {
+    std::vector<float> values(count);
+    group.dataset(name, hdf5::Number::float32).read_rows(1, std::span<float>(values));
+    return values;
+  };
+  EXPECT_EQ(row("stress", 6 * n)[6 * 3], 6);
+  EXPECT_EQ(row("strain", 6 * n)[6 * 3 + 4], 2);
+  EXPECT_EQ(row("element_stress", 6 * m)[6 * 5 + 5], -10);
+  EXPECT_EQ(row("element_von_mises", m)[5], 10);
+  const std::string xdmf = bytes_of(folder / "run.xdmf");
+  EXPECT_EQ(xdmf.find("Name=\"stress\""), xdmf.find("Name=\"stress\"", xdmf.find("Value=\"1\"")));
+  EXPECT_NE(xdmf.find(">1 0 0 1 1 1 1 " + std::to_string(n) + " 6<"), std::string::npos);
+}
+
 /// A file by hand, of a solid with one tetrahedron.
 struct HandMade {
   std::vector<std::uint32_t> tetrahedra{0, 1, 2, 3};

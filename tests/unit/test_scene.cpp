@@ -72,6 +72,12 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_TRUE(change<SetTwoStep>("two-step a 2.5e5 series").options.series);
   EXPECT_EQ(parse_scene_line("at 1 two-step a 3 series").value().at, 1);
   EXPECT_FALSE(change<Emit>("emit shapes").forces);
+  EXPECT_EQ(parsed<EmitStressCommand>("emit stress a").object, "a");
+  EXPECT_FALSE(parsed<EmitStressCommand>("emit stress a").nodes);
+  EXPECT_EQ(parsed<EmitStressCommand>("emit stress a z<3").nodes.has_value(), true);
+  EXPECT_THROW((void)parse_scene_line("emit stress"), Error);
+  EXPECT_THROW((void)parse_scene_line("emit stress a all more"), Error);
+  EXPECT_THROW((void)parse_scene_line("at 1 emit stress a"), Error);
   EXPECT_FALSE(parsed<StepCommand>("step").dt);
   EXPECT_EQ(parsed<StepCommand>("step 0").dt, 0);
   EXPECT_EQ(parsed<RunCommand>("run 2 every 0.5").until, 2);

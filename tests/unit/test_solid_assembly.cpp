@@ -239,6 +239,46 @@ TEST(SolidAssembly, WeightInABoxIsFoundExactly) {
   }
 }
 
+TEST(SolidAssembly, FieldsOfALinearDisplacementAreThoseOfItsGradient) {
+  const std::array<double, 9> g{0.02, 0.01, -0.03, 0.005, -0.01, 0.02, 0.04, 0.03, 0.015};
+  const SymmetricBlock strain{g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2,
+                              g[4], (g[5] + g[7]) / 2, g[8]};
+  for (const bool quadratic : {false, true}) {
+    const TetMesh mesh = distorted(quadratic, false);
+    const std::vector<SolidMaterial> material{{2500, 0.3, 1e-3}};
+    std::vector<double> u;
+    for (const Vec3& p : mesh.points)
+      for (std::size_t i = 0; i < 3; ++i)
+        u.push_back(g[3 * i] * p.x + g[3 * i + 1] * p.y + g[3 * i + 2] * p.z);
+    const SolidFields fields = solid_fields(mesh, material, solid_elements(mesh, material), u);
+    const auto [lambda, mu] = elasticity(2500, 0.3);
+    ASSERT_EQ(fields.node_strain.size(), mesh.points.size());
+    ASSERT_EQ(fields.element_stress.size(), mesh.tetrahedra.size());
+    for (std::size_t k = 0; k < 6; ++k) {
+      const bool diagonal = k == 0 || k == 3 || k == 5;
+      const double stress =
+          2 * mu * strain[k] + (diagonal ? lambda * (strain[0] + strain[3] + strain[5]) : 0);
+      for (const auto* const all : {&fields.node_strain, &fields.element_strain})
+        for (const SymmetricBlock& one : *all)
+          EXPECT_NEAR(one[k], strain[k], 1e-13);
+      for (const auto* const all : {&fields.node_stress, &fields.element_stress})
+        for (const SymmetricBlock& one : *all)
+          EXPECT_NEAR(one[k], stress, 1e-13 * (lambda + mu));
+    }
+  }
+}
+
+TEST(SolidAssembly, VonMisesIsThatOfTensionShearAndPressure) {
+  EXPECT_DOUBLE_EQ(von_mises({0, 0, 0, -30, 0, 0}), 30);
+  EXPECT_DOUBLE_EQ(von_mises({5, 0, 0, 35, 0, 5}), 30); // a pressure adds nothing
+  EXPECT_EQ(von_mises({7, 0, 0, 7, 0, 7}), 0);
+  for (const std::size_t shear : {1U, 2U, 4U}) {
+    SymmetricBlock stress{};
+    stress[shear] = -10;
+    EXPECT_DOUBLE_EQ(von_mises(stress), 10 * std::sqrt(3));
+  }
+}
+
 TEST(SolidAssembly, WhatItCannotUseIsRefusedByName) {
   const auto refuses = [](const TetMesh& mesh, const std::vector<SolidMaterial>& materials,
                           const std::string& expected) {

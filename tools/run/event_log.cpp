@@ -57,6 +57,11 @@ void EventLog::model(double time, const std::string& name, const std::string& fi
   rows_.push_back(csv(time, {.what = "emit", .object = name, .text = "model " + file}));
 }
 
+void EventLog::stress(double time, const std::string& name,
+                      const std::vector<std::uint32_t>& nodes) {
+  rows_.push_back(csv(time, {.what = "emit", .object = name, .nodes = nodes, .text = "stress"}));
+}
+
 void EventLog::change(double time, const ChangeRow& row) {
   rows_.push_back(csv(time, row));
 }

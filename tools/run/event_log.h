@@ -20,6 +20,8 @@ public:
   void object(double time, const std::string& name, const std::string& model, Method method);
   /// An object's model was written to this file.
   void model(double time, const std::string& name, const std::string& file);
+  /// Its stress at some nodes is told from now on.
+  void stress(double time, const std::string& name, const std::vector<std::uint32_t>& nodes);
   void change(double time, const ChangeRow& row);
   /// What cutting did to an object.
   void cutting(const Simulation& simulation, const Cutting& cutting);

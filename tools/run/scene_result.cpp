@@ -54,8 +54,8 @@ void SceneResult::first_frame(const Simulation& simulation, std::size_t objects)
   std::vector<FrameObject> frame;
   for (std::size_t i = 0; i < objects; ++i)
     rest.emplace_back(simulation.object(i).known ? 3 * simulation.first_model(i).nodes.size() : 0);
-  for (const std::vector<double>& one : rest)
-    frame.push_back({one, {}});
+  for (std::size_t i = 0; i < objects; ++i)
+    frame.push_back({rest[i], {}, stress_.fields(i)});
   deliver([&] { writer_.add_frame(0, frame); });
   ++frames_;
 }
@@ -67,7 +67,7 @@ void SceneResult::frame(const Simulation& simulation) {
   for (std::size_t i = 0; i < simulation.object_count(); ++i)
     frame.push_back(
         {writer_.wants_models() ? simulation.displacement(i) : std::span<const double>(),
-         simulation.contact_forces(i)});
+         simulation.contact_forces(i), stress_.fields(i)});
   deliver([&] { writer_.add_frame(simulation.time(), frame); });
   ++frames_;
 }

@@ -3,6 +3,7 @@
 
 #include "formats/results/results_writer.h"
 #include "scene/simulation.h"
+#include "tools/run/scene_stress.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -12,8 +13,8 @@ namespace gewebe {
 /// What the writer throws leaves as Undelivered, what the simulation throws as it is.
 class SceneResult {
 public:
-  /// Keeps a reference to the writer.
-  explicit SceneResult(ResultWriter& writer) : writer_(writer) {}
+  /// Keeps references to both.
+  SceneResult(ResultWriter& writer, const SceneStress& stress) : writer_(writer), stress_(stress) {}
 
   /// Reads the models of the first objects where the result shall have them.
   void need_models(const Simulation& simulation, std::size_t objects) const;
@@ -29,6 +30,7 @@ private:
   void change_objects(const Simulation& simulation);
 
   ResultWriter& writer_;
+  const SceneStress& stress_;
   std::size_t objects_ = 0; ///< that the result knows
   std::uint64_t frames_ = 0;
 };

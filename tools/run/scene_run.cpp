@@ -10,6 +10,7 @@
 #include "tools/run/scene_checks.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_result.h"
+#include "tools/run/scene_stress.h"
 #include "tools/run/step_latency.h"
 #include "tools/run/undelivered.h"
 
@@ -68,6 +69,8 @@ struct SceneRun::State {
   std::uint64_t first_error = 0;
   std::string first_error_text;
   SceneChecks checks;
+  SceneStress stress;
+  Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
   std::optional<SceneResult> result;
   std::vector<std::string> stores; ///< by object; "" where it has none
   std::vector<std::string> models; ///< files that objects were made of
@@ -75,7 +78,7 @@ struct SceneRun::State {
   State(std::string n, const Context& context, SceneOptions o)
       : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {
     if (options.result != nullptr)
-      result.emplace(*options.result);
+      result.emplace(*options.result, stress);
   }
 
   SimulationOptions simulation_options() {
@@ -94,6 +97,8 @@ struct SceneRun::State {
     s.applied = [this](const Change& change) {
       if (const auto* const set = std::get_if<SetInstrument>(&change))
         checks.instrument(set->instrument, set->shape);
+      else if (const auto* const set_gravity = std::get_if<SetGravity>(&change))
+        gravity = set_gravity->gravity;
     };
     if (options.events != nullptr)
       s.log = [this](const ChangeRow& row) { options.events->change(simulation.time(), row); };
@@ -172,12 +177,26 @@ struct SceneRun::State {
       options.events->model(simulation.time(), c.object, c.file);
   }
 
+  void tell_stress(const EmitStressCommand& c) {
+    const std::vector<std::uint32_t>& nodes =
+        stress.ask(simulation, c, [&](const std::string& list) {
+          return lists[list] = options.files.node_list(list);
+        });
+    if (options.events != nullptr)
+      options.events->stress(simulation.time(), c.object, nodes);
+  }
+
   void schedule(const Command& command, const ChangeCommand& what) {
     Change change = scene_change(what, simulation, [&](const std::string& list) {
       return lists[list] = options.files.node_list(list);
     });
-    if (auto* const two_step = std::get_if<SetTwoStep>(&change))
+    if (auto* const two_step = std::get_if<SetTwoStep>(&change)) {
+      if (stress.asked(two_step->object))
+        throw Error("object " + what.object +
+                    " tells its stress, which would be that of no one material, expected no "
+                    "two-step");
       add_stage(*two_step, what.stage);
+    }
     if (command.every)
       simulation.schedule(simulation.time(), change, *command.at);
     else if (command.at)
@@ -206,6 +225,8 @@ struct SceneRun::State {
       add(*object);
     else if (const auto* const emit = std::get_if<EmitModelCommand>(&command.what))
       write(*emit);
+    else if (const auto* const tensors = std::get_if<EmitStressCommand>(&command.what))
+      tell_stress(*tensors);
     else if (const auto* const one = std::get_if<StepCommand>(&command.what))
       step(*one);
     else if (const auto* const many = std::get_if<RunCommand>(&command.what))
@@ -260,10 +281,12 @@ struct SceneRun::State {
         simulation.settings().emits.shapes || options.result != nullptr || options.measure,
         [this](const std::string& text) { warn(text); },
         [this](const std::string& text) { distrust(text); });
+    stress.find(simulation, gravity);
+    answered_gravity = gravity;
     if (options.reply)
       deliver([&] {
-        options.reply(options.binary ? binary_answer(simulation, steps)
-                                     : text_answer(simulation, steps));
+        options.reply(options.binary ? binary_answer(simulation, steps, stress.answers())
+                                     : text_answer(simulation, steps, stress.answers()));
       });
     if (options.events != nullptr)
       for (const Cutting& c : simulation.news().cuttings)
@@ -301,6 +324,7 @@ struct SceneRun::State {
   /// The line was carried out.
   void accept(std::string_view text, const Command& command) {
     ++counts.commands;
+    answered_gravity = gravity;
     deliver([&] {
       if (options.record != nullptr)
         options.record->line(text, command, lists);
@@ -312,6 +336,7 @@ struct SceneRun::State {
   /// The line was not carried out, or only in part if it asked for many steps.
   void refuse(std::uint64_t at, const std::string& text) {
     ++counts.errors;
+    gravity = answered_gravity;
     if (first_error == 0) {
       first_error = at;
       first_error_text = text;

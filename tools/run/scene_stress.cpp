@@ -1,0 +1,56 @@
+#include "tools/run/scene_stress.h"
+
+#include "base/error.h"
+#include "solid/solid_model.h"
+
+#include <numeric>
+#include <utility>
+
+namespace gewebe {
+
+const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
+                                                   const EmitStressCommand& command,
+                                                   const LoadNodeList& lists) {
+  const std::size_t object = find_object(simulation, command.object);
+  const Model& model = simulation.model(object);
+  if (model.tetrahedra.empty())
+    throw Error("object " + command.object +
+                " has no tetrahedra, expected a solid, whose stress can be told");
+  if (simulation.object(object).staged)
+    throw Error("object " + command.object +
+                " has a second stage, so that its stress is that of no one material, expected no "
+                "two-step");
+  Solid solid;
+  if (command.nodes) {
+    solid.nodes = select_nodes(model, *command.nodes, lists);
+  } else {
+    solid.nodes.resize(model.nodes.size());
+    std::iota(solid.nodes.begin(), solid.nodes.end(), 0U);
+  }
+  solid.mesh = element_mesh(model);
+  solid.materials = element_materials(model);
+  solid.elements = solid_elements(solid.mesh, solid.materials);
+  solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
+                              std::vector<double>(3 * model.nodes.size()));
+  return (solids_[object] = std::move(solid)).nodes;
+}
+
+void SceneStress::find(const Simulation& simulation, const Vec3& gravity) {
+  for (auto& [object, solid] : solids_)
+    solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
+                                simulation.displacement(object), gravity);
+}
+
+const SolidFields* SceneStress::fields(std::size_t object) const {
+  const auto found = solids_.find(object);
+  return found == solids_.end() ? nullptr : &found->second.fields;
+}
+
+std::vector<StressAnswer> SceneStress::answers() const {
+  std::vector<StressAnswer> answers;
+  for (const auto& [object, solid] : solids_)
+    answers.push_back({object, solid.nodes, solid.fields.node_stress});
+  return answers;
+}
+
+} // namespace gewebe

@@ -1,0 +1,46 @@
+#pragma once
+// Stresses of solids in a scene that runs: of which objects they are asked for, and what they are.
+
+#include "base/vec3.h"
+#include "formats/scene/command.h"
+#include "formats/scene/scene_answer.h"
+#include "model/selector.h"
+#include "scene/simulation.h"
+#include "solid/assembly.h"
+#include "solid/stress.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+namespace gewebe {
+
+class SceneStress {
+public:
+  /// Asks for those of an object from now on, in place of what was asked of it before.
+  /// \return the nodes   \throw Error if there is no such object or node, it has no tetrahedra, or
+  /// goes on by two steps, whose stress is that of no one material
+  const std::vector<std::uint32_t>&
+  ask(const Simulation& simulation, const EmitStressCommand& command, const LoadNodeList& lists);
+  bool asked(std::size_t object) const { return solids_.contains(object); }
+
+  /// Behind a step: finds the fields of its shapes under the present gravity (mm/s²).
+  /// \throw Error as Simulation::displacement
+  void find(const Simulation& simulation, const Vec3& gravity);
+  /// Of the last find(), 0 before it; nothing where it was not asked for.
+  const SolidFields* fields(std::size_t object) const;
+  std::vector<StressAnswer> answers() const;
+
+private:
+  struct Solid {
+    TetMesh mesh;
+    std::vector<SolidMaterial> materials;
+    std::vector<SolidElement> elements;
+    std::vector<std::uint32_t> nodes; ///< that answers tell of
+    SolidFields fields;
+  };
+  std::map<std::size_t, Solid> solids_; ///< by object
+};
+
+} // namespace gewebe
