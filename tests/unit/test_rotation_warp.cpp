@@ -269,7 +269,7 @@ TEST(RotationWarp, ASiliconeBeamDroopsAsMeasured) {
     }
     on_edge.insert(on_edge.end(), {0, 0, -1});
     const WarpedShape by_columns = beam.warp.shape(beam.warp.columns(edge, gravities), on_edge);
-    EXPECT_LE(beam.error(by_columns.u, reference), 0.007);
+    EXPECT_LE(beam.error(by_columns.u, u), 1.5e-3);
     EXPECT_GE(beam.error(beam.on_surface(beam.linear(load)), reference), loaded ? 0.08 : 0.03);
   }
 }
