@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "formats/mesh/obj_stl.h"
 #include "formats/mesh/ply.h"
+#include "formats/results/series_internal.h"
 
 #include <algorithm>
 #include <optional>
@@ -11,40 +12,6 @@
 namespace gewebe {
 
 namespace {
-
-/// The place of a number in the names of a series.
-struct Pattern {
-  std::string before, after;
-  std::size_t width = 0; ///< filled up with zeros
-
-  std::string name(std::uint64_t frame) const {
-    const std::string number = std::to_string(frame);
-    return before + std::string(width > number.size() ? width - number.size() : 0, '0') + number +
-           after;
-  }
-};
-
-/// \throw UsageError for anything but one %d, %0Nd in the file's name
-std::optional<Pattern> pattern_in(const std::string& path) {
-  const std::size_t name = path.find_last_of('/') + 1; // 0 if there is none
-  const std::size_t sign = path.find('%', name);
-  if (sign == std::string::npos)
-    return std::nullopt;
-  std::size_t end = sign + 1;
-  Pattern pattern;
-  if (end < path.size() && path[end] == '0') // then the width, one digit
-    for (++end; end < path.size() && path[end] >= '1' && path[end] <= '9' && pattern.width == 0;
-         ++end)
-      pattern.width = static_cast<std::size_t>(path[end] - '0');
-  const bool good = end < path.size() && path[end] == 'd' &&
-                    (pattern.width > 0 || end == sign + 1) &&
-                    path.find('%', end) == std::string::npos;
-  if (!good)
-    throw UsageError(path + ": no pattern of a series, expected one %d or %0Nd with N from 1 to 9");
-  pattern.before = path.substr(0, sign);
-  pattern.after = path.substr(end + 1);
-  return pattern;
-}
 
 /// All surfaces in one mesh; each is a part where there are several.
 class Shapes {
@@ -108,7 +75,7 @@ private:
 class ShapeWriter final : public ResultWriter {
 public:
   ShapeWriter(Kind kind, const std::string& path, const Output::Options& options)
-      : kind_(kind), options_(options), pattern_(pattern_in(path)) {
+      : kind_(kind), options_(options), pattern_(series_in(path)) {
     if (!pattern_)
       last_.emplace(path, options);
   }
@@ -133,7 +100,7 @@ public:
 private:
   Kind kind_;
   Output::Options options_;
-  std::optional<Pattern> pattern_; ///< of a series, else
+  std::optional<SeriesName> pattern_; ///< of a series, else
   std::optional<Output> last_;
   Shapes shapes_;
   std::uint64_t frame_ = 0;

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "formats/results/results_mesh.h"
+#include "formats/results/results_vtu.h"
 #include "formats/store/hdf5_internal.h"
 
 #include <algorithm>
@@ -439,7 +440,7 @@ private:
 } // namespace
 
 const std::vector<Kind>& result_kinds() {
-  static const std::vector<Kind> kinds{Kind::hdf5, Kind::ply, Kind::obj, Kind::csv};
+  static const std::vector<Kind> kinds{Kind::hdf5, Kind::ply, Kind::obj, Kind::vtu, Kind::csv};
   return kinds;
 }
 
@@ -448,6 +449,8 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
   switch (kind) {
   case Kind::hdf5:
     return std::make_unique<Hdf5Result>(path, options);
+  case Kind::vtu:
+    return open_vtu_result(path, options);
   case Kind::csv:
     return std::make_unique<ForceTable>(path, options);
   default:

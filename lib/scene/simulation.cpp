@@ -205,6 +205,10 @@ const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) co
   return *world_->now.objects.at(object).shown.forces;
 }
 
+void Simulation::want_shapes() noexcept {
+  world_->options.shapes = true;
+}
+
 std::vector<std::size_t> Simulation::take_renewed() {
   return std::exchange(world_->renewed, {});
 }

@@ -194,6 +194,10 @@ public:
   std::span<const double> displacement(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
+  /// From now on shapes are made within each step, as SimulationOptions::shapes asks for, so that
+  /// one that can't be made fails its step.
+  void want_shapes() noexcept;
+
   /// Since it was last taken.
   const News& news() const noexcept;
   void take_news() noexcept;

@@ -223,7 +223,7 @@ test_stress_after_a_step_that_was_taken_back() {
     'force bar 5 0 0 0' >hang.scene
   ffe-run --serve hang.scene >answers 2>/dev/null || true
   grep -q '^error 6' answers || fail "$(<answers)"
-  printf '%s\n' 'gravity 9810 0 0' 'step 0.1' >>hang.scene
+  echo 'step 0.1' >>hang.scene # not as far as the event
   ffe-run --serve hang.scene 2>/dev/null >answers || true
   [[ $(grep -c '^stress bar 1$' answers) == 2 ]] || fail "$(<answers)"
   [[ $(grep -A1 '^stress' answers | grep '^0 ' | sort -u | wc -l) == 1 ]] || fail "$(<answers)"
@@ -239,4 +239,49 @@ test_stress_fields_are_seen_and_refused() {
   sed 's/.*"range":\[\([0-9.]*\),\([0-9.]*\)\].*/\1 \2/' auto.json | awk '{ exit !($1 >= 0 && $1 < 200 && $2 > 800 && $2 < 5000) }' || fail "$(<auto.json)"
   expect_failure 1 emboss-render emboss-render --backend cpu --frame 0 --field von-mises run.h5 -o none.png
   rm -f auto.* run.h5 run.xdmf bend.scene gel.ela
+}
+
+test_vtk_reads_a_series_of_grids() {
+  need ffe-run exp2ela
+  python3 -c 'import vtk' 2>/dev/null || skip 'no VTK for python3'
+  solid_scene
+  exp2ela -q --fix 'z<1' "$GEWEBE_ROOT/tests/golden/in/cube.ply" -o cube.ela
+  sed -i '1s/$/\nobject cube cube.ela method=ffe\nemit stress gel x<0.001/' bend.scene
+  ffe-run bend.scene -o run_%02d.vtu >answers
+  ffe-run -q bend.scene -o last.vtu
+  cmp last.vtu run_02.vtu
+  [[ $(echo ./*.vtu) == './last.vtu ./run_00.vtu ./run_01.vtu ./run_02.vtu' ]] || fail 'other files:' ./*
+  cat >in.py <<'P'
+import math, vtk
+told = {}
+for line in open('answers'):
+    words = line.split()
+    if words[0] == 'stress' or words[0] == 'step':
+        step = int(words[1]) if words[0] == 'step' else step
+    elif words[0] != 'done' and step == 1:
+        told[int(words[0])] = [float(w) for w in words[1:]]
+assert len(told) == 25, told
+for frame in range(3):
+    r = vtk.vtkXMLUnstructuredGridReader(); r.SetFileName('run_%02d.vtu' % frame); r.Update(); g = r.GetOutput()
+    types = [g.GetCellType(c) for c in range(g.GetNumberOfCells())]
+    assert types == [24] * 192 + [5] * 12, types
+    assert g.GetFieldData().GetArray('TimeValue').GetValue(0) == frame
+    volume = sum(vtk.vtkTetra.ComputeVolume(*(g.GetPoint(g.GetCell(c).GetPointId(k)) for k in range(4))) for c in range(192))
+    assert abs(volume - 4000) < 1e-6, volume
+    p, c = g.GetPointData(), g.GetCellData()
+    assert [c.GetArray('object').GetValue(k) for k in range(204)] == [0] * 192 + [1] * 12
+    assert {c.GetArray('material').GetValue(k) for k in range(192)} == {0, 1}
+    down = min(p.GetArray('displacement').GetTuple(k)[2] for k in range(g.GetNumberOfPoints()))
+    assert abs(down - (-4 if frame else 0)) < 0.1, down
+    for name, components in (('stress', 6), ('strain', 6), ('von_mises', 1)):
+        assert p.GetArray(name).GetNumberOfComponents() == components
+        assert c.GetArray('element_' + name).GetNumberOfComponents() == components
+    assert math.isnan(c.GetArray('element_von_mises').GetValue(203)) and not math.isnan(c.GetArray('element_von_mises').GetValue(191))
+    if frame == 1:
+        for node, (xx, xy, xz, yy, yz, zz, mises) in told.items():
+            got = p.GetArray('stress').GetTuple(node) + (p.GetArray('von_mises').GetValue(node),)
+            assert max(abs(a - b) for a, b in zip(got, (xx, yy, zz, xy, yz, xz, mises))) < 1e-9, (node, got)
+P
+  python3 in.py
+  rm -f in.py answers ./*.vtu ./*.ela bend.scene
 }

@@ -182,6 +182,7 @@ struct SceneRun::State {
         stress.ask(simulation, c, [&](const std::string& list) {
           return lists[list] = options.files.node_list(list);
         });
+    simulation.want_shapes();
     if (options.events != nullptr)
       options.events->stress(simulation.time(), c.object, nodes);
   }
