@@ -66,7 +66,7 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
   const auto objects = static_cast<std::uint32_t>(simulation.object_count());
   for (const Cutting& c : simulation.news().cuttings)
     append_cutting(bytes, c, step);
-  for (std::uint32_t i = 0; simulation.settings().emits.shapes && i < objects; ++i) {
+  for (std::uint32_t i = 0; simulation.settings().emits.any_shapes() && i < objects; ++i) {
     if (!topology_changed(simulation, i))
       continue;
     const std::vector<Triangle>& triangles = simulation.model(i).triangles;
@@ -83,12 +83,15 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
     for (const NodeVector& f : forces)
       append_single(bytes, f.value);
   }
-  for (std::uint32_t i = 0; simulation.settings().emits.shapes && i < objects; ++i) {
+  for (std::uint32_t i = 0; simulation.settings().emits.any_shapes() && i < objects; ++i) {
     const std::vector<Node>& nodes = simulation.model(i).nodes;
-    const std::span<const double> u = simulation.displacement(i);
-    append_head(bytes, {FrameKind::shapes, i, step, 3 * nodes.size()});
-    bytes.reserve(bytes.size() + 12 * nodes.size());
-    for (std::size_t k = 0; k < nodes.size(); ++k)
+    const bool all = simulation.settings().emits.shapes;
+    const std::size_t count = all ? nodes.size() : simulation.surface_nodes(i);
+    const std::span<const double> u =
+        all ? simulation.displacement(i) : simulation.surface_displacement(i);
+    append_head(bytes, {FrameKind::shapes, i, step, 3 * count});
+    bytes.reserve(bytes.size() + 12 * count);
+    for (std::size_t k = 0; k < count; ++k)
       append_single(bytes, nodes[k].position + vector_at(u, k));
   }
   for (const StressAnswer& of : stresses) {

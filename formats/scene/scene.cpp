@@ -300,9 +300,9 @@ What parse_emit(Words& in) {
       c.nodes = in.nodes();
     return c;
   }
-  if (word != "shapes" && word != "forces" && word != "instruments")
+  if (word != "shapes" && word != "surfaces" && word != "forces" && word != "instruments")
     in.fail(shown(word) + " can't be emitted");
-  return ChangeCommand{.change = Emit{word == "forces", word == "instruments"}};
+  return ChangeCommand{.change = Emit{word == "forces", word == "instruments", word == "surfaces"}};
 }
 
 What parse_step(Words& in) {
@@ -416,7 +416,8 @@ const std::array<Verb, 22>& verbs() {
       {"method", "method NAME ffe|ela", true, parse_method},
       {"timestep", "timestep dt", true, parse_timestep},
       {"two-step", "two-step NAME f0 [series] [stage=FILE.ela], f0 positive", true, parse_two_step},
-      {"emit", "emit shapes|forces|instruments, emit stress NAME [NODES], or emit model NAME FILE",
+      {"emit",
+       "emit shapes|surfaces|forces|instruments, emit stress NAME [NODES], or emit model NAME FILE",
        true, parse_emit},
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},

@@ -86,7 +86,7 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
   }
   for (const Cutting& c : simulation.news().cuttings)
     text += cutting_line(simulation, c) + "\n";
-  for (std::size_t i = 0; simulation.settings().emits.shapes && i < simulation.object_count();
+  for (std::size_t i = 0; simulation.settings().emits.any_shapes() && i < simulation.object_count();
        ++i) {
     if (!topology_changed(simulation, i))
       continue;
@@ -105,12 +105,15 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
       append(text, f.value, '\n');
     }
   }
-  for (std::size_t i = 0; simulation.settings().emits.shapes && i < simulation.object_count();
+  for (std::size_t i = 0; simulation.settings().emits.any_shapes() && i < simulation.object_count();
        ++i) {
     const std::vector<Node>& nodes = simulation.model(i).nodes;
-    const std::span<const double> u = simulation.displacement(i);
-    text += "shapes " + simulation.object(i).name + " " + std::to_string(nodes.size()) + "\n";
-    for (std::size_t k = 0; k < nodes.size(); ++k)
+    const bool all = simulation.settings().emits.shapes;
+    const std::size_t count = all ? nodes.size() : simulation.surface_nodes(i);
+    const std::span<const double> u =
+        all ? simulation.displacement(i) : simulation.surface_displacement(i);
+    text += "shapes " + simulation.object(i).name + " " + std::to_string(count) + "\n";
+    for (std::size_t k = 0; k < count; ++k)
       append(text, nodes[k].position + vector_at(u, k), '\n');
   }
   for (const StressAnswer& of : stresses) {

@@ -81,6 +81,10 @@ StiffnessFacts read_facts(const hdf5::Group& root, const std::string& name) {
   require(group, std::isfinite(facts.norm) && facts.norm > 0, "its norm");
   require(group, std::isfinite(facts.condition) && facts.condition > 0, "its condition");
   require(group, std::isfinite(facts.residual) && facts.residual >= 0, "its residual");
+  if (group.has_attribute("row_nodes")) {
+    facts.row_nodes = group.number<std::uint64_t>("row_nodes");
+    require(group, facts.row_nodes > 0 && facts.row_nodes < facts.nodes, "its row_nodes");
+  }
   const std::string precision = group.text("precision");
   facts.single = precision == "float32";
   require(group, facts.single || precision == "float64", "its precision");
@@ -231,7 +235,7 @@ StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
   sizes.factor = object.group("L").dataset("x", hdf5::Number::float64).rows();
   if (object.has("columns")) {
     sizes.touched = object.group("columns").dataset("nodes", hdf5::Number::uint32).rows();
-    sizes.column_bytes = sizes.touched * 9 * facts.nodes * (facts.single ? 4 : 8);
+    sizes.column_bytes = sizes.touched * 9 * rows_of(facts) * (facts.single ? 4 : 8);
   }
   if (object.has(store::compressed)) {
     const hdf5::Group compressed = object.group(store::compressed);
@@ -283,17 +287,18 @@ class StoredColumns final : public ColumnSource {
 public:
   StoredColumns(std::shared_ptr<const void> keep, const hdf5::Group& group,
                 const StiffnessFacts& facts)
-      : keep_(std::move(keep)), count_(facts.nodes),
+      : keep_(std::move(keep)), count_(facts.nodes), rows_(rows_of(facts)),
         nodes_(read_checked<std::uint32_t>(group, "nodes")),
         crc_(read_checked<std::uint32_t>(group, "crc32c", nodes_.size())),
         values_(
             group.dataset("values", facts.single ? hdf5::Number::float32 : hdf5::Number::float64)) {
     for (std::size_t k = 0; k < nodes_.size(); ++k)
-      require(group, nodes_[k] < count_ && (k == 0 || nodes_[k] > nodes_[k - 1]), "its nodes");
-    values_.require_shape({nodes_.size(), 3, 3 * count_});
+      require(group, nodes_[k] < rows_ && (k == 0 || nodes_[k] > nodes_[k - 1]), "its nodes");
+    values_.require_shape({nodes_.size(), 3, 3 * rows_});
   }
 
   std::size_t node_count() const override { return count_; }
+  std::size_t row_nodes() const override { return rows_; }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
 
   void read(std::size_t k, std::span<double> out) const override {
@@ -319,7 +324,7 @@ private:
   }
 
   std::shared_ptr<const void> keep_;
-  std::uint64_t count_;
+  std::uint64_t count_, rows_;
   std::vector<std::uint32_t> nodes_, crc_;
   hdf5::Dataset values_;
 };

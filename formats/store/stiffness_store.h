@@ -38,8 +38,15 @@ struct StiffnessFacts {
   double residual = 0;     ///< largest backward error seen of the checks made
   bool single = false;     ///< columns are float32
   double compressed = 0;   ///< what entries of compressed columns may be wrong by, over the largest
+  /// m: columns have rows for the first so many nodes; 0: for all n
+  std::uint64_t row_nodes = 0;
   StiffnessMethod method{};
 };
+
+/// m, of all n nodes where none are left out.
+inline std::uint64_t rows_of(const StiffnessFacts& facts) {
+  return facts.row_nodes == 0 ? facts.nodes : facts.row_nodes;
+}
 
 /// Which part of the whole a store holds: number `index` of `count`, from 1.
 struct StoreShard {

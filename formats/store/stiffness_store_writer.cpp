@@ -84,13 +84,17 @@ void require_disk(const Output& output, double bytes) {
 
 } // namespace
 
+double stored_columns_bytes(std::size_t nodes, std::size_t row_nodes, bool single) {
+  return static_cast<double>(nodes) * 3 *
+         (3 * static_cast<double>(row_nodes) * (single ? 4 : 8) +
+          4.0 * static_cast<double>(store::bound_blocks(row_nodes)));
+}
+
 double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
-                             bool single) {
+                             bool single, std::size_t row_nodes) {
   const FactorView l = factor.view();
   const double columns =
-      static_cast<double>(nodes) * 3 *
-      (static_cast<double>(matrix.row_of_axis.size()) * (single ? 4 : 8) +
-       4.0 * static_cast<double>(store::bound_blocks(matrix.row_of_axis.size() / 3)));
+      stored_columns_bytes(nodes, std::min(row_nodes, matrix.row_of_axis.size() / 3), single);
   return 8 * (2 * static_cast<double>(matrix.order()) + 2 * static_cast<double>(matrix.row.size()) +
               2 * static_cast<double>(matrix.order()) + 3 * static_cast<double>(l.super.size()) +
               static_cast<double>(l.s.size()) + static_cast<double>(l.x.size())) +
@@ -115,6 +119,8 @@ void add_facts(hdf5::Group& object, const StiffnessFacts& facts) {
   object.set("norm", facts.norm);
   object.set("condition", facts.condition);
   object.set("precision", facts.single ? "float32" : "float64");
+  if (facts.row_nodes != 0)
+    object.set("row_nodes", facts.row_nodes);
 }
 
 /// Of all that columns depend on, beside the model.
@@ -128,6 +134,8 @@ std::uint64_t work_digest(const StiffnessFacts& facts, const StiffnessMatrix& ma
                              static_cast<double>(facts.method.steps), facts.single ? 1.0 : 0.0})
     digest.add(value);
   digest.add(nodes);
+  if (facts.row_nodes != 0)
+    digest.add(facts.row_nodes);
   return digest.value();
 }
 
@@ -317,8 +325,9 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
                                                        std::span<const std::uint32_t> nodes) {
   State& s = *state_;
   const bool plain = !nodes.empty() && facts.compressed == 0;
+  const std::uint64_t rows = rows_of(facts);
   require_disk(s.output,
-               stiffness_store_bytes(matrix, factor, plain ? nodes.size() : 0, facts.single) -
+               stiffness_store_bytes(matrix, factor, plain ? nodes.size() : 0, facts.single, rows) -
                    static_cast<double>(s.data.stored()));
   const std::string group = facts.group.empty() ? hdf5::link_name(facts.object) : facts.group;
   s.object = create_object(s.file, group);
@@ -332,15 +341,15 @@ std::vector<std::uint32_t> StiffnessStoreWriter::begin(const StiffnessFacts& fac
   s.together = facts.method.name == "direct" ? compliance_block : 1;
   s.missing.clear();
   s.damaged.clear();
-  s.sums.resize(plain ? nodes.size() : 0, facts.nodes);
+  s.sums.resize(plain ? nodes.size() : 0, rows);
   if (!plain)
     return {nodes.begin(), nodes.end()};
   s.columns = s.object->create_group("columns");
   write_checked(*s.columns, "nodes", nodes);
   const hdf5::Dataset values =
       s.columns->create_dataset("values", s.single ? hdf5::Number::float32 : hdf5::Number::float64,
-                                {nodes.size(), 3, 3 * facts.nodes});
-  s.row_bytes = 9 * facts.nodes * (s.single ? sizeof(float) : sizeof(double));
+                                {nodes.size(), 3, 3 * rows});
+  s.row_bytes = 9 * rows * (s.single ? sizeof(float) : sizeof(double));
   s.places.push_back({values.offset(), nodes.size() * s.row_bytes});
   std::vector<std::optional<ColumnRecord>> finished(nodes.size());
   if (s.journal)

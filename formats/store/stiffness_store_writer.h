@@ -8,6 +8,7 @@
 #include "solve/factor.h"
 #include "solve/stiffness.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -15,9 +16,13 @@
 
 namespace gewebe {
 
-/// Bytes of a store: what its arrays take. `nodes` columns are wanted.
+/// Bytes of the columns of so many nodes with rows for `row_nodes`, and of their bounds.
+double stored_columns_bytes(std::size_t nodes, std::size_t row_nodes, bool single);
+
+/// Bytes of a store: what its arrays take. `nodes` columns are wanted, with rows for the first
+/// `row_nodes` nodes, or for all if there are fewer.
 double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
-                             bool single);
+                             bool single, std::size_t row_nodes = SIZE_MAX);
 
 /// Writes a store, object by object: matrix and factor at once, columns as they come.
 ///

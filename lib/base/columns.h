@@ -3,9 +3,11 @@
 // know nothing of each other. formats/store implements both interfaces over HDF5, lib/compliance
 // uses them.
 //
-// The columns of a node are three rows of 3n doubles: entry [axis][3 i + a] is the displacement
+// The columns of a node are three rows of 3m doubles: entry [axis][3 i + a] is the displacement
 // (mm) of node i along a under a unit force (1e-6 N) along `axis` at that node; 0 where either axis
-// is fixed.
+// is fixed. m is n, or less where the last nodes are left out: those inside a solid, whose surface
+// alone touches anything. Columns of surface nodes are then the surface's block of K⁻¹, the inverse
+// of the stiffness condensed to it (Bro-Nielsen 1998; report eq. 3.3).
 
 #include <cstddef>
 #include <cstdint>
@@ -25,11 +27,13 @@ public:
 
   /// n, of all nodes of the model.
   virtual std::size_t node_count() const = 0;
-  /// The nodes that have columns, ascending.
+  /// m: the first so many nodes are those that columns have rows for.
+  virtual std::size_t row_nodes() const { return node_count(); }
+  /// The nodes that have columns, ascending, below row_nodes().
   virtual const std::vector<std::uint32_t>& nodes() const = 0;
   /// Whether to read those of so many nodes is cheaper than to solve for them.
   virtual bool pays(std::size_t count) const { return count > 0; }
-  /// Reads the columns of nodes()[k]. \pre out.size() == 9 n \throw Error if they can't be read or
+  /// Reads the columns of nodes()[k]. \pre out.size() == 9 m \throw Error if they can't be read or
   /// are damaged
   virtual void read(std::size_t k, std::span<double> out) const = 0;
   /// Themselves, if sums and entries of them come for less than whole columns; or null.
@@ -55,7 +59,7 @@ public:
   virtual ~ColumnSink() = default;
 
   /// Takes the columns of the k-th node asked for; k ascends by one from call to call. `residual`
-  /// is the backward error of the check that they took part in. \pre columns.size() == 9 n \throw
+  /// is the backward error of the check that they took part in. \pre columns.size() == 9 m \throw
   /// Error if they can't be written
   virtual void write(std::size_t k, std::span<const double> columns, double residual) = 0;
 };

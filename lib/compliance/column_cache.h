@@ -15,15 +15,15 @@
 
 namespace gewebe {
 
-/// Computes the columns of one to eight nodes: 9 n numbers each, one node behind the other.
+/// Computes the columns of one to eight nodes: 9 m numbers each, one node behind the other.
 using ColumnSolve =
     std::function<void(std::span<const std::uint32_t> nodes, std::span<double> columns)>;
 
 class ColumnCache {
 public:
-  /// For a model of `nodes` nodes. \param source of those that are stored, or null; kept by
-  /// reference \param bytes that columns in memory may take, but two nodes' at least \param bounded
-  /// whether sums may skip what a tolerance allows
+  /// Of columns with rows for the first m = `nodes` nodes. \param source of those that are stored,
+  /// or null; kept by reference \param bytes that columns in memory may take, but two nodes' at
+  /// least \param bounded whether sums may skip what a tolerance allows
   ColumnCache(std::size_t nodes, const ColumnSource* source, ColumnSolve solve, double bytes,
               bool bounded);
 
@@ -42,7 +42,7 @@ public:
 
   /// sum += C f for forces at resident nodes, in their order; the same bytes for any number of
   /// threads. Of each block of rows, the contributions whose bounds add up to `allowed` (mm) or
-  /// less are left out. \return largest sum of bounds left out of a row \pre sum.size() == 3 n;
+  /// less are left out. \return largest sum of bounds left out of a row \pre sum.size() == 3 m;
   /// allowed is 0 unless bounded
   double add(std::span<const NodeVector> forces, double allowed, const Context& context,
              std::span<double> sum) const;
@@ -52,7 +52,7 @@ public:
   std::uint64_t skipped() const noexcept { return skipped_; }
 
 private:
-  struct Columns { ///< of a node, [axis][3 n]; one of both
+  struct Columns { ///< of a node, [axis][3 m]; one of both
     double* wide = nullptr;
     float* narrow = nullptr;
     std::vector<float> bound; ///< [axis][block], rounded up
@@ -64,7 +64,7 @@ private:
   void bound(Columns& columns) const;
   void make_room(std::size_t count);
 
-  std::size_t axes_ = 0; ///< 3 n
+  std::size_t axes_ = 0; ///< 3 m
   const ColumnSource* source_ = nullptr;
   ColumnSolve solve_;
   bool bounded_ = false;

@@ -1,5 +1,6 @@
 #include "compliance/compliance.h"
 
+#include "base/error.h"
 #include "base/vector_at.h"
 #include "compliance/compressed_columns.h"
 #include "compliance/costs.h"
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string>
 #include <utility>
 
 namespace gewebe {
@@ -14,6 +16,10 @@ namespace gewebe {
 namespace {
 
 constexpr double max_column_bytes = 1073741824; // where memory is not bounded
+
+double column_bytes(const Context& context) {
+  return std::min(static_cast<double>(context.max_memory) / 4, max_column_bytes);
+}
 
 std::vector<std::uint32_t> nodes_of(std::span<const NodeVector> forces) {
   std::vector<std::uint32_t> nodes;
@@ -23,30 +29,82 @@ std::vector<std::uint32_t> nodes_of(std::span<const NodeVector> forces) {
   return nodes;
 }
 
+/// m, of the source's columns.
+std::size_t row_nodes_of(const Model& model, const ComplianceSource& source) {
+  const ColumnSource* const columns = source.columns();
+  const std::size_t all = model.nodes.size();
+  if (columns == nullptr || columns->row_nodes() == all)
+    return all;
+  if (const std::size_t surface = surface_count(model); columns->row_nodes() != surface)
+    throw Error("the columns have rows for " + std::to_string(columns->row_nodes()) +
+                " nodes, expected the " + std::to_string(surface) + " of the surface or all " +
+                std::to_string(all));
+  return columns->row_nodes();
+}
+
 } // namespace
 
 Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> source,
                        const Context& context, bool bounded)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
       compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
-      context_(context),
-      cache_(
-          model.nodes.size(), source_->columns(),
-          [this](std::span<const std::uint32_t> nodes, std::span<double> columns) {
-            std::fill(columns.begin(), columns.end(), 0.0);
-            for (std::size_t k = 0; k < nodes.size(); ++k)
-              for (std::size_t a = 0; a < 3; ++a)
-                columns[(3 * k + a) * axes_ + 3 * std::size_t{nodes[k]} + a] = 1;
-            solve(columns, 3 * nodes.size());
-          },
-          std::min(static_cast<double>(context.max_memory) / 4, max_column_bytes), bounded) {
+      rows_(3 * row_nodes_of(model, *source_)), context_(context),
+      cache_(rows_ / 3, source_->columns(), columns_of(rows_), column_bytes(context), bounded) {
   context_.progress = nullptr;
+  if (rows_ < axes_)
+    inside_.emplace(axes_ / 3, nullptr, columns_of(axes_), column_bytes(context) / 2, false);
   source_->open(model, context_);
+}
+
+/// Solves for columns, and keeps so many rows of them.
+ColumnSolve Compliance::columns_of(std::size_t rows) {
+  return [this, rows](std::span<const std::uint32_t> nodes, std::span<double> columns) {
+    std::vector<double> whole;
+    if (rows < axes_)
+      whole.resize(3 * axes_ * nodes.size());
+    const std::span<double> all = rows < axes_ ? std::span(whole) : columns;
+    std::fill(all.begin(), all.end(), 0.0);
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      for (std::size_t a = 0; a < 3; ++a)
+        all[(3 * k + a) * axes_ + 3 * std::size_t{nodes[k]} + a] = 1;
+    solve(all, 3 * nodes.size());
+    for (std::size_t c = 0; rows < axes_ && c < 3 * nodes.size(); ++c)
+      std::ranges::copy(all.subspan(c * axes_, rows), columns.subspan(c * rows, rows).begin());
+  };
 }
 
 void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
   source_->solve(over_axes, columns);
   solves_ += columns;
+}
+
+void Compliance::need(std::span<const std::uint32_t> nodes) {
+  if (compressed_ == nullptr && !inside_)
+    return cache_.need(nodes);
+  std::vector<std::uint32_t> first, others;
+  for (const std::uint32_t node : nodes)
+    if (!compressed(node))
+      (outer(node) ? first : others).push_back(node);
+  cache_.need(first);
+  if (inside_)
+    inside_->need(others);
+}
+
+bool Compliance::fit(std::span<const std::uint32_t> nodes) const {
+  const auto others = static_cast<std::size_t>(
+      std::count_if(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return !outer(node); }));
+  return nodes.size() - others <= capacity() && (others == 0 || others <= inside_->capacity());
+}
+
+double Compliance::entry(std::uint32_t node, int axis, std::size_t row) const {
+  if (compressed(node))
+    return compressed_->entry(node, axis, row);
+  if (!outer(node))
+    return inside_->entry(node, axis, row);
+  if (row < rows_)
+    return cache_.entry(node, axis, row);
+  return inside_->entry(static_cast<std::uint32_t>(row / 3), static_cast<int>(row % 3),
+                        axis_of(node, axis)); // C is symmetric
 }
 
 void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
@@ -72,24 +130,9 @@ bool Compliance::compressed(std::uint32_t node) const {
   return compressed_ != nullptr && compressed_->has(node);
 }
 
-void Compliance::need(std::span<const std::uint32_t> nodes) {
-  if (compressed_ == nullptr)
-    return cache_.need(nodes);
-  std::vector<std::uint32_t> others;
-  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(others),
-               [&](std::uint32_t node) { return !compressed(node); });
-  cache_.need(others);
-}
-
 std::size_t Compliance::capacity() const noexcept {
   return compressed_ == nullptr ? cache_.capacity()
                                 : std::max(cache_.capacity(), compressed_->nodes().size());
-}
-
-double Compliance::entry(std::uint32_t node, int axis, std::size_t row) const {
-  if (!compressed(node))
-    return cache_.entry(node, axis, row);
-  return compressed_->entry(node, axis, row);
 }
 
 void Compliance::add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
@@ -103,7 +146,7 @@ void Compliance::add_rows(std::span<const NodeVector> forces, std::span<const st
 
 bool Compliance::stored(std::span<const std::uint32_t> nodes) const {
   return std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) {
-    return cache_.resident(node) || cache_.stored(node);
+    return outer(node) ? cache_.resident(node) || cache_.stored(node) : inside_->resident(node);
   });
 }
 
@@ -115,8 +158,10 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
            costs::compressed_pay(compressed_->numbers(nodes), source_->entries());
   const ColumnSource* const columns = source_->columns();
   const bool single = columns != nullptr && columns->single();
-  const std::size_t max = costs::nodes_worth_a_solve(source_->entries(), axes_, single);
-  return nodes.size() <= std::min(max, capacity()) && stored(nodes);
+  const std::size_t max = costs::nodes_worth_a_solve(source_->entries(), rows_, single);
+  return nodes.size() <= std::min(max, capacity()) &&
+         std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return outer(node); }) &&
+         stored(nodes);
 }
 
 bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int shapes) {

@@ -3,6 +3,10 @@
 // forces at a few, whole shapes. What it is backed by (compliance/compliance_source.h), and what is
 // cheapest for what is asked (compliance/costs.h), stays behind it: single entries and sums of a
 // few columns come from memory, answers to loads on many nodes from the factor.
+//
+// Where stored columns have rows for the first m nodes alone (base/columns.h), sums are of these
+// rows, and what is inside costs nothing; only solve() gives all. Columns of the other nodes are
+// solved for, and have all rows.
 
 #include "base/context.h"
 #include "compliance/column_cache.h"
@@ -13,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,13 +27,15 @@ class Compliance {
 public:
   /// Keeps a reference to the model. \param source null: K is factorised \param bounded whether add
   /// may be asked to leave something out
-  /// \pre check_model(model) passes; the source belongs to it   \throw Error as ComplianceSource
+  /// \pre check_model(model) passes; the source belongs to it   \throw Error as ComplianceSource,
+  /// and if columns of the source have other rows than for the surface or for all nodes
   Compliance(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
              bool bounded);
   Compliance(const Compliance&) = delete;
   Compliance& operator=(const Compliance&) = delete;
 
   std::size_t axes() const noexcept { return axes_; } ///< 3 n
+  std::size_t rows() const noexcept { return rows_; } ///< 3 m, which sums have
 
   // ---- blocks
 
@@ -39,23 +46,24 @@ public:
 
   // ---- rows
 
-  /// Brings columns to memory, but for compressed ones. \pre at most capacity() nodes
+  /// Brings columns to memory, but for compressed ones. \pre they fit
   /// \throw Error if they can't be read
   void need(std::span<const std::uint32_t> nodes);
-  /// How many nodes' columns fit in memory.
-  std::size_t capacity() const noexcept;
-  /// C at a row and a node's axis. \pre the node was needed; 0 where the axis is fixed
+  /// Whether the columns of these nodes fit in memory.
+  bool fit(std::span<const std::uint32_t> nodes) const;
+  /// C at a row and a node's axis. \pre the node was needed, and that of the row too if it is none
+  /// of the first m; 0 where the axis is fixed
   double entry(std::uint32_t node, int axis, std::size_t row) const;
   /// values += C f at these rows, by columns. \pre columns_pay for the nodes of the forces; one
-  /// value for each row
+  /// value for each row, which are below rows()
   void add_rows(std::span<const NodeVector> forces, std::span<const std::size_t> rows,
                 std::span<double> values);
 
   // ---- shapes
 
-  /// u += C f by columns, where they pay, or by a solve. Contributions that the tolerance allows
-  /// are left out of sums of columns. \param forces ascending, of different nodes \param allowed
-  /// mm, by which an entry may be wrong
+  /// u += C f at the first rows() rows by columns, where they pay, or by a solve. Contributions
+  /// that the tolerance allows are left out of sums of columns. \param forces ascending, of
+  /// different nodes \param allowed mm, by which an entry may be wrong
   void add(std::span<const NodeVector> forces, double allowed, std::span<double> u);
   /// u = C f in place, for right-hand sides over all axes one behind the other.
   void solve(std::span<double> over_axes, std::size_t columns = 1);
@@ -78,12 +86,17 @@ public:
 
 private:
   bool compressed(std::uint32_t node) const;
+  std::size_t capacity() const noexcept; ///< nodes whose columns fit in memory, of the first m
+  bool outer(std::uint32_t node) const noexcept { return 3 * std::size_t{node} < rows_; }
+  ColumnSolve columns_of(std::size_t rows);
 
   std::size_t axes_;
   std::shared_ptr<ComplianceSource> source_;
   const CompressedColumns* compressed_; ///< of the source, or null
+  std::size_t rows_;
   Context context_;
   ColumnCache cache_;
+  std::optional<ColumnCache> inside_; ///< of the nodes behind the first m, if there are any
   std::uint64_t solves_ = 0;
 };
 

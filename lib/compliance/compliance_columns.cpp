@@ -21,9 +21,14 @@ std::size_t wave_blocks(std::size_t nodes, const Context& context) {
   return std::min<std::size_t>(blocks, 2 * static_cast<std::size_t>(thread_count(context)));
 }
 
+/// 3 m for the first `row_nodes` nodes.
+std::size_t rows_of(const StiffnessMatrix& matrix, std::size_t row_nodes) {
+  return 3 * std::min(row_nodes, matrix.row_of_axis.size() / 3);
+}
+
 /// The columns of a few nodes, and the backward error of their sum.
 struct Block {
-  std::vector<double> columns;      ///< [node][axis][3 n]
+  std::vector<double> columns;      ///< [node][axis][3 m]
   std::vector<double> x, sum, load; ///< kept from block to block
   double residual = 0;
 };
@@ -36,8 +41,9 @@ double weight(std::size_t c) {
 class Columns {
 public:
   Columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
-          std::span<const std::uint32_t> nodes)
-      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes), place_(matrix.order()) {
+          std::span<const std::uint32_t> nodes, std::size_t row_nodes)
+      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes),
+        rows_(rows_of(matrix, row_nodes)), place_(matrix.order()) {
     const std::span<const std::int64_t> permutation = factor.view().permutation;
     for (std::size_t k = 0; k < place_.size(); ++k)
       place_[static_cast<std::size_t>(permutation[k])] = static_cast<std::int64_t>(k);
@@ -47,7 +53,7 @@ public:
 
   void solve(std::size_t block, Block& out) const {
     const auto nodes = nodes_of(block);
-    const std::size_t n = matrix_.order(), axes = matrix_.row_of_axis.size();
+    const std::size_t n = matrix_.order(), axes = rows_;
     out.columns.resize(block_nodes * 3 * axes); // 0 on fixed axes, which nothing writes
     std::vector<std::size_t> asked;             // only free axes have an equation
     std::vector<std::int64_t> places;
@@ -67,19 +73,22 @@ public:
       out.load[static_cast<std::size_t>(row_of(nodes[asked[c] / 3], asked[c] % 3))] = weight(c);
     for (std::size_t r = 0; r < n; ++r) { // one pass over x, whose order is that of elimination
       const double* const x = out.x.data() + static_cast<std::size_t>(place_[r]) * width;
-      double* const to = out.columns.data() + static_cast<std::size_t>(matrix_.axis_of_row[r]);
+      const auto axis = static_cast<std::size_t>(matrix_.axis_of_row[r]);
       double sum = 0;
-      for (std::size_t c = 0; c < asked.size(); ++c) {
-        to[asked[c] * axes] = x[c];
+      for (std::size_t c = 0; c < asked.size(); ++c)
         sum += weight(c) * x[c];
-      }
       out.sum[r] = sum;
+      if (axis >= axes)
+        continue; // checked, not kept
+      double* const to = out.columns.data() + axis;
+      for (std::size_t c = 0; c < asked.size(); ++c)
+        to[asked[c] * axes] = x[c];
     }
     out.residual = backward_error(matrix_, norm_, out.sum, out.load);
   }
 
   void hand_over(std::size_t block, const Block& from, ColumnSink& sink, double& residual) const {
-    const std::size_t each = 3 * matrix_.row_of_axis.size();
+    const std::size_t each = 3 * rows_;
     keep_worst(residual, from.residual); // nothing wrong is handed over
     for (std::size_t k = 0; k < nodes_of(block).size(); ++k)
       sink.write(block * block_nodes + k, {from.columns.data() + k * each, each}, from.residual);
@@ -103,28 +112,29 @@ private:
   const Factor& factor_;
   double norm_;
   std::span<const std::uint32_t> nodes_;
+  std::size_t rows_;                ///< 3 m
   std::vector<std::int64_t> place_; ///< of a row in the order of elimination
 };
 
 } // namespace
 
 double compliance_columns_bytes(const StiffnessMatrix& matrix, std::size_t nodes,
-                                const Context& context) {
+                                const Context& context, std::size_t row_nodes) {
   // A block has a panel and the columns; those of the wave before wait to be handed over.
   const double block =
       8.0 * 3 * static_cast<double>(block_nodes) * 2 *
-      (static_cast<double>(matrix.order()) + static_cast<double>(matrix.row_of_axis.size()));
+      (static_cast<double>(matrix.order()) + static_cast<double>(rows_of(matrix, row_nodes)));
   return block * static_cast<double>(wave_blocks(nodes, context));
 }
 
 double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
                           std::span<const std::uint32_t> nodes, const Context& context,
-                          ColumnSink& sink) {
+                          ColumnSink& sink, std::size_t row_nodes) {
   require_memory(context,
-                 compliance_columns_bytes(matrix, nodes.size(), context) +
+                 compliance_columns_bytes(matrix, nodes.size(), context, row_nodes) +
                      8 * static_cast<double>(factor.entries()),
                  "the factor with a block of columns");
-  const Columns columns(matrix, factor, norm, nodes);
+  const Columns columns(matrix, factor, norm, nodes, row_nodes);
   const std::size_t wave = wave_blocks(nodes.size(), context);
   Context quiet = context;
   quiet.progress = nullptr;

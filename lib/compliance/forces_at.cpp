@@ -21,9 +21,10 @@ bool ForcesAt::cheaper(const Load& now, std::size_t limit) const {
   const std::size_t m = now.displacement.size();
   if (limit != SIZE_MAX)
     return m <= limit;
-  if (m > std::min(costs::max_in_block(true), compliance_.capacity()))
+  if (m > costs::max_in_block(true))
     return false;
-  return m <= costs::max_in_block(false) || compliance_.stored(nodes_of(now.displacement));
+  const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+  return compliance_.fit(nodes) && (m <= costs::max_in_block(false) || compliance_.stored(nodes));
 }
 
 bool ForcesAt::join(std::uint32_t node) {
@@ -167,7 +168,7 @@ bool ForcesAt::shape(const Load& now, std::vector<double>& u) {
     const double length = std::sqrt(square);
     for (double& r : rest)
       r /= length;
-    std::vector<double> f = rest, answer(compliance_.axes(), 0);
+    std::vector<double> f = rest, answer(compliance_.rows(), 0);
     block_.solve(f);
     compliance_.add(by_node(f), 0, answer);
     modes_.add(rest, std::move(answer));

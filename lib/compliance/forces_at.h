@@ -30,8 +30,8 @@ public:
   bool meet(const Load& now);
   /// Of the last load that was met, by ascending node.
   std::vector<NodeVector> forces() const { return by_node(force_); }
-  /// The shape under that load by what a rigid motion of these nodes did before, if this is one.
-  /// \return whether it was
+  /// The first rows() of the shape under that load by what a rigid motion of these nodes did
+  /// before, if this is one. \return whether it was
   bool shape(const Load& now, std::vector<double>& u);
   /// How many shapes were asked for with this set otherwise, one more now.
   int count_shape() { return ++shapes_; }

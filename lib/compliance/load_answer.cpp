@@ -3,6 +3,7 @@
 #include "base/vector_at.h"
 #include "solid/model_stiffness.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace gewebe {
@@ -41,7 +42,7 @@ std::vector<NodeVector> as_vectors(const std::map<std::uint32_t, Vec3>& values) 
 }
 
 LoadAnswer::LoadAnswer(const Model& model, Compliance& compliance)
-    : model_(model), compliance_(compliance), answer_(compliance.axes(), 0) {}
+    : model_(model), compliance_(compliance), answer_(compliance.rows(), 0) {}
 
 const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
   if (gravity == weight_gravity_)
@@ -52,6 +53,7 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
     alone.gravity = gravity;
     fresh = forces_over_axes(model_, alone);
     compliance_.solve(fresh);
+    fresh.resize(compliance_.rows());
   }
   weight_ = std::move(fresh);
   weight_gravity_ = gravity;
@@ -95,7 +97,7 @@ const std::vector<double>& LoadAnswer::whole(const Load& load) {
     ++increments_;
   } else {
     fresh = weight_;
-    fresh.resize(compliance_.axes(), 0);
+    fresh.resize(compliance_.rows(), 0);
     compliance_.add(as_vectors(load.force), 0, fresh);
     increments_ = 0;
   }
@@ -105,9 +107,30 @@ const std::vector<double>& LoadAnswer::whole(const Load& load) {
   return answer_;
 }
 
+/// The answer over all axes, by a solve.
+const std::vector<double>& LoadAnswer::everywhere(const Load& load) {
+  if (!everywhere_.empty() && load.gravity == solved_.gravity && load.force == solved_.force)
+    return everywhere_;
+  everywhere_.clear(); // should the solve fail
+  std::vector<double> fresh = forces_over_axes(model_, load);
+  if (load.gravity != Vec3{} || !load.force.empty())
+    compliance_.solve(fresh);
+  everywhere_ = std::move(fresh);
+  solved_.gravity = load.gravity;
+  solved_.force = load.force;
+  return everywhere_;
+}
+
 std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t> rows) {
   std::vector<double> values;
   values.reserve(rows.size());
+  if (std::any_of(rows.begin(), rows.end(),
+                  [&](std::size_t row) { return row >= compliance_.rows(); })) {
+    const std::vector<double>& all = everywhere(load);
+    for (const std::size_t row : rows)
+      values.push_back(all[row]);
+    return values;
+  }
   if (compliance_.columns_pay(nodes_of(load.force))) {
     (void)weight(load.gravity);
     for (const std::size_t row : rows)

@@ -1,6 +1,7 @@
 #pragma once
 // u = C f for the forces and the weight of a load, where loads follow one another: sums follow
-// their changes, and where only a few rows are asked for these alone are computed.
+// their changes, and where only a few rows are asked for these alone are computed. What is inside
+// a solid, behind the rows that the compliance's sums have, is solved for when it is asked for.
 
 #include "compliance/compliance.h"
 #include "contact/load.h"
@@ -27,17 +28,18 @@ public:
   /// Keeps references to both.
   LoadAnswer(const Model& model, Compliance& compliance);
 
-  /// Whether the whole answer to this load is the last one.
+  /// Whether the answer to this load is the last one.
   bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
-  /// The whole answer, 3 n numbers.
+  /// The answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
-  /// That of the weight alone; empty for none.
+  /// That to the weight alone; empty for none.
   const std::vector<double>& weight(const Vec3& gravity);
-  /// Rows of it. The same bits whatever answers were asked for.
+  /// Rows of the answer at all axes. The same bits whatever answers were asked for.
   std::vector<double> at(const Load& load, std::span<const std::size_t> rows);
 
 private:
   std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const;
+  const std::vector<double>& everywhere(const Load& load);
   void forget() { gravity_ = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
 
   const Model& model_;
@@ -48,6 +50,8 @@ private:
   Vec3 gravity_;
   std::vector<double> answer_;
   std::uint64_t increments_ = 0; ///< by which it came to be
+  Load solved_;                  ///< whose answer over all axes is known
+  std::vector<double> everywhere_;
 };
 
 } // namespace gewebe

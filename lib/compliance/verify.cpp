@@ -47,7 +47,7 @@ public:
   /// Along `solved` anew, or the next axis that is free. `columns` as base/columns.h has them.
   void compare(std::uint32_t node, std::size_t solved, std::span<const double> columns,
                Verification& result) {
-    const std::size_t axes = matrix_.row_of_axis.size();
+    const std::size_t axes = columns.size() / 3; // of the first nodes
     bool again = false;
     for (std::size_t n = 0; n < 3; ++n) {
       const std::size_t a = (solved + n) % 3;
@@ -65,9 +65,8 @@ public:
       (void)conjugate_gradients(matrix_, load_, x_, context_);
       double difference = 0;
       for (std::size_t r = 0; r < x_.size(); ++r)
-        difference =
-            larger(difference,
-                   std::fabs(column[static_cast<std::size_t>(matrix_.axis_of_row[r])] - x_[r]));
+        if (const auto axis = static_cast<std::size_t>(matrix_.axis_of_row[r]); axis < axes)
+          difference = larger(difference, std::fabs(column[axis] - x_[r]));
       const double tolerance = tolerance_ + bound_ / largest(x_);
       difference /= largest(x_);
       ++result.recomputed;
@@ -97,7 +96,7 @@ std::vector<std::size_t> spread(std::size_t nodes, std::size_t count) {
 
 void verify_stored(const ColumnSource& columns, std::span<const std::size_t> chosen,
                    Recomputed& again, Verification& result, const Context& context) {
-  const std::size_t axes = 3 * columns.node_count(), count = columns.nodes().size();
+  const std::size_t axes = 3 * columns.row_nodes(), count = columns.nodes().size();
   const double tolerance = result.tolerance; // entries that mirror each other have no other bound
   std::vector<std::vector<double>> kept;     // of the chosen nodes
   for (const std::size_t k : chosen) {

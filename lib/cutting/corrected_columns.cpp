@@ -43,6 +43,9 @@ CorrectedColumns::CorrectedColumns(std::shared_ptr<const ColumnSource> before,
   if (3 * before_->node_count() != change_.old_axes)
     throw Error("the columns are of " + std::to_string(before_->node_count()) +
                 " nodes, expected " + std::to_string(change_.old_axes / 3));
+  if (before_->row_nodes() != before_->node_count())
+    throw Error("the columns have rows for " + std::to_string(before_->row_nodes()) +
+                " nodes alone, expected all of them");
   std::vector<std::size_t> place(before_->node_count(), SIZE_MAX);
   for (std::size_t k = 0; k < before_->nodes().size(); ++k)
     place[before_->nodes()[k]] = k;

@@ -94,6 +94,7 @@ struct SetTwoStep {
 struct Emit {
   bool forces = false;      ///< else shapes
   bool instruments = false; ///< rather
+  bool surfaces = false;    ///< rather
 };
 /// Goes on by this method: an elastodynamic object starts at the present elastostatic shape, with
 /// no velocity; an elastostatic one takes its own shape at once.

@@ -209,11 +209,15 @@ void Rule<SetTimestep>::log(const World&, const SetTimestep& c, ChangeRow& row) 
 void Rule<Emit>::apply(World& w, const Emit& c) {
   (c.instruments ? w.now.settings.emits.instruments
    : c.forces    ? w.now.settings.emits.forces
+   : c.surfaces  ? w.now.settings.emits.surfaces
                  : w.now.settings.emits.shapes) = true;
 }
 void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
   row.what = "emit";
-  row.text = c.instruments ? "instruments" : c.forces ? "forces" : "shapes";
+  row.text = c.instruments ? "instruments"
+             : c.forces    ? "forces"
+             : c.surfaces  ? "surfaces"
+                           : "shapes";
 }
 
 void Rule<Renew>::apply(World& w, const Renew& c) {

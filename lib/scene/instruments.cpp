@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <span>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -206,12 +207,16 @@ void Rule<Grasp>::apply(World& w, const Grasp& c) {
   Instrument& i = w.now.instruments[c.instrument];
   Object& object = w.now.objects.at(c.object);
   shape_in_step(w, object); // where the nodes stand
+  const bool inside = 3 * std::size_t{c.nodes.empty() ? 0 : std::ranges::max(c.nodes)} >=
+                      object.shown.displacement->size();
+  const std::span<const double> shape =
+      inside ? whole_shape(w, object) : *object.shown.displacement;
   drop_grips(w, c.object, c.nodes);
   const Pose pose = i.way.at(w.now.clock.time);
   Load& load = object.load.write();
   for (const std::uint32_t node : c.nodes) {
-    const Vec3 u = object.body != nullptr ? motion_of(object)[node].displacement
-                                          : vector_at(*object.shown.displacement, node);
+    const Vec3 u =
+        object.body != nullptr ? motion_of(object)[node].displacement : vector_at(shape, node);
     i.grips.push_back({c.object, node, pose.inverse(object.model().nodes[node].position + u)});
     load.displacement[node] = u;
     load.ramp.erase(node);

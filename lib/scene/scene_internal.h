@@ -58,6 +58,7 @@ struct Matter {
   bool known = false;
   double shortest_edge = 0; // mm; 0: not yet known
   double size = 0;          // mm, longest side of the box at rest; 0: not yet known
+  std::size_t surface = 0;  // nodes that have all of the surface; 0: not yet known
   Told told;
 };
 
@@ -114,7 +115,9 @@ struct DeferredShape {
 
 /// The picture of an object.
 struct Shown {
-  CopyOnWrite<std::vector<double>> displacement{};
+  /// Of all nodes, or of the first ones if a solid's solver has rows for its surface alone; and of
+  /// all where that was asked for, else empty.
+  CopyOnWrite<std::vector<double>> displacement{}, whole{};
   CopyOnWrite<std::vector<NodeVector>> forces{};
   std::vector<NodeTouch> touches{};
   bool valid = true;  // forces are those of the present state, and of ela the displacement

@@ -115,7 +115,7 @@ void warn_of_range(World& w, Object& object) {
     return;
   object.range.looked_at = max;
   object.range.not_looked = 0;
-  const LinearRange range = linear_range(object.model(), *object.shown.displacement);
+  const LinearRange range = linear_range(object.model(), whole_shape(w, object));
   const bool strained = !(range.strain <= strain_limit), rotated = !(range.turn <= turn_limit);
   if (!strained && !rotated)
     return;
@@ -144,7 +144,7 @@ void shape(World& w, Object& object) {
   }
   at_object(w, object, [&] {
     update_stages(w, object, *shown.load); // as it is, but where a change of method looked ahead
-    const std::span<const double> u = static_shape(object);
+    const std::span<const double> u = static_surface(object);
     require_bounded(object, u);
     shown.displacement.replace().assign(u.begin(), u.end());
   });
@@ -159,6 +159,24 @@ void shape_in_step(World& w, Object& object) {
   shape(w, object);
 }
 
+std::span<const double> whole_shape(World& w, Object& object) {
+  shape(w, object);
+  Shown& shown = object.shown;
+  if (shown.displacement->size() == 3 * object.model().nodes.size())
+    return *shown.displacement;
+  if (shown.whole->empty())
+    at_object(w, object, [&] {
+      Load load = *shown.load; // and what instruments push with
+      for (const NodeTouch& t : shown.touches)
+        load.force[t.node] += t.force;
+      update_stages(w, object, load);
+      const std::span<const double> u = static_shape(object);
+      require_bounded(object, u);
+      shown.whole.replace().assign(u.begin(), u.end());
+    });
+  return *shown.whole;
+}
+
 void show(World& w, Object& object) {
   if (object.body != nullptr || !object.load->empty())
     need_model(object);
@@ -169,6 +187,7 @@ void show(World& w, Object& object) {
   Shown& shown = object.shown;
   shown.deferred = nullptr;
   leave_shown(w, object);
+  shown.whole = {};
   shown.forces = {};
   const bool acted_on = object.statics->solver || !object.load->empty();
   if (object.method == Method::ffe && (meets || acted_on))

@@ -197,8 +197,22 @@ void Simulation::step_to(double time) {
 // ---- what is shown and told
 
 std::span<const double> Simulation::displacement(std::size_t object) const {
+  return whole_shape(*world_, world_->now.objects.at(object));
+}
+
+std::span<const double> Simulation::surface_displacement(std::size_t object) const {
   shape(*world_, world_->now.objects.at(object));
   return *world_->now.objects[object].shown.displacement;
+}
+
+std::size_t Simulation::surface_nodes(std::size_t object) const {
+  const Model& now = model(object);
+  if (now.tetrahedra.empty())
+    return now.nodes.size();
+  std::size_t& surface = world_->now.objects[object].matter->surface;
+  if (surface == 0)
+    surface = surface_count(now); // solids are not cut
+  return surface;
 }
 
 const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) const {
@@ -261,7 +275,8 @@ SimulationState Simulation::state() const {
   for (std::size_t i = 0; i < object_count(); ++i) {
     if (!object(i).known)
       continue;
-    state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
+    if (!model(i).springs.empty())
+      state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)
       continue;

@@ -39,6 +39,7 @@ struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
   double tolerance = 0;                           ///< as well
   bool shapes = false;                            ///< shapes are wanted of each step, as if emitted
+  bool surfaces = false;                          ///< as surface_displacement has them
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
   /// Told in its place of shapes that are not to be trusted; without it `warn` is.
   std::function<void(const std::string&)> distrust{};
@@ -115,6 +116,8 @@ struct InstrumentReport {
 /// What the answer to a step tells.
 struct Emits {
   bool forces = false, shapes = false, instruments = false;
+  bool surfaces = false; ///< shapes, of solids those of the surface; `shapes` has all nodes
+  bool any_shapes() const noexcept { return shapes || surfaces; }
 };
 
 /// What changes have set for the scene as a whole.
@@ -192,6 +195,11 @@ public:
   /// of an elastostatic object is computed when it is first asked for; instruments' forces on an
   /// elastodynamic one are means over the last step. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
+  /// As displacement, of the first nodes: at least those of the surface. Where stored columns of a
+  /// solid have rows for these alone, it takes nothing of what is inside.
+  std::span<const double> surface_displacement(std::size_t object) const;
+  /// surface_count of its model where that has tetrahedra, else all nodes.
+  std::size_t surface_nodes(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
   /// From now on shapes are made within each step, as SimulationOptions::shapes asks for, so that

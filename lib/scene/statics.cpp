@@ -92,6 +92,12 @@ std::span<const double> static_shape(Object& object) {
                           : statics.solver->displacement();
 }
 
+std::span<const double> static_surface(Object& object) {
+  Statics& statics = *object.statics;
+  return statics.two_step ? statics.two_step->surface_displacement(*statics.solver)
+                          : statics.solver->surface_displacement();
+}
+
 const std::vector<NodeVector>& static_forces(const Object& object) {
   const Statics& statics = *object.statics;
   return statics.two_step ? statics.two_step->contact_forces() : statics.solver->contact_forces();

@@ -61,14 +61,16 @@ void require_bounded_instruments(const World& w) {
 
 void show_all(World& w) {
   for (Object& object : w.now.objects) {
-    if (w.now.settings.emits.shapes)
+    if (w.now.settings.emits.any_shapes())
       need_model(object);
     if (!object.shown.valid ||
         (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
         touched_anew(w, object))
       at_object(w, object, [&] { show(w, object); });
-    if (w.now.settings.emits.shapes || w.options.shapes)
+    if (w.now.settings.emits.any_shapes() || w.options.shapes || w.options.surfaces)
       shape_in_step(w, object); // now, so that a failure is one of this step
+    if (w.now.settings.emits.shapes || w.options.shapes)
+      (void)whole_shape(w, object);
   }
 }
 

@@ -101,7 +101,9 @@ void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t
                 Object& next);
 void make_whole(const World& w, Object& object);
 void update_stages(World& w, Object& object, const Load& load);
+/// Whole, or of the nodes alone that the solver has rows for: all of the surface among them.
 std::span<const double> static_shape(Object& object);
+std::span<const double> static_surface(Object& object);
 const std::vector<NodeVector>& static_forces(const Object& object);
 
 // bodies.cpp: what is tied together and moves as one
@@ -119,6 +121,8 @@ void advance(World& w, double to);
 void show(World& w, Object& object);
 void shape(World& w, Object& object);
 void shape_in_step(World& w, Object& object);
+/// Of all nodes, those inside a solid too.
+std::span<const double> whole_shape(World& w, Object& object);
 double displacement_limit(Object& object);
 void require_bounded(Object& object, std::span<const double> displacement);
 

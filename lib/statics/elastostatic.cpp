@@ -33,14 +33,15 @@ struct Elastostatic::State {
   // The last load, its contact forces, and its shape, where that was asked for.
   Load load;
   std::vector<NodeVector> forces;
-  std::vector<double> u;
-  bool shape_known = true;
+  std::vector<double> u;     // of the rows that sums have
+  std::vector<double> whole; // over all axes, where these are more
+  bool shape_known = true, whole_known = false;
 
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
       : model(m), context(without_progress(c)), options(o),
         compliance(m, std::move(s), c, o.tolerance > 0), answer(m, compliance),
-        block(m, compliance, answer), held(m, context), u(3 * m.nodes.size()) {}
+        block(m, compliance, answer), held(m, context), u(compliance.rows()) {}
 
   static Context without_progress(Context c) {
     c.progress = nullptr;
@@ -72,7 +73,7 @@ struct Elastostatic::State {
       if (tolerance > 0 && !answer.known(now) && compliance.columns_pay(nodes_of(now.force))) {
         const double allowed = tolerance * min_size(now);
         u = answer.weight(now.gravity);
-        u.resize(compliance.axes(), 0);
+        u.resize(compliance.rows(), 0);
         compliance.add(as_vectors(now.force), allowed, u);
         return;
       }
@@ -86,16 +87,54 @@ struct Elastostatic::State {
         u = answer.whole(now);
         compliance.add(forces, tolerance * min_size(now), u);
       } else {
-        u = forces_over_axes(model, now);
-        for (const NodeVector& contact : forces)
-          for (int a = 0; a < 3; ++a)
-            u[axis_of(contact.node, a)] += contact.value[a];
+        u = all_forces();
         compliance.solve(u);
+        u.resize(compliance.rows());
       }
     }
-    for (const auto& [node, d] : now.displacement)
+    place_displaced(u);
+  }
+
+  /// Displaced nodes stand where they must.
+  void place_displaced(std::vector<double>& shape) const {
+    for (const auto& [node, d] : load.displacement)
       for (int a = 0; a < 3; ++a)
-        u[axis_of(node, a)] = d[a];
+        if (const std::size_t axis = axis_of(node, a); axis < shape.size())
+          shape[axis] = d[a];
+  }
+
+  /// The load with what holds its displaced nodes.
+  std::vector<double> all_forces() const {
+    std::vector<double> f = forces_over_axes(model, load);
+    for (const NodeVector& contact : forces)
+      for (int a = 0; a < 3; ++a)
+        f[axis_of(contact.node, a)] += contact.value[a];
+    return f;
+  }
+
+  static void require_finite(const std::vector<double>& shape) {
+    double sum = 0;
+    for (const double value : shape)
+      sum += std::abs(value);
+    if (!std::isfinite(sum))
+      throw Error("the shape is not finite, expected a smaller load");
+  }
+
+  bool all_rows() const { return compliance.rows() == compliance.axes(); }
+
+  const std::vector<double>& need_whole() {
+    if (all_rows()) {
+      need_shape();
+      return u;
+    }
+    if (!whole_known) {
+      whole = all_forces();
+      compliance.solve(whole);
+      place_displaced(whole);
+      require_finite(whole);
+      whole_known = true;
+    }
+    return whole;
   }
 
   void need_shape() {
@@ -103,38 +142,38 @@ struct Elastostatic::State {
       return;
     make_shape(options.tolerance);
     ++counts.shapes;
-    double sum = 0;
-    for (const double value : u)
-      sum += std::abs(value);
-    if (!std::isfinite(sum))
-      throw Error("the shape is not finite, expected a smaller load");
+    require_finite(u);
     if (options.measure_error)
       measure();
     shape_known = true;
   }
 
+  /// How far the shape is from another one at its rows, over the largest entry of that.
+  double distance_from(const std::vector<double>& other) const {
+    double worst = 0;
+    for (std::size_t r = 0; r < u.size(); ++r)
+      worst = std::max(worst, std::abs(other[r] - u[r]));
+    const double size = largest_size(other);
+    return size > 0 ? worst / size : 0;
+  }
+
   void measure() {
-    const Load& now = load;
     if (options.tolerance > 0) {
       std::vector<double> taken = u;
       make_shape(0);
-      double worst = 0;
-      for (std::size_t r = 0; r < u.size(); ++r)
-        worst = std::max(worst, std::abs(taken[r] - u[r]));
-      const double size = largest_size(u);
-      if (size > 0)
-        counts.shape_error = std::max(counts.shape_error, worst / size);
       std::swap(taken, u);
+      counts.shape_error = std::max(counts.shape_error, distance_from(taken));
     }
+    const std::vector<double>& shape = all_rows() ? u : need_whole();
+    if (!all_rows())
+      counts.backward_error = std::max(counts.backward_error, distance_from(shape));
     if (!norm) {
       norm = stiffness_norm(stiffness_matrix(model));
       stiffness.emplace(model);
     }
-    std::vector<double> f = forces_over_axes(model, now), product(u.size(), 0);
-    for (const NodeVector& contact : forces)
-      for (int a = 0; a < 3; ++a)
-        f[axis_of(contact.node, a)] += contact.value[a];
-    stiffness->multiply(u, product);
+    std::vector<double> product(shape.size(), 0);
+    const std::vector<double> f = all_forces();
+    stiffness->multiply(shape, product);
     double residual = 0, load_size = 0;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
@@ -142,7 +181,7 @@ struct Elastostatic::State {
           residual = std::max(residual, std::abs(product[axis_of(i, a)] - f[axis_of(i, a)]));
           load_size = std::max(load_size, std::abs(f[axis_of(i, a)]));
         }
-    const double scale = *norm * largest_size(u) + load_size;
+    const double scale = *norm * largest_size(shape) + load_size;
     if (scale > 0)
       counts.backward_error = std::max(counts.backward_error, residual / scale);
   }
@@ -153,7 +192,7 @@ struct Elastostatic::State {
       ++counts.unchanged;
       return;
     }
-    shape_known = false;
+    shape_known = whole_known = false;
     std::vector<NodeVector> before = std::move(forces);
     forces.clear();
     try {
@@ -166,6 +205,7 @@ struct Elastostatic::State {
         throw Error("the contact forces are not finite, expected a smaller load");
     } catch (...) {
       forces = std::move(before);
+      shape_known = whole_known = false;
       throw;
     }
     load = now;
@@ -182,8 +222,14 @@ struct Elastostatic::State {
       by_block = true;
       return;
     }
-    forces = held.meet(now, u);
+    std::vector<double>& shape = all_rows() ? u : whole;
+    forces = held.meet(now, shape);
     by_block = false;
+    if (!all_rows()) {
+      u = whole;
+      u.resize(compliance.rows());
+      whole_known = true;
+    }
     shape_known = true;
   }
 
@@ -211,14 +257,15 @@ struct Elastostatic::State {
       symmetric([&](std::size_t c, std::size_t r) {
         return columns.entry(node_at(c), axis_at(c), where[r]);
       });
+      const std::vector<double>& shape = need_whole();
       for (const std::size_t axis : where)
-        delassus.free.push_back(u[axis]);
+        delassus.free.push_back(shape[axis]);
       return delassus;
     }
     std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
     for (const auto& entry : now.displacement)
       all.push_back(entry.first);
-    if (all.size() > compliance.capacity())
+    if (!compliance.fit(all))
       throw Error("the columns of " + std::to_string(all.size()) +
                   " nodes in contact do not fit in memory, expected more of it or fewer contacts");
     compliance.need(all);
@@ -266,6 +313,10 @@ void Elastostatic::update(const Load& load) {
 }
 
 std::span<const double> Elastostatic::displacement() {
+  return state_->need_whole();
+}
+
+std::span<const double> Elastostatic::surface_displacement() {
   state_->need_shape();
   return state_->u;
 }

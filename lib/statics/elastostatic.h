@@ -10,6 +10,10 @@
 //
 // Forces come first, the shape when it is asked for. What was asked before is not asked again: a
 // grasp that moves rigidly costs as much for a hundred nodes as for twelve.
+//
+// Of a solid whose stored columns have rows for its surface alone (base/columns.h), forces and the
+// shape of the surface take what they take of a net of as many nodes; what is inside is found by
+// one solve when the whole shape is asked for.
 
 #include "base/context.h"
 #include "contact/load.h"
@@ -33,7 +37,9 @@ struct ElastostaticCounts {
   std::uint64_t columns_read = 0;           ///< nodes whose columns were read
   std::uint64_t factors = 0;                ///< factorised or loaded
   std::uint64_t terms = 0, skipped = 0;     ///< of columns and blocks of rows: added, left out
-  double backward_error = 0; ///< largest ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖) seen, where it was asked for
+  /// Largest ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖) seen, where it was asked for; and by how much a surface that
+  /// is found alone differs from that of the whole shape, over the largest entry.
+  double backward_error = 0;
   double contact_error = 0; ///< largest miss of a prescribed displacement, over the largest one
   double shape_error = 0; ///< largest effect of the tolerance on an entry, over the largest entry,
                           ///< where errors were asked for
@@ -76,6 +82,10 @@ public:
   /// The shape: 3 n numbers, mm; exactly the prescribed ones at displaced nodes. Computed by the
   /// first call behind an update. \throw Error as update, or if the shape is not finite
   std::span<const double> displacement();
+  /// Of the first m nodes, which columns have rows for: 3 m numbers, all of the surface among them.
+  /// Where m is n the same as displacement(); else it doesn't depend on whether that was asked for.
+  /// \throw as displacement
+  std::span<const double> surface_displacement();
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;

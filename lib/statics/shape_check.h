@@ -26,7 +26,8 @@ class ShapeCheck {
 public:
   explicit ShapeCheck(const Model& model);
   /// Time grows with nodes, triangles and edges. \pre the model is the one given, `displacement`
-  /// has 3 numbers for each of its nodes
+  /// has 3 numbers for each of its nodes, or for the first ones, with all corners of triangles and
+  /// ends of springs among them
   ShapeFaults look(const Model& model, std::span<const double> displacement) const;
   double mean_edge() const noexcept { return mean_edge_; } ///< mm
   double shortest_edge() const noexcept { return shortest_edge_; }

@@ -351,7 +351,7 @@ public:
   }
   std::span<const double> shape() override {
     solver_().update(pushed_);
-    return solver_().displacement();
+    return solver_().surface_displacement();
   }
 
 private:

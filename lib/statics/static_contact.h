@@ -59,7 +59,8 @@ public:
   /// These forces act now, beside all others. \param at where the last operator puts its nodes
   /// under them \return whether they stand there; else another one is asked for
   virtual bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) = 0;
-  /// The shape under them, 3 n displacements.
+  /// The shape under them: displacements of all nodes, or of the first ones, all of the surface
+  /// among them.
   virtual std::span<const double> shape() = 0;
 };
 
@@ -70,8 +71,8 @@ public:
   StaticContact(const Model& model, std::span<const double> shape,
                 std::vector<NodeTouch> touches = {});
 
-  /// Takes the object's shape on to that with the instruments where they are now; `shape` (3 n
-  /// displacements) is the last one before and the new one after. An absent instrument is no
+  /// Takes the object's shape on to that with the instruments where they are now; `shape` (as
+  /// Yielding has it) is the last one before and the new one after. An absent instrument is no
   /// element. Where more of the way is to come (not `last`) and nothing is touched, nothing is
   /// done. \param displaced nodes that stand where they must   \throw as the object
   void update(Yielding& object, const std::map<std::uint32_t, Vec3>& displaced,

@@ -209,8 +209,12 @@ struct TwoStep::State {
   double s = 1;
   Load total; // beyond the threshold: all forces, those of contact too
 
-  std::vector<double> u;
-  bool shaped = true; // u is that of `last`
+  /// That of `last`, where known.
+  struct Shape {
+    std::vector<double> u;
+    bool known = true;
+  };
+  Shape whole, surface; // the surface's where it was asked for alone
 
   std::vector<std::uint32_t> nodes; // of contact
   std::vector<std::size_t> axes;    // of them, those that are free: 3 k + a for nodes[k]
@@ -218,7 +222,9 @@ struct TwoStep::State {
 
   State(const Model& m, std::shared_ptr<ComplianceSource> source, const Context& context, double t)
       : model(m), second(m, std::move(source), context, {.tolerance = t}), tolerance(t),
-        u(3 * m.nodes.size()) {}
+        whole{std::vector<double>(3 * m.nodes.size())}, surface(whole) {}
+
+  using Displacement = std::span<const double> (Elastostatic::*)();
 
   void forget_contact() {
     contact.reset();
@@ -307,20 +313,21 @@ struct TwoStep::State {
     forces = first.contact_forces();
   }
 
-  void shape(Elastostatic& first) {
+  void shape(Elastostatic& first, Displacement of, std::vector<double>& u) {
     if (!(s < 1)) {
       first.update(*last);
-      const std::span<const double> u1 = first.displacement();
+      const std::span<const double> u1 = (first.*of)();
       u.assign(u1.begin(), u1.end());
       return;
     }
     first.update(total);
     second.update(total);
-    const std::span<const double> u1 = first.displacement(), u2 = second.displacement();
+    const std::span<const double> u1 = (first.*of)(), u2 = (second.*of)();
+    u.resize(std::min(u1.size(), u2.size()));
     const double a = options.series ? s : 1, b = options.series ? 1 - s : s - 1;
     for (std::size_t r = 0; r < u.size(); ++r)
       u[r] = a * u1[r] + b * u2[r];
-    meet(std::max(largest_size(u1), largest_size(u2)));
+    meet(std::max(largest_size(u1), largest_size(u2)), u);
     double sum = 0;
     for (const double value : u)
       sum += std::abs(value);
@@ -329,10 +336,10 @@ struct TwoStep::State {
   }
 
   /// The displaced nodes stand exactly where they must.
-  void meet(double size) {
+  void meet(double size, std::vector<double>& u) const {
     double miss = 0;
     for (const auto& [node, d] : last->displacement)
-      for (int a = 0; a < 3; ++a) {
+      for (int a = 0; a < 3 && axis_of(node, a) < u.size(); ++a) {
         double& value = u[axis_of(node, a)];
         const double error = std::abs(value - d[a]);
         miss = std::isnan(error) ? error : std::max(miss, error);
@@ -375,7 +382,7 @@ void TwoStep::update(Elastostatic& first, const Load& load) {
     throw Error("the load is not finite, expected a smaller one");
   state.largest = std::max(state.largest, state.norm);
   state.last = load;
-  state.shaped = false;
+  state.whole.known = state.surface.known = false;
 }
 
 DelassusOperator TwoStep::second_delassus_operator(const Load& load,
@@ -393,15 +400,29 @@ void TwoStep::settle(Load load, Answer answer) {
   state.norm = answer.norm;
   state.largest = std::max(state.largest, answer.norm);
   state.last = std::move(load);
-  state.shaped = false;
+  state.whole.known = state.surface.known = false;
 }
 
-std::span<const double> TwoStep::displacement(Elastostatic& first) {
-  if (state_->last && !state_->shaped) {
-    state_->shape(first);
-    state_->shaped = true;
+namespace {
+
+/// The same for both, so that neither depends on which was asked for before.
+template <class State, class Shape>
+std::span<const double> shape_of(State& state, Elastostatic& first, typename State::Displacement of,
+                                 Shape& shape) {
+  if (state.last && !shape.known) {
+    state.shape(first, of, shape.u);
+    shape.known = true;
   }
-  return state_->u;
+  return shape.u;
+}
+
+} // namespace
+
+std::span<const double> TwoStep::displacement(Elastostatic& first) {
+  return shape_of(*state_, first, &Elastostatic::displacement, state_->whole);
+}
+std::span<const double> TwoStep::surface_displacement(Elastostatic& first) {
+  return shape_of(*state_, first, &Elastostatic::surface_displacement, state_->surface);
 }
 const std::vector<NodeVector>& TwoStep::contact_forces() const noexcept {
   return state_->forces;

@@ -95,6 +95,8 @@ public:
   /// As those of Elastostatic; the shape is computed by the first call behind an update.
   /// \param first that of the update; between them it may have been asked for other loads
   std::span<const double> displacement(Elastostatic& first);
+  /// As Elastostatic's, of the rows that both stages have.
+  std::span<const double> surface_displacement(Elastostatic& first);
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
   // ---- for contact, see two_step_contact.h

@@ -179,7 +179,7 @@ bool TwoStepYielding::push(std::span<const NodeTouch> touches, std::span<const V
 
 std::span<const double> TwoStepYielding::shape() {
   const auto [first, both] = stages_();
-  return both.displacement(first);
+  return both.surface_displacement(first);
 }
 
 } // namespace gewebe

@@ -15,12 +15,14 @@ namespace gewebe::timing {
 
 class MemoryColumns final : public ColumnSource, public ColumnSink {
 public:
-  MemoryColumns(std::size_t count, std::vector<std::uint32_t> nodes, bool single)
-      : count_(count), nodes_(std::move(nodes)), single_(single) {}
+  /// With rows for the first `rows` of `count` nodes.
+  MemoryColumns(std::size_t count, std::vector<std::uint32_t> nodes, bool single, std::size_t rows)
+      : count_(count), rows_(rows), nodes_(std::move(nodes)), single_(single) {}
   void write(std::size_t, std::span<const double> columns, double) override {
     columns_.emplace_back(columns.begin(), columns.end());
   }
   std::size_t node_count() const override { return count_; }
+  std::size_t row_nodes() const override { return rows_; }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
   void read(std::size_t k, std::span<double> out) const override {
     std::copy(columns_[k].begin(), columns_[k].end(), out.begin());
@@ -28,17 +30,20 @@ public:
   bool single() const override { return single_; }
 
 private:
-  std::size_t count_;
+  std::size_t count_, rows_;
   std::vector<std::uint32_t> nodes_;
   bool single_;
   std::vector<std::vector<double>> columns_;
 };
 
-/// Factor and columns of these nodes (ascending), as float32 where `single`.
+/// Factor and columns of these nodes (ascending), as float32 where `single`, with rows for the
+/// first `row_nodes` nodes, or for all if there are fewer.
 inline StoredStiffness memory_stiffness(const StiffnessMatrix& matrix, const FactorData& data,
-                                        const std::vector<std::uint32_t>& nodes, bool single) {
-  auto columns = std::make_unique<MemoryColumns>(matrix.row_of_axis.size() / 3, nodes, single);
-  (void)compliance_columns(matrix, Factor(data), stiffness_norm(matrix), nodes, {}, *columns);
+                                        const std::vector<std::uint32_t>& nodes, bool single,
+                                        std::size_t row_nodes = SIZE_MAX) {
+  const std::size_t count = matrix.row_of_axis.size() / 3, rows = std::min(row_nodes, count);
+  auto columns = std::make_unique<MemoryColumns>(count, nodes, single, rows);
+  (void)compliance_columns(matrix, Factor(data), stiffness_norm(matrix), nodes, {}, *columns, rows);
   return {std::move(columns), [&data] { return Factor(data); }};
 }
 

@@ -86,8 +86,11 @@ void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool
 void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number,
                                 const Tell& distrust) {
   Object& object = objects_[number];
-  const std::span<const double> u = simulation.displacement(number);
-  if (u.size() != 3 * object.nodes)
+  const Model& model = simulation.model(number);
+  const bool surface = !model.tetrahedra.empty() && model.springs.empty();
+  const std::span<const double> u =
+      surface ? simulation.surface_displacement(number) : simulation.displacement(number);
+  if (surface ? u.empty() : u.size() != 3 * object.nodes)
     return;
   const double max = largest(u);
   // Less turns no triangle over, and what moves no farther than before does so seldom.
@@ -96,7 +99,7 @@ void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number
     return;
   object.looked_at = max;
   object.not_looked = 0;
-  const ShapeFaults faults = object.check->look(simulation.model(number), u);
+  const ShapeFaults faults = object.check->look(model, u);
   const std::string who =
       "object " + simulation.object(number).name + " at " + number_text(simulation.time()) + " s: ";
   if (faults.turned > 0 && !object.turned && distrust) {

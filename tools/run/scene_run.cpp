@@ -88,8 +88,8 @@ struct SceneRun::State {
     s.guard = options.serve;
     // Now, so that one that can't be made is the fault of its step.
     s.shapes = options.measure_error ||
-               (options.result != nullptr && options.result->wants_models()) ||
-               (options.serve && options.measure);
+               (options.result != nullptr && options.result->wants_models());
+    s.surfaces = options.serve && options.measure;
     s.rate = options.rate;
     if (options.warn)
       s.warn = [this](const std::string& text) { warn(text); };
@@ -279,7 +279,7 @@ struct SceneRun::State {
     ++steps;
     checks.look(
         simulation,
-        simulation.settings().emits.shapes || options.result != nullptr || options.measure,
+        simulation.settings().emits.any_shapes() || options.result != nullptr || options.measure,
         [this](const std::string& text) { warn(text); },
         [this](const std::string& text) { distrust(text); });
     stress.find(simulation, gravity);
@@ -306,7 +306,8 @@ struct SceneRun::State {
   void measure() {
     digest.add(simulation.time());
     for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-      const std::span<const double> u = simulation.displacement(i);
+      // Not whole, for to measure a solid must not cost what is inside.
+      const std::span<const double> u = simulation.surface_displacement(i);
       const std::vector<NodeVector>& forces = simulation.contact_forces(i);
       // Whether an object was read must not matter.
       if (forces.empty() && std::all_of(u.begin(), u.end(), [](double x) { return x == 0; }))

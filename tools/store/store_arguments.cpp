@@ -30,12 +30,15 @@ void refuse(bool given, const char* option, const char* beside) {
 void refuse_making(const StoreArguments& a, const char* beside) {
   refuse(a.columns != "none", "--columns", beside);
   refuse(a.compress.has_value(), "--compress", beside);
+  refuse(!a.rows.empty(), "--rows", beside);
   refuse(a.method != "direct", "--method", beside);
   refuse(!a.shard_text.empty(), "--shard", beside);
   refuse(a.stage != 1, "--stage", beside);
 }
 
 void check_method(const StoreArguments& a) {
+  if (!a.rows.empty() && a.columns == "none")
+    throw UsageError("--rows goes with --columns");
   const bool relaxes = a.method != "direct";
   if (a.force && !relaxes)
     throw UsageError("--force goes with --method relax or relax-fixed");
@@ -51,6 +54,9 @@ void check_method(const StoreArguments& a) {
 
 void declare(cli::Program& p, StoreArguments& a) {
   p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none");
+  p.option("--rows", a.rows, "NODES",
+           "whose displacements columns hold: surface, all; of solids surface by default")
+      .one_of({"surface", "all"});
   p.option("--precision", a.precision, "TYPE", "of the columns: float64, float32")
       .one_of({"float64", "float32"});
   p.option("--compress", a.compress, "E", "keep columns within E of the largest displacement")
@@ -104,6 +110,7 @@ void complete(StoreArguments& a) {
     refuse(a.method != "direct", "--method", "--compress");
     refuse(a.precision != "float64", "--precision", "--compress");
     refuse(!a.shard_text.empty(), "--shard", "--compress");
+    refuse(a.rows == "surface", "--rows surface", "--compress");
   }
   if (!a.shard_text.empty())
     a.shard = shard_of(a.shard_text);

@@ -15,6 +15,7 @@ namespace gewebe {
 struct StoreArguments {
   std::vector<std::string> inputs; ///< models; the store for --info, shards for --merge
   std::string columns = "none", precision = "float64", method = "direct", shard_text;
+  std::string rows;           ///< "surface", "all"; empty: "surface" where there are tetrahedra
   std::string update, before; ///< the store of the model before a cut, and that model
   std::optional<double> force, threshold;
   std::optional<double> compress; ///< bound of compressed columns

@@ -59,6 +59,8 @@ std::string describe(const StiffnessFacts& facts, const StiffnessSizes& sizes) {
   line("factor_nonzeros", std::to_string(sizes.factor));
   line("factor_mb", number("%.1f", static_cast<double>(sizes.factor) * 8e-6));
   line("touched_nodes", std::to_string(sizes.touched));
+  if (facts.row_nodes != 0)
+    line("row_nodes", std::to_string(facts.row_nodes));
   line("columns_mb", number("%.1f", static_cast<double>(sizes.column_bytes) * 1e-6));
   if (facts.compressed > 0)
     line("compressed", number("%.6g", facts.compressed));

@@ -22,6 +22,7 @@ struct Prepared {
   std::string name; ///< of the input
   Model model;
   std::vector<std::uint32_t> nodes; ///< that shall have columns
+  std::uint64_t row_nodes = 0;      ///< see StiffnessFacts
   StiffnessMatrix matrix;
   std::optional<Factor> factor;
   StiffnessCheck check;
@@ -32,11 +33,26 @@ double seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::vector<std::uint32_t> touched_nodes(const Model& model, const StoreArguments& a) {
+/// What columns have rows for, as StiffnessFacts says it.
+std::uint64_t row_nodes_of(const Model& model, const StoreArguments& a) {
+  if (!a.touched || a.compress || a.rows == "all" || model.tetrahedra.empty())
+    return 0;
+  const std::size_t surface = surface_count(model);
+  return surface < model.nodes.size() ? surface : 0;
+}
+
+std::vector<std::uint32_t> touched_nodes(const Model& model, const StoreArguments& a,
+                                         std::uint64_t row_nodes) {
   if (!a.touched)
     return {};
   const auto load = [](const std::string& name) { return Input(name, false).read_all(); };
   std::vector<std::uint32_t> nodes = select_nodes(model, *a.touched, load);
+  if (row_nodes != 0) {
+    nodes.erase(std::ranges::lower_bound(nodes, row_nodes), nodes.end());
+    if (nodes.empty())
+      throw Error("--columns selects nodes inside the solid alone, expected some of its surface, "
+                  "or --rows all");
+  }
   // Whole blocks, so that what is checked together is so in every part.
   const std::uint64_t blocks = (nodes.size() + compliance_block - 1) / compliance_block;
   const auto bound = [&](std::uint64_t shard) {
@@ -44,6 +60,17 @@ std::vector<std::uint32_t> touched_nodes(const Model& model, const StoreArgument
     return nodes.begin() + static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(end, nodes.size()));
   };
   return {bound(a.shard.index - 1), bound(a.shard.index)};
+}
+
+/// Those of a solid are what a simulation of it keeps: their size is known before any work.
+void require_columns(const Prepared& p, const StoreArguments& a, const Context& context) {
+  if (p.model.tetrahedra.empty() || p.nodes.empty() || a.compress)
+    return;
+  const std::size_t rows = p.row_nodes != 0 ? p.row_nodes : p.model.nodes.size();
+  require_memory(context, stored_columns_bytes(p.nodes.size(), rows, a.precision == "float32"),
+                 ("the columns of " + std::to_string(p.nodes.size()) + " nodes with rows for " +
+                  std::to_string(rows))
+                     .c_str());
 }
 
 Prepared prepare(const std::string& path, const StoreArguments& a, const Context& context) {
@@ -57,7 +84,9 @@ Prepared prepare(const std::string& path, const StoreArguments& a, const Context
     if (a.method != "direct" && !p.model.tetrahedra.empty())
       throw Error("holds tetrahedra, which --method " + a.method +
                   " doesn't simulate, expected --method direct");
-    p.nodes = touched_nodes(p.model, a);
+    p.row_nodes = row_nodes_of(p.model, a);
+    p.nodes = touched_nodes(p.model, a, p.row_nodes);
+    require_columns(p, a, context);
     p.matrix = stiffness_matrix(p.model);
     p.assemble = seconds() - start - p.read;
     p.factor = checked_factor(p.model, p.matrix, context, p.check);
@@ -122,6 +151,7 @@ StiffnessFacts facts_of(const Prepared& p, const StoreArguments& a) {
   facts.single = a.precision == "float32";
   facts.compressed = a.compress.value_or(0);
   facts.method = method_of(a);
+  facts.row_nodes = p.row_nodes;
   if (a.touched)
     require_precision(facts.condition, facts.single);
   return facts;
@@ -165,7 +195,8 @@ void compute(cli::Run& run, const Prepared& p, const StiffnessMethod& method,
              const std::vector<std::uint32_t>& nodes, StiffnessStoreWriter& writer) {
   run.timed("columns", [&] {
     if (method.name == "direct") {
-      (void)compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, run.context(), writer);
+      (void)compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, run.context(), writer,
+                               p.row_nodes != 0 ? p.row_nodes : SIZE_MAX);
       return;
     }
     const RelaxFigures figures =

@@ -37,8 +37,9 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
     Factor l = store->factor(f);
     const auto same = [&](const StiffnessFacts& g) {
       return f.hash == g.hash && f.single == g.single && f.compressed == g.compressed &&
-             f.method == g.method && f.norm == g.norm && f.condition == g.condition &&
-             k.value == matrix->value && std::ranges::equal(l.view().x, factor->view().x);
+             f.row_nodes == g.row_nodes && f.method == g.method && f.norm == g.norm &&
+             f.condition == g.condition && k.value == matrix->value &&
+             std::ranges::equal(l.view().x, factor->view().x);
     };
     if (!facts.empty() && !same(facts.front()))
       throw Error(store->path(), "'" + f.object + "' is of another model than in " +
@@ -71,7 +72,7 @@ void join_object(const std::vector<const StiffnessStore*>& stores, const std::st
     add(totals, facts.front(), *matrix, *factor, nodes.size(), writer.end(residual));
     return;
   }
-  std::vector<double> columns(9 * facts.front().nodes);
+  std::vector<double> columns(9 * rows_of(facts.front()));
   std::size_t k = 0; // of the missing
   for (const auto& source : sources)
     for (std::size_t i = 0; source != nullptr && i < source->nodes().size(); ++i)

@@ -1,0 +1,119 @@
+// Contact with an elastostatic solid: 30 displaced nodes that all change at every update, against a
+// net of as many surface nodes, where much and where little is inside. Columns of a patch of nodes
+// are stored, with rows for the surface alone.
+//
+// Writes CSV to standard output: stage, program, surface nodes, nodes inside, median, fastest and
+// slowest time in ms, and the median over that of the net, all measured in turn.
+
+#include "model/build.h"
+#include "solid/model_stiffness.h"
+#include "solid/solid_model.h"
+#include "statics/elastostatic.h"
+#include "tests/bench/memory_columns.h"
+#include "tests/bench/timing.h"
+#include "tests/unit/tet_fixtures.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+using namespace gewebe;
+using namespace gewebe::timing;
+
+namespace {
+
+constexpr std::size_t contacts = 30, patch = 60;
+
+struct Body {
+  std::string name;
+  Model model;
+  FactorData factor{};
+  std::unique_ptr<Elastostatic> object{};
+  Load load{};
+  std::vector<double> forces{}, surfaces{}, wholes{};
+};
+
+Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz) {
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 5000, 1, 0.2, 0.4}};
+  options.quadratic = false;
+  return solid_model(test::box_tetrahedra(nx, ny, nz), options, {});
+}
+
+void hold_below(Model& model) {
+  for (Node& node : model.nodes)
+    if (node.position.z == 0)
+      node.fixed = fixed_all;
+}
+
+void prepare(Body& body) {
+  hold_below(body.model);
+  const StiffnessMatrix matrix = stiffness_matrix(body.model);
+  body.factor = Factor(matrix, Context{}).data();
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; nodes.size() < patch; ++i)
+    if (body.model.nodes[i].fixed == fixed_none)
+      nodes.push_back(i);
+  const bool net = body.model.tetrahedra.empty();
+  body.object = std::make_unique<Elastostatic>(
+      body.model,
+      compliance_of_store(memory_stiffness(matrix, body.factor, nodes, false,
+                                           net ? SIZE_MAX : surface_count(body.model))),
+      with_threads(1));
+  for (std::size_t k = 0; k < contacts; ++k)
+    body.load.displacement[nodes[2 * k]] = {};
+}
+
+void move_all(Load& load, std::mt19937& random) {
+  std::normal_distribution<double> normal(0, 0.01);
+  for (auto& [node, d] : load.displacement)
+    d = {normal(random), normal(random), normal(random)};
+}
+
+} // namespace
+
+int main() {
+  std::puts("stage,program,surface,inside,median_ms,fastest_ms,slowest_ms,over_net");
+  std::vector<Body> bodies;
+  const Model cube = solid_box(24, 24, 24);
+  bodies.push_back({"net", build_model(surface_mesh(cube), {}, Context{}).model});
+  bodies.push_back({"solid, much inside", cube});
+  bodies.push_back({"solid, little inside", solid_box(40, 40, 2)});
+  for (Body& body : bodies)
+    prepare(body);
+  std::mt19937 random(1);
+  for (int round = -40; round < 1000; ++round)
+    for (Body& body : bodies) {
+      const auto time = [&](std::vector<double>& to, const std::function<void()>& work) {
+        const double taken = milliseconds(work);
+        if (round >= 0)
+          to.push_back(taken);
+      };
+      move_all(body.load, random);
+      time(body.forces, [&] { body.object->update(body.load); });
+      time(body.surfaces, [&] { (void)body.object->surface_displacement(); });
+      if (round < 50)
+        time(body.wholes, [&] { (void)body.object->displacement(); });
+    }
+  const auto report = [&](const char* stage, std::vector<double> Body::*times) {
+    const double net = times_of(bodies[0].*times).median;
+    for (const Body& body : bodies) {
+      const Times t = times_of(body.*times);
+      const std::size_t surface = surface_count(body.model);
+      std::printf("%s,\"%s\",%zu,%zu,%.4f,%.4f,%.4f,%.3f\n", stage, body.name.c_str(), surface,
+                  body.model.nodes.size() - surface, t.median, t.fastest, t.slowest,
+                  t.median / net);
+    }
+  };
+  report("contact forces", &Body::forces);
+  report("shape of the surface", &Body::surfaces);
+  report("whole shape beyond it", &Body::wholes);
+  for (const Body& body : bodies)
+    std::fprintf(stderr, "%s: %llu solves\n", body.name.c_str(),
+                 static_cast<unsigned long long>(body.object->counts().solves));
+  return EXIT_SUCCESS;
+}

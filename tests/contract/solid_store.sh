@@ -1,0 +1,114 @@
+# Stores of solids: columns with rows for the surface alone, and all that is done with stores.
+# shellcheck shell=bash disable=SC2317 # functions are called by name
+
+# s.ela: a ball of finite elements, some 1,500 nodes of which some 600 are the surface's.
+solid() { # NAME [MATERIAL OPTION...]
+  exp2ela --primitive sphere:16x12 --size 30 --solid --cell 12 --poisson 0.3 "${@:2}" --fix 'z<-20 and surface' --name s -o "$1" -q
+}
+
+value() { # KEY: of the store on standard input's --info
+  sed -n "s/^  $1 //p"
+}
+
+test_columns_of_a_solid_have_rows_for_its_surface() {
+  solid s.ela
+  ffe-precompute --columns all --verify s.ela -o s.h5
+  ffe-precompute --info --verify s.h5 >info
+  local nodes rows
+  nodes=$(value nodes <info) rows=$(value row_nodes <info)
+  ((rows > 0 && rows < nodes)) || fail "$(<info)"
+  [[ $(value touched_nodes <info) == "$rows" ]] || fail "$(<info)"
+  (($(stat -c %s s.h5) > 72 * rows * rows)) || fail 'columns are missing'
+  ffe-precompute --columns all --rows all --verify s.ela -o all.h5
+  ffe-precompute --info all.h5 >info
+  ! grep -q row_nodes info || fail "$(<info)"
+  [[ $(value touched_nodes <info) == "$nodes" ]] || fail "$(<info)"
+  # Of a net it changes nothing.
+  exp2ela --primitive sphere:12x8 --name net -o net.ela
+  ffe-precompute --columns all net.ela -o net.h5
+  for rows in surface all; do
+    ffe-precompute --columns all --rows $rows net.ela -o other.h5
+    cmp net.h5 other.h5 || fail "a net's store differs with --rows $rows"
+  done
+  expect_failure 2 ffe-precompute ffe-precompute --rows surface s.ela -o other.h5
+  expect_failure 1 ffe-precompute ffe-precompute --columns "$((nodes - 1))" s.ela -o other.h5
+  expect_failure 1 ffe-precompute ffe-precompute --columns all --max-memory 1M s.ela -o other.h5
+}
+
+# The same forces and shapes as without a store, inside too.
+test_a_scene_of_it_is_that_of_the_model() {
+  solid s.ela
+  ffe-precompute --columns all s.ela -o s.h5
+  local inside last
+  last=$(($(sed -n 's/^nodes //p' s.ela) - 1)) # inside
+  for inside in surfaces shapes; do
+    printf '%s\n' 'object s s.ela store=s.h5' "emit $inside" 'emit forces' 'gravity 0 0 -9810' 'displace s z>25 0 0.1 0' \
+      'force s z>20 0 0 100' step "displace s $last 0.01 0 0.02" step >scene
+    ffe-run scene >stored
+    sed 's/ store=.*/ method=ffe/' scene | ffe-run >made
+    paste stored made | awk 'NF % 2 { print "lines differ"; exit 1 }
+      { for (i = 1; i <= NF / 2; i++) { d = $i - $(i + NF / 2); if (d < 0) d = -d; if (d > 1e-4 + 1e-6 * ($i < 0 ? -$i : $i)) { print; exit 1 } } }' ||
+      fail "$inside differ"
+    grep '^shapes' stored >lines.$inside
+  done
+  [[ $(head -1 lines.shapes) == "shapes s $((last + 1))" ]] || fail "$(<lines.shapes)"
+  [[ $(head -1 lines.surfaces) == "shapes s $(ffe-precompute --info s.h5 | value row_nodes)" ]] || fail "$(<lines.surfaces)"
+}
+
+# Nothing is solved for until somebody asks for what is inside.
+test_the_inside_is_solved_for_when_it_is_asked_for() {
+  solid s.ela
+  ffe-precompute --columns all s.ela -o s.h5
+  printf '%s\n' 'object s s.ela store=s.h5' 'emit surfaces' 'emit forces' 'displace s z>25 0 0.1 0' step \
+    'displace s z>25 0 0.2 0' step >scene
+  ffe-run --rate 1000 --stats=s.json scene >/dev/null
+  grep -q '"solves":0,' s.json || fail "$(<s.json)"
+  echo 'emit shapes' | cat scene - <(echo step) | ffe-run --rate 1000 --stats=s.json >/dev/null
+  grep -qE '"solves":[1-9]' s.json || fail "$(<s.json)"
+  ffe-run --verify --stats=s.json scene >/dev/null
+  grep -qE '"backward_error":[0-9.]+e-1[3-9]' s.json || fail "$(<s.json)"
+}
+
+test_parts_interrupts_and_stages_of_a_solid() {
+  solid s.ela
+  ffe-precompute --columns all s.ela -o whole.h5
+  local part
+  for part in 1 2 3; do
+    ffe-precompute --columns all --shard $part/3 s.ela -o $part.h5
+  done
+  ffe-precompute --merge --verify 3.h5 1.h5 2.h5 -o merged.h5
+  cmp whole.h5 merged.h5 || fail 'parts make other bytes'
+  ffe-precompute --columns all --rows all --shard 2/3 s.ela -o 2.h5
+  expect_failure 1 ffe-precompute ffe-precompute --merge 1.h5 2.h5 3.h5 -o out.h5
+  # Interrupted, it goes on, and not as another kind of work.
+  ffe-precompute -j1 --columns all s.ela -o part.h5 &
+  local pid=$!
+  while [[ ! -e part.h5.part.log || $(wc -l <part.h5.part.log) -lt 30 ]]; do
+    kill -0 "$pid" 2>/dev/null || fail 'it ended too early'
+  done
+  kill -KILL "$pid"
+  wait "$pid" 2>/dev/null || true
+  ffe-precompute --columns all --rows all s.ela -o part.h5 2>message && fail 'other rows are taken up'
+  grep -q "part.h5.part: was begun with other options for 's'" message || fail "$(<message)"
+  ffe-precompute -v --columns all s.ela -o part.h5 2>message
+  grep -q 'nodes are taken up' message || fail "$(<message)"
+  cmp whole.h5 part.h5 || fail 'another store than that of an undisturbed run'
+  # A second stage.
+  solid stiff.ela --young 20000
+  ffe-precompute --stage 2 --columns all --verify stiff.ela -o whole.h5
+  [[ $(ffe-precompute --info whole.h5 | value row_nodes | sort -u | wc -l) == 1 ]] || fail 'stages have other rows'
+  printf '%s\n' 'object s s.ela store=whole.h5' 'emit surfaces' 'two-step s 10 series' 'displace s z>25 0 1 0' step >scene
+  ffe-run scene >stored
+  sed 's/ store=.*/ method=ffe/; s/series/series stage=stiff.ela/' scene | ffe-run >made
+  paste stored made | awk '$1 != "shapes" && NF == 6 { for (i = 1; i <= 3; i++) { d = $i - $(i + 3); if (d * d > 1e-8) { print; exit 1 } } }' ||
+    fail 'the second stage is another'
+}
+
+test_a_cut_of_a_solid_is_refused_by_name() {
+  solid s.ela
+  ffe-precompute --columns all s.ela -o s.h5
+  cp s.h5 before.h5
+  ffe-precompute --update s.h5 --before s.ela s.ela 2>message && fail 'it is taken'
+  grep -q '^ffe-precompute: s.ela: .*tetrahedra' message || fail "$(<message)"
+  cmp s.h5 before.h5 || fail 'the store has changed'
+}

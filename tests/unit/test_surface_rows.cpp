@@ -1,0 +1,375 @@
+// Columns of a solid with rows for its surface alone: what is inside costs nothing, and is right
+// where it is asked for.
+
+#include "base/error.h"
+#include "compliance/compliance_columns.h"
+#include "compliance/verify.h"
+#include "larger.h"
+#include "scene/simulation.h"
+#include "solid/model_stiffness.h"
+#include "solid/solid_model.h"
+#include "solve/condition.h"
+#include "statics/elastostatic.h"
+#include "statics/two_step.h"
+#include "tet_fixtures.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <memory>
+#include <numeric>
+#include <random>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+/// A box 2 × 2 × 2 whose inner nodes stand anywhere, held at z = 0.
+Model box_model(double young = 5000) {
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1.1e-3, young, 1, 0.2, 0.4}};
+  Model model = solid_model(test::distorted_box(), options, {});
+  for (Node& node : model.nodes)
+    if (node.position.z == 0)
+      node.fixed = fixed_all;
+  return model;
+}
+
+/// What compliance_columns gives, in memory.
+class Kept final : public ColumnSource, public ColumnSink {
+public:
+  Kept(const Model& model, std::size_t rows, std::vector<std::uint32_t> nodes)
+      : count_(model.nodes.size()), rows_(rows), nodes_(std::move(nodes)) {}
+  std::size_t node_count() const override { return count_; }
+  std::size_t row_nodes() const override { return rows_; }
+  const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
+  void read(std::size_t k, std::span<double> out) const override {
+    ASSERT_EQ(out.size(), kept[k].size());
+    std::copy(kept[k].begin(), kept[k].end(), out.begin());
+  }
+  void write(std::size_t, std::span<const double> columns, double) override {
+    kept.emplace_back(columns.begin(), columns.end());
+  }
+  std::vector<std::vector<double>> kept;
+
+private:
+  std::size_t count_, rows_;
+  std::vector<std::uint32_t> nodes_;
+};
+
+std::vector<std::uint32_t> first_nodes(std::size_t count) {
+  std::vector<std::uint32_t> nodes(count);
+  std::iota(nodes.begin(), nodes.end(), 0U);
+  return nodes;
+}
+
+/// Columns of all surface nodes with rows for so many.
+std::unique_ptr<Kept> columns_of(const Model& model, std::size_t rows) {
+  const StiffnessMatrix k = stiffness_matrix(model);
+  auto columns = std::make_unique<Kept>(model, rows, first_nodes(surface_count(model)));
+  (void)compliance_columns(k, Factor(k, {}), stiffness_norm(k), columns->nodes(), {}, *columns,
+                           rows);
+  return columns;
+}
+
+std::shared_ptr<ComplianceSource> stored(const Model& model, std::size_t rows, double wrong = 1) {
+  auto columns = columns_of(model, rows);
+  for (double& entry : columns->kept.back())
+    entry *= wrong;
+  return compliance_of_store(
+      {std::move(columns), [&model] { return Factor(stiffness_matrix(model), Context{}); }});
+}
+
+std::shared_ptr<ComplianceSource> surface_of(const Model& model, double wrong = 1) {
+  return stored(model, surface_count(model), wrong);
+}
+
+double largest(std::span<const double> values) {
+  double most = 0;
+  for (const double x : values)
+    most = test::larger(most, std::abs(x));
+  return most;
+}
+
+void expect_near(std::span<const double> a, std::span<const double> b, double tolerance,
+                 const char* what) {
+  ASSERT_LE(a.size(), b.size()) << what;
+  double difference = 0;
+  for (std::size_t r = 0; r < a.size(); ++r)
+    difference = test::larger(difference, std::abs(a[r] - b[r]));
+  EXPECT_LE(difference, tolerance * largest(b)) << what;
+}
+
+/// Nodes that can move: of the surface (some at its top), and inside.
+struct Places {
+  std::vector<std::uint32_t> outer, inner;
+};
+Places places_of(const Model& model) {
+  Places places;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].fixed == fixed_none)
+      (i < surface_count(model) ? places.outer : places.inner).push_back(i);
+  return places;
+}
+
+TEST(SurfaceRows, AreTheFirstOfAllRows) {
+  const Model model = box_model();
+  const std::size_t surface = surface_count(model), n = model.nodes.size();
+  ASSERT_LT(surface + 20, n);
+  const auto some = columns_of(model, surface), all = columns_of(model, n);
+  for (std::size_t k = 0; k < some->kept.size(); ++k) {
+    ASSERT_EQ(some->kept[k].size(), 9 * surface);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::size_t r = 0; r < 3 * surface; ++r)
+        ASSERT_EQ(some->kept[k][axis * 3 * surface + r], all->kept[k][axis * 3 * n + r]);
+  }
+}
+
+TEST(SurfaceRows, AreTheInverseOfTheCondensedStiffness) {
+  const Model model = box_model();
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const auto n = static_cast<Eigen::Index>(k.order());
+  const std::size_t axes = 3 * surface_count(model);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t c = 0; c < k.order(); ++c)
+    for (auto at = k.column_start[c]; at < k.column_start[c + 1]; ++at) {
+      const auto r = k.row[static_cast<std::size_t>(at)], column = static_cast<std::int64_t>(c);
+      dense(r, column) = dense(column, r) = k.value[static_cast<std::size_t>(at)];
+    }
+  Eigen::Index outer = 0; // rows of the surface come first
+  while (outer < n &&
+         static_cast<std::size_t>(k.axis_of_row[static_cast<std::size_t>(outer)]) < axes)
+    ++outer;
+  const Eigen::Index inner = n - outer;
+  const Eigen::MatrixXd condensed =
+      dense.topLeftCorner(outer, outer) -
+      dense.topRightCorner(outer, inner) *
+          dense.bottomRightCorner(inner, inner).llt().solve(dense.bottomLeftCorner(inner, outer));
+  const auto columns = columns_of(model, surface_count(model));
+  Eigen::MatrixXd compliance(outer, outer);
+  for (Eigen::Index c = 0; c < outer; ++c)
+    for (Eigen::Index r = 0; r < outer; ++r) {
+      const auto of = static_cast<std::size_t>(k.axis_of_row[static_cast<std::size_t>(c)]);
+      const auto at = static_cast<std::size_t>(k.axis_of_row[static_cast<std::size_t>(r)]);
+      compliance(r, c) = columns->kept[of / 3][of % 3 * axes + at];
+    }
+  const Eigen::MatrixXd one = condensed * compliance;
+  EXPECT_LT((one - Eigen::MatrixXd::Identity(outer, outer)).lpNorm<Eigen::Infinity>(), 1e-10);
+}
+
+TEST(SurfaceRows, AreVerified) {
+  const Model model = box_model();
+  const StiffnessMatrix k = stiffness_matrix(model);
+  StiffnessCheck check;
+  const Factor factor = checked_factor(model, k, {}, check);
+  const VerifyOptions options{.condition = check.condition};
+  auto columns = columns_of(model, surface_count(model));
+  EXPECT_EQ(verify_compliance(k, factor, columns.get(), options, {}).recomputed, 3U);
+  // The last row of one that is solved for again.
+  columns->kept[columns->kept.size() / 2].back() += 1e-6 * largest(columns->kept.back());
+  EXPECT_THROW((void)verify_compliance(k, factor, columns.get(), options, {}), Error);
+}
+
+/// Loads of each kind, one after the other.
+std::vector<Load> loads_of(const Model& model) {
+  const Places at = places_of(model);
+  std::vector<Load> loads(9);
+  const auto push = [](std::size_t k) {
+    return Vec3{1.0 + static_cast<double>(k), -2, 3 - static_cast<double>(k)};
+  };
+  for (std::size_t k = 0; k < 4; ++k)
+    loads[0].force[at.outer[7 * k]] = push(k);
+  loads[1] = loads[0];
+  loads[1].gravity = {0, 50, -9810};
+  for (std::size_t k = 0; k < 8; ++k)
+    loads[2].displacement[at.outer[5 * k]] = 0.01 * push(k);
+  loads[3] = loads[2];
+  loads[3].force[at.outer[3]] = {5, 6, 7};
+  loads[3].gravity = {0, 0, -9810};
+  loads[4] = loads[3];
+  loads[4].force[at.inner[2]] = {-50, 6, 70}; // inside
+  loads[5] = loads[3];
+  loads[5].displacement[at.inner[1]] = {0.01, 0, 0.02};
+  loads[5].displacement[at.inner[9]] = {0, 0.01, 0};
+  loads[5].force[at.inner[2]] = {50, 6, 7};
+  loads[6].displacement[at.inner[1]] = {0.01, 0, 0.02};
+  loads[7] = loads[2];
+  for (auto& [node, d] : loads[7].displacement)
+    d = {0.01, 0.02, 0.03}; // one by one alike
+  for (const std::uint32_t node : at.outer)
+    loads[8].displacement[node] = {0.01, 0.02, 0.03};
+  return loads;
+}
+
+TEST(SurfaceRows, GiveWhatAllRowsGive) {
+  const Model model = box_model();
+  for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
+    const ElastostaticOptions options{.measure_error = true, .block_limit = limit};
+    Elastostatic some(model, surface_of(model), {}, options);
+    Elastostatic never(model, surface_of(model), {}, {.block_limit = limit}); // asked for the whole
+    Elastostatic all(model, nullptr, {}, options);
+    const std::size_t rows = 3 * surface_count(model);
+    int number = 0;
+    for (const Load& load : loads_of(model)) {
+      SCOPED_TRACE(number++);
+      some.update(load);
+      never.update(load);
+      all.update(load);
+      ASSERT_EQ(some.contact_forces().size(), all.contact_forces().size());
+      for (std::size_t k = 0; k < all.contact_forces().size(); ++k)
+        for (int a = 0; a < 3; ++a)
+          EXPECT_NEAR(some.contact_forces()[k].value[a], all.contact_forces()[k].value[a], 1e-7);
+      ASSERT_EQ(some.displacement().size(), 3 * model.nodes.size());
+      ASSERT_EQ(some.surface_displacement().size(), rows);
+      expect_near(some.displacement(), all.displacement(), 1e-10, "whole");
+      expect_near(some.surface_displacement(), all.displacement(), 1e-10, "surface");
+      const auto a = never.surface_displacement(), b = some.surface_displacement();
+      EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())); // whoever asked for more
+      for (const auto& [node, d] : load.displacement)
+        for (int axis = 0; axis < 3; ++axis)
+          EXPECT_EQ(some.displacement()[3 * std::size_t{node} + static_cast<std::size_t>(axis)],
+                    d[axis]);
+    }
+    EXPECT_LT(some.counts().backward_error, 1e-10);
+    EXPECT_EQ(some.counts().shape_error, 0);
+  }
+}
+
+TEST(SurfaceRows, CostNoSolveUntilTheInsideIsAskedFor) {
+  const Model model = box_model();
+  Elastostatic object(model, surface_of(model), {});
+  const std::vector<Load> loads = loads_of(model);
+  for (const std::size_t k : {0U, 2U, 7U, 2U}) {
+    object.update(loads[k]);
+    (void)object.surface_displacement();
+    (void)object.delassus_operator(loads[k], std::vector<std::uint32_t>{places_of(model).outer[1]});
+  }
+  EXPECT_EQ(object.counts().solves, 0U);
+  EXPECT_EQ(object.counts().factors, 0U);
+  (void)object.displacement();
+  (void)object.displacement();
+  EXPECT_EQ(object.counts().solves, 1U);
+  EXPECT_EQ(object.counts().factors, 1U);
+}
+
+TEST(SurfaceRows, OfContactAreTheSame) {
+  const Model model = box_model();
+  const Places at = places_of(model);
+  const std::vector<std::uint32_t> touched{at.outer[1], at.outer[4], at.outer[30]};
+  for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
+    Elastostatic some(model, surface_of(model), {}, {.block_limit = limit}),
+        all(model, nullptr, {}, {.block_limit = limit});
+    for (const std::size_t k : {1U, 3U, 4U, 5U}) {
+      const Load load = loads_of(model)[k];
+      const DelassusOperator a = some.delassus_operator(load, touched),
+                             b = all.delassus_operator(load, touched);
+      expect_near(a.compliance, b.compliance, 1e-10, "compliance");
+      expect_near(a.free, b.free, 1e-9, "free");
+    }
+  }
+}
+
+TEST(SurfaceRows, ThatAreWrongAreMeasured) {
+  const Model model = box_model();
+  Elastostatic object(model, surface_of(model, 1.001), {}, {.measure_error = true});
+  Load load;
+  load.force[static_cast<std::uint32_t>(surface_count(model) - 1)] = {1, 2, 3};
+  object.update(load);
+  (void)object.surface_displacement();
+  EXPECT_GT(object.counts().backward_error, 1e-5);
+}
+
+TEST(SurfaceRows, OfOtherNodesAreRefused) {
+  const Model model = box_model();
+  EXPECT_THROW(Elastostatic(model, stored(model, surface_count(model) - 1), {}), Error);
+  EXPECT_THROW(Elastostatic(model, stored(model, surface_count(model) + 1), {}), Error);
+  EXPECT_NO_THROW(Elastostatic(model, stored(model, model.nodes.size()), {}));
+}
+
+TEST(SurfaceRows, OfTwoStagesAreTheSame) {
+  const Model soft = box_model(), stiff = box_model(20000);
+  Elastostatic some(soft, surface_of(soft), {}), all(soft, nullptr, {});
+  const TwoStepOptions options{.threshold = 3, .series = true};
+  TwoStep two_some(soft, surface_of(stiff), {}, options),
+      two_all(soft, compliance_of_factor([&] { return Factor(stiffness_matrix(stiff), {}); }), {},
+              options);
+  for (const std::size_t k : {0U, 2U, 3U, 5U}) {
+    const Load load = loads_of(soft)[k];
+    two_some.update(some, load);
+    two_all.update(all, load);
+    EXPECT_GT(two_some.load(), options.threshold);
+    const std::span<const double> surface = two_some.surface_displacement(some);
+    ASSERT_EQ(surface.size(), 3 * surface_count(soft));
+    expect_near(surface, two_all.displacement(all), 1e-9, "surface");
+    ASSERT_EQ(two_some.displacement(some).size(), 3 * soft.nodes.size());
+    expect_near(two_some.displacement(some), two_all.displacement(all), 1e-9, "whole");
+  }
+}
+
+TEST(SurfaceRows, OfASceneGiveItsWholeShapeWhenAsked) {
+  const Model model = box_model();
+  const std::size_t n = model.nodes.size(), surface = surface_count(model);
+  const std::uint32_t inside = places_of(model).inner[4];
+  Simulation some({}, {}), never({}, {}), all({}, {});
+  some.add_object("o", model, Method::ffe, surface_of(model));
+  never.add_object("o", model, Method::ffe, surface_of(model));
+  all.add_object("o", model, Method::ffe, nullptr);
+  EXPECT_EQ(some.surface_nodes(0), surface);
+  const auto both = [&](const Change& change) {
+    for (Simulation* const s : {&some, &never, &all})
+      s->apply(change);
+  };
+  const auto compare = [&](const char* what, double tolerance) {
+    for (Simulation* const s : {&some, &never, &all})
+      s->step(0.01);
+    ASSERT_EQ(some.displacement(0).size(), 3 * n);
+    EXPECT_GT(largest(some.displacement(0)), 0);
+    expect_near(some.displacement(0), all.displacement(0), tolerance, what);
+    expect_near(some.surface_displacement(0), all.displacement(0), tolerance, what);
+    const auto a = never.surface_displacement(0), b = some.surface_displacement(0);
+    ASSERT_EQ(a.size(), b.size());
+    EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << what;
+  };
+  both(SetForce{0, {places_of(model).outer[9]}, {3, 4, 5}});
+  compare("force", 1e-10);
+  both(SetForce{0, {inside}, {30, 4, 5}});
+  compare("a force inside", 1e-10);
+  // A ball pressed into its top: contact needs the surface alone.
+  both(SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 3}, {}}, "ball"});
+  compare("a ball above", 1e-10);
+  both(MoveInstrument{0, {1, 1, 2.6}, {}, 0});
+  compare("a ball presses", 1e-7);
+  ASSERT_GT(some.instrument(0).nodes, 2U);
+  both(Grasp{0, {inside}, 0});
+  both(MoveInstrument{0, {1.1, 1, 2.7}, {}, 0});
+  compare("a node inside follows it", 1e-7);
+  const std::uint64_t solves = never.counts().elastostatic.solves;
+  EXPECT_GT(some.counts().elastostatic.solves, solves);
+}
+
+TEST(SurfaceRows, OfASceneCostNoSolve) {
+  const Model model = box_model();
+  Simulation scene({}, {});
+  scene.add_object("o", model, Method::ffe, surface_of(model));
+  scene.apply(Emit{.surfaces = true});
+  scene.apply(SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 2.7}, {}}, "ball"});
+  for (int k = 0; k < 5; ++k) {
+    scene.apply(MoveInstrument{0, {1 + 0.01 * k, 1, 2.6}, {}, 0});
+    scene.step(0.01);
+    ASSERT_EQ(scene.surface_displacement(0).size(), 3 * surface_count(model));
+  }
+  EXPECT_GT(scene.instrument(0).nodes, 2U);
+  EXPECT_EQ(scene.counts().elastostatic.solves, 0U);
+  EXPECT_EQ(scene.counts().elastostatic.factors, 0U);
+  scene.apply(Emit{}); // all nodes
+  scene.apply(MoveInstrument{0, {1, 1, 2.5}, {}, 0});
+  scene.step(0.01);
+  EXPECT_GT(scene.counts().elastostatic.solves, 0U);
+}
+
+} // namespace
+} // namespace gewebe
