@@ -87,8 +87,8 @@ struct SceneRun::State {
     s.tolerance = options.tolerance;
     s.guard = options.serve;
     // Now, so that one that can't be made is the fault of its step.
-    s.shapes = options.measure_error ||
-               (options.result != nullptr && options.result->wants_models());
+    s.shapes =
+        options.measure_error || (options.result != nullptr && options.result->wants_models());
     s.surfaces = options.serve && options.measure;
     s.rate = options.rate;
     if (options.warn)
