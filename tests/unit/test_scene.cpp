@@ -188,7 +188,7 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"two-step a 5 stage=", "'stage=' is no use here"},
       {"two-step a 5 stage=b c", "surplus word 'c'"},
       {"two-step a 5 serial", "'serial' is no use here"},
-      {"emit", "expected emit shapes|forces"},
+      {"emit", "expected emit shapes|surfaces|forces"},
       {"emit pictures", "'pictures' can't be emitted"},
       {"emit shapes forces", "surplus word 'forces'"},
       {"step -1", "back in time"},
