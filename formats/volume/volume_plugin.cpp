@@ -29,23 +29,37 @@ void* load() {
               " is missing, expected beside the program or in ../lib/gewebe");
 }
 
+/// A function of the library by its name. \throw Error if it is missing or of another version
+template <class Function>
+Function* function_named(const char* name) {
+  static void* const library = load();
+  const auto* version = static_cast<const char* const*>(::dlsym(library, "gewebe_volume_version"));
+  // POSIX: a function's address comes as an object's.
+  auto* const found = reinterpret_cast<Function*>(::dlsym(library, name));
+  if (version == nullptr || found == nullptr || std::string_view(*version) != GEWEBE_VERSION)
+    throw Error(std::string(library_name) + " is of another version, expected " GEWEBE_VERSION);
+  return found;
+}
+
 } // namespace
 
 VolumeView view_volume_bytes(std::string bytes, const std::string& name,
                              const VolumeViewOptions& options, const Context& context) {
   return at(name, [&] {
-    static void* const library = load();
-    const auto* version =
-        static_cast<const char* const*>(::dlsym(library, "gewebe_volume_version"));
-    // POSIX: a function's address comes as an object's.
-    const auto view_function =
-        reinterpret_cast<decltype(&gewebe_view_volume)>(::dlsym(library, "gewebe_view_volume"));
-    if (version == nullptr || view_function == nullptr ||
-        std::string_view(*version) != GEWEBE_VERSION)
-      throw Error(std::string(library_name) + " is of another version, expected " GEWEBE_VERSION);
     VolumeView view;
-    view_function(&bytes, &name, &options, &context, &view);
+    function_named<decltype(gewebe_view_volume)>("gewebe_view_volume")(&bytes, &name, &options,
+                                                                       &context, &view);
     return view;
+  });
+}
+
+TetMesh fill_surface(const TriangleMesh& mesh, const std::string& name,
+                     const SurfaceFilling& filling, const Context& context) {
+  return at(name, [&] {
+    TetMesh filled;
+    function_named<decltype(gewebe_fill_surface)>("gewebe_fill_surface")(&mesh, &name, &filling,
+                                                                         &context, &filled);
+    return filled;
   });
 }
 

@@ -2,7 +2,10 @@
 // What gewebe-volume.so offers. One compiler makes it and its programs.
 
 #include "base/context.h"
+#include "base/mesh.h"
+#include "formats/volume/volume_plugin.h"
 #include "shading/volume_view.h"
+#include "tetrahedra/tet_mesh.h"
 
 #include <string>
 
@@ -11,4 +14,7 @@ extern const char* const gewebe_volume_version;
 void gewebe_view_volume(std::string* bytes, const std::string* name,
                         const gewebe::VolumeViewOptions* options, const gewebe::Context* context,
                         gewebe::VolumeView* view);
+void gewebe_fill_surface(const gewebe::TriangleMesh* mesh, const std::string* name,
+                         const gewebe::SurfaceFilling* filling, const gewebe::Context* context,
+                         gewebe::TetMesh* filled);
 }

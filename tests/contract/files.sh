@@ -240,8 +240,8 @@ test_a_suffix_of_nobody_is_wrong_use() {
   for tool in $(programs); do
     sample "$tool"
     expect_failure 2 "$tool" "${words[@]}" -o out.jpg
-    expect_failure 2 "$tool" "${words[@]}" -o out.vtu
-    [[ ! -e out.jpg && ! -e out.vtu ]] || fail "$tool wrote it"
+    expect_failure 2 "$tool" "${words[@]}" -o out.mp4
+    [[ ! -e out.jpg && ! -e out.mp4 ]] || fail "$tool wrote it"
   done
 }
 

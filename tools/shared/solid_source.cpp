@@ -3,10 +3,9 @@
 #include "base/number_text.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
+#include "formats/volume/volume_plugin.h"
 #include "solid/solid_model.h"
-#include "stuffing/stuffing.h"
 #include "tetrahedra/check.h"
-#include "voxelize/distance_ramp.h"
 
 #include <cmath>
 #include <string>
@@ -100,12 +99,8 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
   return at(name, [&] {
     if (!(cell > 0 && std::isfinite(cell)))
       throw Error("the surface has no volume, expected a closed one");
-    const Grid grid = run.timed("voxelize", [&] {
-      return jones_density(run.context(), mesh, uniform_transform(cell / voxels_per_cell),
-                           OpenMesh::refuse, nullptr, VoxelRule::parity);
-    });
-    TetMesh tets = run.timed("stuff", [&] {
-      return stuff(run.context(), grid, {.isovalue = {}, .cell = cell, .grade = usual_grade});
+    TetMesh tets = run.timed("fill", [&] {
+      return fill_surface(mesh, name, {cell / voxels_per_cell, cell, usual_grade}, run.context());
     });
     if (tets.tetrahedra.empty())
       throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
