@@ -26,7 +26,7 @@ void AxisSolver::solve(std::span<double> over_axes, std::size_t columns) const {
 }
 
 AxisSolver factorise_axes(const Model& model, const Context& context) {
-  StiffnessMatrix matrix = stiffness_matrix(model);
+  StiffnessMatrix matrix = stiffness_matrix(model, {}, context);
   StiffnessCheck check;
   Factor factor = checked_factor(model, matrix, context, check);
   return {std::move(factor), std::move(matrix.row_of_axis)};
@@ -34,7 +34,7 @@ AxisSolver factorise_axes(const Model& model, const Context& context) {
 
 AxisSolver factorise_axes(const Model& model, std::span<const std::uint8_t> held,
                           const Context& context) {
-  StiffnessMatrix matrix = stiffness_matrix(model, held);
+  StiffnessMatrix matrix = stiffness_matrix(model, held, context);
   return {Factor(matrix, context), std::move(matrix.row_of_axis)};
 }
 

@@ -87,7 +87,7 @@ Prepared prepare(const std::string& path, const StoreArguments& a, const Context
     p.row_nodes = row_nodes_of(p.model, a);
     p.nodes = touched_nodes(p.model, a, p.row_nodes);
     require_columns(p, a, context);
-    p.matrix = stiffness_matrix(p.model);
+    p.matrix = stiffness_matrix(p.model, {}, context);
     p.assemble = seconds() - start - p.read;
     p.factor = checked_factor(p.model, p.matrix, context, p.check);
   });
