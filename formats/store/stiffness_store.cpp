@@ -334,7 +334,7 @@ CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& fac
   CompressedLayout layout;
   layout.relative = facts.compressed;
   layout.bound = group.number<double>("bound");
-  layout.clusters.node = read_checked<std::uint32_t>(group, "order", facts.nodes);
+  layout.clusters.node = read_checked<std::uint32_t>(group, "order", rows_of(facts));
   layout.clusters.first = read_checked<std::uint32_t>(group, "first");
   layout.with_columns = group.number<std::uint64_t>("chunks");
   const std::vector<std::uint32_t> counts = read_checked<std::uint32_t>(group, "count");
@@ -342,7 +342,7 @@ CompressedLayout read_layout(const hdf5::Group& group, const StiffnessFacts& fac
   for (std::size_t k = 0; k < counts.size(); k += 2)
     layout.count.push_back({counts[k], counts[k + 1]});
   try {
-    check_layout(layout, facts.nodes);
+    check_layout(layout, rows_of(facts));
   } catch (const Error& error) {
     group.fail(std::string("is damaged: ") + error.what());
   }
@@ -394,7 +394,7 @@ std::unique_ptr<ColumnSource> StiffnessStore::columns(const StiffnessFacts& fact
     CompressedLayout layout = read_layout(group, facts);
     const auto file = std::make_shared<const ChunkFile>(state_, group, layout);
     return std::make_unique<CompressedColumns>(
-        std::move(layout), [file](std::size_t chunk) { return file->read(chunk); });
+        std::move(layout), facts.nodes, [file](std::size_t chunk) { return file->read(chunk); });
   }
   if (!object.has("columns"))
     return nullptr;

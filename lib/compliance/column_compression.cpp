@@ -82,9 +82,9 @@ void make_symmetric(std::vector<double>& block, std::size_t rows) {
 
 } // namespace
 
-std::unique_ptr<CompressedColumns> compressed_columns(CompressedMade made) {
+std::unique_ptr<CompressedColumns> compressed_columns(CompressedMade made, std::size_t nodes) {
   return std::make_unique<CompressedColumns>(
-      std::move(made.layout),
+      std::move(made.layout), nodes,
       [chunks = std::move(made.chunks)](std::size_t chunk) { return chunks[chunk]; });
 }
 

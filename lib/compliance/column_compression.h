@@ -22,10 +22,11 @@ struct CompressedMade {
   double residual = 0; ///< what the maker of columns returned, at most
 };
 
-/// Columns in memory.
-std::unique_ptr<CompressedColumns> compressed_columns(CompressedMade made);
+/// Columns in memory, of a model of so many nodes.
+std::unique_ptr<CompressedColumns> compressed_columns(CompressedMade made, std::size_t nodes);
 
-/// Hands the columns of some nodes, ascending, to a sink, and returns their residual.
+/// Hands the columns of some nodes, ascending, to a sink, and returns their residual. They have
+/// rows for as many nodes as have positions below.
 using ColumnMaker = std::function<double(std::span<const std::uint32_t> nodes, ColumnSink& sink)>;
 
 /// Compresses the columns of `nodes`, which are asked for cluster by cluster, and those of some
@@ -33,9 +34,9 @@ using ColumnMaker = std::function<double(std::span<const std::uint32_t> nodes, C
 /// largest of the entries on the diagonal, which of a positive definite C is the largest of all.
 /// Takes memory for the columns of one cluster beside the result. The same bytes for any number of
 /// threads.
-/// \param positions of all nodes \pre nodes ascending; relative in min_relative to 1
-/// \throw Error if a number isn't finite, or memory exceeds the context's; Cancelled; what the
-/// maker throws
+/// \param positions of the nodes that columns have rows for: of all, or of the first ones \pre
+/// nodes ascending, among these; relative in min_relative to 1 \throw Error if a number isn't
+/// finite, or memory exceeds the context's; Cancelled; what the maker throws
 CompressedMade compress_columns(std::span<const Vec3> positions,
                                 std::span<const std::uint32_t> nodes, double relative,
                                 const ColumnMaker& maker, const Context& context);

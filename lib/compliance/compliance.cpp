@@ -97,12 +97,10 @@ bool Compliance::fit(std::span<const std::uint32_t> nodes) const {
 }
 
 double Compliance::entry(std::uint32_t node, int axis, std::size_t row) const {
-  if (compressed(node))
-    return compressed_->entry(node, axis, row);
   if (!outer(node))
     return inside_->entry(node, axis, row);
   if (row < rows_)
-    return cache_.entry(node, axis, row);
+    return compressed(node) ? compressed_->entry(node, axis, row) : cache_.entry(node, axis, row);
   return inside_->entry(static_cast<std::uint32_t>(row / 3), static_cast<int>(row % 3),
                         axis_of(node, axis)); // C is symmetric
 }
@@ -117,7 +115,7 @@ void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
 ComplianceBlock Compliance::block(std::uint32_t node, std::uint32_t other) const {
   if (const ForwardBlocks* const blocks = source_->blocks(); blocks != nullptr)
     return blocks->block(node, other);
-  if (compressed(node))
+  if (compressed(node) && outer(other))
     return compressed_->block(node, other);
   ComplianceBlock block{};
   for (int a = 0; a < 3; ++a)

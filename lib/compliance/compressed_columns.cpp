@@ -63,22 +63,22 @@ std::vector<T> take(const std::vector<std::uint8_t>& bytes, std::uint64_t& at,
 
 } // namespace
 
-void check_layout(const CompressedLayout& layout, std::size_t nodes) {
+void check_layout(const CompressedLayout& layout, std::size_t row_nodes) {
   const auto require = [](bool good, const char* what) {
     if (!good)
       throw Error(std::string("compressed columns contradict themselves: ") + what);
   };
   const NodeClusters& clusters = layout.clusters;
-  require(clusters.node.size() == nodes, "their nodes");
+  require(clusters.node.size() == row_nodes, "their nodes");
   require(!clusters.first.empty() && clusters.first.front() == 0 &&
-              clusters.first.back() == nodes &&
+              clusters.first.back() == row_nodes &&
               std::is_sorted(clusters.first.begin(), clusters.first.end()),
           "their clusters");
   for (std::size_t a = 0; a < clusters.size(); ++a)
     require(clusters.nodes(a).size() <= max_cluster_nodes, "their clusters");
-  std::vector<bool> seen(nodes);
+  std::vector<bool> seen(row_nodes);
   for (const std::uint32_t node : clusters.node) {
-    require(node < nodes && !seen[node], "their nodes");
+    require(node < row_nodes && !seen[node], "their nodes");
     seen[node] = true;
   }
   require(layout.with_columns <= clusters.size(), "their clusters");
@@ -110,8 +110,8 @@ std::vector<std::uint8_t> bytes_of(const Crosses& chunk) {
   return bytes;
 }
 
-CompressedColumns::CompressedColumns(CompressedLayout layout, ChunkReader reader)
-    : layout_(std::move(layout)), reader_(std::move(reader)),
+CompressedColumns::CompressedColumns(CompressedLayout layout, std::size_t nodes, ChunkReader reader)
+    : layout_(std::move(layout)), node_count_(nodes), reader_(std::move(reader)),
       cluster_(layout_.clusters.node.size()), place_(cluster_.size()), at_(layout_.count.size()),
       row_numbers_(layout_.with_columns), chunks_(layout_.with_columns) {
   for (std::size_t a = 0; a < layout_.clusters.size(); ++a) {

@@ -26,15 +26,16 @@ namespace gewebe {
 
 /// What is known of compressed columns without any of their numbers.
 struct CompressedLayout {
-  NodeClusters clusters;         ///< of all n nodes
+  NodeClusters clusters;         ///< of the m nodes that columns have rows for
   std::size_t with_columns = 0;  ///< the first so many clusters are of the nodes with columns
   std::vector<CrossCount> count; ///< by block: chunk by chunk, cluster by cluster
   double relative = 0;           ///< the bound that was asked for, over the largest entry of C
   double bound = 0;              ///< what any entry may be wrong by, mm for 1e-6 N
 };
 
-/// \throw Error if it contradicts itself or isn't of `nodes` nodes: it may come from a file
-void check_layout(const CompressedLayout& layout, std::size_t nodes);
+/// \throw Error if it contradicts itself or isn't of the first `row_nodes` nodes: it may come from
+/// a file
+void check_layout(const CompressedLayout& layout, std::size_t row_nodes);
 /// Bytes of each chunk. \pre check_layout passed
 std::vector<std::uint64_t> chunk_sizes(const CompressedLayout& layout);
 /// A chunk as bytes: scales, then int16, then int8, little-endian.
@@ -46,24 +47,27 @@ using ChunkReader = std::function<std::vector<std::uint8_t>(std::size_t chunk)>;
 /// Not to be used from several threads at once.
 class CompressedColumns final : public ColumnSource {
 public:
-  /// \pre check_layout passed
-  CompressedColumns(CompressedLayout layout, ChunkReader reader);
+  /// \param nodes n, of all nodes of the model   \pre check_layout passed for n nodes or fewer
+  CompressedColumns(CompressedLayout layout, std::size_t nodes, ChunkReader reader);
 
   const CompressedLayout& layout() const noexcept { return layout_; }
-  std::size_t node_count() const override { return cluster_.size(); }
+  std::size_t node_count() const override { return node_count_; }
+  std::size_t row_nodes() const override { return cluster_.size(); }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
   /// Puts a node's columns together. \throw what the reader throws, as all below
   void read(std::size_t k, std::span<double> out) const override;
   const CompressedColumns* compressed() const override { return this; }
 
-  bool has(std::uint32_t node) const { return cluster_[node] < layout_.with_columns; }
-  /// C between a node that has columns and any other, [axis][axis of the other]; that of the two
-  /// in the other order is its transpose, bit by bit.
+  bool has(std::uint32_t node) const {
+    return node < cluster_.size() && cluster_[node] < layout_.with_columns;
+  }
+  /// C between a node that has columns and any other of the first m, [axis][axis of the other];
+  /// that of the two in the other order is its transpose, bit by bit.
   std::array<std::array<double, 3>, 3> block(std::uint32_t node, std::uint32_t other) const;
   /// One entry of it, bit by bit: a row's displacement under a force along an axis of the node.
   double entry(std::uint32_t node, int axis, std::size_t row) const;
-  /// u += C f over all 3 n axes, for forces at nodes that have columns. The same bytes for any
-  /// number of threads.
+  /// u += C f over the first 3 m axes, for forces at nodes that have columns. The same bytes for
+  /// any number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
@@ -85,6 +89,7 @@ private:
     std::size_t scale = 0, wide = 0, narrow = 0;
   };
   CompressedLayout layout_;
+  std::size_t node_count_;
   ChunkReader reader_;
   std::vector<std::uint32_t> nodes_;           ///< that have columns
   std::vector<std::uint32_t> cluster_, place_; ///< of a node, and where in that

@@ -155,7 +155,7 @@ void bench(const Solid& solid, std::initializer_list<double> bounds) {
     for (const auto& chunk : made.chunks)
       bytes += static_cast<double>(chunk.size());
     const double surface = surface_bytes(made.layout), bound = made.layout.bound;
-    const auto columns = compressed_columns(std::move(made));
+    const auto columns = compressed_columns(std::move(made), n);
     double worst = 0;
     std::vector<double> exact(9 * n), read(9 * n);
     for (std::size_t k = 0; k < 24; ++k) {

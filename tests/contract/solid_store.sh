@@ -55,6 +55,40 @@ test_a_scene_of_it_is_that_of_the_model() {
   [[ $(head -1 lines.surfaces) == "shapes s $(ffe-precompute --info s.h5 | value row_nodes)" ]] || fail "$(<lines.surfaces)"
 }
 
+# Compressed ones have rows for the surface too, unless all are asked for; the inside comes from the factor.
+test_compressed_columns_of_a_solid_have_rows_for_its_surface() {
+  solid s.ela
+  local kind rows last
+  ffe-precompute --columns all s.ela -o plain.h5
+  ffe-precompute --columns all --compress 1e-6 --verify s.ela -o s.h5
+  ffe-precompute --columns all --rows surface --compress 1e-6 s.ela -o same.h5
+  cmp s.h5 same.h5 || fail 'surface is not the default'
+  ffe-precompute --columns surface --rows all --compress 1e-6 --verify s.ela -o all.h5
+  for kind in s all; do
+    ffe-precompute --info --verify $kind.h5 >$kind.info
+  done
+  rows=$(ffe-precompute --info plain.h5 | value row_nodes)
+  [[ $(value row_nodes <s.info) == "$rows" && $(value touched_nodes <s.info) == "$rows" ]] || fail "$(<s.info)"
+  [[ -z $(value row_nodes <all.info) && $(value touched_nodes <all.info) == "$rows" ]] || fail "$(<all.info)"
+  awk 'NR == FNR { if ($1 == "columns_mb") some = $2; next } $1 == "columns_mb" { exit !(some > 0 && some < 0.8 * $2) }' s.info all.info ||
+    fail "they take as much as all rows: $(grep columns_mb s.info all.info)"
+  last=$(($(value nodes <s.info) - 1)) # inside
+  for kind in surfaces shapes; do
+    printf '%s\n' 'object s s.ela store=s.h5' "emit $kind" 'emit forces' 'displace s z>29 0 0.1 0' step 'force s z>20 0 0 100' step >scene
+    [[ $kind == surfaces ]] || printf '%s\n' "displace s $last 0.01 0 0.02" step "displace s $last 0 0 0" "force s $last 0 0 900" step >>scene
+    ffe-run --rate 1000 --stats=s.json scene >small
+    sed 's/s\.h5/plain.h5/' scene | ffe-run --rate 1000 --stats=plain.json >exact
+    [[ $(wc -l <small) == $(wc -l <exact) && $(wc -l <small) -gt $rows ]] || fail "$kind: other lines"
+    paste small exact | awk '{ size = far = 0
+      for (i = 1; i <= NF / 2; i++) { d = $i - $(i + NF / 2); far = d * d > far ? d * d : far; size = NF == 8 && i == 1 || $i * $i < size ? size : $i * $i }
+      if (!(far <= (1e-4 + 1e-3 * sqrt(size)) ^ 2)) { print; exit 1 } }' ||
+      fail "$kind differ"
+    grep -q '"columns_read":0,' s.json || fail "plain columns are read: $(<s.json)"
+    [[ $kind == shapes ]] || grep -q '"solves":0,' s.json || fail "$kind: $(<s.json)"
+  done
+  grep -qE '"solves":[1-9]' s.json || fail "$(<s.json)"
+}
+
 # Nothing is solved for until somebody asks for what is inside.
 test_the_inside_is_solved_for_when_it_is_asked_for() {
   solid s.ela

@@ -46,9 +46,9 @@ struct Body {
     factor = std::make_unique<Factor>(matrix, Context{});
     norm = stiffness_norm(matrix);
   }
-  ColumnMaker maker(const Context& context = {}) const {
-    return [this, context](std::span<const std::uint32_t> of, ColumnSink& sink) {
-      return compliance_columns(matrix, *factor, norm, of, context, sink);
+  ColumnMaker maker(const Context& context = {}, std::size_t rows = SIZE_MAX) const {
+    return [this, context, rows](std::span<const std::uint32_t> of, ColumnSink& sink) {
+      return compliance_columns(matrix, *factor, norm, of, context, sink, rows);
     };
   }
   CompressedMade compress(double relative, int threads = 0) const {
@@ -125,7 +125,7 @@ double largest(const std::vector<std::vector<double>>& columns) {
 /// How far columns are from those that they stand for, over the largest entry.
 double error_of(const ColumnSource& columns, const std::vector<std::vector<double>>& exact) {
   double worst = 0;
-  std::vector<double> read(9 * columns.node_count());
+  std::vector<double> read(9 * columns.row_nodes());
   for (std::size_t k = 0; k < exact.size(); ++k) {
     columns.read(k, read);
     for (std::size_t r = 0; r < read.size(); ++r)
@@ -150,7 +150,7 @@ void expect_within(const char* name, const Body& body, std::initializer_list<dou
     check_layout(made.layout, body.positions.size());
     EXPECT_LE(made.residual, max_backward_error);
     EXPECT_LE(made.layout.bound, relative * largest(exact.columns) * (1 + 1e-12)) << name;
-    const auto columns = compressed_columns(std::move(made));
+    const auto columns = compressed_columns(std::move(made), body.positions.size());
     ASSERT_EQ(columns->nodes(), body.nodes);
     const double error = error_of(*columns, exact.columns);
     EXPECT_LE(error, relative) << name;
@@ -161,6 +161,27 @@ void expect_within(const char* name, const Body& body, std::initializer_list<dou
 TEST(CompressedColumns, EveryEntryOfASolidIsWithinTheBound) {
   expect_within("ball", ball(1.5), {1e-2, 1e-3, 1e-4, 1e-5, 1e-6});
   expect_within("bar", bar(), {1e-3, 1e-5});
+}
+
+TEST(CompressedColumns, OfTheSurfaceAloneAreWithinTheBoundAndTakeLess) {
+  const Body body = ball(1.1);
+  const std::size_t rows = body.nodes.size(), n = body.positions.size();
+  ASSERT_LT(rows + 100, n);
+  Collected exact;
+  body.maker({}, rows)(body.nodes, exact);
+  CompressedMade made = compress_columns(std::span(body.positions).first(rows), body.nodes, 1e-4,
+                                         body.maker({}, rows), {});
+  check_layout(made.layout, rows);
+  EXPECT_THROW(check_layout(made.layout, n), Error);
+  EXPECT_LT(bytes(made), 0.8 * static_cast<double>(bytes(body.compress(1e-4))));
+  const auto columns = compressed_columns(std::move(made), n);
+  EXPECT_EQ(columns->node_count(), n);
+  EXPECT_EQ(columns->row_nodes(), rows);
+  EXPECT_TRUE(columns->has(static_cast<std::uint32_t>(rows - 1)));
+  EXPECT_FALSE(columns->has(static_cast<std::uint32_t>(rows)));
+  EXPECT_FALSE(columns->has(static_cast<std::uint32_t>(n - 1)));
+  EXPECT_LE(error_of(*columns, exact.columns), 1e-4);
+  EXPECT_GE(error_of(*columns, exact.columns), 1e-5) << "less would have done";
 }
 
 TEST(CompressedColumns, EveryEntryOfANetIsWithinTheBound) {
@@ -190,7 +211,7 @@ TEST(CompressedColumns, AnyNumberOfThreadsGivesTheSameBytes) {
 
 TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
   const Body body = net();
-  const auto columns = compressed_columns(body.compress(1e-3));
+  const auto columns = compressed_columns(body.compress(1e-3), body.positions.size());
   double most = 0;
   for (std::size_t k = 0; k < body.nodes.size(); k += 7)
     for (std::uint32_t other = 0; other < body.positions.size(); other += 5) {
@@ -213,7 +234,7 @@ TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
 
 TEST(CompressedColumns, BlocksColumnsAndSumsAreOfOneMatrix) {
   const Body body = ball(1.5);
-  const auto columns = compressed_columns(body.compress(1e-4));
+  const auto columns = compressed_columns(body.compress(1e-4), body.positions.size());
   const std::size_t axes = 3 * body.positions.size();
   std::vector<double> read(3 * axes), expected(axes, 0.25), one(expected), five(expected);
   std::mt19937 random(3);
@@ -271,7 +292,7 @@ TEST(CompressedColumns, AnyMatrixIsWithinTheBound) {
     most = test::larger(most, std::abs(x));
   for (const double relative : {0.3, 1e-2, 1e-5}) {
     const auto columns =
-        compressed_columns(compress_columns(positions, nodes, relative, maker, {}));
+        compressed_columns(compress_columns(positions, nodes, relative, maker, {}), 120);
     std::vector<double> read(1080);
     double worst = 0;
     for (std::size_t k = 0; k < 120; ++k) {
@@ -306,13 +327,13 @@ TEST(CompressedColumns, WhatContradictsItselfIsRefused) {
   refuses([](CompressedLayout& l) { l.bound = std::numeric_limits<double>::quiet_NaN(); });
   CompressedMade cut = made;
   cut.chunks[0].pop_back();
-  const auto columns = compressed_columns(std::move(cut));
+  const auto columns = compressed_columns(std::move(cut), body.positions.size());
   std::vector<double> read(9 * body.positions.size());
   EXPECT_THROW(columns->read(0, read), Error);
   CompressedMade loud = made;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::memcpy(loud.chunks[0].data(), &nan, sizeof nan);
-  const auto damaged = compressed_columns(std::move(loud));
+  const auto damaged = compressed_columns(std::move(loud), body.positions.size());
   EXPECT_THROW(damaged->read(0, read), Error);
   EXPECT_EQ(chunk_sizes(made.layout).size(), made.chunks.size());
   for (std::size_t k = 0; k < made.chunks.size(); ++k)

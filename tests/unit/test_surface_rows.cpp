@@ -2,6 +2,8 @@
 // where it is asked for.
 
 #include "base/error.h"
+#include "compliance/column_compression.h"
+#include "compliance/compliance.h"
 #include "compliance/compliance_columns.h"
 #include "compliance/verify.h"
 #include "larger.h"
@@ -237,6 +239,91 @@ TEST(SurfaceRows, GiveWhatAllRowsGive) {
     EXPECT_LT(some.counts().backward_error, 1e-10);
     EXPECT_EQ(some.counts().shape_error, 0);
   }
+}
+
+/// Compressed columns of every `step`-th surface node, with rows for the surface.
+std::shared_ptr<ComplianceSource> compressed(const Model& model, double relative,
+                                             std::size_t step = 1) {
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  const std::size_t rows = surface_count(model);
+  std::vector<Vec3> positions;
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < rows; ++i) {
+    positions.push_back(model.nodes[i].position);
+    if (i % step == 0)
+      nodes.push_back(i);
+  }
+  CompressedMade made = compress_columns(positions, nodes, relative,
+                                         [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+                                           return compliance_columns(k, factor, stiffness_norm(k),
+                                                                     of, {}, sink, rows);
+                                         },
+                                         {});
+  return compliance_of_store({compressed_columns(std::move(made), model.nodes.size()),
+                              [&model] { return Factor(stiffness_matrix(model), Context{}); }});
+}
+
+// Nodes with columns, without, and inside, in all mixtures.
+TEST(SurfaceRows, OfCompressedColumnsGiveWhatAllRowsGive) {
+  const Model model = box_model();
+  const std::size_t surface = surface_count(model);
+  for (const std::size_t step : {1U, 2U})
+    for (const std::size_t limit : {SIZE_MAX, std::size_t{0}}) {
+      const ElastostaticOptions options{.block_limit = limit};
+      Elastostatic some(model, compressed(model, 1e-7, step), {}, options);
+      Elastostatic all(model, nullptr, {}, options);
+      int number = 0;
+      for (const Load& load : loads_of(model)) {
+        SCOPED_TRACE(number++);
+        some.update(load);
+        all.update(load);
+        expect_near(some.surface_displacement(), all.displacement(), 1e-5, "surface");
+        ASSERT_EQ(some.surface_displacement().size(), 3 * surface);
+        expect_near(some.displacement(), all.displacement(), 1e-5, "whole");
+        const std::vector<std::uint32_t> touched{
+            places_of(model).outer[1], places_of(model).outer[4], places_of(model).inner[3]};
+        const DelassusOperator a = some.delassus_operator(load, touched),
+                               b = all.delassus_operator(load, touched);
+        expect_near(a.compliance, b.compliance, 1e-5, "compliance");
+      }
+    }
+}
+
+TEST(SurfaceRows, OfCompressedColumnsHaveBlocksWithTheInside) {
+  const Model model = box_model();
+  Compliance some(model, compressed(model, 1e-7), {}, false), all(model, nullptr, {}, false);
+  const Places at = places_of(model);
+  const std::vector<std::uint32_t> nodes{at.outer[2], at.outer[20], at.inner[1], at.inner[7]};
+  for (Compliance* const compliance : {&some, &all}) {
+    compliance->need(nodes);
+    compliance->need_blocks(nodes);
+  }
+  const double size = all.block(nodes[3], nodes[3])[0][0];
+  ASSERT_GT(size, 0);
+  for (const std::uint32_t node : nodes)
+    for (const std::uint32_t other : nodes)
+      for (int a = 0; a < 3; ++a)
+        for (std::size_t b = 0; b < 3; ++b) {
+          const double expected = all.block(node, other)[static_cast<std::size_t>(a)][b];
+          EXPECT_NEAR(some.block(node, other)[static_cast<std::size_t>(a)][b], expected,
+                      1e-5 * size);
+          EXPECT_NEAR(some.entry(node, a, 3 * std::size_t{other} + b), expected, 1e-5 * size);
+        }
+}
+
+TEST(SurfaceRows, OfCompressedColumnsCostNoSolveUntilTheInsideIsAskedFor) {
+  const Model model = box_model();
+  Elastostatic object(model, compressed(model, 1e-4), {});
+  const std::vector<Load> loads = loads_of(model);
+  for (const std::size_t k : {0U, 2U, 7U, 2U}) {
+    object.update(loads[k]);
+    (void)object.surface_displacement();
+  }
+  EXPECT_EQ(object.counts().solves, 0U);
+  EXPECT_EQ(object.counts().factors, 0U);
+  (void)object.displacement();
+  EXPECT_EQ(object.counts().solves, 1U);
 }
 
 TEST(SurfaceRows, CostNoSolveUntilTheInsideIsAskedFor) {

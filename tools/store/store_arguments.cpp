@@ -110,7 +110,6 @@ void complete(StoreArguments& a) {
     refuse(a.method != "direct", "--method", "--compress");
     refuse(a.precision != "float64", "--precision", "--compress");
     refuse(!a.shard_text.empty(), "--shard", "--compress");
-    refuse(a.rows == "surface", "--rows surface", "--compress");
   }
   if (!a.shard_text.empty())
     a.shard = shard_of(a.shard_text);

@@ -35,7 +35,7 @@ double seconds() {
 
 /// What columns have rows for, as StiffnessFacts says it.
 std::uint64_t row_nodes_of(const Model& model, const StoreArguments& a) {
-  if (!a.touched || a.compress || a.rows == "all" || model.tetrahedra.empty())
+  if (!a.touched || a.rows == "all" || model.tetrahedra.empty())
     return 0;
   const std::size_t surface = surface_count(model);
   return surface < model.nodes.size() ? surface : 0;
@@ -159,13 +159,14 @@ StiffnessFacts facts_of(const Prepared& p, const StoreArguments& a) {
 
 /// Columns of clusters of nodes, compressed as they come. \return their residual
 double compress(cli::Run& run, const Prepared& p, double relative, StiffnessStoreWriter& writer) {
-  std::vector<Vec3> positions;
-  for (const Node& node : p.model.nodes)
-    positions.push_back(node.position);
+  const std::size_t rows = p.row_nodes != 0 ? p.row_nodes : p.model.nodes.size();
+  std::vector<Vec3> positions; // of the nodes with rows
+  for (std::size_t i = 0; i < rows; ++i)
+    positions.push_back(p.model.nodes[i].position);
   Context quiet = run.context();
   quiet.progress = nullptr;
   const auto columns_of = [&](std::span<const std::uint32_t> nodes, ColumnSink& sink) {
-    return compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, quiet, sink);
+    return compliance_columns(p.matrix, *p.factor, p.check.norm, nodes, quiet, sink, rows);
   };
   const CompressedMade made = run.timed("columns", [&] {
     return compress_columns(positions, p.nodes, relative, columns_of, run.context());
