@@ -18,6 +18,12 @@ namespace gewebe {
 
 class CompressedColumns;
 
+/// What entries may be wrong by beside their rounding; 0 where that is all.
+struct EntryBound {
+  double relative = 0; ///< what was asked for, over the largest entry of C
+  double entry = 0;    ///< mm for 1e-6 N
+};
+
 class ColumnSource {
 public:
   ColumnSource() = default;
@@ -38,6 +44,7 @@ public:
   virtual void read(std::size_t k, std::span<double> out) const = 0;
   /// Themselves, if sums and entries of them come for less than whole columns; or null.
   virtual const CompressedColumns* compressed() const { return nullptr; }
+  virtual EntryBound bound() const { return {}; }
   /// Whether they are kept as float32, so that nothing is lost by read_single.
   virtual bool single() const { return false; }
   /// As read. \pre single()

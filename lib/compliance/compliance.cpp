@@ -7,6 +7,7 @@
 #include "compliance/forward_blocks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -140,6 +141,22 @@ void Compliance::add_rows(std::span<const NodeVector> forces, std::span<const st
     for (const NodeVector& f : forces)
       for (int a = 0; a < 3; ++a)
         values[k] += entry(f.node, a, rows[k]) * f.value[a];
+}
+
+EntryBound Compliance::bound(std::span<const NodeVector> forces) const {
+  const ColumnSource* const columns = source_->columns();
+  if (columns == nullptr)
+    return {};
+  EntryBound bound = columns->bound();
+  if (bound.entry == 0)
+    return {};
+  double size = 0; // of forces that take part in a sum of stored columns
+  for (const NodeVector& f : forces)
+    if (std::ranges::binary_search(columns->nodes(), f.node))
+      for (int a = 0; a < 3; ++a)
+        size += std::abs(f.value[a]);
+  bound.entry *= size;
+  return bound;
 }
 
 bool Compliance::stored(std::span<const std::uint32_t> nodes) const {

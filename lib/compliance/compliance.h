@@ -68,6 +68,10 @@ public:
   /// u = C f in place, for right-hand sides over all axes one behind the other.
   void solve(std::span<double> over_axes, std::size_t columns = 1);
 
+  /// By how much an entry of C f may be wrong because stored columns are compressed, mm; 0 for
+  /// others. `relative` is what they were asked for.
+  EntryBound bound(std::span<const NodeVector> forces) const;
+
   // ---- what pays
 
   /// Whether all these have columns that are stored or in memory.

@@ -57,6 +57,7 @@ public:
   /// Puts a node's columns together. \throw what the reader throws, as all below
   void read(std::size_t k, std::span<double> out) const override;
   const CompressedColumns* compressed() const override { return this; }
+  EntryBound bound() const override { return {layout_.relative, layout_.bound}; }
 
   bool has(std::uint32_t node) const {
     return node < cluster_.size() && cluster_[node] < layout_.with_columns;

@@ -126,6 +126,13 @@ void CorrectedColumns::read_single(std::size_t k, std::span<float> out) const {
     out[r] = static_cast<float>(wide[r]);
 }
 
+EntryBound CorrectedColumns::bound() const {
+  EntryBound bound = before_->bound();
+  if (bound.entry > 0)
+    bound.entry *= error_gain();
+  return bound;
+}
+
 double CorrectedColumns::error_gain() const {
   prepare();
   if (!answers_.empty())

@@ -39,6 +39,8 @@ public:
   /// By the operations that each way takes, the responses counted while they are not there.
   bool pays(std::size_t count) const override;
   void read_single(std::size_t k, std::span<float> out) const override;
+  /// Of the columns before, and what correcting makes of it. Solves where nothing was read yet.
+  EntryBound bound() const override;
 
   /// As read, of nodes first to first + count - 1, one behind the other: faster than one by one,
   /// with the same bytes. \pre out.size() == 9 n count

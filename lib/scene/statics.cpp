@@ -20,6 +20,8 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
   sum.columns_read += more.columns_read;
   sum.factors += more.factors;
   sum.backward_error = std::max(sum.backward_error, more.backward_error);
+  if (more.worst_shape.worse_than(sum.worst_shape))
+    sum.worst_shape = more.worst_shape;
   sum.contact_error = std::max(sum.contact_error, more.contact_error);
   sum.shape_error = std::max(sum.shape_error, more.shape_error);
 }

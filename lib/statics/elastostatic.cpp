@@ -165,8 +165,9 @@ struct Elastostatic::State {
       counts.shape_error = std::max(counts.shape_error, distance_from(taken));
     }
     const std::vector<double>& shape = all_rows() ? u : need_whole();
+    ShapeError error;
     if (!all_rows())
-      counts.backward_error = std::max(counts.backward_error, distance_from(shape));
+      error.error = distance_from(shape);
     if (!norm) {
       norm = stiffness_norm(stiffness_matrix(model));
       stiffness.emplace(model);
@@ -181,9 +182,18 @@ struct Elastostatic::State {
           residual = std::max(residual, std::abs(product[axis_of(i, a)] - f[axis_of(i, a)]));
           load_size = std::max(load_size, std::abs(f[axis_of(i, a)]));
         }
-    const double scale = *norm * largest_size(shape) + load_size;
+    const double size = largest_size(shape), scale = *norm * size + load_size;
     if (scale > 0)
-      counts.backward_error = std::max(counts.backward_error, residual / scale);
+      error.error = std::max(error.error, residual / scale);
+    if (size > 0) {
+      const EntryBound given = compliance.bound(as_vectors(load.force)),
+                       found = compliance.bound(forces);
+      error.limit += (given.entry + found.entry) / size;
+      error.relative = given.relative;
+    }
+    counts.backward_error = std::max(counts.backward_error, error.error);
+    if (error.worse_than(counts.worst_shape))
+      counts.worst_shape = error;
   }
 
   void update(const Load& now) {

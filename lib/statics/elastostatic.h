@@ -19,6 +19,7 @@
 #include "contact/load.h"
 #include "model/model.h"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -29,6 +30,23 @@ namespace gewebe {
 
 class ComplianceSource;
 
+/// How well a shape balances its forces: ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖), and by how much a surface that
+/// is found alone differs from that of the whole shape, over the largest entry.
+struct ShapeError {
+  double error = 0;
+  /// What it may be: a wrong solution has one of 1, columns of float32 give 1e-7. Compressed
+  /// columns add what their bound lets an entry be wrong by under the forces of this shape.
+  double limit = 1e-6;
+  double relative = 0; ///< the bound that these columns were asked for; 0: they aren't compressed
+
+  bool within() const noexcept { return error <= limit; }
+  /// Whether it comes nearer to its limit than another, or is beyond it by more, or is NaN.
+  bool worse_than(const ShapeError& other) const noexcept {
+    return std::isnan(error) ||
+           (!std::isnan(other.error) && error * other.limit > other.error * limit);
+  }
+};
+
 /// How an elastostatic object came to its shapes.
 struct ElastostaticCounts {
   std::uint64_t updates = 0, unchanged = 0; ///< asked for; answered without work
@@ -37,10 +55,9 @@ struct ElastostaticCounts {
   std::uint64_t columns_read = 0;           ///< nodes whose columns were read
   std::uint64_t factors = 0;                ///< factorised or loaded
   std::uint64_t terms = 0, skipped = 0;     ///< of columns and blocks of rows: added, left out
-  /// Largest ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖) seen, where it was asked for; and by how much a surface that
-  /// is found alone differs from that of the whole shape, over the largest entry.
-  double backward_error = 0;
-  double contact_error = 0; ///< largest miss of a prescribed displacement, over the largest one
+  double backward_error = 0; ///< largest ShapeError::error seen, where it was asked for
+  ShapeError worst_shape;    ///< that which comes nearest to its limit
+  double contact_error = 0;  ///< largest miss of a prescribed displacement, over the largest one
   double shape_error = 0; ///< largest effect of the tolerance on an entry, over the largest entry,
                           ///< where errors were asked for
 };

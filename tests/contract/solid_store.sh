@@ -89,6 +89,77 @@ test_compressed_columns_of_a_solid_have_rows_for_its_surface() {
   grep -qE '"solves":[1-9]' s.json || fail "$(<s.json)"
 }
 
+# Shapes from compressed columns may be wrong by what the store's bound allows, and no more; others by 1e-6.
+test_verify_follows_the_bound_of_compressed_columns() {
+  solid s.ela
+  exp2ela --primitive sphere:24x16 --size 50 --bend --fix 'z<-40' --name s -o net.ela
+  local model kind python
+  python=$(python_with_h5py || true)
+  stat() { sed -n "s/.*\"$1\":\([^,]*\).*/\1/p" stats; }
+  for model in s net; do
+    for kind in 0 1e-4 1e-5; do
+      if [[ $kind == 0 ]]; then
+        ffe-precompute --columns all $model.ela -o s.h5
+      else
+        ffe-precompute --columns all --compress $kind $model.ela -o s.h5
+      fi
+      printf '%s\n' "object s $model.ela store=s.h5" 'emit surfaces' 'force s z>20 0 0 100' step 'force s 3 0.1 0 0' 'displace s z>27 0 0.1 0' step >scene
+      ffe-run --verify --stats=stats scene >/dev/null || fail "$model, $kind"
+      awk -v a="$(stat compressed)" -v b=$kind 'BEGIN { exit !(a + 0 == b + 0) }' || fail "$model: $kind: $(<stats)"
+      if [[ $kind == 0 ]]; then
+        [[ $(stat backward_limit) == 1e-06 ]] || fail "$(<stats)"
+        continue
+      fi
+      awk -v limit="$(stat backward_limit)" -v error="$(stat backward_error)" -v e=$kind 'BEGIN { exit !(limit > e / 10 && limit < 1 && error > 1e-6) }' ||
+        fail "$model, $kind: $(<stats)"
+      [[ $python ]] || continue
+      "$python" -c 'import h5py; h5py.File("s.h5", "a")["s/compressed"].attrs["bound"] *= 1e-5'
+      ffe-run --verify scene >/dev/null 2>message && fail "$model, $kind: a bound that does not hold is taken"
+      grep -qE "^ffe-run: the backward error of a shape is [^ ]*, expected at most [^ ]* with columns compressed within [^ ]*$" message ||
+        fail "$(<message)"
+    done
+  done
+  [[ $python ]] || left_out 'bounds that do not hold: no h5py for python3'
+}
+
+# examples/store/displace.py knows the page alone: plain columns, and compressed ones within their bound.
+test_the_python_example_reads_stores_of_solids() {
+  local python kind nodes n within
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  solid s.ela
+  ffe-precompute s.ela -o factor.h5
+  ffe-precompute --columns all s.ela -o surface.h5
+  ffe-precompute --columns surface --rows all --precision float32 s.ela -o all.h5
+  ffe-precompute --columns all --compress 1e-4 s.ela -o surface-compressed.h5
+  ffe-precompute --columns '300,301,400,430' --rows all --compress 1e-3 s.ela -o some-compressed.h5
+  nodes=$(ffe-precompute --info surface.h5 | value row_nodes)
+  printf '%s\n' 'object s s.ela store=factor.h5' 'force s 300 10 0 40' 'force s 430 0 -20 5' 'emit shapes' step | ffe-run |
+    awk '/^shapes /{ n = $3; next } n-- > 0' >shape
+  awk '/^nodes /{ n = $2; next } n-- > 0 { print $1, $2, $3 }' s.ela >rest
+  for kind in surface all surface-compressed some-compressed; do
+    "$python" "$GEWEBE_ROOT/examples/store/displace.py" $kind.h5 s 300 10 0 40 430 0 -20 5 >u
+    n=$(wc -l <rest)
+    [[ $kind != surface* ]] || n=$nodes
+    [[ $(wc -l <u) == "$n" ]] || fail "$kind: $(wc -l <u) nodes, expected $n"
+    within='1e-6 * most'
+    if [[ $kind == *compressed ]]; then
+      # The bound of an entry, times the sum of forces.
+      within="75 * $("$python" -c 'import h5py, sys; print(h5py.File(sys.argv[1])["s/compressed"].attrs["bound"])' $kind.h5) + 1e-9 * most"
+    fi
+    agree() { # FACTOR on u
+      paste -d' ' rest u shape | head -n "$n" | awk -v factor="$1" '{ for (a = 1; a <= 3; ++a) {
+          d = $a + factor * $(a + 3) - $(a + 6); d = d < 0 ? -d : d; if (!(d <= worst)) worst = d
+          if ($(a + 3) * $(a + 3) > most * most) most = $(a + 3) < 0 ? -$(a + 3) : $(a + 3) } }
+        END { exit !(most > 0 && worst <= '"$within"') }'
+    }
+    agree 1 || fail "$kind: Python says something else"
+    ! agree 1.01 || fail "$kind: the check sees nothing"
+    [[ $("$python" "$GEWEBE_ROOT/examples/store/displace.py" --at 7 $kind.h5 s 300 10 0 40 430 0 -20 5) == "$(sed -n 8p u)" ]] ||
+      fail "$kind: another displacement of one node"
+  done
+  ! "$python" "$GEWEBE_ROOT/examples/store/displace.py" some-compressed.h5 s 302 1 0 0 >u 2>&1 || fail 'a node without columns is taken'
+}
+
 # Nothing is solved for until somebody asks for what is inside.
 test_the_inside_is_solved_for_when_it_is_asked_for() {
   solid s.ela

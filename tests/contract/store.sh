@@ -41,6 +41,36 @@ PYTHON
   rm read.py cube.ela cube.h5
 }
 
+# Names that stand in stores of every kind, as h5dump lists them, and names that stand on the page are the same.
+test_the_page_names_what_stands_in_a_store() {
+  has h5dump || skip 'no h5dump'
+  held_cube
+  exp2ela --primitive sphere:8x6 --size 30 --solid --cell 20 --fix 'z<-20' --name solid -o solid.ela -q
+  ffe-precompute --columns all solid.ela -o surface.h5
+  ffe-precompute --columns all --rows all solid.ela -o all.h5
+  ffe-precompute --columns all --compress 1e-3 solid.ela -o compressed.h5
+  ffe-precompute --columns all cube.ela -o stage2.h5
+  ffe-precompute --stage 2 --columns all --compress 1e-3 cube.ela -o stage2.h5
+  ffe-precompute --columns all --shard 1/2 cube.ela -o part.h5
+  ffe-precompute --columns 0,1 --method relax cube.ela -o relax.h5
+  ffe-precompute --columns 0 --method relax-fixed --steps 9 cube.ela -o fixed.h5
+  local store
+  for store in *.h5; do
+    h5dump -n 1 "$store" | sed -nE 's,^ *(group|dataset|attribute) +/(cube|solid)?/?,,p'
+  done | tr / '\n' | grep . | LC_ALL=C sort -u >stand
+  named() { # FILE: the page's names: items, words in the text, headings of groups
+    sed -nE '/^\.Sh EXAMPLES/q
+      s/^\.(It )?Ic (.*)/\2/p; s/^\.Ql ([^ ]*).*/\1/p; s/^\.Ss ([KL]|columns|compressed|stage2)(,.*)?$/\1/p' "$1" |
+      sed 's/ Bq.*//' | tr -s ' ,.()' '\n' | grep . | LC_ALL=C sort -u
+  }
+  page() { named "$1" | diff - stand; }
+  page "$GEWEBE_ROOT/man/stiffness_store.5" || fail 'the page names (<) other things than stand in stores (>)'
+  sed '/^\.Ic bound$/d; /^\.It Ic bound/d' "$GEWEBE_ROOT/man/stiffness_store.5" >less
+  ! page less >/dev/null || fail 'a name that is missing on the page is not seen'
+  sed 's/^\.It Ic first/.It Ic firsts/' "$GEWEBE_ROOT/man/stiffness_store.5" >other
+  ! page other >/dev/null || fail 'a name that no store has is not seen'
+}
+
 test_equal_models_make_equal_bytes() {
   held_cube
   ffe-precompute -j1 --columns surface cube.ela -o a.h5

@@ -241,9 +241,10 @@ TEST(SurfaceRows, GiveWhatAllRowsGive) {
   }
 }
 
-/// Compressed columns of every `step`-th surface node, with rows for the surface.
+/// Compressed columns of every `step`-th surface node, with rows for the surface, which say of
+/// themselves `claimed` times the bound that they have.
 std::shared_ptr<ComplianceSource> compressed(const Model& model, double relative,
-                                             std::size_t step = 1) {
+                                             std::size_t step = 1, double claimed = 1) {
   const StiffnessMatrix k = stiffness_matrix(model);
   const Factor factor(k, {});
   const std::size_t rows = surface_count(model);
@@ -260,6 +261,7 @@ std::shared_ptr<ComplianceSource> compressed(const Model& model, double relative
                                                                      of, {}, sink, rows);
                                          },
                                          {});
+  made.layout.bound *= claimed;
   return compliance_of_store({compressed_columns(std::move(made), model.nodes.size()),
                               [&model] { return Factor(stiffness_matrix(model), Context{}); }});
 }
@@ -368,6 +370,31 @@ TEST(SurfaceRows, ThatAreWrongAreMeasured) {
   object.update(load);
   (void)object.surface_displacement();
   EXPECT_GT(object.counts().backward_error, 1e-5);
+  EXPECT_FALSE(object.counts().worst_shape.within());
+  EXPECT_EQ(object.counts().worst_shape.limit, 1e-6);
+  EXPECT_EQ(object.counts().worst_shape.relative, 0);
+}
+
+// A shape may be wrong by what the bound allows under its own forces, and not by more.
+TEST(SurfaceRows, OfCompressedColumnsAreAsWrongAsTheirBoundSays) {
+  const Model model = box_model();
+  const auto worst = [&](double relative, double claimed) {
+    Elastostatic object(model, compressed(model, relative, 1, claimed), {},
+                        {.measure_error = true});
+    for (const Load& load : loads_of(model)) {
+      object.update(load);
+      (void)object.surface_displacement();
+    }
+    return object.counts().worst_shape;
+  };
+  for (const double relative : {1e-2, 1e-4}) {
+    const ShapeError good = worst(relative, 1);
+    EXPECT_TRUE(good.within()) << good.error << " > " << good.limit;
+    EXPECT_EQ(good.relative, relative);
+    EXPECT_GT(good.limit, 1e-6);
+    EXPECT_GT(good.error, relative / 100);
+    EXPECT_FALSE(worst(relative, 1e-3).within()) << relative;
+  }
 }
 
 TEST(SurfaceRows, OfOtherNodesAreRefused) {
