@@ -186,39 +186,36 @@ struct Factor::State {
   FrontTree tree;
   Entries entries;
   std::vector<Front> fronts;
+  std::vector<std::uint32_t> block; ///< fronts + 1: the first supernode of each
 
   explicit State(CpuLevel level) : cpu(level) {}
 
-  /// Supernodes, each what a front eliminates.
+  /// Supernodes, each a block of what a front eliminates.
   void lay_out() {
     FactorData& d = data;
-    d.super = d.pi = d.px = {0};
-    std::vector<std::int64_t> row(nodes.axes.size()); // of L, by node
-    for (const std::uint32_t node : tree.sequence) {
-      row[node] = static_cast<std::int64_t>(d.permutation.size());
+    for (const std::uint32_t node : tree.sequence)
       for (std::uint32_t a = 0; a < nodes.axes[node]; ++a)
         d.permutation.push_back(nodes.first_row[node] + a);
-    }
     d.order = static_cast<std::int64_t>(d.permutation.size());
-    d.max_row_size = 1;
-    const auto add = [&](std::span<const std::uint32_t> some) {
-      for (const std::uint32_t node : some)
-        for (std::uint32_t a = 0; a < nodes.axes[node]; ++a)
-          d.s.push_back(row[node] + a);
-    };
-    for (std::size_t f = 0; f < tree.fronts(); ++f) {
-      const Front& front = fronts[f];
-      add(tree.eliminated(f));
-      add(tree.boundary_of(f));
-      d.super.push_back(d.super.back() + static_cast<std::int64_t>(front.columns));
-      d.pi.push_back(static_cast<std::int64_t>(d.s.size()));
-      d.px.push_back(d.px.back() + static_cast<std::int64_t>(front.rows * front.columns));
-      for (std::size_t c = 0; c < front.columns; ++c)
-        d.column_count.push_back(static_cast<std::int64_t>(front.rows - c));
-      const auto below = static_cast<std::int64_t>(front.below());
-      d.max_row_size = std::max(d.max_row_size, below);
-      d.max_column_size = std::max(d.max_column_size, below * below);
+    FrontBlocks blocks = front_blocks(tree, nodes.axes, fronts);
+    d.px = {0};
+    for (std::size_t k = 0; k + 1 < blocks.super.size(); ++k) {
+      const std::int64_t columns = blocks.super[k + 1] - blocks.super[k];
+      const std::int64_t rows = blocks.pi[k + 1] - blocks.pi[k];
+      d.px.push_back(d.px.back() + rows * columns);
+      for (std::int64_t c = 0; c < columns; ++c)
+        d.column_count.push_back(rows - c);
     }
+    d.super = std::move(blocks.super);
+    d.pi = std::move(blocks.pi);
+    d.s = std::move(blocks.s);
+    block = std::move(blocks.first);
+    d.max_row_size = static_cast<std::int64_t>(blocks.longest);
+    d.max_column_size = d.max_row_size * d.max_row_size;
+  }
+
+  std::size_t first_column(std::size_t front) const {
+    return static_cast<std::size_t>(data.super[block[front]]);
   }
 
   void analyse(const StiffnessMatrix& matrix) {
@@ -241,7 +238,7 @@ struct Factor::State {
       for (std::size_t k = entries.start[node]; k < entries.start[node + std::size_t{1}]; ++k) {
         const auto [at, c] = entries.places[k];
         const std::uint32_t i = row(static_cast<std::size_t>(matrix.row[at])), j = row(c);
-        to.l[std::min(i, j) * to.rows + std::max(i, j)] += matrix.value[at];
+        to.at(std::max(i, j), std::min(i, j)) += matrix.value[at];
       }
   }
 
@@ -255,7 +252,7 @@ struct Factor::State {
       made = std::make_unique_for_overwrite<double[]>(size);
     x = {made.get(), size};
     for (std::size_t f = 0; f < fronts.size(); ++f)
-      fronts[f].l = made.get() + data.px[f];
+      fronts[f].l = made.get() + data.px[block[f]];
     try {
       (void)gewebe::factorise({.tree = tree,
                                .axes = nodes.axes,
@@ -263,8 +260,8 @@ struct Factor::State {
                                .assemble = [&](const FrontAssembly& to) { assemble(matrix, to); }},
                               {}, context);
     } catch (const PivotTooSmall& pivot) {
-      throw NotPositiveDefinite(static_cast<std::size_t>(
-          data.permutation[static_cast<std::size_t>(data.super[pivot.front]) + pivot.column]));
+      throw NotPositiveDefinite(
+          static_cast<std::size_t>(data.permutation[first_column(pivot.front) + pivot.column]));
     }
   }
 };

@@ -147,7 +147,7 @@ inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_
   const Square s(count, scratch.square);
   std::fill_n(s.at, s.columns * s.step + s.columns, 0.0);
   for (std::size_t c = 0; c < count; ++c)
-    std::copy_n(f.l + (begin + c) * f.rows + begin + c, count - c, s.column(c) + c);
+    std::copy_n(f.block(begin) + c * (f.rows - begin) + c, count - c, s.column(c) + c);
   for (std::size_t group = 0; group < count; group += tile_columns) {
     const std::size_t own = std::min(tile_columns, count - group);
     std::size_t row = group;
@@ -167,7 +167,7 @@ inline std::size_t eliminate(const FrontArrays& f, std::size_t begin, std::size_
       square_solve<1>(s, group, row);
   }
   for (std::size_t c = 0; c < count; ++c)
-    std::copy_n(s.column(c) + c, count - c, f.l + (begin + c) * f.rows + begin + c);
+    std::copy_n(s.column(c) + c, count - c, f.block(begin) + c * (f.rows - begin) + c);
   return count;
 }
 
@@ -194,9 +194,11 @@ struct Strips {
 inline void solve_strip(const FrontArrays& f, std::size_t begin, std::size_t count,
                         const Square& square, double* packed, std::ptrdiff_t start,
                         std::size_t missing) {
+  const std::size_t step = f.rows - begin;
+  double* const block = f.block(begin) + (start - static_cast<std::ptrdiff_t>(begin));
   const auto copy = [&](std::size_t from, std::size_t to, bool back) {
     for (std::size_t c = from; c < to; ++c) {
-      double* const rows = f.l + (begin + c) * f.rows + start;
+      double* const rows = block + c * step;
       double* const there = packed + c * strip_rows;
       if (back) {
         for (std::size_t r = missing; r < strip_rows; ++r)

@@ -3,26 +3,27 @@
 // level. Every level gives the same bits, whatever the blocks: each entry loses its products one by
 // one in the order of elimination, each rounded once (fused).
 
+#include "solve/multifrontal.h"
+
 #include <cstddef>
 
 namespace gewebe {
 
-/// Columns that are eliminated together, at most.
-inline constexpr std::size_t front_block = 128;
-
-/// A front by columns: `columns` of `rows` numbers, and the lower triangle of the update matrix of
-/// `below` = rows - columns, packed: a column begins at its diagonal, right behind the one before.
-/// What is above the diagonal in `l` is not written to.
+/// A front by columns: `columns` of L (see front_offset), and the lower triangle of the update
+/// matrix of `below` = rows - columns, packed: a column begins at its diagonal, right behind the
+/// one before. What is above the diagonal in `l` is not written to.
 struct FrontArrays {
   std::size_t rows = 0, columns = 0;
   double* l = nullptr;
   double* update = nullptr;
 
   std::size_t below() const { return rows - columns; }
+  /// The block of L that begins with this column, by columns of `rows` - begin numbers.
+  double* block(std::size_t begin) const { return l + front_offset(rows, begin); }
   /// Column c such that [r] is its entry in row r of the front, r >= c.
   double* column(std::size_t c) const {
     if (c < columns)
-      return l + c * rows;
+      return front_column(l, rows, c);
     // The packed column k begins k (k - 1) / 2 numbers before where that of a square would.
     const std::size_t k = c - columns;
     return update + (k * below() - k * (k + 1) / 2) - columns;
@@ -39,9 +40,9 @@ struct FrontScratch {
 struct FrontKernel {
   std::size_t strip; ///< rows of one
   std::size_t (*square_size)(std::size_t count);
-  /// Cholesky of the square of columns [begin, begin + count), count <= front_block, on the
-  /// diagonal. Pivots must exceed `least[column]`. \return how many columns were eliminated: fewer
-  /// than count, and nothing is to be used, where a pivot did not
+  /// Cholesky of the square of columns [begin, begin + count), a block of L, on the diagonal.
+  /// Pivots must exceed `least[column]`. \return how many columns were eliminated: fewer than
+  /// count, and nothing is to be used, where a pivot did not
   std::size_t (*eliminate)(const FrontArrays& front, std::size_t begin, std::size_t count,
                            const double* min_pivot, const FrontScratch& scratch);
   /// L of the rows below it, strips [first, last) of strips(rows - begin - count).

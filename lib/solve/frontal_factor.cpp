@@ -69,12 +69,12 @@ struct FrontalFactor::State {
   std::vector<std::uint8_t> fixed;
 
   // L as the solver wants it.
-  std::vector<std::int64_t> super, pi, s;
-  std::vector<const double*> blocks;
+  FrontBlocks blocks;
+  std::vector<const double*> values; // of each block
   std::vector<std::uint32_t> axis_of_row;
   std::vector<std::uint32_t> row_of_node; // the first of its axes, or none
   std::vector<std::uint32_t> to_root;     // rows eliminated by a front and all above it
-  std::size_t longest = 1, entries = 0;
+  std::size_t entries = 0;
   double weakest = 1;
   std::size_t weakest_row = 0;
 
@@ -102,8 +102,7 @@ struct FrontalFactor::State {
         const FreeAxes& other = free_axes(model, end);
         for (std::size_t a = 0; a < free.count; ++a)
           for (std::size_t b = 0; b < other.count; ++b)
-            to.l[(to.row[node] + a) * to.rows + to.row[end] + b] -=
-                block[entry[free.axis[a]][other.axis[b]]];
+            to.at(to.row[end] + b, to.row[node] + a) -= block[entry[free.axis[a]][other.axis[b]]];
       }
     }
     to.min_pivot.clear();
@@ -113,8 +112,7 @@ struct FrontalFactor::State {
       const SymmetricBlock& diagonal = diagonals[at - first];
       for (std::size_t a = 0; a < free.count; ++a) {
         for (std::size_t b = a; b < free.count; ++b)
-          to.l[(to.row[node] + a) * to.rows + to.row[node] + b] +=
-              diagonal[entry[free.axis[a]][free.axis[b]]];
+          to.at(to.row[node] + b, to.row[node] + a) += diagonal[entry[free.axis[a]][free.axis[b]]];
         to.min_pivot.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
       }
     }
@@ -138,7 +136,7 @@ struct FrontalFactor::State {
                    "the factor of the stiffness matrix");
     memory.resize(tree.fronts());
     for (std::size_t f = 0; f < tree.fronts(); ++f)
-      fronts[f].l = memory[f].reserve(fronts[f].rows * fronts[f].columns, true);
+      fronts[f].l = memory[f].reserve(fronts[f].entries(), true);
     try {
       work = gewebe::factorise({.tree = tree,
                                 .axes = graph.axes,
@@ -153,34 +151,21 @@ struct FrontalFactor::State {
 
   void lay_out(const Model& model) {
     const std::size_t count = tree.fronts();
-    super.assign(1, 0);
-    pi.assign(1, 0);
-    s.clear();
-    blocks.clear();
+    values.clear();
     axis_of_row.clear();
-    longest = 1;
     entries = 0;
     row_of_node.assign(graph.axes.size(), none);
-    std::vector<std::uint32_t>& row = row_of_node;
     for (const std::uint32_t node : tree.sequence) {
-      row[node] = static_cast<std::uint32_t>(axis_of_row.size());
+      row_of_node[node] = static_cast<std::uint32_t>(axis_of_row.size());
       const FreeAxes& free = free_axes(model, node);
       for (std::size_t a = 0; a < free.count; ++a)
         axis_of_row.push_back(3 * node + free.axis[a]);
     }
-    for (std::size_t f = 0; f < count; ++f) {
-      const auto add = [&](std::span<const std::uint32_t> nodes) {
-        for (const std::uint32_t node : nodes)
-          for (std::uint32_t a = 0; a < graph.axes[node]; ++a)
-            s.push_back(row[node] + a);
-      };
-      add(tree.eliminated(f));
-      super.push_back(super.back() + static_cast<std::int64_t>(fronts[f].columns));
-      add(tree.boundary_of(f));
-      pi.push_back(static_cast<std::int64_t>(s.size()));
-      blocks.push_back(fronts[f].l);
-      longest = std::max(longest, fronts[f].below());
-      entries += fronts[f].rows * fronts[f].columns;
+    blocks = front_blocks(tree, graph.axes, fronts);
+    for (const Front& front : fronts) {
+      for (std::size_t c = 0; c < front.columns; c += front_block)
+        values.push_back(front.l + front_offset(front.rows, c));
+      entries += front.entries();
     }
     find_weakest();
     to_root.resize(count);
@@ -190,15 +175,25 @@ struct FrontalFactor::State {
   }
 
   SupernodalArrays arrays() const {
-    return {super.size() - 1, super.data(), pi.data(), nullptr, s.data(), nullptr, blocks.data()};
+    return {blocks.super.size() - 1,
+            blocks.super.data(),
+            blocks.pi.data(),
+            nullptr,
+            blocks.s.data(),
+            nullptr,
+            values.data()};
+  }
+
+  /// The first of the rows of L that a front eliminates.
+  std::size_t first_row(std::size_t front) const {
+    return static_cast<std::size_t>(blocks.super[blocks.first[front]]);
   }
 
   std::uint32_t front_of_node(std::uint32_t node) const {
     if (row_of_node[node] == none)
       return none;
-    const auto above =
-        std::upper_bound(super.begin(), super.end(), static_cast<std::int64_t>(row_of_node[node]));
-    return static_cast<std::uint32_t>(above - super.begin() - 1);
+    const auto above = std::ranges::upper_bound(tree.first, tree.position[node]);
+    return static_cast<std::uint32_t>(above - tree.first.begin() - 1);
   }
 
   void find_weakest() {
@@ -207,7 +202,7 @@ struct FrontalFactor::State {
     for (std::size_t f = 0; f < fronts.size(); ++f)
       if (const double pivot = fronts[f].weakest / max_condition; pivot < weakest) {
         weakest = pivot;
-        weakest_row = static_cast<std::size_t>(super[f]) + fronts[f].weakest_column;
+        weakest_row = first_row(f) + fronts[f].weakest_column;
       }
   }
 
@@ -459,7 +454,7 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
     const std::size_t count = std::min(Factor::max_units, columns - first);
     const std::size_t width = solve_width(count);
     x.assign(order * width, 0.0);
-    work.resize(s.longest * width);
+    work.resize(s.blocks.longest * width);
     double* const from = over_axes.data() + first * all;
     for (std::size_t k = 0; k < order; ++k)
       for (std::size_t j = 0; j < count; ++j)
@@ -480,32 +475,32 @@ FrontalFactor::forward_solves(std::span<const std::uint32_t> nodes) const {
   const State& s = *state_;
   std::vector<ForwardSolve> all(nodes.size());
   std::vector<double> x, work;
-  std::vector<std::uint32_t> fronts;
+  std::vector<std::uint32_t> blocks;
   for (std::size_t first = 0; first < nodes.size(); first += at_once) {
     const std::size_t count = std::min(at_once, nodes.size() - first);
     const std::size_t width = solve_width(3 * count);
-    fronts.clear();
+    blocks.clear();
     x.assign(s.axis_of_row.size() * width, 0.0);
-    work.resize(s.longest * width);
+    work.resize(s.blocks.longest * width);
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
       all[first + k].front = s.front_of_node(node);
       for (std::uint32_t f = all[first + k].front; f != none; f = s.tree.parent[f])
-        fronts.push_back(f);
+        for (std::uint32_t b = s.blocks.first[f]; b < s.blocks.first[f + std::size_t{1}]; ++b)
+          blocks.push_back(b);
       for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
         x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
     }
-    std::sort(fronts.begin(), fronts.end());
-    fronts.erase(std::unique(fronts.begin(), fronts.end()), fronts.end());
+    std::sort(blocks.begin(), blocks.end());
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
-        s.arrays(), fronts, x.data(), width, work.data());
+        s.arrays(), blocks, x.data(), width, work.data());
     for (std::size_t k = 0; k < count; ++k) {
       ForwardSolve& solution = all[first + k];
       if (solution.front != none)
         solution.values.reserve(s.to_root[solution.front]);
       for (std::uint32_t f = solution.front; f != none; f = s.tree.parent[f])
-        for (auto row = static_cast<std::size_t>(s.super[f]);
-             row < static_cast<std::size_t>(s.super[f + std::size_t{1}]); ++row) {
+        for (std::size_t row = s.first_row(f); row < s.first_row(f + std::size_t{1}); ++row) {
           const double* const values = x.data() + row * width + 3 * k;
           solution.values.push_back({values[0], values[1], values[2]});
         }

@@ -178,7 +178,7 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
   front.update = own ? front.kept.reserve(packed_triangle(front.below()), task.keep_updates)
                      : scratch.stacks.push(plan.place[f], front.below());
   const FrontArrays arrays{front.rows, front.columns, front.l, front.update};
-  const std::size_t size = front.rows * front.columns;
+  const std::size_t size = front.entries();
   over(context, size >= worth_threads_entries, size, worth_threads_entries / 4,
        [&](std::size_t first, std::size_t last) {
          std::fill(front.l + first, front.l + last, 0.0);
@@ -194,7 +194,7 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
   eliminate(front, f, arrays, scratch, context);
   front.weakest = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < front.columns; ++c) {
-    const double root = front.l[c * front.rows + c];
+    const double root = arrays.column(c)[c];
     if (const double pivot = root * root / scratch.min_pivot[c]; pivot < front.weakest) {
       front.weakest = pivot;
       front.weakest_column = c;
@@ -215,9 +215,40 @@ std::size_t measure_fronts(const FrontTree& tree, std::span<const std::uint8_t> 
     front.rows = front.columns;
     for (const std::uint32_t node : tree.boundary_of(f))
       front.rows += axes[node];
-    entries += front.rows * front.columns;
+    entries += front.entries();
   }
   return entries;
+}
+
+FrontBlocks front_blocks(const FrontTree& tree, std::span<const std::uint8_t> axes,
+                         std::span<const Front> fronts) {
+  FrontBlocks b;
+  std::vector<std::int64_t> row(axes.size()), rows; // the first one of each node; of a front
+  std::int64_t next = 0;
+  for (const std::uint32_t node : tree.sequence) {
+    row[node] = next;
+    next += axes[node];
+  }
+  for (std::size_t f = 0; f < tree.fronts(); ++f) {
+    rows.clear();
+    const auto add = [&](std::span<const std::uint32_t> nodes) {
+      for (const std::uint32_t node : nodes)
+        for (std::uint8_t a = 0; a < axes[node]; ++a)
+          rows.push_back(row[node] + a);
+    };
+    add(tree.eliminated(f));
+    add(tree.boundary_of(f));
+    const std::size_t columns = fronts[f].columns;
+    for (std::size_t c = 0; c < columns; c += front_block) {
+      const std::size_t count = std::min(front_block, columns - c);
+      b.s.insert(b.s.end(), rows.begin() + static_cast<std::ptrdiff_t>(c), rows.end());
+      b.super.push_back(b.super.back() + static_cast<std::int64_t>(count));
+      b.pi.push_back(static_cast<std::int64_t>(b.s.size()));
+      b.longest = std::max(b.longest, rows.size() - c - count);
+    }
+    b.first.push_back(static_cast<std::uint32_t>(b.super.size() - 1));
+  }
+  return b;
 }
 
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,

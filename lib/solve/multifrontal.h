@@ -32,24 +32,45 @@ private:
   std::size_t capacity_ = 0;
 };
 
+/// Columns that are eliminated together, at most: a block of L.
+inline constexpr std::size_t front_block = 128;
+
+/// Where column c of a front's L begins, at the first row of its block: what is above a block isn't
+/// there, so that little more is than L's own entries. Of the column behind the last one: how many
+/// numbers L has. \pre c <= rows
+constexpr std::size_t front_offset(std::size_t rows, std::size_t c) {
+  const std::size_t first = c / front_block * front_block; // column and row of the block
+  return first * rows - first * (first - front_block) / 2 + (c - first) * (rows - first);
+}
+/// Column c such that [r] is its entry in row r of the front, r >= c.
+inline double* front_column(double* l, std::size_t rows, std::size_t c) {
+  if (c < front_block)
+    return l + c * rows;
+  return l + front_offset(rows, c) - c / front_block * front_block;
+}
+
 struct Front {
   std::size_t rows = 0, columns = 0;
-  double* l = nullptr;      ///< rows x columns, column by column
+  double* l = nullptr;      ///< see front_offset
   double* update = nullptr; ///< what it leaves to its parent: a lower triangle, packed by columns
   FrontMemory kept;         ///< where that is, if it isn't on a stack
   double weakest = std::numeric_limits<double>::infinity(); ///< pivot over what it had to exceed
   std::size_t weakest_column = 0;
 
   std::size_t below() const noexcept { return rows - columns; }
+  std::size_t entries() const noexcept { return front_offset(rows, columns); }
 };
 
 /// What a front's matrix is made of: its part of K is added to `l`, which is 0.
 struct FrontAssembly {
   std::size_t front = 0;
   std::span<const std::uint32_t> row; ///< by node, those of this front: where its rows begin
-  std::size_t rows = 0;               ///< from one column to the next
-  double* l = nullptr;                ///< on and below the diagonal
+  std::size_t rows = 0;               ///< of the front
+  double* l = nullptr;
   std::vector<double>& min_pivot; ///< of each column what its pivot must exceed; 0 if left alone
+
+  /// \pre row >= column
+  double& at(std::size_t r, std::size_t c) const { return front_column(l, rows, c)[r]; }
 };
 
 /// Thrown where a pivot is too small.
@@ -75,6 +96,18 @@ struct FrontalWork {
 /// Sets rows and columns of the fronts. \return the entries of L of all of them, zeros counted
 std::size_t measure_fronts(const FrontTree& tree, std::span<const std::uint8_t> axes,
                            std::span<Front> fronts);
+
+/// The blocks of L of all fronts as supernodes (solve/supernodal_solve_internal.h), one behind the
+/// other.
+struct FrontBlocks {
+  std::vector<std::int64_t> super{0}, pi{0}; ///< where their columns, and rows in s, begin
+  std::vector<std::int64_t> s;               ///< rows of L, which are those of tree.sequence
+  std::vector<std::uint32_t> first{0};       ///< fronts + 1: blocks of each
+  std::size_t longest = 1;                   ///< rows that a block has below its columns
+};
+/// \pre measure_fronts() has measured the fronts
+FrontBlocks front_blocks(const FrontTree& tree, std::span<const std::uint8_t> axes,
+                         std::span<const Front> fronts);
 
 /// Bytes that the update matrices need at once, at most, on so many threads.
 double update_bytes(const FrontTree& tree, std::span<const Front> fronts, bool keep_updates,

@@ -100,11 +100,11 @@ void bench_front(std::size_t eliminated, std::size_t below, double rate) {
   std::vector<Front> fronts(2);
   std::vector<double> l(measure_fronts(tree, axes, fronts));
   fronts[0].l = l.data();
-  fronts[1].l = l.data() + fronts[0].rows * fronts[0].columns;
+  fronts[1].l = l.data() + fronts[0].entries();
   const auto assemble = [&](const FrontAssembly& to) {
     for (std::size_t c = 0; c < fronts[to.front].columns; ++c) {
-      std::fill_n(to.l + c * to.rows + c, to.rows - c, -0.5);
-      to.l[c * to.rows + c] = 2.0 * static_cast<double>(l.size());
+      std::fill_n(&to.at(c, c), to.rows - c, -0.5);
+      to.at(c, c) = 2.0 * static_cast<double>(l.size());
     }
   };
   double one = 0;

@@ -25,7 +25,7 @@ struct MadeFront {
   FrontArrays arrays;
 
   MadeFront(std::size_t columns, std::size_t below)
-      : l(random_vector((columns + below) * columns, 1)),
+      : l(random_vector(front_offset(columns + below, columns), 1)),
         update(random_vector(below * (below + 1) / 2, 2)) {
     arrays = {columns + below, columns, l.data(), update.data()};
     for (std::size_t c = 0; c < columns; ++c)
@@ -100,6 +100,14 @@ TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
   }
 }
 
+/// Columns of all rows, one behind the other: one supernode, however wide.
+std::vector<double> square_columns(const FrontArrays& f) {
+  std::vector<double> l(f.rows * f.columns);
+  for (std::size_t c = 0; c < f.columns; ++c)
+    std::copy_n(f.column(c) + c, f.rows - c, l.data() + c * f.rows + c);
+  return l;
+}
+
 /// Two supernodes, the second of what is below the first.
 struct MadeFactor {
   std::vector<double> first, second;
@@ -110,8 +118,8 @@ struct MadeFactor {
     MadeFront a(columns, below), b(below, 0);
     plainly(a.arrays);
     plainly(b.arrays);
-    first = a.l;
-    second = b.l;
+    first = square_columns(a.arrays);
+    second = square_columns(b.arrays);
     const auto c = static_cast<std::int64_t>(columns), n = static_cast<std::int64_t>(below) + c;
     super = {0, c, n};
     pi = {0, n, 2 * n - c};
