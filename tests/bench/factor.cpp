@@ -11,11 +11,10 @@
 #include "solve/multifrontal.h"
 #include "solve/stiffness.h"
 #include "tests/bench/blas.h"
+#include "tests/bench/cholmod_peer.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/stiffness_models.h"
-
-#include <cholmod.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -79,10 +78,6 @@ double product_rate() {
   return rate;
 }
 
-double operations(double columns, double below) {
-  return columns * columns * columns / 3 + columns * columns * below + columns * below * below;
-}
-
 /// Two fronts, the second as wide as the first is below its columns.
 void bench_front(std::size_t eliminated, std::size_t below, double rate) {
   FrontTree tree;
@@ -131,56 +126,6 @@ void bench_front(std::size_t eliminated, std::size_t below, double rate) {
   }
 }
 
-class Peer {
-public:
-  explicit Peer(const StiffnessMatrix& matrix) {
-    (void)cholmod_l_start(&common_);
-    common_.print = 0;
-    common_.supernodal = CHOLMOD_SUPERNODAL;
-    matrix_ = cholmod_l_allocate_sparse(matrix.order(), matrix.order(), matrix.row.size(), 1, 1, -1,
-                                        CHOLMOD_REAL, &common_);
-    std::memcpy(matrix_->p, matrix.column_start.data(), 8 * matrix.column_start.size());
-    std::memcpy(matrix_->i, matrix.row.data(), 8 * matrix.row.size());
-    std::memcpy(matrix_->x, matrix.value.data(), 8 * matrix.value.size());
-  }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-  ~Peer() {
-    (void)cholmod_l_free_sparse(&matrix_, &common_);
-    (void)cholmod_l_free_factor(&factor_, &common_);
-    (void)cholmod_l_finish(&common_);
-  }
-  void order() {
-    (void)cholmod_l_free_factor(&factor_, &common_);
-    factor_ = cholmod_l_analyze(matrix_, &common_);
-  }
-  void factorise() { (void)cholmod_l_factorize(matrix_, factor_, &common_); }
-  double entries() const { return static_cast<double>(factor_->xsize); }
-
-  void solve(const std::vector<double>& f, std::size_t count) {
-    cholmod_dense* from = cholmod_l_zeros(factor_->n, count, CHOLMOD_REAL, &common_);
-    std::memcpy(from->x, f.data(), 8 * factor_->n * count);
-    cholmod_dense* u = cholmod_l_solve(CHOLMOD_A, factor_, from, &common_);
-    (void)cholmod_l_free_dense(&u, &common_);
-    (void)cholmod_l_free_dense(&from, &common_);
-  }
-
-private:
-  cholmod_common common_{};
-  cholmod_sparse* matrix_ = nullptr;
-  cholmod_factor* factor_ = nullptr;
-};
-
-double all_operations(const Factor& factor) {
-  const FactorView l = factor.view();
-  double all = 0;
-  for (std::size_t f = 0; f + 1 < l.super.size(); ++f) {
-    const auto columns = static_cast<double>(l.super[f + 1] - l.super[f]);
-    all += operations(columns, static_cast<double>(l.pi[f + 1] - l.pi[f]) - columns);
-  }
-  return all;
-}
-
 void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) {
   const std::size_t rows = matrix.order();
   const int runs = rows > 30000 ? 3 : 7;
@@ -199,7 +144,7 @@ void bench_matrix(const char* stage, const StiffnessMatrix& matrix, bool peers) 
         timed([&] { factor->refactor(matrix, with_threads(threads)); }, threads, runs);
     say("factor", "gewebe", 0, threads, times, all / times.fastest * 1e-6, "GFLOP/s");
   }
-  std::optional<Peer> peer;
+  std::optional<CholmodPeer> peer;
   if (peers) {
     peer.emplace(matrix);
     const Times order = timed([&] { peer->order(); }, 1, runs);
@@ -259,7 +204,7 @@ void bench_memory(std::size_t side) {
   const Times times = timed(
       [&] {
         max = peak_memory([&] {
-          Peer peer(matrix);
+          CholmodPeer peer(matrix);
           peer.order();
           peer.factorise();
         });
