@@ -1,0 +1,367 @@
+// Solids in motion: what mechanics says of them (energy, momentum, rest, order), that they find
+// back from any shape, and a measured beam's frequency.
+
+#include "solid/hyperelastic_statics.h"
+#include "solid/solid_motion.h"
+#include "solve/factor.h"
+#include "tests/unit/larger.h"
+#include "tests/unit/solid_bodies.h"
+#include "tet_fixtures.h"
+#include "tetrahedra/order.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using Numbers = std::vector<double>;
+
+struct Kind {
+  SolidLaw law;
+  bool quadratic;
+};
+std::string name(const Kind& kind) {
+  return std::string(kind.law == SolidLaw::corotational ? "corotational" : "neo_hookean") +
+         (kind.quadratic ? "_quadratic" : "_linear");
+}
+
+class SolidMotionOf : public testing::TestWithParam<Kind> {
+protected:
+  static TetMesh mesh(TetMesh of = test::box_tetrahedra(3, 2, 2, 5)) {
+    if (GetParam().quadratic)
+      make_quadratic(of);
+    return of;
+  }
+  static SolidMotion body(const TetMesh& mesh, SolidMotionOptions options = {}) {
+    options.law = GetParam().law;
+    return {mesh, materials(), options};
+  }
+  static std::vector<SolidMaterial> materials() { return {{2e4, 0.45, 1e-3}}; }
+};
+
+Numbers random_numbers(std::size_t count, double by, std::mt19937& random) {
+  std::uniform_real_distribution<double> value(-by, by);
+  Numbers numbers(count);
+  for (double& n : numbers)
+    n = value(random);
+  return numbers;
+}
+
+std::vector<std::uint8_t> held_end(const TetMesh& mesh) {
+  std::vector<std::uint8_t> held;
+  for (const Vec3& p : mesh.points)
+    held.insert(held.end(), 3, p.x == 0 ? 1 : 0);
+  return held;
+}
+
+double energy(const SolidMotion& body) {
+  return body.kinetic_energy() + body.potential_energy();
+}
+
+double difference(const Numbers& a, const Numbers& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k)
+    most = test::larger(most, std::abs(a[k] - b[k]));
+  return most;
+}
+double largest(const Numbers& a) {
+  return difference(a, Numbers(a.size()));
+}
+
+std::array<Vec3, 2> momentum(const SolidMotion& body) {
+  std::array<Vec3, 2> sum{};
+  for (std::size_t i = 0; i < body.masses().size(); ++i) {
+    const auto x = body.places().subspan(3 * i, 3), v = body.velocity().subspan(3 * i, 3);
+    const Vec3 p = body.masses()[i] * Vec3{v[0], v[1], v[2]};
+    sum[0] += p;
+    sum[1] += cross({x[0], x[1], x[2]}, p);
+  }
+  return sum;
+}
+
+TEST_P(SolidMotionOf, EnergyNeverGrowsWithoutWork) {
+  const bool slow = GetParam().law != SolidLaw::corotational && GetParam().quadratic;
+  const TetMesh m = mesh(slow ? test::box_tetrahedra(1, 1, 1, 1) : test::distorted_box());
+  std::mt19937 random(1);
+  for (const bool held : {false, true})
+    for (const double h : {1e-5, 1e-3, 1.0 / 60, 0.1, 1.0}) {
+      SolidMotionOptions options;
+      options.max_rounds = 1 + static_cast<int>(random() % 4); // unfinished steps as well
+      options.damping = random() % 2 == 0 ? 0 : 1e-3;
+      options.drag = random() % 2 == 0 ? 0 : 2;
+      SolidMotion moving = body(m, options);
+      const std::size_t axes = 3 * m.points.size();
+      if (held)
+        moving.hold(held_end(m));
+      Numbers load = random_numbers(axes, 50, random);
+      if (!held) // a free one would fall and gain all that the load has
+        load.assign(axes, 0);
+      moving.set_load(load);
+      Numbers u = random_numbers(axes, 0.1, random), v = random_numbers(axes, 300, random);
+      for (std::size_t axis = 0; held && axis < axes; ++axis)
+        if (held_end(m)[axis] != 0)
+          u[axis] = v[axis] = 0;
+      moving.set_state(u, v);
+      double before = energy(moving);
+      const double scale = std::abs(before) + moving.kinetic_energy() + moving.elastic_energy();
+      for (int n = 0; n < (slow ? 3 : GetParam().law == SolidLaw::corotational ? 60 : 8); ++n) {
+        (void)moving.step(h, {});
+        const double after = energy(moving);
+        ASSERT_LE(after, before + 1e-10 * scale) << "step " << n << " of " << h;
+        before = after;
+      }
+    }
+}
+
+TEST_P(SolidMotionOf, FreeBodiesKeepTheirMomentum) {
+  const TetMesh m = mesh();
+  const std::size_t axes = 3 * m.points.size();
+  std::array<double, 2> turned{};
+  for (const int half : {0, 1}) {
+    const int steps = half == 0 ? 10 : 20;
+    SolidMotionOptions options;
+    options.tolerance = 1e-6;
+    options.max_rounds = 60;
+    SolidMotion moving = body(m, options);
+    std::mt19937 random(2);
+    Numbers v = random_numbers(axes, 1, random);
+    for (std::size_t i = 0; i < m.points.size(); ++i) { // and a spin
+      const Vec3 spin = cross({3, 5, 8}, m.points[i]);
+      for (int k = 0; k < 3; ++k)
+        v[3 * i + static_cast<std::size_t>(k)] += spin[k];
+    }
+    moving.set_state(Numbers(axes), v);
+    const auto before = momentum(moving);
+    for (int n = 0; n < steps; ++n)
+      (void)moving.step(0.02 / steps, {});
+    const auto after = momentum(moving);
+    EXPECT_LT(norm(after[0] - before[0]), 1e-11 * norm(before[0]));
+    turned[static_cast<std::size_t>(half)] = norm(after[1] - before[1]) / norm(before[1]);
+  }
+  EXPECT_LT(turned[0], 0.05);
+  EXPECT_NEAR(turned[0] / turned[1], 2, 0.5);
+}
+
+TEST_P(SolidMotionOf, ALoadGivesItsMomentum) {
+  const TetMesh m = mesh();
+  SolidMotion moving = body(m);
+  Numbers load(3 * m.points.size());
+  load[1] = 1000;
+  moving.set_load(load);
+  for (int n = 0; n < 50; ++n)
+    (void)moving.step(1e-3, {});
+  EXPECT_NEAR(momentum(moving)[0].y, 50, 1e-9);
+  EXPECT_NEAR(momentum(moving)[0].x, 0, 1e-9);
+}
+
+TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
+  const TetMesh m = mesh(test::box_tetrahedra(5, 2, 2, 5));
+  const std::vector<SolidElement> elements = solid_elements(m, materials());
+  const std::vector<std::uint8_t> held = held_end(m);
+  SolidMotionOptions options;
+  options.tolerance = 1e-6;
+  options.max_rounds = 100;
+  SolidMotion moving = body(m, options);
+  moving.hold(held);
+  const auto rest = [&](const Numbers& load) {
+    moving.set_load(load);
+    for (int n = 0; n < 30; ++n)
+      (void)moving.step(1, {});
+    return moving.displacement();
+  };
+  if (GetParam().law == SolidLaw::stable_neo_hookean) {
+    SolidVector load;
+    load.axes = Numbers(held.size());
+    for (std::size_t axis = 2; axis < load.axes.size(); axis += 3)
+      load.axes[axis] = -9810 * moving.masses()[axis / 3];
+    const Numbers u = rest(load.axes),
+                  expected = hyperelastic_statics(m, elements, held, {}, load).displacement.axes;
+    EXPECT_GT(largest(expected), 0.5);
+    EXPECT_LT(difference(u, expected), 1e-5 * largest(expected));
+  }
+  Numbers small(held.size());
+  for (std::size_t axis = 2; axis < small.size(); axis += 3)
+    small[axis] = -1e-3 * moving.masses()[axis / 3];
+  const StiffnessMatrix k = solid_stiffness(m, elements, held);
+  Numbers expected(held.size());
+  solve_axes(k, Factor(k, {}), small, expected);
+  EXPECT_LT(difference(rest(small), expected), 1e-5 * largest(expected));
+  // And what holds it carries the load.
+  double carried = 0, weight = 0;
+  for (std::size_t axis = 2; axis < small.size(); axis += 3) {
+    carried += moving.reactions()[axis];
+    weight += held[axis] == 0 ? small[axis] : 0;
+    if (held[axis] != 0)
+      weight += small[axis];
+  }
+  EXPECT_NEAR(carried, -weight, 1e-5 * std::abs(weight));
+}
+
+TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
+  const TetMesh m = mesh();
+  const auto end = [&](int steps, bool reference, double tolerance) {
+    SolidMotionOptions options;
+    options.reference = reference;
+    options.tolerance = tolerance;
+    options.max_rounds = 60;
+    options.damping = 1e-4;
+    SolidMotion moving = body(m, options);
+    moving.hold(held_end(m));
+    Numbers load(3 * m.points.size());
+    for (std::size_t axis = 2; axis < load.size(); axis += 3)
+      load[axis] = -30000 * moving.masses()[axis / 3];
+    moving.set_load(load);
+    for (int n = 0; n < steps; ++n)
+      (void)moving.step(0.004 / steps, {});
+    return moving.displacement();
+  };
+  const Numbers a = end(8, false, 1e-7), b = end(16, false, 1e-7), c = end(32, false, 1e-7);
+  EXPECT_NEAR(difference(a, b) / difference(b, c), 2, 0.3);
+  EXPECT_LT(difference(a, end(8, true, 0.1)), 1e-5 * largest(a));
+  EXPECT_LT(difference(a, end(8, false, SolidMotionOptions().tolerance)), 0.02 * largest(a));
+}
+
+/// Volumes of tetrahedra at the places.
+int inverted(const TetMesh& mesh, std::span<const double> x) {
+  int count = 0;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    std::array<Vec3, 4> p;
+    for (std::size_t k = 0; k < 4; ++k)
+      p[k] = {x[3 * std::size_t{t[k]}], x[3 * std::size_t{t[k]} + 1], x[3 * std::size_t{t[k]} + 2]};
+    count += tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
+  }
+  return count;
+}
+
+/// Nodes anywhere, elements inside out. Stable Neo-Hookean bodies turn all of them right again,
+/// most corotational ones too (some stay tangled where rotations jump); all lose their energy.
+TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
+  const TetMesh m = mesh(test::box_tetrahedra(2, 1, 1, 5));
+  const std::size_t axes = 3 * m.points.size();
+  std::mt19937 random(7);
+  SolidMotionOptions options;
+  options.max_rounds = 20;
+  const bool corotational = GetParam().law == SolidLaw::corotational;
+  const int states = GetParam().quadratic ? (corotational ? 12 : 1) : 40;
+  int right = 0;
+  for (int n = 0; n < states; ++n) {
+    SolidMotion moving = body(m, options);
+    Numbers u = random_numbers(axes, 5, random);
+    if (n % 3 == 1) // flat
+      for (std::size_t axis = 0; axis < axes; axis += 3)
+        u[axis] = -m.points[axis / 3].x;
+    if (n % 7 == 2) // nearly a point, which itself is in balance
+      for (std::size_t axis = 0; axis < axes; ++axis)
+        u[axis] = 1e-4 * u[axis] - m.points[axis / 3][static_cast<int>(axis % 3)];
+    moving.set_state(u, Numbers(axes));
+    const double first = moving.elastic_energy();
+    for (int k = 0; k < 60 && !(moving.elastic_energy() <= 1e-10 * first); ++k)
+      (void)moving.step(0.05, {});
+    EXPECT_LT(moving.elastic_energy(), 0.2 * first) << n;
+    right += inverted(m, moving.places()) == 0 ? 1 : 0;
+  }
+  EXPECT_GE(right, corotational ? states * 2 / 3 : states);
+}
+
+TEST_P(SolidMotionOf, SameBytesOnAnyThreadsAndLevel) {
+  const TetMesh m = mesh(test::box_tetrahedra(5, 3, 3, 2));
+  const auto end = [&](int threads, CpuLevel cpu) {
+    Context context;
+    context.threads = threads;
+    context.cpu = cpu;
+    SolidMotionOptions options;
+    options.damping = 1e-3;
+    SolidMotion moving = body(m, options);
+    moving.hold(held_end(m));
+    std::mt19937 random(3);
+    moving.set_load(random_numbers(3 * m.points.size(), 500, random));
+    for (int n = 0; n < 3; ++n)
+      (void)moving.step(1.0 / 60, context);
+    return moving.displacement();
+  };
+  const Numbers one = end(1, CpuLevel::baseline);
+  EXPECT_EQ(one, end(2, best_cpu_level()));
+  EXPECT_EQ(one, end(2, CpuLevel::baseline));
+}
+
+TEST_P(SolidMotionOf, HeldNodesAreMovedAndPullTheRest) {
+  const TetMesh m = mesh();
+  SolidMotionOptions options;
+  options.tolerance = 1e-6;
+  options.max_rounds = 60;
+  SolidMotion moving = body(m, options);
+  const std::vector<std::uint8_t> held = held_end(m);
+  moving.hold(held);
+  Numbers target(held.size());
+  for (int n = 1; n <= 10; ++n) {
+    for (std::size_t axis = 0; axis < held.size(); axis += 3)
+      target[axis] = 0.4 * n;
+    moving.move_held(target);
+    (void)moving.step(0.01, {});
+  }
+  for (int n = 0; n < 60; ++n)
+    (void)moving.step(0.5, {});
+  Numbers expected(held.size());
+  for (std::size_t axis = 0; axis < held.size(); axis += 3)
+    expected[axis] = 4;
+  EXPECT_LT(difference(moving.displacement(), expected), 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, SolidMotionOf,
+                         testing::Values(Kind{SolidLaw::corotational, false},
+                                         Kind{SolidLaw::corotational, true},
+                                         Kind{SolidLaw::stable_neo_hookean, false},
+                                         Kind{SolidLaw::stable_neo_hookean, true}),
+                         [](const auto& of) { return name(of.param); });
+
+/// Swings of the free end about its rest: the time between the first and the last crossing.
+TEST(SolidMotion, ASiliconeBeamHasItsMeasuredFrequency) {
+  const test::SolidCase beam = test::silicone_beam(3, true);
+  SolidMotionOptions options;
+  options.damping = damping_per_stiffness(0.02, 7.76);
+  SolidMotion moving(beam.solid.mesh, beam.solid.materials, options);
+  moving.hold(beam.solid.fixed);
+  moving.set_load(beam.load);
+  const std::size_t node = beam.solid.node_at({100, 0, 30});
+  const double h = 1.0 / 400;
+  Numbers height;
+  for (int n = 0; n < 160; ++n) {
+    (void)moving.step(h, {});
+    height.push_back(moving.places()[3 * node + 2] - 30);
+  }
+  const double middle = -6.5;
+  Numbers crossings;
+  for (std::size_t n = 1; n < height.size(); ++n)
+    if ((height[n] < middle) != (height[n - 1] < middle))
+      crossings.push_back(
+          h * (static_cast<double>(n) - (height[n] - middle) / (height[n] - height[n - 1])));
+  ASSERT_GE(crossings.size(), 4U);
+  const double frequency =
+      static_cast<double>(crossings.size() - 1) / (2 * (crossings.back() - crossings.front()));
+  EXPECT_NEAR(frequency, 7.76, 0.05 * 7.76);
+}
+
+TEST(SolidMotion, RefusesWhatItCantDo) {
+  TetMesh m = test::box_tetrahedra(1, 1, 1);
+  const std::vector<SolidMaterial> materials{{2e4, 0.45, 1e-3}};
+  SolidMotionOptions options;
+  options.damping = std::nan("");
+  EXPECT_THROW(SolidMotion(m, materials, options), Error);
+  options.damping = 0;
+  options.tolerance = 0;
+  EXPECT_THROW(SolidMotion(m, materials, options), Error);
+  m.points.push_back({9, 9, 9});
+  EXPECT_THROW(SolidMotion(m, materials, {}), Error);
+}
+
+} // namespace
+} // namespace gewebe
