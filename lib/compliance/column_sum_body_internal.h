@@ -3,13 +3,14 @@
 
 #include "compliance/column_sum.h"
 
+#include <cstring>
+#include <immintrin.h>
+
 namespace gewebe {
 namespace {
 
 using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
 using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
-using FourShort = std::int16_t __attribute__((vector_size(8), aligned(2), may_alias));
-using FourByte = std::int8_t __attribute__((vector_size(4), aligned(1), may_alias));
 
 inline const Four& four(const double* at) {
   return *reinterpret_cast<const Four*>(at);
@@ -24,11 +25,37 @@ inline void load(const double* at, Four& to) {
 inline void load(const float* at, Four& to) {
   to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
 }
+
+// Small integers take intrinsics: compilers widen them one by one.
+inline void widen(__m128i whole, Four& to) { // four of 32 bits
+#ifdef __AVX2__
+  to = reinterpret_cast<Four>(_mm256_cvtepi32_pd(whole));
+#else
+  const __m128d low = _mm_cvtepi32_pd(whole), high = _mm_cvtepi32_pd(_mm_srli_si128(whole, 8));
+  std::memcpy(&to, &low, sizeof low);
+  std::memcpy(reinterpret_cast<char*>(&to) + sizeof low, &high, sizeof high);
+#endif
+}
 inline void load(const std::int16_t* at, Four& to) {
-  to = __builtin_convertvector(*reinterpret_cast<const FourShort*>(at), Four);
+  std::int64_t four = 0;
+  std::memcpy(&four, at, sizeof four);
+  const __m128i packed = _mm_cvtsi64_si128(four);
+#ifdef __AVX2__
+  widen(_mm_cvtepi16_epi32(packed), to);
+#else
+  widen(_mm_srai_epi32(_mm_unpacklo_epi16(packed, packed), 16), to);
+#endif
 }
 inline void load(const std::int8_t* at, Four& to) {
-  to = __builtin_convertvector(*reinterpret_cast<const FourByte*>(at), Four);
+  std::int32_t four = 0;
+  std::memcpy(&four, at, sizeof four);
+  const __m128i packed = _mm_cvtsi32_si128(four);
+#ifdef __AVX2__
+  widen(_mm_cvtepi8_epi32(packed), to);
+#else
+  const __m128i twice = _mm_unpacklo_epi8(packed, packed);
+  widen(_mm_srai_epi32(_mm_unpacklo_epi16(twice, twice), 24), to);
+#endif
 }
 
 template <int Width, class Entry>

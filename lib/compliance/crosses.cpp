@@ -239,6 +239,19 @@ void add_triangle_of(const CrossView& b, const T* from, const double* scale, std
     }
 }
 
+/// In four lanes, as product().
+template <class T>
+double product_of(const T* from, std::span<const CrossLoad> x) {
+  std::array<double, 4> lane{};
+  std::size_t k = 0;
+  for (; k + 4 <= x.size(); k += 4)
+    for (std::size_t l = 0; l < 4; ++l)
+      lane[l] += static_cast<double>(from[x[k + l].at]) * x[k + l].value;
+  for (; k < x.size(); ++k)
+    lane[0] += static_cast<double>(from[x[k].at]) * x[k].value;
+  return (lane[0] + lane[2]) + (lane[1] + lane[3]);
+}
+
 template <class T>
 void add_product_of(const CrossView& b, const T* from, const double* scale, std::size_t count,
                     bool transposed, std::span<const CrossLoad> x, CpuLevel cpu,
@@ -254,11 +267,8 @@ void add_product_of(const CrossView& b, const T* from, const double* scale, std:
     const std::size_t some = std::min(at_once, count - done);
     for (std::size_t k = 0; k < some; ++k) {
       const T* const cross = from + (done + k) * stride;
-      double sum = 0;
-      for (const CrossLoad& load : x)
-        sum += static_cast<double>(cross[input + load.at]) * load.value;
       column[k] = cross + output;
-      factor[k] = scale[done + k] * sum;
+      factor[k] = scale[done + k] * product_of(cross + input, x);
     }
     column_sum<T>(cpu)(column.data(), factor.data(), some, y.data(), 0, y.size());
   }

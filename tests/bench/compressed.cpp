@@ -1,12 +1,12 @@
 // Compressed columns of elastic solids beside plain ones: size, error, the time to make them, and
 // shapes under forces on a patch, over the number of surface nodes. Balls of tetrahedra, held at
 // one end; with a mesh of tetrahedra as argument that one alone. An argument that is a number is
-// the bound, in place of 1e-3, 1e-4, 1e-5.
+// the cell of a ball of radius 5, `all` gives columns rows for all nodes instead of the surface's.
 //
-// Writes CSV to standard output: nodes, surface nodes, bound, and by each what its name says:
-// MB as float32, MB compressed (all rows; rows of surface nodes alone), share of float32, largest
-// error over the bound (of 24 nodes' columns), seconds of solves, seconds of compression alone; for
-// each number of forces milliseconds of a sum of plain columns of float32, and of compressed ones.
+// Writes CSV to standard output: nodes, nodes with rows, bound, and by each what its name says:
+// MB as float32, MB compressed, share of float32, largest error over the bound (of 24 nodes'
+// columns), seconds of solves, seconds of compression alone; for each number of forces milliseconds
+// of a sum of plain columns of float32, and of compressed ones: medians of runs that take turns.
 
 #include "base/error.h"
 #include "compliance/column_cache.h"
@@ -82,9 +82,9 @@ Solid solid_of(TetMesh mesh) {
 /// Keeps columns of a few nodes as float32, and as they are.
 class Patch final : public ColumnSource, public ColumnSink {
 public:
-  Patch(std::size_t count, std::vector<std::uint32_t> nodes)
-      : count_(count), nodes_(std::move(nodes)) {}
-  std::size_t node_count() const override { return count_; }
+  Patch(std::size_t rows, std::vector<std::uint32_t> nodes)
+      : rows_(rows), nodes_(std::move(nodes)) {}
+  std::size_t node_count() const override { return rows_; }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
   bool single() const override { return true; }
   void read(std::size_t k, std::span<double> out) const override {
@@ -95,7 +95,7 @@ public:
   }
 
 private:
-  std::size_t count_;
+  std::size_t rows_;
   std::vector<std::uint32_t> nodes_;
   std::vector<std::vector<double>> kept_;
 };
@@ -115,49 +115,35 @@ std::vector<std::uint32_t> patch_of(const Solid& solid, std::size_t count) {
   return nodes;
 }
 
-double surface_bytes(const CompressedLayout& layout) {
-  double sum = 0;
-  std::size_t block = 0;
-  for (std::size_t a = 0; a < layout.with_columns; ++a)
-    for (std::size_t b = a; b < layout.clusters.size(); ++b, ++block)
-      if (b < layout.with_columns) {
-        const double stride =
-            3.0 * static_cast<double>(layout.clusters.nodes(a).size() +
-                                      (a == b ? 0 : layout.clusters.nodes(b).size()));
-        const CrossCount count = layout.count[block];
-        sum += count.wide * (8 + 2 * stride) + count.narrow * (8 + stride);
-      }
-  return sum;
-}
-
-void bench(const Solid& solid, std::initializer_list<double> bounds) {
-  const std::size_t n = solid.mesh.points.size();
+void bench(const Solid& solid, bool all_rows, std::initializer_list<double> bounds) {
+  const std::size_t n = solid.mesh.points.size(), rows = all_rows ? n : solid.surface.size();
+  const auto points = std::span(solid.mesh.points).first(rows);
   double solving = 0;
   const ColumnMaker maker = [&](std::span<const std::uint32_t> nodes, ColumnSink& sink) {
     double residual = 0;
     solving += milliseconds([&] {
-      residual = compliance_columns(solid.matrix, *solid.factor, solid.norm, nodes, {}, sink);
+      residual = compliance_columns(solid.matrix, *solid.factor, solid.norm, nodes, {}, sink, rows);
     });
     return residual;
   };
   const std::initializer_list<std::size_t> patches{1, 3, 10, 30, 100, 300};
   const std::vector<std::uint32_t> largest = patch_of(solid, 300);
-  Patch plain(n, largest);
+  Patch plain(rows, largest);
   (void)maker(largest, plain);
-  ColumnCache cache(n, &plain, {}, 4e9, false);
+  ColumnCache cache(rows, &plain, {}, 4e9, false);
   cache.need(largest);
   for (const double relative : bounds) {
     solving = 0;
     CompressedMade made;
-    const double all = milliseconds(
-        [&] { made = compress_columns(solid.mesh.points, solid.surface, relative, maker, {}); });
+    const double all =
+        milliseconds([&] { made = compress_columns(points, solid.surface, relative, maker, {}); });
     double bytes = 0;
     for (const auto& chunk : made.chunks)
       bytes += static_cast<double>(chunk.size());
-    const double surface = surface_bytes(made.layout), bound = made.layout.bound;
+    const double bound = made.layout.bound;
     const auto columns = compressed_columns(std::move(made), n);
     double worst = 0;
-    std::vector<double> exact(9 * n), read(9 * n);
+    std::vector<double> exact(9 * rows), read(9 * rows);
     for (std::size_t k = 0; k < 24; ++k) {
       plain.read(k * largest.size() / 24, exact);
       const auto at = std::lower_bound(columns->nodes().begin(), columns->nodes().end(),
@@ -167,26 +153,22 @@ void bench(const Solid& solid, std::initializer_list<double> bounds) {
         worst = test::larger(worst, std::abs(read[r] - exact[r]));
       }
     }
-    const double single = 36e-6 * static_cast<double>(solid.surface.size() * n);
-    std::printf("%zu,%zu,%g,%.1f,%.1f,%.1f,%.4f,%.4f,%.3f,%.1f,%.1f", n, solid.surface.size(),
-                relative, single, bytes * 1e-6, surface * 1e-6, bytes * 1e-6 / single,
-                surface / (36.0 * static_cast<double>(solid.surface.size() * solid.surface.size())),
-                worst / bound, solving * 1e-3, (all - solving) * 1e-3);
+    const double single = 36e-6 * static_cast<double>(solid.surface.size() * rows);
+    std::printf("%zu,%zu,%g,%.1f,%.1f,%.4f,%.3f,%.1f,%.1f", n, rows, relative, single, bytes * 1e-6,
+                bytes * 1e-6 / single, worst / bound, solving * 1e-3, (all - solving) * 1e-3);
     for (const std::size_t count : patches) {
       std::vector<NodeVector> forces;
       for (const std::uint32_t node : patch_of(solid, count))
         forces.push_back({node, {1, 2, 3}});
-      std::vector<double> u(3 * n);
+      std::vector<double> u(3 * rows);
       const Context alone = with_threads(1);
-      const auto timed = [](const std::function<void()>& work) {
-        std::vector<double> times;
-        for (int run = 0; run < 9; ++run)
-          times.push_back(processor_milliseconds(work));
-        return times_of(std::move(times));
-      };
-      const Times of_plain = timed([&] { (void)cache.add(forces, 0, alone, u); });
-      const Times of_compressed = timed([&] { columns->add(forces, alone, u); });
-      std::printf(",%.3f,%.3f", of_plain.median, of_compressed.median);
+      std::vector<double> of_plain, of_compressed;
+      for (int run = 0; run < 31; ++run) {
+        of_plain.push_back(processor_milliseconds([&] { (void)cache.add(forces, 0, alone, u); }));
+        of_compressed.push_back(processor_milliseconds([&] { columns->add(forces, alone, u); }));
+      }
+      std::printf(",%.3f,%.3f", times_of(std::move(of_plain)).median,
+                  times_of(std::move(of_compressed)).median);
     }
     std::printf("\n");
     std::fflush(stdout);
@@ -196,17 +178,20 @@ void bench(const Solid& solid, std::initializer_list<double> bounds) {
 } // namespace
 
 int main(int argc, char** argv) {
-  std::printf("nodes,surface,bound,float32_mb,compressed_mb,surface_rows_mb,share,surface_share,"
-              "error_over_bound,solve_s,compress_s");
+  std::printf("nodes,row_nodes,bound,float32_mb,compressed_mb,share,error_over_bound,solve_s,"
+              "compress_s");
   for (const int count : {1, 3, 10, 30, 100, 300})
     std::printf(",plain_%d_ms,compressed_%d_ms", count, count);
   std::printf("\n");
   std::vector<double> cells{1.4, 0.8, 0.55, 0.381};
   std::vector<std::string> meshes;
+  bool all_rows = false;
   for (int i = 1; i < argc; ++i) {
     char* end = nullptr;
     const double cell = std::strtod(argv[i], &end);
-    if (*end != 0)
+    if (argv[i] == std::string("all"))
+      all_rows = true;
+    else if (*end != 0)
       meshes.emplace_back(argv[i]);
     else
       cells = {cell};
@@ -214,8 +199,8 @@ int main(int argc, char** argv) {
   for (const std::string& name : meshes)
     at(name, [&] {
       Input input(name);
-      bench(solid_of(read_tet_mesh(input, {})), {1e-3, 1e-4, 1e-5});
+      bench(solid_of(read_tet_mesh(input, {})), all_rows, {1e-3, 1e-4, 1e-5});
     });
   for (std::size_t k = 0; meshes.empty() && k < cells.size(); ++k)
-    bench(solid_of(ball(cells[k])), {1e-3, 1e-4, 1e-5});
+    bench(solid_of(ball(cells[k])), all_rows, {1e-3, 1e-4, 1e-5});
 }
