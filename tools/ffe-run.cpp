@@ -30,8 +30,9 @@ Kind result_kind(const cli::Run& run) {
   if (run.output() == "-" && run.to().empty())
     return Kind::unknown;
   const Kind kind = output_kind(run.to(), run.output(), Kind::hdf5, result_kinds());
-  if (kind == Kind::hdf5 && run.output() == "-")
-    throw UsageError("h5 can't go to standard output, expected -o FILE");
+  if ((kind == Kind::hdf5 || kind == Kind::vtkhdf) && run.output() == "-")
+    throw UsageError(std::string(kind_name(kind)) +
+                     " can't go to standard output, expected -o FILE");
   return kind;
 }
 

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "formats/results/results_mesh.h"
+#include "formats/results/results_vtkhdf.h"
 #include "formats/results/results_vtu.h"
 #include "formats/store/hdf5_internal.h"
 
@@ -440,7 +441,8 @@ private:
 } // namespace
 
 const std::vector<Kind>& result_kinds() {
-  static const std::vector<Kind> kinds{Kind::hdf5, Kind::ply, Kind::obj, Kind::vtu, Kind::csv};
+  static const std::vector<Kind> kinds{Kind::hdf5, Kind::ply,    Kind::obj,
+                                       Kind::vtu,  Kind::vtkhdf, Kind::csv};
   return kinds;
 }
 
@@ -451,6 +453,8 @@ std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
     return std::make_unique<Hdf5Result>(path, options);
   case Kind::vtu:
     return open_vtu_result(path, options);
+  case Kind::vtkhdf:
+    return open_vtkhdf_result(path, options);
   case Kind::csv:
     return std::make_unique<ForceTable>(path, options);
   default:

@@ -50,11 +50,12 @@ public:
   virtual void commit() = 0;
 };
 
-/// The kinds that there are: h5, ply, obj, vtu, csv.
+/// The kinds that there are: h5, ply, obj, vtu, vtkhdf, csv.
 const std::vector<Kind>& result_kinds();
 
 /// A ply, obj or vtu whose path holds a pattern, %d or %04d, is a series: one file for each frame.
-/// \throw Error, UsageError as Output; h5 needs a file, and writes PATH with suffix .xdmf beside it
+/// \throw Error, UsageError as Output; h5 and vtkhdf need a file, and h5 writes PATH with
+/// suffix .xdmf beside it
 std::unique_ptr<ResultWriter> open_result(Kind kind, const std::string& path,
                                           const Output::Options& options);
 

@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 22> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 23> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -33,6 +33,7 @@ constexpr std::array<std::pair<Kind, std::string_view>, 22> names{{
     {Kind::png, "png"},
     {Kind::ppm, "ppm"},
     {Kind::csv, "csv"},
+    {Kind::vtkhdf, "vtkhdf"},
 }};
 
 /// The suffix of a path that names a kind, though none of ours: a letter, then up to four letters

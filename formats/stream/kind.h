@@ -32,6 +32,7 @@ enum class Kind {
   ppm,
   rgb,
   csv,
+  vtkhdf, ///< VTK's unstructured grids over time, in HDF5
 };
 
 /// The name of `--format` and `--to`: "vdb", "3ds", …

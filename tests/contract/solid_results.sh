@@ -285,3 +285,108 @@ P
   python3 in.py
   rm -f in.py answers ./*.vtu ./*.ela bend.scene
 }
+
+# run.vtkhdf holds what a series of vtu holds: as its page says it lies in HDF5, and as VTK 9.3 or newer reads it.
+test_vtkhdf_holds_the_frames_of_a_series() {
+  need ffe-run exp2ela
+  local python
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  "$python" -c 'import vtk' 2>/dev/null || skip "no VTK for $python"
+  solid_scene
+  exp2ela -q --primitive sphere:16x12 --size 50 --bend --fix 'z<-15' --name ball -o ball.ela
+  printf '%s\n' 'object gel gel.ela method=ffe' 'object ball ball.ela method=ffe' 'displace gel x>39.999 0 0 -4' 'step 1' \
+    'cut ball plane 8 0 0 1 0 0 z>10' 'emit stress gel' 'step 1' 'displace gel x>39.999 0 0 -5' 'step 1' >bend.scene
+  ffe-run -q bend.scene -o run.vtkhdf
+  ffe-run -q -j1 bend.scene -o again.vtkhdf
+  cmp run.vtkhdf again.vtkhdf || fail 'other bytes on another number of threads'
+  ffe-run -q bend.scene -o run_%02d.vtu
+  expect_failure 2 ffe-run ffe-run --to vtkhdf bend.scene
+  cat >grids.py <<'P'
+import numpy, vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+def arrays(grid):
+    cells = grid.GetCells()
+    all = {'points': vtk_to_numpy(grid.GetPoints().GetData()), 'nodes': vtk_to_numpy(cells.GetConnectivityArray()),
+           'ends': vtk_to_numpy(cells.GetOffsetsArray()), 'types': vtk_to_numpy(grid.GetCellTypesArray())}
+    for data in (grid.GetPointData(), grid.GetCellData()):
+        for k in range(data.GetNumberOfArrays()):
+            all[data.GetArrayName(k)] = vtk_to_numpy(data.GetArray(k))
+    return all
+
+def series(frame):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName('run_%02d.vtu' % frame)
+    reader.Update()
+    return arrays(reader.GetOutput())
+
+def compare(get, count):
+    points = set()
+    for frame in range(count):
+        one, other = get(frame), series(frame)
+        assert ('stress' in other) == (frame >= 2), frame
+        for name in set(one) | set(other):
+            if name not in other: # stress was not emitted yet
+                assert frame < 2 and numpy.isnan(one[name]).all(), (frame, name)
+                continue
+            assert numpy.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == 'f'), (frame, name)
+        points.add(len(one['points']))
+    assert len(points) == 2, points # before and behind the cut
+P
+  cat >structure.py <<'P'
+import h5py, sys
+from grids import compare
+
+def read(frame):
+    steps = file['Steps']
+    part = steps['PartOffsets'][frame]
+    assert steps['NumberOfParts'][frame] == 1
+    points, cells, nodes = (file[name][part] for name in ('NumberOfPoints', 'NumberOfCells', 'NumberOfConnectivityIds'))
+    point, cell, node = steps['PointOffsets'][frame], steps['CellOffsets'][frame, 0], steps['ConnectivityIdOffsets'][frame, 0]
+    all = {'points': file['Points'][point:point + points], 'nodes': file['Connectivity'][node:node + nodes],
+           'ends': file['Offsets'][cell + part:cell + part + cells + 1], 'types': file['Types'][cell:cell + cells]}
+    for group, offsets, count in (('PointData', 'PointDataOffsets', points), ('CellData', 'CellDataOffsets', cells)):
+        assert set(file[group]) == set(steps[offsets])
+        for name, values in file[group].items():
+            first = steps[offsets][name][frame]
+            all[name] = values[first:first + count]
+            assert len(all[name]) == count
+    return all
+
+file = h5py.File(sys.argv[1], 'r')['VTKHDF']
+assert bytes(file.attrs['Type']) == b'UnstructuredGrid' and list(file.attrs['Version']) == [2, 0]
+assert file['Steps'].attrs['NSteps'] == 4 and list(file['Steps/Values'])[1:3] == [1, 2]
+assert len(file['NumberOfPoints']) == 2 # grids stand there once
+compare(read, 4)
+P
+  "$python" structure.py run.vtkhdf || fail 'the file holds something else'
+  cp run.vtkhdf spoilt.vtkhdf
+  "$python" -c 'import h5py; h5py.File("spoilt.vtkhdf", "a")["VTKHDF/Steps/PointDataOffsets/displacement"][3] -= 1'
+  ! "$python" structure.py spoilt.vtkhdf 2>/dev/null || fail 'the check sees nothing'
+  cat >in.py <<'P'
+import vtk
+from grids import arrays, compare
+reader = vtk.vtkHDFReader()
+reader.SetFileName('run.vtkhdf')
+reader.UpdateInformation()
+times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+assert len(times) == 4, times
+
+def read(frame):
+    reader.UpdateTimeStep(times[frame])
+    grid = reader.GetOutput()
+    return arrays(grid if grid.IsA('vtkUnstructuredGrid') else grid.GetPartition(0))
+
+compare(read, 4)
+P
+  for python in python3 "$(type -P python3)" ''; do
+    [[ $python ]] || break
+    "$python" -c 'import numpy, vtk; v = vtk.vtkVersion(); assert (v.GetVTKMajorVersion(), v.GetVTKMinorVersion()) >= (9, 3)' 2>/dev/null && break
+  done
+  if [[ $python ]]; then
+    "$python" in.py || fail 'VTK reads something else'
+  else
+    left_out 'VTK reads vtkhdf: no VTK of 9.3 or newer for python3'
+  fi
+  rm -rf ./*.py ./*.vtu ./*.vtkhdf ./*.ela bend.scene __pycache__
+}

@@ -1,0 +1,67 @@
+#pragma once
+// All objects of a frame as one unstructured grid of VTK's, which files of several kinds hold.
+
+#include "base/vec3.h"
+#include "model/model.h"
+#include "solid/stress.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace gewebe::grid {
+
+/// Cells of VTK's types: triangles where there are no tetrahedra.
+enum CellType : std::uint8_t { triangle = 5, tetrahedron = 10, quadratic = 24 };
+
+/// An object as it is now.
+struct Shape {
+  std::vector<Vec3> points; ///< at rest
+  CellType type = triangle;
+  std::vector<std::uint32_t> nodes; ///< of the cells
+  std::vector<std::int32_t> material;
+  std::vector<double> displacement;
+  std::optional<SolidFields> fields;
+
+  std::size_t size() const { return type == triangle ? 3 : type == tetrahedron ? 4 : 10; }
+  std::size_t cells() const { return nodes.size() / size(); }
+};
+
+/// At rest, without fields.
+Shape shape_of(const Model& model);
+
+/// What doesn't change from frame to frame unless a shape is cut.
+struct Joined {
+  std::vector<double> points; ///< at rest
+  std::vector<std::int64_t> nodes, ends;
+  std::vector<std::uint8_t> types;
+  std::vector<std::int32_t> object, material; ///< of the cells
+};
+
+Joined join(const std::vector<Shape>& shapes);
+std::vector<double> displacements(const std::vector<Shape>& shapes);
+
+/// Tensors of solids, or their equivalent stresses.
+struct Field {
+  const char* name;
+  std::vector<SymmetricBlock> SolidFields::*tensors;
+  bool mises, of_cells;
+
+  std::size_t components() const { return mises ? 1 : 6; }
+};
+inline constexpr std::array<Field, 3> node_fields{
+    {{"stress", &SolidFields::node_stress, false, false},
+     {"strain", &SolidFields::node_strain, false, false},
+     {"von_mises", &SolidFields::node_stress, true, false}}};
+inline constexpr std::array<Field, 3> cell_fields{
+    {{"element_stress", &SolidFields::element_stress, false, true},
+     {"element_strain", &SolidFields::element_strain, false, true},
+     {"element_von_mises", &SolidFields::element_stress, true, true}}};
+
+bool have_fields(const std::vector<Shape>& shapes);
+/// Of all nodes or cells, NaN where a shape has none. Tensors in VTK's order: xx yy zz xy yz xz.
+std::vector<double> values_of(const std::vector<Shape>& shapes, const Field& field);
+
+} // namespace gewebe::grid
