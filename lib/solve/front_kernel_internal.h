@@ -3,7 +3,7 @@
 // level. Every level gives the same bits, whatever the blocks: each entry loses its products one by
 // one in the order of elimination, each rounded once (fused).
 
-#include "solve/multifrontal.h"
+#include "solve/front_layout.h"
 
 #include <cstddef>
 
