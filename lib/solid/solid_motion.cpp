@@ -5,6 +5,7 @@
 #include "solid/assembly_internal.h"
 #include "solid/corotational.h"
 #include "solve/factor.h"
+#include "solve/single_factor.h"
 #include "solve/stiffness.h"
 
 #include <Eigen/Cholesky>
@@ -149,6 +150,7 @@ struct SolidMotion::State {
   std::vector<std::uint8_t> factor_held;
   StiffnessMatrix stiffness;
   std::optional<Factor> factor;
+  std::optional<SingleFactor> quick;
   Numbers rotations;
   // The tangent of the reference.
   StiffnessMatrix tangent;
@@ -306,17 +308,18 @@ struct SolidMotion::State {
     found.forces.resize(axes());
     const double energy = potential(found.at, options.damping / o.h, found.forces, context),
                  work = work_of_load(found.at);
-    double inertial = 0;
+    double inertial = 0, forced = 0;
     for (std::size_t axis = 0; axis < axes(); ++axis) {
       const double off = found.at[axis] - o.ahead[axis], mass = masses[axis / 3] * o.inertia;
+      forced += std::abs(found.forces[axis] * found.at[axis]);
       found.forces[axis] = mass * off - found.forces[axis] - load[axis];
       found.gradient[axis] = held[axis] != 0 ? 0 : found.forces[axis];
       if (held[axis] == 0)
         inertial += mass * off * off / 2;
     }
     found.value = energy + inertial - work;
-    found.unsure =
-        unsure_at_rest + 1e-13 * (std::abs(energy) + std::abs(inertial) + std::abs(work));
+    found.unsure = unsure_at_rest + 1e-15 * forced +
+                   1e-13 * (std::abs(energy) + std::abs(inertial) + std::abs(work));
   }
 
   int make_factor(double h, const Context& context) {
@@ -334,6 +337,7 @@ struct SolidMotion::State {
       factor->refactor(a, context);
     else
       factor.emplace(a, context);
+    quick.emplace(*factor);
     factor_step = h;
     factor_held = held;
     return 1;
@@ -355,21 +359,28 @@ struct SolidMotion::State {
           rotations[9 * i + k] = k % 4 == 0 ? 1 : 0;
   }
 
-  /// A⁻¹ in the nodes' frames, in place.
-  void solve_turned(Numbers& v) const {
+  /// A⁻¹ in the nodes' frames, in place, to single precision.
+  void solve_turned(Numbers& v, const Context& context) {
     const std::size_t order = stiffness.order();
-    Numbers rows(order), solved(order), turned(axes());
+    Numbers rows(order), turned(axes());
     for (std::size_t i = 0; i < axes() / 3; ++i) {
       const double *const r = rotations.data() + 9 * i, *const from = v.data() + 3 * i;
       for (std::size_t k = 0; k < 3; ++k)
         turned[3 * i + k] = r[k] * from[0] + r[3 + k] * from[1] + r[6 + k] * from[2];
     }
-    for (std::size_t k = 0; k < order; ++k)
+    double scale = 0; // whatever the numbers are, single precision holds them
+    for (std::size_t k = 0; k < order; ++k) {
       rows[k] = turned[static_cast<std::size_t>(stiffness.axis_of_row[k])];
-    factor->solve(rows, solved);
+      scale = std::max(scale, std::abs(rows[k]));
+    }
+    if (!(scale > 0 && std::isfinite(scale)))
+      return;
+    for (double& value : rows)
+      value /= scale;
+    quick->solve(rows, context);
     std::ranges::fill(turned, 0.0);
     for (std::size_t k = 0; k < order; ++k)
-      turned[static_cast<std::size_t>(stiffness.axis_of_row[k])] = solved[k];
+      turned[static_cast<std::size_t>(stiffness.axis_of_row[k])] = scale * rows[k];
     for (std::size_t i = 0; i < axes() / 3; ++i) {
       const double *const r = rotations.data() + 9 * i, *const from = turned.data() + 3 * i;
       for (std::size_t k = 0; k < 3; ++k)
@@ -477,7 +488,7 @@ struct SolidMotion::State {
         if (options.reference)
           solve_tangent(v);
         else
-          solve_turned(v);
+          solve_turned(v, context);
       });
       ++step.rounds;
       const double slope = product(now.gradient, direction),

@@ -14,12 +14,19 @@
 //
 // The quick way there is a quasi-Newton method with a constant matrix (Liu, Bouaziz, Kavan,
 // Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017):
-// the factor of A = M (1/h² + drag/h) + (1 + damping/h) K at rest, made once for a step's length
-// and held axes, in frames that turn with each node (Müller, Dorsey, McMillan, Jagnow, Cutler,
-// Stable real-time deformations, 2002), and L-BFGS of the step's own rounds on top. The factor is
-// of all three axes: one by components (n × n, projective dynamics) needs a ninth of the memory but
-// does not bend: 4 rounds with it left a swinging beam 60 % wrong where 2 with this one left 9 %.
-// The reference way has a factor of the tangent where the body is, anew as it moves.
+// the factor of A = M (1/h² + drag/h) + (1 + damping/h) K at rest (solve/single_factor.h), made
+// once for a step's length and held axes, in frames that turn with each node (Müller, Dorsey,
+// McMillan, Jagnow, Cutler, Stable real-time deformations, 2002), and L-BFGS of the step's own
+// rounds on top. The factor is of all three axes: one by components (n × n, as projective dynamics
+// has) is a ninth of the size but knows no bending. Errors of a step of 1/60 s against the
+// converged one, over its displacement, a beam 100 × 25 × 25 mm of 52,728 tetrahedra, held at an
+// end, falling under its weight, nu = 0.45, E = 50 kPa: 4 rounds by components 100 % on average
+// (the error of earlier steps counts), 2 rounds with this factor 9 %; with E = 5 kPa 0.6 %. With
+// the default tolerance, about 3 rounds, it is below 1 %. The reference way has a factor of the
+// tangent where the body is, anew as it moves.
+//
+// From scrambled shapes the elements of stable Neo-Hookean bodies turn right again; corotational
+// ones may stay tangled where rotations of elements jump, and either may stay wound up.
 //
 // Damping is Rayleigh's: `drag` (1/s) by masses, `damping` (s) by the stiffness, but in the
 // elements' own frames, so that rotations aren't slowed down.
@@ -45,7 +52,7 @@ struct SolidMotionOptions {
   double drag = 0;    ///< per mass, 1/s
   double damping = 0; ///< per stiffness, s
   /// A round whose change is below this part of the step's whole displacement is the last one.
-  double tolerance = 0.03;
+  double tolerance = 0.02;
   int max_rounds = 8;     ///< of the quick way
   bool reference = false; ///< Newton's method until rounding; no limit of time
 };

@@ -1,0 +1,61 @@
+// The factor in single precision against the factor.
+
+#include "solid/assembly.h"
+#include "solve/factor.h"
+#include "solve/single_factor.h"
+#include "tests/unit/larger.h"
+#include "tet_fixtures.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+TEST(SingleFactor, SolvesAsTheFactorDoesWithTheSameBytesEverywhere) {
+  for (const unsigned n : {1U, 4U, 9U}) {
+    const TetMesh mesh = test::box_tetrahedra(n, n, n + 3, 2);
+    const std::vector<SolidElement> elements =
+        solid_elements(mesh, std::vector<SolidMaterial>{{2500, 0.3, 1e-3}});
+    std::vector<std::uint8_t> fixed(3 * mesh.points.size());
+    fixed[0] = fixed[1] = fixed[2] = fixed[5] = 1;
+    StiffnessMatrix k = solid_stiffness(mesh, elements, fixed);
+    for (std::size_t c = 0; c < k.order(); ++c)
+      k.value[static_cast<std::size_t>(k.column_start[c])] += 3000;
+    const Factor factor(k, {});
+    std::mt19937 random(n);
+    std::uniform_real_distribution<double> value(-1, 1);
+    std::vector<double> f(k.order()), exact(k.order());
+    for (double& x : f)
+      x = value(random);
+    factor.solve(f, exact);
+    const auto solve = [&](int threads, CpuLevel cpu) {
+      Context context;
+      context.threads = threads;
+      context.cpu = cpu;
+      SingleFactor single(factor);
+      std::vector<double> x = f;
+      single.solve(x, context);
+      x = f; // again, for nothing of the first time may be left
+      single.solve(x, context);
+      return x;
+    };
+    const std::vector<double> x = solve(1, CpuLevel::baseline);
+    double off = 0, whole = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      off = test::larger(off, std::abs(x[i] - exact[i]));
+      whole = test::larger(whole, std::abs(exact[i]));
+    }
+    EXPECT_LT(off, 1e-5 * whole);
+    EXPECT_EQ(x, solve(2, CpuLevel::baseline));
+    EXPECT_EQ(x, solve(1, best_cpu_level()));
+    EXPECT_EQ(x, solve(2, best_cpu_level()));
+  }
+}
+
+} // namespace
+} // namespace gewebe
