@@ -14,6 +14,7 @@ struct ObjectCommand {
   std::string name, model, store; ///< files as the scene names them; no store: ""
   Method method = Method::ela;
   bool implicit = false;
+  bool warp = false; ///< large rotations
 };
 /// A change, but for the numbers of what it names, which scene_change() finds.
 struct ChangeCommand {

@@ -127,12 +127,16 @@ What parse_object(Words& in) {
       c.store = word.substr(6);
     else if (word == "integration=implicit" && !c.implicit)
       c.implicit = true;
+    else if (word == "rotation=warp" && !c.warp)
+      c.warp = true;
     else if ((word == "method=ffe" || word == "method=ela") && !method)
       method = word == "method=ffe" ? Method::ffe : Method::ela;
     else
       in.fail(shown(word) + " is no use here");
   }
   c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
+  if (c.warp && c.method == Method::ela)
+    in.fail("rotation=warp with method=ela");
   return c;
 }
 
@@ -393,7 +397,9 @@ struct Verb {
 
 const std::array<Verb, 22>& verbs() {
   static const std::array<Verb, 22> all{{
-      {"object", "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit]",
+      {"object",
+       "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit] "
+       "[rotation=warp]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
       {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},

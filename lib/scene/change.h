@@ -91,6 +91,10 @@ struct SetTwoStep {
   /// In place of `second`: the object as it came with other stiffnesses. It follows cuts.
   std::shared_ptr<const Model> model{};
 };
+/// Large rotations of an elastostatic solid from now on, see statics/warped_statics.h.
+struct SetWarp {
+  std::size_t object = 0;
+};
 struct Emit {
   bool forces = false;      ///< else shapes
   bool instruments = false; ///< rather
@@ -130,7 +134,7 @@ struct Restore {
 };
 using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
                             MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
-                            Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
+                            SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
 /// What a log says of a change; what does not apply stays empty.
 struct ChangeRow {

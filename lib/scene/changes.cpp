@@ -224,6 +224,7 @@ void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
   renew(object);
+  object.warped = nullptr;
   touch(object);
 }
 

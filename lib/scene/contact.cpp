@@ -3,6 +3,7 @@
 #include "base/vector_at.h"
 #include "scene/world_internal.h"
 #include "statics/two_step_contact.h"
+#include "statics/warped_contact.h"
 
 #include <algorithm>
 #include <cmath>
@@ -190,7 +191,7 @@ void follow_instruments(World& w, Object& object) {
   std::vector<double>& shape = object.shown.displacement.write();
   // An object that nothing ever acted on has no shape to find.
   const bool changed = !object.shown.touches.empty() ||
-                       ((object.statics->solver || !object.load->empty()) &&
+                       ((object.statics->made() || !object.load->empty()) &&
                         (!object.shown.valid || object.load->changes_until() > object.shown.time));
   for (std::size_t p = w.now.poses.size() > 1 ? 1 : 0; p < w.now.poses.size(); ++p) {
     std::vector<MovedInstrument> moved;
@@ -213,7 +214,15 @@ void follow_instruments(World& w, Object& object) {
         }
       const bool last = changed && p + 1 == w.now.poses.size() && part == parts;
       const Load& load = *object.shown.load;
-      if (object.stages.options) {
+      if (object.warp) {
+        WarpedYielding turning(
+            object.model(), [&]() -> WarpedStatics& { return warped_of(w, object); }, load,
+            object.contact->touches());
+        object.contact->update(turning, load.displacement, here, shape, last);
+        solved = solved && turning.solved();
+        if (object.statics->warped)
+          object.warped = object.statics->warped->answer();
+      } else if (object.stages.options) {
         TwoStepYielding both(object.model(), stages, load);
         object.contact->update(both, load.displacement, here, shape, last);
         solved = solved && both.solved();

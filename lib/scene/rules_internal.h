@@ -103,6 +103,13 @@ struct Rule<SetTwoStep> : Plain<SetTwoStep> {
   static void log(const World& w, const SetTwoStep& c, ChangeRow& row);
 };
 
+template <>
+struct Rule<SetWarp> : Plain<SetWarp> {
+  static void check(World& w, const SetWarp& c);
+  static void apply(World& w, const SetWarp& c);
+  static void log(const World& w, const SetWarp& c, ChangeRow& row);
+};
+
 // instruments.cpp
 template <>
 struct Rule<SetInstrument> : Plain<SetInstrument> {

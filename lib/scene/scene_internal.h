@@ -8,6 +8,7 @@
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/static_contact.h"
+#include "statics/warped_statics.h"
 
 #include <array>
 #include <cstddef>
@@ -67,11 +68,14 @@ struct Matter {
 struct Statics {
   std::optional<Elastostatic> solver;
   std::optional<TwoStep> two_step;            // over `solver`, made when needed
+  std::optional<WarpedStatics> warped;        // in place of both
   std::shared_ptr<ComplianceSource> prepared; // of the cut model, by cut_source
   std::unique_ptr<CutStiffness> stiffness;    // that made them
   ElastostaticCounts spent;                   // of what was renewed
   int slow = 0;                               // updates in a row that took too long for the rate
   bool ahead = false;                         // it has moved on since the scene was saved
+
+  bool made() const { return solver || warped; }
 };
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.
@@ -160,8 +164,10 @@ struct Object {
   Method method = Method::ela;
   CopyOnWrite<Load> load{};
   Stages stages;
-  std::shared_ptr<Body> body; // of an elastodynamic object
-  std::size_t offset = 0;     // of its nodes in the body
+  bool warp = false;                          // large rotations
+  std::shared_ptr<const WarpedAnswer> warped; // the last one, that the next one starts from
+  std::shared_ptr<Body> body;                 // of an elastodynamic object
+  std::size_t offset = 0;                     // of its nodes in the body
   Shown shown;
   CameFrom came;
   RangeWatch range;

@@ -13,8 +13,9 @@ namespace gewebe::simulation {
 namespace {
 
 constexpr double strain_limit = 0.1, turn_limit = 0.2;
-constexpr double max_sizes = 1e6; // of an object, that a node may be displaced by
-constexpr int slow_enough = 10;   // updates in a row, the first ones read and factorise
+constexpr double warp_strain_limit = 0.2; // of a shape that may turn as it likes
+constexpr double max_sizes = 1e6;         // of an object, that a node may be displaced by
+constexpr int slow_enough = 10;           // updates in a row, the first ones read and factorise
 
 std::string percent(double part) {
   return number_text(std::round(1000 * part) / 10) + " %";
@@ -115,18 +116,19 @@ void warn_of_range(World& w, Object& object) {
     return;
   object.range.looked_at = max;
   object.range.not_looked = 0;
-  const LinearRange range = linear_range(object.model(), whole_shape(w, object));
-  const bool strained = !(range.strain <= strain_limit), rotated = !(range.turn <= turn_limit);
+  const LinearRange range = linear_range(object.model(), *object.shown.displacement);
+  const bool strained = !(range.strain <= (object.warp ? warp_strain_limit : strain_limit)),
+             rotated = !object.warp && !(range.turn <= turn_limit);
   if (!strained && !rotated)
     return;
   object.range.warned = true;
   const auto& tell = w.options.distrust ? w.options.distrust : w.options.warn;
   if (!tell)
     return;
-  const Spring& spring = object.model().springs[strained ? range.strain_spring : range.turn_spring];
+  const auto& edge = strained ? range.strain_edge : range.turn_edge;
   tell("object " + object.name() + " at " + number_text(w.now.clock.time) +
-       " s: beyond the linear range, the edge " + std::to_string(spring.i) + "-" +
-       std::to_string(spring.j) +
+       " s: beyond the linear range, the edge " + std::to_string(edge[0]) + "-" +
+       std::to_string(edge[1]) +
        (strained ? " is strained by " + percent(range.strain)
                  : " is turned by " + percent(range.turn)) +
        ", the shape is not to be trusted there");
@@ -189,14 +191,14 @@ void show(World& w, Object& object) {
   leave_shown(w, object);
   shown.whole = {};
   shown.forces = {};
-  const bool acted_on = object.statics->solver || !object.load->empty();
+  const bool acted_on = object.statics->made() || !object.load->empty();
   if (object.method == Method::ffe && (meets || acted_on))
     shown.load = load_at(*object.load, object.model(), w.now.clock.time);
   if (meets) {
     follow_instruments(w, object);
     shown.shaped = true;
     warn_of_range(w, object);
-    if (object.statics->solver)
+    if (object.statics->made())
       shown.forces = static_forces(object);
   } else if (object.method == Method::ffe && acted_on) {
     update_in_time(w, object);

@@ -102,8 +102,8 @@ const Model& Simulation::first_model(std::size_t object) const {
 
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
-  return {one.name(),           one.method,     one.matter->known, one.stages.model != nullptr,
-          *one.cut.first_nodes, *one.cut.places};
+  return {one.name(), one.method,           one.matter->known, one.stages.model != nullptr,
+          one.warp,   *one.cut.first_nodes, *one.cut.places};
 }
 
 std::size_t find_object(const Simulation& simulation, const std::string& name) {
@@ -200,6 +200,12 @@ std::span<const double> Simulation::displacement(std::size_t object) const {
   return whole_shape(*world_, world_->now.objects.at(object));
 }
 
+std::span<const double> Simulation::local_displacement(std::size_t object) const {
+  Object& one = world_->now.objects.at(object);
+  const std::span<const double> whole = whole_shape(*world_, one);
+  return one.warped ? warped_of(*world_, one).local_displacement() : whole;
+}
+
 std::span<const double> Simulation::surface_displacement(std::size_t object) const {
   shape(*world_, world_->now.objects.at(object));
   return *world_->now.objects[object].shown.displacement;
@@ -257,9 +263,7 @@ SimulationCounts Simulation::counts() const {
   SimulationCounts all = world_->now.counts;
   for (const Object& object : world_->now.objects) {
     const Statics& statics = *object.statics;
-    add_counts(all.elastostatic, statics.spent);
-    if (statics.solver)
-      add_counts(all.elastostatic, statics.solver->counts());
+    add_counts(all.elastostatic, static_counts(object));
     if (!statics.two_step)
       continue;
     const ElastostaticCounts second = statics.two_step->second_counts();

@@ -92,6 +92,7 @@ struct ObjectFacts {
   Method method = Method::ela;
   bool known = false;  ///< its model was needed so far
   bool staged = false; ///< that of its second stage is known
+  bool warp = false;   ///< with large rotations
   /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
   std::span<const std::uint32_t> first_nodes;
   /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.
@@ -195,6 +196,10 @@ public:
   /// of an elastostatic object is computed when it is first asked for; instruments' forces on an
   /// elastodynamic one are means over the last step. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
+  /// Displacements of all nodes whose small strains are those of the shape: displacement(), but of
+  /// an object with large rotations those in frames that turn with it. Valid until the next call of
+  /// anything that isn't const.
+  std::span<const double> local_displacement(std::size_t object) const;
   /// As displacement, of the first nodes: at least those of the surface. Where stored columns of a
   /// solid have rows for these alone, it takes nothing of what is inside.
   std::span<const double> surface_displacement(std::size_t object) const;

@@ -24,6 +24,8 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
     sum.worst_shape = more.worst_shape;
   sum.contact_error = std::max(sum.contact_error, more.contact_error);
   sum.shape_error = std::max(sum.shape_error, more.shape_error);
+  sum.rounds += more.rounds;
+  sum.change = std::max(sum.change, more.change);
 }
 
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
@@ -32,19 +34,60 @@ void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSourc
                                                      .tolerance = w.options.tolerance});
 }
 
+namespace {
+
+std::shared_ptr<ComplianceSource> source_of(Object& object) {
+  Statics& statics = *object.statics;
+  statics.ahead = true;
+  if (statics.prepared)
+    return std::exchange(statics.prepared, nullptr);
+  if (!object.cut.first && object.matter->source.stiffness)
+    return object.matter->source.stiffness(object.model());
+  return {};
+}
+
+/// What its solver did so far.
+ElastostaticCounts counts_of(const Statics& statics) {
+  if (!statics.warped)
+    return statics.solver ? statics.solver->counts() : ElastostaticCounts{};
+  const WarpedCounts counts = statics.warped->counts();
+  ElastostaticCounts all;
+  all.updates = counts.updates;
+  all.unchanged = counts.unchanged;
+  all.shapes = counts.shapes;
+  all.solves = counts.solves;
+  all.columns_read = counts.columns_read;
+  all.factors = counts.factors;
+  all.rounds = counts.rounds;
+  all.change = counts.change;
+  return all;
+}
+
+} // namespace
+
 Elastostatic& solver_of(World& w, Object& object) {
   need_model(object);
   Statics& statics = *object.statics;
-  if (statics.solver)
-    return *statics.solver;
-  statics.ahead = true;
-  std::shared_ptr<ComplianceSource> source;
-  if (statics.prepared)
-    source = std::exchange(statics.prepared, nullptr);
-  else if (!object.cut.first && object.matter->source.stiffness)
-    source = object.matter->source.stiffness(object.model());
-  make_solver(w, object, std::move(source));
+  if (!statics.solver)
+    make_solver(w, object, source_of(object));
   return *statics.solver;
+}
+
+WarpedStatics& warped_of(World& w, Object& object) {
+  need_model(object);
+  Statics& statics = *object.statics;
+  if (!statics.warped) {
+    statics.warped.emplace(object.model(), source_of(object), w.context);
+    statics.warped->restore(object.warped);
+  }
+  return *statics.warped;
+}
+
+ElastostaticCounts static_counts(const Object& object) {
+  const Statics& statics = *object.statics;
+  ElastostaticCounts all = statics.spent;
+  add_counts(all, counts_of(statics));
+  return all;
 }
 
 void update_solver(World& w, Object& object, const Load& load) {
@@ -54,10 +97,9 @@ void update_solver(World& w, Object& object, const Load& load) {
 
 void renew(Object& object) {
   Statics& statics = *object.statics;
-  if (statics.solver) {
-    add_counts(statics.spent, statics.solver->counts());
-    statics.solver.reset();
-  }
+  add_counts(statics.spent, counts_of(statics));
+  statics.solver.reset();
+  statics.warped.reset();
   if (statics.two_step) {
     ElastostaticCounts second = statics.two_step->second_counts();
     second.updates = second.unchanged = 0; // those of the first stage count
@@ -81,6 +123,12 @@ TwoStep& two_step_of(World& w, Object& object) {
 }
 
 void update_stages(World& w, Object& object, const Load& load) {
+  if (object.warp) {
+    WarpedStatics& warped = warped_of(w, object);
+    warped.update(load);
+    object.warped = warped.answer();
+    return;
+  }
   Elastostatic& solver = solver_of(w, object);
   if (object.stages.options)
     two_step_of(w, object).update(solver, load);
@@ -90,18 +138,24 @@ void update_stages(World& w, Object& object, const Load& load) {
 
 std::span<const double> static_shape(Object& object) {
   Statics& statics = *object.statics;
+  if (statics.warped)
+    return statics.warped->displacement();
   return statics.two_step ? statics.two_step->displacement(*statics.solver)
                           : statics.solver->displacement();
 }
 
 std::span<const double> static_surface(Object& object) {
   Statics& statics = *object.statics;
+  if (statics.warped)
+    return statics.warped->surface_displacement();
   return statics.two_step ? statics.two_step->surface_displacement(*statics.solver)
                           : statics.solver->surface_displacement();
 }
 
-const std::vector<NodeVector>& static_forces(const Object& object) {
+std::vector<NodeVector> static_forces(const Object& object) {
   const Statics& statics = *object.statics;
+  if (statics.warped)
+    return statics.warped->holding_forces();
   return statics.two_step ? statics.two_step->contact_forces() : statics.solver->contact_forces();
 }
 
@@ -131,6 +185,26 @@ void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t
 void make_whole(const World& w, Object& object) {
   if (object.stages.first_model)
     set_second(w, object, object.stages.first_model);
+}
+
+void Rule<SetWarp>::check(World& w, const SetWarp& c) {
+  require_support(w, w.now.objects.at(c.object), Feature::warp);
+}
+
+void Rule<SetWarp>::apply(World& w, const SetWarp& c) {
+  Object& object = w.now.objects.at(c.object);
+  if (object.warp)
+    return;
+  if (object.statics->made())
+    renew(object);
+  object.statics->ahead = true;
+  object.warp = true;
+  touch(object);
+}
+
+void Rule<SetWarp>::log(const World&, const SetWarp&, ChangeRow& row) {
+  row.what = "rotation";
+  row.text = "warp";
 }
 
 void Rule<SetTwoStep>::check(World& w, const SetTwoStep& c) {

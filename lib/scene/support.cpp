@@ -32,6 +32,10 @@ bool goes(const Object& object, Way way) {
     return object.cut.first != nullptr;
   case Way::solid:
     return object.matter->known && !object.model().tetrahedra.empty();
+  case Way::net:
+    return object.matter->known && object.model().tetrahedra.empty();
+  case Way::warped:
+    return object.warp;
   }
   return false;
 }

@@ -17,11 +17,14 @@ enum class Way : std::uint8_t {
   two_step_stored, ///< its second stage known by its stiffness alone
   whole,
   cut,
-  solid ///< of tetrahedra, or with some
+  solid, ///< of tetrahedra, or with some
+  net,   ///< of none
+  warped ///< with large rotations
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic, Way::two_step,
-    Way::two_step_stored, Way::whole,           Way::cut,      Way::solid};
+    Way::two_step_stored, Way::whole,           Way::cut,      Way::solid,        Way::net,
+    Way::warped};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -37,11 +40,12 @@ enum class Feature : std::uint8_t {
   method, ///< another one
   two_step,
   renew,
+  warp, ///< large rotations
 };
-inline constexpr std::array all_features{Feature::force,  Feature::pressure, Feature::displace,
-                                         Feature::grasp,  Feature::touch,    Feature::cut,
-                                         Feature::blade,  Feature::restore,  Feature::attach,
-                                         Feature::method, Feature::two_step, Feature::renew};
+inline constexpr std::array all_features{
+    Feature::force,    Feature::pressure, Feature::displace, Feature::grasp,  Feature::touch,
+    Feature::cut,      Feature::blade,    Feature::restore,  Feature::attach, Feature::method,
+    Feature::two_step, Feature::renew,    Feature::warp};
 
 /// A pair that does not go together.
 struct Gap {
@@ -67,6 +71,15 @@ inline constexpr std::array gaps{
         "is elastodynamic (ela), expected an elastostatic one for two-step"},
     Gap{Way::implicit_motion, Feature::two_step, true,
         "is elastodynamic (ela), expected an elastostatic one for two-step"},
+    Gap{Way::warped, Feature::two_step, true,
+        "has large rotations (rotation=warp), expected one without for two-step"},
+    Gap{Way::explicit_motion, Feature::warp, true,
+        "is elastodynamic (ela), expected an elastostatic one for rotation=warp"},
+    Gap{Way::implicit_motion, Feature::warp, true,
+        "is elastodynamic (ela), expected an elastostatic one for rotation=warp"},
+    Gap{Way::two_step, Feature::warp, true,
+        "goes on by two steps, expected none for rotation=warp"},
+    Gap{Way::net, Feature::warp, true, "has no tetrahedra, expected a solid for rotation=warp"},
     Gap{Way::cut, Feature::two_step, true,
         "is cut and its second stage is not, expected one that is whole"},
     Gap{Way::whole, Feature::restore, true, "is as it came, expected one that was cut"},

@@ -90,6 +90,8 @@ bool feels(const World& w, Object& object, Feature feature);
 
 // statics.cpp: solvers of one step and of two
 Elastostatic& solver_of(World& w, Object& object);
+WarpedStatics& warped_of(World& w, Object& object);
+ElastostaticCounts static_counts(const Object& object);
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source);
 void update_solver(World& w, Object& object, const Load& load);
 /// Forgets what is kept to be quick.
@@ -104,7 +106,7 @@ void update_stages(World& w, Object& object, const Load& load);
 /// Whole, or of the nodes alone that the solver has rows for: all of the surface among them.
 std::span<const double> static_shape(Object& object);
 std::span<const double> static_surface(Object& object);
-const std::vector<NodeVector>& static_forces(const Object& object);
+std::vector<NodeVector> static_forces(const Object& object);
 
 // bodies.cpp: what is tied together and moves as one
 using Motions = std::map<std::size_t, std::vector<NodeMotion>>;

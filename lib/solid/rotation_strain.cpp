@@ -12,6 +12,8 @@ namespace gewebe {
 
 namespace {
 
+constexpr double smoothing_lengths = 1; ///< volume over surface
+
 Vec3 at(std::span<const double> v, std::uint32_t node) {
   const std::size_t k = 3 * std::size_t{node};
   return {v[k], v[k + 1], v[k + 2]};
@@ -98,6 +100,59 @@ void RotationStrain::list_triangles(const TetMesh& mesh, std::span<const std::ui
       at_[fill[i]++] = t;
 }
 
+/// `stiffness` times the surface's Laplacian and `mass` times its areas, on the first axes that
+/// have rows.
+void RotationStrain::fill_surface_matrix(StiffnessMatrix& matrix, double stiffness,
+                                         double mass) const {
+  matrix.column_start.push_back(0);
+  std::vector<std::pair<std::int64_t, double>> column;
+  for (const std::int64_t of_row : matrix.axis_of_row) {
+    const auto i = static_cast<std::uint32_t>(of_row / 3);
+    const std::int64_t row_of_i = matrix.row_of_axis[3 * std::size_t{i}];
+    column.clear();
+    for (std::size_t k = start_[i]; k < start_[std::size_t{i} + 1]; ++k) {
+      const Triangle& t = triangles_[at_[k]];
+      const std::array<Vec3, 3> g{-(t.gradient[0] + t.gradient[1]), t.gradient[0], t.gradient[1]};
+      const auto own = static_cast<std::size_t>(std::ranges::find(t.node, i) - t.node.begin());
+      for (std::size_t b = 0; b < 3; ++b)
+        if (const std::int64_t row = matrix.row_of_axis[3 * std::size_t{t.node[b]}];
+            row >= row_of_i)
+          column.emplace_back(row,
+                              t.area * (stiffness * dot(g[own], g[b]) + (b == own ? mass / 3 : 0)));
+    }
+    std::ranges::stable_sort(column, {}, [](const auto& entry) { return entry.first; });
+    for (const auto& [row, value] : column) {
+      const auto begin = static_cast<std::size_t>(matrix.column_start.back());
+      if (matrix.row.size() > begin && matrix.row.back() == row) {
+        matrix.value.back() += value;
+      } else {
+        matrix.row.push_back(row);
+        matrix.value.push_back(value);
+      }
+    }
+    matrix.column_start.push_back(static_cast<std::int64_t>(matrix.row.size()));
+  }
+}
+
+/// Rotations of shorter waves than the body is thick are no rotations of the body.
+void RotationStrain::factor_smoothing(std::span<const SolidElement> elements,
+                                      const Context& context) {
+  double volume = 0, area = 0;
+  for (const SolidElement& e : elements)
+    volume += e.volume;
+  for (const Triangle& t : triangles_)
+    area += t.area;
+  const double length = smoothing_lengths * volume / area;
+  StiffnessMatrix matrix; // scalar: the first axis of each node
+  matrix.row_of_axis.assign(3 * corners_, -1);
+  for (std::size_t i = 0; i < corners_; ++i) {
+    matrix.row_of_axis[3 * i] = static_cast<std::int64_t>(i);
+    matrix.axis_of_row.push_back(static_cast<std::int64_t>(3 * i));
+  }
+  fill_surface_matrix(matrix, length * length, 1);
+  smoothing_.emplace(matrix, context);
+}
+
 void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const Context& context) {
   const auto held = [&](std::size_t i, std::size_t axis) {
     return !fixed.empty() && fixed[3 * std::size_t{nodes_[i]} + axis] != 0;
@@ -140,31 +195,7 @@ void RotationStrain::factor_surface(std::span<const std::uint8_t> fixed, const C
         matrix.axis_of_row.push_back(static_cast<std::int64_t>(3 * i));
       }
     laplacian.order = matrix.order();
-    matrix.column_start.push_back(0);
-    std::vector<std::pair<std::int64_t, double>> column;
-    for (const std::int64_t of_row : matrix.axis_of_row) {
-      const auto i = static_cast<std::uint32_t>(of_row / 3);
-      column.clear();
-      for (std::size_t k = start_[i]; k < start_[std::size_t{i} + 1]; ++k) {
-        const Triangle& t = triangles_[at_[k]];
-        const std::array<Vec3, 3> g{-(t.gradient[0] + t.gradient[1]), t.gradient[0], t.gradient[1]};
-        const auto own = static_cast<std::size_t>(std::ranges::find(t.node, i) - t.node.begin());
-        for (std::size_t b = 0; b < 3; ++b)
-          if (laplacian.row[t.node[b]] >= laplacian.row[i])
-            column.emplace_back(laplacian.row[t.node[b]], t.area * dot(g[own], g[b]));
-      }
-      std::ranges::stable_sort(column, {}, [](const auto& entry) { return entry.first; });
-      for (const auto& [row, value] : column) {
-        const auto begin = static_cast<std::size_t>(matrix.column_start.back());
-        if (matrix.row.size() > begin && matrix.row.back() == row) {
-          matrix.value.back() += value;
-        } else {
-          matrix.row.push_back(row);
-          matrix.value.push_back(value);
-        }
-      }
-      matrix.column_start.push_back(static_cast<std::int64_t>(matrix.row.size()));
-    }
+    fill_surface_matrix(matrix, 1, 0);
     if (laplacian.order > 0)
       laplacian.factor.emplace(matrix, context);
     axes_.push_back(std::move(laplacian));
@@ -176,6 +207,7 @@ RotationStrain::RotationStrain(const TetMesh& mesh, std::span<const SolidElement
     : cpu_(context.cpu) {
   list_triangles(mesh, fixed);
   factor_surface(fixed, context);
+  factor_smoothing(elements, context);
 
   // The scalar Laplacian of the volume on the first axis of each node.
   const std::size_t n = mesh.points.size();
@@ -231,10 +263,34 @@ void RotationStrain::solve(std::span<const double> f, std::span<double> y) const
   }
 }
 
+std::vector<double> RotationStrain::smoothed(std::span<const double> of_triangles) const {
+  std::vector<double> right(3 * corners_), found(right.size()), result(12 * groups_.size());
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (const std::uint32_t i : triangles_[t].node)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        right[axis * corners_ + i] += triangles_[t].area / 3 * of_triangles[3 * t + axis];
+  smoothing_->solve(right, found, 3);
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double sum = 0;
+      for (const std::uint32_t i : triangles_[t].node)
+        sum += found[axis * corners_ + i];
+      result[3 * t + axis] = sum / 3;
+    }
+  return result;
+}
+
+std::vector<double> RotationStrain::turning(std::span<const double> local) const {
+  std::vector<double> w(12 * groups_.size());
+  warp_kernel(cpu_).find_rotations(groups_.data(), groups_.size(), local.data(), w.data());
+  return smoothed(w);
+}
+
 void RotationStrain::deform(std::span<const double> local, std::span<double> u) const {
   const WarpKernel& kernel = warp_kernel(cpu_);
-  std::vector<double> divergence(3 * corners_), w(12 * groups_.size());
-  kernel.ask(groups_.data(), groups_.size(), local.data(), divergence.data(), w.data());
+  std::vector<double> divergence(3 * corners_);
+  const std::vector<double> w = turning(local);
+  kernel.ask(groups_.data(), groups_.size(), local.data(), w.data(), divergence.data());
   solve(divergence, u);
   kernel.turn_middles(middle_groups_.data(), middle_groups_.size(), w.data(), local.data(),
                       u.data());
@@ -252,16 +308,20 @@ void RotationStrain::spread(std::span<const double> f, std::span<double> y) cons
   solve(on_corners, y);
 }
 
-void RotationStrain::take_back(std::span<const double> local, std::span<const double> y,
-                               std::span<double> forces) const {
+void RotationStrain::take_back(std::span<const double> local, std::span<const double> w,
+                               std::span<const double> y, std::span<double> forces) const {
+  const WarpKernel& kernel = warp_kernel(cpu_);
   std::ranges::fill(forces, 0.0);
-  warp_kernel(cpu_).take_back(groups_.data(), groups_.size(), local.data(), y.data(),
-                              forces.data());
+  std::vector<double> moments(12 * groups_.size());
+  kernel.find_moments(groups_.data(), groups_.size(), local.data(), w.data(), y.data(),
+                      moments.data());
+  kernel.take_back(groups_.data(), groups_.size(), local.data(), w.data(), y.data(),
+                   smoothed(moments).data(), forces.data());
   for (const Middle& m : middles_) {
     const Vec3 f = at(y, m.node);
     if (f == Vec3{})
       continue;
-    const std::array<double, 9> r = rotation(local, m.node);
+    const std::array<double, 9> r = rotation(w, m.node);
     for (std::size_t i = 0; i < 3; ++i) {
       const double turned = r[i] * f.x + r[3 + i] * f.y + r[6 + i] * f.z;
       forces[3 * std::size_t{m.node} + i] = turned;
@@ -271,28 +331,20 @@ void RotationStrain::take_back(std::span<const double> local, std::span<const do
   }
 }
 
-/// curl of u with the gradient Σ u ∇Nᵀ - tilt normalᵀ.
-Vec3 RotationStrain::twice_w(const Triangle& t, std::span<const double> local) {
-  const Vec3 first = at(local, t.node[0]), b = at(local, t.node[1]) - first,
-             c = at(local, t.node[2]) - first,
-             tilt = t.gradient[0] * dot(t.normal, b) + t.gradient[1] * dot(t.normal, c);
-  return cross(t.gradient[0], b) + cross(t.gradient[1], c) - cross(t.normal, tilt);
-}
-
-std::array<double, 9> RotationStrain::rotation(std::span<const double> local,
+std::array<double, 9> RotationStrain::rotation(std::span<const double> turning,
                                                std::uint32_t node) const {
   Vec3 w;
   if (node < corners_) {
     double area = 0;
     for (std::size_t k = start_[node]; k < start_[std::size_t{node} + 1]; ++k) {
       const Triangle& t = triangles_[at_[k]];
-      w += twice_w(t, local) * (t.area / 2);
+      w += t.area * at(turning, at_[k]);
       area += t.area;
     }
     w = w / area;
   } else {
     for (const std::uint32_t t : middles_[node - corners_].triangle)
-      w += twice_w(triangles_[t], local) / 4;
+      w += at(turning, t) / 2;
   }
   // By the quaternion of an eighth of the angle, doubled three times.
   const Vec3 eighth = w / 16;
@@ -341,6 +393,33 @@ std::vector<double> RotationStrain::on_surface(std::span<const double> load) con
             followed[axis * order + static_cast<std::size_t>(inner_row_[inner])];
     }
   return result;
+}
+
+std::vector<double> RotationStrain::extend(std::span<const double> surface) const {
+  std::vector<double> all(3 * place_.size());
+  for (std::size_t k = 0; k < surface.size(); ++k)
+    all[3 * std::size_t{nodes_[k / 3]} + k % 3] = surface[k];
+  if (!inside_)
+    return all;
+  const std::size_t order = inside_->order();
+  std::vector<double> right(3 * order), found(right.size());
+  for (std::size_t i = 0; i < inner_row_.size(); ++i) // columns of the whole Laplacian
+    for (auto e = static_cast<std::size_t>(between_.column_start[i]);
+         e < static_cast<std::size_t>(between_.column_start[i + 1]); ++e) {
+      const auto j = static_cast<std::size_t>(between_.row[e]);
+      const bool i_inside = inner_row_[i] >= 0, j_inside = inner_row_[j] >= 0;
+      if (i_inside == j_inside)
+        continue;
+      const std::size_t inner = i_inside ? i : j, outer = i_inside ? j : i;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        right[axis * order + static_cast<std::size_t>(inner_row_[inner])] -=
+            between_.value[e] * all[3 * outer + axis];
+    }
+  inside_->solve(right, found, 3);
+  for (std::size_t i = 0; i < inner_row_.size(); ++i)
+    for (std::size_t axis = 0; inner_row_[i] >= 0 && axis < 3; ++axis)
+      all[3 * i + axis] = found[axis * order + static_cast<std::size_t>(inner_row_[i])];
+  return all;
 }
 
 } // namespace gewebe

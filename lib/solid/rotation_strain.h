@@ -1,9 +1,10 @@
 #pragma once
 // The surface of a solid from rotations and strains.
 //
-// A small displacement u has at each place a rotation, axial vector w = curl u / 2, and a strain E.
-// Taken as a large rotation and a strain in its frame they ask for the gradient
-// R(w) (I + E + E² / 2) of the places; the surface with the nearest gradients is found by a
+// A small displacement u has at each place a rotation, axial vector curl u / 2, and a strain E.
+// Frames turn by w, that rotation without its short waves; r is what it has beyond w. Taken as
+// large rotations and strains in their frames they ask for the gradient
+// R(w) (I + E + E² / 2 + [r]) of the places; the surface with the nearest gradients is found by a
 // Poisson equation for each axis (Huang, Tong, Zhou, Bao, Desbrun, Interactive shape interpolation
 // through controllable dynamic deformation, IEEE TVCG 17(7), 2011, who do it in the volume). Here
 // it is done on the surface alone: nothing pulls at a free surface, so that its normal stays at
@@ -15,6 +16,10 @@
 // Differentiated and transposed, the map takes forces on the deformed surface back to forces on the
 // one at rest that do the same work: what a load does in the local frames, lever arms included,
 // for solid/rotation_warp.h.
+//
+// Without waves shorter than the body's volume over its surface, by a Helmholtz equation on the
+// surface: of forces that all go through the surface, where the map has them, shorter ones would
+// turn the surface with less work than the body's stiffness takes, however small the strain.
 //
 // Angles are sums of powers, good to rounding up to a quarter of a turn, to 1e-9 up to half of one,
 // to 1e-5 up to a whole one. The same bytes everywhere.
@@ -69,15 +74,20 @@ public:
   void spread(std::span<const double> f, std::span<double> y) const;
   /// The forces that do, under any change of `local`, the work that f = of spread's do under the
   /// change of deform(local). One pass over triangles. 0 on fixed axes is not promised.
-  void take_back(std::span<const double> local, std::span<const double> y,
-                 std::span<double> forces) const;
+  void take_back(std::span<const double> local, std::span<const double> turning,
+                 std::span<const double> y, std::span<double> forces) const;
 
+  /// The frames' w of each triangle under `local`, for what follows.
+  std::vector<double> turning(std::span<const double> local) const;
   /// R at a node: of the mean w of its triangles, by their areas at corners.
-  std::array<double, 9> rotation(std::span<const double> local, std::uint32_t node) const;
+  std::array<double, 9> rotation(std::span<const double> turning, std::uint32_t node) const;
 
   /// Loads of all 3 n axes of the mesh put on the surface: those inside move onto it as if the
   /// inside followed it harmonically, so that their sum and their work in any affine motion stay.
   std::vector<double> on_surface(std::span<const double> load) const;
+  /// Displacements of all nodes of the mesh, where the inside follows those of the surface
+  /// harmonically; 0 at nodes of no tetrahedron.
+  std::vector<double> extend(std::span<const double> surface) const;
 
 private:
   struct Triangle {
@@ -97,8 +107,10 @@ private:
   };
   void solve(std::span<const double> f, std::span<double> y) const;
   void list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed);
-  static Vec3 twice_w(const Triangle& t, std::span<const double> local);
+  void fill_surface_matrix(StiffnessMatrix& matrix, double stiffness, double mass) const;
   void factor_surface(std::span<const std::uint8_t> fixed, const Context& context);
+  void factor_smoothing(std::span<const SolidElement> elements, const Context& context);
+  std::vector<double> smoothed(std::span<const double> of_triangles) const;
 
   std::vector<std::uint32_t> nodes_, place_;
   std::vector<Triangle> triangles_;
@@ -109,6 +121,7 @@ private:
   CpuLevel cpu_;
   std::vector<std::size_t> start_; ///< of each corner's triangles
   std::vector<std::uint32_t> at_;
+  std::optional<Factor> smoothing_;
   std::vector<Laplacian> axes_;         ///< one for all axes, or one for each
   std::optional<Factor> inside_;        ///< of the Laplacian on inner nodes, if there are any
   std::vector<std::int64_t> inner_row_; ///< of each node of the mesh

@@ -8,124 +8,153 @@
 // the load turned back into the local frames, where lever arms count as they are on the deformed
 // body. (Turning each force by the rotation of its node alone, as modal warping does - Choi, Ko,
 // Modal warping, IEEE TVCG 11(1), 2005 -, takes the arms of the body at rest.) Under small loads it
-// is the linear answer. The equation is a fixed point, v <- K⁻¹ (dx/dv)ᵀ f; two or three rounds
-// from the linear answer do, mixed by Anderson's method.
+// is the linear answer, which the first round gives. The equation is a fixed point,
+// v <- K⁻¹ (dx/dv)ᵀ f; two or three more rounds do, mixed by Anderson's method.
 //
 // Against converged Neo-Hookean bodies of the same elements, beam 100 × 30 × 30 held at one end,
 // nu = 0.45, load on the other end, largest error over largest displacement:
 //
-//   | end turns by     | linear | all loads | by columns | 1, 2, 3 rounds           |
-//   |------------------|--------|-----------|------------|--------------------------|
-//   | 15°, bent        | 10.6 % | 0.4 %     | 0.4 %      | 0.6 %, 0.4 %, 0.4 %      |
-//   | 30°, bent        | 23.4 % | 1.0 %     | 1.2 %      | 3.6 %, 1.1 %, 1.0 %      |
-//   | 45°, bent        | 41.7 % | 1.8 %     | 2.3 %      | 17 %, 2.4 %, 1.7 %       |
-//   | 36°, twisted     | 38.5 % | 3.4 %     | 3.5 %      | 9.6 %, 3.3 %, 3.4 %      |
+//   | end turns by     | linear | whole  | by columns | 2, 3, 4 rounds           |
+//   |------------------|--------|--------|------------|--------------------------|
+//   | 15°, bent        | 10.6 % | 0.3 %  | 0.4 %      | 0.6 %, 0.4 %, 0.4 %      |
+//   | 30°, bent        | 23.4 % | 1.0 %  | 1.2 %      | 3.7 %, 1.0 %, 1.2 %      |
+//   | 45°, bent        | 41.7 % | 1.7 %  | 2.3 %      | 17 %, 0.9 %, 2.8 %       |
+//   | 36°, twisted     | 38.5 % | 2.7 %  | 2.8 %      | 11 %, 3.5 %, 2.7 %       |
 //
-// Cost, a surface of 3,842 nodes, 28 of them loaded, columns in the cache, one core: the linear
-// shape is a pass over the columns, 0.15 ms; with one round from a start 0.46 ms (3 times), with
-// two from nothing 0.61 ms (4 times). By the factor of the same body, 45,084 unknowns, one round
-// from a start costs 1.1 linear solutions, two from nothing 3.2. Corners alone, a quarter of the
-// nodes of quadratic elements, take part in rounds.
+// Loads come in two kinds. A whole load, as weight or a pressure, is turned back and solved for
+// with K's factor. Forces on a few nodes, given or those that hold nodes at places, count by the
+// columns of these nodes alone: of the columns' combinations the one with the least energy. Both
+// add up, in one frame.
+//
+// A round costs a pass over the columns, a quarter of one (corners take part, not the middles of
+// quadratic elements), two over the surface's triangles, two solutions of the surface's Laplacian;
+// and where there is a whole load that has turned further than the tolerance since it was solved
+// for, a solution with K's factor. Near the last answer, as from step to step, one round does.
 //
 // Loads inside count as they are in K v, and on the surface (RotationStrain::on_surface) in how
-// they turn. Shapes are those of the surface; nodes inside have none.
+// they turn.
 
 #include "base/context.h"
 #include "solid/assembly.h"
 #include "solid/rotation_strain.h"
-#include "solve/factor.h"
-#include "solve/stiffness.h"
 #include "tetrahedra/tet_mesh.h"
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 namespace gewebe {
+
+/// u = K⁻¹ f in place, over all 3 n axes; 0 on fixed ones.
+using WarpSolve = std::function<void(std::span<double>)>;
 
 struct WarpOptions {
   int max_rounds = 8;
   double tolerance = 1e-3; ///< of a round's change over the largest displacement
 };
 
-/// Columns of K⁻¹ for some nodes of the surface, at the nodes of the surface: what a store has. And
-/// what whole loads, as gravity's along an axis, displace there, as further columns.
-struct WarpColumns {
-  std::vector<std::uint32_t> nodes;       ///< among RotationStrain::nodes()
-  std::vector<std::vector<double>> loads; ///< on_surface
-  std::vector<float> values;              ///< 3 columns for each node, one for each load
-  std::vector<double> inverse;            ///< of the work of each column's load in each, by rows
+/// Columns of K⁻¹ of some nodes of the surface, at the nodes of the surface; all of them counted as
+/// RotationStrain::nodes() does. Along an axis that is fixed they are 0.
+class WarpColumns {
+public:
+  explicit WarpColumns(std::size_t surface_nodes) : rows_(3 * surface_nodes) {}
 
-  std::size_t count() const noexcept { return 3 * nodes.size() + loads.size(); }
+  /// These and no others, in any order; of new ones `column_of` gives the three columns.
+  void set(std::span<const std::uint32_t> nodes,
+           const std::function<void(std::uint32_t node, std::span<double> columns)>& column_of);
+  const std::vector<std::uint32_t>& nodes() const noexcept { return nodes_; }
+  std::size_t count() const noexcept { return 3 * nodes_.size(); }
+  const float* values() const noexcept { return values_.data(); } ///< [column][row]
+  double entry(std::size_t column, std::size_t row) const {
+    return static_cast<double>(values_[column * rows_ + row]);
+  }
+
+  /// Their rows and columns among each other: x = block⁻¹ x, of all, or of those nodes alone that
+  /// are held (the others' entries of x are not used, and 0 behind it).
+  void solve(std::span<double> x) const;
+  void solve_held(std::span<const std::uint8_t> held, std::span<double> x) const;
+
+private:
+  std::vector<double> inverse_of(std::span<const std::size_t> columns) const;
+
+  std::size_t rows_;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<float> values_;
+  std::vector<double> inverse_;
+  mutable std::vector<std::uint8_t> held_; ///< that the next ones are of
+  mutable std::vector<std::size_t> held_columns_;
+  mutable std::vector<double> held_inverse_;
 };
 
-/// A shape, and how far the last round still changed it.
-struct WarpedShape {
-  std::vector<double> u; ///< of the surface's nodes, mm
-  /// What a next answer may start from: the surface's displacements of small strains that the shape
-  /// stands for; by columns, their coefficients, forces in the local frames.
-  std::vector<double> local;
-  double change = 0; ///< over the largest displacement: > tolerance, if rounds ran out
-  int rounds = 0;
+/// A load on all 3 n axes.
+struct WarpWholeLoad {
+  std::vector<double> over_axes;
+  std::vector<double> on_surface, spread; ///< as RotationStrain has it
 };
 
-/// Forces that hold nodes at places, on the deformed body, and its shape.
-struct WarpedForces {
-  std::vector<double> forces; ///< 3 for each node, g mm/s²
-  WarpedShape shape;
+/// What acts on a body.
+struct WarpLoad {
+  const WarpColumns& columns;
+  std::span<const double> forces{};     ///< 3 for each column node; 0 where held
+  std::span<const std::uint8_t> held{}; ///< of each column node; empty: none
+  std::span<const double> targets{};    ///< 3 for each column node: where those stand
+  const WarpWholeLoad* whole = nullptr;
+};
+
+/// An answer, and what the next one starts from.
+struct WarpState {
+  std::vector<double> local;        ///< of the surface: the small strains' displacements, mm
+  std::vector<double> u;            ///< of the surface, mm
+  std::vector<double> whole_local;  ///< what the whole load has of `local`
+  std::vector<double> whole_forces; ///< the whole load turned back, on the surface
+  std::vector<std::uint32_t> nodes; ///< the columns', by which the next ones count
+  std::vector<double> local_forces; ///< 3 each: forces in the local frames
+  std::vector<double> holding;      ///< 3 each: what holds the held ones, else 0
+  /// Of the last round, over the largest displacement: > tolerance, if they ran out. What held
+  /// nodes miss their places by is among it, and a tenth of how the forces there changed over the
+  /// largest.
+  double change = 0;
+  int rounds = 0; ///< of this answer
+  int solves = 0; ///< with K's factor, as well
 };
 
 struct WarpKernel;
 
 class RotationWarp {
 public:
-  /// The factor must outlive it. Costs what RotationStrain does.
-  /// \pre matrix is solid_stiffness(mesh, elements, fixed), the factor is its   \throw as
-  /// RotationStrain
+  /// Costs what RotationStrain does. \pre K is that of the mesh's elements, or of these and what
+  /// else acts between its nodes; `solve` is of it, and outlives this   \throw as RotationStrain
   RotationWarp(const TetMesh& mesh, std::span<const SolidElement> elements,
-               std::span<const std::uint8_t> fixed, const StiffnessMatrix& matrix,
-               const Factor& factor, const Context& context = {});
+               std::span<const std::uint8_t> fixed, WarpSolve solve, const Context& context = {});
 
   const RotationStrain& surface() const noexcept { return surface_; }
 
-  /// Under loads on the 3 n axes. A round costs a solution with K's factor and a pass over the
-  /// surface's triangles, a start another solution where none is given; all of it two solutions of
-  /// the surface's Laplacian, and one of the inside's where loads are there.
-  WarpedShape shape(std::span<const double> load, std::span<const double> start = {},
-                    const WarpOptions& options = {}) const;
+  /// By two solutions of Laplacians. \pre 3 n numbers
+  WarpWholeLoad whole_load(std::vector<double> over_axes) const;
+  /// The columns of a node by three solutions with K's factor, for WarpColumns::set.
+  void column_of(std::uint32_t node, std::span<double> columns) const;
 
-  /// By three solutions with K's factor for each node, one for each load on the 3 n axes, where
-  /// loads are one behind the other. \throw Error if a node is fixed along an axis
-  WarpColumns columns(std::span<const std::uint32_t> nodes,
-                      std::span<const double> loads = {}) const;
+  /// The shape under a load, and the forces that hold nodes at places. \param state the last
+  /// answer, or nothing; the one found behind it
+  void answer(const WarpLoad& load, WarpState& state, const WarpOptions& options = {}) const;
 
-  /// Under loads on the columns' nodes, 3 numbers each, and factors of their loads, by the columns
-  /// alone: the least energy that their combinations have. A round costs two passes over the
-  /// columns at corners (one of them at all nodes, if there are loads) and one over triangles; all
-  /// of it a pass over the columns, as a linear shape, and two solutions of the surface's
-  /// Laplacian. Near the start, as from step to step, one round does.
-  WarpedShape shape(const WarpColumns& columns, std::span<const double> load,
-                    std::span<const double> start = {}, const WarpOptions& options = {}) const;
+  /// How the surface gives way at column nodes that aren't held, by place among them: the change of
+  /// their 3 m displacements for their 3 m forces, held ones held, near a state; symmetric.
+  std::vector<double> compliance_at(const WarpLoad& load, const WarpState& state,
+                                    std::span<const std::size_t> places) const;
 
-  /// What holds the columns' nodes displaced by `targets`, 3 numbers each: of the columns'
-  /// combinations the one that is there, and the forces whose work balances its energy. A round
-  /// costs one pass over the columns, one over triangles, a solution of the surface's Laplacian;
-  /// the forces, then, a few rounds of the same.
-  WarpedForces forces(const WarpColumns& columns, std::span<const double> targets,
-                      std::span<const double> start = {}, const WarpOptions& options = {}) const;
+  /// The displacements of small strains on all 3 n axes, of which a state's `local` is the surface,
+  /// by one solution with K's factor; and the body's displacements, inside too, where what turning
+  /// adds goes on harmonically from the surface.
+  std::vector<double> whole_local(const WarpLoad& load, const WarpState& state) const;
+  std::vector<double> whole_shape(const WarpState& state,
+                                  std::span<const double> whole_local) const;
 
 private:
-  /// Σ coefficients × columns at the first nodes.
-  void combine(const WarpColumns& columns, std::span<const double> coefficients, std::size_t nodes,
-               std::span<double> u) const;
-  /// The work with each column of forces on corners and on the columns' nodes, or on the surface
-  /// where the columns have loads.
-  std::vector<double> project(const WarpColumns& columns, std::span<const double> forces) const;
-
   RotationStrain surface_;
-  const StiffnessMatrix& matrix_;
-  const Factor& factor_;
+  WarpSolve solve_;
   const WarpKernel& kernel_;
 };
 

@@ -1,5 +1,8 @@
 #include "solid/stress.h"
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
 #include <cmath>
 #include <cstddef>
 
@@ -9,6 +12,25 @@ namespace {
 
 SymmetricBlock symmetric_part(const SolidBlock& g) {
   return {g[0], (g[1] + g[3]) / 2, (g[2] + g[6]) / 2, g[4], (g[5] + g[7]) / 2, g[8]};
+}
+
+/// Half of the curl.
+Eigen::Vector3d rotation_vector(const SolidBlock& g) {
+  return Eigen::Vector3d(g[7] - g[5], g[2] - g[6], g[3] - g[1]) / 2;
+}
+
+Eigen::Matrix3d rotation_by(const Eigen::Vector3d& w) {
+  const double angle = w.norm();
+  if (!(angle > 0))
+    return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
+}
+
+SymmetricBlock turned(const SymmetricBlock& s, const Eigen::Matrix3d& r) {
+  Eigen::Matrix3d m;
+  m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+  m = (r * m * r.transpose()).eval();
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
 }
 
 Vec3 at_node(std::span<const double> u, std::uint32_t node) {
@@ -21,7 +43,8 @@ Vec3 at_node(std::span<const double> u, std::uint32_t node) {
 std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          std::span<const SolidElement> elements,
-                                         std::span<const double> u, const Vec3& acceleration) {
+                                         std::span<const double> u, const Vec3& acceleration,
+                                         StrainFrames frames) {
   std::vector<CornerTensors> strains(elements.size());
   std::array<Vec3, 10> values;
   const std::size_t count = mesh.middles.empty() ? 4 : 10;
@@ -30,11 +53,24 @@ std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
       values[a] = at_node(u, a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4]);
     const std::size_t material =
         mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
-    const auto gradients =
-        displacement_gradients(elements[t], std::span<const Vec3>(values).first(count),
-                               materials[material].density * acceleration);
-    for (std::size_t p = 0; p < 4; ++p)
+    const auto under = [&](const Vec3& a) {
+      return displacement_gradients(elements[t], std::span<const Vec3>(values).first(count),
+                                    materials[material].density * a);
+    };
+    auto gradients = under(acceleration);
+    if (frames == StrainFrames::turning && acceleration != Vec3{}) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (const SolidBlock& g : gradients)
+        mean += rotation_vector(g) / 4;
+      const Eigen::Vector3d a =
+          rotation_by(-mean) * Eigen::Vector3d(acceleration.x, acceleration.y, acceleration.z);
+      gradients = under({a.x(), a.y(), a.z()});
+    }
+    for (std::size_t p = 0; p < 4; ++p) {
       strains[t][p] = symmetric_part(gradients[p]);
+      if (frames == StrainFrames::turning)
+        strains[t][p] = turned(strains[t][p], rotation_by(rotation_vector(gradients[p])));
+    }
   }
   return strains;
 }
@@ -109,9 +145,9 @@ std::vector<SymmetricBlock> in_the_middle(std::span<const CornerTensors> tensors
 
 SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> materials,
                          std::span<const SolidElement> elements, std::span<const double> u,
-                         const Vec3& acceleration) {
+                         const Vec3& acceleration, StrainFrames frames) {
   const std::vector<CornerTensors> strains =
-      solid_strains(mesh, materials, elements, u, acceleration);
+      solid_strains(mesh, materials, elements, u, acceleration, frames);
   const std::vector<CornerTensors> stresses = solid_stresses(elements, strains);
   return {in_the_middle(strains), nodal_tensors(mesh, elements, strains), in_the_middle(stresses),
           nodal_tensors(mesh, elements, stresses)};

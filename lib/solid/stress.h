@@ -20,13 +20,19 @@ namespace gewebe {
 /// Symmetric tensors at the four corners of a tetrahedron: xx xy xz yy yz zz.
 using CornerTensors = std::array<SymmetricBlock, 4>;
 
+/// In which frames displacements are those of small strains: at rest, or in ones that turn by their
+/// curl, as solid/rotation_warp.h has them.
+enum class StrainFrames { resting, turning };
+
 /// Strains under displacements u (mm) of the 3 n axes and gravity (acceleration in mm/s²), without
-/// which the bubbles of a body that its weight deforms would be wrong; at rest in space, 0.
-/// \pre elements are those of the mesh and the materials, u.size() == 3 n
+/// which the bubbles of a body that its weight deforms would be wrong; at rest in space, 0. Those
+/// of turning frames are turned by their rotations, so that they are told in space. \pre elements
+/// are those of the mesh and the materials, u.size() == 3 n
 std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          std::span<const SolidElement> elements,
-                                         std::span<const double> u, const Vec3& acceleration = {});
+                                         std::span<const double> u, const Vec3& acceleration = {},
+                                         StrainFrames frames = StrainFrames::resting);
 
 /// Stresses of strains, Pa. \pre one strain per element
 std::vector<CornerTensors> solid_stresses(std::span<const SolidElement> elements,
@@ -52,6 +58,7 @@ struct SolidFields {
 /// \pre as for solid_strains
 SolidFields solid_fields(const TetMesh& mesh, std::span<const SolidMaterial> materials,
                          std::span<const SolidElement> elements, std::span<const double> u,
-                         const Vec3& acceleration = {});
+                         const Vec3& acceleration = {},
+                         StrainFrames frames = StrainFrames::resting);
 
 } // namespace gewebe

@@ -2,6 +2,7 @@
 
 namespace gewebe {
 
-const WarpKernel warp_kernel_baseline{&ask, &turn_middles, &take_back, &combine, &project};
+const WarpKernel warp_kernel_baseline{&find_rotations, &ask,     &turn_middles, &find_moments,
+                                      &take_back,      &combine, &project};
 
 } // namespace gewebe

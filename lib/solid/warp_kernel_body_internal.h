@@ -108,15 +108,16 @@ inline void angle_terms(const Four& square, Four& second, Four& third) {
   }
 }
 
-/// Rotation and strain of displacements, R(w) and I + E + E² / 2.
+/// R of the frames' w, E of displacements, and what is in the frames: I + E + E² / 2 + [r], where r
+/// is the rotation beyond w.
 struct State {
   Vector w;
   Four second, third; ///< (1 - cos a) / a², (a - sin a) / a³ of the angle a
-  Matrix strain, rotation, stretch;
+  Matrix strain, rotation, inside;
 };
 
-inline void state(const TriangleGroup& t, const double* local, State& s) {
-  Matrix h;
+/// The gradient of displacements.
+inline void gradient(const TriangleGroup& t, const double* local, Matrix& h) {
   along(t, local, h);
   Vector n;
   load(t.normal, n);
@@ -133,10 +134,40 @@ inline void state(const TriangleGroup& t, const double* local, State& s) {
   turn(tilt.x, h.row[0]);
   turn(tilt.y, h.row[1]);
   turn(tilt.z, h.row[2]);
+}
 
-  s.w.x = 0.5 * (h.row[2].y - h.row[1].z);
-  s.w.y = 0.5 * (h.row[0].z - h.row[2].x);
-  s.w.z = 0.5 * (h.row[1].x - h.row[0].y);
+/// Half of the curl.
+inline void rotation_of(const Matrix& h, Vector& w) {
+  w.x = 0.5 * (h.row[2].y - h.row[1].z);
+  w.y = 0.5 * (h.row[0].z - h.row[2].x);
+  w.z = 0.5 * (h.row[1].x - h.row[0].y);
+}
+
+/// Four vectors, one behind the other.
+inline void gather(const double* values, Vector& to) {
+  to.x = Four{values[0], values[3], values[6], values[9]};
+  to.y = Four{values[1], values[4], values[7], values[10]};
+  to.z = Four{values[2], values[5], values[8], values[11]};
+}
+
+inline void put(const Vector& v, double* to) {
+  for (std::size_t lane = 0; lane < 4; ++lane) {
+    to[3 * lane] = v.x[lane];
+    to[3 * lane + 1] = v.y[lane];
+    to[3 * lane + 2] = v.z[lane];
+  }
+}
+
+/// \param w of the frames
+inline void state(const TriangleGroup& t, const double* local, const double* w, State& s) {
+  Matrix h;
+  gradient(t, local, h);
+  gather(w, s.w);
+  Vector beyond;
+  rotation_of(h, beyond);
+  beyond.x -= s.w.x;
+  beyond.y -= s.w.y;
+  beyond.z -= s.w.z;
   Matrix& e = s.strain;
   e.row[0].x = h.row[0].x;
   e.row[1].y = h.row[1].y;
@@ -161,14 +192,20 @@ inline void state(const TriangleGroup& t, const double* local, State& s) {
   r.row[1].z = yz - first * s.w.x;
   r.row[2].y = yz + first * s.w.x;
 
-  Matrix& u = s.stretch;
+  Matrix& u = s.inside;
   const Vector *a = e.row, &p = a[0], &q = a[1], &o = a[2];
   u.row[0].x = 1 + p.x + 0.5 * (p.x * p.x + p.y * p.y + p.z * p.z);
   u.row[1].y = 1 + q.y + 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z);
   u.row[2].z = 1 + o.z + 0.5 * (o.x * o.x + o.y * o.y + o.z * o.z);
-  u.row[0].y = u.row[1].x = p.y + 0.5 * (p.x * q.x + p.y * q.y + p.z * q.z);
-  u.row[0].z = u.row[2].x = p.z + 0.5 * (p.x * o.x + p.y * o.y + p.z * o.z);
-  u.row[1].z = u.row[2].y = q.z + 0.5 * (q.x * o.x + q.y * o.y + q.z * o.z);
+  const Four pq = p.y + 0.5 * (p.x * q.x + p.y * q.y + p.z * q.z),
+             po = p.z + 0.5 * (p.x * o.x + p.y * o.y + p.z * o.z),
+             qo = q.z + 0.5 * (q.x * o.x + q.y * o.y + q.z * o.z);
+  u.row[0].y = pq - beyond.z;
+  u.row[1].x = pq + beyond.z;
+  u.row[0].z = po + beyond.y;
+  u.row[2].x = po - beyond.y;
+  u.row[1].z = qo - beyond.x;
+  u.row[2].y = qo + beyond.x;
 }
 
 /// a b
@@ -180,23 +217,28 @@ inline void product(const Matrix& a, const Matrix& b, Matrix& c) {
   }
 }
 
+inline void find_rotations(const TriangleGroup* groups, std::size_t count, const double* local,
+                           double* w) {
+  for (std::size_t n = 0; n < count; ++n) {
+    Matrix h;
+    Vector v;
+    gradient(groups[n], local, h);
+    rotation_of(h, v);
+    put(v, w + 12 * n);
+  }
+}
+
 inline void ask(const TriangleGroup* groups, std::size_t count, const double* local,
-                double* divergence, double* w) {
+                const double* w, double* divergence) {
   for (std::size_t n = 0; n < count; ++n) {
     State s;
-    state(groups[n], local, s);
+    state(groups[n], local, w + 12 * n, s);
     Matrix wanted;
-    product(s.rotation, s.stretch, wanted);
+    product(s.rotation, s.inside, wanted);
     wanted.row[0].x -= 1;
     wanted.row[1].y -= 1;
     wanted.row[2].z -= 1;
     add_divergence(groups[n], wanted, divergence);
-    for (int lane = 0; lane < 4; ++lane) {
-      double* const to = w + 12 * n + 3 * static_cast<std::size_t>(lane);
-      to[0] = s.w.x[lane];
-      to[1] = s.w.y[lane];
-      to[2] = s.w.z[lane];
-    }
   }
 }
 
@@ -239,32 +281,59 @@ inline void turn_middles(const MiddleGroup* groups, std::size_t count, const dou
   }
 }
 
+/// Rᵀ ∇y: what acts in the frames.
+inline void in_frames(const TriangleGroup& t, const State& s, const double* y, Matrix& back) {
+  Matrix slope, turned;
+  along(t, y, slope);
+  for (int i = 0; i < 3; ++i) { // Rᵀ
+    const Vector* const r = s.rotation.row;
+    turned.row[i].x = i == 0 ? r[0].x : i == 1 ? r[0].y : r[0].z;
+    turned.row[i].y = i == 0 ? r[1].x : i == 1 ? r[1].y : r[1].z;
+    turned.row[i].z = i == 0 ? r[2].x : i == 1 ? r[2].y : r[2].z;
+  }
+  product(turned, slope, back);
+}
+
+inline void find_moments(const TriangleGroup* groups, std::size_t count, const double* local,
+                         const double* w, const double* y, double* moments) {
+  for (std::size_t n = 0; n < count; ++n) {
+    State s;
+    state(groups[n], local, w + 12 * n, s);
+    // Of F = R S, dF = R [v] S + R dS with v = dw - second w × dw + third w × (w × dw), and
+    // dS = - [dw] among others.
+    Matrix back;
+    in_frames(groups[n], s, y, back);
+    const auto across = [](const Vector& a, const Vector& b, const Vector& c, const Vector& d,
+                           Four& to) {
+      to = (a.x * b.x + a.y * b.y + a.z * b.z) - (c.x * d.x + c.y * d.y + c.z * d.z);
+    };
+    const Vector *b = back.row, *u = s.inside.row;
+    Vector moment, once, twice;
+    across(b[2], u[1], b[1], u[2], moment.x);
+    across(b[0], u[2], b[2], u[0], moment.y);
+    across(b[1], u[0], b[0], u[1], moment.z);
+    cross(s.w, moment, once);
+    cross(s.w, once, twice);
+    moment.x += once.x * s.second + twice.x * s.third - (b[2].y - b[1].z);
+    moment.y += once.y * s.second + twice.y * s.third - (b[0].z - b[2].x);
+    moment.z += once.z * s.second + twice.z * s.third - (b[1].x - b[0].y);
+    put(moment, moments + 12 * n);
+  }
+}
+
 inline void take_back(const TriangleGroup* groups, std::size_t count, const double* local,
-                      const double* y, double* forces) {
+                      const double* w, const double* y, const double* moments, double* forces) {
   for (std::size_t n = 0; n < count; ++n) {
     const TriangleGroup& t = groups[n];
     State s;
-    state(t, local, s);
-    // Of F = R S, dF = R [v] S + R dS with v = dw - second w × dw + third w × (w × dw).
-    Matrix slope, turned, back, moments;
-    along(t, y, slope);
-    for (int i = 0; i < 3; ++i) { // Rᵀ
-      const Vector* const r = s.rotation.row;
-      turned.row[i].x = i == 0 ? r[0].x : i == 1 ? r[0].y : r[0].z;
-      turned.row[i].y = i == 0 ? r[1].x : i == 1 ? r[1].y : r[1].z;
-      turned.row[i].z = i == 0 ? r[2].x : i == 1 ? r[2].y : r[2].z;
-    }
-    product(turned, slope, back);
-    product(back, s.stretch, moments);
-    Vector moment, once, twice, half;
-    moment.x = moments.row[2].y - moments.row[1].z;
-    moment.y = moments.row[0].z - moments.row[2].x;
-    moment.z = moments.row[1].x - moments.row[0].y;
-    cross(s.w, moment, once);
-    cross(s.w, once, twice);
-    half.x = 0.5 * (moment.x + once.x * s.second + twice.x * s.third);
-    half.y = 0.5 * (moment.y + once.y * s.second + twice.y * s.third);
-    half.z = 0.5 * (moment.z + once.z * s.second + twice.z * s.third);
+    state(t, local, w + 12 * n, s);
+    Matrix back;
+    in_frames(t, s, y, back);
+    Vector half;
+    gather(moments + 12 * n, half);
+    half.x = 0.5 * (half.x + back.row[2].y - back.row[1].z);
+    half.y = 0.5 * (half.y + back.row[0].z - back.row[2].x);
+    half.z = 0.5 * (half.z + back.row[1].x - back.row[0].y);
 
     Matrix even, m;
     even.row[0].x = back.row[0].x;

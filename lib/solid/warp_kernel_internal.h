@@ -25,17 +25,25 @@ struct MiddleGroup {
 };
 
 struct WarpKernel {
-  /// Adds area (R (I + E + E² / 2) - I) ∇N to the nodes of each triangle: what asks the surface to
-  /// become what `local` stands for. Puts w of triangle t to w[3 t].
-  void (*ask)(const TriangleGroup* groups, std::size_t count, const double* local,
-              double* divergence, double* w);
+  /// Puts half of the curl in triangle t to w[3 t].
+  void (*find_rotations)(const TriangleGroup* groups, std::size_t count, const double* local,
+                         double* w);
+  /// Adds area (R (I + E + E² / 2 + [r]) - I) ∇N to the nodes of each triangle, in frames that are
+  /// turned by w, r the rotation beyond that: what asks the surface to become what `local` stands
+  /// for.
+  void (*ask)(const TriangleGroup* groups, std::size_t count, const double* local, const double* w,
+              double* divergence);
   /// Middles of edges whose ends are displaced by u: as far from the middle of those as in `local`,
   /// turned by the triangles' mean w.
   void (*turn_middles)(const MiddleGroup* groups, std::size_t count, const double* w,
                        const double* local, double* u);
-  /// Adds the transposed derivative of the same by `local`, times y.
+  /// The transposed derivative of the same, times y: by w, over the area, of triangle t to
+  /// moments[3 t]; and added to forces that by `local`, where moments, over the area, act on its
+  /// rotations besides.
+  void (*find_moments)(const TriangleGroup* groups, std::size_t count, const double* local,
+                       const double* w, const double* y, double* moments);
   void (*take_back)(const TriangleGroup* groups, std::size_t count, const double* local,
-                    const double* y, double* forces);
+                    const double* w, const double* y, const double* moments, double* forces);
   /// sum[k] = Σ factor[c] columns[stride c + k] of the first `rows` k.
   void (*combine)(const float* columns, std::size_t stride, std::size_t rows, const double* factor,
                   std::size_t count, double* sum);

@@ -58,6 +58,8 @@ struct ElastostaticCounts {
   double backward_error = 0; ///< largest ShapeError::error seen, where it was asked for
   ShapeError worst_shape;    ///< that which comes nearest to its limit
   double contact_error = 0;  ///< largest miss of a prescribed displacement, over the largest one
+  std::uint64_t rounds = 0;  ///< of answers with large rotations, see warped_statics.h
+  double change = 0;      ///< the largest that a last round of these made, over the largest entry
   double shape_error = 0; ///< largest effect of the tolerance on an entry, over the largest entry,
                           ///< where errors were asked for
 };

@@ -1,42 +1,57 @@
 #include "statics/linear_range.h"
 
+#include "base/vector_at.h"
+
 #include <algorithm>
 #include <cmath>
 
 namespace gewebe {
 
-LinearRange linear_range(const Model& model, std::span<const double> displacement) {
-  const auto moved = [&](std::size_t node) {
-    return Vec3{displacement[3 * node], displacement[3 * node + 1], displacement[3 * node + 2]};
-  };
-  LinearRange range;
-  for (std::size_t s = 0; s < model.springs.size(); ++s) {
-    const Spring& spring = model.springs[s];
+namespace {
+
+template <class Visit>
+void visit_edges(const Model& model, const Visit& visit) {
+  if (!model.tetrahedra.empty()) {
+    for (const Triangle& t : model.triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        if (t[k] < t[(k + 1) % 3]) // the other triangle has it the other way around
+          visit(t[k], t[(k + 1) % 3]);
+    return;
+  }
+  for (const Spring& spring : model.springs) {
     if (spring.kind != SpringKind::edge)
       break; // edges come first
-    const Vec3 along = model.nodes[spring.j].position - model.nodes[spring.i].position;
-    const Vec3 by = moved(spring.j) - moved(spring.i);
+    visit(spring.i, spring.j);
+  }
+}
+
+} // namespace
+
+LinearRange linear_range(const Model& model, std::span<const double> displacement) {
+  LinearRange range;
+  visit_edges(model, [&](std::uint32_t i, std::uint32_t j) {
+    const Vec3 along = model.nodes[j].position - model.nodes[i].position;
+    const Vec3 by = vector_at(displacement, j) - vector_at(displacement, i);
     const double length = norm(along);
     const double strain = std::abs(norm(along + by) - length) / length;
     const double turn = norm(by - along * (dot(by, along) / (length * length))) / length;
     if (strain > range.strain) {
       range.strain = strain;
-      range.strain_spring = s;
+      range.strain_edge = {i, j};
     }
     if (turn > range.turn) {
       range.turn = turn;
-      range.turn_spring = s;
+      range.turn_edge = {i, j};
     }
-  }
+  });
   return range;
 }
 
 double shortest_edge(const Model& model) {
   double shortest = HUGE_VAL;
-  for (const Spring& spring : model.springs)
-    if (spring.kind == SpringKind::edge)
-      shortest =
-          std::min(shortest, norm(model.nodes[spring.j].position - model.nodes[spring.i].position));
+  visit_edges(model, [&](std::uint32_t i, std::uint32_t j) {
+    shortest = std::min(shortest, norm(model.nodes[j].position - model.nodes[i].position));
+  });
   return shortest;
 }
 

@@ -68,7 +68,8 @@ ShapeCheck::ShapeCheck(const Model& model) {
       ++edges;
     }
   mean_edge_ = edges > 0 ? mean_edge_ / static_cast<double>(edges) : 0;
-  shortest_edge_ = edges > 0 ? gewebe::shortest_edge(model) : 0;
+  const double shortest = gewebe::shortest_edge(model);
+  shortest_edge_ = std::isfinite(shortest) ? shortest : 0;
 }
 
 ShapeFaults ShapeCheck::look(const Model& model, std::span<const double> displacement) const {
@@ -83,10 +84,8 @@ ShapeFaults ShapeCheck::look(const Model& model, std::span<const double> displac
     faults.volume = faces.volume / volume_ - 1;
   const LinearRange range = linear_range(model, displacement);
   faults.strain = range.strain;
-  if (range.strain_spring < model.springs.size()) {
-    faults.i = model.springs[range.strain_spring].i;
-    faults.j = model.springs[range.strain_spring].j;
-  }
+  faults.i = range.strain_edge[0];
+  faults.j = range.strain_edge[1];
   return faults;
 }
 

@@ -97,6 +97,9 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(said("attach a 1 b z<3 500").others.value().text, "z<3");
   EXPECT_EQ(said("grasp a z<3 tongs").instrument, "tongs");
   EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela integration=implicit").implicit);
+  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela method=ffe rotation=warp").warp);
+  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela rotation=warp store=a.h5").warp);
+  EXPECT_FALSE(parsed<ObjectCommand>("object a a.ela store=a.h5").warp);
   // What an object has no use for now it may have by another method.
   EXPECT_EQ(parsed<ObjectCommand>("object a a.ela store=x method=ela").method, Method::ela);
   EXPECT_EQ(change<SetMethod>("method a ffe").method, Method::ffe);
@@ -154,6 +157,8 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"object " + std::string(101, 'a') + " c", "is no name"},
       {"object a b method=fem", "'method=fem' is no use here"},
       {"object a b store=", "'store=' is no use here"},
+      {"object a b rotation=warp", "rotation=warp with method=ela"},
+      {"object a b method=ffe rotation=warp rotation=warp", "'rotation=warp' is no use here"},
       {"object a b store=x store=y", "'store=y' is no use here"},
       {"object a b method=ela method=ela", "'method=ela' is no use here"},
       {"object a b c", "'c' is no use here"},

@@ -20,7 +20,11 @@
 namespace gewebe {
 namespace {
 
-/// All that an object is which goes on this way, in these tests.
+bool is_solid(Way way) {
+  return way == Way::solid || way == Way::warped;
+}
+
+/// All that an object is which goes on this way, in these tests, but for what it consists of.
 std::vector<Way> ways_of(Way way) {
   switch (way) {
   case Way::attached:
@@ -34,15 +38,21 @@ std::vector<Way> ways_of(Way way) {
   case Way::whole:
     return {Way::elastostatic, Way::whole};
   case Way::solid:
-    return {Way::elastostatic, Way::whole, Way::solid};
+    return {Way::elastostatic, Way::whole};
+  case Way::warped:
+    return {Way::elastostatic, Way::whole, Way::warped};
+  case Way::net:
+    return {Way::elastostatic, Way::whole};
   default:
     return {way, Way::whole};
   }
 }
 
 const Gap* expected(Way way, Feature feature) {
+  std::vector<Way> ways = ways_of(way);
+  ways.push_back(is_solid(way) ? Way::solid : Way::net);
   for (const Gap& one : gaps)
-    for (const Way is : ways_of(way))
+    for (const Way is : ways)
       if (one.way == is && one.feature == feature)
         return &one;
   return nullptr;
@@ -76,7 +86,7 @@ Model solid(Model model) {
 class Pair {
 public:
   Pair(Way way, std::vector<std::string>& warnings)
-      : model_(way == Way::solid ? solid(test::organ(3)) : test::organ(3)), way_(way),
+      : model_(is_solid(way) ? solid(test::organ(3)) : test::organ(3)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
     const bool moves =
         way == Way::explicit_motion || way == Way::implicit_motion || way == Way::attached;
@@ -89,6 +99,8 @@ public:
     scene_.add_object("p", std::move(beside), Method::ela, {}, integration);
     if (way == Way::attached)
       scene_.apply(tie());
+    if (way == Way::warped)
+      scene_.apply(SetWarp{0});
     if (way == Way::two_step || way == Way::two_step_stored)
       scene_.apply(two_step());
     if (way == Way::cut) {
@@ -144,6 +156,10 @@ public:
     }
     case Feature::two_step:
       scene_.apply(two_step());
+      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      return bends();
+    case Feature::warp:
+      scene_.apply(SetWarp{0});
       scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
     case Feature::renew:

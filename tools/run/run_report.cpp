@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "statics/warped_statics.h"
 
 #include <cmath>
 #include <cstdint>
@@ -50,6 +51,10 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("compressed", statics.worst_shape.relative);
     stats.set("shape_error", statics.shape_error);
   }
+  if (statics.rounds > 0) {
+    stats.set("warp_rounds", statics.rounds);
+    stats.set("warp_change", statics.change);
+  }
   stats.set("contact_error", statics.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);
   stats.set("largest_jump", steps.largest_jump);
@@ -78,6 +83,8 @@ void require_verified(const ElastostaticCounts& errors, double tolerance) {
                   ", expected at most " + number_text(max) + because);
   };
   require("error", errors.shape_error <= tolerance, errors.shape_error, tolerance, "");
+  require("last round's change", errors.change <= warp_tolerance, errors.change, warp_tolerance,
+          "");
   const ShapeError& worst = errors.worst_shape;
   if (tolerance == 0)
     require("backward error", worst.within(), worst.error, worst.limit,

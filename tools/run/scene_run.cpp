@@ -144,6 +144,8 @@ struct SceneRun::State {
     };
     simulation.add_object(c.name, std::move(source), c.method,
                           c.implicit ? Integration::implicit : Integration::semi_implicit);
+    if (c.warp)
+      simulation.apply(SetWarp{simulation.object_count() - 1});
     stores.resize(simulation.object_count()); // parts that came off have none
     stores.back() = c.store;
     models.push_back(c.model);

@@ -37,8 +37,9 @@ const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
 
 void SceneStress::find(const Simulation& simulation, const Vec3& gravity) {
   for (auto& [object, solid] : solids_)
-    solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
-                                simulation.displacement(object), gravity);
+    solid.fields = solid_fields(
+        solid.mesh, solid.materials, solid.elements, simulation.local_displacement(object), gravity,
+        simulation.object(object).warp ? StrainFrames::turning : StrainFrames::resting);
 }
 
 const SolidFields* SceneStress::fields(std::size_t object) const {
