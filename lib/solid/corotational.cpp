@@ -69,9 +69,7 @@ struct CorotationalSolid::State {
   Groups<10> quadratic;
   bool is_quadratic = false;
   std::size_t nodes = 0;
-  std::vector<double> volume;     ///< by element
-  std::vector<std::size_t> start; ///< by node, into
-  std::vector<std::uint32_t> use; ///< 10 t + a, ascending
+  std::vector<double> volume; ///< by element
 
   template <class Work>
   decltype(auto) with(const Work& work) {
@@ -95,18 +93,6 @@ CorotationalSolid::CorotationalSolid(const TetMesh& mesh, std::span<const SolidE
   s.with([&](auto& of) { of.make(mesh, elements); });
   for (const SolidElement& e : elements)
     s.volume.push_back(e.volume);
-  const std::size_t count = solid_nodes(mesh);
-  s.start.resize(s.nodes + 1);
-  for (std::size_t t = 0; t < elements.size(); ++t)
-    for (std::size_t a = 0; a < count; ++a)
-      ++s.start[std::size_t{solid_node(mesh, t, a)} + 1];
-  for (std::size_t i = 0; i < s.nodes; ++i)
-    s.start[i + 1] += s.start[i];
-  s.use.resize(s.start.back());
-  std::vector<std::size_t> next(s.start.begin(), s.start.end() - 1);
-  for (std::size_t t = 0; t < elements.size(); ++t)
-    for (std::size_t a = 0; a < count; ++a)
-      s.use[next[solid_node(mesh, t, a)]++] = static_cast<std::uint32_t>(10 * t + a);
 }
 
 double CorotationalSolid::evaluate(std::span<const double> x, const CorotationalWeights& weights,
@@ -115,20 +101,18 @@ double CorotationalSolid::evaluate(std::span<const double> x, const Corotational
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
   const double energy = s.is_quadratic ? s.quadratic.evaluate(kernel.quadratic, x, weights, context)
                                        : s.linear.evaluate(kernel.linear, x, weights, context);
+  // In order, by one thread: the sums stay in its cache, where threads that each ask for the
+  // elements of their nodes would wait for memory.
+  std::ranges::fill(forces, 0.0);
   s.with([&](const auto& of) {
-    parallel_blocks(context, s.nodes, 1024, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        double sum[3] = {0, 0, 0};
-        for (std::size_t k = s.start[i]; k < s.start[i + 1]; ++k) {
-          const std::size_t t = s.use[k] / 10, a = s.use[k] % 10;
-          const auto* const force = of.results[t / 4].force + 3 * a;
-          for (std::size_t c = 0; c < 3; ++c)
-            sum[c] += force[c][t % 4];
-        }
+    for (std::size_t t = 0; t < s.volume.size(); ++t) {
+      const auto& group = of.groups[t / 4];
+      for (std::size_t a = 0; a < group.nodes; ++a) {
+        double* const to = forces.data() + 3 * std::size_t{group.node[a][t % 4]};
         for (std::size_t c = 0; c < 3; ++c)
-          forces[3 * i + c] = sum[c];
+          to[c] += of.results[t / 4].force[3 * a + c][t % 4];
       }
-    });
+    }
   });
   return energy;
 }
@@ -140,24 +124,22 @@ void CorotationalSolid::remember() {
 void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) const {
   const State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
+  std::vector<std::array<double[4], 9>> sums((s.nodes + 3) / 4);
   s.with([&](const auto& of) {
-    parallel_blocks(context, (s.nodes + 3) / 4, 256, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::array<double[4], 9>> sums(end - begin);
-      for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i) {
-        auto& sum = sums[i / 4 - begin];
-        if (s.start[i] == s.start[i + 1])
-          sum[0][i % 4] = sum[4][i % 4] = sum[8][i % 4] = 1;
-        for (std::size_t k = s.start[i]; k < s.start[i + 1]; ++k) {
-          const std::size_t t = s.use[k] / 10;
-          for (std::size_t c = 0; c < 9; ++c)
-            sum[c][i % 4] += s.volume[t] * of.results[t / 4].rotation[c][t % 4];
-        }
-      }
-      kernel.turn(sums[0].data(), sums.size());
-      for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)
+    for (std::size_t t = 0; t < s.volume.size(); ++t) {
+      const auto& group = of.groups[t / 4];
+      for (std::size_t a = 0; a < group.nodes; ++a) {
+        const std::size_t i = group.node[a][t % 4];
         for (std::size_t c = 0; c < 9; ++c)
-          rotations[9 * i + c] = sums[i / 4 - begin][c][i % 4];
-    });
+          sums[i / 4][c][i % 4] += s.volume[t] * of.results[t / 4].rotation[c][t % 4];
+      }
+    }
+  });
+  parallel_blocks(context, sums.size(), 256, [&](std::size_t begin, std::size_t end) {
+    kernel.turn(sums[begin].data(), end - begin);
+    for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)
+      for (std::size_t c = 0; c < 9; ++c)
+        rotations[9 * i + c] = sums[i / 4][c][i % 4];
   });
 }
 
