@@ -308,20 +308,20 @@ void RotationStrain::spread(std::span<const double> f, std::span<double> y) cons
   solve(on_corners, y);
 }
 
-void RotationStrain::take_back(std::span<const double> local, std::span<const double> w,
+void RotationStrain::take_back(std::span<const double> local, std::span<const double> turning,
                                std::span<const double> y, std::span<double> forces) const {
   const WarpKernel& kernel = warp_kernel(cpu_);
   std::ranges::fill(forces, 0.0);
   std::vector<double> moments(12 * groups_.size());
-  kernel.find_moments(groups_.data(), groups_.size(), local.data(), w.data(), y.data(),
+  kernel.find_moments(groups_.data(), groups_.size(), local.data(), turning.data(), y.data(),
                       moments.data());
-  kernel.take_back(groups_.data(), groups_.size(), local.data(), w.data(), y.data(),
+  kernel.take_back(groups_.data(), groups_.size(), local.data(), turning.data(), y.data(),
                    smoothed(moments).data(), forces.data());
   for (const Middle& m : middles_) {
     const Vec3 f = at(y, m.node);
     if (f == Vec3{})
       continue;
-    const std::array<double, 9> r = rotation(w, m.node);
+    const std::array<double, 9> r = rotation(turning, m.node);
     for (std::size_t i = 0; i < 3; ++i) {
       const double turned = r[i] * f.x + r[3 + i] * f.y + r[6 + i] * f.z;
       forces[3 * std::size_t{m.node} + i] = turned;

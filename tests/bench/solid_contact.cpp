@@ -1,6 +1,7 @@
 // Contact with an elastostatic solid: 30 displaced nodes that all change at every update, against a
 // net of as many surface nodes, where much and where little is inside. Columns of a patch of nodes
-// are stored, with rows for the surface alone.
+// are stored, with rows for the surface alone. And the same nodes moved together, slowly and far:
+// forces and shape by the linear method and with large rotations (statics/warped_statics.h).
 //
 // Writes CSV to standard output: stage, program, surface nodes, nodes inside, median, fastest and
 // slowest time in ms, and the median over that of the net, all measured in turn.
@@ -9,6 +10,7 @@
 #include "solid/model_stiffness.h"
 #include "solid/solid_model.h"
 #include "statics/elastostatic.h"
+#include "statics/warped_statics.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/tet_fixtures.h"
@@ -35,6 +37,8 @@ struct Body {
   std::unique_ptr<Elastostatic> object{};
   Load load{};
   std::vector<double> forces{}, surfaces{}, wholes{};
+  std::unique_ptr<WarpedStatics> turning{}; ///< of a solid
+  std::vector<double> linear_far{}, turning_far{};
 };
 
 Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz) {
@@ -59,11 +63,13 @@ void prepare(Body& body) {
     if (body.model.nodes[i].fixed == fixed_none)
       nodes.push_back(i);
   const bool net = body.model.tetrahedra.empty();
-  body.object = std::make_unique<Elastostatic>(
-      body.model,
-      compliance_of_store(memory_stiffness(matrix, body.factor, nodes, false,
-                                           net ? SIZE_MAX : surface_count(body.model))),
-      with_threads(1));
+  const auto source = [&] {
+    return compliance_of_store(memory_stiffness(matrix, body.factor, nodes, false,
+                                                net ? SIZE_MAX : surface_count(body.model)));
+  };
+  body.object = std::make_unique<Elastostatic>(body.model, source(), with_threads(1));
+  if (!net)
+    body.turning = std::make_unique<WarpedStatics>(body.model, source(), with_threads(1));
   for (std::size_t k = 0; k < contacts; ++k)
     body.load.displacement[nodes[2 * k]] = {};
 }
@@ -99,6 +105,34 @@ int main() {
       if (round < 50)
         time(body.wholes, [&] { (void)body.object->displacement(); });
     }
+  std::uint64_t rounds = 0, updates = 0;
+  for (int step = -40; step < 400; ++step)
+    for (Body& body : bodies) {
+      Load far = body.load;
+      for (auto& [node, d] : far.displacement)
+        d = {1 + 0.001 * step, 0, 1.5 + 0.002 * step};
+      const auto time = [&](std::vector<double>& to, auto& object) {
+        const double taken = milliseconds([&] {
+          object.update(far);
+          (void)object.surface_displacement();
+        });
+        if (step >= 0)
+          to.push_back(taken);
+      };
+      time(body.linear_far, *body.object);
+      if (!body.turning) {
+        body.turning_far = body.linear_far;
+        continue;
+      }
+      const std::uint64_t before = body.turning->counts().rounds;
+      time(body.turning_far, *body.turning);
+      if (step >= 0) {
+        rounds += body.turning->counts().rounds - before;
+        ++updates;
+      }
+    }
+  std::fprintf(stderr, "%.2f rounds a shape that turns\n",
+               static_cast<double>(rounds) / static_cast<double>(updates));
   const auto report = [&](const char* stage, std::vector<double> Body::*times) {
     const double net = times_of(bodies[0].*times).median;
     for (const Body& body : bodies) {
@@ -112,6 +146,8 @@ int main() {
   report("contact forces", &Body::forces);
   report("shape of the surface", &Body::surfaces);
   report("whole shape beyond it", &Body::wholes);
+  report("forces and surface, moved together", &Body::linear_far);
+  report("the same with large rotations", &Body::turning_far);
   for (const Body& body : bodies)
     std::fprintf(stderr, "%s: %llu solves\n", body.name.c_str(),
                  static_cast<unsigned long long>(body.object->counts().solves));
