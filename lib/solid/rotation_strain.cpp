@@ -286,13 +286,13 @@ std::vector<double> RotationStrain::turning(std::span<const double> local) const
   return smoothed(w);
 }
 
-void RotationStrain::deform(std::span<const double> local, std::span<double> u) const {
+void RotationStrain::deform(std::span<const double> local, std::span<const double> turning,
+                            std::span<double> u) const {
   const WarpKernel& kernel = warp_kernel(cpu_);
   std::vector<double> divergence(3 * corners_);
-  const std::vector<double> w = turning(local);
-  kernel.ask(groups_.data(), groups_.size(), local.data(), w.data(), divergence.data());
+  kernel.ask(groups_.data(), groups_.size(), local.data(), turning.data(), divergence.data());
   solve(divergence, u);
-  kernel.turn_middles(middle_groups_.data(), middle_groups_.size(), w.data(), local.data(),
+  kernel.turn_middles(middle_groups_.data(), middle_groups_.size(), turning.data(), local.data(),
                       u.data());
 }
 

@@ -67,7 +67,8 @@ public:
 
   /// Displacements of the surface from those of small strains. One pass over triangles, one
   /// solution of the surface's Laplacian. \pre spans have 3 entries for each node
-  void deform(std::span<const double> local, std::span<double> u) const;
+  void deform(std::span<const double> local, std::span<const double> turning,
+              std::span<double> u) const;
 
   /// y of forces f on the surface: the solution of the Laplacian at corners, f itself at middles;
   /// linear, once for each f.

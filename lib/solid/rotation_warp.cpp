@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 namespace gewebe {
@@ -51,50 +52,50 @@ void turn(const Rotation& r, bool back, double* v) {
   }
 }
 
-/// Anderson's method for x = map(x): the combination of the last rounds whose changes cancel best.
-class Mixing {
-public:
-  /// \return what to go on from, behind map(from) = to
-  Vector next(const Vector& from, Vector to) {
-    Vector change(to.size());
-    for (std::size_t k = 0; k < to.size(); ++k)
-      change[k] = to[k] - from[k];
-    places_.insert(places_.begin(), to);
-    changes_.insert(changes_.begin(), std::move(change));
-    if (places_.size() > depth + 1) {
-      places_.pop_back();
-      changes_.pop_back();
-    }
-    const auto older = static_cast<Eigen::Index>(places_.size()) - 1;
-    if (older == 0)
-      return to;
-    const auto difference = [&](Eigen::Index a, std::size_t k) {
-      return changes_[0][k] - changes_[static_cast<std::size_t>(a) + 1][k];
-    };
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(older, older);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(older);
-    for (Eigen::Index a = 0; a < older; ++a) {
-      for (std::size_t k = 0; k < to.size(); ++k)
-        right[a] += difference(a, k) * changes_[0][k];
-      for (Eigen::Index b = 0; b <= a; ++b) {
-        for (std::size_t k = 0; k < to.size(); ++k)
-          normal(a, b) += difference(a, k) * difference(b, k);
-        normal(b, a) = normal(a, b);
-      }
-    }
-    normal.diagonal() *= 1 + 1e-10;
-    const Eigen::VectorXd share = Eigen::LDLT<Eigen::MatrixXd>(normal).solve(right);
-    if (share.allFinite())
-      for (Eigen::Index a = 0; a < older; ++a)
-        for (std::size_t k = 0; k < to.size(); ++k)
-          to[k] -= share[a] * (places_[0][k] - places_[static_cast<std::size_t>(a) + 1][k]);
-    return to;
-  }
-
-private:
-  static constexpr std::size_t depth = 3;
-  std::vector<Vector> places_, changes_; // the latest first
+/// What a round finds: from z comes to.
+struct Round {
+  Vector z, to;
+  Vector off; ///< what it changes, as displacements: of these lengths are taken
 };
+
+/// Anderson's method for z = map(z), also known as a secant method of several pairs: the
+/// combination of earlier changes that leaves the least one.
+void mix(std::span<const WarpPair> pairs, const Vector& off, Vector& to) {
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  if (count == 0)
+    return;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+  const auto of = [&](Eigen::Index a) { return std::span(pairs[static_cast<std::size_t>(a)].off); };
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (std::size_t k = 0; k < off.size(); ++k)
+      right[a] += of(a)[k] * off[k];
+    for (Eigen::Index b = 0; b <= a; ++b) {
+      for (std::size_t k = 0; k < off.size(); ++k)
+        normal(a, b) += of(a)[k] * of(b)[k];
+      normal(b, a) = normal(a, b);
+    }
+  }
+  normal.diagonal() *= 1 + 1e-10;
+  const Eigen::VectorXd share = Eigen::LDLT<Eigen::MatrixXd>(normal).solve(right);
+  if (share.allFinite())
+    for (Eigen::Index a = 0; a < count; ++a)
+      for (std::size_t k = 0; k < to.size(); ++k)
+        to[k] -= share[a] * pairs[static_cast<std::size_t>(a)].to[k];
+}
+
+/// The change between two rounds, kept with the last ones.
+void keep_pair(const Round& before, const Round& now, std::vector<WarpPair>& pairs) {
+  constexpr std::size_t depth = 5;
+  WarpPair pair{now.off, now.to};
+  for (std::size_t k = 0; k < pair.off.size(); ++k)
+    pair.off[k] -= before.off[k];
+  for (std::size_t k = 0; k < pair.to.size(); ++k)
+    pair.to[k] -= before.to[k];
+  pairs.insert(pairs.begin(), std::move(pair));
+  if (pairs.size() > depth)
+    pairs.pop_back();
+}
 
 /// inverse times x, by rows.
 Vector product(std::span<const double> inverse, std::span<const double> x) {
@@ -137,28 +138,37 @@ void WarpColumns::set(std::span<const std::uint32_t> nodes,
   std::vector<std::size_t> all(count());
   for (std::size_t c = 0; c < all.size(); ++c)
     all[c] = c;
+  block_ = block_of(all);
   inverse_ = inverse_of(all);
   held_.clear();
   held_columns_.clear();
 }
 
 /// An axis that is fixed gives way to nothing: its row and column are those of the identity.
+Vector WarpColumns::block_of(std::span<const std::size_t> columns) const {
+  const std::size_t size = columns.size();
+  Vector block(size * size);
+  for (std::size_t r = 0; r < size; ++r)
+    for (std::size_t c = 0; c <= r; ++c)
+      block[r * size + c] = block[c * size + r] =
+          (entry(columns[r], row_of(columns[c])) + entry(columns[c], row_of(columns[r]))) / 2;
+  for (std::size_t r = 0; r < size; ++r)
+    if (block[r * size + r] == 0)
+      block[r * size + r] = 1;
+  return block;
+}
+
 Vector WarpColumns::inverse_of(std::span<const std::size_t> columns) const {
   const auto size = static_cast<Eigen::Index>(columns.size());
-  const auto row_of = [&](std::size_t c) { return 3 * std::size_t{nodes_[c / 3]} + c % 3; };
-  Eigen::MatrixXd block(size, size);
-  for (Eigen::Index r = 0; r < size; ++r)
-    for (Eigen::Index c = 0; c <= r; ++c) {
-      const std::size_t a = columns[static_cast<std::size_t>(r)],
-                        b = columns[static_cast<std::size_t>(c)];
-      block(r, c) = block(c, r) = (entry(a, row_of(b)) + entry(b, row_of(a))) / 2;
-    }
-  for (Eigen::Index r = 0; r < size; ++r)
-    if (block(r, r) == 0)
-      block(r, r) = 1;
+  const Vector block = block_of(columns);
   const Eigen::MatrixXd inverse =
-      Eigen::LDLT<Eigen::MatrixXd>(block).solve(Eigen::MatrixXd::Identity(size, size));
+      Eigen::LDLT<Eigen::MatrixXd>(Eigen::Map<const Eigen::MatrixXd>(block.data(), size, size))
+          .solve(Eigen::MatrixXd::Identity(size, size));
   return {inverse.data(), inverse.data() + inverse.size()};
+}
+
+void WarpColumns::multiply(std::span<double> x) const {
+  std::ranges::copy(product(block_, x), x.begin());
 }
 
 void WarpColumns::solve(std::span<double> x) const {
@@ -210,173 +220,213 @@ void RotationWarp::column_of(std::uint32_t node, std::span<double> columns) cons
   }
 }
 
+namespace {
+
+/// Which numbers an answer goes on by: local forces at column nodes, what holds the held ones, and
+/// the whole load's share of displacements.
+struct Unknowns {
+  std::size_t forces, whole;
+  std::span<double> local(Vector& z) const { return std::span(z).first(forces); }
+  std::span<double> holding(Vector& z) const { return std::span(z).subspan(forces, forces); }
+  std::span<double> share(Vector& z) const { return std::span(z).subspan(2 * forces, whole); }
+};
+
+} // namespace
+
+/// The whole load's share of local displacements, if it has turned since that was found.
+void RotationWarp::follow_whole(const WarpWholeLoad& whole, const WarpOptions& options,
+                                WarpState& state) const {
+  const std::vector<std::uint32_t>& nodes = surface_.nodes();
+  const std::size_t rows = 3 * nodes.size();
+  Vector back(rows), change(rows);
+  surface_.take_back(state.local, state.frames, whole.spread, back);
+  for (std::size_t k = 0; k < state.whole_forces.size(); ++k)
+    change[k] = back[k] - state.whole_forces[k];
+  if (!state.whole_forces.empty() &&
+      sum_of_sizes(change) <= options.tolerance * sum_of_sizes(whole.on_surface))
+    return;
+  Vector all_axes = whole.over_axes;
+  for (std::size_t k = 0; k < rows; ++k)
+    all_axes[3 * std::size_t{nodes[k / 3]} + k % 3] += back[k] - whole.on_surface[k];
+  solve_(all_axes);
+  ++state.solves;
+  state.whole_forces = std::move(back);
+  state.whole_local.resize(rows);
+  for (std::size_t k = 0; k < rows; ++k)
+    state.whole_local[k] = all_axes[3 * std::size_t{nodes[k / 3]} + k % 3];
+}
+
+/// Local forces at column nodes under forces there.
+Vector RotationWarp::forces_in_frames(const WarpColumns& columns, std::span<const double> on_nodes,
+                                      const WarpState& state) const {
+  const std::size_t rows = 3 * surface_.nodes().size(), corners = 3 * surface_.corners(),
+                    count = columns.count();
+  Vector f(rows), y(rows), back(rows), work(count);
+  for (std::size_t c = 0; c < count; ++c)
+    f[columns.row_of(c)] = on_nodes[c];
+  surface_.spread(f, y);
+  surface_.take_back(state.local, state.frames, y, back);
+  for (std::size_t k = 0; k < rows; ++k)
+    back[k] -= f[k]; // what turning changes
+  kernel_.project(columns.values(), rows, corners, back.data(), count, work.data());
+  for (std::size_t n = 0; n < count; n += 3) // and what is on middles
+    for (std::size_t k = columns.row_of(n); k >= corners && k < columns.row_of(n) + 3; ++k)
+      for (std::size_t c = 0; c < count; ++c)
+        work[c] += back[k] * columns.entry(c, k);
+  columns.solve(work);
+  for (std::size_t c = 0; c < count; ++c)
+    work[c] += on_nodes[c];
+  return work;
+}
+
+/// Displacements of the rows from `from` to `to` under local forces and the whole load.
+void RotationWarp::combine(const WarpColumns& columns, std::span<const double> forces,
+                           std::span<const double> whole, std::size_t from, std::size_t to,
+                           std::span<double> local) const {
+  if (columns.count() > 0)
+    kernel_.combine(columns.values() + from, 3 * surface_.nodes().size(), to - from, forces.data(),
+                    columns.count(), &local[from]);
+  else
+    std::ranges::fill(local.subspan(from, to - from), 0.0);
+  for (std::size_t k = from; k < to && !whole.empty(); ++k)
+    local[k] += whole[k];
+}
+
 void RotationWarp::answer(const WarpLoad& load, WarpState& state,
                           const WarpOptions& options) const {
   const WarpColumns& columns = load.columns;
-  const std::vector<std::uint32_t>& nodes = surface_.nodes();
-  const std::size_t rows = 3 * nodes.size(), corners = 3 * surface_.corners(),
+  const std::size_t rows = 3 * surface_.nodes().size(), corners = 3 * surface_.corners(),
                     count = columns.count();
   const bool holds = any(load.held);
-  const auto row_of = [&](std::size_t c) {
-    return 3 * std::size_t{columns.nodes()[c / 3]} + c % 3;
-  };
   const auto held = [&](std::size_t c) { return holds && load.held[c / 3] != 0; };
+  const Unknowns part{count, load.whole != nullptr ? rows : 0};
 
-  // The last answer.
-  Vector local = std::move(state.local), u = std::move(state.u), holding(count),
-         by_place(count); // local forces that put the held nodes where they are
-  local.resize(rows);
-  u.resize(rows);
+  // From the last answer, as far as it is of these nodes.
+  state.local.resize(rows);
+  state.u.resize(rows);
+  if (state.frames.empty())
+    state.frames = surface_.turning(state.local);
+  Round round;
+  round.z.assign(2 * count + part.whole, 0);
   for (std::size_t c = 0; c < count; ++c)
     if (const auto at = std::ranges::lower_bound(state.nodes, columns.nodes()[c / 3]);
-        held(c) && at != state.nodes.end() && *at == columns.nodes()[c / 3]) {
+        at != state.nodes.end() && *at == columns.nodes()[c / 3]) {
       const std::size_t old = 3 * static_cast<std::size_t>(at - state.nodes.begin()) + c % 3;
-      holding[c] = state.holding[old];
-      by_place[c] = state.local_forces[old];
+      part.local(round.z)[c] = state.local_forces[old];
+      part.holding(round.z)[c] = held(c) ? state.holding[old] : 0;
     }
-  Vector missed(count); // by the held nodes, last
-  const auto find_missed = [&] {
-    for (std::size_t c = 0; c < count; ++c)
-      missed[c] = held(c) ? load.targets[c] - u[row_of(c)] : 0;
-  };
-  find_missed();
-  state.nodes = columns.nodes();
-  state.local_forces.assign(count, 0);
-  state.rounds = state.solves = 0;
+  std::vector<std::uint8_t> flags(load.held.begin(), load.held.end());
+  if (state.nodes != columns.nodes() || state.held != flags ||
+      (load.whole == nullptr) != state.whole_local.empty()) {
+    state.pairs.clear();
+    state.nodes = columns.nodes();
+    state.held = std::move(flags);
+  }
   if (load.whole == nullptr) {
     state.whole_local.clear();
     state.whole_forces.clear();
+  } else if (!state.whole_local.empty()) {
+    std::ranges::copy(state.whole_local, part.share(round.z).begin());
   }
-  double softest = 0; // turns forces into displacements of a like size
-  for (std::size_t c = 0; c < count; ++c)
-    softest = std::max(softest, columns.entry(c, row_of(c)));
+  state.rounds = state.solves = 0;
+  Vector missed(count); // by the held nodes
+  const auto find_missed = [&] {
+    for (std::size_t c = 0; c < count; ++c)
+      missed[c] = held(c) ? load.targets[c] - state.u[columns.row_of(c)] : 0;
+  };
+  find_missed();
 
-  Vector f(rows), y(rows), last_f, back(rows), work(count), all_axes, found(rows);
-  Mixing mixing;
+  Vector on_nodes(count), found(rows);
+  std::optional<Round> before;
   for (;;) {
-    const Vector frames = surface_.turning(local);
-    if (load.whole != nullptr) {
-      surface_.take_back(local, frames, load.whole->spread, back);
-      Vector change = back;
-      for (std::size_t k = 0; k < state.whole_forces.size(); ++k)
-        change[k] -= state.whole_forces[k];
-      if (state.whole_forces.empty() ||
-          !(sum_of_sizes(change) <= options.tolerance * sum_of_sizes(load.whole->on_surface))) {
-        state.whole_forces = back;
-        all_axes = load.whole->over_axes;
-        for (std::size_t k = 0; k < rows; ++k)
-          all_axes[3 * std::size_t{nodes[k / 3]} + k % 3] += back[k] - load.whole->on_surface[k];
-        solve_(all_axes);
-        ++state.solves;
-        state.whole_local.resize(rows);
-        for (std::size_t k = 0; k < rows; ++k)
-          state.whole_local[k] = all_axes[3 * std::size_t{nodes[k / 3]} + k % 3];
-      }
+    if (load.whole != nullptr)
+      follow_whole(*load.whole, options, state);
+    for (std::size_t c = 0; c < count; ++c) {
+      on_nodes[c] = held(c) ? part.holding(round.z)[c] : load.forces.empty() ? 0 : load.forces[c];
+      if (columns.entry(c, columns.row_of(c)) == 0) // fixed
+        on_nodes[c] = 0;
     }
-    if (count > 0) {
-      for (std::size_t c = 0; c < count; ++c)
-        f[row_of(c)] = held(c) ? holding[c] : load.forces.empty() ? 0 : load.forces[c];
-      if (f != last_f) {
-        surface_.spread(f, y);
-        last_f = f;
-      }
-      surface_.take_back(local, frames, y, back);
-      for (std::size_t k = 0; k < rows; ++k)
-        back[k] -= f[k]; // what turning changes
-      kernel_.project(columns.values(), rows, corners, back.data(), count, work.data());
-      for (std::size_t n = 0; n < count; n += 3) // and what is on middles
-        for (std::size_t k = row_of(n); k >= corners && k < row_of(n) + 3; ++k)
-          for (std::size_t c = 0; c < count; ++c)
-            work[c] += back[k] * columns.entry(c, k);
-      columns.solve(work);
-      for (std::size_t c = 0; c < count; ++c)
-        state.local_forces[c] = f[row_of(c)] + work[c];
-    }
-    // Held nodes go where they must by what is missing in their frames; what holds them follows.
-    // (The other way around, wrong forces of a first round would turn the body.)
-    const Vector placed_before = by_place, held_before = holding;
-    if (holds) {
-      Vector more = missed;
-      std::vector<Rotation> turned(count / 3);
-      for (std::size_t n = 0; n < count / 3; ++n)
-        if (held(3 * n)) {
-          turned[n] = surface_.rotation(frames, columns.nodes()[n]);
-          turn(turned[n], true, &more[3 * n]);
-        }
-      columns.solve_held(load.held, more);
-      for (std::size_t n = 0; n < count / 3; ++n)
-        for (std::size_t c = 3 * n; held(c) && c < 3 * n + 3; ++c) {
-          by_place[c] += more[c];
-          more[c] = by_place[c] - state.local_forces[c];
-          state.local_forces[c] = by_place[c];
-        }
-      for (std::size_t n = 0; n < count / 3; ++n)
-        if (held(3 * n))
-          turn(turned[n], false, &more[3 * n]);
-      for (std::size_t c = 0; c < count; ++c)
-        holding[c] += held(c) ? more[c] : 0;
-    }
-    const auto combine = [&](std::size_t from, std::size_t to) {
-      if (count > 0)
-        kernel_.combine(columns.values() + from, rows, to - from, state.local_forces.data(), count,
-                        &found[from]);
-      else
-        std::fill(found.begin() + static_cast<std::ptrdiff_t>(from),
-                  found.begin() + static_cast<std::ptrdiff_t>(to), 0.0);
-      for (std::size_t k = from; k < to && load.whole != nullptr; ++k)
-        found[k] += state.whole_local[k];
-    };
+    round.to = round.z;
+    if (part.whole > 0)
+      std::ranges::copy(state.whole_local, part.share(round.to).begin());
+    if (count > 0)
+      std::ranges::copy(forces_in_frames(columns, on_nodes, state), part.local(round.to).begin());
+    if (holds)
+      hold(load, state, missed, part.local(round.z), part.local(round.to), part.holding(round.to));
+    // What the round changes, at the column nodes as displacements.
+    round.off.assign(round.z.size(), 0);
+    for (std::size_t k = 0; k < round.off.size(); ++k)
+      round.off[k] = round.to[k] - round.z[k];
+    columns.multiply(part.local(round.off));
+    columns.multiply(part.holding(round.off));
+    if (before)
+      keep_pair(*before, round, state.pairs);
+    Vector next = round.to;
+    mix(state.pairs, round.off, next);
+
     const std::size_t known = holds ? rows : corners;
-    combine(0, known);
+    combine(columns, part.local(next), part.share(next), 0, known, found);
     ++state.rounds;
     const double size = largest(std::span(found).first(corners));
-    double change = largest_difference(std::span(local).first(corners), found);
-    Vector from, to; // corners; forces that hold; places of the held
-    const auto gather = [&](Vector& into, const Vector& displacement, const Vector& placed,
-                            const Vector& forces) {
-      into.assign(displacement.begin(),
-                  displacement.begin() + static_cast<std::ptrdiff_t>(corners));
-      for (std::size_t c = 0; c < count; ++c)
-        if (held(c)) {
-          into.push_back(softest * placed[c]);
-          into.push_back(softest * forces[c]);
-          into.push_back(missed[c]);
-        }
-    };
-    gather(from, local, placed_before, held_before);
+    double change = largest_difference(std::span(state.local).first(corners), found);
+    std::swap(state.local, found);
+    state.frames = surface_.turning(state.local);
     if (holds) {
-      surface_.deform(found, u);
+      surface_.deform(state.local, state.frames, state.u);
       find_missed();
       change = std::max(change, largest(missed));
     }
     state.change = size > 0 ? change / size : 0;
-    if (holds) { // of forces less is asked
-      const double force = largest(holding);
-      if (force > 0)
-        state.change =
-            std::max(state.change, fair_force * largest_difference(holding, held_before) / force);
+    const double force = largest(part.holding(next));
+    if (holds && force > 0) // of forces less is asked
+      state.change = std::max(
+          state.change,
+          fair_force * largest_difference(part.holding(next), part.holding(round.z)) / force);
+    const bool last = state.change <= options.tolerance || state.rounds >= options.max_rounds;
+    if (last && !holds) {
+      combine(columns, part.local(next), part.share(next), corners, rows, state.local);
+      surface_.deform(state.local, state.frames, state.u);
     }
-    if (state.change <= options.tolerance || state.rounds >= options.max_rounds) {
-      if (!holds) {
-        combine(corners, rows);
-        surface_.deform(found, u);
-      }
-      break;
+    if (last) {
+      const std::span<const double> local = part.local(next), holding = part.holding(next),
+                                    share = part.share(next);
+      state.local_forces.assign(local.begin(), local.end());
+      state.holding.assign(holding.begin(), holding.end());
+      state.whole_local.assign(share.begin(), share.end());
+      return;
     }
-    gather(to, found, by_place, holding);
-    const Vector mixed = mixing.next(from, std::move(to));
-    std::copy_n(mixed.begin(), corners, local.begin());
-    for (std::size_t c = 0, k = corners; c < count; ++c)
-      if (held(c)) {
-        by_place[c] = softest > 0 ? mixed[k] / softest : 0;
-        holding[c] = softest > 0 ? mixed[k + 1] / softest : 0;
-        missed[c] = mixed[k + 2];
-        k += 3;
-      }
+    before = round;
+    round.z = std::move(next);
   }
-  state.local = std::move(found);
-  state.u = std::move(u);
-  state.holding = std::move(holding);
+}
+
+/// Held nodes go where they must by what is missing in their frames; what holds them follows. (The
+/// other way around, wrong forces of a first round would turn the body.)
+void RotationWarp::hold(const WarpLoad& load, const WarpState& state,
+                        std::span<const double> missed, std::span<const double> placed,
+                        std::span<double> local, std::span<double> holding) const {
+  const WarpColumns& columns = load.columns;
+  const std::size_t count = columns.count();
+  Vector more(missed.begin(), missed.end());
+  std::vector<Rotation> turned(count / 3);
+  for (std::size_t n = 0; n < count / 3; ++n)
+    if (load.held[n] != 0) {
+      turned[n] = surface_.rotation(state.frames, columns.nodes()[n]);
+      turn(turned[n], true, &more[3 * n]);
+    }
+  columns.solve_held(load.held, more);
+  for (std::size_t n = 0; n < count / 3; ++n) {
+    if (load.held[n] == 0)
+      continue;
+    for (std::size_t c = 3 * n; c < 3 * n + 3; ++c) {
+      const double wanted = placed[c] + more[c];
+      more[c] = wanted - local[c];
+      local[c] = wanted;
+    }
+    turn(turned[n], false, &more[3 * n]);
+    for (std::size_t c = 3 * n; c < 3 * n + 3; ++c)
+      holding[c] += more[c];
+  }
 }
 
 Vector RotationWarp::compliance_at(const WarpLoad& load, const WarpState& state,
@@ -385,26 +435,22 @@ Vector RotationWarp::compliance_at(const WarpLoad& load, const WarpState& state,
   const std::size_t size = 3 * places.size(), count = columns.count();
   const bool holds = any(load.held);
   std::vector<Rotation> turned;
-  const Vector frames = surface_.turning(state.local);
   for (const std::size_t place : places)
-    turned.push_back(surface_.rotation(frames, columns.nodes()[place]));
-  const auto row_of = [&](std::size_t c) {
-    return 3 * std::size_t{columns.nodes()[c / 3]} + c % 3;
-  };
+    turned.push_back(surface_.rotation(state.frames, columns.nodes()[place]));
   Vector block(size * size), across(count);
   for (std::size_t r = 0; r < size; ++r) {
     const std::size_t column = 3 * places[r / 3] + r % 3;
     if (holds) {
       for (std::size_t c = 0; c < count; ++c)
-        across[c] = load.held[c / 3] != 0 ? columns.entry(column, row_of(c)) : 0;
+        across[c] = load.held[c / 3] != 0 ? columns.entry(column, columns.row_of(c)) : 0;
       columns.solve_held(load.held, across);
     }
     for (std::size_t c = 0; c < size; ++c) {
       const std::size_t other = 3 * places[c / 3] + c % 3;
-      double value = columns.entry(column, row_of(other));
+      double value = columns.entry(column, columns.row_of(other));
       for (std::size_t k = 0; holds && k < count; ++k)
         if (load.held[k / 3] != 0)
-          value -= across[k] * columns.entry(other, row_of(k));
+          value -= across[k] * columns.entry(other, columns.row_of(k));
       block[r * size + c] = value;
     }
   }

@@ -54,6 +54,7 @@ struct WarpedStatics::State {
   Compliance compliance;
   RotationWarp warp;
   std::vector<std::uint8_t> fixed;
+  std::size_t surface_nodes;
   WarpColumns columns;
   std::optional<WarpWholeLoad> whole;
   Load whole_of; // what that is of
@@ -66,7 +67,8 @@ struct WarpedStatics::State {
       : model(m), compliance(m, std::move(source), context, false),
         warp(made_warp(
             m, [this](std::span<double> f) { compliance.solve(f); }, context)),
-        fixed(fixed_axes(m)), columns(warp.surface().nodes().size()) {}
+        fixed(fixed_axes(m)), surface_nodes(surface_count(m)),
+        columns(warp.surface().nodes().size()) {}
 
   std::uint32_t place_of(std::uint32_t node) const {
     const std::uint32_t place = warp.surface().place()[node];
@@ -234,7 +236,7 @@ struct WarpedStatics::State {
     if (!surface.empty())
       return surface;
     ++counts.shapes;
-    surface.assign(3 * surface_count(model), 0);
+    surface.assign(3 * surface_nodes, 0);
     if (!answer)
       return surface;
     const std::vector<std::uint32_t>& nodes = warp.surface().nodes();

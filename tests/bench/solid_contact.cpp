@@ -41,11 +41,11 @@ struct Body {
   std::vector<double> linear_far{}, turning_far{};
 };
 
-Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz) {
+Model solid_box(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, bool quadratic = false) {
   SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 5000, 1, 0.2, 0.4}};
-  options.quadratic = false;
-  return solid_model(test::box_tetrahedra(nx, ny, nz), options, {});
+  options.quadratic = quadratic;
+  return solid_model(test::box_tetrahedra(nx, ny, nz, quadratic ? 2 : 1), options, {});
 }
 
 void hold_below(Model& model) {
@@ -89,6 +89,7 @@ int main() {
   bodies.push_back({"net", build_model(surface_mesh(cube), {}, Context{}).model});
   bodies.push_back({"solid, much inside", cube});
   bodies.push_back({"solid, little inside", solid_box(40, 40, 2)});
+  bodies.push_back({"solid, quadratic", solid_box(12, 12, 12, true)});
   for (Body& body : bodies)
     prepare(body);
   std::mt19937 random(1);

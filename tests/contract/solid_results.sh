@@ -390,3 +390,42 @@ P
   fi
   rm -rf ./*.py ./*.vtu ./*.vtkhdf ./*.ela bend.scene __pycache__
 }
+
+test_solids_turn_far_with_rotation_warp() {
+  local python
+  need ffe-run exp2ela
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  solid_scene
+  for rotation in '' rotation=warp; do
+    printf '%s\n' "object gel gel.ela method=ffe $rotation" 'force gel x>39.999 0 0 -3e4 total' 'emit stress gel' 'step' |
+      ffe-run -q --verify - -o "run$rotation.h5"
+  done
+  cat >far.py <<'P'
+import h5py, numpy
+def read(name):
+    with h5py.File(name) as f:
+        o = f['objects/gel']
+        return o['points'][:], o['displacement'][-1], o['tetrahedra'][:], o['fields/von_mises'][-1]
+p, u, t, _ = read('run.h5')
+_, w, _, stress = read('runrotation=warp.h5')
+end = p[:, 0] > 39.999
+length = lambda v: numpy.linalg.norm((p + v)[end].mean(0) - p[p[:, 0] < 1e-3].mean(0))
+droop = -w[end, 2].mean()
+assert droop > 8, droop                     # it bends far,
+assert length(w) < 39.5 and abs(w[end, 0].mean()) > 1, (length(w), w[end, 0].mean())
+assert length(u) > 40.5, length(u)          # where small strains make it longer
+a, b, c, d = ((p + w)[t[:, k]] for k in range(4))
+volume = numpy.einsum('ij,ij->i', numpy.cross(b - a, c - a), d - a) / 6
+assert volume.min() > 0 and abs(volume.sum() / 4000 - 1) < 0.03, volume.sum()  # inside too
+assert 0 < stress.max() < 1e5, stress.max()
+P
+  "$python" far.py
+  for line in 'method=ela rotation=warp' 'rotation=warp'; do
+    printf '%s\n' "object gel gel.ela $line" | ffe-run -q - -o run.h5 2>message && fail "$line is taken"
+    grep -q 'rotation=warp with method=ela, expected object' message || fail "$(cat message)"
+  done
+  exp2ela -q --primitive sphere:12x8 --size 20 --fix 'z<-5' -o net.ela
+  printf '%s\n' 'object net net.ela method=ffe rotation=warp' 'gravity 0 0 -9810' 'step' |
+    ffe-run -q - -o run.h5 2>message && fail 'a net turns'
+  grep -q 'has no tetrahedra, expected a solid for rotation=warp' message || fail "$(cat message)"
+}

@@ -184,7 +184,8 @@ TEST(RotationWarp, BentAndTwistedBeamsAreAsNeoHookean) {
     beam.warp.answer(on_columns, by_columns, {1, 0});
     EXPECT_LE(beam.error(by_columns.u, reference), c.by_columns);
     EXPECT_LE(beam.error(beam.shape(load, {1, 0}, whole).u, reference), c.whole);
-    EXPECT_GE(beam.error(beam.shape(load, {2, 0}).u, reference), 1.1 * c.whole);
+    EXPECT_GE(beam.error(beam.shape(load, {2, 0}).u, reference),
+              (c.turn > 20 ? 1.1 : 0.9) * c.whole);
     // Inside as well.
     const WarpColumns none(beam.warp.surface().nodes().size());
     const WarpWholeLoad as_whole = beam.warp.whole_load(load);
@@ -404,7 +405,7 @@ TEST(RotationStrain, ForcesTakenBackDoTheSameWork) {
       auto moved = u;
       for (std::size_t k = 0; k < u.size(); ++k)
         moved[k] += sign * h * change[k];
-      surface.deform(moved, there);
+      surface.deform(moved, surface.turning(moved), there);
       for (std::size_t k = 0; k < u.size(); ++k)
         work += sign / (2 * h) * there[k] * f[k];
     }
