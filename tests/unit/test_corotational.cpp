@@ -99,7 +99,8 @@ TEST_P(Corotational, ForcesAreTheDerivativeOfTheEnergy) {
   const std::vector<double> forces = body.forces(x, weights);
   std::mt19937 random(3);
   for (int n = 0; n < 20; ++n) {
-    const std::vector<double> direction = moved(std::vector<double>(x.size()), 1, static_cast<unsigned>(random()));
+    const std::vector<double> direction =
+        moved(std::vector<double>(x.size()), 1, static_cast<unsigned>(random()));
     double slope = 0, found = 0;
     for (std::size_t k = 0; k < x.size(); ++k)
       slope -= forces[k] * direction[k];
