@@ -421,10 +421,14 @@ TEST(ResultsMesh, ASeriesHasOneFileForEachFrame) {
 // sides here.
 TEST(RunReport, VerifyTakesWhatIsWithinItsBoundsAlone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto passes = [](double shape, double backward, double tolerance) {
+  const auto passes = [](double shape, double backward, double tolerance, double limit = 1e-6,
+                         double change = 0) {
     ElastostaticCounts errors;
     errors.shape_error = shape;
     errors.backward_error = backward;
+    errors.worst_shape.error = backward;
+    errors.worst_shape.limit = limit;
+    errors.change = change;
     try {
       require_verified(errors, tolerance);
     } catch (const Error&) {
@@ -441,6 +445,11 @@ TEST(RunReport, VerifyTakesWhatIsWithinItsBoundsAlone) {
   EXPECT_FALSE(passes(0.011, 0, 0.01));
   EXPECT_FALSE(passes(nan, 0, 0.01));
   EXPECT_FALSE(passes(0, nan, 0));
+  EXPECT_TRUE(passes(0, 1.1e-6, 0, 2e-6)) << "by compressed columns";
+  EXPECT_FALSE(passes(0, 2.1e-6, 0, 2e-6));
+  EXPECT_TRUE(passes(0, 0, 0, 1e-6, 0.9e-3)) << "large rotations";
+  EXPECT_FALSE(passes(0, 0, 0, 1e-6, 1.1e-3));
+  EXPECT_FALSE(passes(0, 0, 0.01, 1e-6, nan));
 }
 
 } // namespace
