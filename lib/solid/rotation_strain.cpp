@@ -19,6 +19,20 @@ Vec3 at(std::span<const double> v, std::uint32_t node) {
   return {v[k], v[k + 1], v[k + 2]};
 }
 
+/// Entries of the whole Laplacian between nodes inside, which have rows, and others.
+template <class Visit>
+void visit_between(const StiffnessMatrix& laplacian, std::span<const std::int64_t> inner_row,
+                   const Visit& visit) {
+  for (std::size_t i = 0; i < inner_row.size(); ++i)
+    for (auto e = static_cast<std::size_t>(laplacian.column_start[i]);
+         e < static_cast<std::size_t>(laplacian.column_start[i + 1]); ++e) {
+      const auto j = static_cast<std::size_t>(laplacian.row[e]);
+      if ((inner_row[i] >= 0) == (inner_row[j] >= 0))
+        continue;
+      visit(inner_row[i] >= 0 ? i : j, inner_row[i] >= 0 ? j : i, laplacian.value[e]);
+    }
+}
+
 } // namespace
 
 void RotationStrain::list_triangles(const TetMesh& mesh, std::span<const std::uint8_t> fixed) {
@@ -379,19 +393,11 @@ std::vector<double> RotationStrain::on_surface(std::span<const double> load) con
   if (!any)
     return result;
   inside_->solve(right, followed, 3);
-  for (std::size_t i = 0; i < inner_row_.size(); ++i) // columns of the whole Laplacian
-    for (auto e = static_cast<std::size_t>(between_.column_start[i]);
-         e < static_cast<std::size_t>(between_.column_start[i + 1]); ++e) {
-      const auto j = static_cast<std::size_t>(between_.row[e]);
-      const bool i_inside = inner_row_[i] >= 0, j_inside = inner_row_[j] >= 0;
-      if (i_inside == j_inside)
-        continue;
-      const std::size_t inner = i_inside ? i : j, outer = i_inside ? j : i;
-      for (std::size_t axis = 0; place_[outer] != none && axis < 3; ++axis)
-        result[3 * std::size_t{place_[outer]} + axis] -=
-            between_.value[e] *
-            followed[axis * order + static_cast<std::size_t>(inner_row_[inner])];
-    }
+  visit_between(between_, inner_row_, [&](std::size_t inner, std::size_t outer, double value) {
+    for (std::size_t axis = 0; place_[outer] != none && axis < 3; ++axis)
+      result[3 * std::size_t{place_[outer]} + axis] -=
+          value * followed[axis * order + static_cast<std::size_t>(inner_row_[inner])];
+  });
   return result;
 }
 
@@ -403,18 +409,11 @@ std::vector<double> RotationStrain::extend(std::span<const double> surface) cons
     return all;
   const std::size_t order = inside_->order();
   std::vector<double> right(3 * order), found(right.size());
-  for (std::size_t i = 0; i < inner_row_.size(); ++i) // columns of the whole Laplacian
-    for (auto e = static_cast<std::size_t>(between_.column_start[i]);
-         e < static_cast<std::size_t>(between_.column_start[i + 1]); ++e) {
-      const auto j = static_cast<std::size_t>(between_.row[e]);
-      const bool i_inside = inner_row_[i] >= 0, j_inside = inner_row_[j] >= 0;
-      if (i_inside == j_inside)
-        continue;
-      const std::size_t inner = i_inside ? i : j, outer = i_inside ? j : i;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        right[axis * order + static_cast<std::size_t>(inner_row_[inner])] -=
-            between_.value[e] * all[3 * outer + axis];
-    }
+  visit_between(between_, inner_row_, [&](std::size_t inner, std::size_t outer, double value) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      right[axis * order + static_cast<std::size_t>(inner_row_[inner])] -=
+          value * all[3 * outer + axis];
+  });
   inside_->solve(right, found, 3);
   for (std::size_t i = 0; i < inner_row_.size(); ++i)
     for (std::size_t axis = 0; inner_row_[i] >= 0 && axis < 3; ++axis)

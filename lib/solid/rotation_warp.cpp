@@ -42,6 +42,11 @@ double largest_difference(std::span<const double> a, std::span<const double> b) 
   return most;
 }
 
+/// The larger one; NaN if one is.
+double larger(double a, double b) {
+  return std::isnan(b) || a <= b ? b : a;
+}
+
 /// r v or rᵀ v of three numbers, in place.
 void turn(const Rotation& r, bool back, double* v) {
   const std::array<double, 3> old{v[0], v[1], v[2]};
@@ -374,12 +379,12 @@ void RotationWarp::answer(const WarpLoad& load, WarpState& state,
     if (holds) {
       surface_.deform(state.local, state.frames, state.u);
       find_missed();
-      change = std::max(change, largest(missed));
+      change = larger(change, largest(missed));
     }
-    state.change = size > 0 ? change / size : 0;
+    state.change = size == 0 ? 0 : change / size;
     const double force = largest(part.holding(next));
-    if (holds && force > 0) // of forces less is asked
-      state.change = std::max(
+    if (holds && force != 0) // of forces less is asked
+      state.change = larger(
           state.change,
           fair_force * largest_difference(part.holding(next), part.holding(round.z)) / force);
     const bool last = state.change <= options.tolerance || state.rounds >= options.max_rounds;

@@ -74,7 +74,8 @@ bool WarpedYielding::push(std::span<const NodeTouch> touches, std::span<const Ve
     largest = std::max(largest, std::abs(x));
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const Vec3 off = at[k] - model_.nodes[nodes_[k]].position - vector_at(u, nodes_[k]);
-    miss = std::max({miss, std::abs(off.x), std::abs(off.y), std::abs(off.z)});
+    for (int a = 0; a < 3; ++a)
+      miss = !(std::abs(off[a]) <= miss) ? std::abs(off[a]) : miss;
   }
   if (miss <= met * largest)
     return true;
