@@ -1,0 +1,20 @@
+#pragma once
+// Blocks of solid/element.h as Eigen's matrices.
+
+#include "solid/element.h"
+
+#include <Eigen/Core>
+
+namespace gewebe {
+
+using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+inline Matrix3 matrix(const SolidBlock& block) {
+  return Eigen::Map<const Matrix3>(block.data());
+}
+
+inline Eigen::Vector3d eigen(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+} // namespace gewebe

@@ -1,0 +1,37 @@
+#pragma once
+// What moves in solid/solid_motion.h, and where it is.
+
+#include "solid/element.h"
+#include "solid/motion_numbers_internal.h"
+#include "tetrahedra/tet_mesh.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace gewebe {
+
+struct MotionBody {
+  TetMesh mesh;
+  std::vector<SolidElement> elements;
+  Numbers masses; ///< by node
+  Numbers rest;   ///< places
+
+  std::size_t axes() const noexcept { return rest.size(); }
+  std::size_t nodes() const noexcept { return masses.size(); }
+};
+
+/// Numbers on the 3 n axes.
+struct MotionState {
+  Numbers place, velocity, load;
+  std::vector<std::uint8_t> held;
+
+  bool any_held() const;
+};
+
+/// Of speeds v.
+double motion_energy(const MotionBody& body, const Numbers& v);
+/// From rest to the places.
+double work_of_load(const MotionBody& body, const Numbers& load, const Numbers& places);
+
+} // namespace gewebe

@@ -1,0 +1,49 @@
+#pragma once
+// What a step of solid/solid_motion.h makes least.
+
+#include "base/context.h"
+#include "solid/motion_body_internal.h"
+#include "solid/solid_energy_internal.h"
+
+#include <cmath>
+
+namespace gewebe {
+
+/// A place with what is known of it.
+struct MotionPoint {
+  Numbers at;
+  Numbers gradient; ///< 0 on held axes
+  Numbers forces;   ///< what holders must push with, on all axes
+  double value = HUGE_VAL;
+  double unsure = 0; ///< of the value, by rounding
+};
+
+class MotionObjective {
+public:
+  /// Of a step of h. \pre all outlive this; the state doesn't change meanwhile
+  MotionObjective(const MotionBody& body, const MotionState& state, SolidEnergy& energy, double h,
+                  const SolidMotionOptions& options);
+
+  /// At point.at.
+  void evaluate(MotionPoint& point, const Context& context) const;
+  /// The value where the state is, its elastic energy given.
+  double value_of_standing(double elastic) const;
+  /// A free body goes on with its momentum and the load's: moves it by what unfinished rounds took
+  /// or gave.
+  void keep_momentum(MotionPoint& point) const;
+
+  const MotionBody& body() const noexcept { return body_; }
+  const MotionState& state() const noexcept { return state_; }
+  SolidEnergy& energy() const noexcept { return energy_; }
+  double inertia() const noexcept { return inertia_; } ///< per mass
+  double damping() const noexcept { return damping_; } ///< per stiffness
+
+private:
+  const MotionBody& body_;
+  const MotionState& state_;
+  SolidEnergy& energy_;
+  double inertia_, damping_;
+  Numbers ahead_; ///< where inertia alone leads
+};
+
+} // namespace gewebe

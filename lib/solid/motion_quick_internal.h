@@ -1,0 +1,41 @@
+#pragma once
+// The constant matrix of the quick way of solid/solid_motion.h.
+
+#include "base/context.h"
+#include "solid/motion_body_internal.h"
+#include "solid/motion_objective_internal.h"
+#include "solve/factor.h"
+#include "solve/single_factor.h"
+#include "solve/stiffness.h"
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace gewebe {
+
+/// A⁻¹ in frames that turn with the nodes.
+class MotionQuick {
+public:
+  /// For a step of h; returns how many factors had to be made. \throw as Factor
+  int prepare(const MotionBody& body, const std::vector<std::uint8_t>& held, double h,
+              const SolidMotionOptions& options, const Context& context);
+  /// Frames as in the last evaluation; those of nodes held along an axis don't turn.
+  /// \pre prepared
+  void turn(const SolidEnergy& energy, const Context& context);
+  /// In place, to single precision. \pre turned
+  void solve(Numbers& v, const Context& context);
+
+private:
+  double step_ = 0;
+  std::vector<std::uint8_t> held_;
+  StiffnessMatrix stiffness_;
+  std::optional<Factor> factor_;
+  std::optional<SingleFactor> single_;
+  Numbers rotations_;
+};
+
+/// Adds the masses times `inertia` to the diagonal.
+void add_masses(const MotionBody& body, double inertia, StiffnessMatrix& matrix);
+
+} // namespace gewebe

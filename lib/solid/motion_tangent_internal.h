@@ -1,0 +1,29 @@
+#pragma once
+// The tangent of the reference of solid/solid_motion.h.
+
+#include "base/context.h"
+#include "solid/motion_objective_internal.h"
+#include "solve/factor.h"
+#include "solve/stiffness.h"
+
+#include <optional>
+#include <vector>
+
+namespace gewebe {
+
+class MotionTangent {
+public:
+  /// Other axes are held.
+  void renew() noexcept { renewed_ = true; }
+  /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor
+  void make(const MotionObjective& objective, const Numbers& at, const Context& context);
+  /// In place. \pre made
+  void solve(Numbers& v) const;
+
+private:
+  bool renewed_ = true;
+  StiffnessMatrix tangent_;
+  std::optional<Factor> factor_;
+};
+
+} // namespace gewebe

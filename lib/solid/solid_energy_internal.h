@@ -1,0 +1,55 @@
+#pragma once
+// The energy of a body's elements by either law, and damping, for solid/solid_motion.h.
+
+#include "base/context.h"
+#include "solid/corotational.h"
+#include "solid/motion_body_internal.h"
+#include "solid/solid_motion.h"
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class SolidEnergy {
+public:
+  /// \pre the body outlives this and stays where it is
+  SolidEnergy(const MotionBody& body, SolidLaw law);
+
+  SolidLaw law() const noexcept { return law_; }
+  /// The energy at the places `at`, and that of damping from the strains kept times `damping`;
+  /// -dE/dx into `forces`. Bubbles of Neo-Hookean elements are where they have least energy.
+  double evaluate(const Numbers& at, double damping, std::span<double> forces,
+                  const Context& context);
+  /// Strains and bubbles of the last evaluation are kept: damping counts from the ones, bubbles
+  /// are sought from the others.
+  void keep();
+  /// Bubbles are sought from rest.
+  void forget_bubbles();
+  /// What rounding may add to an energy whatever its size: a Neo-Hookean one is a difference of
+  /// numbers of the size of mu.
+  double unsure_at_rest() const noexcept { return unsure_at_rest_; }
+
+  // As in the last evaluation.
+  void node_rotations(std::span<double> rotations, const Context& context) const {
+    frames_.node_rotations(rotations, context);
+  }
+  ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
+  Vec3 bubble(std::size_t t) const { return new_bubbles_.empty() ? Vec3{} : new_bubbles_[t]; }
+  /// Of the nodes of tetrahedron t.
+  std::array<Vec3, 10> displacements(const Numbers& at, std::size_t t) const;
+
+private:
+  double hyperelastic(const Numbers& at, std::span<double> forces, const Context& context);
+  Vec3 settled_bubble(std::size_t t, const std::array<Vec3, 10>& u) const;
+
+  const MotionBody& body_;
+  SolidLaw law_;
+  CorotationalSolid frames_;                ///< and corotational energy, and damping
+  std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
+  double unsure_at_rest_ = 0;
+};
+
+} // namespace gewebe
