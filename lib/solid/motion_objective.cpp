@@ -12,6 +12,7 @@ MotionObjective::MotionObjective(const MotionBody& body, const MotionState& stat
 }
 
 void MotionObjective::evaluate(MotionPoint& point, const Context& context) const {
+  ++evaluations_;
   point.gradient.resize(body_.axes());
   point.forces.resize(body_.axes());
   const double energy = energy_.evaluate(point.at, damping_, point.forces, context),

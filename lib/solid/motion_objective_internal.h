@@ -24,7 +24,7 @@ public:
   MotionObjective(const MotionBody& body, const MotionState& state, SolidEnergy& energy, double h,
                   const SolidMotionOptions& options);
 
-  /// At point.at.
+  /// At point.at. Counted by evaluations().
   void evaluate(MotionPoint& point, const Context& context) const;
   /// The value where the state is, its elastic energy given.
   double value_of_standing(double elastic) const;
@@ -37,6 +37,7 @@ public:
   SolidEnergy& energy() const noexcept { return energy_; }
   double inertia() const noexcept { return inertia_; } ///< per mass
   double damping() const noexcept { return damping_; } ///< per stiffness
+  int evaluations() const noexcept { return evaluations_; }
 
 private:
   const MotionBody& body_;
@@ -44,6 +45,7 @@ private:
   SolidEnergy& energy_;
   double inertia_, damping_;
   Numbers ahead_; ///< where inertia alone leads
+  mutable int evaluations_ = 0;
 };
 
 } // namespace gewebe

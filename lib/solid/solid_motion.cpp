@@ -144,6 +144,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
         limit_energy(s.body, s.now, s.elastic, energy,
                      1e-12 * (motion_energy(s.body, s.now.velocity) + s.elastic + std::abs(energy) +
                               std::abs(work_of_load(s.body, s.now.load, s.now.place))));
+  step.evaluations = objective.evaluations() + 1;
   s.last_step = h;
   s.moved = false;
   return step;

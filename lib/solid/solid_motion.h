@@ -59,8 +59,9 @@ struct SolidMotionOptions {
 
 /// What a step took.
 struct SolidStep {
-  int rounds = 0;    ///< solutions with a factor
-  double change = 0; ///< of the last round, over the displacement: > tolerance, if they ran out
+  int rounds = 0;      ///< solutions with a factor
+  int evaluations = 0; ///< of energy and forces
+  double change = 0;   ///< of the last round, over the displacement: > tolerance, if they ran out
   int factorisations = 0; ///< made for this step
   bool limited = false;   ///< speeds were lowered, see SolidMotion::step
 };
