@@ -133,8 +133,9 @@ private:
   std::size_t line_ = 0;
 };
 
-constexpr std::array<std::string_view, 8> section_names{
-    "name", "materials", "nodes", "normals", "springs", "triangles", "texcoords", "tetrahedra"};
+constexpr std::array<std::string_view, 11> section_names{
+    "name",      "materials",  "nodes", "normals",        "springs",       "triangles",
+    "texcoords", "tetrahedra", "skin",  "skin_triangles", "skin_texcoords"};
 
 bool is_section(std::string_view word) {
   return word == "end" ||
@@ -158,8 +159,13 @@ public:
     triangles();
     if (section_ == "texcoords")
       texcoords();
-    if (section_ == "tetrahedra")
+    if (section_ == "tetrahedra") {
       tetrahedra();
+      if (section_ == "skin")
+        skin();
+      else
+        expect({"skin", "end"});
+    }
     expect({"end"});
     in_.end_line(1);
     if (in_.next_line())
@@ -372,6 +378,41 @@ private:
     next_section();
   }
 
+  void skin() {
+    Skin& skin = model_.skin;
+    const std::size_t points = optional_count(8, 0, nullptr);
+    skin.points.reserve(points);
+    for (std::size_t i = 0; i < points; ++i) {
+      element(i);
+      skin.points.push_back(vector("coordinate"));
+      skin.tetrahedron.push_back(in_.number<std::uint32_t>("tetrahedron"));
+      in_.end_line(4);
+      check_.skin_point(i);
+    }
+    next_section();
+    expect({"skin_triangles"});
+    const std::size_t triangles = optional_count(8, 0, nullptr);
+    skin.triangles.reserve(triangles);
+    for (std::size_t i = 0; i < triangles; ++i) {
+      element(i);
+      skin.triangles.push_back(corners<3>());
+      skin.material.push_back(in_.number<std::int32_t>("material"));
+      in_.end_line(4);
+      check_.skin_triangle(i);
+    }
+    next_section();
+    if (section_ != "skin_texcoords")
+      return expect({"skin_texcoords", "end"});
+    skin.texcoords.reserve(optional_count(12, triangles, "skin_triangles"));
+    for (std::size_t i = 0; i < triangles; ++i) {
+      element(i);
+      for (double& value : skin.texcoords.emplace_back())
+        value = in_.number<double>("texture coordinate");
+      in_.end_line(6);
+    }
+    next_section();
+  }
+
   Vec3 vector(const char* what) {
     Vec3 v;
     v.x = in_.number<double>(what);
@@ -461,6 +502,24 @@ void emit(const Sink& sink, const Context& context, std::string_view section, st
   }
 }
 
+void emit_skin(const Sink& sink, const Skin& skin, const Context& context) {
+  emit(sink, context, "skin", skin.points.size(), [&](std::size_t i, LineWriter& line) {
+    line.vector(skin.points[i]).number(skin.tetrahedron[i]).end();
+  });
+  emit(sink, context, "skin_triangles", skin.triangles.size(),
+       [&](std::size_t i, LineWriter& line) {
+         const Triangle& t = skin.triangles[i];
+         line.number(t[0]).number(t[1]).number(t[2]).number(skin.material[i]).end();
+       });
+  if (!skin.texcoords.empty())
+    emit(sink, context, "skin_texcoords", skin.texcoords.size(),
+         [&](std::size_t i, LineWriter& line) {
+           for (const double value : skin.texcoords[i])
+             line.number(value);
+           line.end();
+         });
+}
+
 void emit_model(const Sink& sink, const Model& m, const Context& context) {
   sink("ela_expl 1\nname \"" + m.name + "\"\nmaterials " + std::to_string(m.materials.size()) +
        "\n");
@@ -502,6 +561,8 @@ void emit_model(const Sink& sink, const Model& m, const Context& context) {
           line.number(middle);
       line.number(m.tetrahedron_material[i]).end();
     });
+  if (!m.skin.points.empty())
+    emit_skin(sink, m.skin, context);
   sink("end\n");
 }
 

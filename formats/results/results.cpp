@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "formats/store/hdf5_internal.h"
+#include "solid/skin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -123,6 +124,62 @@ FramePoints read_points(const std::string& path, const ShapeGroup& shape, std::s
   return result;
 }
 
+/// Triangles, with texture coordinates and materials where there are some.
+void read_triangles(const hdf5::Group& group, TriangleMesh& mesh) {
+  const hdf5::Dataset triangles = group.dataset("triangles", hdf5::Number::uint32);
+  const std::uint64_t count = rows_of_three(triangles);
+  std::vector<std::uint32_t> corners(3 * count);
+  triangles.read_rows(0, std::span<std::uint32_t>(corners));
+  mesh.triangles.reserve(count);
+  for (std::size_t t = 0; t < count; ++t)
+    mesh.triangles.push_back({corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]});
+
+  if (group.has("texcoords")) {
+    const hdf5::Dataset texcoords = group.dataset("texcoords", hdf5::Number::float32);
+    texcoords.require_shape({count, 3, 2});
+    std::vector<float> st(6 * count);
+    texcoords.read_rows(0, std::span<float>(st));
+    mesh.texcoords.resize(count);
+    for (std::size_t t = 0; t < count; ++t)
+      std::copy_n(&st[6 * t], 6, mesh.texcoords[t].begin());
+  }
+  if (group.has("material"))
+    mesh.material = group.read<std::int32_t>("material", count);
+}
+
+/// The skin of a shape in a frame, from the displacements of its nodes.
+void read_skin(const hdf5::Group& group, const FramePoints& nodes, ResultSurface& result) {
+  const hdf5::Dataset points = group.dataset("points", hdf5::Number::float64);
+  const std::uint64_t count = rows_of_three(points);
+  const hdf5::Dataset followed = group.dataset("nodes", hdf5::Number::uint32),
+                      weights = group.dataset("weights", hdf5::Number::float64);
+  const std::uint64_t each = followed.shape().size() == 2 ? followed.shape()[1] : 0;
+  followed.require_shape({count, each});
+  weights.require_shape({count, each});
+  std::vector<double> rest(3 * count);
+  points.read_rows(0, std::span<double>(rest));
+  SkinWeights skin;
+  skin.nodes = each;
+  skin.node.resize(each * count);
+  followed.read_rows(0, std::span<std::uint32_t>(skin.node));
+  skin.weight.resize(each * count);
+  weights.read_rows(0, std::span<double>(skin.weight));
+  for (const std::uint32_t node : skin.node)
+    if (node >= nodes.rest.size())
+      followed.fail("names node " + std::to_string(node) + ", expected 0 to " +
+                    std::to_string(nodes.rest.size() - 1));
+  std::vector<double> displacement;
+  displacement.reserve(3 * nodes.rest.size());
+  for (std::size_t i = 0; i < nodes.rest.size(); ++i) {
+    const Vec3 u = nodes.moved[i] - nodes.rest[i];
+    displacement.insert(displacement.end(), {u.x, u.y, u.z});
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    result.rest.push_back({rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]});
+  result.mesh.points = displaced_skin(skin, result.rest, displacement);
+  read_triangles(group, result.mesh);
+}
+
 std::vector<double> read_von_mises(const std::string& path, const ShapeGroup& shape,
                                    const std::string& object, std::size_t frame) {
   const std::uint64_t n = rows_of_three(shape.group.dataset("points", hdf5::Number::float64));
@@ -156,7 +213,7 @@ ResultIndex read_result_index(const std::string& path) {
 }
 
 ResultSurface read_result_surface(const std::string& path, const std::string& object,
-                                  std::size_t frame) {
+                                  std::size_t frame, bool skin) {
   const hdf5::File file = open_checked(path);
   const hdf5::Group objects = file.root().group("objects");
   const hdf5::Group whole = object_group(path, objects, object);
@@ -167,30 +224,15 @@ ResultSurface read_result_surface(const std::string& path, const std::string& ob
     return none;
   }
   const hdf5::Group& group = shape->group;
-  FramePoints points = read_points(path, *shape, frame, true);
   ResultSurface result;
-  result.rest = std::move(points.rest);
-  result.mesh.points = std::move(points.moved);
-
-  const hdf5::Dataset triangles = group.dataset("triangles", hdf5::Number::uint32);
-  const std::uint64_t count = rows_of_three(triangles);
-  std::vector<std::uint32_t> corners(3 * count);
-  triangles.read_rows(0, std::span<std::uint32_t>(corners));
-  result.mesh.triangles.reserve(count);
-  for (std::size_t t = 0; t < count; ++t)
-    result.mesh.triangles.push_back({corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]});
-
-  if (group.has("texcoords")) {
-    const hdf5::Dataset texcoords = group.dataset("texcoords", hdf5::Number::float32);
-    texcoords.require_shape({count, 3, 2});
-    std::vector<float> st(6 * count);
-    texcoords.read_rows(0, std::span<float>(st));
-    result.mesh.texcoords.resize(count);
-    for (std::size_t t = 0; t < count; ++t)
-      std::copy_n(&st[6 * t], 6, result.mesh.texcoords[t].begin());
+  if (skin && group.has("skin")) {
+    read_skin(group.group("skin"), read_points(path, *shape, frame, false), result);
+  } else {
+    FramePoints points = read_points(path, *shape, frame, true);
+    result.rest = std::move(points.rest);
+    result.mesh.points = std::move(points.moved);
+    read_triangles(group, result.mesh);
   }
-  if (group.has("material"))
-    result.mesh.material = group.read<std::int32_t>("material", count);
   if (whole.has("materials"))
     result.materials = whole.read_texts("materials");
   at(path, [&] { check_mesh(result.mesh); });

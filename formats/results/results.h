@@ -21,8 +21,9 @@ struct ResultIndex {
 /// \throw Error, place = path: missing, no HDF5, no result, truncated, of a newer version
 ResultIndex read_result_index(const std::string& path);
 
-/// An object's surface in one frame, as cuts have left it, and where its points were at rest.
-/// Texture coordinates where the model had them. \throw Error, place = path; if there is no such
+/// An object's surface in one frame, as cuts have left it, and where its points were at rest: its
+/// skin, where it has one and that is asked for, else the surface of its nodes. Texture coordinates
+/// where the model had them. \throw Error, place = path; if there is no such
 /// object or frame, naming what there is
 struct ResultSurface {
   TriangleMesh mesh;                  ///< displaced points
@@ -31,7 +32,7 @@ struct ResultSurface {
   bool there = true;                  ///< false: a part that came off later, the mesh is empty
 };
 ResultSurface read_result_surface(const std::string& path, const std::string& object,
-                                  std::size_t frame);
+                                  std::size_t frame, bool skin = true);
 
 /// An object's tetrahedra in one frame. A mesh that is displaced may have turned ones.
 struct ResultSolid {

@@ -4,6 +4,7 @@
 #include "formats/mesh/obj_stl.h"
 #include "formats/mesh/ply.h"
 #include "formats/results/series_internal.h"
+#include "solid/skin.h"
 
 #include <algorithm>
 #include <optional>
@@ -17,11 +18,13 @@ namespace {
 class Shapes {
 public:
   void add(const Model& model) {
-    surfaces_.push_back(surface_mesh(model));
+    surfaces_.push_back(shown_mesh(model));
+    skins_.push_back(skin_weights(model));
     last_.emplace_back(3 * model.nodes.size());
   }
   void change(std::size_t object, const Model& model) {
-    surfaces_.at(object) = surface_mesh(model);
+    surfaces_.at(object) = shown_mesh(model);
+    skins_[object] = skin_weights(model);
     last_[object].assign(3 * model.nodes.size(), 0);
   }
   void set(std::span<const FrameObject> objects) {
@@ -52,9 +55,12 @@ private:
       const auto shift = static_cast<std::uint32_t>(all.points.size());
       if (all.points.size() + mesh.points.size() > UINT32_MAX)
         throw Error("the objects have over 2^32 nodes, expected fewer");
-      for (std::size_t i = 0; i < mesh.points.size(); ++i)
-        all.points.push_back(mesh.points[i] +
-                             Vec3{last_[k][3 * i], last_[k][3 * i + 1], last_[k][3 * i + 2]});
+      if (!skins_[k].node.empty())
+        mesh.points = displaced_skin(skins_[k], mesh.points, last_[k]);
+      else
+        for (std::size_t i = 0; i < mesh.points.size(); ++i)
+          mesh.points[i] += Vec3{last_[k][3 * i], last_[k][3 * i + 1], last_[k][3 * i + 2]};
+      all.points.insert(all.points.end(), mesh.points.begin(), mesh.points.end());
       for (const Triangle& t : mesh.triangles)
         all.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
       mesh.texcoords.resize(textured ? mesh.triangles.size() : 0);
@@ -68,6 +74,7 @@ private:
   }
 
   std::vector<TriangleMesh> surfaces_;
+  std::vector<SkinWeights> skins_;
   std::vector<std::vector<double>> last_;
 };
 

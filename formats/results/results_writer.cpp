@@ -6,6 +6,7 @@
 #include "formats/results/results_vtkhdf.h"
 #include "formats/results/results_vtu.h"
 #include "formats/store/hdf5_internal.h"
+#include "solid/skin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -257,7 +258,44 @@ private:
     for (const Node& node : model.nodes)
       points.insert(points.end(), {node.position.x, node.position.y, node.position.z});
     group.write("points", std::span<const double>(points), {n, 3});
-    const TriangleMesh mesh = surface_mesh(model);
+    add_triangles(group, surface_mesh(model));
+    if (!model.tetrahedra.empty()) {
+      const std::uint64_t nodes = model.middles.empty() ? 4 : 10;
+      std::vector<std::uint32_t> elements;
+      elements.reserve(nodes * model.tetrahedra.size());
+      for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
+        elements.insert(elements.end(), model.tetrahedra[t].begin(), model.tetrahedra[t].end());
+        if (nodes == 10)
+          elements.insert(elements.end(), model.middles[t].begin(), model.middles[t].end());
+      }
+      group.write("tetrahedra", std::span<const std::uint32_t>(elements),
+                  {model.tetrahedra.size(), nodes});
+      group.write("tetrahedron_material", model.tetrahedron_material);
+    }
+    if (!model.skin.points.empty())
+      add_skin(group, model);
+    const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
+    return group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
+  }
+
+  /// What a reader needs to show the skin without knowing elements.
+  static void add_skin(hdf5::Group& shape, const Model& model) {
+    hdf5::Group group = shape.create_group("skin");
+    const SkinWeights follows = skin_weights(model);
+    const TriangleMesh mesh = shown_mesh(model);
+    const std::uint64_t count = mesh.points.size();
+    std::vector<double> points;
+    points.reserve(3 * count);
+    for (const Vec3& point : mesh.points)
+      points.insert(points.end(), {point.x, point.y, point.z});
+    group.write("points", std::span<const double>(points), {count, 3});
+    group.write("nodes", std::span<const std::uint32_t>(follows.node), {count, follows.nodes});
+    group.write("weights", std::span<const double>(follows.weight), {count, follows.nodes});
+    add_triangles(group, mesh);
+  }
+
+  /// Triangles, with texture coordinates and materials where they have some.
+  static void add_triangles(hdf5::Group& group, const TriangleMesh& mesh) {
     std::vector<std::uint32_t> corners;
     corners.reserve(3 * mesh.triangles.size());
     for (const Triangle& t : mesh.triangles)
@@ -272,21 +310,6 @@ private:
     }
     if (!mesh.material.empty())
       group.write("material", mesh.material);
-    if (!model.tetrahedra.empty()) {
-      const std::uint64_t nodes = model.middles.empty() ? 4 : 10;
-      std::vector<std::uint32_t> elements;
-      elements.reserve(nodes * model.tetrahedra.size());
-      for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
-        elements.insert(elements.end(), model.tetrahedra[t].begin(), model.tetrahedra[t].end());
-        if (nodes == 10)
-          elements.insert(elements.end(), model.middles[t].begin(), model.middles[t].end());
-      }
-      group.write("tetrahedra", std::span<const std::uint32_t>(elements),
-                  {model.tetrahedra.size(), nodes});
-      group.write("tetrahedron_material", model.tetrahedron_material);
-    }
-    const std::uint64_t rows = std::max<std::uint64_t>(1, 65536 / (12 * n));
-    return group.create_growing("displacement", hdf5::Number::float32, {n, 3}, rows);
   }
 
   static Output::Options with_sync(Output::Options options) {

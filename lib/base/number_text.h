@@ -14,6 +14,15 @@ inline std::string number_text(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+/// The double whose shortest text is that of the float, so that 0.1f does not become 0.10000000149…
+inline double decimal_of(float value) {
+  std::array<char, 32> text{};
+  const char* const end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  double result = 0;
+  std::from_chars(text.data(), end, result);
+  return result;
+}
+
 /// What std::from_chars, which knows no plus sign, is to read of a word: "+1" is a number, "+-1"
 /// and
 /// "++1" are none.

@@ -1,13 +1,13 @@
 #include "model/build.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
 #include "mesh/repeated_faces.h"
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -84,15 +84,6 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
     report.nonmanifold_edges += faces > 2 ? 1 : 0;
   }
   return s;
-}
-
-/// The double whose shortest text is that of the float, so that 0.1f does not become 0.10000000149…
-double decimal(float value) {
-  std::array<char, 32> text{};
-  const char* const end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  double result = 0;
-  std::from_chars(text.data(), end, result);
-  return result;
 }
 
 class Builder {
@@ -417,7 +408,7 @@ private:
         context_, model_.texcoords.size(), 4096, [&](std::size_t begin, std::size_t end) {
           for (std::size_t t = begin; t < end; ++t) {
             const auto& from = mesh_.texcoords[surface_.face_of_triangle[t]];
-            std::transform(from.begin(), from.end(), model_.texcoords[t].begin(), decimal);
+            std::transform(from.begin(), from.end(), model_.texcoords[t].begin(), decimal_of);
           }
         });
   }

@@ -78,9 +78,7 @@ void ModelChecker::node(std::size_t i) {
   require_not_negative(n.drag, "drag");
   if (n.fixed > fixed_all)
     throw Error("unknown fixed axes, expected a subset of x, y, z");
-  if (n.material < 0 || static_cast<std::size_t>(n.material) >= model_.materials.size())
-    throw Error("material " + std::to_string(n.material) + " does not exist, expected 0 to " +
-                std::to_string(model_.materials.size() - 1));
+  require_material(n.material);
   if (n.central == -1)
     return;
   if (n.central < -1 || static_cast<std::size_t>(n.central) >= node_count_)
@@ -191,9 +189,7 @@ void ModelChecker::tetrahedron(std::size_t i) const {
     nodes.insert(nodes.end(), model_.middles[i].begin(), model_.middles[i].end());
   corners(nodes);
   const std::int32_t material = model_.tetrahedron_material[i];
-  if (material < 0 || static_cast<std::size_t>(material) >= model_.materials.size())
-    throw Error("material " + std::to_string(material) + " does not exist, expected 0 to " +
-                std::to_string(model_.materials.size() - 1));
+  require_material(material);
   const Material& m = model_.materials[static_cast<std::size_t>(material)];
   if (!m.poisson)
     throw Error("material " + std::to_string(material) + " has no Poisson's ratio, expected one");
@@ -202,6 +198,38 @@ void ModelChecker::tetrahedron(std::size_t i) const {
   const Vec3 p = at(1) - at(0), q = at(2) - at(0), r = at(3) - at(0);
   if (!(dot(cross(p, q), r) > 0))
     throw Error("the tetrahedron has no positive volume, expected its nodes in VTK's order");
+}
+
+void ModelChecker::skin_point(std::size_t i) const {
+  for (int a = 0; a < 3; ++a)
+    require_finite(model_.skin.points[i][a], "coordinate");
+  const std::uint32_t follows = model_.skin.tetrahedron[i];
+  if (follows >= model_.tetrahedra.size())
+    throw Error("tetrahedron " + std::to_string(follows) + " does not exist, expected 0 to " +
+                std::to_string(model_.tetrahedra.size() - 1));
+}
+
+void ModelChecker::skin_triangle(std::size_t i) const {
+  const Triangle& t = model_.skin.triangles[i];
+  for (std::size_t a = 0; a < t.size(); ++a) {
+    if (t[a] >= model_.skin.points.size())
+      throw Error("point " + std::to_string(t[a]) + " does not exist, expected 0 to " +
+                  std::to_string(model_.skin.points.size() - 1));
+    if (t[a] == t[(a + 1) % t.size()])
+      throw Error("corner " + std::to_string(t[a]) + " stands twice, expected different corners");
+  }
+  require_material(model_.skin.material[i]);
+}
+
+void ModelChecker::skin_texcoord(std::size_t i) const {
+  for (const double value : model_.skin.texcoords[i])
+    require_finite(value, "texture coordinate");
+}
+
+void ModelChecker::require_material(std::int32_t material) const {
+  if (material < 0 || static_cast<std::size_t>(material) >= model_.materials.size())
+    throw Error("material " + std::to_string(material) + " does not exist, expected 0 to " +
+                std::to_string(model_.materials.size() - 1));
 }
 
 } // namespace gewebe

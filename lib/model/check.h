@@ -33,9 +33,14 @@ public:
   void triangle(std::size_t i) const;
   void texcoord(std::size_t i) const;
   void tetrahedron(std::size_t i) const;
+  void skin_point(std::size_t i) const;
+  /// After the last point of the skin.
+  void skin_triangle(std::size_t i) const;
+  void skin_texcoord(std::size_t i) const;
 
 private:
   void corners(std::span<const std::uint32_t> index) const;
+  void require_material(std::int32_t material) const;
 
   const Model& model_;
   std::size_t node_count_ = 0;

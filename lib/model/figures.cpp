@@ -28,6 +28,8 @@ std::vector<std::pair<const char*, std::uint64_t>> model_counts(const Model& mod
     counts.emplace_back("surface_nodes", surface_count(model));
     counts.emplace_back("tetrahedra", model.tetrahedra.size());
     counts.emplace_back("order", model.middles.empty() ? 1 : 2);
+    if (!model.skin.points.empty())
+      counts.emplace_back("skin_triangles", model.skin.triangles.size());
   }
   return counts;
 }

@@ -64,6 +64,21 @@ void check_model(const Model& model) {
                 " materials of tetrahedra, expected " + std::to_string(model.tetrahedra.size()));
   check_each("tetrahedron", model.tetrahedra.size(),
              [&](std::size_t i) { checker.tetrahedron(i); });
+  const Skin& skin = model.skin;
+  if (skin.tetrahedron.size() != skin.points.size())
+    throw Error(std::to_string(skin.tetrahedron.size()) + " tetrahedra of the skin, expected " +
+                std::to_string(skin.points.size()));
+  check_each("skin", skin.points.size(), [&](std::size_t i) { checker.skin_point(i); });
+  if (skin.points.empty() != skin.triangles.empty())
+    throw Error("a skin of points or triangles alone, expected both");
+  if (skin.material.size() != skin.triangles.size())
+    throw Error(std::to_string(skin.material.size()) + " materials of the skin, expected " +
+                std::to_string(skin.triangles.size()));
+  check_each("skin_triangle", skin.triangles.size(),
+             [&](std::size_t i) { checker.skin_triangle(i); });
+  require_size("skin_texcoords", skin.texcoords.size(), skin.triangles.size());
+  check_each("skin_texcoord", skin.texcoords.size(),
+             [&](std::size_t i) { checker.skin_texcoord(i); });
 }
 
 std::size_t body_count(const Model& model) {
@@ -270,8 +285,32 @@ std::string model_digest(const Model& model) {
     for (const Material& m : model.materials)
       add_values(m.poisson.value_or(-1));
   }
+  if (const Skin& skin = model.skin; !skin.points.empty()) {
+    add_count(skin.points.size());
+    for (const Vec3& p : skin.points)
+      add_values(p.x, p.y, p.z);
+    digest.add(skin.tetrahedron);
+    add_count(skin.triangles.size());
+    digest.add(skin.triangles);
+    digest.add(skin.material);
+    add_count(skin.texcoords.size());
+    digest.add(skin.texcoords);
+  }
   return digest.hex();
 }
+
+namespace {
+
+std::vector<std::array<float, 6>> single(const std::vector<std::array<double, 6>>& texcoords) {
+  std::vector<std::array<float, 6>> result;
+  result.reserve(texcoords.size());
+  for (const auto& t : texcoords)
+    std::transform(t.begin(), t.end(), result.emplace_back().begin(),
+                   [](double value) { return static_cast<float>(value); });
+  return result;
+}
+
+} // namespace
 
 TriangleMesh surface_mesh(const Model& model) {
   TriangleMesh mesh;
@@ -288,15 +327,23 @@ TriangleMesh surface_mesh(const Model& model) {
           {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
     }
   }
-  mesh.texcoords.reserve(model.texcoords.size());
-  for (const auto& t : model.texcoords) {
-    std::array<float, 6>& to = mesh.texcoords.emplace_back();
-    std::transform(t.begin(), t.end(), to.begin(),
-                   [](double value) { return static_cast<float>(value); });
-  }
+  mesh.texcoords = single(model.texcoords);
   if (model.materials.size() > 1)
     for (const Triangle& t : model.triangles)
       mesh.material.push_back(model.nodes[t[0]].material);
+  return mesh;
+}
+
+TriangleMesh shown_mesh(const Model& model) {
+  const Skin& skin = model.skin;
+  if (skin.points.empty())
+    return surface_mesh(model);
+  TriangleMesh mesh;
+  mesh.points = skin.points;
+  mesh.triangles = skin.triangles;
+  mesh.texcoords = single(skin.texcoords);
+  if (model.materials.size() > 1)
+    mesh.material = skin.material;
   return mesh;
 }
 

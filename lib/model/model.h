@@ -21,6 +21,8 @@
 //   - triangles and tetrahedra have different nodes, none of them a central node; a tetrahedron has
 //   a positive volume, a material, which exists and has a Poisson's ratio, and with one of them all
 //   have middles
+//   - a skin has points, each with a tetrahedron that exists, and triangles of three different
+//   ones, each with a material that exists; its `texcoords` are empty or complete
 
 #include "base/mesh.h"
 #include "base/vec3.h"
@@ -84,6 +86,18 @@ struct Spring {
   bool operator==(const Spring&) const = default;
 };
 
+/// A surface that follows the elements of a model, in pictures and written shapes: nothing acts on
+/// it, and it acts on nothing. How a point follows is said in solid/skin.h.
+struct Skin {
+  std::vector<Vec3> points;                     ///< at rest, mm
+  std::vector<std::uint32_t> tetrahedron;       ///< one per point: the element that it follows
+  std::vector<Triangle> triangles;              ///< of its points, counter-clockwise from outside
+  std::vector<std::int32_t> material;           ///< one per triangle
+  std::vector<std::array<double, 6>> texcoords; ///< optional, per triangle s0 t0 s1 t1 s2 t2
+
+  bool operator==(const Skin&) const = default;
+};
+
 struct Model {
   std::string name;
   std::vector<Material> materials;
@@ -97,6 +111,7 @@ struct Model {
   std::vector<Tetrahedron> tetrahedra;          ///< optional: finite elements
   std::vector<EdgeMiddles> middles; ///< optional, one per tetrahedron: quadratic elements
   std::vector<std::int32_t> tetrahedron_material; ///< one per tetrahedron
+  Skin skin;                                      ///< optional, where there are tetrahedra
 
   bool operator==(const Model&) const = default;
 };
@@ -155,5 +170,9 @@ std::string model_digest(const Model& model);
 /// The triangles of the model over its surface nodes (same indices), with normals and texture
 /// coordinates where it has them, and face materials where it has several.
 TriangleMesh surface_mesh(const Model& model);
+
+/// What pictures and written shapes show of a model: its skin at rest, the points in their order,
+/// else surface_mesh().
+TriangleMesh shown_mesh(const Model& model);
 
 } // namespace gewebe

@@ -168,32 +168,6 @@ std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
 
 } // namespace
 
-NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0)
-    return {a, 4};
-  const Vec3 bp = p - b;
-  const double d3 = dot(ab, bp), d4 = dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3)
-    return {b, 5};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0)
-    return {a + ab * (d1 / (d1 - d3)), 1};
-  const Vec3 cp = p - c;
-  const double d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6)
-    return {c, 6};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0)
-    return {a + ac * (d2 / (d2 - d6)), 3};
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 2};
-  const double sum = va + vb + vc;
-  return {a + ab * (vb / sum) + ac * (vc / sum), 0};
-}
-
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
                   const VoxelizeOptions& options, double half_width,
                   const std::function<RampDistance(const SlabbedMesh&)>& prepare,

@@ -23,6 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     context.threads = 1;
     (void)gewebe::model_counts(model, context);
     (void)gewebe::surface_mesh(model);
+    (void)gewebe::shown_mesh(model);
   } catch (const gewebe::Error&) { // what bad input is for
   }
   return 0;

@@ -15,5 +15,5 @@ section != "materials" && NF != words[section] { fail(NF " words in " section) }
 section == "springs" { kind[$3]++; if ($1 >= $2 || $2 >= count["nodes"]) fail("nodes of spring " $0) }
 section == "triangles" && ($1 >= count["nodes"] || $2 >= count["nodes"] || $3 >= count["nodes"]) { fail("corner") }
 { left-- }
-BEGIN { split("materials 6 nodes 8 normals 3 springs 6 triangles 3 texcoords 6 tetrahedra 5", w); for (i = 1; i < 14; i += 2) words[w[i]] = w[i + 1] }
+BEGIN { split("materials 6 nodes 8 normals 3 springs 6 triangles 3 texcoords 6 tetrahedra 5 skin 4 skin_triangles 4 skin_texcoords 6", w); for (i = 1; i < 20; i += 2) words[w[i]] = w[i + 1] }
 END { if (!bad) { if (!ended) { print "no end"; exit 1 } print count["nodes"], kind["e"] + 0, kind["b"] + 0, kind["c"] + 0, count["triangles"] } }

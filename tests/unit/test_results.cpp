@@ -5,6 +5,7 @@
 #include "formats/store/hdf5_internal.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "solid/skin.h"
 #include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
@@ -105,6 +106,51 @@ TEST(Results, WhatIsWrittenIsRead) {
   const hdf5::Group forces = file.root().group("objects").group("z-a").group("forces");
   EXPECT_EQ(forces.read<std::uint64_t>("frame", 2), (std::vector<std::uint64_t>{1, 1}));
   EXPECT_EQ(forces.read<std::uint32_t>("node", 2), (std::vector<std::uint32_t>{3, 7}));
+}
+
+TEST(Results, HoldTheSkinOfASolidAndShowIt) {
+  const ScratchFolder folder;
+  TetMesh box = test::distorted_box();
+  SolidModelOptions options;
+  options.material.materials[0].poisson = 0.3;
+  Model model = solid_model(std::move(box), options, {});
+  TriangleMesh surface = test::ball(3, 1.3, {1, 1, 1}); // in and out of the box
+  surface.texcoords.assign(surface.triangles.size(), {0.1F, 0, 1, 0.25F, 0.5F, 2});
+  (void)add_skin(model, surface, {}, {});
+  const std::vector<double> rest(3 * model.nodes.size());
+  std::vector<double> u;
+  for (const Node& node : model.nodes) {
+    const Vec3& p = node.position;
+    u.insert(u.end(), {p.x * p.x, p.y - p.z, 1 + p.x * p.z});
+  }
+  const std::vector<NodeVector> none;
+  const std::vector<Vec3> moved = displaced_skin(skin_weights(model), surface.points, u);
+  for (const Kind kind : {Kind::hdf5, Kind::ply}) {
+    const std::unique_ptr<ResultWriter> result =
+        open_result(kind, folder / (kind == Kind::ply ? "run.ply" : "run.h5"), {.binary = true});
+    result->add_object("s", model);
+    result->add_frame(0, std::vector<FrameObject>{{rest, none}});
+    result->add_frame(1, std::vector<FrameObject>{{u, none}});
+    result->commit();
+  }
+  const std::string path = folder / "run.h5";
+  const ResultSurface first = read_result_surface(path, "s", 0);
+  EXPECT_EQ(first.mesh.points, surface.points);
+  EXPECT_EQ(first.mesh.triangles, surface.triangles);
+  EXPECT_EQ(first.mesh.texcoords, surface.texcoords);
+  const ResultSurface second = read_result_surface(path, "s", 1);
+  EXPECT_EQ(second.rest, surface.points);
+  const TriangleMesh last = read_ply(bytes_of(folder / "run.ply"), "run.ply");
+  ASSERT_EQ(second.mesh.points.size(), moved.size());
+  ASSERT_EQ(last.points.size(), moved.size());
+  EXPECT_EQ(last.texcoords, surface.texcoords);
+  for (std::size_t p = 0; p < moved.size(); ++p) { // displacements are float32, so is the PLY
+    EXPECT_LT(norm(second.mesh.points[p] - moved[p]), 1e-5) << p;
+    EXPECT_LT(norm(last.points[p] - moved[p]), 1e-5) << p;
+    EXPECT_GT(norm(moved[p] - surface.points[p]), 1e-3) << p;
+  }
+  // The nodes' own surface is there for values at nodes.
+  EXPECT_EQ(read_result_surface(path, "s", 0, false).mesh.points.size(), surface_count(model));
 }
 
 TEST(Results, WhatComesLaterWasAtRestInEveryFrameBefore) {

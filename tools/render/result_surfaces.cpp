@@ -92,7 +92,9 @@ std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadO
         surfaces.push_back(std::move(left));
       continue;
     }
-    ResultSurface read = read_result_surface(frame.path, object, frame.number);
+    // Values are those of nodes, which a skin has none of.
+    ResultSurface read =
+        read_result_surface(frame.path, object, frame.number, !options.field_range);
     if (!read.there && options.object.empty())
       continue;
     if (read.there && options.field_range)

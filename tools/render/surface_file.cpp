@@ -121,7 +121,7 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
     refuse(model.tetrahedra.empty() && options.clip, input, no_tetrahedra);
     std::vector<Surface> surfaces = one(
         options.clip ? at(input.name(), [&] { return open_model(model, *options.clip, report); })
-                     : surface_mesh(model));
+                     : shown_mesh(model));
     for (const Material& material : model.materials)
       surfaces[0].materials.push_back(material.name);
     return surfaces;

@@ -56,6 +56,7 @@ void declare(cli::Program& p, ModelArguments& a) {
       .positive();
   p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
   p.option("--cell", a.cell, "S", "edge of the cells that fill it, in mm").positive();
+  p.flag("--no-skin", a.no_skin, "leave the surface out of the solid that fills it");
   p.option("--poisson", a.values.poisson, "NU",
            "of tetrahedra: Poisson's ratio, instead of the material's")
       .range(0, 0.4999999);
@@ -90,6 +91,7 @@ void complete(ModelArguments& a) {
   refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
          "--fix-axes without --fix, expected both");
   refuse(a.cell && !a.solid, "--cell without --solid, expected both");
+  refuse(a.no_skin && !a.solid, "--no-skin without --solid, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");
   a.repairs = parsed("--repair", [&] { return parse_repair(a.repair); });

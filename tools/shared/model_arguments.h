@@ -25,7 +25,7 @@ struct ModelArguments {
   std::optional<double> dt;
   std::int64_t order = 2;     ///< of finite elements
   std::optional<double> cell; ///< of the lattice that fills a surface
-  bool solid = false, scale_mass = false, list_materials = false;
+  bool solid = false, no_skin = false, scale_mass = false, list_materials = false;
 };
 
 /// The options of a program, to be told into `a`.

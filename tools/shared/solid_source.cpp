@@ -1,9 +1,11 @@
 #include "tools/shared/solid_source.h"
 
 #include "base/number_text.h"
+#include "base/rounded_text.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
 #include "formats/volume/volume_plugin.h"
+#include "solid/skin.h"
 #include "solid/solid_model.h"
 #include "tetrahedra/check.h"
 
@@ -62,6 +64,21 @@ Model model_of(Run& run, TetMesh mesh, const ModelArguments& a) {
   });
 }
 
+/// The surface goes along with what fills it.
+void skin(Run& run, const std::string& name, const TriangleMesh& mesh, double cell, Model& model) {
+  const SkinReport made =
+      run.timed("skin", [&] { return add_skin(model, mesh, {}, run.context()); });
+  run.stats().set("skin_dropped_triangles", made.dropped_triangles);
+  run.stats().set("skin_points_outside", made.points_outside);
+  run.stats().set("skin_farthest", made.farthest);
+  if (made.dropped_triangles > 0)
+    run.warn(name + ": " + std::to_string(made.dropped_triangles) +
+             " faces with two equal corners are left out of the skin");
+  if (!(made.farthest <= cell))
+    run.warn(name + ": the surface lies up to " + rounded_text(made.farthest) +
+             " mm outside the tetrahedra, where it follows them poorly, expected a smaller --cell");
+}
+
 constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
 constexpr double usual_tetrahedra = 10000; // without a grade
 constexpr unsigned usual_grade = 1;
@@ -114,7 +131,10 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
       run.warn(name + ": cells of " + number_text(cell) + " mm change the volume by " +
                number_text(std::round(1000 * (filled - volume) / volume) / 10) +
                " %, expected a smaller --cell");
-    return model_of(run, std::move(tets), a);
+    Model model = model_of(run, std::move(tets), a);
+    if (!a.no_skin)
+      skin(run, name, mesh, cell, model);
+    return model;
   });
 }
 
