@@ -3,6 +3,7 @@
 
 #include "model/selector.h"
 #include "scene/change.h"
+#include "solid/solid_motion.h"
 
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@ struct ObjectCommand {
   Method method = Method::ela;
   bool implicit = false;
   bool warp = false; ///< large rotations
+  SolidChoice solid; ///< how a solid moves
 };
 /// A change, but for the numbers of what it names, which scene_change() finds.
 struct ChangeCommand {

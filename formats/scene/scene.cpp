@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/number_text.h"
+#include "solid/solid_motion.h"
 
 #include <algorithm>
 #include <array>
@@ -49,8 +50,9 @@ public:
     return same;
   }
 
-  double number(const char* what) {
-    const std::string& text = word(what);
+  double number(const char* what) { return number_in(word(what), what); }
+
+  double number_in(std::string_view text, const char* what) {
     const std::string_view digits = without_plus(text);
     const char* const end = digits.data() + digits.size();
     double value = 0;
@@ -114,6 +116,28 @@ private:
 
 using What = decltype(Command::what);
 
+/// RATIO@HZ: what a motion of this frequency decays by.
+double parse_damping(Words& in, std::string_view text) {
+  const std::size_t at = text.find('@');
+  if (at == std::string_view::npos)
+    in.fail("a damping without a frequency");
+  const double ratio = in.number_in(text.substr(0, at), "damping ratio"),
+               frequency = in.number_in(text.substr(at + 1), "frequency");
+  if (!(ratio >= 0) || !(frequency > 0))
+    in.fail("a damping ratio below 0, or a frequency that is not positive");
+  const double damping = damping_per_stiffness(ratio, frequency);
+  if (!std::isfinite(damping))
+    in.fail("a damping that is not finite");
+  return damping;
+}
+
+double parse_tolerance(Words& in, std::string_view text) {
+  const double tolerance = in.number_in(text, "tolerance");
+  if (!(tolerance >= 1e-9 && tolerance <= 0.1))
+    in.fail("a tolerance that is not from 1e-9 to 0.1");
+  return tolerance;
+}
+
 What parse_object(Words& in) {
   ObjectCommand c;
   c.name = in.name();
@@ -129,6 +153,13 @@ What parse_object(Words& in) {
       c.implicit = true;
     else if (word == "rotation=warp" && !c.warp)
       c.warp = true;
+    else if ((word == "law=corotational" || word == "law=neo-hookean") && !c.solid.law)
+      c.solid.law =
+          word == "law=corotational" ? SolidLaw::corotational : SolidLaw::stable_neo_hookean;
+    else if (word.starts_with("damping=") && !c.solid.damping)
+      c.solid.damping = parse_damping(in, std::string_view(word).substr(8));
+    else if (word.starts_with("tolerance=") && !c.solid.tolerance)
+      c.solid.tolerance = parse_tolerance(in, std::string_view(word).substr(10));
     else if ((word == "method=ffe" || word == "method=ela") && !method)
       method = word == "method=ffe" ? Method::ffe : Method::ela;
     else
@@ -399,7 +430,7 @@ const std::array<Verb, 22>& verbs() {
   static const std::array<Verb, 22> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit] "
-       "[rotation=warp]",
+       "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
       {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},

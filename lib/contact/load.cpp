@@ -28,22 +28,6 @@ std::vector<std::uint8_t> middles_of(const Model& model) {
   return flags;
 }
 
-/// A traction puts no force on the corners of a quadratic face: what a triangle has for its corner
-/// goes to its middles, which so carry a third of the face each under an even pressure.
-void hand_on(const Triangle& t, std::uint32_t corner, const std::vector<std::uint8_t>& is_middle,
-             const Vec3& force, std::map<std::uint32_t, Vec3>& forces) {
-  int middles = 0;
-  if (!is_middle.empty() && is_middle[corner] == 0)
-    middles = is_middle[t[0]] + is_middle[t[1]] + is_middle[t[2]];
-  if (middles == 0) {
-    forces[corner] += force;
-    return;
-  }
-  for (const std::uint32_t node : t)
-    if (is_middle[node] != 0)
-      forces[node] += force / middles;
-}
-
 } // namespace
 
 Load load_at(const Load& load, const Model& model, double time) {
@@ -52,19 +36,33 @@ Load load_at(const Load& load, const Model& model, double time) {
     now.force[node] *= pulse(time, period);
   for (const auto& [node, way] : load.ramp)
     now.displacement[node] = way.at(time);
-  if (load.pressure.empty())
-    return now;
-  const std::vector<std::uint8_t> is_middle = middles_of(model);
-  for (const Triangle& t : model.triangles) {
-    const Vec3 &a = model.nodes[t[0]].position, &b = model.nodes[t[1]].position,
-               &c = model.nodes[t[2]].position;
-    const Vec3 third = cross(b - a, c - a) / 6;
-    for (const std::uint32_t corner : t)
-      if (const auto p = load.pressure.find(corner); p != load.pressure.end())
-        hand_on(t, corner, is_middle, p->second.pressure * pulse(time, p->second.period) * third,
-                now.force);
-  }
+  press(
+      pressed_corners(load, model), time,
+      [&](std::uint32_t node) { return model.nodes[node].position; },
+      [&](std::uint32_t node, const Vec3& force) { now.force[node] += force; });
   return now;
+}
+
+std::vector<PressedCorner> pressed_corners(const Load& load, const Model& model) {
+  std::vector<PressedCorner> all;
+  if (load.pressure.empty())
+    return all;
+  const std::vector<std::uint8_t> is_middle = middles_of(model);
+  for (const Triangle& t : model.triangles)
+    for (const std::uint32_t corner : t) {
+      const auto p = load.pressure.find(corner);
+      if (p == load.pressure.end())
+        continue;
+      PressedCorner one{.triangle = t, .pressure = p->second};
+      if (!is_middle.empty() && is_middle[corner] == 0)
+        for (const std::uint32_t node : t)
+          if (is_middle[node] != 0)
+            one.bearers[one.count++] = node;
+      if (one.count == 0)
+        one.bearers[one.count++] = corner;
+      all.push_back(one);
+    }
+  return all;
 }
 
 } // namespace gewebe

@@ -5,10 +5,13 @@
 #include "contact/instrument.h"
 #include "model/model.h"
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
+#include <vector>
 
 namespace gewebe {
 
@@ -89,6 +92,29 @@ struct Load {
 /// The load at one time: forces without a period, with the pressures among them, along the normals
 /// at rest, and displacements.
 Load load_at(const Load& load, const Model& model, double time);
+
+/// A corner of a triangle under a pressure, and who bears what it takes: on a quadratic face the
+/// middles, which so carry a third of the face each under an even pressure, for a traction puts no
+/// force on its corners.
+struct PressedCorner {
+  Triangle triangle{};
+  NodePressure pressure;
+  std::array<std::uint32_t, 3> bearers{};
+  std::uint32_t count = 0; ///< of bearers
+};
+std::vector<PressedCorner> pressed_corners(const Load& load, const Model& model);
+
+/// Calls add(node, force) for all that pressures do at a time, with nodes where place(node) says.
+template <class Place, class Add>
+void press(std::span<const PressedCorner> corners, double time, Place&& place, Add&& add) {
+  for (const PressedCorner& c : corners) {
+    const Vec3 at = place(c.triangle[0]);
+    const Vec3 third = cross(place(c.triangle[1]) - at, place(c.triangle[2]) - at) / 6;
+    const Vec3 force = c.pressure.pressure * pulse(time, c.pressure.period) * third;
+    for (std::uint32_t k = 0; k < c.count; ++k)
+      add(c.bearers[k], force / static_cast<double>(c.count));
+  }
+}
 
 /// Whether the model holds `node` along `axis` (0 to 2).
 inline bool is_fixed(const Model& model, std::size_t node, int axis) {

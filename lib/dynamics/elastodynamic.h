@@ -11,8 +11,8 @@
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
-#include "base/error.h"
 #include "contact/load.h"
+#include "dynamics/body_motion.h"
 #include "dynamics/dynamic_contact.h"
 #include "dynamics/implicit_contact.h"
 #include "dynamics/implicit_euler.h"
@@ -20,6 +20,7 @@
 #include "dynamics/spring_layout.h"
 #include "model/model.h"
 
+#include <any>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -35,47 +36,25 @@ inline constexpr double safe_step_fraction = 0.9;
 
 enum class Integration { semi_implicit, implicit };
 
-/// The state of an object can't be continued.
-class MotionError : public Error {
-public:
-  MotionError(std::uint32_t node, double time, const std::string& what)
-      : Error(what), node_(node), time_(time) {}
-  std::uint32_t node() const noexcept { return node_; }
-  double time() const noexcept { return time_; }
-
-private:
-  std::uint32_t node_;
-  double time_;
-};
-
-class Elastodynamic {
+class Elastodynamic final : public BodyMotion {
 public:
   /// At rest. Keeps a reference to the model.
   /// \pre check_model(model) passes   \throw Error if a node can move but has no mass
   explicit Elastodynamic(const Model& model, Integration integration = Integration::semi_implicit);
 
-  /// What acts from now on. Displaced nodes stand where they must at once. An unchanged load wakes
-  /// nobody. \pre nodes exist, no displacement along an axis that the model holds
-  void set_load(const Load& load, double time = 0);
-
-  /// Integrates from `start` over `duration` in equal steps of at most `largest_step`. An object
-  /// that rests (see resting()) takes none. \return steps taken
-  /// \pre duration >= 0, largest_step > 0, start >= 0
-  /// \throw Error if there would be over 1e9 steps; MotionError that names the node and the time
-  /// where the state is no longer finite, or an implicit step has no solution; Cancelled
+  void set_load(const Load& load, double time = 0) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
-                        double start = 0);
+                        double start = 0) override;
 
-  /// Whether the object was found at rest: no speed, and acceleration (times the square of the
-  /// step) under 1e-15 of its size; so it stays until its load changes.
-  bool resting() const noexcept { return resting_; }
+  /// At rest it has no speed, and acceleration (times the square of the step) under 1e-15 of its
+  /// size.
+  bool resting() const noexcept override { return resting_; }
+  void wake() override { resting_ = false; }
 
-  /// By node of the model. \pre not from two threads at once
-  std::span<const NodeMotion> motion() const;
-  /// Gives the nodes another state; it wakes. \pre as many as nodes; 0 where the model holds them
-  void set_motion(std::span<const NodeMotion> motion);
+  std::span<const NodeMotion> motion() const override;
+  void set_motion(std::span<const NodeMotion> motion) override;
 
-  /// All that decides how it goes on, but for what is kept to be quick (see renew).
+  /// What a snapshot holds.
   struct State {
     std::shared_ptr<const Load> load;
     double time = 0, loaded = 0;
@@ -87,25 +66,20 @@ public:
   State state() const;
   /// Goes back. \pre a state of this object
   void restore(const State& state);
-  /// Forgets an implicit step's matrix and factor, which serve for several steps.
-  void renew();
+  std::any snapshot() const override { return state(); }
+  void go_back(const std::any& snapshot) override {
+    restore(std::any_cast<const State&>(snapshot));
+  }
+  /// Of an implicit step the matrix and factor, which serve for several steps.
+  void renew() override;
 
-  /// What holds the displaced nodes: the force on the object, per node in ascending order; 0 along
-  /// axes that the model holds.
-  std::vector<NodeVector> contact_forces() const;
+  std::vector<NodeVector> contact_forces() const override;
 
-  /// Instruments during the advances to come, by number; none of them: no cost. Wakes nobody.
-  void set_instruments(std::vector<std::optional<MovingInstrument>> instruments);
-  void wake() { resting_ = false; }
-  /// That it rests for `duration` s more, in place of an advance. \pre resting()
-  void rest_on(double duration);
-  /// Impulses (forces times s) of the instruments since the last call, by ascending node and
-  /// instrument.
-  std::vector<NodeTouch> take_impulses();
-  /// Whether the forces of instruments in implicit steps so far meet the conditions.
-  bool touches_exact() const { return !touch_ || touch_->state().exact; }
-  /// The forces of the instruments, if it rested for these last `duration` s, all since that call.
-  std::optional<std::vector<NodeTouch>> held_touches(double duration) const;
+  void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
+  void rest_on(double duration) override;
+  std::vector<NodeTouch> take_impulses() override;
+  bool touches_exact() const override { return !touch_ || touch_->state().exact; }
+  std::optional<std::vector<NodeTouch>> held_touches(double duration) const override;
 
 private:
   /// A row whose force changes with time or shape.

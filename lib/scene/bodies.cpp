@@ -65,13 +65,9 @@ void add_ties(const World& w, const std::vector<std::size_t>& parts,
   }
 }
 
-Integration integration_of(const World& w, const Body& body) {
-  return w.now.objects[body.parts[0]].matter->integration;
-}
-
 double integration_step(World& w, Body& body) {
   const std::optional<double> wish = w.now.settings.timestep;
-  if (integration_of(w, body) == Integration::implicit)
+  if (moves_implicitly(w.now.objects[body.parts[0]]))
     return wish.value_or(implicit_step);
   const double usual = safe_step_fraction * body.safe;
   if (!wish)
@@ -136,6 +132,27 @@ std::span<const NodeMotion> motion_of(const Object& object) {
   return object.body->moving->motion().subspan(object.offset, object.model().nodes.size());
 }
 
+namespace {
+
+/// What moves a body of this model, whose parts are all as this object.
+std::unique_ptr<BodyMotion> motion_for(const World& w, const Object& object, const Model& model) {
+  if (!is_solid(object)) {
+    if (object.matter->solid.said())
+      throw Error("object " + object.name() +
+                  " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
+    return std::make_unique<Elastodynamic>(model, object.matter->integration);
+  }
+  try {
+    return std::make_unique<SolidDynamic>(model, object.matter->solid, w.context);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("object " + object.name() + ": " + error.what());
+  }
+}
+
+} // namespace
+
 /// \param motions of parts, by object; none: as they move now
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const Motions* motions) {
   auto body = std::make_shared<Body>();
@@ -159,9 +176,10 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
         motions != nullptr ? std::span<const NodeMotion>(motions->at(part)) : motion_of(object);
     motion.insert(motion.end(), from.begin(), from.end());
   }
-  body->moving.emplace(*body->model, w.now.objects[parts[0]].matter->integration);
+  const Object& first = w.now.objects[parts[0]];
+  body->moving = motion_for(w, first, *body->model);
   body->moving->set_motion(motion);
-  body->safe = safe_step(*body->model);
+  body->safe = moves_implicitly(first) ? HUGE_VAL : safe_step(*body->model);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     w.now.objects[parts[k]].body = body;
     w.now.objects[parts[k]].offset = offset[k];
@@ -175,10 +193,16 @@ void need_body(World& w, std::size_t object) {
   if (w.now.objects[object].body != nullptr)
     return;
   need_model(w.now.objects[object]);
-  if (!w.now.objects[object].model().tetrahedra.empty())
-    throw Error("object " + w.now.objects[object].name() + " " +
-                std::string(gap(Way::solid, Feature::method)->text));
   w.now.bodies.push_back(make_body(w, {object}));
+}
+
+void add_counts(SolidStepCounts& sum, const SolidStepCounts& more) {
+  sum.steps += more.steps;
+  sum.rounds += more.rounds;
+  sum.factors += more.factors;
+  sum.unfinished += more.unfinished;
+  sum.limited += more.limited;
+  sum.seconds += more.seconds;
 }
 
 void drop_body(World& w, const Body* body) {
@@ -224,8 +248,12 @@ void move_bodies(World& w, double to) {
   for (Body* const body : awake)
     if (body->failure)
       raise(w, *body);
+  for (Body* const body : awake)
+    require_untouched(w, *body, to);
   end_guiding(w, to);
   SimulationCounts& counts = w.now.counts;
+  for (Body* const body : awake)
+    add_counts(counts.solids, body->moving->take_counts());
   for (const Object& object : w.now.objects)
     counts.resting += object.method == Method::ela && object.body == nullptr ? 1 : 0;
   for (const auto& body : w.now.bodies) {
@@ -242,9 +270,11 @@ void move_bodies(World& w, double to) {
 // ---- attachments
 
 void Rule<Attach>::check(World& w, const Attach& c) {
-  const Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
-  for (const Object* const o : {&a, &b})
+  Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
+  for (Object* const o : {&a, &b}) {
+    need_model(*o);
     require_support(w, *o, Feature::attach);
+  }
   if (&a == &b)
     throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
   if (a.matter->integration != b.matter->integration)

@@ -12,7 +12,7 @@ void Body::restore(const Snapshot& was) {
   changed = was.changed;
   touched = was.touched;
   rest_box = was.rest_box;
-  moving->restore(was.motion);
+  moving->go_back(was.motion);
   failure = nullptr;
 }
 
@@ -39,9 +39,8 @@ void take_back(World& w, Saved&& saved) noexcept {
     Object& object = w.now.objects[i];
     if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
       object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
-    const bool implicit = object.body != nullptr &&
-                          object.matter->integration == Integration::implicit && object.body->ahead;
-    if (!implicit && !object.statics->ahead)
+    const bool ahead = object.body != nullptr && object.body->ahead && moves_implicitly(object);
+    if (!ahead && !object.statics->ahead)
       continue;
     renew(object);
     if (object.contact) // as it was, with what it touched

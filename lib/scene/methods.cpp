@@ -22,7 +22,7 @@ std::span<const double> shape_now(World& w, Object& object) {
   }
   const Shown& shown = object.shown;
   if (!shown.touches.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
-    u = *shown.displacement; // instruments among what acts
+    u = whole_shape(w, object); // instruments among what acts
   return u;
 }
 

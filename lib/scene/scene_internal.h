@@ -5,11 +5,14 @@
 
 #include "base/copy_on_write.h"
 #include "cutting/cut_stiffness.h"
+#include "dynamics/body_motion.h"
+#include "dynamics/solid_dynamic.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/static_contact.h"
 #include "statics/warped_statics.h"
 
+#include <any>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -54,7 +57,8 @@ struct Told {
 struct Matter {
   std::string name;
   ObjectSource source;
-  Integration integration = Integration::semi_implicit;
+  Integration integration = Integration::semi_implicit;                 // of a net
+  SolidChoice solid;                                                    // how a solid moves
   std::shared_ptr<const Model> model = std::make_shared<const Model>(); // empty until it is known
   bool known = false;
   double shortest_edge = 0; // mm; 0: not yet known
@@ -82,7 +86,7 @@ struct Statics {
 struct Body {
   std::vector<std::size_t> parts;     // objects
   std::shared_ptr<const Model> model; // of all parts
-  std::optional<Elastodynamic> moving;
+  std::unique_ptr<BodyMotion> moving;
   double safe = 0; // largest stable step
   bool changed = true;
   bool touched = false;         // by an instrument, in the last step
@@ -95,9 +99,9 @@ struct Body {
   struct Snapshot {
     bool changed = true, touched = false;
     std::optional<Box3> rest_box;
-    Elastodynamic::State motion;
+    std::any motion;
   };
-  Snapshot snapshot() const { return {changed, touched, rest_box, moving->state()}; }
+  Snapshot snapshot() const { return {changed, touched, rest_box, moving->snapshot()}; }
   void restore(const Snapshot& was);
 };
 

@@ -53,22 +53,25 @@ Simulation::~Simulation() = default;
 // ---- objects
 
 void Simulation::add_object(const std::string& name, ObjectSource source, Method method,
-                            Integration integration) {
+                            Integration integration, const SolidChoice& solid) {
   Object object;
   object.matter->name = name;
   object.matter->source = std::move(source);
   object.matter->integration = integration;
+  object.matter->solid = solid;
   object.method = method;
   insert(*world_, std::move(object));
 }
 
 void Simulation::add_object(const std::string& name, Model model, Method method,
-                            std::shared_ptr<ComplianceSource> source, Integration integration) {
+                            std::shared_ptr<ComplianceSource> source, Integration integration,
+                            const SolidChoice& solid) {
   World& w = *world_;
   Object object;
   object.matter->name = name;
   object.matter->source.model = [&] { return std::move(model); };
   object.matter->integration = integration;
+  object.matter->solid = solid;
   object.method = method;
   need_model(object);
   object.matter->source = {};
@@ -102,8 +105,15 @@ const Model& Simulation::first_model(std::size_t object) const {
 
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
-  return {one.name(), one.method,           one.matter->known, one.stages.model != nullptr,
-          one.warp,   *one.cut.first_nodes, *one.cut.places};
+  return {one.name(),
+          one.method,
+          one.matter->known,
+          one.stages.model != nullptr,
+          one.warp,
+          one.method == Method::ela && one.matter->known && is_solid(one),
+          one.matter->solid.law.value_or(SolidLaw::corotational),
+          *one.cut.first_nodes,
+          *one.cut.places};
 }
 
 std::size_t find_object(const Simulation& simulation, const std::string& name) {
@@ -203,7 +213,8 @@ std::span<const double> Simulation::displacement(std::size_t object) const {
 std::span<const double> Simulation::local_displacement(std::size_t object) const {
   Object& one = world_->now.objects.at(object);
   const std::span<const double> whole = whole_shape(*world_, one);
-  return one.warped ? warped_of(*world_, one).local_displacement() : whole;
+  return one.method == Method::ffe && one.warped ? warped_of(*world_, one).local_displacement()
+                                                 : whole;
 }
 
 std::span<const double> Simulation::surface_displacement(std::size_t object) const {
@@ -284,6 +295,11 @@ SimulationState Simulation::state() const {
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)
       continue;
+    if (const auto energies = object.body->moving->energies()) {
+      state.kinetic_energy += energies->kinetic;
+      state.elastic_energy += energies->elastic;
+      continue;
+    }
     const std::span<const NodeMotion> motion = motion_of(object);
     state.kinetic_energy += kinetic_energy(object.model(), motion);
     state.elastic_energy += elastic_energy(object.model(), motion);

@@ -6,6 +6,7 @@
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "dynamics/elastodynamic.h"
+#include "dynamics/solid_dynamic.h"
 #include "model/cut.h"
 #include "model/cut_select.h"
 #include "model/model.h"
@@ -80,6 +81,7 @@ struct SimulationCounts {
   std::uint64_t resting = 0;       ///< advances that an object at rest did not need
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
+  SolidStepCounts solids;          ///< of all that move
   double largest_jump = 0;         ///< mm, see MethodJump
   std::uint64_t cuts = 0;          ///< that changed a model
   /// Of elastostatic objects: how their stiffness followed, see CutWay.
@@ -90,9 +92,11 @@ struct SimulationCounts {
 struct ObjectFacts {
   const std::string& name;
   Method method = Method::ela;
-  bool known = false;  ///< its model was needed so far
-  bool staged = false; ///< that of its second stage is known
-  bool warp = false;   ///< with large rotations
+  bool known = false;                    ///< its model was needed so far
+  bool staged = false;                   ///< that of its second stage is known
+  bool warp = false;                     ///< with large rotations
+  bool moving_solid = false;             ///< of tetrahedra, and elastodynamic
+  SolidLaw law = SolidLaw::corotational; ///< of these
   /// By node: the node of the first model that it is, or is a copy of. Empty: all as they came.
   std::span<const std::uint32_t> first_nodes;
   /// By node of the first model: its number now, or CutModel::gone. Empty: all as they came.
@@ -146,15 +150,18 @@ public:
   Simulation& operator=(const Simulation&) = delete;
 
   /// An object at rest, under the present gravity. \param source for ffe: of its compliance
+  /// \param integration of a net \param solid of a solid
   /// \pre check_model(model) passes   \throw Error if there is one of that name, or it can't be
   /// simulated by this method; Cancelled
   void add_object(const std::string& name, Model model, Method method,
                   std::shared_ptr<ComplianceSource> source = {},
-                  Integration integration = Integration::semi_implicit);
+                  Integration integration = Integration::semi_implicit,
+                  const SolidChoice& solid = {});
   /// One of which nothing is read before it is needed: at the latest when something acts on it.
   /// Until then it rests. \throw Error if there is one of that name
   void add_object(const std::string& name, ObjectSource source, Method method,
-                  Integration integration = Integration::semi_implicit);
+                  Integration integration = Integration::semi_implicit,
+                  const SolidChoice& solid = {});
 
   std::size_t object_count() const noexcept;
   /// Read now if it was not needed before. The first one of an object lives as long as this; a cut
@@ -197,8 +204,8 @@ public:
   /// elastodynamic one are means over the last step. \throw Error as step
   std::span<const double> displacement(std::size_t object) const;
   /// Displacements of all nodes whose small strains are those of the shape: displacement(), but of
-  /// an object with large rotations those in frames that turn with it. Valid until the next call of
-  /// anything that isn't const.
+  /// an elastostatic object with large rotations those in frames that turn with it. Valid until the
+  /// next call of anything that isn't const.
   std::span<const double> local_displacement(std::size_t object) const;
   /// As displacement, of the first nodes: at least those of the surface. Where stored columns of a
   /// solid have rows for these alone, it takes nothing of what is inside.

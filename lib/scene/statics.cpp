@@ -108,7 +108,7 @@ void renew(Object& object) {
   }
   statics.stiffness.reset();
   statics.prepared.reset();
-  if (object.body != nullptr && object.matter->integration == Integration::implicit)
+  if (object.body != nullptr && moves_implicitly(object))
     object.body->moving->renew();
   object.shown.valid = false;
 }

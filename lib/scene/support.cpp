@@ -34,6 +34,8 @@ bool goes(const Object& object, Way way) {
     return object.matter->known && !object.model().tetrahedra.empty();
   case Way::net:
     return object.matter->known && object.model().tetrahedra.empty();
+  case Way::solid_motion:
+    return moves && object.matter->known && is_solid(object);
   case Way::warped:
     return object.warp;
   }

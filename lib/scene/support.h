@@ -17,14 +17,15 @@ enum class Way : std::uint8_t {
   two_step_stored, ///< its second stage known by its stiffness alone
   whole,
   cut,
-  solid, ///< of tetrahedra, or with some
-  net,   ///< of none
-  warped ///< with large rotations
+  solid,        ///< of tetrahedra, or with some
+  net,          ///< of none
+  solid_motion, ///< a solid that moves
+  warped        ///< with large rotations
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic, Way::two_step,
     Way::two_step_stored, Way::whole,           Way::cut,      Way::solid,        Way::net,
-    Way::warped};
+    Way::solid_motion,    Way::warped};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -63,8 +64,10 @@ inline constexpr std::array gaps{
     Gap{Way::solid, Feature::cut, true,
         "holds tetrahedra, expected springs and triangles alone to cut"},
     Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
-    Gap{Way::solid, Feature::method, true,
-        "holds tetrahedra, whose motion is not simulated, expected ffe"},
+    Gap{Way::solid_motion, Feature::touch, true,
+        "is a solid that moves, which no instrument can push yet, expected ffe"},
+    Gap{Way::solid_motion, Feature::attach, true,
+        "is a solid, expected objects of springs and triangles alone to attach"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

@@ -98,6 +98,7 @@ void update_solver(World& w, Object& object, const Load& load);
 void renew(Object& object);
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
+void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);
 TwoStep& two_step_of(World& w, Object& object);
 void follow_cut(const World& w, const Object& old, std::span<const std::uint32_t> origin,
                 Object& next);
@@ -115,6 +116,14 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
 void drop_body(World& w, const Body* body);
 void move_bodies(World& w, double to);
+/// Of tetrahedra, or with some. \pre its model is known
+inline bool is_solid(const Object& object) {
+  return !object.model().tetrahedra.empty();
+}
+/// By steps that keep a factor.
+inline bool moves_implicitly(const Object& object) {
+  return object.matter->integration == Integration::implicit || is_solid(object);
+}
 /// How an object's nodes move. \pre it has a body
 std::span<const NodeMotion> motion_of(const Object& object);
 
@@ -143,6 +152,7 @@ bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
 // contact.cpp: whom they touch
+void require_untouched(const World& w, const Body& body, double to);
 void guide(World& w, Body& body, double to);
 void end_guiding(World& w, double to);
 void take_touches(World& w, double duration);

@@ -122,7 +122,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   else
     descend_quickly(objective, found, s.quick, s.options, step, context);
   if (!std::isfinite(found.value))
-    throw Error("a solid's motion is no longer finite");
+    throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
 
   s.reactions = found.forces;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
@@ -170,9 +170,15 @@ std::span<const double> SolidMotion::masses() const noexcept {
 
 void SolidMotion::set_state(std::span<const double> displacement, std::span<const double> velocity,
                             const Context& context) {
+  Numbers places = state_->body.rest;
+  add(places, 1, displacement);
+  restore(places, velocity, context);
+}
+
+void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
+                          const Context& context) {
   State& s = *state_;
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    s.now.place[axis] = s.body.rest[axis] + displacement[axis];
+  std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
   std::ranges::fill(s.acceleration, 0.0);
   s.energy.forget_bubbles();
@@ -180,6 +186,14 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
   s.energy.keep();
+}
+
+void SolidMotion::find_reactions(const Context& context) {
+  State& s = *state_;
+  Numbers forces(s.body.axes());
+  s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    s.reactions[axis] = s.now.held[axis] != 0 ? -forces[axis] - s.now.load[axis] : 0;
 }
 
 double SolidMotion::kinetic_energy() const {

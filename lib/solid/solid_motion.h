@@ -40,6 +40,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,6 +56,16 @@ struct SolidMotionOptions {
   double tolerance = 0.02;
   int max_rounds = 8;     ///< of the quick way
   bool reference = false; ///< Newton's method until rounding; no limit of time
+};
+
+/// What is said of how a solid moves; SolidMotionOptions has the rest.
+struct SolidChoice {
+  std::optional<SolidLaw> law;
+  std::optional<double> damping;   ///< per stiffness, s
+  std::optional<double> tolerance; ///< of a step: it takes as many rounds as this needs
+
+  bool said() const { return law || damping || tolerance; }
+  bool operator==(const SolidChoice&) const = default;
 };
 
 /// What a step took.
@@ -101,6 +112,11 @@ public:
   /// Another state. \pre 3 n each, finite
   void set_state(std::span<const double> displacement, std::span<const double> velocity,
                  const Context& context = {});
+  /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
+  void restore(std::span<const double> places, std::span<const double> velocity,
+               const Context& context = {});
+  /// From now on reactions() are those of the state as it stands still, until the next step.
+  void find_reactions(const Context& context = {});
 
   double kinetic_energy() const;   ///< g mm²/s²
   double elastic_energy() const;   ///< of the state

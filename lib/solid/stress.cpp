@@ -1,5 +1,7 @@
 #include "solid/stress.h"
 
+#include "solid/corotational.h"
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -40,6 +42,48 @@ Vec3 at_node(std::span<const double> u, std::uint32_t node) {
 
 } // namespace
 
+namespace {
+
+/// The rotation nearest to each element's gradient.
+std::vector<Eigen::Matrix3d> element_rotations(const TetMesh& mesh,
+                                               std::span<const SolidElement> elements,
+                                               std::span<const double> u) {
+  std::vector<double> places, forces(u.size());
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      places.push_back(mesh.points[i][a] + u[3 * i + static_cast<std::size_t>(a)]);
+  CorotationalSolid solid(mesh, elements);
+  Context one;
+  one.threads = 1;
+  (void)solid.evaluate(places, {}, forces, one);
+  std::vector<Eigen::Matrix3d> rotations;
+  for (std::size_t t = 0; t < elements.size(); ++t) {
+    const SolidBlock r = solid.frame(t).rotation;
+    rotations.emplace_back(
+        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data()));
+  }
+  return rotations;
+}
+
+/// What displacements are in the frame of an element that turns by r about its first corner.
+void turn_back(const TetMesh& mesh, std::size_t t, const Eigen::Matrix3d& r,
+               std::span<Vec3> values) {
+  const Vec3 from = mesh.points[mesh.tetrahedra[t][0]], moved = values[0];
+  for (std::size_t a = 0; a < values.size(); ++a) {
+    const Vec3 rest = mesh.points[a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4]] - from;
+    const Vec3 now = rest + values[a] - moved;
+    const Eigen::Vector3d back = r.transpose() * Eigen::Vector3d(now.x, now.y, now.z);
+    values[a] = Vec3{back.x(), back.y(), back.z()} - rest;
+  }
+}
+
+Vec3 turned_back(const Eigen::Matrix3d& r, const Vec3& v) {
+  const Eigen::Vector3d back = r.transpose() * Eigen::Vector3d(v.x, v.y, v.z);
+  return {back.x(), back.y(), back.z()};
+}
+
+} // namespace
+
 std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,
                                          std::span<const SolidElement> elements,
@@ -48,16 +92,21 @@ std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
   std::vector<CornerTensors> strains(elements.size());
   std::array<Vec3, 10> values;
   const std::size_t count = mesh.middles.empty() ? 4 : 10;
+  const bool own = frames == StrainFrames::elements;
+  const std::vector<Eigen::Matrix3d> rotations =
+      own ? element_rotations(mesh, elements, u) : std::vector<Eigen::Matrix3d>{};
   for (std::size_t t = 0; t < elements.size(); ++t) {
     for (std::size_t a = 0; a < count; ++a)
       values[a] = at_node(u, a < 4 ? mesh.tetrahedra[t][a] : mesh.middles[t][a - 4]);
+    if (own)
+      turn_back(mesh, t, rotations[t], std::span(values).first(count));
     const std::size_t material =
         mesh.material.empty() ? 0 : static_cast<std::size_t>(mesh.material[t]);
     const auto under = [&](const Vec3& a) {
       return displacement_gradients(elements[t], std::span<const Vec3>(values).first(count),
                                     materials[material].density * a);
     };
-    auto gradients = under(acceleration);
+    auto gradients = under(own ? turned_back(rotations[t], acceleration) : acceleration);
     if (frames == StrainFrames::turning && acceleration != Vec3{}) {
       Eigen::Vector3d mean = Eigen::Vector3d::Zero();
       for (const SolidBlock& g : gradients)
@@ -70,6 +119,8 @@ std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
       strains[t][p] = symmetric_part(gradients[p]);
       if (frames == StrainFrames::turning)
         strains[t][p] = turned(strains[t][p], rotation_by(rotation_vector(gradients[p])));
+      else if (own)
+        strains[t][p] = turned(strains[t][p], rotations[t]);
     }
   }
   return strains;

@@ -21,12 +21,13 @@ namespace gewebe {
 using CornerTensors = std::array<SymmetricBlock, 4>;
 
 /// In which frames displacements are those of small strains: at rest, or in ones that turn by their
-/// curl, as solid/rotation_warp.h has them.
-enum class StrainFrames { resting, turning };
+/// curl, as solid/rotation_warp.h has them, or those that turn with each element, nearest to its
+/// gradient in the middle, as solid/corotational.h has them: there displacements are in space.
+enum class StrainFrames { resting, turning, elements };
 
 /// Strains under displacements u (mm) of the 3 n axes and gravity (acceleration in mm/s²), without
 /// which the bubbles of a body that its weight deforms would be wrong; at rest in space, 0. Those
-/// of turning frames are turned by their rotations, so that they are told in space. \pre elements
+/// of other frames are turned by their rotations, so that they are told in space. \pre elements
 /// are those of the mesh and the materials, u.size() == 3 n
 std::vector<CornerTensors> solid_strains(const TetMesh& mesh,
                                          std::span<const SolidMaterial> materials,

@@ -9,10 +9,12 @@
 #include "model/build.h"
 #include "model/primitive.h"
 #include "solid/model_stiffness.h"
+#include "solid/solid_model.h"
 #include "solve/condition.h"
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/scratch.h"
 #include "tests/unit/simulation_scenes.h"
+#include "tests/unit/tet_fixtures.h"
 #include "tools/run/event_log.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_run.h"
@@ -34,7 +36,8 @@
 
 namespace gewebe::test {
 
-/// The models by name: held balls, a sheet, a tube, a ball that nothing holds, a shell, two masses.
+/// The models by name: held balls, a sheet, a tube, a ball that nothing holds, a shell, two masses,
+/// solids of quadratic and of linear elements, the latter free.
 inline const std::map<std::string, Model>& fuzzed_models() {
   static const std::map<std::string, Model> models = [] {
     std::map<std::string, Model> all;
@@ -56,6 +59,16 @@ inline const std::map<std::string, Model>& fuzzed_models() {
     for (Node& n : tube.nodes)
       if (n.position.z < 1 || n.position.z > 39)
         n.fixed = fixed_all;
+    for (const bool quadratic : {true, false}) {
+      SolidModelOptions options;
+      options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
+      options.quadratic = quadratic;
+      Model& solid = all[quadratic ? "gel" : "loaf"] =
+          solid_model(box_tetrahedra(3, 1, 1, 8), options, {});
+      for (Node& n : solid.nodes)
+        if (n.position.x < 1 && quadratic)
+          n.fixed = fixed_all;
+    }
     for (auto& [name, model] : all)
       model.name = name;
     return all;
@@ -127,6 +140,11 @@ private:
       text += " store=" + model;
     text += one_in(3) ? " method=ffe" : one_in(3) ? " method=ela" : "";
     text += one_in(4) ? " integration=implicit" : "";
+    if (!fuzzed_models().at(model).tetrahedra.empty() || one_in(20)) {
+      text += one_in(3) ? " law=neo-hookean" : "";
+      text += one_in(3) ? " damping=" + number_text(real(0, 1)) + "@30" : "";
+      text += one_in(5) ? " tolerance=1e-5" : "";
+    }
     objects_.push_back({name, &fuzzed_models().at(model)});
     line(text);
     if (one_in(4))
@@ -353,6 +371,13 @@ private:
   std::vector<std::size_t> nodes_;
 };
 
+inline void stiffen(Model& model, double by) {
+  for (Spring& s : model.springs)
+    s.stiffness *= by;
+  if (!model.tetrahedra.empty())
+    model.materials[0].young *= by;
+}
+
 /// Stores of the models, and of a second stage four times as stiff.
 inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
   struct Kept {
@@ -364,8 +389,7 @@ inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
   std::shared_ptr<Kept>& kept = all[{name, stiffer}];
   if (!kept) {
     Model model = fuzzed_models().at(name);
-    for (Spring& s : model.springs)
-      s.stiffness *= stiffer;
+    stiffen(model, stiffer);
     auto made = std::make_shared<Kept>();
     made->matrix = stiffness_matrix(model);
     made->data = Factor(made->matrix, Context{}).data();
@@ -394,8 +418,7 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     if (!file.ends_with(stiff))
       return fuzzed_models().at(file);
     Model model = fuzzed_models().at(file.substr(0, file.size() - stiff.size()));
-    for (Spring& s : model.springs)
-      s.stiffness *= 4;
+    stiffen(model, 4);
     return model;
   };
   options.files.store = [&](const std::string& name, const Model&) {

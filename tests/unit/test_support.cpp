@@ -6,7 +6,9 @@
 #include "larger.h"
 #include "scene/support.h"
 #include "simulation_scenes.h"
+#include "solid/assembly.h"
 #include "solid/model_stiffness.h"
+#include "solid/solid_model.h"
 #include "solve/stiffness.h"
 
 #include <algorithm>
@@ -21,7 +23,7 @@ namespace gewebe {
 namespace {
 
 bool is_solid(Way way) {
-  return way == Way::solid || way == Way::warped;
+  return way == Way::solid || way == Way::warped || way == Way::solid_motion;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
@@ -43,6 +45,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole, Way::warped};
   case Way::net:
     return {Way::elastostatic, Way::whole};
+  case Way::solid_motion:
+    return {Way::explicit_motion, Way::whole, Way::solid_motion};
   default:
     return {way, Way::whole};
   }
@@ -80,6 +84,11 @@ Model solid(Model model) {
   for (const Triangle& t : model.triangles)
     model.tetrahedra.push_back({t[1], t[0], t[2], surface});
   model.tetrahedron_material.assign(model.tetrahedra.size(), 0);
+  const std::vector<double> masses = solid_masses(element_mesh(model), element_materials(model));
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    model.nodes[i].mass = masses[i];
+    model.nodes[i].drag = masses[i];
+  }
   return model;
 }
 
@@ -88,8 +97,8 @@ public:
   Pair(Way way, std::vector<std::string>& warnings)
       : model_(is_solid(way) ? solid(test::organ(3)) : test::organ(3)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
-    const bool moves =
-        way == Way::explicit_motion || way == Way::implicit_motion || way == Way::attached;
+    const bool moves = way == Way::explicit_motion || way == Way::implicit_motion ||
+                       way == Way::attached || way == Way::solid_motion;
     const Integration integration =
         way == Way::implicit_motion ? Integration::implicit : Integration::semi_implicit;
     scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration);

@@ -55,6 +55,15 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("warp_rounds", statics.rounds);
     stats.set("warp_change", statics.change);
   }
+  if (steps.solids.steps > 0) {
+    const SolidStepCounts& solids = steps.solids;
+    stats.set("solid_steps", solids.steps);
+    stats.set("solid_rounds", solids.rounds);
+    stats.set("solid_factors", solids.factors);
+    stats.set("solid_unfinished", solids.unfinished);
+    stats.set("solid_limited", solids.limited);
+    stats.seconds("solid_motion", solids.seconds);
+  }
   stats.set("contact_error", statics.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);
   stats.set("largest_jump", steps.largest_jump);

@@ -143,7 +143,7 @@ struct SceneRun::State {
       return compliance_of_store(std::move(stored));
     };
     simulation.add_object(c.name, std::move(source), c.method,
-                          c.implicit ? Integration::implicit : Integration::semi_implicit);
+                          c.implicit ? Integration::implicit : Integration::semi_implicit, c.solid);
     if (c.warp)
       simulation.apply(SetWarp{simulation.object_count() - 1});
     stores.resize(simulation.object_count()); // parts that came off have none

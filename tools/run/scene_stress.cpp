@@ -35,11 +35,21 @@ const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
   return (solids_[object] = std::move(solid)).nodes;
 }
 
+namespace {
+
+StrainFrames frames_of(const ObjectFacts& object) {
+  if (object.moving_solid)
+    return StrainFrames::elements;
+  return object.warp ? StrainFrames::turning : StrainFrames::resting;
+}
+
+} // namespace
+
 void SceneStress::find(const Simulation& simulation, const Vec3& gravity) {
   for (auto& [object, solid] : solids_)
-    solid.fields = solid_fields(
-        solid.mesh, solid.materials, solid.elements, simulation.local_displacement(object), gravity,
-        simulation.object(object).warp ? StrainFrames::turning : StrainFrames::resting);
+    solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
+                                simulation.local_displacement(object), gravity,
+                                frames_of(simulation.object(object)));
 }
 
 const SolidFields* SceneStress::fields(std::size_t object) const {

@@ -1,0 +1,341 @@
+#include "dynamics/solid_dynamic.h"
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "base/vector_at.h"
+#include "solid/assembly.h"
+#include "solid/model_stiffness.h"
+#include "solid/solid_model.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
+constexpr int quiet_steps = 2;
+constexpr double same_step = 1e-9; ///< lengths that differ by less are one
+constexpr double max_steps = 1e9;
+constexpr double largest_force = 1e38; ///< squares of what it does are finite
+constexpr double same_mass = 1e-6;
+/// Rounds of a step whose tolerance is asked for.
+constexpr int rounds_for_tolerance = 200;
+
+bool about(double value, double expected) {
+  return std::abs(value - expected) <= same_mass * expected;
+}
+
+/// Drag per mass, 1/s.
+double drag_of(const Model& model) {
+  if (!model.springs.empty())
+    throw Error("has springs beside its tetrahedra, whose motion together is not simulated, "
+                "expected ffe");
+  const std::vector<double> masses = solid_masses(element_mesh(model), element_materials(model));
+  double rate = -1;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    const Node& node = model.nodes[i];
+    const std::string name = "node " + std::to_string(i);
+    if (!(masses[i] > 0))
+      throw Error(name + " is in no tetrahedron, expected none such of a solid that moves");
+    if (!about(node.mass, masses[i]))
+      throw Error(name + " has a mass of " + number_text(node.mass) +
+                  " g, expected that of its tetrahedra, " + number_text(masses[i]) +
+                  " g, of a solid that moves");
+    if (rate < 0)
+      rate = node.drag / node.mass;
+    if (!about(node.drag, rate * node.mass))
+      throw Error(name + " has a drag of " + number_text(node.drag) + " g/s, expected " +
+                  number_text(rate * node.mass) +
+                  " g/s, as much per mass as node 0, of a solid that moves");
+  }
+  return std::max(0.0, rate);
+}
+
+} // namespace
+
+SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context)
+    : model_(model), context_(context), motion_(model.nodes.size()) {
+  options_.drag = drag_of(model);
+  options_.law = choice.law.value_or(options_.law);
+  options_.damping = choice.damping.value_or(options_.damping);
+  if (choice.tolerance) {
+    options_.tolerance = *choice.tolerance;
+    options_.max_rounds = rounds_for_tolerance;
+  }
+  Box3 box;
+  std::vector<double>& places = state_.places.write();
+  for (const Node& node : model.nodes) {
+    box.add(node.position);
+    places.insert(places.end(), {node.position.x, node.position.y, node.position.z});
+  }
+  size_ = box.longest_side();
+  state_.velocity.write().resize(places.size());
+  state_.reactions.write().resize(places.size());
+  read_load();
+  (void)engine(context);
+}
+
+SolidMotion& SolidDynamic::engine(const Context& context) {
+  if (!engine_) {
+    engine_.emplace(element_mesh(model_), element_materials(model_), options_, context);
+    engine_->hold(held_);
+    engine_->restore(*state_.places, *state_.velocity, context);
+  }
+  return *engine_;
+}
+
+void SolidDynamic::set_load(const Load& load, double time) {
+  if (load == *state_.load)
+    return;
+  state_.load = std::make_shared<const Load>(load);
+  apply_load(time);
+}
+
+/// What follows from the load alone.
+void SolidDynamic::read_load() {
+  const Load& load = *state_.load;
+  held_.assign(3 * model_.nodes.size(), 0);
+  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      held_[axis_of(i, a)] = is_fixed(model_, i, a) || load.displacement.contains(i) ? 1 : 0;
+  all_held_ = std::ranges::all_of(held_, [](std::uint8_t held) { return held != 0; });
+  if (weighed_ != load.gravity) {
+    weight_ = weight_of(model_, load.gravity);
+    weighed_ = load.gravity;
+  }
+  steady_ = weight_;
+  for (const auto& [node, force] : load.force)
+    if (!load.force_period.contains(node))
+      for (int a = 0; a < 3; ++a)
+        steady_[axis_of(node, a)] += force[a];
+  pressed_ = pressed_corners(load, model_);
+}
+
+/// Where a displaced node stands.
+Vec3 SolidDynamic::held_at(std::uint32_t node, double time) const {
+  const auto way = state_.load->ramp.find(node);
+  return way != state_.load->ramp.end() ? way->second.at(time) : state_.load->displacement.at(node);
+}
+
+void SolidDynamic::apply_load(double time) {
+  const std::vector<std::uint8_t> held_before = std::exchange(held_, {});
+  read_load();
+  bool jumped = false;
+  std::vector<double>&places = state_.places.write(), &velocity = state_.velocity.write();
+  for (const auto& [node, displacement] : state_.load->displacement) {
+    const Vec3 to = model_.nodes[node].position + held_at(node, time);
+    for (int a = 0; a < 3; ++a) {
+      double& place = places[axis_of(node, a)];
+      jumped = jumped || !(place == to[a]);
+      place = to[a];
+    }
+  }
+  for (std::size_t axis = 0; axis < held_.size(); ++axis)
+    if (held_[axis] != 0)
+      velocity[axis] = 0;
+  if (engine_ && held_ != held_before)
+    engine_->hold(held_);
+  if (engine_ && jumped)
+    engine_->restore(places, velocity, context_);
+  if (!state_.load->displacement.empty()) {
+    SolidMotion& moving = engine(context_);
+    moving.set_load(forces_at(time));
+    moving.find_reactions(context_);
+    state_.reactions.replace().assign(moving.reactions().begin(), moving.reactions().end());
+  }
+  state_.time = time;
+  state_.quiet = 0;
+  state_.resting = false;
+  state_.version = ++versions_;
+  motion_shown_ = false;
+}
+
+/// All forces on the 3 n axes at this time, in the present shape.
+std::vector<double> SolidDynamic::forces_at(double time) const {
+  std::vector<double> forces = steady_;
+  const auto add = [&](std::uint32_t node, const Vec3& force) {
+    for (int a = 0; a < 3; ++a)
+      forces[axis_of(node, a)] += force[a];
+  };
+  for (const auto& [node, period] : state_.load->force_period)
+    add(node, pulse(time, period) * state_.load->force.at(node));
+  const std::span<const double> places = engine_ ? engine_->places() : *state_.places;
+  press(
+      pressed_, time, [&](std::uint32_t node) { return vector_at(places, node); }, add);
+  return forces;
+}
+
+std::span<const NodeMotion> SolidDynamic::motion() const {
+  if (motion_shown_)
+    return motion_;
+  for (std::uint32_t i = 0; i < motion_.size(); ++i)
+    motion_[i] = {vector_at(*state_.places, i) - model_.nodes[i].position,
+                  vector_at(*state_.velocity, i)};
+  for (const auto& [node, displacement] : state_.load->displacement) { // exactly
+    motion_[node].displacement = held_at(node, state_.time);
+    const auto way = state_.load->ramp.find(node);
+    if (way == state_.load->ramp.end() || !(state_.time < way->second.end))
+      motion_[node].velocity = {};
+  }
+  motion_shown_ = true;
+  return motion_;
+}
+
+void SolidDynamic::set_motion(std::span<const NodeMotion> motion) {
+  std::vector<double>&places = state_.places.write(), &velocity = state_.velocity.write();
+  for (std::uint32_t i = 0; i < motion.size(); ++i) {
+    const Vec3 at = model_.nodes[i].position + motion[i].displacement;
+    for (int a = 0; a < 3; ++a) {
+      places[axis_of(i, a)] = at[a];
+      velocity[axis_of(i, a)] = motion[i].velocity[a];
+    }
+  }
+  renew();
+  apply_load(state_.time);
+}
+
+void SolidDynamic::go_back(const std::any& snapshot) {
+  const State& was = std::any_cast<const State&>(snapshot);
+  const bool same = was.version == state_.version;
+  state_ = was;
+  if (same)
+    return;
+  read_load();
+  renew();
+  motion_shown_ = false;
+}
+
+void SolidDynamic::renew() {
+  engine_.reset();
+  last_step_ = 0;
+}
+
+std::uint64_t SolidDynamic::advance(double duration, double largest_step, const Context& context,
+                                    double start) {
+  if (state_.resting || duration == 0)
+    return 0;
+  // A hair more than a whole number of steps is rounding.
+  const double exact = duration / largest_step * (1 - 1e-12);
+  if (!(exact <= max_steps))
+    throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
+  const double count = std::max(1.0, std::ceil(exact));
+  double h = duration / count;
+  if (std::abs(h - last_step_) <= same_step * last_step_)
+    h = last_step_; // so that the factor serves on
+  last_step_ = h;
+  const auto steps = static_cast<std::uint64_t>(count);
+  const auto since = std::chrono::steady_clock::now();
+  (void)engine(context);
+  state_.version = ++versions_;
+  motion_shown_ = false;
+  std::uint64_t taken = 0;
+  const auto at = [&](std::uint64_t step) {
+    return step == steps ? start + duration : start + static_cast<double>(step) * h;
+  };
+  while (taken < steps && !state_.resting) {
+    step(h, at(taken), at(taken + 1), context);
+    ++taken;
+  }
+  take_over();
+  state_.time = start + duration;
+  counts_.steps += taken;
+  counts_.seconds +=
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
+  return taken;
+}
+
+void SolidDynamic::step(double h, double from, double to, const Context& context) {
+  SolidMotion& moving = *engine_;
+  const std::vector<double> before(moving.places().begin(), moving.places().end());
+  const std::vector<double> forces = forces_at(to);
+  for (std::size_t axis = 0; axis < forces.size(); ++axis)
+    if (!(std::abs(forces[axis]) <= largest_force))
+      throw MotionError(static_cast<std::uint32_t>(axis / 3), to,
+                        "is under a force beyond single precision, expected a smaller one");
+  moving.set_load(forces);
+  const auto& ramps = state_.load->ramp;
+  const bool led = std::ranges::any_of(ramps, [&](const auto& r) { return from < r.second.end; });
+  if (led || all_held_) {
+    std::vector<double> target(before.size());
+    for (const auto& [node, displacement] : state_.load->displacement) {
+      const Vec3 u = held_at(node, to);
+      for (int a = 0; a < 3; ++a)
+        target[axis_of(node, a)] = u[a];
+    }
+    if (all_held_) {
+      std::vector<double> velocity(before.size());
+      for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+        for (int a = 0; a < 3; ++a) {
+          double& place = target[axis_of(i, a)];
+          place += model_.nodes[i].position[a];
+          velocity[axis_of(i, a)] = (place - before[axis_of(i, a)]) / h;
+        }
+      moving.restore(target, velocity, context);
+      moving.find_reactions(context);
+    } else {
+      moving.move_held(target);
+    }
+  }
+  if (!all_held_) {
+    const SolidStep took = moving.step(h, context);
+    counts_.rounds += static_cast<std::uint64_t>(took.rounds);
+    counts_.factors += static_cast<std::uint64_t>(took.factorisations);
+    counts_.unfinished += took.change <= options_.tolerance ? 0 : 1;
+    counts_.limited += took.limited ? 1 : 0;
+  }
+  double moved = 0, largest = 0;
+  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      const std::size_t axis = axis_of(i, a);
+      const double by = std::abs(moving.places()[axis] - before[axis]);
+      moved = by <= moved ? moved : by; // NaN stays
+      largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
+    }
+  const bool quiet = moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
+                     !(state_.load->changes_until() > to);
+  state_.quiet = quiet ? state_.quiet + 1 : 0;
+  if (state_.quiet < quiet_steps)
+    return;
+  state_.resting = true;
+  moving.restore(std::vector<double>(moving.places().begin(), moving.places().end()),
+                 std::vector<double>(before.size()), context);
+}
+
+/// The engine's state, to be kept.
+void SolidDynamic::take_over() {
+  const auto keep = [](std::span<const double> from, CopyOnWrite<std::vector<double>>& to) {
+    to.replace().assign(from.begin(), from.end());
+  };
+  keep(engine_->places(), state_.places);
+  keep(engine_->velocity(), state_.velocity);
+  keep(engine_->reactions(), state_.reactions);
+  state_.energies = {engine_->kinetic_energy(), engine_->elastic_energy()};
+}
+
+std::vector<NodeVector> SolidDynamic::contact_forces() const {
+  std::vector<NodeVector> forces;
+  forces.reserve(state_.load->displacement.size());
+  for (const auto& [node, displacement] : state_.load->displacement) {
+    Vec3 force = vector_at(*state_.reactions, node);
+    for (int a = 0; a < 3; ++a)
+      if (is_fixed(model_, node, a) || force[a] == 0)
+        force[a] = 0; // no -0
+    forces.push_back({node, force});
+  }
+  return forces;
+}
+
+SolidStepCounts SolidDynamic::take_counts() {
+  return std::exchange(counts_, {});
+}
+
+std::optional<MotionEnergies> SolidDynamic::energies() const {
+  return state_.energies;
+}
+
+} // namespace gewebe

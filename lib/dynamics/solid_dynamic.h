@@ -1,0 +1,103 @@
+#pragma once
+// The elastodynamic method of a solid: a model of tetrahedra moves by the implicit steps of
+// solid/solid_motion.h, under what acts on objects of a scene.
+//
+// Nodes have the masses of their tetrahedra and the model's drag per mass; weight acts by the loads
+// that statics has (weight_of), so that at rest a solid stands where statics says. Forces and
+// pressures of a step are those at its end, pressures on the shape at its beginning. Displaced
+// nodes stand at their displacement, or are on their way there. The same bytes for any number of
+// threads.
+
+#include "base/context.h"
+#include "base/copy_on_write.h"
+#include "contact/load.h"
+#include "dynamics/body_motion.h"
+#include "model/model.h"
+#include "solid/solid_motion.h"
+
+#include <any>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class SolidDynamic final : public BodyMotion {
+public:
+  /// At rest. Keeps a reference to the model.
+  /// \pre check_model(model) passes, it has tetrahedra \throw Error if it has springs too, a node
+  /// of no tetrahedron, of another mass than its tetrahedra's or of another drag per mass than the
+  /// others; as SolidMotion
+  SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
+
+  void set_load(const Load& load, double time) override;
+  std::uint64_t advance(double duration, double largest_step, const Context& context,
+                        double start) override;
+
+  /// At rest two steps in a row moved nothing by more than 1e-9 of the largest displacement, or
+  /// 1e-13 of its size.
+  bool resting() const noexcept override { return state_.resting; }
+  void wake() override { state_.resting = false; }
+
+  std::span<const NodeMotion> motion() const override;
+  void set_motion(std::span<const NodeMotion> motion) override;
+
+  std::any snapshot() const override { return state_; }
+  void go_back(const std::any& snapshot) override;
+  void renew() override;
+
+  std::vector<NodeVector> contact_forces() const override;
+
+  void set_instruments(std::vector<std::optional<MovingInstrument>>) override {}
+  void rest_on(double) override {}
+  std::vector<NodeTouch> take_impulses() override { return {}; }
+  bool touches_exact() const override { return true; }
+  std::optional<std::vector<NodeTouch>> held_touches(double) const override { return {}; }
+
+  SolidStepCounts take_counts() override;
+  std::optional<MotionEnergies> energies() const override;
+
+private:
+  /// What a snapshot holds.
+  struct State {
+    std::shared_ptr<const Load> load = std::make_shared<const Load>();
+    double time = 0;
+    CopyOnWrite<std::vector<double>> places{}, velocity{}, reactions{}; ///< 3 n
+    MotionEnergies energies;
+    std::uint64_t version = 0; ///< of all these
+    int quiet = 0;             ///< steps in a row that moved next to nothing
+    bool resting = false;
+  };
+
+  void read_load();
+  void apply_load(double time);
+  void take_over();
+  SolidMotion& engine(const Context& context);
+  std::vector<double> forces_at(double time) const;
+  Vec3 held_at(std::uint32_t node, double time) const;
+  void step(double h, double from, double to, const Context& context);
+
+  const Model& model_;
+  SolidMotionOptions options_;
+  Context context_;
+  double size_ = 0; ///< longest side of the box at rest
+  State state_;
+  std::uint64_t versions_ = 0;
+
+  // Of the load.
+  std::vector<std::uint8_t> held_; ///< 3 n
+  bool all_held_ = false;
+  std::optional<Vec3> weighed_; ///< gravity that weight_ is of
+  std::vector<double> weight_, steady_;
+  std::vector<PressedCorner> pressed_;
+
+  std::optional<SolidMotion> engine_;
+  double last_step_ = 0; ///< of the engine
+  SolidStepCounts counts_;
+  mutable std::vector<NodeMotion> motion_;
+  mutable bool motion_shown_ = false;
+};
+
+} // namespace gewebe
