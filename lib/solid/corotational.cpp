@@ -6,25 +6,91 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <utility>
 
 namespace gewebe {
 
 namespace {
 
-constexpr std::size_t grain = 128; // groups, of which the energy is summed by itself
+constexpr std::size_t grain = 128; // groups of a block, whose results are summed by themselves
+constexpr std::size_t some = 16;   // groups whose results the next cache holds
+
+/// Sums of what tetrahedra bring to their nodes: first by blocks of groups, whose sums stay in the
+/// cache, then those of the blocks that a node is in, in order.
+template <std::size_t Nodes>
+struct NodeSums {
+  std::vector<std::array<std::array<std::uint16_t, 4>, Nodes>> local; ///< number within the block
+  std::vector<std::size_t> first; ///< slot of each block, and of one more
+  std::vector<std::size_t> start; ///< of each node's slots, and of one more, in
+  std::vector<std::uint32_t> slot;
+  std::vector<double> sums; ///< of each slot
+
+  void make(std::span<const CorotationalGroup<Nodes>> groups, std::size_t nodes) {
+    local.resize(groups.size());
+    start.assign(nodes + 1, 0);
+    std::vector<std::uint32_t> node_of_slot, number(nodes, UINT32_MAX);
+    for (std::size_t n = 0; n < groups.size(); ++n) {
+      if (n % grain == 0)
+        first.push_back(node_of_slot.size());
+      for (std::size_t a = 0; a < Nodes; ++a)
+        for (std::size_t lane = 0; lane < 4; ++lane) {
+          const std::uint32_t i = groups[n].node[a][lane];
+          if (number[i] == UINT32_MAX || number[i] < first.back()) {
+            number[i] = static_cast<std::uint32_t>(node_of_slot.size());
+            node_of_slot.push_back(i);
+            ++start[i + 1];
+          }
+          local[n][a][lane] = static_cast<std::uint16_t>(number[i] - first.back());
+        }
+    }
+    first.push_back(node_of_slot.size());
+    std::partial_sum(start.begin(), start.end(), start.begin());
+    std::vector<std::size_t> next(start.begin(), start.end() - 1);
+    slot.resize(node_of_slot.size());
+    for (std::size_t s = 0; s < node_of_slot.size(); ++s)
+      slot[next[node_of_slot[s]]++] = static_cast<std::uint32_t>(s);
+  }
+
+  std::size_t nodes() const { return start.size() - 1; }
+
+  /// Sums of `Width` numbers a node: block(begin, end, sums) adds those of groups [begin, end) to
+  /// sums[Width · local number], done(node, sum) takes a node's.
+  template <std::size_t Width, class Block, class Done>
+  void sum(const Context& context, const Block& block, const Done& done) {
+    sums.resize(Width * slot.size());
+    parallel_blocks(context, local.size(), grain, [&](std::size_t begin, std::size_t end) {
+      const std::size_t b = begin / grain;
+      std::fill(sums.begin() + static_cast<std::ptrdiff_t>(Width * first[b]),
+                sums.begin() + static_cast<std::ptrdiff_t>(Width * first[b + 1]), 0.0);
+      block(begin, end, sums.data() + Width * first[b]);
+    });
+    parallel_blocks(context, nodes(), 2048, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        std::array<double, Width> sum{};
+        for (std::size_t k = start[i]; k < start[i + 1]; ++k)
+          for (std::size_t c = 0; c < Width; ++c)
+            sum[c] += sums[Width * slot[k] + c];
+        done(i, sum);
+      }
+    });
+  }
+};
 
 template <std::size_t Nodes>
 struct Groups {
   std::vector<CorotationalGroup<Nodes>> groups;
   std::vector<CorotationalStrains<Nodes>> strains, before;
-  std::vector<CorotationalResult<Nodes>> results;
+  std::vector<CorotationalRotations> rotations;
+  NodeSums<Nodes> sums;
+  double elastic = 0;
+  bool remembered = false; ///< the last strains are `before`
 
   void make(const TetMesh& mesh, std::span<const SolidElement> elements) {
     groups.resize((elements.size() + 3) / 4);
     strains.resize(groups.size());
     before.resize(groups.size());
-    results.resize(groups.size());
+    rotations.resize(groups.size());
     for (std::size_t k = 0; k < 4 * groups.size(); ++k) {
       const std::size_t t = std::min(k, elements.size() - 1), lane = k % 4;
       const SolidElement& e = elements[t];
@@ -42,23 +108,87 @@ struct Groups {
         for (std::size_t c = 0; c < 6; ++c)
           g.flexibility[c][lane] = real ? e.bubble_flexibility[c] : 0;
     }
+    sums.make(groups, mesh.points.size());
   }
 
   double evaluate(CorotationalEvaluate<Nodes> kernel, std::span<const double> x,
-                  const CorotationalWeights& weights, const Context& context) {
-    std::vector<double> energy((groups.size() + grain - 1) / grain);
-    parallel_blocks(context, groups.size(), grain, [&](std::size_t begin, std::size_t end) {
-      kernel(groups.data() + begin, end - begin, x.data(), before.data() + begin, weights,
-             results.data() + begin, strains.data() + begin);
-      double& sum = energy[begin / grain];
-      for (std::size_t n = begin; n < end; ++n)
-        for (const double e : results[n].energy)
-          sum += e;
+                  const CorotationalWeights& weights, std::span<double> forces,
+                  const Context& context) {
+    std::vector<std::array<double, 2>> energy((groups.size() + grain - 1) / grain);
+    const auto block = [&](std::size_t begin, std::size_t end, double* to) {
+      std::array<CorotationalResult<Nodes>, some> results;
+      std::array<double, 2>& sum = energy[begin / grain];
+      for (std::size_t n = begin; n < end; n += some) {
+        const std::size_t count = std::min(some, end - n);
+        kernel(groups.data() + n, count, x.data(), before.data() + n, weights, results.data(),
+               strains.data() + n, rotations.data() + n);
+        for (std::size_t k = 0; k < count; ++k)
+          add(results[k], sums.local[n + k], to, sum);
+      }
+    };
+    sums.template sum<3>(context, block, [&](std::size_t i, const std::array<double, 3>& sum) {
+      std::ranges::copy(sum, forces.begin() + static_cast<std::ptrdiff_t>(3 * i));
     });
-    double sum = 0;
-    for (const double e : energy)
-      sum += e;
-    return sum;
+    elastic = 0;
+    double damping = 0;
+    for (const auto& [of_elements, of_damping] : energy) {
+      elastic += of_elements;
+      damping += of_damping;
+    }
+    remembered = false;
+    return weights.elastic * elastic + weights.damping * damping;
+  }
+
+  static void add(const CorotationalResult<Nodes>& result,
+                  const std::array<std::array<std::uint16_t, 4>, Nodes>& local, double* to,
+                  std::array<double, 2>& energy) {
+    for (std::size_t a = 0; a < Nodes; ++a)
+      for (std::size_t lane = 0; lane < 4; ++lane)
+        for (std::size_t c = 0; c < 3; ++c)
+          to[3 * std::size_t{local[a][lane]} + c] += result.force[3 * a + c][lane];
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      energy[0] += result.elastic[lane];
+      energy[1] += result.damping[lane];
+    }
+  }
+
+  void remember() {
+    if (!remembered)
+      std::swap(before, strains);
+    remembered = true;
+  }
+
+  /// Mean rotations of nodes, times their volumes, [9 k + entry][lane] of node 4 k + lane.
+  void mean_rotations(std::vector<std::array<double[4], 9>>& to, const Context& context) {
+    const auto block = [&](std::size_t begin, std::size_t end, double* sum) {
+      for (std::size_t n = begin; n < end; ++n)
+        for (std::size_t lane = 0; lane < 4; ++lane) {
+          std::array<double, 9> part;
+          for (std::size_t c = 0; c < 9; ++c)
+            part[c] = groups[n].volume[lane] * rotations[n].value[c][lane];
+          for (std::size_t a = 0; a < Nodes; ++a)
+            for (std::size_t c = 0; c < 9; ++c)
+              sum[9 * std::size_t{sums.local[n][a][lane]} + c] += part[c];
+        }
+    };
+    sums.template sum<9>(context, block, [&](std::size_t i, const std::array<double, 9>& sum) {
+      for (std::size_t c = 0; c < 9; ++c)
+        to[i / 4][c][i % 4] = sum[c];
+    });
+  }
+
+  ElementFrame frame(std::size_t t) const {
+    constexpr std::size_t points = CorotationalGroup<Nodes>::points;
+    const auto& of = (remembered ? before : strains)[t / 4].value;
+    ElementFrame frame;
+    for (std::size_t c = 0; c < 9; ++c)
+      frame.rotation[c] = rotations[t / 4].value[c][t % 4];
+    for (std::size_t c = 0; c < 6; ++c) { // the mean strain is that of the middle
+      for (std::size_t p = 0; p < points; ++p)
+        frame.stretch[c] += of[6 * p + c][t % 4] / points;
+      frame.stretch[c] += c == 0 || c == 3 || c == 5 ? 1 : 0;
+    }
+    return frame;
   }
 };
 
@@ -69,14 +199,9 @@ struct CorotationalSolid::State {
   Groups<10> quadratic;
   bool is_quadratic = false;
   std::size_t nodes = 0;
-  std::vector<double> volume; ///< by element
 
   template <class Work>
   decltype(auto) with(const Work& work) {
-    return is_quadratic ? work(quadratic) : work(linear);
-  }
-  template <class Work>
-  decltype(auto) with(const Work& work) const {
     return is_quadratic ? work(quadratic) : work(linear);
   }
 };
@@ -91,50 +216,29 @@ CorotationalSolid::CorotationalSolid(const TetMesh& mesh, std::span<const SolidE
   s.is_quadratic = !mesh.middles.empty();
   s.nodes = mesh.points.size();
   s.with([&](auto& of) { of.make(mesh, elements); });
-  for (const SolidElement& e : elements)
-    s.volume.push_back(e.volume);
 }
 
 double CorotationalSolid::evaluate(std::span<const double> x, const CorotationalWeights& weights,
                                    std::span<double> forces, const Context& context) {
   State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
-  const double energy = s.is_quadratic ? s.quadratic.evaluate(kernel.quadratic, x, weights, context)
-                                       : s.linear.evaluate(kernel.linear, x, weights, context);
-  // In order, by one thread: the sums stay in its cache, where threads that each ask for the
-  // elements of their nodes would wait for memory.
-  std::ranges::fill(forces, 0.0);
-  s.with([&](const auto& of) {
-    for (std::size_t t = 0; t < s.volume.size(); ++t) {
-      const auto& group = of.groups[t / 4];
-      for (std::size_t a = 0; a < group.nodes; ++a) {
-        double* const to = forces.data() + 3 * std::size_t{group.node[a][t % 4]};
-        for (std::size_t c = 0; c < 3; ++c)
-          to[c] += of.results[t / 4].force[3 * a + c][t % 4];
-      }
-    }
-  });
-  return energy;
+  return s.is_quadratic ? s.quadratic.evaluate(kernel.quadratic, x, weights, forces, context)
+                        : s.linear.evaluate(kernel.linear, x, weights, forces, context);
+}
+
+double CorotationalSolid::elastic_energy() const noexcept {
+  return state_->with([](const auto& of) { return of.elastic; });
 }
 
 void CorotationalSolid::remember() {
-  state_->with([](auto& of) { of.before = of.strains; });
+  state_->with([](auto& of) { of.remember(); });
 }
 
-void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) const {
-  const State& s = *state_;
+void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) {
+  State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
   std::vector<std::array<double[4], 9>> sums((s.nodes + 3) / 4);
-  s.with([&](const auto& of) {
-    for (std::size_t t = 0; t < s.volume.size(); ++t) {
-      const auto& group = of.groups[t / 4];
-      for (std::size_t a = 0; a < group.nodes; ++a) {
-        const std::size_t i = group.node[a][t % 4];
-        for (std::size_t c = 0; c < 9; ++c)
-          sums[i / 4][c][i % 4] += s.volume[t] * of.results[t / 4].rotation[c][t % 4];
-      }
-    }
-  });
+  s.with([&](auto& of) { of.mean_rotations(sums, context); });
   parallel_blocks(context, sums.size(), 256, [&](std::size_t begin, std::size_t end) {
     kernel.turn(sums[begin].data(), end - begin);
     for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)
@@ -144,14 +248,7 @@ void CorotationalSolid::node_rotations(std::span<double> rotations, const Contex
 }
 
 ElementFrame CorotationalSolid::frame(std::size_t t) const {
-  ElementFrame frame;
-  state_->with([&](const auto& of) {
-    for (std::size_t c = 0; c < 9; ++c)
-      frame.rotation[c] = of.results[t / 4].rotation[c][t % 4];
-    for (std::size_t c = 0; c < 6; ++c)
-      frame.stretch[c] = of.results[t / 4].stretch[c][t % 4];
-  });
-  return frame;
+  return state_->with([&](const auto& of) { return of.frame(t); });
 }
 
 } // namespace gewebe

@@ -56,12 +56,14 @@ public:
   /// g mm/s²).
   double evaluate(std::span<const double> x, const CorotationalWeights& weights,
                   std::span<double> forces, const Context& context);
+  /// Of the last evaluate(), its weight left aside.
+  double elastic_energy() const noexcept;
   /// The strains of the last evaluate() are those that damping counts from. From the start they are
   /// those at rest.
   void remember();
   /// Of each node the rotation nearest to the mean of its elements', by rows, 9 n: as in the last
   /// evaluate(). That of a node of no element is none.
-  void node_rotations(std::span<double> rotations, const Context& context) const;
+  void node_rotations(std::span<double> rotations, const Context& context);
   /// Of element t, as in the last evaluate().
   ElementFrame frame(std::size_t t) const;
 

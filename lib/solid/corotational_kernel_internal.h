@@ -27,13 +27,16 @@ struct CorotationalStrains {
   double value[6 * CorotationalGroup<Nodes>::points][4];
 };
 
+/// By rows.
+struct CorotationalRotations {
+  double value[9][4];
+};
+
 /// What is made of a group.
 template <std::size_t Nodes>
 struct CorotationalResult {
-  double force[3 * Nodes][4]; ///< on node a along i at 3 a + i
-  double rotation[9][4];      ///< by rows
-  double stretch[6][4];       ///< of the middle
-  double energy[4];
+  double force[3 * Nodes][4];    ///< on node a along i at 3 a + i
+  double elastic[4], damping[4]; ///< energies, their weights left aside
 };
 
 template <std::size_t Nodes>
@@ -41,7 +44,8 @@ using CorotationalEvaluate = void (*)(const CorotationalGroup<Nodes>* groups, st
                                       const double* x, const CorotationalStrains<Nodes>* before,
                                       const CorotationalWeights& weights,
                                       CorotationalResult<Nodes>* results,
-                                      CorotationalStrains<Nodes>* strains);
+                                      CorotationalStrains<Nodes>* strains,
+                                      CorotationalRotations* rotations);
 
 struct CorotationalKernel {
   CorotationalEvaluate<4> linear;

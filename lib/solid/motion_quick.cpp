@@ -35,7 +35,7 @@ int MotionQuick::prepare(const MotionBody& body, const std::vector<std::uint8_t>
   return 1;
 }
 
-void MotionQuick::turn(const SolidEnergy& energy, const Context& context) {
+void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
   rotations_.resize(3 * held_.size());
   energy.node_rotations(rotations_, context);
   for (std::size_t i = 0; i < held_.size() / 3; ++i)

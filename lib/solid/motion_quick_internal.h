@@ -22,7 +22,7 @@ public:
               const SolidMotionOptions& options, const Context& context);
   /// Frames as in the last evaluation; those of nodes held along an axis don't turn.
   /// \pre prepared
-  void turn(const SolidEnergy& energy, const Context& context);
+  void turn(SolidEnergy& energy, const Context& context);
   /// In place, to single precision. \pre turned
   void solve(Numbers& v, const Context& context);
 

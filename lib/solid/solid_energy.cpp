@@ -117,7 +117,12 @@ double SolidEnergy::evaluate(const Numbers& at, double damping, std::span<double
                              const Context& context) {
   const bool corotational = law_ == SolidLaw::corotational;
   const double energy = frames_.evaluate(at, {corotational ? 1.0 : 0.0, damping}, forces, context);
-  return corotational ? energy : energy + hyperelastic(at, forces, context);
+  if (corotational) {
+    elastic_ = frames_.elastic_energy();
+    return energy;
+  }
+  elastic_ = hyperelastic(at, forces, context);
+  return energy + elastic_;
 }
 
 } // namespace gewebe

@@ -33,7 +33,8 @@ public:
   double unsure_at_rest() const noexcept { return unsure_at_rest_; }
 
   // As in the last evaluation.
-  void node_rotations(std::span<double> rotations, const Context& context) const {
+  double elastic() const noexcept { return elastic_; }
+  void node_rotations(std::span<double> rotations, const Context& context) {
     frames_.node_rotations(rotations, context);
   }
   ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
@@ -49,7 +50,7 @@ private:
   SolidLaw law_;
   CorotationalSolid frames_;                ///< and corotational energy, and damping
   std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
-  double unsure_at_rest_ = 0;
+  double elastic_ = 0, unsure_at_rest_ = 0;
 };
 
 } // namespace gewebe

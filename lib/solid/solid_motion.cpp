@@ -131,20 +131,19 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   if (!s.now.any_held())
     objective.keep_momentum(found);
   s.energy.keep();
-  Numbers forces(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
     const double speed = (found.at[axis] - s.now.place[axis]) / h;
     s.acceleration[axis] = (speed - s.now.velocity[axis]) / h;
     s.now.velocity[axis] = speed;
   }
   s.now.place = std::move(found.at);
-  s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
+  s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
   if (!s.moved)
     step.limited =
         limit_energy(s.body, s.now, s.elastic, energy,
                      1e-12 * (motion_energy(s.body, s.now.velocity) + s.elastic + std::abs(energy) +
                               std::abs(work_of_load(s.body, s.now.load, s.now.place))));
-  step.evaluations = objective.evaluations() + 1;
+  step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;
   return step;

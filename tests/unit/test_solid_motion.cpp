@@ -272,6 +272,24 @@ TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
   EXPECT_GE(right, corotational ? states * 2 / 3 : states);
 }
 
+TEST_P(SolidMotionOf, ItsElasticEnergyIsThatOfItsPlaces) {
+  const TetMesh m = mesh();
+  std::mt19937 random(4);
+  SolidMotionOptions options;
+  options.damping = 0.01;
+  SolidMotion moving = body(m, options);
+  moving.set_state(random_numbers(3 * m.points.size(), 0.3, random),
+                   random_numbers(3 * m.points.size(), 300, random));
+  for (int n = 0; n < 3; ++n) {
+    (void)moving.step(0.002, {});
+    SolidMotion standing = body(m);
+    standing.set_state(moving.displacement(), Numbers(3 * m.points.size()));
+    EXPECT_GT(moving.elastic_energy(), 0);
+    EXPECT_NEAR(moving.elastic_energy(), standing.elastic_energy(),
+                1e-7 * standing.elastic_energy());
+  }
+}
+
 TEST_P(SolidMotionOf, SameBytesOnAnyThreadsAndLevel) {
   const TetMesh m = mesh(test::box_tetrahedra(5, 3, 3, 2));
   const auto end = [&](int threads, CpuLevel cpu) {
