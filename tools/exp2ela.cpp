@@ -43,8 +43,10 @@ void fix(Model& model, const ModelArguments& a) {
 }
 
 Model source(cli::Run& run, const ModelArguments& a) {
-  if (a.matrix)
+  if (a.matrix) {
+    require_parts(a.build.material, {});
     return cli::model_of_surface(run, a.primitive, primitive_mesh(*a.matrix), a);
+  }
   Input input(a.mesh);
   const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
   // Nothing that was asked for may be ignored.
@@ -61,6 +63,7 @@ Model source(cli::Run& run, const ModelArguments& a) {
          "the input is a surface, expected --solid beside --poisson and --order");
   const MeshReadOptions options{from, a.unit, weld_from_name(a.weld)};
   TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options); });
+  at(input.name(), [&] { require_parts(a.build.material, mesh.part); });
   if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, {});
   return cli::model_of_surface(run, input.name(), std::move(mesh), a);

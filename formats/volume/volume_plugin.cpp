@@ -53,10 +53,10 @@ VolumeView view_volume_bytes(std::string bytes, const std::string& name,
   });
 }
 
-TetMesh fill_surface(const TriangleMesh& mesh, const std::string& name,
-                     const SurfaceFilling& filling, const Context& context) {
+FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
+                           const SurfaceFilling& filling, const Context& context) {
   return at(name, [&] {
-    TetMesh filled;
+    FilledSurface filled;
     function_named<decltype(gewebe_fill_surface)>("gewebe_fill_surface")(&mesh, &name, &filling,
                                                                          &context, &filled);
     return filled;

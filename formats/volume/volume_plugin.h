@@ -8,7 +8,9 @@
 #include "shading/volume_view.h"
 #include "tetrahedra/tet_mesh.h"
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace gewebe {
 
@@ -21,12 +23,27 @@ VolumeView view_volume_bytes(std::string bytes, const std::string& name,
 struct SurfaceFilling {
   double voxel = 1, cell = 2; ///< mm
   unsigned grade = 0;         ///< as in StuffingOptions
+  /// Parts of the mesh that are bodies of their own, different ones. Each must have triangles.
+  std::vector<std::int32_t> parts = {};
 };
 
 /// Tetrahedra that fill a closed surface: jones_density (voxelize/distance_ramp.h) by parity on
-/// voxels at multiples of `voxel`, then stuff (stuffing/stuffing.h). \throw Error as they, with
-/// place `name`, and as above
-TetMesh fill_surface(const TriangleMesh& mesh, const std::string& name,
-                     const SurfaceFilling& filling, const Context& context);
+/// voxels at multiples of `voxel`, then stuff (stuffing/stuffing.h).
+struct FilledSurface {
+  /// Without parts of their own without materials; else a tetrahedron has as material the place in
+  /// `parts` of that with the least volume of those that hold it, or their number. Faces follow the
+  /// interfaces.
+  TetMesh mesh;
+  /// Of each part of its own, then of all others together, if there are any: of its surface and of
+  /// the tetrahedra in it, whatever their material, mm³. Without parts of their own: of all.
+  struct Volume {
+    double of_surface = 0, filled = 0;
+  };
+  std::vector<Volume> volumes;
+};
+/// \throw Error as they, with place `name`, and as above; each part of its own, and the others
+/// together, must be closed
+FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
+                           const SurfaceFilling& filling, const Context& context);
 
 } // namespace gewebe

@@ -3,12 +3,116 @@
 #include "base/error.h"
 #include "formats/volume/volume_file.h"
 #include "formats/volume/volume_plugin_internal.h"
+#include "stuffing/materials.h"
 #include "stuffing/stuffing.h"
+#include "volume/csg.h"
 #include "voxelize/distance_ramp.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <string>
 #include <utility>
+#include <vector>
 
 using namespace gewebe;
+
+namespace {
+
+/// The triangles of one part, or of all parts but some.
+TriangleMesh triangles_of(const TriangleMesh& mesh, const std::vector<std::int32_t>& parts,
+                          bool among) {
+  TriangleMesh some;
+  std::vector<std::uint32_t> number(mesh.points.size(), UINT32_MAX);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::int32_t part = mesh.part.empty() ? 0 : mesh.part[t];
+    if ((std::ranges::find(parts, part) != parts.end()) != among)
+      continue;
+    Triangle& triangle = some.triangles.emplace_back(mesh.triangles[t]);
+    for (std::uint32_t& corner : triangle) {
+      if (number[corner] == UINT32_MAX) {
+        number[corner] = static_cast<std::uint32_t>(some.points.size());
+        some.points.push_back(mesh.points[corner]);
+      }
+      corner = number[corner];
+    }
+  }
+  return some;
+}
+
+/// A body that is filled.
+struct Body {
+  std::int32_t material = 0;
+  double volume = 0;
+  Grid density;
+};
+
+FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
+                   const Context& context) {
+  std::vector<Body> bodies;
+  const auto add = [&](const TriangleMesh& of, std::size_t material) {
+    bodies.push_back({static_cast<std::int32_t>(material), std::abs(signed_volume(of)),
+                      jones_density(context, of, uniform_transform(filling.voxel), OpenMesh::refuse,
+                                    nullptr, VoxelRule::parity)});
+  };
+  for (std::size_t p = 0; p < filling.parts.size(); ++p)
+    try {
+      add(triangles_of(mesh, {filling.parts[p]}, true), p);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      throw Error("part " + std::to_string(filling.parts[p]) + ": " + error.what());
+    }
+  if (const TriangleMesh rest = triangles_of(mesh, filling.parts, false); !rest.triangles.empty())
+    add(rest, filling.parts.size());
+  StuffingOptions options{.isovalue = {}, .cell = filling.cell, .grade = filling.grade};
+  if (filling.parts.empty()) {
+    FilledSurface filled{stuff(context, bodies[0].density, options), {}};
+    filled.volumes.push_back({bodies[0].volume, volume(filled.mesh)});
+    return filled;
+  }
+  std::vector<std::size_t> by_volume(bodies.size());
+  std::iota(by_volume.begin(), by_volume.end(), std::size_t{0});
+  std::ranges::stable_sort(by_volume, {}, [&](std::size_t b) { return bodies[b].volume; });
+  std::vector<MaterialSource> inside;
+  std::vector<CsgOperand> operands;
+  for (const std::size_t b : by_volume) {
+    inside.push_back(inside_source(bodies[b].density));
+    operands.push_back({bodies[b].density, "a part"});
+  }
+  options.follow_interface = true;
+  // Where the smooth boundary of all goes a little beyond that of each, the largest one is near.
+  options.materials = [&]() -> MaterialAt {
+    std::vector<MaterialAt> holds;
+    for (const MaterialSource& one : inside)
+      holds.push_back(one());
+    return [&bodies, &by_volume, holds](const Vec3& place) {
+      for (std::size_t k = 0; k < holds.size(); ++k)
+        if (holds[k](place) != 0)
+          return bodies[by_volume[k]].material;
+      return bodies[by_volume.back()].material;
+    };
+  };
+  const Grid all = operands.size() == 1 ? bodies[0].density
+                                        : csg(context, CsgOperation::unite, std::move(operands));
+  FilledSurface filled{stuff(context, all, options), {}};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    TetMesh in = filled.mesh;
+    set_materials(context, inside_source(bodies[b].density), in);
+    FilledSurface::Volume& told = filled.volumes.emplace_back();
+    told.of_surface = bodies[b].volume;
+    for (std::size_t t = 0; t < in.tetrahedra.size(); ++t)
+      if (in.material[t] != 0) {
+        const Tetrahedron& c = in.tetrahedra[t];
+        told.filled +=
+            tetrahedron_volume(in.points[c[0]], in.points[c[1]], in.points[c[2]], in.points[c[3]]);
+      }
+  }
+  return filled;
+}
+
+} // namespace
 
 const char* const gewebe_volume_version = GEWEBE_VERSION;
 
@@ -20,10 +124,7 @@ void gewebe_view_volume(std::string* bytes, const std::string* name,
 }
 
 void gewebe_fill_surface(const TriangleMesh* mesh, const std::string* name,
-                         const SurfaceFilling* filling, const Context* context, TetMesh* filled) {
-  *filled = at(*name, [&] {
-    const Grid grid = jones_density(*context, *mesh, uniform_transform(filling->voxel),
-                                    OpenMesh::refuse, nullptr, VoxelRule::parity);
-    return stuff(*context, grid, {.isovalue = {}, .cell = filling->cell, .grade = filling->grade});
-  });
+                         const SurfaceFilling* filling, const Context* context,
+                         FilledSurface* filled) {
+  *filled = at(*name, [&] { return fill(*mesh, *filling, *context); });
 }

@@ -16,5 +16,5 @@ void gewebe_view_volume(std::string* bytes, const std::string* name,
                         gewebe::VolumeView* view);
 void gewebe_fill_surface(const gewebe::TriangleMesh* mesh, const std::string* name,
                          const gewebe::SurfaceFilling* filling, const gewebe::Context* context,
-                         gewebe::TetMesh* filled);
+                         gewebe::FilledSurface* filled);
 }

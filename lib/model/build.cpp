@@ -136,10 +136,7 @@ private:
         area_vector_[t] = 0.5 * cross(b - a, c - a);
         if (mesh_.part.empty())
           continue;
-        const std::int32_t part = mesh_.part[surface_.face_of_triangle[t]];
-        const auto& of_part = options_.material.of_part;
-        if (part >= 0 && static_cast<std::size_t>(part) < of_part.size())
-          material_[t] = of_part[static_cast<std::size_t>(part)];
+        material_[t] = chosen_material(options_.material, mesh_.part[surface_.face_of_triangle[t]]);
       }
     });
   }

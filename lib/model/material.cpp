@@ -34,6 +34,29 @@ void override_materials(std::vector<Material>& materials, const MaterialOverride
   }
 }
 
+std::int32_t chosen_material(const MaterialChoice& choice, std::int32_t part) {
+  const auto p = static_cast<std::size_t>(part);
+  return part >= 0 && p < choice.of_part.size() ? choice.of_part[p] : 0;
+}
+
+void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> parts) {
+  std::vector<std::int32_t> there(parts.begin(), parts.end());
+  if (there.empty())
+    there.push_back(0);
+  std::ranges::sort(there);
+  there.erase(std::ranges::unique(there).begin(), there.end());
+  for (const std::int32_t part : choice.named)
+    if (!std::ranges::binary_search(there, part)) {
+      constexpr std::size_t told = 8;
+      std::string list;
+      for (std::size_t k = 0; k < std::min(there.size(), told); ++k)
+        list += (k == 0 ? "" : ", ") + std::to_string(there[k]);
+      throw Error("there is no part " + std::to_string(part) + " to give a material, expected " +
+                  (there.size() == 1 ? "" : "one of ") + list +
+                  (there.size() > told ? " ..." : ""));
+    }
+}
+
 MaterialChoice parse_material_choice(std::string_view text, const std::vector<Material>& table) {
   constexpr std::int32_t max_parts = 4096;
   MaterialChoice choice;
@@ -67,8 +90,12 @@ MaterialChoice parse_material_choice(std::string_view text, const std::vector<Ma
         found = choice.materials.insert(found, material);
       choice.of_part[p] = static_cast<std::int32_t>(found - choice.materials.begin());
     }
-    if (comma == text.size())
+    if (comma == text.size()) {
+      for (std::size_t p = 0; p < named.size(); ++p)
+        if (named[p])
+          choice.named.push_back(static_cast<std::int32_t>(p));
       return choice;
+    }
     text.remove_prefix(comma + 1);
   }
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,10 +21,17 @@ Material material_named(std::string_view name, const std::vector<Material>& tabl
 /// The materials of a mesh in parts.
 struct MaterialChoice {
   std::vector<Material> materials;
-  std::vector<std::int32_t> of_part; ///< material of part p; of all further parts: 0
+  std::vector<std::int32_t> of_part;    ///< material of part p; of all further parts: 0
+  std::vector<std::int32_t> named = {}; ///< the parts that were named, ascending
 
   bool operator==(const MaterialChoice&) const = default;
 };
+
+/// Which of its materials a part has.
+std::int32_t chosen_material(const MaterialChoice& choice, std::int32_t part);
+
+/// \throw Error if a part was named that none of `parts` is, saying which there are
+void require_parts(const MaterialChoice& choice, std::span<const std::int32_t> parts);
 
 /// What replaces the values of materials.
 struct MaterialOverrides {

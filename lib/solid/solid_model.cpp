@@ -11,12 +11,6 @@
 namespace gewebe {
 namespace {
 
-/// Which of the choice's materials tetrahedra of each number have.
-std::int32_t chosen(const MaterialChoice& choice, std::int32_t part) {
-  const auto p = static_cast<std::size_t>(part);
-  return part >= 0 && p < choice.of_part.size() ? choice.of_part[p] : 0;
-}
-
 void drop_unused(TetMesh& mesh, const NodeOrder& order) {
   mesh.points.resize(mesh.points.size() - order.unused);
 }
@@ -70,7 +64,7 @@ Model solid_model(TetMesh mesh, const SolidModelOptions& options, const Context&
   model.tetrahedron_material.reserve(mesh.tetrahedra.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
     model.tetrahedron_material.push_back(
-        chosen(options.material, mesh.material.empty() ? 0 : mesh.material[t]));
+        chosen_material(options.material, mesh.material.empty() ? 0 : mesh.material[t]));
   mesh.material = model.tetrahedron_material;
   model.tetrahedra = mesh.tetrahedra;
   model.middles = mesh.middles;

@@ -10,8 +10,10 @@
 #include "tetrahedra/check.h"
 
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace gewebe::cli {
 
@@ -65,9 +67,13 @@ Model model_of(Run& run, TetMesh mesh, const ModelArguments& a) {
 }
 
 /// The surface goes along with what fills it.
-void skin(Run& run, const std::string& name, const TriangleMesh& mesh, double cell, Model& model) {
+void skin(Run& run, const std::string& name, const TriangleMesh& mesh, double cell,
+          const MaterialChoice& choice, Model& model) {
+  std::vector<std::int32_t> materials;
+  for (const std::int32_t part : mesh.part)
+    materials.push_back(chosen_material(choice, part));
   const SkinReport made =
-      run.timed("skin", [&] { return add_skin(model, mesh, {}, run.context()); });
+      run.timed("skin", [&] { return add_skin(model, mesh, materials, run.context()); });
   run.stats().set("skin_dropped_triangles", made.dropped_triangles);
   run.stats().set("skin_points_outside", made.points_outside);
   run.stats().set("skin_farthest", made.farthest);
@@ -83,7 +89,16 @@ constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
 constexpr double usual_tetrahedra = 10000; // without a grade
 constexpr unsigned usual_grade = 1;
 constexpr double voxels_per_cell = 2;
-constexpr double told_loss = 0.02; // of the volume
+constexpr double told_loss = 0.02;          // of the volume
+constexpr std::int32_t unnamed = INT32_MAX; // no part that --material can name
+
+void tell_change(Run& run, const std::string& what, double cell,
+                 const FilledSurface::Volume& volume) {
+  const double change = (volume.filled - volume.of_surface) / volume.of_surface;
+  if (!(std::abs(change) <= told_loss))
+    run.warn(what + ": cells of " + number_text(cell) + " mm change the volume by " +
+             number_text(std::round(1000 * change) / 10) + " %, expected a smaller --cell");
+}
 
 } // namespace
 
@@ -101,6 +116,7 @@ Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
     const TetReport found = examine_tetrahedra(mesh);
     require_sound(found);
     run.stats().set("dropped_points", found.unused_points.count);
+    require_parts(a.build.material, mesh.material);
     return model_of(run, std::move(mesh), a);
   });
 }
@@ -108,32 +124,35 @@ Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
 Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh,
                      const ModelArguments& a) {
   refuse_others(a);
-  refuse(
-      !a.build.material.of_part.empty(),
-      "--solid has one material, expected no PART=NAME: mc-opt --tets --materials makes several");
   const double volume = std::abs(signed_volume(mesh));
   const double cell = a.cell.value_or(std::cbrt(tetrahedra_per_cell * volume / usual_tetrahedra));
   return at(name, [&] {
     if (!(cell > 0 && std::isfinite(cell)))
       throw Error("the surface has no volume, expected a closed one");
-    TetMesh tets = run.timed("fill", [&] {
-      return fill_surface(mesh, name, {cell / voxels_per_cell, cell, usual_grade}, run.context());
+    const std::vector<std::int32_t> parts =
+        mesh.part.empty() ? std::vector<std::int32_t>{} : a.build.material.named;
+    FilledSurface filled = run.timed("fill", [&] {
+      return fill_surface(mesh, name, {cell / voxels_per_cell, cell, usual_grade, parts},
+                          run.context());
     });
+    TetMesh& tets = filled.mesh;
     if (tets.tetrahedra.empty())
       throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
-    const double filled = gewebe::volume(tets);
     run.stats().set("cell", cell);
     run.stats().set("volume_surface", volume);
-    run.stats().set("volume", filled);
+    run.stats().set("volume", gewebe::volume(tets));
     run.say(name + ": " + std::to_string(tets.tetrahedra.size()) + " tetrahedra of cells of " +
             number_text(cell) + " mm");
-    if (!(std::abs(filled - volume) <= told_loss * volume))
-      run.warn(name + ": cells of " + number_text(cell) + " mm change the volume by " +
-               number_text(std::round(1000 * (filled - volume) / volume) / 10) +
-               " %, expected a smaller --cell");
+    for (std::size_t k = 0; k < filled.volumes.size(); ++k)
+      tell_change(run, k < parts.size() ? name + ": part " + std::to_string(parts[k]) : name, cell,
+                  filled.volumes[k]);
+    for (std::int32_t& material : tets.material) // others have the material of all
+      material = static_cast<std::size_t>(material) < parts.size()
+                     ? parts[static_cast<std::size_t>(material)]
+                     : unnamed;
     Model model = model_of(run, std::move(tets), a);
     if (!a.no_skin)
-      skin(run, name, mesh, cell, model);
+      skin(run, name, mesh, cell, a.build.material, model);
     return model;
   });
 }
