@@ -7,6 +7,7 @@
 #include "tools/shared/cli.h"
 #include "tools/shared/mesh_size.h"
 #include "tools/shared/model_arguments.h"
+#include "tools/shared/model_fit.h"
 #include "tools/shared/net_source.h"
 #include "tools/shared/solid_source.h"
 
@@ -94,6 +95,8 @@ void work(cli::Run& run, ModelArguments& a) {
     model.name = a.name;
   if (a.fixed)
     fix(model, a);
+  if (!a.fit.empty())
+    cli::fit_model(run, model, a.fit);
   if (to == Kind::ela)
     cli::warn_of_hinges(run, model);
   hold_step(run, model, a);

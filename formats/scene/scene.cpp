@@ -2,12 +2,11 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
-#include "base/number_text.h"
+#include "formats/scene/words.h"
 #include "solid/solid_motion.h"
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -20,99 +19,6 @@ namespace {
 bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
 }
-
-/// A word as a message may show it: short, printable.
-std::string shown(std::string_view word) {
-  std::string text = "'";
-  for (const char c : word.substr(0, 40))
-    text += static_cast<unsigned char>(c) >= 0x20 && c != 0x7f ? c : '?';
-  return text + (word.size() > 40 ? "…'" : "'");
-}
-
-/// Takes the words of a line one by one; the complaints name what the command looks like.
-class Words {
-public:
-  Words(std::vector<std::string> words, const char* usage)
-      : words_(std::move(words)), usage_(usage) {}
-
-  bool done() const { return at_ == words_.size(); }
-
-  const std::string& word(const char* what) {
-    if (done())
-      fail(std::string("no ") + what);
-    return words_[at_++];
-  }
-
-  /// Takes the next word if it is this one.
-  bool take(std::string_view word) {
-    const bool same = !done() && words_[at_] == word;
-    at_ += same ? 1 : 0;
-    return same;
-  }
-
-  double number(const char* what) { return number_in(word(what), what); }
-
-  double number_in(std::string_view text, const char* what) {
-    const std::string_view digits = without_plus(text);
-    const char* const end = digits.data() + digits.size();
-    double value = 0;
-    const auto [rest, status] = std::from_chars(digits.data(), end, value);
-    if (status != std::errc{} || rest != end)
-      fail(shown(text) + " is no " + what);
-    if (!std::isfinite(value))
-      fail(shown(text) + " is not finite");
-    return value;
-  }
-
-  Vec3 vector(const char* what) {
-    Vec3 v;
-    for (int a = 0; a < 3; ++a)
-      v[a] = number(what);
-    return v;
-  }
-
-  std::string name() {
-    const std::string& text = word("NAME");
-    const auto allowed = [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-             c == '_' || c == '-' || c == '.';
-    };
-    if (text.empty() || text.size() > 100 || text[0] == '.' ||
-        !std::all_of(text.begin(), text.end(), allowed))
-      throw Error(shown(text) + " is no name, expected up to 100 letters, digits, '_', '-', '.'");
-    return text;
-  }
-
-  /// The number behind `word`, which may be absent: 0.
-  double time_after(std::string_view word) {
-    if (!take(word))
-      return 0;
-    const double time = number("time");
-    if (!(time > 0))
-      fail("a time that is not positive");
-    return time;
-  }
-
-  Selector nodes() { return parse_selector(word("NODES")); }
-
-  void end() const {
-    if (!done())
-      fail("surplus word " + shown(words_[at_]));
-  }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(what + ", expected " + usage_);
-  }
-
-  Words rest(const char* usage) const {
-    return {{words_.begin() + static_cast<std::ptrdiff_t>(at_), words_.end()}, usage};
-  }
-
-private:
-  std::vector<std::string> words_;
-  const char* usage_;
-  std::size_t at_ = 0;
-};
 
 using What = decltype(Command::what);
 

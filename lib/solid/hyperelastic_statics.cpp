@@ -116,6 +116,29 @@ public:
     return false;
   }
 
+  /// How a balance moves per change of the load. False if it isn't stable.
+  bool respond(const SolidVector& at, std::span<const SolidVector> changes,
+               std::vector<std::vector<double>>& moves) {
+    const SolidVector none{std::vector<double>(fixed_.size()), {}};
+    SolidVector direction;
+    if (!linearise(none, at, HyperelasticPart::tangent) || !solve({}, direction))
+      return false;
+    for (const SolidVector& change : changes) {
+      condensed_ = change.axes;
+      for (std::size_t t = 0; t < change.bubbles.size(); ++t) {
+        const Linearised& e = of_element_[t];
+        const Eigen::Vector3d w(change.bubbles[t].x, change.bubbles[t].y, change.bubbles[t].z);
+        const Eigen::Matrix<double, 30, 1> handed =
+            e.between.transpose() * (e.bubble_flexibility * w);
+        for (std::size_t a = 0; a < 30; ++a)
+          condensed_[axis_of(t, a)] -= handed[static_cast<Eigen::Index>(a)];
+      }
+      std::vector<double>& u = moves.emplace_back(fixed_.size());
+      solve_axes(*matrix_, *factor_, condensed_, u);
+    }
+    return true;
+  }
+
 private:
   /// Fills of_element_, unbalanced_ and residual_. False if a bubble isn't stable.
   bool linearise(const SolidVector& load, const SolidVector& at, HyperelasticPart part) {
@@ -188,7 +211,7 @@ private:
   /// the tangent isn't definite.
   bool solve(const std::vector<double>& by, SolidVector& direction) {
     const std::size_t count = solid_nodes(mesh_);
-    const StiffnessMatrix k = assembled_matrix(
+    matrix_ = assembled_matrix(
         mesh_,
         [&](std::size_t t, std::size_t a, std::size_t b) {
           SolidBlock block;
@@ -199,9 +222,9 @@ private:
         fixed_, context_);
     try {
       if (factor_)
-        factor_->refactor(k, context_);
+        factor_->refactor(*matrix_, context_);
       else
-        factor_.emplace(k, context_);
+        factor_.emplace(*matrix_, context_);
     } catch (const NotPositiveDefinite&) {
       factor_.reset();
       return false;
@@ -212,7 +235,7 @@ private:
         for (std::size_t b = 0; b < 3 * count; ++b)
           rest[axis_of(t, a)] -= of_element_[t].tangent[3 * count * a + b] * by[axis_of(t, b)];
     direction.axes.assign(fixed_.size(), 0);
-    solve_axes(k, *factor_, rest, direction.axes);
+    solve_axes(*matrix_, *factor_, rest, direction.axes);
     for (std::size_t axis = 0; !by.empty() && axis < fixed_.size(); ++axis)
       direction.axes[axis] += by[axis];
     direction.bubbles.assign(unbalanced_.bubbles.size(), {});
@@ -266,8 +289,9 @@ private:
   SolidVector unbalanced_;        ///< forces, 0 on fixed axes
   std::vector<double> condensed_; ///< with what the bubbles hand on
   double residual_ = 0;
-  double rounding_ = 0;       ///< of energies
-  double force_rounding_ = 0; ///< of forces, squared
+  double rounding_ = 0;                   ///< of energies
+  double force_rounding_ = 0;             ///< of forces, squared
+  std::optional<StiffnessMatrix> matrix_; ///< the last tangent
   std::optional<Factor> factor_;
 };
 
@@ -346,6 +370,23 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
   state.displacement.bubbles.resize(mesh.middles.empty() ? 0 : elements.size());
   Newton newton(mesh, elements, fixed, options, context);
   std::vector<double> by(fixed.size());
+  const auto way = [&](const HyperelasticState& from, double part) {
+    for (std::size_t axis = 0; axis < fixed.size(); ++axis)
+      by[axis] = fixed[axis] != 0 && !prescribed.empty()
+                     ? part * prescribed[axis] - from.displacement.axes[axis]
+                     : 0;
+  };
+  if (!options.start.axes.empty()) {
+    HyperelasticState near = state;
+    near.displacement = options.start;
+    near.displacement.bubbles.resize(state.displacement.bubbles.size());
+    way(near, 1);
+    if (newton.step(load, by, near)) {
+      near.steps = 1;
+      return near;
+    }
+    state.rounds = near.rounds;
+  }
   double done = 0, step = 1;
   while (done < 1) {
     const double next = std::min(1.0, done + step);
@@ -355,10 +396,7 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
     for (Vec3& f : part.bubbles)
       f *= next;
     HyperelasticState tried = state;
-    for (std::size_t axis = 0; axis < fixed.size(); ++axis)
-      by[axis] = fixed[axis] != 0 && !prescribed.empty()
-                     ? next * prescribed[axis] - state.displacement.axes[axis]
-                     : 0;
+    way(state, next);
     if (newton.step(part, by, tried)) {
       state = std::move(tried);
       ++state.steps;
@@ -373,6 +411,18 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
     }
   }
   return state;
+}
+
+std::vector<std::vector<double>>
+hyperelastic_response_to(const TetMesh& mesh, std::span<const SolidElement> elements,
+                         std::span<const std::uint8_t> fixed, const SolidVector& at,
+                         std::span<const SolidVector> changes, const HyperelasticOptions& options,
+                         const Context& context) {
+  Newton newton(mesh, elements, fixed, options, context);
+  std::vector<std::vector<double>> moves;
+  if (!newton.respond(at, changes, moves))
+    throw Error("the balance of a hyperelastic solid is not stable");
+  return moves;
 }
 
 } // namespace gewebe

@@ -48,6 +48,9 @@ struct HyperelasticOptions {
   double tolerance = 1e-10;
   int max_rounds = 20;      ///< of Newton in one load step, before it is halved
   double least_step = 1e-3; ///< of the load, before it gives up
+  /// Empty, or a balance of the same supports under nearby loads or materials, from which the way
+  /// is tried first.
+  SolidVector start{};
 };
 
 struct HyperelasticState {
@@ -69,5 +72,14 @@ HyperelasticState hyperelastic_statics(const TetMesh& mesh, std::span<const Soli
                                        std::span<const double> prescribed, const SolidVector& load,
                                        const HyperelasticOptions& options = {},
                                        const Context& context = {});
+
+/// How a balance moves when its load changes by each of `changes`, to first order: displacements of
+/// the 3 n axes, 0 on fixed ones. \pre `at` is a balance of these elements
+/// \throw Error if the balance isn't stable; Cancelled
+std::vector<std::vector<double>>
+hyperelastic_response_to(const TetMesh& mesh, std::span<const SolidElement> elements,
+                         std::span<const std::uint8_t> fixed, const SolidVector& at,
+                         std::span<const SolidVector> changes,
+                         const HyperelasticOptions& options = {}, const Context& context = {});
 
 } // namespace gewebe

@@ -72,6 +72,8 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.flag("--normals", b.normals, "add vertex normals");
   p.option("--dt", a.dt, "T", "refuse a model for which a step of T s is not safe").positive();
   p.flag("--scale-mass", a.scale_mass, "raise masses until --dt is safe instead");
+  p.option("--fit", a.fit, "FILE",
+           "of tetrahedra: find Young's moduli from measured displacements");
   p.option("--primitive", a.primitive, "KIND",
            "plane:MxN, tube:MxN or sphere:MxN instead of a mesh");
   p.option("--size", a.size, "A,B", "its sides, radius and length or radius in mm");
@@ -101,13 +103,15 @@ void complete(ModelArguments& a) {
     a.matrix = parsed("--primitive", [&] { return parse_primitive(a.primitive, a.size); });
   }
   parsed("--name", [&] { check_name(a.name); });
-  refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none"),
+  refuse(a.list_materials && (a.mesh != "-" || a.matrix || a.fix != "none" || !a.fit.empty()),
          "--list-materials makes no model, expected no mesh and no nodes");
   if (a.materials.empty())
     choose_materials(a); // what is wrong is known before anything is read
   std::vector<std::string> inputs;
   if (!a.materials.empty())
     inputs.push_back(a.materials);
+  if (!a.fit.empty())
+    inputs.push_back(a.fit);
   if (!a.matrix && !a.list_materials)
     inputs.push_back(a.mesh);
   if (a.fix != "none") {

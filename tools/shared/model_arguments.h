@@ -16,7 +16,7 @@ namespace gewebe {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
-              axes = "xyz", primitive, size, repair, materials;
+              axes = "xyz", primitive, size, repair, materials, fit;
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;

@@ -1,0 +1,267 @@
+// Young's moduli from measured displacements, damping from a measured swing.
+
+#include "solid/solid_place.h"
+#include "solid/swing_fit.h"
+#include "solid/young_fit.h"
+#include "tests/unit/solid_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+
+using namespace gewebe;
+
+namespace {
+
+/// A bar of 80 x 20 x 20 along x, held at x = 0; its second half is of another material.
+test::Solid bar(double first, double second, std::uint32_t across = 2) {
+  TetMesh mesh = test::box_tetrahedra(4 * across, across, across, 20.0 / across);
+  mesh.material.clear();
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    double x = 0;
+    for (const auto c : t)
+      x += mesh.points[c].x / 4;
+    mesh.material.push_back(x > 40 ? 1 : 0);
+  }
+  test::Solid solid(mesh, true, {{first, 0.45, 1e-3}, {second, 0.45, 1e-3}});
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
+  return solid;
+}
+
+const std::vector<std::string> names{"soft", "stiff"};
+const std::vector<std::size_t> both{0, 1};
+
+SolidVector weight(const test::Solid& s, double acceleration) {
+  return hyperelastic_weight(s.mesh, s.materials, s.elements, {0, 0, -acceleration});
+}
+
+/// What is measured on the body under its weight, at its upper edge and 4 mm off its end.
+MeasuredCase measured(const test::Solid& s, double acceleration, double noise) {
+  MeasuredCase c{weight(s, acceleration), {}};
+  const auto u = hyperelastic_statics(s.mesh, s.elements, s.fixed, {}, c.load).displacement.axes;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0, noise);
+  for (const Vec3 place : {Vec3{20, 10, 20},
+                           {30, 0, 20},
+                           {40, 10, 20},
+                           {60, 20, 20},
+                           {80, 10, 20},
+                           {84, 10, 10},
+                           {51, 7, 3}}) {
+    const Vec3 d = displacement_at(find_place(s.mesh, place), u);
+    Measurement m{place, {}, "point " + std::to_string(c.measurements.size())};
+    for (int i = 0; i < 3; ++i)
+      m.displacement[static_cast<std::size_t>(i)] = d[i] + normal(random);
+    c.measurements.push_back(m);
+  }
+  return c;
+}
+
+/// The message of what fit_young throws.
+std::string refusal(const test::Solid& s, const MeasuredCase& c,
+                    std::span<const std::size_t> wanted = both) {
+  try {
+    fit_young(s.mesh, s.materials, names, wanted, s.fixed, std::span(&c, 1));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+} // namespace
+
+TEST(SolidPlace, FollowsLinearFieldsInsideAndOff) {
+  const test::Solid s = bar(1e4, 1e4);
+  std::vector<double> u;
+  for (const Vec3& p : s.mesh.points)
+    for (const double v : {1 + 0.1 * p.x, 0.2 * p.y - 0.3 * p.z, 0.5 * p.x})
+      u.push_back(v);
+  for (const Vec3& p : {Vec3{33, 7, 11}, {86, 10, 4}, {-3, -2, 22}, {0, 0, 0}}) {
+    const Vec3 d = displacement_at(find_place(s.mesh, p), u);
+    EXPECT_NEAR(d.x, 1 + 0.1 * p.x, 1e-12);
+    EXPECT_NEAR(d.y, 0.2 * p.y - 0.3 * p.z, 1e-12);
+    EXPECT_NEAR(d.z, 0.5 * p.x, 1e-12);
+  }
+  EXPECT_NEAR(find_place(s.mesh, {86, 10, 4}).outside, 6, 1e-12);
+  EXPECT_NEAR(find_place(s.mesh, {-3, -4, 10}).outside, 5, 1e-12);
+  EXPECT_EQ(find_place(s.mesh, {33, 7, 11}).outside, 0);
+}
+
+TEST(SolidPlace, FollowsQuadraticFieldsInside) {
+  const test::Solid s = bar(1e4, 1e4);
+  std::vector<double> u;
+  for (const Vec3& p : s.mesh.points)
+    for (const double v : {p.x * p.y, p.z * p.z, p.x * p.x - p.y * p.z})
+      u.push_back(v);
+  const Vec3 p{33, 7, 11}, d = displacement_at(find_place(s.mesh, p), u);
+  EXPECT_NEAR(d.x, p.x * p.y, 1e-9);
+  EXPECT_NEAR(d.y, p.z * p.z, 1e-9);
+  EXPECT_NEAR(d.z, p.x * p.x - p.y * p.z, 1e-9);
+}
+
+TEST(YoungFit, FindsWhatMadeTheDisplacements) {
+  test::Solid truth = bar(8000, 20000);
+  // 27 mm of 80: far beyond small strains.
+  const MeasuredCase c = measured(truth, 9810, 0);
+  const test::Solid start = bar(50000, 10000);
+  const YoungFit fit = fit_young(start.mesh, start.materials, names, both, start.fixed,
+                                 std::span(&c, 1), {.tolerance = 1e-6});
+  EXPECT_NEAR(fit.materials[0].young, 8000, 8e-4 * 8000);
+  EXPECT_NEAR(fit.materials[1].young, 20000, 8e-4 * 20000);
+  EXPECT_LE(fit.solves, 10);
+  EXPECT_LT(fit.residual, 1e-4 * fit.measured);
+  EXPECT_TRUE(fit.outliers.empty());
+}
+
+TEST(YoungFit, OfOneMaterialTakesTheOtherAsKnown) {
+  const MeasuredCase c = measured(bar(8000, 20000), 9810, 0);
+  const test::Solid start = bar(8000, 900);
+  const std::array<std::size_t, 1> second{1};
+  const YoungFit fit =
+      fit_young(start.mesh, start.materials, names, second, start.fixed, std::span(&c, 1));
+  ASSERT_EQ(fit.materials.size(), 1u);
+  EXPECT_EQ(fit.materials[0].material, 1u);
+  EXPECT_NEAR(fit.materials[0].young, 20000, 200);
+}
+
+// Intervals of repeated noise hold the truth about as often as they say.
+TEST(YoungFit, IsAsSureAsItSays) {
+  const test::Solid truth = bar(30000, 30000, 1);
+  const MeasuredCase exact = measured(truth, 2000, 0);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, 0.05);
+  const std::array<std::size_t, 1> first{0};
+  int held = 0;
+  constexpr int runs = 60;
+  double widest = 0;
+  for (int run = 0; run < runs; ++run) {
+    MeasuredCase c = exact;
+    for (Measurement& m : c.measurements)
+      for (auto& d : m.displacement)
+        *d += normal(random);
+    const YoungFit fit =
+        fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+    const auto [low, high] = fit.materials[0].interval.value();
+    held += low <= 30000 && 30000 <= high ? 1 : 0;
+    widest = std::max(widest, high / low);
+  }
+  EXPECT_GE(held, 52); // 57 expected; fewer than 52 by chance once in 100
+  EXPECT_LT(held, 60);
+  EXPECT_LT(widest, 1.5);
+}
+
+TEST(YoungFit, NamesAnOutlier) {
+  const test::Solid truth = bar(30000, 30000);
+  MeasuredCase c = measured(truth, 2000, 0.01);
+  *c.measurements[4].displacement[2] += 0.5;
+  const std::array<std::size_t, 1> first{0};
+  const YoungFit fit =
+      fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+  ASSERT_EQ(fit.outliers.size(), 1u);
+  EXPECT_EQ(fit.outliers[0], "point 4");
+}
+
+TEST(YoungFit, NamesBadData) {
+  const test::Solid s = bar(30000, 30000);
+  const MeasuredCase good = measured(s, 2000, 0);
+  EXPECT_EQ(refusal(s, good), "");
+
+  MeasuredCase c = good;
+  for (Measurement& m : c.measurements)
+    for (auto& d : m.displacement)
+      *d = -*d;
+  EXPECT_NE(refusal(s, c).find("against the loads"), std::string::npos) << refusal(s, c);
+
+  c = good;
+  c.measurements.push_back({{300, 0, 0}, {1, 1, 1}, "line 9"});
+  EXPECT_NE(refusal(s, c).find("line 9: the place is 220 mm off"), std::string::npos)
+      << refusal(s, c);
+
+  c = good;
+  c.measurements.push_back({{0, 10, 10}, {1, 1, 1}, "line 8"});
+  EXPECT_NE(refusal(s, c).find("line 8: what is measured there is held"), std::string::npos)
+      << refusal(s, c);
+
+  c = good;
+  c.measurements.resize(1);
+  c.measurements[0].displacement = {std::nullopt, std::nullopt, -1.0};
+  EXPECT_NE(refusal(s, c).find("1 measured axes for 2 materials"), std::string::npos)
+      << refusal(s, c);
+
+  // Two copies of one number say one thing.
+  c.measurements.push_back(c.measurements[0]);
+  EXPECT_NE(refusal(s, c).find("soft and stiff apart"), std::string::npos) << refusal(s, c);
+
+  c = good;
+  c.load = weight(s, 0);
+  EXPECT_NE(refusal(s, c).find("the loads move nothing"), std::string::npos) << refusal(s, c);
+
+  // What a load near the support bends says nothing of the end.
+  c.load = {std::vector<double>(s.fixed.size()), {}};
+  c.load.axes[3 * s.node_at({20, 10, 20}) + 2] = -1e5;
+  c.measurements = {{{20, 10, 20}, {std::nullopt, std::nullopt, -1}, "a"},
+                    {{10, 10, 20}, {std::nullopt, std::nullopt, -0.4}, "b"}};
+  EXPECT_EQ(refusal(s, c).find("no measurement depends on"), 0u) << refusal(s, c);
+
+  const std::array<std::size_t, 0> none{};
+  EXPECT_NE(refusal(s, good, none).find("all materials are known"), std::string::npos);
+}
+
+TEST(SwingFit, FindsFrequencyAndDamping) {
+  for (const double ratio : {0.005, 0.05, 0.3}) {
+    std::vector<double> t, y;
+    const double w = 2 * std::numbers::pi * 7;
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal(0, 0.02);
+    for (int k = 0; k < 200; ++k) {
+      t.push_back(3 + 0.005 * k);
+      const double s = t.back() - 3;
+      y.push_back(
+          -4 + 2 * std::exp(-ratio * w * s) * std::cos(w * std::sqrt(1 - ratio * ratio) * s + 0.4) +
+          normal(random));
+    }
+    const SwingFit fit = fit_swing(t, y);
+    EXPECT_NEAR(fit.frequency, 7 * std::sqrt(1 - ratio * ratio), 0.01 * 7) << ratio;
+    EXPECT_NEAR(fit.ratio, ratio, 0.02 * ratio + 0.0005) << ratio;
+    EXPECT_LT(fit.ratio_interval[0], ratio + 0.001);
+    EXPECT_GT(fit.ratio_interval[1], ratio - 0.001);
+    EXPECT_NEAR(fit.rest, -4, 0.02);
+    EXPECT_NEAR(fit.amplitude, 2, 0.05);
+    EXPECT_GT(fit.explained, 0.9);
+  }
+}
+
+TEST(SwingFit, RefusesWhatIsNoSwing) {
+  const auto refused = [](const std::function<double(double)>& y, int count, double step) {
+    std::vector<double> t, v;
+    for (int k = 0; k < count; ++k) {
+      t.push_back(step * k);
+      v.push_back(y(t.back()));
+    }
+    try {
+      fit_swing(t, v);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const auto swing = [](double t) { return std::exp(-t) * std::cos(20 * t); };
+  EXPECT_EQ(refused(swing, 100, 0.02), "");
+  EXPECT_NE(refused(swing, 9, 0.02).find("9 samples"), std::string::npos);
+  EXPECT_NE(refused(swing, 100, 0.0).find("ascending"), std::string::npos);
+  EXPECT_NE(refused([](double) { return 3; }, 100, 0.02).find("all alike"), std::string::npos);
+  EXPECT_NE(refused([](double t) { return std::exp(t) * std::cos(20 * t); }, 100, 0.02)
+                .find("does not die away"),
+            std::string::npos);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0, 1);
+  EXPECT_NE(refused([&](double) { return normal(random); }, 100, 0.02).find("explains"),
+            std::string::npos);
+  EXPECT_NE(refused([](double t) { return std::exp(-t) * std::cos(3 * t); }, 100, 0.02)
+                .find("swings, expected"),
+            std::string::npos);
+}
