@@ -1,7 +1,7 @@
 #include "solid/swing_fit.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "base/rounded_text.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -119,7 +119,8 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
                 std::to_string(fewest) + " at least");
   for (std::size_t k = 1; k < times.size(); ++k)
     if (!(times[k] > times[k - 1]))
-      throw Error("sample " + std::to_string(k + 1) + " of the swing, at " + number_text(times[k]) +
+      throw Error("sample " + std::to_string(k + 1) + " of the swing, at " +
+                  rounded_text(times[k]) +
                   " s, is not after the one before, expected ascending times");
   const auto count = static_cast<Eigen::Index>(times.size());
   Samples s;
@@ -137,13 +138,13 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   fit.frequency = std::abs(p[4]) / two_pi;
   if (!(fit.explained >= least_explained))
     throw Error("no swing that dies away is in the samples: the best one, of " +
-                number_text(fit.frequency) + " Hz, explains " + number_text(100 * fit.explained) +
-                " % of their variance, expected " + number_text(100 * least_explained) +
+                rounded_text(fit.frequency) + " Hz, explains " + rounded_text(100 * fit.explained) +
+                " % of their variance, expected " + rounded_text(100 * least_explained) +
                 " at least");
   const double swings = fit.frequency * s.t[count - 1];
   if (!(swings >= fewest_swings))
-    throw Error("the samples hold " + number_text(swings) + " swings, expected " +
-                number_text(fewest_swings) + " at least");
+    throw Error("the samples hold " + rounded_text(swings) + " swings, expected " +
+                rounded_text(fewest_swings) + " at least");
   if (!(p[3] > 0))
     throw Error("the swing does not die away, expected one that does");
   const double w = std::hypot(p[3], p[4]);

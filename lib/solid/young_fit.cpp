@@ -1,7 +1,7 @@
 #include "solid/young_fit.h"
 
 #include "base/error.h"
-#include "base/number_text.h"
+#include "base/rounded_text.h"
 #include "solid/solid_place.h"
 #include "solve/factor.h"
 
@@ -45,8 +45,8 @@ std::vector<Datum> data_of(const TetMesh& mesh, std::span<const std::uint8_t> fi
     for (const Measurement& m : cases[c].measurements) {
       const SolidPlace place = find_place(mesh, m.place);
       if (!(place.outside <= limit))
-        throw Error(m.name + ": the place is " + number_text(place.outside) +
-                    " mm off the body, expected at most " + number_text(limit));
+        throw Error(m.name, "the place is " + rounded_text(place.outside) +
+                                " mm off the body, expected at most " + rounded_text(limit));
       for (int axis = 0; axis < 3; ++axis) {
         const std::optional<double>& value = m.displacement[static_cast<std::size_t>(axis)];
         if (!value)
@@ -57,7 +57,7 @@ std::vector<Datum> data_of(const TetMesh& mesh, std::span<const std::uint8_t> fi
               held && (place.weight[k] == 0 ||
                        fixed[3 * std::size_t{place.node[k]} + static_cast<std::size_t>(axis)] != 0);
         if (held)
-          throw Error(m.name + ": what is measured there is held, expected a place that can move");
+          throw Error(m.name, "what is measured there is held, expected a place that can move");
         data.push_back({c, place, axis, *value, &m.name});
       }
     }
@@ -289,7 +289,7 @@ YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials
       return fit.result();
     if (fit.solves() + static_cast<int>(cases.size()) > options.max_solves)
       throw Error("the fit did not end in " + std::to_string(fit.solves()) +
-                  " solves: moduli still change by " + number_text(100 * change) +
+                  " solves: moduli still change by " + rounded_text(100 * change) +
                   " %, expected measurements of this body under these loads");
   }
 }

@@ -9,11 +9,11 @@ ball() { # FILE OPTION...
 # measured: what ffe-run has a ball of 20 kPa do, at every fortieth node that can move.
 measure() {
   ball truth.ela --young 20000
-  printf '%s\n' 'object ball truth.ela method=ffe' 'emit shapes' 'gravity 0 -9810 0' 'force ball z>25 0 0 -20000 total' step >scene
+  printf '%s\n' 'object ball truth.ela method=ffe' 'emit shapes' 'gravity 0 -500 0' 'force ball z>25 0 0 -2000 total' step >scene
   ffe-run scene >shapes
   {
-    printf '%s\n' '# a ball' 'gravity 0 -9810 0' 'force z>25 0 0 -20000 total'
-    awk 'FNR == NR { if ($1 == "nodes") want = $2; else if (want && n < want) { x[n] = $1; y[n] = $2; z[n++] = $3 } next }
+    printf '%s\n' '# a ball' 'gravity 0 -500 0' 'force z>25 0 0 -2000 total'
+    awk 'BEGIN { n = 0 } FNR == NR { if ($1 == "nodes") want = $2; else if (want && n < want) { x[n] = $1; y[n] = $2; z[n++] = $3 } next }
       $1 == "shapes" { k = 0; seen = 1; next }
       seen && k < n { if (k % 40 == 0 && z[k] > -20) printf "measure %.9g %.9g %.9g %.9g %.9g %.9g\n", x[k], y[k], z[k], $1 - x[k], $2 - y[k], $3 - z[k]; ++k }' \
       truth.ela shapes
@@ -24,11 +24,6 @@ measure() {
 test_a_modulus_is_found_again() {
   measure
   ball start.ela --young 1000
-  local options
-  for options in '-v --stats=stats' -q; do
-    # shellcheck disable=SC2086 # options are words
-    exp2ela $options --fit measured start.ela -o fitted.ela 2>said
-  done
   exp2ela -v --stats=stats --fit measured start.ela -o fitted.ela 2>said
   python3 - <<'END'
 import json
@@ -48,7 +43,7 @@ END
   exp2ela -j 1 --fit measured start.ela -o one.ela
   cmp one.ela fitted.ela
   # Straight from the surface.
-  ball direct.ela --fit measured
+  ball direct.ela --young 1000 --fit measured
   cmp direct.ela fitted.ela
 }
 
@@ -79,13 +74,13 @@ test_bad_data_is_named() {
   local load='gravity 0 -9810 0' good='measure 0 0 29 - -0.5 -'
   refused 'no measurement' '# nothing'
   refused 'no measurement' "$load"
-  refused ":2: 'gravty' is no word of measurements, did you mean" '' 'gravty 0 0 1'
+  refused ":2: 'gravty' is no word of measurements (did you mean gravity?)" '' 'gravty 0 0 1'
   refused ":2: no number, expected measure x y z dx dy dz" "$load" 'measure 1 2 3 4 5'
   refused ":2: no axis measured" "$load" 'measure 1 2 3 - - -'
   refused ":2: 'x' is no number" "$load" 'measure 1 2 3 x - -'
   refused ":2: 'nan' is not finite" "$load" 'measure 1 2 3 nan - -'
   refused ":2: surplus word '7'" "$load" "$good 7"
-  refused ":3: the place is 71 mm off the body" "$load" "$good" 'measure 0 0 100 - 1 -'
+  refused ":3: the place is 70 mm off the body" "$load" "$good" 'measure 0 0 100 - 1 -'
   refused ":3: what is measured there is held" "$load" "$good" 'measure 0 0 -27 - 1 -'
   refused 'goes against the loads' "$load" 'measure 0 0 29 - 0.5 -'
   refused 'the loads move nothing' "$good"

@@ -67,7 +67,7 @@ std::string refusal(const test::Solid& s, const MeasuredCase& c,
   try {
     fit_young(s.mesh, s.materials, names, wanted, s.fixed, std::span(&c, 1));
   } catch (const Error& error) {
-    return error.what();
+    return error.place() + (error.place().empty() ? "" : ": ") + error.what();
   }
   return "";
 }
