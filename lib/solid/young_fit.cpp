@@ -19,7 +19,7 @@ namespace {
 
 constexpr double furthest = 0.1; // of the body's diagonal, that a place may be off it
 constexpr double confidence = 0.95;
-constexpr double unseen = 1e-6; // of the largest displacement, per relative change of a modulus
+constexpr double unseen = 1e-6; // of displacements, per relative change of a modulus or of nodes
 constexpr double alike = 1e-8;  // of the largest eigenvalue: materials not told apart
 constexpr double widest = 4;    // factor of a modulus in a round
 
@@ -51,12 +51,11 @@ std::vector<Datum> data_of(const TetMesh& mesh, std::span<const std::uint8_t> fi
         const std::optional<double>& value = m.displacement[static_cast<std::size_t>(axis)];
         if (!value)
           continue;
-        bool held = true;
+        double free = 0;
         for (std::size_t k = 0; k < place.count; ++k)
-          held =
-              held && (place.weight[k] == 0 ||
-                       fixed[3 * std::size_t{place.node[k]} + static_cast<std::size_t>(axis)] != 0);
-        if (held)
+          if (fixed[3 * std::size_t{place.node[k]} + static_cast<std::size_t>(axis)] == 0)
+            free += std::abs(place.weight[k]);
+        if (!(free > unseen))
           throw Error(m.name, "what is measured there is held, expected a place that can move");
         data.push_back({c, place, axis, *value, &m.name});
       }

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
-#include "formats/model/measurements.h"
+#include "formats/scene/measurements.h"
 #include "formats/stream/stream.h"
 #include "solid/solid_model.h"
 #include "solid/swing_fit.h"

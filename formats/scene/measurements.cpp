@@ -1,4 +1,4 @@
-#include "formats/model/measurements.h"
+#include "formats/scene/measurements.h"
 
 #include "base/error.h"
 #include "base/nearest_word.h"
