@@ -19,7 +19,8 @@ namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 constexpr int quiet_steps = 2;
-constexpr double same_step = 1e-9; ///< lengths that differ by less are one
+constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
+constexpr double same_step = 1e-9;     ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
 constexpr double largest_force = 1e38; ///< squares of what it does are finite
 constexpr double same_mass = 1e-6;
@@ -212,6 +213,7 @@ void SolidDynamic::go_back(const std::any& snapshot) {
 
 void SolidDynamic::renew() {
   engine_.reset();
+  contact_.reset();
   last_step_ = 0;
 }
 
@@ -238,9 +240,11 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
     return step == steps ? start + duration : start + static_cast<double>(step) * h;
   };
   while (taken < steps && !state_.resting) {
-    step(h, at(taken), at(taken + 1), context);
+    step(h, at(taken), at(taken + 1), taken == 0, context);
     ++taken;
   }
+  if (state_.resting)
+    state_.held_time += start + duration - at(taken);
   take_over();
   state_.time = start + duration;
   counts_.steps += taken;
@@ -249,7 +253,7 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
   return taken;
 }
 
-void SolidDynamic::step(double h, double from, double to, const Context& context) {
+void SolidDynamic::step(double h, double from, double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
   const std::vector<double> forces = forces_at(to);
@@ -260,29 +264,27 @@ void SolidDynamic::step(double h, double from, double to, const Context& context
   moving.set_load(forces);
   const auto& ramps = state_.load->ramp;
   const bool led = std::ranges::any_of(ramps, [&](const auto& r) { return from < r.second.end; });
+  std::vector<double> target; // where held axes go
   if (led || all_held_) {
-    std::vector<double> target(before.size());
+    target.resize(before.size());
     for (const auto& [node, displacement] : state_.load->displacement) {
       const Vec3 u = held_at(node, to);
       for (int a = 0; a < 3; ++a)
         target[axis_of(node, a)] = u[a];
     }
-    if (all_held_) {
-      std::vector<double> velocity(before.size());
-      for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
-        for (int a = 0; a < 3; ++a) {
-          double& place = target[axis_of(i, a)];
-          place += model_.nodes[i].position[a];
-          velocity[axis_of(i, a)] = (place - before[axis_of(i, a)]) / h;
-        }
-      moving.restore(target, velocity, context);
-      moving.find_reactions(context);
-    } else {
-      moving.move_held(target);
-    }
   }
-  if (!all_held_) {
-    const SolidStep took = moving.step(h, context);
+  if (all_held_) {
+    std::vector<double> velocity(before.size());
+    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a) {
+        double& place = target[axis_of(i, a)];
+        place += model_.nodes[i].position[a];
+        velocity[axis_of(i, a)] = (place - before[axis_of(i, a)]) / h;
+      }
+    moving.restore(target, velocity, context);
+    moving.find_reactions(context);
+  } else {
+    const SolidStep took = push(forces, target, h, from, to, first, context);
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
     counts_.factors += static_cast<std::uint64_t>(took.factorisations);
     counts_.unfinished += took.change <= options_.tolerance ? 0 : 1;
@@ -297,13 +299,84 @@ void SolidDynamic::step(double h, double from, double to, const Context& context
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
   const bool quiet = moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
-                     !(state_.load->changes_until() > to);
+                     !(state_.load->changes_until() > to) && !instruments_move(first, from, to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
     return;
   state_.resting = true;
   moving.restore(std::vector<double>(moving.places().begin(), moving.places().end()),
                  std::vector<double>(before.size()), context);
+}
+
+bool SolidDynamic::instruments_move(bool first, double from, double to) const {
+  return std::ranges::any_of(state_.instruments, [&](const auto& i) {
+    return i && (i->way.end > to || (first && i->before != i->way.at(from)));
+  });
+}
+
+/// A step, with what instruments do in it.
+SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vector<double>& target,
+                             double h, double from, double to, bool first, const Context& context) {
+  SolidMotion& moving = *engine_;
+  const auto& instruments = state_.instruments;
+  if (std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
+    state_.touched.clear();
+    if (!target.empty())
+      moving.move_held(target);
+    return moving.step(h, context);
+  }
+  if (!contact_)
+    contact_ = std::make_unique<SolidContact>(model_);
+  SolidStep all;
+  bool exact = true;
+  const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
+    std::vector<std::optional<MovedInstrument>> moved;
+    for (const auto& i : instruments) {
+      if (!i) {
+        moved.emplace_back();
+        continue;
+      }
+      const auto at = [&](double of_jump, double of_way) {
+        const Pose start = i->way.at(from);
+        return of_jump < 1 ? between(i->before, start, of_jump)
+                           : between(start, i->way.at(to), of_way);
+      };
+      moved.emplace_back(MovedInstrument{i->shape, at(jump, way), at(jump_to, way_to)});
+    }
+    const SolidContact::Result result = contact_->step(
+        {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
+         state_.load->displacement, moved, h, options_, clearing},
+        state_.touched, context);
+    all.rounds += result.took.rounds;
+    all.factorisations += result.took.factorisations;
+    all.change = result.took.change;
+    all.limited = result.took.limited;
+    exact = clearing || result.exact;
+  };
+  const auto parts = [&](bool jump) {
+    std::vector<MovedInstrument> ways;
+    for (const auto& i : instruments)
+      if (i && jump)
+        ways.push_back({i->shape, i->before, i->way.at(from)});
+      else if (i)
+        ways.push_back({i->shape, i->way.at(from), i->way.at(to)});
+    const bool moves = std::ranges::any_of(ways, [](const auto& w) { return w.before != w.now; });
+    return moves ? parts_of_way(ways, max_parts) : 0;
+  };
+  const auto share = [](std::size_t part, std::size_t of) {
+    return static_cast<double>(part) / static_cast<double>(of);
+  };
+  const std::size_t jumps = first ? parts(true) : 0, ways = std::max<std::size_t>(1, parts(false));
+  for (std::size_t p = 0; p < jumps; ++p)
+    go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
+  for (std::size_t p = 0; p < ways; ++p)
+    go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
+  for (NodeTouch t : state_.touched) {
+    t.force *= h;
+    state_.impulses.push_back(t);
+  }
+  state_.exact = state_.exact && exact;
+  return all;
 }
 
 /// The engine's state, to be kept.
@@ -328,6 +401,31 @@ std::vector<NodeVector> SolidDynamic::contact_forces() const {
     forces.push_back({node, force});
   }
   return forces;
+}
+
+void SolidDynamic::set_instruments(std::vector<std::optional<MovingInstrument>> instruments) {
+  state_.instruments = std::move(instruments);
+}
+
+void SolidDynamic::rest_on(double duration) {
+  state_.held_time += duration;
+}
+
+std::vector<NodeTouch> SolidDynamic::take_impulses() {
+  std::vector<NodeTouch> all = std::exchange(state_.impulses, {});
+  for (NodeTouch t : state_.touched) {
+    t.force *= state_.held_time;
+    if (state_.held_time > 0)
+      all.push_back(t);
+  }
+  state_.held_time = 0;
+  return sums_of_touches(std::move(all));
+}
+
+std::optional<std::vector<NodeTouch>> SolidDynamic::held_touches(double duration) const {
+  if (!(state_.held_time >= duration * (1 - same_step)))
+    return std::nullopt;
+  return state_.touched;
 }
 
 SolidStepCounts SolidDynamic::take_counts() {

@@ -5,13 +5,16 @@
 // Nodes have the masses of their tetrahedra and the model's drag per mass; weight acts by the loads
 // that statics has (weight_of), so that at rest a solid stands where statics says. Forces and
 // pressures of a step are those at its end, pressures on the shape at its beginning. Displaced
-// nodes stand at their displacement, or are on their way there. The same bytes for any number of
+// nodes stand at their displacement, or are on their way there. Instruments push within each step
+// (dynamics/solid_contact.h); what one jumps over, or passes by more than half its radius in a
+// step, is moved along before, without speed. The same bytes for any number of
 // threads.
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
 #include "contact/load.h"
 #include "dynamics/body_motion.h"
+#include "dynamics/solid_contact.h"
 #include "model/model.h"
 #include "solid/solid_motion.h"
 
@@ -50,11 +53,11 @@ public:
 
   std::vector<NodeVector> contact_forces() const override;
 
-  void set_instruments(std::vector<std::optional<MovingInstrument>>) override {}
-  void rest_on(double) override {}
-  std::vector<NodeTouch> take_impulses() override { return {}; }
-  bool touches_exact() const override { return true; }
-  std::optional<std::vector<NodeTouch>> held_touches(double) const override { return {}; }
+  void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
+  void rest_on(double duration) override;
+  std::vector<NodeTouch> take_impulses() override;
+  bool touches_exact() const override { return state_.exact; }
+  std::optional<std::vector<NodeTouch>> held_touches(double duration) const override;
 
   SolidStepCounts take_counts() override;
   std::optional<MotionEnergies> energies() const override;
@@ -69,6 +72,12 @@ private:
     std::uint64_t version = 0; ///< of all these
     int quiet = 0;             ///< steps in a row that moved next to nothing
     bool resting = false;
+
+    std::vector<std::optional<MovingInstrument>> instruments{};
+    std::vector<NodeTouch> touched{};  ///< forces in the last step
+    std::vector<NodeTouch> impulses{}; ///< of steps since they were taken
+    double held_time = 0;              ///< s that `touched` acted at rest since then
+    bool exact = true;                 ///< all forces so far
   };
 
   void read_load();
@@ -77,7 +86,10 @@ private:
   SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;
-  void step(double h, double from, double to, const Context& context);
+  void step(double h, double from, double to, bool first, const Context& context);
+  bool instruments_move(bool first, double from, double to) const;
+  SolidStep push(const std::vector<double>& forces, const std::vector<double>& target, double h,
+                 double from, double to, bool first, const Context& context);
 
   const Model& model_;
   SolidMotionOptions options_;
@@ -94,7 +106,8 @@ private:
   std::vector<PressedCorner> pressed_;
 
   std::optional<SolidMotion> engine_;
-  double last_step_ = 0; ///< of the engine
+  double last_step_ = 0;                  ///< of the engine
+  std::unique_ptr<SolidContact> contact_; ///< of the engine, while there are instruments
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false;

@@ -248,8 +248,6 @@ void move_bodies(World& w, double to) {
   for (Body* const body : awake)
     if (body->failure)
       raise(w, *body);
-  for (Body* const body : awake)
-    require_untouched(w, *body, to);
   end_guiding(w, to);
   SimulationCounts& counts = w.now.counts;
   for (Body* const body : awake)

@@ -6,7 +6,6 @@
 #include "statics/warped_contact.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -15,7 +14,6 @@ namespace gewebe::simulation {
 namespace {
 
 constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
-constexpr double touching = 1e-6;      ///< of the radius: not deeper is outside
 
 Box3 joined(Box3 a, const Box3& b) {
   a.add(b.min);
@@ -57,42 +55,10 @@ void warn_inexact(World& w, Object& object) {
 
 // ---- elastodynamic objects
 
-/// That no instrument on its way to `to` has a free node of a solid in it, as its nodes are now.
-/// \throw Error: what is not simulated
-void require_untouched(const World& w, const Body& body, double to) {
-  const Object& object = w.now.objects[body.parts[0]];
-  if (!instruments_there(w) || !is_solid(object))
-    return;
-  const std::span<const NodeMotion> motion = motion_of(object);
-  for (const Instrument& i : w.now.instruments) {
-    if (!i.present || i.shape.blade)
-      continue;
-    const Pose now = i.way.at(to);
-    const Box3 all = box_between(i.shape, i.before, now);
-    const std::size_t parts =
-        parts_of_way(std::array{MovedInstrument{i.shape, i.before, now}}, max_parts);
-    std::vector<PlacedInstrument> placed;
-    for (std::size_t p = 0; p <= parts; ++p)
-      placed.emplace_back(
-          i.shape, between(i.before, now, static_cast<double>(p) / static_cast<double>(parts)));
-    for (std::uint32_t n = 0; n < surface_count(object.model()); ++n) {
-      const Vec3 at = object.model().nodes[n].position + motion[n].displacement;
-      if (object.model().nodes[n].fixed == fixed_all || object.load->displacement.contains(n) ||
-          !near(all, {at, at}))
-        continue;
-      for (const PlacedInstrument& there : placed)
-        if (!(there.distance(at) >= -touching * i.shape.radius))
-          require_support(w, object, Feature::touch);
-    }
-  }
-}
-
 /// Tells a body that is to move of the instruments, and wakes it where one comes.
 void guide(World& w, Body& body, double to) {
   if (!instruments_there(w))
     return;
-  if (gap_of(w.now.objects[body.parts[0]], Feature::touch) != nullptr)
-    return require_untouched(w, body, to);
   std::vector<std::optional<MovingInstrument>> all;
   for (const Instrument& i : w.now.instruments)
     all.push_back(i.present && !i.shape.blade

@@ -64,8 +64,6 @@ inline constexpr std::array gaps{
     Gap{Way::solid, Feature::cut, true,
         "holds tetrahedra, expected springs and triangles alone to cut"},
     Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
-    Gap{Way::solid_motion, Feature::touch, true,
-        "is a solid that moves, which no instrument can push yet, expected ffe"},
     Gap{Way::solid_motion, Feature::attach, true,
         "is a solid, expected objects of springs and triangles alone to attach"},
     Gap{Way::elastostatic, Feature::attach, true,

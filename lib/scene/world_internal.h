@@ -152,7 +152,6 @@ bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
 // contact.cpp: whom they touch
-void require_untouched(const World& w, const Body& body, double to);
 void guide(World& w, Body& body, double to);
 void end_guiding(World& w, double to);
 void take_touches(World& w, double duration);

@@ -43,6 +43,7 @@ struct SolidMotion::State {
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
+  Numbers guess; ///< of the next step; empty: none
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
@@ -107,6 +108,8 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   add(found.at, h, s.now.velocity);
   if (s.last_step == h)
     add(found.at, h * h, s.acceleration);
+  if (!s.guess.empty())
+    found.at = std::exchange(s.guess, {});
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] != 0)
       found.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
@@ -185,6 +188,21 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
   s.energy.keep();
+}
+
+void SolidMotion::guess(std::span<const double> places) {
+  state_->guess.assign(places.begin(), places.end());
+}
+
+void SolidMotion::set_tolerance(double tolerance, int max_rounds) {
+  state_->options.tolerance = tolerance;
+  state_->options.max_rounds = max_rounds;
+}
+
+void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
+  Numbers all(over_axes.begin(), over_axes.end());
+  state_->quick.solve(all, context);
+  std::ranges::copy(all, over_axes.begin());
 }
 
 void SolidMotion::find_reactions(const Context& context) {

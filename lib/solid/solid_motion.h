@@ -115,6 +115,13 @@ public:
   /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {});
+  /// The next step is sought from these places on, in place of where the motion leads. \pre 3 n
+  void guess(std::span<const double> places);
+  /// From now on, in place of the options'.
+  void set_tolerance(double tolerance, int max_rounds);
+  /// What forces on the 3 n axes move by the constant matrix of the last step, in frames as it left
+  /// them, to single precision, in place; 0 on held axes. \pre a step was taken, the quick way
+  void respond(std::span<double> over_axes, const Context& context);
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
 

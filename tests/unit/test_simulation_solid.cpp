@@ -5,7 +5,6 @@
 #include "base/vector_at.h"
 #include "larger.h"
 #include "scene/simulation.h"
-#include "scene/support.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
 #include "solid/solid_model.h"
@@ -426,22 +425,85 @@ TEST(SimulationSolid, RefusesWhatItCantMove) {
   EXPECT_NE(refusal(test::organ(1), damped()).find("has no tetrahedra"), std::string::npos);
 }
 
-/// Instruments can't push it yet: where one would, and only there, the step is refused.
-TEST(SimulationSolid, AnInstrumentThatWouldPushIsRefused) {
-  const auto s = scene(bar(), Method::ela, damped(), {.guard = true});
-  s->apply(SetGravity{{0, 0, -100}});
-  s->apply(SetInstrument{0, {2, {}, 0}, {{18, 4, 11}, {}}, "probe"});
-  s->step(0.01);
-  const Numbers before = shape(*s, 0);
-  s->apply(MoveInstrument{0, {18, 4, -10}, {}, 0}); // through it
-  try {
+/// How deep the deepest node is in a sphere.
+double depth(const Simulation& s, const Model& model, double radius) {
+  const Vec3 centre = s.instrument(0).pose.place;
+  double deepest = -HUGE_VAL;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    deepest = test::larger(
+        deepest, radius - norm(model.nodes[i].position + vector_at(s.displacement(0), i) - centre));
+  return deepest;
+}
+
+/// Pressed slowly a solid pushes back as the elastostatic one does; no node is in the instrument.
+TEST(SimulationSolid, AnInstrumentPressesAsStaticsSays) {
+  const Model model = bar();
+  const auto still = scene(model, Method::ffe, {}), moving = scene(model, Method::ela, damped());
+  for (Simulation* const s : {still.get(), moving.get()}) {
+    s->apply(SetInstrument{0, {4, {}, 0}, {{18, 4, 12.5}, {}}, "probe"});
     s->step(0.01);
-    ADD_FAILURE() << "it isn't refused";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.what(),
-              "object o " + std::string(gap(Way::solid_motion, Feature::touch)->text));
+    s->apply(MoveInstrument{0, {18, 4, 11.98}, {}, 0.1}); // 0.02 mm deep
+    for (int k = 0; k < 20; ++k) {
+      s->step(0.02);
+      EXPECT_LE(depth(*s, model, 4), 4 * 2e-4);
+    }
   }
-  EXPECT_EQ(shape(*s, 0), before);
+  settle(*moving);
+  EXPECT_LE(depth(*moving, model, 4), 4 * 2e-4);
+  const InstrumentReport a = still->instrument(0), b = moving->instrument(0);
+  EXPECT_GT(a.nodes, 0U);
+  EXPECT_GT(a.force.z, 10);
+  EXPECT_LE(norm(a.force - b.force), 0.03 * norm(a.force));
+  EXPECT_LE(difference(shape(*moving, 0), shape(*still, 0)), 0.03 * largest(shape(*still, 0)));
+  moving->apply(MoveInstrument{0, {18, 4, 40}, {}, 0});
+  settle(*moving);
+  EXPECT_EQ(moving->instrument(0).nodes, 0U);
+  EXPECT_LE(largest(shape(*moving, 0)), 1e-5);
+}
+
+/// Swept by a fast instrument, and by one that jumps, nodes are pushed along and not passed.
+TEST(SimulationSolid, NoInstrumentPassesIt) {
+  for (const double duration : {0.05, 0.0}) {
+    const Model model = bar();
+    const auto s = scene(model, Method::ela, damped());
+    s->apply(SetInstrument{0, {5, {0, 8, 0}, 0}, {{18, 0, 15}, {}}, "rod"});
+    s->step(0.01);
+    s->apply(MoveInstrument{0, {18, 0, 5}, {}, duration});
+    s->step(0.05);
+    s->step(0.05);
+    double lowest = HUGE_VAL;
+    for (const std::uint32_t node : end_of(model))
+      lowest = test::smaller(lowest, vector_at(s->displacement(0), node).z);
+    EXPECT_LT(lowest, -6) << duration; // the end is below it, where it would else be inside
+    EXPECT_GT(s->instrument(0).force.z, 100);
+  }
+}
+
+TEST(SimulationSolid, WhatInstrumentsDoIsTheSameOnAnyThreadsAndBehindAStepBack) {
+  const Model model = bar();
+  const auto run = [&](int threads, bool back) {
+    Context context;
+    context.threads = threads;
+    const auto s = scene(model, Method::ela, {}, {.guard = true}, context);
+    s->apply(SetInstrument{0, {4, {}, 0.4}, {{18, 4, 12.5}, {}}, "probe"});
+    s->apply(MoveInstrument{0, {17, 4.5, 11}, {}, 0.1});
+    s->step(0.05);
+    if (back) {
+      s->apply(SetForce{0, {1}, {0, 0, 1e300}});
+      EXPECT_THROW(s->step(0.02), Error);
+      s->apply(SetForce{0, {1}, {}});
+      (void)s->take_renewed();
+    } else {
+      s->apply(Renew{0});
+    }
+    s->step(0.05);
+    s->step(0.05);
+    EXPECT_GT(s->instrument(0).force.z, 10);
+    return shape(*s, 0);
+  };
+  const Numbers one = run(1, false);
+  EXPECT_EQ(one, run(2, false));
+  EXPECT_EQ(one, run(2, true));
 }
 
 } // namespace

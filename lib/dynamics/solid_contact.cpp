@@ -1,0 +1,237 @@
+#include "dynamics/solid_contact.h"
+
+#include "base/vector_at.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gewebe {
+
+namespace {
+
+constexpr double same_place = 1e-4;  ///< of the smallest radius
+constexpr double sure = 3e-4;        ///< tolerance of a step that instruments touch
+constexpr int rounds_of_a_step = 16; ///< so that it is reached
+constexpr int max_pushes = 40;
+
+} // namespace
+
+/// A step that gives way to forces of contact.
+class SolidContact::Object final : public Yielding {
+public:
+  Object(SolidContact& all, const Step& step, std::span<const NodeTouch> touches,
+         const Context& context)
+      : all_(all), step_(step), context_(context),
+        force_(sums_of_touches({touches.begin(), touches.end()})),
+        places_(step.engine.places().begin(), step.engine.places().end()),
+        speed_(step.engine.velocity().begin(), step.engine.velocity().end()),
+        velocity_(step.clearing ? std::vector<double>(speed_.size()) : speed_) {
+    double radius = HUGE_VAL;
+    for (const auto& i : step.instruments)
+      if (i)
+        radius = std::min(radius, i->shape.radius);
+    tolerance_ = same_place * radius;
+  }
+
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
+    if (!ran_)
+      run();
+    const std::size_t size = 3 * nodes.size(), axes = places_.size();
+    for (const std::uint32_t node : nodes) {
+      std::vector<double>& columns = all_.columns_[node];
+      if (!columns.empty())
+        continue;
+      columns.resize(3 * axes);
+      for (int a = 0; a < 3; ++a) {
+        const std::span<double> column =
+            std::span(columns).subspan(static_cast<std::size_t>(a) * axes, axes);
+        column[axis_of(node, a)] = 1;
+        step_.engine.respond(column, context_);
+      }
+    }
+    DelassusOperator delassus;
+    delassus.nodes.assign(nodes.begin(), nodes.end());
+    if (all_.learned_of_ != delassus.nodes) {
+      all_.learned_of_ = delassus.nodes;
+      all_.learned_.resize(size * size);
+      const auto entry = [&](std::size_t r, std::size_t c) {
+        return all_.columns_.at(
+            nodes[c / 3])[(c % 3) * axes + 3 * std::size_t{nodes[r / 3]} + r % 3];
+      };
+      for (std::size_t c = 0; c < size; ++c)
+        for (std::size_t r = c; r < size; ++r) // columns are of single precision
+          all_.learned_[c * size + r] = all_.learned_[r * size + c] =
+              (entry(r, c) + entry(c, r)) / 2;
+    }
+    delassus.compliance = all_.learned_;
+    nodes_ = delassus.nodes;
+    note();
+    for (const std::uint32_t node : nodes) {
+      const Vec3 u = vector_at(step_.engine.places(), node) - all_.model_.nodes[node].position;
+      delassus.free.insert(delassus.free.end(), {u.x, u.y, u.z});
+    }
+    for (const NodeTouch& t : force_) { // without these
+      const auto k =
+          static_cast<std::size_t>(std::ranges::lower_bound(nodes, t.node) - nodes.begin());
+      if (k == nodes.size() || nodes[k] != t.node)
+        continue;
+      for (std::size_t r = 0; r < size; ++r)
+        for (std::size_t a = 0; a < 3; ++a)
+          delassus.free[r] -=
+              delassus.compliance[(3 * k + a) * size + r] * t.force[static_cast<int>(a)];
+    }
+    return delassus;
+  }
+
+  bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) override {
+    force_.assign(touches.begin(), touches.end());
+    run();
+    double miss = 0;
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      const double error = norm(vector_at(step_.engine.places(), nodes_[k]) - at[k]);
+      miss = error <= miss ? miss : error;
+    }
+    learn();
+    const bool agreed = miss <= tolerance_;
+    if (agreed || ++pushes_ == max_pushes) {
+      exact_ = exact_ && agreed;
+      pushes_ = 0;
+      return true;
+    }
+    return false;
+  }
+
+  std::span<const double> shape() override {
+    const std::span<const double> places = step_.engine.places();
+    shape_.resize(places.size());
+    for (std::uint32_t i = 0; i < all_.model_.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        shape_[axis_of(i, a)] = places[axis_of(i, a)] - all_.model_.nodes[i].position[a];
+    return shape_;
+  }
+
+  /// Behind all: a cleared body goes on as it moved.
+  void end() const {
+    if (ran_ && step_.clearing)
+      step_.engine.restore(
+          std::vector<double>(step_.engine.places().begin(), step_.engine.places().end()), speed_,
+          context_);
+  }
+  bool exact() const { return exact_; }
+  const SolidStep& took() const { return took_; }
+
+private:
+  /// The forces on the touched nodes, and where these stand: 3 for each.
+  std::vector<double> forces_now() const {
+    std::vector<double> all(3 * nodes_.size());
+    for (const NodeTouch& t : force_)
+      if (const auto at = std::ranges::lower_bound(nodes_, t.node);
+          at != nodes_.end() && *at == t.node)
+        for (int a = 0; a < 3; ++a)
+          all[axis_of(static_cast<std::uint32_t>(at - nodes_.begin()), a)] += t.force[a];
+    return all;
+  }
+  std::vector<double> places_now() const {
+    std::vector<double> all;
+    for (const std::uint32_t node : nodes_)
+      for (int a = 0; a < 3; ++a)
+        all.push_back(step_.engine.places()[axis_of(node, a)]);
+    return all;
+  }
+  void note() {
+    noted_force_ = forces_now();
+    noted_place_ = places_now();
+  }
+  /// What the last forces have moved corrects W: the update of BFGS, with forces for places.
+  void learn() {
+    std::vector<double> s = forces_now(), y = places_now();
+    if (s.size() != noted_force_.size())
+      return;
+    double curvature = 0, own = 0;
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      s[k] -= noted_force_[k];
+      y[k] -= noted_place_[k];
+      curvature += s[k] * y[k];
+    }
+    const std::size_t size = s.size();
+    std::vector<double>& w = all_.learned_;
+    std::vector<double> ws(size);
+    for (std::size_t c = 0; c < size; ++c)
+      for (std::size_t r = 0; r < size; ++r)
+        ws[r] += w[c * size + r] * s[c];
+    for (std::size_t k = 0; k < size; ++k)
+      own += s[k] * ws[k];
+    if (!(curvature > 1e-3 * own) || !(own > 0)) // rounding, or nothing that W can know
+      return;
+    for (std::size_t c = 0; c < size; ++c)
+      for (std::size_t r = 0; r < size; ++r)
+        w[c * size + r] += y[c] * y[r] / curvature - ws[c] * ws[r] / own;
+  }
+  void run() {
+    SolidMotion& engine = step_.engine;
+    const std::vector<double> end(engine.places().begin(), engine.places().end());
+    if (ran_ || step_.clearing)
+      engine.restore(places_, velocity_, context_);
+    if (ran_) // once more, from where it led
+      engine.guess(end);
+    std::vector<double> forces(step_.forces.begin(), step_.forces.end());
+    for (const NodeTouch& t : force_)
+      for (int a = 0; a < 3; ++a)
+        forces[axis_of(t.node, a)] += t.force[a];
+    engine.set_load(forces);
+    if (!step_.target.empty())
+      engine.move_held(step_.target);
+    const bool pushed = !force_.empty() || ran_;
+    engine.set_tolerance(pushed ? std::min(sure, step_.options.tolerance) : step_.options.tolerance,
+                         pushed ? std::max(rounds_of_a_step, step_.options.max_rounds)
+                                : step_.options.max_rounds);
+    const SolidStep took = engine.step(step_.h, context_);
+    ran_ = true;
+    took_.rounds += took.rounds;
+    took_.factorisations += took.factorisations;
+    took_.change = took.change;
+    took_.limited = took.limited;
+    if (took.factorisations > 0)
+      all_.renew();
+  }
+
+  SolidContact& all_;
+  const Step& step_;
+  const Context& context_;
+  std::vector<NodeTouch> force_;
+  std::vector<double> places_, speed_, velocity_; ///< where it begins, and how it moves there
+  std::vector<double> shape_;                     ///< the last one
+  std::vector<std::uint32_t> nodes_;
+  double tolerance_ = 0;
+  int pushes_ = 0;
+  std::vector<double> noted_force_, noted_place_;
+  bool ran_ = false, exact_ = true;
+  SolidStep took_;
+};
+
+SolidContact::SolidContact(const Model& model)
+    : model_(model), contact_(model, std::vector<double>(3 * model.nodes.size())) {}
+
+SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>& touches,
+                                        const Context& context) {
+  std::erase_if(touches, [&](const NodeTouch& t) {
+    return t.instrument >= step.instruments.size() || !step.instruments[t.instrument] ||
+           step.displaced.contains(t.node);
+  });
+  std::erase_if(columns_, [&](const auto& of) {
+    return std::ranges::none_of(touches, [&](const NodeTouch& t) { return t.node == of.first; });
+  });
+  std::vector<double> shape;
+  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      shape.push_back(step.engine.places()[axis_of(i, a)] - model_.nodes[i].position[a]);
+  contact_.restart(shape, touches);
+  Object object(*this, step, touches, context);
+  contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
+  object.end();
+  step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);
+  touches = contact_.touches();
+  return {object.took(), object.exact() && contact_.solved()};
+}
+
+} // namespace gewebe

@@ -1,0 +1,66 @@
+#pragma once
+// Instruments in a step of a solid that moves (solid/solid_motion.h).
+//
+// As in dynamics/implicit_contact.h: in turn the step under the last forces λ of the instruments;
+// W = H A⁻¹ Hᵀ of the touched nodes, with the constant matrix A of the step, in frames that turn
+// with the nodes; λ for where W puts them (statics/static_contact.h); the step under these, until
+// its nodes stand where W put them, within 1e-4 of the smallest radius. A is not the tangent,
+// where tissue is pressed in deeply by far, so W is corrected by what each round's forces have
+// moved (the update of BFGS: Nocedal, Wright, Numerical optimization, 2006, 6.1), and each round
+// starts from the last one's end. Nothing of a step's velocity into an instrument is left at its
+// end, and friction acts against the slip over the step.
+
+#include "base/context.h"
+#include "dynamics/dynamic_contact.h"
+#include "model/model.h"
+#include "solid/solid_motion.h"
+#include "statics/static_contact.h"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class SolidContact {
+public:
+  /// Keeps a reference to the model.
+  explicit SolidContact(const Model& model);
+
+  struct Step {
+    SolidMotion& engine;                            ///< where the step begins
+    std::span<const double> forces;                 ///< on the 3 n axes, without instruments
+    std::span<const double> target;                 ///< of held axes; empty: they stay
+    const std::map<std::uint32_t, Vec3>& displaced; ///< nodes whose axes are all held
+    std::span<const std::optional<MovedInstrument>> instruments; ///< during the step
+    double h = 0;
+    SolidMotionOptions options; ///< of the engine
+    bool clearing = false;      ///< only what is in the way moves, from rest, and keeps its speed
+  };
+  struct Result {
+    SolidStep took; ///< of all rounds
+    bool exact = true;
+  };
+  /// Takes the engine on by a step; one that clears, where something is in the way. \param touches
+  /// forces of the last step, then of this one \throw as SolidMotion::step
+  Result step(const Step& step, std::vector<NodeTouch>& touches, const Context& context);
+  /// Forgets the columns of A⁻¹, which serve for some steps.
+  void renew() {
+    columns_.clear();
+    learned_of_.clear();
+  }
+
+private:
+  class Object;
+
+  const Model& model_;
+  StaticContact contact_;
+  /// By node three columns of A⁻¹, 3 n numbers each.
+  std::map<std::uint32_t, std::vector<double>> columns_;
+  std::vector<std::uint32_t> learned_of_; ///< nodes
+  std::vector<double> learned_;           ///< their W, as rounds have corrected it
+};
+
+} // namespace gewebe
