@@ -88,7 +88,7 @@ test_programs_load_only_what_they_use() {
     case $tool in
       metaball2vol | csg) uses=' openvdb ' ;;
       voxelize | mc-opt) uses=' openvdb assimp ' ;;
-      exp2ela) uses=' assimp ' ;;
+      exp2ela) uses=' assimp cholmod ' ;; # --fit solves
       ffe-precompute | ffe-run) uses=' hdf5_serial cholmod ' ;;
       emboss-render) uses=' assimp hdf5_serial epoxy png ' ;;
       *) fail "what may $tool load?" ;;

@@ -249,19 +249,6 @@ TEST(SolidScene, IsWhatTheFactorSays) {
   EXPECT_NEAR(forces[0].value.z, 500, 1e-7);
 }
 
-TEST(SolidScene, RefusesMotionByName) {
-  Simulation scene(Context{}, {});
-  try {
-    scene.add_object("o", box_model(), Method::ela, {});
-    scene.apply(SetForce{0, {0}, {0, 0, 1}});
-    scene.step(0.01);
-    ADD_FAILURE() << "it moves";
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "object o holds tetrahedra, whose motion is not simulated, expected ffe");
-  }
-}
-
 TEST(SolidCondition, NamesThePartThatFloats) {
   Model model = box_model();
   const auto offset = static_cast<std::uint32_t>(model.nodes.size());
