@@ -1,5 +1,6 @@
 #include "solid/solid_place.h"
 
+#include "mesh/nearest_point.h"
 #include "solid/assembly_internal.h"
 
 #include <algorithm>
@@ -10,32 +11,6 @@ namespace gewebe {
 namespace {
 
 using Barycentric = std::array<double, 4>;
-
-/// The point of a triangle nearest to p, by its corners' weights (Ericson, Real-time collision
-/// detection, 2005, 5.1.5).
-std::array<double, 3> nearest_of_triangle(const Vec3& p, const Vec3& a, const Vec3& b,
-                                          const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a;
-  const double d1 = dot(ab, p - a), d2 = dot(ac, p - a), d3 = dot(ab, p - b), d4 = dot(ac, p - b),
-               d5 = dot(ab, p - c), d6 = dot(ac, p - c);
-  if (d1 <= 0 && d2 <= 0)
-    return {1, 0, 0};
-  if (d3 >= 0 && d4 <= d3)
-    return {0, 1, 0};
-  if (d6 >= 0 && d5 <= d6)
-    return {0, 0, 1};
-  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0)
-    return {d3 / (d3 - d1), d1 / (d1 - d3), 0};
-  if (vb <= 0 && d2 >= 0 && d6 <= 0)
-    return {d6 / (d6 - d2), 0, d2 / (d2 - d6)};
-  if (va <= 0 && d4 >= d3 && d5 >= d6) {
-    const double s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - s, s};
-  }
-  const double sum = va + vb + vc;
-  return {va / sum, vb / sum, vc / sum};
-}
 
 struct Nearest {
   double distance = HUGE_VAL;
@@ -66,14 +41,13 @@ Nearest nearest_of(const TetMesh& mesh, std::size_t t, const Vec3& place) {
   }
   for (std::size_t k = 0; k < 4; ++k) {
     const auto& face = tetrahedron_faces[k];
-    const auto w = nearest_of_triangle(place, corner[face[0]], corner[face[1]], corner[face[2]]);
-    const Vec3 there = w[0] * corner[face[0]] + w[1] * corner[face[1]] + w[2] * corner[face[2]];
+    const Vec3 there =
+        nearest_on_triangle(place, corner[face[0]], corner[face[1]], corner[face[2]]).point;
     const double distance = norm(place - there);
     if (distance < found.distance) {
       found.distance = distance;
-      found.at = {};
-      for (std::size_t c = 0; c < 3; ++c)
-        found.at[face[c]] = w[c];
+      for (std::size_t c = 0; c < 4; ++c)
+        found.at[c] = c == k ? 0 : dot(found.gradient[c], there - corner[tetrahedron_faces[c][0]]);
     }
   }
   return found;
