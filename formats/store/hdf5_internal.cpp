@@ -467,6 +467,12 @@ void require_stored(hid_t dataset, std::uint64_t bytes, const Object& where) {
 
 } // namespace
 
+bool Group::holds(const std::string& name, Number type) const {
+  const Handle handle(has(name) ? H5Dopen2(handle_.id(), name.c_str(), H5P_DEFAULT) : -1);
+  const Handle found(handle.id() < 0 ? -1 : H5Dget_type(handle.id()));
+  return found.id() >= 0 && is_type(found.id(), type);
+}
+
 Dataset Group::dataset(const std::string& name, Number type) const {
   Handle handle(has(name) ? H5Dopen2(handle_.id(), name.c_str(), H5P_DEFAULT) : -1);
   if (handle.id() < 0)

@@ -198,6 +198,8 @@ public:
   /// Of 0 rows; `row_shape` is the shape of one row, `rows_per_chunk` how many are kept together.
   Dataset create_growing(const std::string& name, Number type, const Shape& row_shape,
                          std::uint64_t rows_per_chunk = 1);
+  /// Whether there is a dataset of this name and type.
+  bool holds(const std::string& name, Number type) const;
   /// \throw Error too if it isn't of `type`, or its size exceeds what the file holds: every number
   /// of it stands in the file
   Dataset dataset(const std::string& name, Number type) const;

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace gewebe {
 
@@ -32,6 +33,17 @@ template <class T>
 std::vector<T> read_checked(const hdf5::Group& group, const std::string& name) {
   const hdf5::Dataset from = group.dataset(name, hdf5::number_of<T>());
   return read_checked<T>(group, name, from.rows());
+}
+
+/// Numbers of rows and places, of 32 bits or of 64. \param count how many; nothing: as there are
+std::vector<std::int64_t> read_places(const hdf5::Group& group, const std::string& name,
+                                      std::optional<std::uint64_t> count = {}) {
+  if (!group.holds(name, hdf5::Number::uint32))
+    return count ? read_checked<std::int64_t>(group, name, *count)
+                 : read_checked<std::int64_t>(group, name);
+  const std::vector<std::uint32_t> narrow = count ? read_checked<std::uint32_t>(group, name, *count)
+                                                  : read_checked<std::uint32_t>(group, name);
+  return {narrow.begin(), narrow.end()};
 }
 
 void require(const hdf5::Object& where, bool good, const char* what) {
@@ -248,9 +260,9 @@ StiffnessSizes StiffnessStore::sizes(const StiffnessFacts& facts) const {
 StiffnessMatrix StiffnessStore::matrix(const StiffnessFacts& facts) const {
   const hdf5::Group group = group_of(state_->file.root(), facts.group).group("K");
   StiffnessMatrix matrix;
-  matrix.axis_of_row = read_checked<std::int64_t>(group, "axis", facts.order);
-  matrix.column_start = read_checked<std::int64_t>(group, "p", facts.order + 1);
-  matrix.row = read_checked<std::int64_t>(group, "i");
+  matrix.axis_of_row = read_places(group, "axis", facts.order);
+  matrix.column_start = read_places(group, "p", facts.order + 1);
+  matrix.row = read_places(group, "i");
   matrix.value = read_checked<double>(group, "x", matrix.row.size());
   check_matrix(group, matrix);
   matrix.row_of_axis.assign(3 * facts.nodes, -1);
@@ -270,12 +282,12 @@ Factor StiffnessStore::factor(const StiffnessFacts& facts) const {
   data.order = static_cast<std::int64_t>(facts.order);
   data.max_column_size = group.number<std::int64_t>("maxcsize");
   data.max_row_size = group.number<std::int64_t>("maxesize");
-  data.permutation = read_checked<std::int64_t>(group, "Perm", facts.order);
-  data.column_count = read_checked<std::int64_t>(group, "ColCount", facts.order);
-  data.super = read_checked<std::int64_t>(group, "super");
-  data.pi = read_checked<std::int64_t>(group, "pi", data.super.size());
-  data.px = read_checked<std::int64_t>(group, "px", data.super.size());
-  data.s = read_checked<std::int64_t>(group, "s");
+  data.permutation = read_places(group, "Perm", facts.order);
+  data.column_count = read_places(group, "ColCount", facts.order);
+  data.super = read_places(group, "super");
+  data.pi = read_places(group, "pi", data.super.size());
+  data.px = read_places(group, "px", data.super.size());
+  data.s = read_places(group, "s");
   data.x = read_checked<double>(group, "x");
   return at(path(), [&] { return Factor(std::move(data)); });
 }

@@ -31,11 +31,22 @@ void write_checked(hdf5::Group& group, const std::string& name, std::span<const 
   write_checked(group, name, values, {values.size()});
 }
 
+/// Numbers of rows and places, none below 0: in 32 bits where they fit, as nearly always.
+void write_places(hdf5::Group& group, const std::string& name,
+                  std::span<const std::int64_t> values) {
+  if (std::ranges::any_of(values, [](std::int64_t v) { return v > UINT32_MAX; }))
+    return write_checked<std::int64_t>(group, name, values);
+  std::vector<std::uint32_t> narrow(values.size());
+  std::ranges::transform(values, narrow.begin(),
+                         [](std::int64_t v) { return static_cast<std::uint32_t>(v); });
+  write_checked<std::uint32_t>(group, name, narrow);
+}
+
 void write_matrix(hdf5::Group& object, const StiffnessMatrix& matrix) {
   hdf5::Group group = object.create_group("K");
-  write_checked<std::int64_t>(group, "axis", matrix.axis_of_row);
-  write_checked<std::int64_t>(group, "p", matrix.column_start);
-  write_checked<std::int64_t>(group, "i", matrix.row);
+  write_places(group, "axis", matrix.axis_of_row);
+  write_places(group, "p", matrix.column_start);
+  write_places(group, "i", matrix.row);
   write_checked<double>(group, "x", matrix.value);
 }
 
@@ -43,12 +54,12 @@ void write_factor(hdf5::Group& object, const FactorView& l) {
   hdf5::Group group = object.create_group("L");
   group.set("maxcsize", l.max_column_size);
   group.set("maxesize", l.max_row_size);
-  write_checked(group, "Perm", l.permutation);
-  write_checked(group, "ColCount", l.column_count);
-  write_checked(group, "super", l.super);
-  write_checked(group, "pi", l.pi);
-  write_checked(group, "px", l.px);
-  write_checked(group, "s", l.s);
+  write_places(group, "Perm", l.permutation);
+  write_places(group, "ColCount", l.column_count);
+  write_places(group, "super", l.super);
+  write_places(group, "pi", l.pi);
+  write_places(group, "px", l.px);
+  write_places(group, "s", l.s);
   write_checked(group, "x", l.x);
 }
 

@@ -41,6 +41,46 @@ PYTHON
   rm read.py cube.ela cube.h5
 }
 
+test_lists_of_64_bits_are_read_as_well() {
+  local python
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  held_cube
+  ffe-precompute --columns all cube.ela -o cube.h5
+  cp cube.h5 wide.h5
+  cat >widen.py <<'PYTHON'
+import h5py, numpy
+
+def crc32c(data):
+    value = 0xFFFFFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ 0x82F63B78 * (value & 1)
+    return value ^ 0xFFFFFFFF
+
+with h5py.File("wide.h5", "r+") as file:
+    for group, names in (("cube/K", "p i axis"), ("cube/L", "Perm ColCount super pi px s")):
+        for name in names.split():
+            old = file[group][name]
+            assert old.dtype == numpy.uint32
+            assert old.attrs["crc32c"] == crc32c(old[:].tobytes())
+            wide = old[:].astype("<i8")
+            del file[group][name]
+            file[group][name] = wide
+            file[group][name].attrs["crc32c"] = numpy.uint32(crc32c(wide.tobytes()))
+PYTHON
+  "$python" widen.py || fail 'lists can not be widened'
+  (($(stat -c %s wide.h5) > $(stat -c %s cube.h5))) || fail 'nothing is wider'
+  local store
+  for store in cube wide; do
+    printf 'object c cube.ela store=%s.h5\nforce c 5 1 2 3\ngravity 0 0 -9810\nstep 1\n' $store >"$store.scene"
+    ffe-run "$store.scene" -o "$store.csv"
+  done
+  [[ -s cube.csv ]] || fail 'no answer'
+  cmp cube.csv wide.csv
+  ffe-precompute --info wide.h5 >/dev/null
+}
+
 # Names that stand in stores of every kind, as h5dump lists them, and names that stand on the page are the same.
 test_the_page_names_what_stands_in_a_store() {
   has h5dump || skip 'no h5dump'

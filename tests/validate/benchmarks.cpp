@@ -104,7 +104,8 @@ void cooks_reference(Section& section) {
 void plate(Section& section) {
   const double expected = test::le10_stress;
   Plot plot{"le10.svg", "NAFEMS LE10", "seconds of one processor", "error of stress yy at D", {}};
-  Curve ours{"Gewebe, quadratic", {}}, linear{"Gewebe, linear", {}};
+  Curve ours{"Gewebe, quadratic", {}}, linear{"Gewebe, linear", {}},
+      peer{"scikit-fem, plain quadratic", {}};
   for (const auto [radial, around, through] :
        {Size{3, 4, 1}, Size{6, 8, 1}, Size{8, 10, 2}, Size{12, 16, 2}}) {
     const auto [stress, cost] = figure_of(test::le10(radial, around, through, true));
@@ -124,7 +125,17 @@ void plate(Section& section) {
     const auto [stress, cost] = figure_of(test::le10(radial, around, through, false));
     linear.points.push_back({cost.total() / 1000, std::abs(stress / expected - 1)});
   }
+  for (const auto [radial, around, through] :
+       {Size{3, 4, 1}, Size{6, 8, 1}, Size{8, 10, 2}, Size{12, 16, 2}}) {
+    const test::SolidCase c = test::le10(radial, around, through, true);
+    PeerWish wish{nullptr, c.solid.node_at({2, 0, 0.6})};
+    if (const auto answer = solve_by_peer(c, PeerElement::plain, &wish))
+      peer.points.push_back(
+          {answer->cost.total() / 1000, std::abs(wish.stress[3] / 1e6 / expected - 1)});
+  }
   plot.curves = {ours, linear};
+  if (!peer.points.empty())
+    plot.curves.push_back(peer);
   section.plots.push_back(plot);
 }
 

@@ -84,6 +84,7 @@ Figure figure_of(const test::SolidCase& c);
 Section constant_strain();
 Section manufactured();
 Section benchmarks();
+Section hertz();
 Section peers();
 Section silicone();
 Section organs();

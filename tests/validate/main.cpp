@@ -19,9 +19,10 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 6> all{{{"patch", constant_strain},
+  const std::array<std::pair<std::string, Section (*)()>, 7> all{{{"patch", constant_strain},
                                                                   {"order", manufactured},
                                                                   {"benchmarks", benchmarks},
+                                                                  {"contact", hertz},
                                                                   {"peers", peers},
                                                                   {"beam", silicone},
                                                                   {"organs", organs}}};

@@ -185,8 +185,7 @@ void write_page(const std::string& folder, const std::vector<Section>& sections)
           "benchmarks with known answers, against another program and against an experiment. Each "
           "line has its bound, and the command fails where one is not kept. Times are the "
           "processor's on one thread: assembly, factor and solution; memory is that of the numbers "
-          "of the factor. Curves compare what an error costs. Contact (Hertz) is not among it "
-          "yet.\n";
+          "of the factor. Curves compare what an error costs.\n";
   for (const Section& section : sections) {
     page << "\n## " << section.title << "\n\n" << section.text << "\n";
     if (!section.checks.empty())

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Solves a solid of tetrahedra by scikit-fem, on one thread, and by CHOLMOD where scikit-sparse has it.
 
-Usage: peer_skfem.py FOLDER linear|plain|mixed [matrix]
+Usage: peer_skfem.py FOLDER linear|plain|mixed [matrix] [stress NODE]
 
 FOLDER holds the case as raw arrays (tests/validate/peers.cpp writes them) and takes the answer, u.f64; with `matrix` also K on
-all axes, its lower triangle by columns: column_start.i64, row.i64, value.f64. Prints unknowns, ms of the processor for assembly,
+all axes, its lower triangle by columns: column_start.i64, row.i64, value.f64; with `stress` also stress.f64, xx xy xz yy yz zz at a
+corner: the mean of its elements, each by its own displacements there. Prints unknowns, ms of the processor for assembly,
 factor and solve, and 1 if the factor is CHOLMOD's. Elements: linear; plain quadratic; quadratic with a bubble and discontinuous
 linear pressure, pressure and bubble condensed (lib/solid/element.h), built here from their weak form.
 """
@@ -169,4 +170,18 @@ if "matrix" in sys.argv[3:]:
     lower.indptr.astype(np.int64).tofile(f"{folder}/column_start.i64")
     lower.indices.astype(np.int64).tofile(f"{folder}/row.i64")
     lower.data.tofile(f"{folder}/value.f64")
+if "stress" in sys.argv[3:]:
+    corner = number[int(sys.argv[sys.argv.index("stress") + 1])]
+    local = np.zeros(basis.N)
+    local[:] = u[ours]
+    at_corners = np.array([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
+    with_corners = Basis(mesh, basis.elem, quadrature=(at_corners, np.full(4, 1 / 24)))
+    grad = np.asarray(with_corners.interpolate(local).grad)  # axis, derivative, element, corner
+    of_corner = np.argwhere(mesh.t.T == corner)
+    stresses = []
+    for t, k in of_corner:
+        strain = (grad[:, :, t, k] + grad[:, :, t, k].T) / 2
+        stresses.append(lame[t, 0] * np.trace(strain) * np.eye(3) + 2 * lame[t, 1] * strain)
+    stress = np.mean(stresses, axis=0)
+    stress[np.triu_indices(3)].tofile(f"{folder}/stress.f64")
 print(free.size, *(1e3 * t for t in (assembled - started, factored - factoring, solved - factored)), int(cholesky is not None))

@@ -4,6 +4,7 @@
 #include "tests/unit/larger.h"
 #include "tests/unit/relative_difference.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -81,8 +82,7 @@ std::string peer_name() {
   return name;
 }
 
-std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement element,
-                                    PeerMatrix* matrix) {
+std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement element, PeerWish* wish) {
   if (peer_name().empty())
     return {};
   const Folder folder;
@@ -108,9 +108,12 @@ std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement elemen
   const char* const word = element == PeerElement::linear  ? " linear"
                            : element == PeerElement::plain ? " plain"
                                                            : " mixed";
-  const std::vector<double> numbers =
-      timing::numbers_of_script(std::string(script) + " " + folder.path.string() + word +
-                                (matrix != nullptr ? " matrix" : ""));
+  std::string command = std::string(script) + " " + folder.path.string() + word;
+  if (wish != nullptr && wish->matrix != nullptr)
+    command += " matrix";
+  if (wish != nullptr && wish->node)
+    command += " stress " + std::to_string(*wish->node);
+  const std::vector<double> numbers = timing::numbers_of_script(command);
   if (numbers.size() != 5 || numbers[0] != static_cast<double>(c.solid.unknowns()))
     throw Error("the peer gave no answer: run " + std::string(script) + " by hand");
   Answer answer;
@@ -118,9 +121,15 @@ std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement elemen
   if (answer.u.size() != c.load.size())
     throw Error("the peer gave displacements of other nodes");
   answer.cost = {c.solid.unknowns(), numbers[1], numbers[2], numbers[3], 0};
-  if (matrix != nullptr)
-    *matrix = {read<std::int64_t>(folder, "column_start.i64"),
-               read<std::int64_t>(folder, "row.i64"), read<double>(folder, "value.f64")};
+  if (wish != nullptr && wish->matrix != nullptr)
+    *wish->matrix = {read<std::int64_t>(folder, "column_start.i64"),
+                     read<std::int64_t>(folder, "row.i64"), read<double>(folder, "value.f64")};
+  if (wish != nullptr && wish->node) {
+    const std::vector<double> stress = read<double>(folder, "stress.f64");
+    if (stress.size() != wish->stress.size())
+      throw Error("the peer gave no stress");
+    std::ranges::copy(stress, wish->stress.begin());
+  }
   return answer;
 }
 
@@ -207,7 +216,8 @@ void compare(Section& section, PeerElement element, const std::string& name) {
       traction_load(c.solid.mesh, faces,
                     c.solid.triangles(faces, [](const Vec3& p) { return p.x == 2; }), {3, -5, 7});
   PeerMatrix matrix;
-  const auto theirs = solve_by_peer(c, element, &matrix);
+  PeerWish wish{&matrix};
+  const auto theirs = solve_by_peer(c, element, &wish);
   Check check{"K, " + name, source, "the same", "", 0, 1e-10, {}, {}};
   if (element == PeerElement::plain) {
     check.error = difference(plain_stiffness(c.solid), matrix);

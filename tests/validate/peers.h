@@ -3,6 +3,7 @@
 
 #include "tests/validate/checks.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -22,9 +23,16 @@ struct PeerMatrix {
   std::vector<double> value; ///< of all axes, the lower triangle by columns
 };
 
+/// What it can tell beside displacements.
+struct PeerWish {
+  PeerMatrix* matrix = nullptr;      ///< filled where there is one
+  std::optional<std::size_t> node{}; ///< a corner, whose stress is wanted
+  std::array<double, 6> stress{};    ///< there: xx xy xz yy yz zz, the mean of its elements
+};
+
 /// Nothing where there is no scikit-fem. \throw Error if it is there and gives no answer
 std::optional<Answer> solve_by_peer(const test::SolidCase& c, PeerElement element,
-                                    PeerMatrix* matrix = nullptr);
+                                    PeerWish* wish = nullptr);
 std::optional<Figure> figure_by_peer(const test::SolidCase& c, PeerElement element);
 
 /// Why a check is skipped without it.
