@@ -190,6 +190,7 @@ private:
     took_.rounds += took.rounds;
     took_.factorisations += took.factorisations;
     took_.change = took.change;
+    took_.left = took.left;
     took_.limited = took.limited;
     if (took.factorisations > 0)
       all_.renew();

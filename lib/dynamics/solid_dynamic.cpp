@@ -287,7 +287,7 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
     const SolidStep took = push(forces, target, h, from, to, first, context);
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
     counts_.factors += static_cast<std::uint64_t>(took.factorisations);
-    counts_.unfinished += took.change <= options_.tolerance ? 0 : 1;
+    counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
     counts_.limited += took.limited ? 1 : 0;
   }
   double moved = 0, largest = 0;
@@ -350,6 +350,7 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     all.rounds += result.took.rounds;
     all.factorisations += result.took.factorisations;
     all.change = result.took.change;
+    all.left = result.took.left;
     all.limited = result.took.limited;
     exact = clearing || result.exact;
   };

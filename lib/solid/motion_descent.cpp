@@ -3,6 +3,8 @@
 #include "base/error.h"
 #include "solid/secants_internal.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -19,13 +21,22 @@ struct Way {
   std::function<bool(double change, double before)> stale;
   std::function<void(const Numbers& at)> renew; ///< the matrix is that of the last evaluation
   std::function<void(Numbers&)> solve;
+  std::function<void(Numbers&)> into, out; ///< of the frames that solve() and secants are in
+  Secants& secants;
+  double& rate; ///< of changes, that of a second round over the first one's
 };
 
-double distance(const Numbers& a, const Numbers& b) {
-  double sum = 0;
-  for (std::size_t axis = 0; axis < a.size(); ++axis)
-    sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
-  return std::sqrt(sum);
+// What a round's change is expected to leave is its part of this many, or of as many as rounds
+// before left: never less than `least`, which a lucky round is no reason for.
+constexpr double least_first = 0.2, least_later = 0.3, doubt = 1.25;
+
+double distance(const Numbers& a, const Numbers& b, const Context& context) {
+  const auto sum = sums_of_axes<1>(
+      context, a.size(), [&](std::size_t begin, std::size_t end, std::array<double, 1>& sums) {
+        for (std::size_t axis = begin; axis < end; ++axis)
+          sums[0] += (a[axis] - b[axis]) * (a[axis] - b[axis]);
+      });
+  return std::sqrt(sum[0]);
 }
 
 /// The first of the points along the direction, from the whole of it on by halves, whose value is
@@ -33,9 +44,12 @@ double distance(const Numbers& a, const Numbers& b) {
 double search(const MotionObjective& o, const MotionPoint& now, const Numbers& direction,
               double slope, MotionPoint& next, const Context& context) {
   double s = 1;
+  next.at.resize(now.at.size());
   while (s > 1e-14 && slope > 0) {
-    next.at = now.at;
-    add(next.at, -s, direction);
+    parallel_blocks(context, now.at.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t axis = begin; axis < end; ++axis)
+        next.at[axis] = now.at[axis] - s * direction[axis];
+    });
     o.evaluate(next, context);
     if (next.value <= now.value - 1e-4 * s * slope + now.unsure)
       return s;
@@ -44,12 +58,39 @@ double search(const MotionObjective& o, const MotionPoint& now, const Numbers& d
   return 0;
 }
 
+/// What a round learned, into the secants.
+void learn(const MotionPoint& from, const MotionPoint& to, const Way& way, const Context& context) {
+  Numbers moved = to.at, turned = to.gradient;
+  parallel_blocks(context, moved.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t axis = begin; axis < end; ++axis) {
+      moved[axis] -= from.at[axis];
+      turned[axis] -= from.gradient[axis];
+    }
+  });
+  way.into(moved);
+  way.into(turned);
+  way.secants.add(moved, turned, context);
+}
+
+/// What a round that was taken leaves, by what the one before it, or steps before, left.
+void expect(const Way& way, SolidStep& step, double before) {
+  const double measured = before < HUGE_VAL ? step.change / before : HUGE_VAL;
+  if (step.rounds == 1) {
+    step.left = step.change * std::clamp(way.rate, least_first, 1.0);
+    way.rate = std::min(1.0, std::max(way.rate, least_first) * doubt);
+    return;
+  }
+  if (step.rounds == 2)
+    way.rate = measured;
+  step.left = step.change * std::clamp(measured, least_later, 1.0);
+}
+
 void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidStep& step,
              const Context& context) {
   // Rounding of places, which no round gets below.
   const double rounding = 1e-15 * std::sqrt(product(o.body().rest, o.body().rest));
-  Secants secants;
   MotionPoint next;
+  Numbers direction;
   double before = HUGE_VAL;
   bool stuck = true, fresh = false; // the matrix is of here
   while (step.rounds < way.most) {
@@ -57,18 +98,19 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
       throw Cancelled();
     if (stuck || way.stale(step.change, before)) {
       way.renew(now.at);
-      secants.clear();
       fresh = true;
       stuck = false;
     }
     before = step.change;
-    Numbers direction = now.gradient;
-    secants.direction(direction, way.solve);
+    direction = now.gradient;
+    way.into(direction);
+    way.secants.direction(direction, way.solve, context);
+    way.out(direction);
     ++step.rounds;
     const double slope = product(now.gradient, direction),
                  length = std::sqrt(product(direction, direction));
     if (!(length > rounding)) {
-      step.change = 0;
+      step.change = step.left = 0;
       return;
     }
     const double s = search(o, now, direction, slope, next, context);
@@ -81,13 +123,13 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
       continue;
     }
     fresh = false;
-    step.change = s * length / distance(next.at, o.state().place);
-    Numbers taken = next.at, turned = next.gradient;
-    add(taken, -1, now.at);
-    add(turned, -1, now.gradient);
-    secants.add(std::move(taken), std::move(turned));
+    step.change = s * length / distance(next.at, o.state().place, context);
+    if (s < 1)
+      way.secants.forget_earlier();
+    learn(now, next, way, context);
     std::swap(now, next);
-    if (s == 1 && step.change <= way.tolerance)
+    expect(way, step, before);
+    if (s == 1 && step.left <= way.tolerance)
       return;
   }
 }
@@ -96,20 +138,45 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
 
 void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQuick& quick,
                      const SolidMotionOptions& options, SolidStep& step, const Context& context) {
-  const Way way{options.tolerance, options.max_rounds, [](double, double) { return false; },
-                [&](const Numbers&) { quick.turn(objective.energy(), context); },
-                [&](Numbers& v) { quick.solve(v, context); }};
+  bool first = true;
+  const auto turn = [&](const Numbers&) {
+    quick.turn(objective.energy(), context);
+    if (!std::exchange(first, false))
+      quick.forget();
+  };
+  double rate = quick.rate();
+  quick.secants().begin_step();
+  const Way way{options.tolerance,
+                options.max_rounds,
+                [](double, double) { return false; },
+                turn,
+                [&](Numbers& v) { quick.solve(v, context); },
+                [&](Numbers& v) { quick.into_frames(v, context); },
+                [&](Numbers& v) { quick.out_of_frames(v, context); },
+                quick.secants(),
+                rate};
   descend(objective, now, way, step, context);
+  quick.set_rate(rate);
 }
 
 void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                           MotionTangent& tangent, SolidStep& step, const Context& context) {
-  const Way way{1e-10, 200, [](double change, double before) { return change > 0.25 * before; },
+  Secants secants;
+  double rate = 1;
+  const auto stay = [](Numbers&) {};
+  const Way way{3e-11,
+                200,
+                [](double change, double before) { return change > 0.25 * before; },
                 [&](const Numbers& at) {
                   tangent.make(objective, at, context);
+                  secants.clear();
                   ++step.factorisations;
                 },
-                [&](Numbers& v) { tangent.solve(v); }};
+                [&](Numbers& v) { tangent.solve(v); },
+                stay,
+                stay,
+                secants,
+                rate};
   descend(objective, now, way, step, context);
 }
 

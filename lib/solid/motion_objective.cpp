@@ -15,17 +15,20 @@ void MotionObjective::evaluate(MotionPoint& point, const Context& context) const
   ++evaluations_;
   point.gradient.resize(body_.axes());
   point.forces.resize(body_.axes());
-  const double energy = energy_.evaluate(point.at, damping_, point.forces, context),
-               work = gewebe::work_of_load(body_, state_.load, point.at);
-  double inertial = 0, forced = 0;
-  for (std::size_t axis = 0; axis < body_.axes(); ++axis) {
-    const double off = point.at[axis] - ahead_[axis], mass = body_.masses[axis / 3] * inertia_;
-    forced += std::abs(point.forces[axis] * point.at[axis]);
-    point.forces[axis] = mass * off - point.forces[axis] - state_.load[axis];
-    point.gradient[axis] = state_.held[axis] != 0 ? 0 : point.forces[axis];
-    if (state_.held[axis] == 0)
-      inertial += mass * off * off / 2;
-  }
+  const double energy = energy_.evaluate(point.at, damping_, point.forces, context);
+  const auto [inertial, forced, work] = sums_of_axes<3>(
+      context, body_.axes(), [&](std::size_t begin, std::size_t end, std::array<double, 3>& sums) {
+        for (std::size_t axis = begin; axis < end; ++axis) {
+          const double off = point.at[axis] - ahead_[axis],
+                       mass = body_.masses[axis / 3] * inertia_, load = state_.load[axis];
+          sums[1] += std::abs(point.forces[axis] * point.at[axis]);
+          sums[2] += load * (point.at[axis] - body_.rest[axis]);
+          point.forces[axis] = mass * off - point.forces[axis] - load;
+          const bool held = state_.held[axis] != 0;
+          point.gradient[axis] = held ? 0 : point.forces[axis];
+          sums[0] += held ? 0 : mass * off * off / 2;
+        }
+      });
   point.value = energy + inertial - work;
   point.unsure = energy_.unsure_at_rest() + 1e-15 * forced +
                  1e-13 * (std::abs(energy) + std::abs(inertial) + std::abs(work));

@@ -32,6 +32,7 @@ int MotionQuick::prepare(const MotionBody& body, const std::vector<std::uint8_t>
   single_.emplace(*factor_);
   step_ = h;
   held_ = held;
+  forget();
   return 1;
 }
 
@@ -44,32 +45,49 @@ void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
         rotations_[9 * i + k] = k % 4 == 0 ? 1 : 0;
 }
 
+void MotionQuick::forget() {
+  secants_.clear();
+  rate_ = 1;
+}
+
+void MotionQuick::into_frames(Numbers& v, const Context& context) const {
+  parallel_blocks(context, v.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t at = begin; at < end; at += 3) {
+      const double* const r = rotations_.data() + 3 * at;
+      const double x = v[at], y = v[at + 1], z = v[at + 2];
+      for (std::size_t k = 0; k < 3; ++k)
+        v[at + k] = r[k] * x + r[3 + k] * y + r[6 + k] * z;
+    }
+  });
+}
+
+void MotionQuick::out_of_frames(Numbers& v, const Context& context) const {
+  parallel_blocks(context, v.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t at = begin; at < end; at += 3) {
+      const double* const r = rotations_.data() + 3 * at;
+      const double x = v[at], y = v[at + 1], z = v[at + 2];
+      for (std::size_t k = 0; k < 3; ++k)
+        v[at + k] = r[3 * k] * x + r[3 * k + 1] * y + r[3 * k + 2] * z;
+    }
+  });
+}
+
 void MotionQuick::solve(Numbers& v, const Context& context) {
   const std::size_t order = stiffness_.order();
-  Numbers rows(order), turned(v.size());
-  for (std::size_t i = 0; i < v.size() / 3; ++i) {
-    const double *const r = rotations_.data() + 9 * i, *const from = v.data() + 3 * i;
-    for (std::size_t k = 0; k < 3; ++k)
-      turned[3 * i + k] = r[k] * from[0] + r[3 + k] * from[1] + r[6 + k] * from[2];
-  }
+  rows_.resize(order);
   double scale = 0; // whatever the numbers are, single precision holds them
   for (std::size_t k = 0; k < order; ++k) {
-    rows[k] = turned[static_cast<std::size_t>(stiffness_.axis_of_row[k])];
-    scale = std::max(scale, std::abs(rows[k]));
+    rows_[k] = v[static_cast<std::size_t>(stiffness_.axis_of_row[k])];
+    scale = std::max(scale, std::abs(rows_[k]));
   }
   if (!(scale > 0 && std::isfinite(scale)))
     return;
-  for (double& value : rows)
+  for (double& value : rows_)
     value /= scale;
-  single_->solve(rows, context);
-  std::ranges::fill(turned, 0.0);
+  single_->solve(rows_, context);
+  std::ranges::fill(v, 0.0);
   for (std::size_t k = 0; k < order; ++k)
-    turned[static_cast<std::size_t>(stiffness_.axis_of_row[k])] = scale * rows[k];
-  for (std::size_t i = 0; i < v.size() / 3; ++i) {
-    const double *const r = rotations_.data() + 9 * i, *const from = turned.data() + 3 * i;
-    for (std::size_t k = 0; k < 3; ++k)
-      v[3 * i + k] = r[3 * k] * from[0] + r[3 * k + 1] * from[1] + r[3 * k + 2] * from[2];
-  }
+    v[static_cast<std::size_t>(stiffness_.axis_of_row[k])] = scale * rows_[k];
 }
 
 } // namespace gewebe

@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_objective_internal.h"
+#include "solid/secants_internal.h"
 #include "solve/factor.h"
 #include "solve/single_factor.h"
 #include "solve/stiffness.h"
@@ -14,7 +15,8 @@
 
 namespace gewebe {
 
-/// A⁻¹ in frames that turn with the nodes.
+/// A⁻¹ in frames that turn with the nodes, and what rounds have learned since A was made: secants
+/// stand in the frames, where they hold on as the body turns.
 class MotionQuick {
 public:
   /// For a step of h; returns how many factors had to be made. \throw as Factor
@@ -23,8 +25,18 @@ public:
   /// Frames as in the last evaluation; those of nodes held along an axis don't turn.
   /// \pre prepared
   void turn(SolidEnergy& energy, const Context& context);
-  /// In place, to single precision. \pre turned
+  // \pre turned
+  void into_frames(Numbers& v, const Context& context) const;
+  void out_of_frames(Numbers& v, const Context& context) const;
+  /// In frames and in place, to single precision.
   void solve(Numbers& v, const Context& context);
+
+  /// What was learned from other motions.
+  void forget();
+  Secants& secants() noexcept { return secants_; }
+  /// What the second round of a step changes, over the first one's change, as far as is known.
+  double rate() const noexcept { return rate_; }
+  void set_rate(double rate) noexcept { rate_ = rate; }
 
 private:
   double step_ = 0;
@@ -32,7 +44,9 @@ private:
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;
-  Numbers rotations_;
+  Numbers rotations_, rows_;
+  Secants secants_;
+  double rate_ = 1;
 };
 
 /// Adds the masses times `inertia` to the diagonal.

@@ -5,44 +5,43 @@
 
 #include <array>
 #include <cstddef>
-#include <deque>
-#include <utility>
+#include <vector>
 
 namespace gewebe {
 
-/// What L-BFGS knows of a step's rounds (Nocedal, Wright, Numerical optimization, 2006, 7.2).
+/// What L-BFGS knows of rounds (Nocedal, Wright, Numerical optimization, 2006, 7.2), in single
+/// precision. Products of pairs with each other are kept, so that a direction takes four passes
+/// over them and no more (Byrd, Nocedal, Schnabel, Representations of quasi-Newton matrices, 1994).
 class Secants {
 public:
-  void clear() { pairs_.clear(); }
-  void add(Numbers moved, Numbers turned) {
-    const double curvature = product(moved, turned);
-    if (!(curvature > 0))
-      return;
-    if (pairs_.size() == most)
-      pairs_.pop_front();
-    pairs_.push_back({std::move(moved), std::move(turned), 1 / curvature});
-  }
+  void clear() { count_ = earlier_ = 0; }
+  /// Those that there are are of earlier steps from now on.
+  void begin_step() { earlier_ = count_; }
+  void forget_earlier();
+  /// \param moved, turned changes of places and of gradients
+  void add(const Numbers& moved, const Numbers& turned, const Context& context);
   /// The direction for a gradient, by `solve` in place.
   template <class Solve>
-  void direction(Numbers& gradient, const Solve& solve) const {
-    std::array<double, most> part{};
-    for (std::size_t k = pairs_.size(); k-- > 0;) {
-      part[k] = pairs_[k].over * product(pairs_[k].moved, gradient);
-      gewebe::add(gradient, -part[k], pairs_[k].turned);
-    }
+  void direction(Numbers& gradient, const Solve& solve, const Context& context) const {
+    const Parts first = remove(gradient, context);
     solve(gradient);
-    for (std::size_t k = 0; k < pairs_.size(); ++k)
-      gewebe::add(gradient, part[k] - pairs_[k].over * product(pairs_[k].turned, gradient),
-                  pairs_[k].moved);
+    restore(first, gradient, context);
   }
 
 private:
   static constexpr std::size_t most = 8;
+  using Parts = std::array<double, most>;
   struct Pair {
-    Numbers moved, turned; ///< of places, of gradients
-    double over;
+    std::vector<float> moved, turned; ///< of places, of gradients
+    double over = 0;
+    Parts by_older{}; ///< products of `turned` with `moved` of those before
   };
-  std::deque<Pair> pairs_;
+  Parts remove(Numbers& gradient, const Context& context) const;
+  void restore(const Parts& first, Numbers& direction, const Context& context) const;
+  void drop(std::size_t oldest);
+
+  std::array<Pair, most> pairs_; ///< the first `count_`, ascending
+  std::size_t count_ = 0, earlier_ = 0;
 };
 
 } // namespace gewebe

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
+#include "solid/motion_forecast_internal.h"
 #include "solid/motion_limit_internal.h"
 #include "solid/motion_objective_internal.h"
 #include "solid/motion_quick_internal.h"
@@ -38,8 +39,8 @@ struct SolidMotion::State {
   MotionBody body;
   MotionState now;
   SolidEnergy energy;
-  double elastic = 0;   ///< energy of now.place
-  Numbers acceleration; ///< of the last step, if one was of `last_step`
+  double elastic = 0;      ///< energy of now.place
+  MotionForecast forecast; ///< of steps of `last_step`
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
@@ -53,7 +54,7 @@ struct SolidMotion::State {
       : options(with), body(body_of(mesh, materials, context)), energy(body, with.law) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
-    acceleration = target = reactions = Numbers(axes);
+    target = reactions = Numbers(axes);
   }
 };
 
@@ -82,8 +83,10 @@ void SolidMotion::hold(std::span<const std::uint8_t> held) {
   State& s = *state_;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
     s.now.held[axis] = held[axis];
-    if (held[axis] != 0)
-      s.now.velocity[axis] = s.acceleration[axis] = 0;
+    if (held[axis] == 0)
+      continue;
+    s.now.velocity[axis] = 0;
+    s.forecast.hold(axis);
   }
   s.tangent.renew();
 }
@@ -97,7 +100,7 @@ void SolidMotion::move_held(std::span<const double> displacement) {
 SolidStep SolidMotion::step(double h, const Context& context) {
   State& s = *state_;
   SolidStep step;
-  step.change = HUGE_VAL;
+  step.change = step.left = HUGE_VAL;
   if (!s.options.reference)
     step.factorisations += s.quick.prepare(s.body, s.now.held, h, s.options, context);
   const double energy = motion_energy(s.body, s.now.velocity) + s.elastic -
@@ -106,8 +109,9 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   MotionPoint found;
   found.at = s.now.place;
   add(found.at, h, s.now.velocity);
-  if (s.last_step == h)
-    add(found.at, h * h, s.acceleration);
+  if (s.last_step != h)
+    s.forecast.clear();
+  s.forecast.add_to(found.at, h * h, context);
   if (!s.guess.empty())
     found.at = std::exchange(s.guess, {});
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
@@ -134,11 +138,13 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   if (!s.now.any_held())
     objective.keep_momentum(found);
   s.energy.keep();
+  Numbers acceleration(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
     const double speed = (found.at[axis] - s.now.place[axis]) / h;
-    s.acceleration[axis] = (speed - s.now.velocity[axis]) / h;
+    acceleration[axis] = (speed - s.now.velocity[axis]) / h;
     s.now.velocity[axis] = speed;
   }
+  s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(found.at);
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
   if (!s.moved)
@@ -182,7 +188,8 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   State& s = *state_;
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
-  std::ranges::fill(s.acceleration, 0.0);
+  s.forecast.clear();
+  s.quick.forget();
   s.energy.forget_bubbles();
   s.last_step = 0;
   Numbers forces(s.body.axes());
@@ -201,7 +208,9 @@ void SolidMotion::set_tolerance(double tolerance, int max_rounds) {
 
 void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
   Numbers all(over_axes.begin(), over_axes.end());
+  state_->quick.into_frames(all, context);
   state_->quick.solve(all, context);
+  state_->quick.out_of_frames(all, context);
   std::ranges::copy(all, over_axes.begin());
 }
 
