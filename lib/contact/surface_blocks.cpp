@@ -21,9 +21,20 @@ std::vector<Vec3> inward_directions(const Model& model) {
   return inward;
 }
 
-SurfaceBlocks::SurfaceBlocks(const Model& model) : nodes_(surface_count(model)) {
-  for (std::uint32_t i = 0; i < nodes_.size(); ++i)
-    nodes_[i] = i;
+SurfaceBlocks::SurfaceBlocks(const Model& model) {
+  std::vector<std::uint8_t> inside(model.nodes.size());
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (const std::uint32_t corner : t)
+      inside[corner] = 1;
+  for (const EdgeMiddles& middles : model.middles)
+    for (const std::uint32_t middle : middles)
+      inside[middle] = 1;
+  for (const Triangle& t : model.triangles)
+    for (const std::uint32_t corner : t)
+      inside[corner] = 0;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (inside[i] == 0)
+      nodes_.push_back(i);
   // Halved along the longest side until small; ties by number, so that the order is one.
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, nodes_.size()}};
   while (!open.empty()) {

@@ -19,7 +19,8 @@ std::vector<Vec3> inward_directions(const Model& model);
 
 class SurfaceBlocks {
 public:
-  /// Of all nodes but the central ones. \pre check_model(model) passes
+  /// Of all nodes but the central ones and those inside of tetrahedra. \pre check_model(model)
+  /// passes
   explicit SurfaceBlocks(const Model& model);
 
   /// The shape from now on: 3 n displacements from rest.

@@ -26,44 +26,52 @@ constexpr double largest_force = 1e38; ///< squares of what it does are finite
 constexpr double same_mass = 1e-6;
 /// Rounds of a step whose tolerance is asked for.
 constexpr int rounds_for_tolerance = 200;
+/// With springs, whose part of the constant matrix is a bound and not a tangent.
+constexpr int rounds_with_springs = 40;
 
 bool about(double value, double expected) {
   return std::abs(value - expected) <= same_mass * expected;
 }
 
-/// Drag per mass, 1/s.
-double drag_of(const Model& model) {
-  if (!model.springs.empty())
-    throw Error("has springs beside its tetrahedra, whose motion together is not simulated, "
-                "expected ffe");
+/// What moves along with the elements.
+struct Net {
+  std::vector<SolidSpring> springs;
+  std::vector<double> masses, drag;
+};
+
+/// Springs, masses of nodes and drag per mass.
+Net net_of(const Model& model) {
+  Net net;
+  std::vector<std::uint8_t> tied(model.nodes.size());
+  for (const Spring& s : model.springs) {
+    net.springs.push_back({s.i, s.j, s.stiffness, s.damping, s.rest});
+    tied[s.i] = tied[s.j] = 1;
+  }
   const std::vector<double> masses = solid_masses(element_mesh(model), element_materials(model));
-  double rate = -1;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
     const std::string name = "node " + std::to_string(i);
-    if (!(masses[i] > 0))
+    if (!(masses[i] > 0) && tied[i] == 0)
       throw Error(name + " is in no tetrahedron, expected none such of a solid that moves");
-    if (!about(node.mass, masses[i]))
+    if (masses[i] > 0 && !about(node.mass, masses[i]))
       throw Error(name + " has a mass of " + number_text(node.mass) +
                   " g, expected that of its tetrahedra, " + number_text(masses[i]) +
                   " g, of a solid that moves");
-    if (rate < 0)
-      rate = node.drag / node.mass;
-    if (!about(node.drag, rate * node.mass))
-      throw Error(name + " has a drag of " + number_text(node.drag) + " g/s, expected " +
-                  number_text(rate * node.mass) +
-                  " g/s, as much per mass as node 0, of a solid that moves");
+    net.masses.push_back(node.mass);
+    net.drag.push_back(node.drag / node.mass);
   }
-  return std::max(0.0, rate);
+  return net;
 }
 
 } // namespace
 
 SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context)
     : model_(model), context_(context), motion_(model.nodes.size()) {
-  options_.drag = drag_of(model);
+  (void)net_of(model); // refuses what does not go
   options_.law = choice.law.value_or(options_.law);
   options_.damping = choice.damping.value_or(options_.damping);
+  if (!model.springs.empty())
+    options_.max_rounds = rounds_with_springs;
   if (choice.tolerance) {
     options_.tolerance = *choice.tolerance;
     options_.max_rounds = rounds_for_tolerance;
@@ -83,7 +91,9 @@ SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const 
 
 SolidMotion& SolidDynamic::engine(const Context& context) {
   if (!engine_) {
-    engine_.emplace(element_mesh(model_), element_materials(model_), options_, context);
+    const Net net = net_of(model_);
+    engine_.emplace(element_mesh(model_), element_materials(model_),
+                    SolidNet{net.springs, net.masses, net.drag}, options_, context);
     engine_->hold(held_);
     engine_->restore(*state_.places, *state_.velocity, context);
   }

@@ -1,6 +1,6 @@
 #pragma once
-// The elastodynamic method of a solid: a model of tetrahedra moves by the implicit steps of
-// solid/solid_motion.h, under what acts on objects of a scene.
+// The elastodynamic method of a solid: a model of tetrahedra, and springs beside them, moves by the
+// implicit steps of solid/solid_motion.h, under what acts on objects of a scene.
 //
 // Nodes have the masses of their tetrahedra and the model's drag per mass; weight acts by the loads
 // that statics has (weight_of), so that at rest a solid stands where statics says. Forces and
@@ -30,9 +30,8 @@ namespace gewebe {
 class SolidDynamic final : public BodyMotion {
 public:
   /// At rest. Keeps a reference to the model.
-  /// \pre check_model(model) passes, it has tetrahedra \throw Error if it has springs too, a node
-  /// of no tetrahedron, of another mass than its tetrahedra's or of another drag per mass than the
-  /// others; as SolidMotion
+  /// \pre check_model(model) passes, it has tetrahedra \throw Error if it has a node of no
+  /// tetrahedron and no spring, or of another mass than its tetrahedra's; as SolidMotion
   SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
 
   void set_load(const Load& load, double time) override;

@@ -28,11 +28,23 @@ Model joined(const World& w, const std::vector<std::size_t>& parts,
       s.j += base;
       all.springs.push_back(s);
     }
-    for (Triangle t : from.triangles) {
-      for (std::uint32_t& corner : t)
+    const auto shifted = [&](auto corners) {
+      for (std::uint32_t& corner : corners)
         corner += base;
-      all.triangles.push_back(t);
-    }
+      return corners;
+    };
+    for (const Triangle& t : from.triangles)
+      all.triangles.push_back(shifted(t));
+    for (const Tetrahedron& t : from.tetrahedra)
+      all.tetrahedra.push_back(shifted(t));
+    for (const EdgeMiddles& middles : from.middles)
+      all.middles.push_back(shifted(middles));
+    const auto materials = static_cast<std::int32_t>(all.materials.size());
+    all.materials.insert(all.materials.end(), from.materials.begin(), from.materials.end());
+    for (const std::int32_t material : from.tetrahedron_material)
+      all.tetrahedron_material.push_back(materials + material);
+    for (std::size_t i = base; i < all.nodes.size(); ++i)
+      all.nodes[i].material += materials;
   }
   return all;
 }
@@ -51,14 +63,13 @@ void add_ties(const World& w, const std::vector<std::size_t>& parts,
     Spring s{
         index(a, tie.node), index(b, tie.other_node), SpringKind::edge, tie.stiffness, 0, tie.rest};
     const Node &m = all.nodes[s.i], &n = all.nodes[s.j];
-    const auto ratio = [&](const Object& o, const Node& node) {
-      return o.model().materials[static_cast<std::size_t>(node.material)].damping_ratio;
+    const auto ratio = [&](const Node& node) {
+      return all.materials[static_cast<std::size_t>(node.material)].damping_ratio;
     };
     const double mass = m.fixed == fixed_all   ? n.mass
                         : n.fixed == fixed_all ? m.mass
                                                : m.mass * (n.mass / (m.mass + n.mass));
-    s.damping = (ratio(w.now.objects[tie.object], m) + ratio(w.now.objects[tie.other], n)) *
-                std::sqrt(s.stiffness * mass);
+    s.damping = (ratio(m) + ratio(n)) * std::sqrt(s.stiffness * mass);
     if (s.i > s.j)
       std::swap(s.i, s.j);
     all.springs.push_back(s);
@@ -134,9 +145,13 @@ std::span<const NodeMotion> motion_of(const Object& object) {
 
 namespace {
 
-/// What moves a body of this model, whose parts are all as this object.
-std::unique_ptr<BodyMotion> motion_for(const World& w, const Object& object, const Model& model) {
-  if (!is_solid(object)) {
+/// What moves a body of this model: by the steps of a solid if one of its parts is one.
+std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::size_t>& parts,
+                                       const Model& model) {
+  const auto solid =
+      std::ranges::find_if(parts, [&](std::size_t part) { return is_solid(w.now.objects[part]); });
+  const Object& object = w.now.objects[solid != parts.end() ? *solid : parts[0]];
+  if (solid == parts.end()) {
     if (object.matter->solid.said())
       throw Error("object " + object.name() +
                   " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
@@ -177,7 +192,7 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
     motion.insert(motion.end(), from.begin(), from.end());
   }
   const Object& first = w.now.objects[parts[0]];
-  body->moving = motion_for(w, first, *body->model);
+  body->moving = motion_for(w, parts, *body->model);
   body->moving->set_motion(motion);
   body->safe = moves_implicitly(first) ? HUGE_VAL : safe_step(*body->model);
   for (std::size_t k = 0; k < parts.size(); ++k) {
@@ -267,6 +282,32 @@ void move_bodies(World& w, double to) {
 
 // ---- attachments
 
+namespace {
+
+/// Solids that move as one have elements of one order and are moved alike.
+void require_like_solids(const World& w, const Object& a, const Object& b) {
+  const Object* first = nullptr;
+  const auto look = [&](const Object& object) {
+    if (!is_solid(object))
+      return;
+    if (first == nullptr)
+      first = &object;
+    const std::string both = "of " + first->name() + " and " + object.name();
+    if (first->model().middles.empty() != object.model().middles.empty())
+      throw Error("one " + both + " is linear and the other quadratic, expected both alike");
+    if (!(first->matter->solid == object.matter->solid))
+      throw Error("law=, damping= and tolerance= " + both + " differ, expected both alike");
+  };
+  for (const Object* const object : {&a, &b}) {
+    look(*object);
+    if (object->body != nullptr)
+      for (const std::size_t part : object->body->parts)
+        look(w.now.objects[part]);
+  }
+}
+
+} // namespace
+
 void Rule<Attach>::check(World& w, const Attach& c) {
   Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
   for (Object* const o : {&a, &b}) {
@@ -275,9 +316,10 @@ void Rule<Attach>::check(World& w, const Attach& c) {
   }
   if (&a == &b)
     throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
-  if (a.matter->integration != b.matter->integration)
+  if (moves_implicitly(a) != moves_implicitly(b))
     throw Error("one of " + a.name() + " and " + b.name() +
                 " is implicit and the other is not, expected both alike");
+  require_like_solids(w, a, b);
 }
 
 void Rule<Attach>::apply(World& w, const Attach& c) {

@@ -64,8 +64,6 @@ inline constexpr std::array gaps{
     Gap{Way::solid, Feature::cut, true,
         "holds tetrahedra, expected springs and triangles alone to cut"},
     Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
-    Gap{Way::solid_motion, Feature::attach, true,
-        "is a solid, expected objects of springs and triangles alone to attach"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

@@ -14,11 +14,15 @@ namespace gewebe {
 struct MotionBody {
   TetMesh mesh;
   std::vector<SolidElement> elements;
-  Numbers masses; ///< by node
-  Numbers rest;   ///< places
+  Numbers masses;                        ///< by node
+  Numbers drag;                          ///< by node, per mass, 1/s
+  Numbers rest;                          ///< places
+  std::vector<std::uint8_t> in_elements; ///< by node, whether it is in a tetrahedron
 
   std::size_t axes() const noexcept { return rest.size(); }
   std::size_t nodes() const noexcept { return masses.size(); }
+  /// Of a node in a step of h, per mass.
+  double inertia(std::size_t node, double h) const { return 1 / (h * h) + drag[node] / h; }
 };
 
 /// Numbers on the 3 n axes.

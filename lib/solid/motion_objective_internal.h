@@ -35,7 +35,7 @@ public:
   const MotionBody& body() const noexcept { return body_; }
   const MotionState& state() const noexcept { return state_; }
   SolidEnergy& energy() const noexcept { return energy_; }
-  double inertia() const noexcept { return inertia_; } ///< per mass
+  double step() const noexcept { return step_; }
   double damping() const noexcept { return damping_; } ///< per stiffness
   int evaluations() const noexcept { return evaluations_; }
 
@@ -43,7 +43,8 @@ private:
   const MotionBody& body_;
   const MotionState& state_;
   SolidEnergy& energy_;
-  double inertia_, damping_;
+  double step_, damping_;
+  Numbers mass_;  ///< by node, times its inertia
   Numbers ahead_; ///< where inertia alone leads
   mutable int evaluations_ = 0;
 };

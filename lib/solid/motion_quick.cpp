@@ -7,24 +7,29 @@
 
 namespace gewebe {
 
-void add_masses(const MotionBody& body, double inertia, StiffnessMatrix& matrix) {
-  for (std::size_t c = 0; c < matrix.order(); ++c)
+void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix) {
+  for (std::size_t c = 0; c < matrix.order(); ++c) {
+    const std::size_t node = static_cast<std::size_t>(matrix.axis_of_row[c]) / 3;
     matrix.value[static_cast<std::size_t>(matrix.column_start[c])] +=
-        body.masses[static_cast<std::size_t>(matrix.axis_of_row[c]) / 3] * inertia;
+        body.masses[node] * body.inertia(node, h);
+  }
 }
 
-int MotionQuick::prepare(const MotionBody& body, const std::vector<std::uint8_t>& held, double h,
+int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
+                         const std::vector<std::uint8_t>& held, double h,
                          const SolidMotionOptions& options, const Context& context) {
   if (factor_ && step_ == h && held_ == held)
     return 0;
-  const double scale = 1 + options.damping / h, inertia = 1 / (h * h) + options.drag / h;
+  const double scale = 1 + options.damping / h;
   const bool same_pattern = factor_ && held_ == held;
   if (!same_pattern)
     stiffness_ = solid_stiffness(body.mesh, body.elements, held, context);
   StiffnessMatrix a = stiffness_;
   for (double& value : a.value)
     value *= scale;
-  add_masses(body, inertia, a);
+  if (!springs.empty())
+    a = springs.with_bound(a, 1 / h);
+  add_masses(body, h, a);
   if (same_pattern)
     factor_->refactor(a, context);
   else
@@ -33,14 +38,18 @@ int MotionQuick::prepare(const MotionBody& body, const std::vector<std::uint8_t>
   step_ = h;
   held_ = held;
   forget();
+  still_.resize(body.nodes());
+  for (std::size_t i = 0; i < body.nodes(); ++i)
+    still_[i] = body.in_elements[i] == 0 || held[3 * i] != 0 || held[3 * i + 1] != 0 ||
+                held[3 * i + 2] != 0;
   return 1;
 }
 
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
   rotations_.resize(3 * held_.size());
   energy.node_rotations(rotations_, context);
-  for (std::size_t i = 0; i < held_.size() / 3; ++i)
-    if (held_[3 * i] != 0 || held_[3 * i + 1] != 0 || held_[3 * i + 2] != 0)
+  for (std::size_t i = 0; i < still_.size(); ++i)
+    if (still_[i] != 0)
       for (std::size_t k = 0; k < 9; ++k)
         rotations_[9 * i + k] = k % 4 == 0 ? 1 : 0;
 }

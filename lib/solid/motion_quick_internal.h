@@ -20,9 +20,11 @@ namespace gewebe {
 class MotionQuick {
 public:
   /// For a step of h; returns how many factors had to be made. \throw as Factor
-  int prepare(const MotionBody& body, const std::vector<std::uint8_t>& held, double h,
-              const SolidMotionOptions& options, const Context& context);
-  /// Frames as in the last evaluation; those of nodes held along an axis don't turn.
+  int prepare(const MotionBody& body, const MotionSprings& springs,
+              const std::vector<std::uint8_t>& held, double h, const SolidMotionOptions& options,
+              const Context& context);
+  /// Frames as in the last evaluation; those of nodes held along an axis, or of no tetrahedron,
+  /// don't turn.
   /// \pre prepared
   void turn(SolidEnergy& energy, const Context& context);
   // \pre turned
@@ -40,7 +42,7 @@ public:
 
 private:
   double step_ = 0;
-  std::vector<std::uint8_t> held_;
+  std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;
@@ -49,7 +51,7 @@ private:
   double rate_ = 1;
 };
 
-/// Adds the masses times `inertia` to the diagonal.
-void add_masses(const MotionBody& body, double inertia, StiffnessMatrix& matrix);
+/// Adds the masses times their inertia in a step of h to the diagonal.
+void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix);
 
 } // namespace gewebe

@@ -113,7 +113,9 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
     return block;
   };
   tangent_ = assembled_matrix(body.mesh, block_of, objective.state().held, context);
-  add_masses(body, objective.inertia(), tangent_);
+  if (!energy.springs().empty())
+    tangent_ = energy.springs().with_tangent(tangent_, at, 1 / objective.step());
+  add_masses(body, objective.step(), tangent_);
   if (factor_ && factor_->order() == tangent_.order() && !renewed_)
     factor_->refactor(tangent_, context);
   else

@@ -12,8 +12,8 @@
 
 namespace gewebe {
 
-SolidEnergy::SolidEnergy(const MotionBody& body, SolidLaw law)
-    : body_(body), law_(law), frames_(body.mesh, body.elements) {
+SolidEnergy::SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs, SolidLaw law)
+    : body_(body), law_(law), springs_(springs), frames_(body.mesh, body.elements) {
   if (law_ != SolidLaw::stable_neo_hookean)
     return;
   if (!body.mesh.middles.empty())
@@ -25,6 +25,7 @@ SolidEnergy::SolidEnergy(const MotionBody& body, SolidLaw law)
 
 void SolidEnergy::keep() {
   frames_.remember();
+  springs_.keep();
   bubbles_ = new_bubbles_;
 }
 
@@ -113,16 +114,22 @@ Vec3 SolidEnergy::settled_bubble(std::size_t t, const std::array<Vec3, 10>& u) c
   return {w[0], w[1], w[2]};
 }
 
-double SolidEnergy::evaluate(const Numbers& at, double damping, std::span<double> forces,
-                             const Context& context) {
+double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,
+                             std::span<double> forces, const Context& context) {
   const bool corotational = law_ == SolidLaw::corotational;
-  const double energy = frames_.evaluate(at, {corotational ? 1.0 : 0.0, damping}, forces, context);
+  double energy =
+      frames_.evaluate(at, {corotational ? 1.0 : 0.0, damping.by_strain}, forces, context);
   if (corotational) {
     elastic_ = frames_.elastic_energy();
-    return energy;
+  } else {
+    elastic_ = hyperelastic(at, forces, context);
+    energy += elastic_;
   }
-  elastic_ = hyperelastic(at, forces, context);
-  return energy + elastic_;
+  if (springs_.empty())
+    return energy;
+  energy += springs_.evaluate(at, damping.per_time, forces);
+  elastic_ += springs_.elastic();
+  return energy;
 }
 
 } // namespace gewebe

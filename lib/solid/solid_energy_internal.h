@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "solid/corotational.h"
 #include "solid/motion_body_internal.h"
+#include "solid/motion_springs_internal.h"
 #include "solid/solid_motion.h"
 
 #include <array>
@@ -13,15 +14,21 @@
 
 namespace gewebe {
 
+/// What damping takes in a step; nothing at rest.
+struct StepDamping {
+  double by_strain = 0; ///< times the energy of what strains changed by
+  double per_time = 0;  ///< 1/h, for dampers of springs
+};
+
 class SolidEnergy {
 public:
   /// \pre the body outlives this and stays where it is
-  SolidEnergy(const MotionBody& body, SolidLaw law);
+  SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs, SolidLaw law);
 
   SolidLaw law() const noexcept { return law_; }
-  /// The energy at the places `at`, and that of damping from the strains kept times `damping`;
-  /// -dE/dx into `forces`. Bubbles of Neo-Hookean elements are where they have least energy.
-  double evaluate(const Numbers& at, double damping, std::span<double> forces,
+  /// The energy at the places `at`, and that of damping from the strains and lengths kept; -dE/dx
+  /// into `forces`. Bubbles of Neo-Hookean elements are where they have least energy.
+  double evaluate(const Numbers& at, const StepDamping& damping, std::span<double> forces,
                   const Context& context);
   /// Strains and bubbles of the last evaluation are kept: damping counts from the ones, bubbles
   /// are sought from the others.
@@ -31,6 +38,7 @@ public:
   /// What rounding may add to an energy whatever its size: a Neo-Hookean one is a difference of
   /// numbers of the size of mu.
   double unsure_at_rest() const noexcept { return unsure_at_rest_; }
+  const MotionSprings& springs() const noexcept { return springs_; }
 
   // As in the last evaluation.
   double elastic() const noexcept { return elastic_; }
@@ -48,6 +56,7 @@ private:
 
   const MotionBody& body_;
   SolidLaw law_;
+  MotionSprings springs_;
   CorotationalSolid frames_;                ///< and corotational energy, and damping
   std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
   double elastic_ = 0, unsure_at_rest_ = 0;

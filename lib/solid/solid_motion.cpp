@@ -1,6 +1,7 @@
 #include "solid/solid_motion.h"
 
 #include "base/error.h"
+#include "solid/assembly_internal.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
 #include "solid/motion_forecast_internal.h"
@@ -20,11 +21,22 @@ namespace gewebe {
 namespace {
 
 MotionBody body_of(const TetMesh& mesh, std::span<const SolidMaterial> materials,
-                   const Context& context) {
-  MotionBody body{
-      mesh, solid_elements(mesh, materials, context), solid_masses(mesh, materials), {}};
+                   const SolidNet& net, double drag, const Context& context) {
+  MotionBody body;
+  body.mesh = mesh;
+  body.elements = solid_elements(mesh, materials, context);
+  body.masses = solid_masses(mesh, materials);
   for (const Vec3& p : mesh.points)
     body.rest.insert(body.rest.end(), {p.x, p.y, p.z});
+  body.drag.assign(net.drag.begin(), net.drag.end());
+  body.drag.resize(body.nodes(), drag);
+  body.in_elements.resize(body.nodes());
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+    for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
+      body.in_elements[solid_node(mesh, t, a)] = 1;
+  for (std::size_t i = 0; i < std::min(body.nodes(), net.masses.size()); ++i)
+    if (body.in_elements[i] == 0)
+      body.masses[i] = net.masses[i];
   return body;
 }
 
@@ -49,9 +61,10 @@ struct SolidMotion::State {
   MotionQuick quick;
   MotionTangent tangent;
 
-  State(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+  State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
-      : options(with), body(body_of(mesh, materials, context)), energy(body, with.law) {
+      : options(with), body(body_of(mesh, materials, net, with.drag, context)),
+        energy(body, net.springs, with.law) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
@@ -64,7 +77,12 @@ SolidMotion& SolidMotion::operator=(SolidMotion&&) noexcept = default;
 
 SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
                          const SolidMotionOptions& options, const Context& context)
-    : state_(std::make_unique<State>(mesh, materials, options, context)) {
+    : SolidMotion(mesh, materials, SolidNet{}, options, context) {}
+
+SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+                         const SolidNet& net, const SolidMotionOptions& options,
+                         const Context& context)
+    : state_(std::make_unique<State>(mesh, materials, net, options, context)) {
   const auto sound = [](double value) { return value >= 0 && std::isfinite(value); };
   if (!sound(options.drag) || !sound(options.damping))
     throw Error("the damping of a solid is not a number of 0 or more");
@@ -73,6 +91,14 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
   for (const double mass : state_->body.masses)
     if (!(mass > 0))
       throw Error("a node of a solid is in no tetrahedron");
+  for (const double rate : state_->body.drag)
+    if (!sound(rate))
+      throw Error("the damping of a solid is not a number of 0 or more");
+  if (net.springs.empty())
+    return;
+  Numbers forces(state_->body.axes()); // springs need not be at rest
+  state_->elastic = state_->energy.evaluate(state_->now.place, {}, forces, context);
+  state_->energy.keep();
 }
 
 void SolidMotion::set_load(std::span<const double> forces) {
@@ -102,7 +128,8 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   SolidStep step;
   step.change = step.left = HUGE_VAL;
   if (!s.options.reference)
-    step.factorisations += s.quick.prepare(s.body, s.now.held, h, s.options, context);
+    step.factorisations +=
+        s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
   const double energy = motion_energy(s.body, s.now.velocity) + s.elastic -
                         work_of_load(s.body, s.now.load, s.now.place);
   const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
@@ -193,7 +220,7 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
   s.energy.forget_bubbles();
   s.last_step = 0;
   Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
+  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   s.energy.keep();
 }
 
@@ -217,7 +244,7 @@ void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, 0, forces, context);
+  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     s.reactions[axis] = s.now.held[axis] != 0 ? -forces[axis] - s.now.load[axis] : 0;
 }

@@ -29,6 +29,9 @@
 // From scrambled shapes the elements of stable Neo-Hookean bodies turn right again; corotational
 // ones may stay tangled where rotations of elements jump, and either may stay wound up.
 //
+// Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
+// The constant matrix has their stiffness along every axis, which bounds them however they turn.
+//
 // Damping is Rayleigh's: `drag` (1/s) by masses, `damping` (s) by the stiffness, but in the
 // elements' own frames, so that rotations aren't slowed down.
 //
@@ -60,6 +63,21 @@ struct SolidMotionOptions {
   bool reference = false; ///< Newton's method until rounding; no limit of time
 };
 
+/// A spring between two nodes, with a damper along it.
+struct SolidSpring {
+  std::uint32_t i = 0, j = 0;
+  double stiffness = 0, damping = 0; ///< g/s², g/s
+  double rest = 0;                   ///< mm
+};
+
+/// What moves along with the elements: springs, and nodes of their own.
+struct SolidNet {
+  std::span<const SolidSpring> springs{};
+  /// By node: of those in no tetrahedron, what is read; else the mass of its tetrahedra counts.
+  std::span<const double> masses{};
+  std::span<const double> drag{}; ///< by node, per mass, 1/s, in place of the options'; or none
+};
+
 /// What is said of how a solid moves; SolidMotionOptions has the rest.
 struct SolidChoice {
   std::optional<SolidLaw> law;
@@ -87,9 +105,12 @@ double damping_per_stiffness(double ratio, double frequency);
 
 class SolidMotion {
 public:
-  /// At rest, nothing held. \pre check_mesh(mesh) passes, each node is in a tetrahedron
-  /// \throw Error as solid_elements; if an option is out of its range
+  /// At rest, nothing held. \pre check_mesh(mesh) passes, each node is in a tetrahedron or, with a
+  /// mass, in the net; ends of springs are nodes
+  /// \throw Error as solid_elements; if an option is out of its range, or a node has no mass
   SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
+              const SolidMotionOptions& options, const Context& context = {});
+  SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
               const SolidMotionOptions& options, const Context& context = {});
   ~SolidMotion();
   SolidMotion(SolidMotion&&) noexcept;

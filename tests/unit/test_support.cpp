@@ -105,7 +105,8 @@ public:
     Model beside = test::organ(3);
     for (Node& n : beside.nodes)
       n.position.x += 100;
-    scene_.add_object("p", std::move(beside), Method::ela, {}, integration);
+    scene_.add_object("p", std::move(beside), Method::ela, {},
+                      way == Way::solid_motion ? Integration::implicit : integration);
     if (way == Way::attached)
       scene_.apply(tie());
     if (way == Way::warped)
