@@ -14,15 +14,14 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t grain = 128; // groups of a block, whose results are summed by themselves
-constexpr std::size_t some = 16;   // groups whose results the next cache holds
 
 /// Sums of what tetrahedra bring to their nodes: first by blocks of groups, whose sums stay in the
 /// cache, then those of the blocks that a node is in, in order.
 template <std::size_t Nodes>
 struct NodeSums {
-  std::vector<std::array<std::array<std::uint16_t, 4>, Nodes>> local; ///< number within the block
-  std::vector<std::size_t> first; ///< slot of each block, and of one more
-  std::vector<std::size_t> start; ///< of each node's slots, and of one more, in
+  std::vector<CorotationalPlaces<Nodes>> local; ///< number within the block
+  std::vector<std::size_t> first;               ///< slot of each block, and of one more
+  std::vector<std::size_t> start;               ///< of each node's slots, and of one more, in
   std::vector<std::uint32_t> slot;
   std::vector<double> sums; ///< of each slot
 
@@ -58,7 +57,8 @@ struct NodeSums {
   /// sums[Width · local number], done(node, sum) takes a node's.
   template <std::size_t Width, class Block, class Done>
   void sum(const Context& context, const Block& block, const Done& done) {
-    sums.resize(Width * slot.size());
+    if (sums.size() < Width * slot.size())
+      sums.resize(Width * slot.size());
     parallel_blocks(context, local.size(), grain, [&](std::size_t begin, std::size_t end) {
       const std::size_t b = begin / grain;
       std::fill(sums.begin() + static_cast<std::ptrdiff_t>(Width * first[b]),
@@ -82,15 +82,19 @@ struct Groups {
   std::vector<CorotationalGroup<Nodes>> groups;
   std::vector<CorotationalStrains<Nodes>> strains, before;
   std::vector<CorotationalRotations> rotations;
+  /// Rotations of nodes' elements times volumes, [9 k + entry][lane] of node 4 k + lane.
+  std::vector<std::array<double[4], 9>> turns;
   NodeSums<Nodes> sums;
   double elastic = 0;
   bool remembered = false; ///< the last strains are `before`
 
-  void make(const TetMesh& mesh, std::span<const SolidElement> elements) {
+  void make(const TetMesh& mesh, std::span<const SolidElement> elements,
+            const CorotationalNotes& notes) {
     groups.resize((elements.size() + 3) / 4);
-    strains.resize(groups.size());
-    before.resize(groups.size());
-    rotations.resize(groups.size());
+    strains.resize(notes.strains ? groups.size() : 0);
+    before.resize(strains.size());
+    rotations.resize(notes.frames ? groups.size() : 0);
+    turns.resize((mesh.points.size() + 3) / 4);
     for (std::size_t k = 0; k < 4 * groups.size(); ++k) {
       const std::size_t t = std::min(k, elements.size() - 1), lane = k % 4;
       const SolidElement& e = elements[t];
@@ -113,22 +117,39 @@ struct Groups {
 
   double evaluate(CorotationalEvaluate<Nodes> kernel, std::span<const double> x,
                   const CorotationalWeights& weights, std::span<double> forces,
-                  const Context& context) {
+                  const Context& context, bool with_turns) {
     std::vector<std::array<double, 2>> energy((groups.size() + grain - 1) / grain);
     const auto block = [&](std::size_t begin, std::size_t end, double* to) {
-      std::array<CorotationalResult<Nodes>, some> results;
+      std::array<CorotationalResult<Nodes>, corotational_together> results;
       std::array<double, 2>& sum = energy[begin / grain];
-      for (std::size_t n = begin; n < end; n += some) {
-        const std::size_t count = std::min(some, end - n);
-        kernel(groups.data() + n, count, x.data(), before.data() + n, weights, results.data(),
-               strains.data() + n, rotations.data() + n);
-        for (std::size_t k = 0; k < count; ++k)
-          add(results[k], sums.local[n + k], to, sum);
+      for (std::size_t n = begin; n < end; n += corotational_together) {
+        const std::size_t count = std::min(corotational_together, end - n);
+        kernel(groups.data() + n, count,
+               {x.data(), sums.local.data() + n, to, with_turns,
+                before.empty() ? nullptr : before.data() + n,
+                strains.empty() ? nullptr : strains.data() + n, weights},
+               results.data());
+        for (std::size_t k = 0; k < count; ++k) {
+          for (std::size_t lane = 0; lane < 4; ++lane) {
+            sum[0] += results[k].elastic[lane];
+            sum[1] += results[k].damping[lane];
+          }
+          if (!rotations.empty())
+            rotations[n + k] = results[k].rotation;
+        }
       }
     };
-    sums.template sum<3>(context, block, [&](std::size_t i, const std::array<double, 3>& sum) {
-      std::ranges::copy(sum, forces.begin() + static_cast<std::ptrdiff_t>(3 * i));
-    });
+    const auto force = [&](std::size_t i, const auto& sum) {
+      std::copy_n(sum.begin(), 3, forces.begin() + static_cast<std::ptrdiff_t>(3 * i));
+    };
+    if (with_turns)
+      sums.template sum<corotational_turned>(context, block, [&](std::size_t i, const auto& sum) {
+        force(i, sum);
+        for (std::size_t c = 0; c < 9; ++c)
+          turns[i / 4][c][i % 4] = sum[3 + c];
+      });
+    else
+      sums.template sum<corotational_force>(context, block, force);
     elastic = 0;
     double damping = 0;
     for (const auto& [of_elements, of_damping] : energy) {
@@ -139,50 +160,20 @@ struct Groups {
     return weights.elastic * elastic + weights.damping * damping;
   }
 
-  static void add(const CorotationalResult<Nodes>& result,
-                  const std::array<std::array<std::uint16_t, 4>, Nodes>& local, double* to,
-                  std::array<double, 2>& energy) {
-    for (std::size_t a = 0; a < Nodes; ++a)
-      for (std::size_t lane = 0; lane < 4; ++lane)
-        for (std::size_t c = 0; c < 3; ++c)
-          to[3 * std::size_t{local[a][lane]} + c] += result.force[3 * a + c][lane];
-    for (std::size_t lane = 0; lane < 4; ++lane) {
-      energy[0] += result.elastic[lane];
-      energy[1] += result.damping[lane];
-    }
-  }
-
   void remember() {
     if (!remembered)
       std::swap(before, strains);
     remembered = true;
   }
 
-  /// Mean rotations of nodes, times their volumes, [9 k + entry][lane] of node 4 k + lane.
-  void mean_rotations(std::vector<std::array<double[4], 9>>& to, const Context& context) {
-    const auto block = [&](std::size_t begin, std::size_t end, double* sum) {
-      for (std::size_t n = begin; n < end; ++n)
-        for (std::size_t lane = 0; lane < 4; ++lane) {
-          std::array<double, 9> part;
-          for (std::size_t c = 0; c < 9; ++c)
-            part[c] = groups[n].volume[lane] * rotations[n].value[c][lane];
-          for (std::size_t a = 0; a < Nodes; ++a)
-            for (std::size_t c = 0; c < 9; ++c)
-              sum[9 * std::size_t{sums.local[n][a][lane]} + c] += part[c];
-        }
-    };
-    sums.template sum<9>(context, block, [&](std::size_t i, const std::array<double, 9>& sum) {
-      for (std::size_t c = 0; c < 9; ++c)
-        to[i / 4][c][i % 4] = sum[c];
-    });
-  }
-
   ElementFrame frame(std::size_t t) const {
     constexpr std::size_t points = CorotationalGroup<Nodes>::points;
-    const auto& of = (remembered ? before : strains)[t / 4].value;
     ElementFrame frame;
     for (std::size_t c = 0; c < 9; ++c)
       frame.rotation[c] = rotations[t / 4].value[c][t % 4];
+    if (strains.empty())
+      return frame;
+    const auto& of = (remembered ? before : strains)[t / 4].value;
     for (std::size_t c = 0; c < 6; ++c) { // the mean strain is that of the middle
       for (std::size_t p = 0; p < points; ++p)
         frame.stretch[c] += of[6 * p + c][t % 4] / points;
@@ -210,20 +201,21 @@ CorotationalSolid::~CorotationalSolid() = default;
 CorotationalSolid::CorotationalSolid(CorotationalSolid&&) noexcept = default;
 CorotationalSolid& CorotationalSolid::operator=(CorotationalSolid&&) noexcept = default;
 
-CorotationalSolid::CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements)
+CorotationalSolid::CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements,
+                                     const CorotationalNotes& notes)
     : state_(std::make_unique<State>()) {
   State& s = *state_;
   s.is_quadratic = !mesh.middles.empty();
   s.nodes = mesh.points.size();
-  s.with([&](auto& of) { of.make(mesh, elements); });
+  s.with([&](auto& of) { of.make(mesh, elements, notes); });
 }
 
 double CorotationalSolid::evaluate(std::span<const double> x, const CorotationalWeights& weights,
-                                   std::span<double> forces, const Context& context) {
+                                   std::span<double> forces, const Context& context, bool turns) {
   State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
-  return s.is_quadratic ? s.quadratic.evaluate(kernel.quadratic, x, weights, forces, context)
-                        : s.linear.evaluate(kernel.linear, x, weights, forces, context);
+  return s.is_quadratic ? s.quadratic.evaluate(kernel.quadratic, x, weights, forces, context, turns)
+                        : s.linear.evaluate(kernel.linear, x, weights, forces, context, turns);
 }
 
 double CorotationalSolid::elastic_energy() const noexcept {
@@ -237,8 +229,7 @@ void CorotationalSolid::remember() {
 void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) {
   State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
-  std::vector<std::array<double[4], 9>> sums((s.nodes + 3) / 4);
-  s.with([&](auto& of) { of.mean_rotations(sums, context); });
+  auto sums = s.with([](auto& of) { return of.turns; });
   parallel_blocks(context, sums.size(), 256, [&](std::size_t begin, std::size_t end) {
     kernel.turn(sums[begin].data(), end - begin);
     for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)

@@ -44,27 +44,35 @@ struct ElementFrame {
   SymmetricBlock stretch{}; ///< Rᵀ F in the middle
 };
 
+/// What is written down of every element in every evaluation, which takes a third of its time.
+struct CorotationalNotes {
+  bool strains = true; ///< for remember() and frame()
+  bool frames = true;  ///< for frame()
+};
+
 class CorotationalSolid {
 public:
   /// \pre elements are those of the mesh
-  CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements);
+  CorotationalSolid(const TetMesh& mesh, std::span<const SolidElement> elements,
+                    const CorotationalNotes& notes = {});
   ~CorotationalSolid();
   CorotationalSolid(CorotationalSolid&&) noexcept;
   CorotationalSolid& operator=(CorotationalSolid&&) noexcept;
 
   /// The energy (g mm²/s²) with the places of nodes x (3 n, mm), and -dE/dx into `forces` (3 n,
-  /// g mm/s²).
+  /// g mm/s²). With `turns` node_rotations() are those of x from now on.
+  /// \pre without damping, or strains are noted
   double evaluate(std::span<const double> x, const CorotationalWeights& weights,
-                  std::span<double> forces, const Context& context);
+                  std::span<double> forces, const Context& context, bool turns = true);
   /// Of the last evaluate(), its weight left aside.
   double elastic_energy() const noexcept;
   /// The strains of the last evaluate() are those that damping counts from. From the start they are
   /// those at rest.
   void remember();
   /// Of each node the rotation nearest to the mean of its elements', by rows, 9 n: as in the last
-  /// evaluate(). That of a node of no element is none.
+  /// evaluate() with turns. That of a node of no element is none.
   void node_rotations(std::span<double> rotations, const Context& context);
-  /// Of element t, as in the last evaluate().
+  /// Of element t, as in the last evaluate(). \pre both are noted, or frames, if only they are read
   ElementFrame frame(std::size_t t) const;
 
 private:

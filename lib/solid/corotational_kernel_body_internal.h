@@ -10,6 +10,7 @@ namespace gewebe {
 namespace {
 
 using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
+using Whole = long long __attribute__((vector_size(32)));
 
 inline const Four& four(const double* at) {
   return *reinterpret_cast<const Four*>(at);
@@ -91,43 +92,67 @@ inline void robust_rotation(const std::array<double, 9>& f, std::array<double, 9
        2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
 }
 
-/// The same of four. With s the (signed) singular values, t = Σ s is the largest root of
-/// (t² - |f|²)² - 8 det f t - 4 |cof f|² = 0, convex and ascending from there on, so that Newton's
-/// method comes down to it; then Cayley-Hamilton gives r without the stretch's inverse:
-/// r Π (s_i + s_j) = t cof f + (t² - i) f - f fᵀ f, i = (t² - |f|²) / 2. A step of Newton's method
-/// below 1e-9 t leaves less than 1e-15 t: by its curvature 12 t² over twice its slope 8 Π, except
-/// where Π is so small that Jacobi's method takes over.
-inline void rotation(const Matrix& f, Matrix& r) {
-  const Four* const m = f.m;
-  const Four c[9] = {
-      m[4] * m[8] - m[5] * m[7], m[5] * m[6] - m[3] * m[8], m[3] * m[7] - m[4] * m[6],
-      m[2] * m[7] - m[1] * m[8], m[0] * m[8] - m[2] * m[6], m[1] * m[6] - m[0] * m[7],
-      m[1] * m[5] - m[2] * m[4], m[2] * m[3] - m[0] * m[5], m[0] * m[4] - m[1] * m[3]};
-  Four square = m[0] * m[0], cofactors = c[0] * c[0];
-  for (int k = 1; k < 9; ++k) {
-    square += m[k] * m[k];
-    cofactors += c[k] * c[k];
-  }
-  const Four det = m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
+/// What the rotation of f is made of: its cofactors, and invariants.
+struct Invariants {
+  Matrix cofactor;
+  Four square, det, cofactors; ///< |f|², det f, |cof f|²
   Four t;
-  for (int l = 0; l < 4; ++l)
-    t[l] = std::sqrt(3 * square[l]);
-  for (int round = 0; round < 12; ++round) {
-    const Four over = t * t - square,
-               step = (over * over - 8 * det * t - 4 * cofactors) / (4 * t * over - 8 * det);
-    t -= step;
-    bool done = true;
-    for (int l = 0; l < 4; ++l)
-      done = done && std::abs(step[l]) <= 1e-9 * t[l];
-    if (done)
-      break;
+};
+
+inline void invariants(const Matrix& f, Invariants& of) {
+  const Four* const m = f.m;
+  Four* const c = of.cofactor.m;
+  for (int i = 0; i < 3; ++i) {
+    const int k = 3 * ((i + 1) % 3), l = 3 * ((i + 2) % 3);
+    c[3 * i] = m[k + 1] * m[l + 2] - m[k + 2] * m[l + 1];
+    c[3 * i + 1] = m[k + 2] * m[l] - m[k] * m[l + 2];
+    c[3 * i + 2] = m[k] * m[l + 1] - m[k + 1] * m[l];
   }
-  const Four second = 0.5 * (t * t - square), pairs = t * second - det, inverse = 1 / pairs;
+  of.square = m[0] * m[0];
+  of.cofactors = c[0] * c[0];
+  for (int k = 1; k < 9; ++k) {
+    of.square += m[k] * m[k];
+    of.cofactors += c[k] * c[k];
+  }
+  of.det = m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
+}
+
+/// With s the (signed) singular values, t = Σ s is the largest root of
+/// (t² - |f|²)² - 8 det f t - 4 |cof f|² = 0, convex and ascending from there on, so that Newton's
+/// method comes down to it. A step of Newton's method below 1e-9 t leaves less than 1e-15 t: by its
+/// curvature 12 t² over twice its slope 8 Π (s_i + s_j), except where that is so small that
+/// Jacobi's method takes over. Several side by side, since each waits for its divisions.
+inline void sums_of_stretches(Invariants* of, std::size_t count) {
+  for (std::size_t n = 0; n < count; ++n)
+    for (int l = 0; l < 4; ++l)
+      of[n].t[l] = std::sqrt(3 * of[n].square[l]);
+  for (int round = 0; round < 12; ++round) {
+    Whole done = ~Whole{};
+    for (std::size_t n = 0; n < count; ++n) {
+      Invariants& o = of[n];
+      const Four over = o.t * o.t - o.square,
+                 step = (over * over - 8 * o.det * o.t - 4 * o.cofactors) /
+                        (4 * o.t * over - 8 * o.det),
+                 t = o.t - step, most = 1e-9 * t;
+      o.t = t;
+      done &= (step <= most) & (-step <= most);
+    }
+    if ((done[0] & done[1] & done[2] & done[3]) != 0)
+      return;
+  }
+}
+
+/// The same as robust_rotation() of four. Cayley-Hamilton gives r without the stretch's inverse:
+/// r Π (s_i + s_j) = t cof f + (t² - i) f - f fᵀ f, i = (t² - |f|²) / 2.
+inline void rotation(const Matrix& f, const Invariants& of, Matrix& r) {
+  const Four* const m = f.m;
+  const Four t = of.t, second = 0.5 * (t * t - of.square), pairs = t * second - of.det,
+             inverse = 1 / pairs;
   Matrix right;
   transposed_product(f, f, right);
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j)
-      r.m[3 * i + j] = (t * c[3 * i + j] + (t * t - second) * m[3 * i + j] -
+      r.m[3 * i + j] = (t * of.cofactor.m[3 * i + j] + (t * t - second) * m[3 * i + j] -
                         (m[3 * i] * right.m[j] + m[3 * i + 1] * right.m[3 + j] +
                          m[3 * i + 2] * right.m[6 + j])) *
                        inverse;
@@ -175,27 +200,35 @@ inline void for_parts(std::size_t p, const Part& part) {
     }
 }
 
+/// What a group's evaluation begins with.
 template <std::size_t Nodes>
-void evaluate_group(const CorotationalGroup<Nodes>& g, const double* x,
-                    const CorotationalStrains<Nodes>& before, const CorotationalWeights& weights,
-                    CorotationalResult<Nodes>& result, CorotationalStrains<Nodes>& strains,
-                    CorotationalRotations& rotations) {
-  constexpr std::size_t points = CorotationalGroup<Nodes>::points;
-  const Four volume = four(g.volume), mu = four(g.mu), lambda = four(g.lambda);
-  Vector gradient[4], at[Nodes], first;
+struct GroupBegun {
+  Matrix f[CorotationalGroup<Nodes>::points], middle; ///< deformation gradients
+};
+
+/// Of barycentric coordinates.
+template <std::size_t Nodes>
+inline void gradients(const CorotationalGroup<Nodes>& g, Vector (&gradient)[4]) {
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k)
       gradient[k + 1].v[i] = four(g.gradient[k][i]);
     gradient[0].v[i] = -(gradient[1].v[i] + gradient[2].v[i] + gradient[3].v[i]);
   }
+}
+
+template <std::size_t Nodes>
+inline void begin_group(const CorotationalGroup<Nodes>& g, const double* x,
+                        GroupBegun<Nodes>& begun) {
+  constexpr std::size_t points = CorotationalGroup<Nodes>::points;
+  Vector gradient[4], at[Nodes], first;
+  gradients(g, gradient);
   gather(x, g.node[0], first);
   for (std::size_t a = 0; a < Nodes; ++a) {
     gather(x, g.node[a], at[a]);
     for (int i = 0; i < 3; ++i)
       at[a].v[i] -= first.v[i]; // for less rounding
   }
-
-  Matrix f[points], middle, r;
+  Matrix(&f)[points] = begun.f;
   for (std::size_t p = 0; p < points; ++p) {
     for (Four& m : f[p].m)
       m = Four{};
@@ -206,12 +239,26 @@ void evaluate_group(const CorotationalGroup<Nodes>& g, const double* x,
     });
   }
   for (int k = 0; k < 9; ++k) {
-    middle.m[k] = f[0].m[k];
+    begun.middle.m[k] = f[0].m[k];
     for (std::size_t p = 1; p < points; ++p)
-      middle.m[k] += f[p].m[k];
-    middle.m[k] *= 1.0 / points;
+      begun.middle.m[k] += f[p].m[k];
+    begun.middle.m[k] *= 1.0 / points;
   }
-  rotation(middle, r);
+}
+
+template <std::size_t Nodes>
+void end_group(const CorotationalGroup<Nodes>& g, const GroupBegun<Nodes>& begun,
+               const Invariants& of, const CorotationalStrains<Nodes>* before,
+               const CorotationalWeights& weights, CorotationalResult<Nodes>& result,
+               CorotationalStrains<Nodes>* strains) {
+  constexpr std::size_t points = CorotationalGroup<Nodes>::points;
+  const Four volume = four(g.volume), mu = four(g.mu), lambda = four(g.lambda);
+  const Matrix(&f)[points] = begun.f;
+  const Matrix& middle = begun.middle;
+  Vector gradient[4];
+  gradients(g, gradient);
+  Matrix r;
+  rotation(middle, of, r);
 
   // Strains and stresses.
   Matrix turned[points];
@@ -228,8 +275,8 @@ void evaluate_group(const CorotationalGroup<Nodes>& g, const double* x,
       for (int j = i; j < 3; ++j)
         now[p].m[entry[i][j]] =
             0.5 * (turned[p].m[3 * i + j] + turned[p].m[3 * j + i]) - (i == j ? 1 : 0);
-    for (std::size_t k = 0; k < 6; ++k)
-      four(strains.value[6 * p + k]) = now[p].m[k];
+    for (std::size_t k = 0; strains != nullptr && k < 6; ++k)
+      four(strains->value[6 * p + k]) = now[p].m[k];
   }
   // The energy of strains e, and its derivative by them; the bubble eliminated.
   const auto work = [&](const Symmetric(&e)[points], Symmetric(&force)[points]) {
@@ -282,7 +329,7 @@ void evaluate_group(const CorotationalGroup<Nodes>& g, const double* x,
     Symmetric change[points], of_change[points];
     for (std::size_t p = 0; p < points; ++p)
       for (std::size_t k = 0; k < 6; ++k)
-        change[p].m[k] = now[p].m[k] - four(before.value[6 * p + k]);
+        change[p].m[k] = now[p].m[k] - four(before->value[6 * p + k]);
     four(result.elastic) = work(now, stress).m[0];
     four(result.damping) = work(change, of_change).m[0];
     for (std::size_t p = 0; p < points; ++p)
@@ -343,26 +390,87 @@ void evaluate_group(const CorotationalGroup<Nodes>& g, const double* x,
     });
   }
   for (int k = 0; k < 9; ++k)
-    four(rotations.value[k]) = r.m[k];
+    four(result.rotation.value[k]) = r.m[k];
+}
+
+/// Four vectors, by lanes in place of by entries.
+inline void transpose(const Four (&rows)[4], Four (&lanes)[4]) {
+  const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+             b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+             c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+             d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  lanes[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  lanes[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  lanes[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  lanes[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+/// Adds a group's results to the sums of its nodes.
+template <std::size_t Nodes>
+inline void add_group(const CorotationalGroup<Nodes>& g, const CorotationalResult<Nodes>& result,
+                      const CorotationalPlaces<Nodes>& places, bool turns, double* sums) {
+  const std::size_t width = turns ? corotational_turned : corotational_force;
+  const Four volume = four(g.volume);
+  Four rows[4], force[4], first[4], rest[4];
+  if (turns) {
+    for (int k = 0; k < 4; ++k)
+      rows[k] = volume * four(result.rotation.value[1 + k]);
+    transpose(rows, first);
+    for (int k = 0; k < 4; ++k)
+      rows[k] = volume * four(result.rotation.value[5 + k]);
+    transpose(rows, rest);
+  }
+  for (std::size_t a = 0; a < Nodes; ++a) {
+    for (std::size_t i = 0; i < 3; ++i)
+      rows[i] = four(result.force[3 * a + i]);
+    rows[3] = volume * four(result.rotation.value[0]);
+    transpose(rows, force);
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      double* const to = sums + width * places[a][lane];
+      four(to) += force[lane];
+      if (turns) {
+        four(to + 4) += first[lane];
+        four(to + 8) += rest[lane];
+      }
+    }
+  }
 }
 
 template <std::size_t Nodes>
-void evaluate(const CorotationalGroup<Nodes>* groups, std::size_t count, const double* x,
-              const CorotationalStrains<Nodes>* before, const CorotationalWeights& weights,
-              CorotationalResult<Nodes>* results, CorotationalStrains<Nodes>* strains,
-              CorotationalRotations* rotations) {
-  for (std::size_t n = 0; n < count; ++n)
-    evaluate_group<Nodes>(groups[n], x, before[n], weights, results[n], strains[n], rotations[n]);
+void evaluate(const CorotationalGroup<Nodes>* groups, std::size_t count,
+              const CorotationalTask<Nodes>& task, CorotationalResult<Nodes>* results) {
+  GroupBegun<Nodes> begun[corotational_together];
+  Invariants of[corotational_together];
+  for (std::size_t n = 0; n < count; ++n) {
+    begin_group<Nodes>(groups[n], task.x, begun[n]);
+    invariants(begun[n].middle, of[n]);
+  }
+  sums_of_stretches(of, count);
+  for (std::size_t n = 0; n < count; ++n) {
+    end_group<Nodes>(groups[n], begun[n], of[n], task.before == nullptr ? nullptr : task.before + n,
+                     task.weights, results[n],
+                     task.strains == nullptr ? nullptr : task.strains + n);
+    add_group<Nodes>(groups[n], results[n], task.places[n], task.turns, task.sums);
+  }
 }
 
 inline void turn(double (*matrices)[4], std::size_t count) {
-  for (std::size_t n = 0; n < count; ++n) {
-    Matrix f, r;
-    for (std::size_t k = 0; k < 9; ++k)
-      f.m[k] = four(matrices[9 * n + k]);
-    rotation(f, r);
-    for (std::size_t k = 0; k < 9; ++k)
-      four(matrices[9 * n + k]) = r.m[k];
+  Matrix f[corotational_together], r;
+  Invariants of[corotational_together];
+  for (std::size_t begin = 0; begin < count; begin += corotational_together) {
+    const std::size_t together =
+        count - begin < corotational_together ? count - begin : corotational_together;
+    for (std::size_t n = 0; n < together; ++n) {
+      for (std::size_t k = 0; k < 9; ++k)
+        f[n].m[k] = four(matrices[9 * (begin + n) + k]);
+      invariants(f[n], of[n]);
+    }
+    sums_of_stretches(of, together);
+    for (std::size_t n = 0; n < together; ++n) {
+      rotation(f[n], of[n], r);
+      for (std::size_t k = 0; k < 9; ++k)
+        four(matrices[9 * (begin + n) + k]) = r.m[k];
+    }
   }
 }
 

@@ -5,6 +5,7 @@
 #include "base/cpu.h"
 #include "solid/corotational.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -35,17 +36,38 @@ struct CorotationalRotations {
 /// What is made of a group.
 template <std::size_t Nodes>
 struct CorotationalResult {
+  CorotationalRotations rotation;
   double force[3 * Nodes][4];    ///< on node a along i at 3 a + i
   double elastic[4], damping[4]; ///< energies, their weights left aside
 };
 
+inline constexpr std::size_t corotational_together = 16; ///< groups that are evaluated at once
+
+/// Numbers a node that a group's evaluation adds to: its force, then, with turns, the rotations of
+/// its elements times their volumes; the fourth is none without.
+inline constexpr std::size_t corotational_force = 4, corotational_turned = 12;
+
+/// Where a group's nodes have their sums.
+template <std::size_t Nodes>
+using CorotationalPlaces = std::array<std::array<std::uint16_t, 4>, Nodes>;
+
+/// What evaluations read and write beside their groups.
+template <std::size_t Nodes>
+struct CorotationalTask {
+  const double* x;                          ///< places of nodes
+  const CorotationalPlaces<Nodes>* places;  ///< of the groups
+  double* sums;                             ///< added to, as above
+  bool turns;                               ///< wanted
+  const CorotationalStrains<Nodes>* before; ///< of the groups; may be null without damping
+  CorotationalStrains<Nodes>* strains;      ///< of the groups; null: not wanted
+  CorotationalWeights weights;
+};
+
+/// Of `count` groups, corotational_together at most.
 template <std::size_t Nodes>
 using CorotationalEvaluate = void (*)(const CorotationalGroup<Nodes>* groups, std::size_t count,
-                                      const double* x, const CorotationalStrains<Nodes>* before,
-                                      const CorotationalWeights& weights,
-                                      CorotationalResult<Nodes>* results,
-                                      CorotationalStrains<Nodes>* strains,
-                                      CorotationalRotations* rotations);
+                                      const CorotationalTask<Nodes>& task,
+                                      CorotationalResult<Nodes>* results);
 
 struct CorotationalKernel {
   CorotationalEvaluate<4> linear;

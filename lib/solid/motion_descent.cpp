@@ -115,7 +115,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
     }
     const double s = search(o, now, direction, slope, next, context);
     if (!(s > 0)) {             // nothing to be gained, but perhaps with a matrix of here
-      o.evaluate(now, context); // frames, strains and bubbles are those of the last one
+      o.evaluate(now, context, true); // frames, strains and bubbles are those of the last one
       if (fresh)
         return;
       stuck = true;

@@ -14,11 +14,12 @@ MotionObjective::MotionObjective(const MotionBody& body, const MotionState& stat
     ahead_[axis] += h / (1 + body.drag[axis / 3] * h) * state.velocity[axis];
 }
 
-void MotionObjective::evaluate(MotionPoint& point, const Context& context) const {
+void MotionObjective::evaluate(MotionPoint& point, const Context& context, bool turns) const {
   ++evaluations_;
   point.gradient.resize(body_.axes());
   point.forces.resize(body_.axes());
-  const double energy = energy_.evaluate(point.at, {damping_, 1 / step_}, point.forces, context);
+  const double energy =
+      energy_.evaluate(point.at, {damping_, 1 / step_}, point.forces, context, turns);
   const auto [inertial, forced, work] = sums_of_axes<3>(
       context, body_.axes(), [&](std::size_t begin, std::size_t end, std::array<double, 3>& sums) {
         for (std::size_t axis = begin; axis < end; ++axis) {

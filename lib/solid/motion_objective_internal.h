@@ -24,8 +24,8 @@ public:
   MotionObjective(const MotionBody& body, const MotionState& state, SolidEnergy& energy, double h,
                   const SolidMotionOptions& options);
 
-  /// At point.at. Counted by evaluations().
-  void evaluate(MotionPoint& point, const Context& context) const;
+  /// At point.at, with what MotionQuick::turn() needs, if `turns`. Counted by evaluations().
+  void evaluate(MotionPoint& point, const Context& context, bool turns = false) const;
   /// The value where the state is, its elastic energy given.
   double value_of_standing(double elastic) const;
   /// A free body goes on with its momentum and the load's: moves it by what unfinished rounds took

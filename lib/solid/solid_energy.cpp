@@ -12,8 +12,12 @@
 
 namespace gewebe {
 
-SolidEnergy::SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs, SolidLaw law)
-    : body_(body), law_(law), springs_(springs), frames_(body.mesh, body.elements) {
+SolidEnergy::SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs,
+                         const SolidMotionOptions& options)
+    : body_(body), law_(options.law), springs_(springs),
+      frames_(body.mesh, body.elements,
+              {options.damping > 0 || options.reference,
+               options.law != SolidLaw::corotational || options.reference}) {
   if (law_ != SolidLaw::stable_neo_hookean)
     return;
   if (!body.mesh.middles.empty())
@@ -115,10 +119,10 @@ Vec3 SolidEnergy::settled_bubble(std::size_t t, const std::array<Vec3, 10>& u) c
 }
 
 double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,
-                             std::span<double> forces, const Context& context) {
+                             std::span<double> forces, const Context& context, bool turns) {
   const bool corotational = law_ == SolidLaw::corotational;
   double energy =
-      frames_.evaluate(at, {corotational ? 1.0 : 0.0, damping.by_strain}, forces, context);
+      frames_.evaluate(at, {corotational ? 1.0 : 0.0, damping.by_strain}, forces, context, turns);
   if (corotational) {
     elastic_ = frames_.elastic_energy();
   } else {

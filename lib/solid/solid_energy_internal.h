@@ -23,13 +23,15 @@ struct StepDamping {
 class SolidEnergy {
 public:
   /// \pre the body outlives this and stays where it is
-  SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs, SolidLaw law);
+  SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs,
+              const SolidMotionOptions& options);
 
   SolidLaw law() const noexcept { return law_; }
   /// The energy at the places `at`, and that of damping from the strains and lengths kept; -dE/dx
   /// into `forces`. Bubbles of Neo-Hookean elements are where they have least energy.
+  /// `turns`: node_rotations() are wanted.
   double evaluate(const Numbers& at, const StepDamping& damping, std::span<double> forces,
-                  const Context& context);
+                  const Context& context, bool turns = false);
   /// Strains and bubbles of the last evaluation are kept: damping counts from the ones, bubbles
   /// are sought from the others.
   void keep();
@@ -42,9 +44,11 @@ public:
 
   // As in the last evaluation.
   double elastic() const noexcept { return elastic_; }
+  /// \pre of the last one with turns
   void node_rotations(std::span<double> rotations, const Context& context) {
     frames_.node_rotations(rotations, context);
   }
+  /// \pre the law is Neo-Hookean, or the way is that of the reference
   ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
   Vec3 bubble(std::size_t t) const { return new_bubbles_.empty() ? Vec3{} : new_bubbles_[t]; }
   /// Of the nodes of tetrahedron t.

@@ -64,7 +64,7 @@ struct SolidMotion::State {
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
-        energy(body, net.springs, with.law) {
+        energy(body, net.springs, with) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
@@ -144,12 +144,12 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] != 0)
       found.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
-  objective.evaluate(found, context);
+  objective.evaluate(found, context, true);
   if (!(found.value <= objective.value_of_standing(s.elastic))) {
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       if (s.now.held[axis] == 0)
         found.at[axis] = s.now.place[axis];
-    objective.evaluate(found, context);
+    objective.evaluate(found, context, true);
   }
   if (s.options.reference)
     descend_as_reference(objective, found, s.tangent, step, context);
