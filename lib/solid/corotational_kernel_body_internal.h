@@ -102,8 +102,8 @@ struct Invariants {
 inline void invariants(const Matrix& f, Invariants& of) {
   const Four* const m = f.m;
   Four* const c = of.cofactor.m;
-  for (int i = 0; i < 3; ++i) {
-    const int k = 3 * ((i + 1) % 3), l = 3 * ((i + 2) % 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t k = 3 * ((i + 1) % 3), l = 3 * ((i + 2) % 3);
     c[3 * i] = m[k + 1] * m[l + 2] - m[k + 2] * m[l + 1];
     c[3 * i + 1] = m[k + 2] * m[l] - m[k] * m[l + 2];
     c[3 * i + 2] = m[k] * m[l + 1] - m[k + 1] * m[l];

@@ -26,39 +26,59 @@ SingleFactor::SingleFactor(const Factor& factor) {
   for (const std::int64_t p : v.permutation)
     permutation_.push_back(static_cast<std::uint32_t>(p));
   x_.resize(order());
-  copy_values(v);
+  std::vector<std::size_t> value_start, square_start;
   for (std::size_t k = 0; k < count; ++k) {
     const auto first = static_cast<std::size_t>(v.super[k]),
                columns = static_cast<std::size_t>(v.super[k + 1]) - first,
                rows = static_cast<std::size_t>(v.pi[k + 1] - v.pi[k]);
-    fronts_.push_back(
-        {values_.data() + v.px[k], scale_.data() + first, inverse_.data() + first, rows, columns});
+    value_start.push_back(values_.size());
+    square_start.push_back(squares_.size());
+    fronts_.push_back({nullptr, nullptr, rows, columns});
+    copy_front(fronts_.back(), v.x.data() + v.px[k]);
     first_.push_back(first);
     start_.push_back(row_.size());
     for (std::size_t r = columns; r < rows; ++r)
       row_.push_back(static_cast<std::uint32_t>(v.s[static_cast<std::size_t>(v.pi[k]) + r]));
   }
   start_.push_back(row_.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    fronts_[k].l = values_.data() + value_start[k];
+    fronts_[k].squares = squares_.data() + square_start[k];
+  }
   make_branches();
 }
 
-void SingleFactor::copy_values(const FactorView& v) {
-  values_.resize(v.x.size());
-  for (std::size_t k = 0; k + 1 < v.super.size(); ++k) {
-    const auto columns = static_cast<std::size_t>(v.super[k + 1] - v.super[k]),
-               rows = static_cast<std::size_t>(v.pi[k + 1] - v.pi[k]);
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::size_t at = static_cast<std::size_t>(v.px[k]) + c * rows;
-      const std::span below = v.x.subspan(at + c + 1, rows - c - 1);
+/// The panels of a front, whose entry (r, c) is l[c · rows + r].
+void SingleFactor::copy_front(SingleFront& f, const double* l) {
+  const auto entry = [&](std::size_t r, std::size_t c) { return l[c * f.rows + r]; };
+  for (std::size_t c = 0; c < f.columns; c += f.width(c)) {
+    const std::size_t width = f.width(c), own = f.own(c), steps = f.steps(c), first = c + own;
+    // Its square's inverse, column by column.
+    std::vector<double> inverse(width * width);
+    for (std::size_t k = 0; k < own; ++k)
+      for (std::size_t r = k; r < own; ++r) {
+        double sum = r == k ? 1 : 0;
+        for (std::size_t m = k; m < r; ++m)
+          sum -= entry(c + r, c + m) * inverse[k * width + m];
+        inverse[k * width + r] = sum / entry(c + r, c + r);
+      }
+    for (std::size_t k = 0; k < width * width; ++k)
+      squares_.push_back(static_cast<float>(inverse[k]));
+    for (std::size_t k = 0; k < width * width; ++k)
+      squares_.push_back(static_cast<float>(inverse[k % width * width + k / width]));
+    const std::size_t at = values_.size();
+    values_.resize(at + SingleFront::step * width * steps);
+    for (std::size_t k = 0; k < width; ++k) {
       double largest = 0;
-      for (const double l : below)
-        largest = std::max(largest, std::abs(l));
+      for (std::size_t r = first; k < own && r < f.rows; ++r)
+        largest = std::max(largest, std::abs(entry(r, c + k)));
       const auto scale = static_cast<float>(largest / most);
-      scale_.push_back(scale);
-      inverse_.push_back(static_cast<float>(1 / v.x[at + c]));
-      for (std::size_t r = 0; r < below.size() && scale > 0; ++r)
-        values_[at + c + 1 + r] = static_cast<std::int16_t>(
-            std::lround(std::clamp(below[r] / static_cast<double>(scale), -most, most)));
+      squares_.push_back(scale);
+      for (std::size_t r = first; scale > 0 && r < f.rows; ++r)
+        values_[at + ((r - first) / SingleFront::step * width + k) * SingleFront::step +
+                (r - first) % SingleFront::step] =
+            static_cast<std::int16_t>(
+                std::lround(std::clamp(entry(r, c + k) / static_cast<double>(scale), -most, most)));
     }
   }
 }
@@ -112,28 +132,33 @@ void SingleFactor::forward(Branch& branch, const SingleKernel& kernel) {
     for (const std::uint32_t row : rows_below(before.fronts.back()))
       sums[row] += before.sums[row - first(before)];
   }
-  std::vector<float> below;
+  std::vector<float> rows;
   for (const std::uint32_t k : branch.fronts) {
     const SingleFront& f = fronts_[k];
-    for (std::size_t r = first_[k]; r < first_[k] + f.columns; ++r)
-      x_[r] += sums[r];
-    below.assign(f.rows - f.columns, 0.0F);
-    kernel.forward(f, x_.data() + first_[k], below.data());
-    const std::span rows = rows_below(k);
+    rows.assign(f.rows + SingleFront::step, 0.0F);
+    for (std::size_t r = 0; r < f.columns; ++r)
+      rows[r] = x_[first_[k] + r] + sums[first_[k] + r];
+    kernel.forward(f, rows.data());
+    std::copy_n(rows.begin(), f.columns, x_.begin() + static_cast<std::ptrdiff_t>(first_[k]));
+    const std::span below = rows_below(k);
     for (std::size_t r = 0; r < below.size(); ++r)
-      sums[rows[r]] += below[r];
+      sums[below[r]] += rows[f.columns + r];
   }
 }
 
 void SingleFactor::backward(const Branch& branch, const SingleKernel& kernel) {
-  std::vector<float> below;
+  std::vector<float> rows;
   for (std::size_t n = branch.fronts.size(); n-- > 0;) {
     const std::uint32_t k = branch.fronts[n];
-    const std::span rows = rows_below(k);
-    below.resize(rows.size());
+    const SingleFront& f = fronts_[k];
+    const std::span below = rows_below(k);
+    rows.assign(f.rows + SingleFront::step, 0.0F);
+    const auto own = x_.begin() + static_cast<std::ptrdiff_t>(first_[k]);
+    std::copy_n(own, f.columns, rows.begin());
     for (std::size_t r = 0; r < below.size(); ++r)
-      below[r] = x_[rows[r]];
-    kernel.backward(fronts_[k], x_.data() + first_[k], below.data());
+      rows[f.columns + r] = x_[below[r]];
+    kernel.backward(f, rows.data());
+    std::copy_n(rows.begin(), f.columns, own);
   }
 }
 

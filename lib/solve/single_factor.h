@@ -3,10 +3,10 @@
 // subtrees on several threads. What one right-hand side costs is the memory to read: a quarter of
 // that of the factor.
 //
-// An entry below the diagonal is a whole number times a scale of its column, whose largest one is
-// ±32767 of them; diagonals are single precision. Beams of solid/solid_motion.h, rounds a step:
-// 2.68 with entries in single precision as with 16 bits, 2.65 with 12, 7.3 with 8 (3.8, if each 32
-// rows of a column have a scale of their own).
+// An entry below its panel's square is a whole number times a scale of its column, whose largest
+// one is ±32767 of them; squares are inverted, in single precision. Beams of solid/solid_motion.h,
+// rounds a step: 2.68 with entries in single precision as with 16 bits, 2.65 with 12, 7.3 with 8
+// (3.8, if each 32 rows of a column have a scale of their own).
 
 #include "base/context.h"
 #include "solve/factor.h"
@@ -18,12 +18,22 @@
 
 namespace gewebe {
 
-/// A front's columns, one behind the other, `rows` entries each, its own rows first.
+/// A front's columns, in panels of eight, the last ones four: of each panel the rows below it,
+/// eight at a time, column by column, so that memory is read straight on. What fills them up is 0.
 struct SingleFront {
-  const std::int16_t* l = nullptr; ///< below the diagonal, over its column's scale
-  const float* scale = nullptr;
-  const float* inverse = nullptr; ///< of the diagonal
+  const std::int16_t* l = nullptr; ///< over its column's scale
+  /// Of each panel the inverse of its own square by columns, the same by rows, and the scales of
+  /// its columns.
+  const float* squares = nullptr;
   std::size_t rows = 0, columns = 0;
+
+  static constexpr std::size_t step = 8; ///< rows
+  /// Of a panel that begins with column c.
+  std::size_t width(std::size_t c) const noexcept { return columns - c > 4 ? 8 : 4; }
+  std::size_t own(std::size_t c) const noexcept { ///< columns that don't fill up
+    return columns - c < width(c) ? columns - c : width(c);
+  }
+  std::size_t steps(std::size_t c) const noexcept { return (rows - c - own(c) + step - 1) / step; }
 };
 
 struct SingleKernel;
@@ -47,7 +57,7 @@ private:
     std::vector<std::uint32_t> branches; ///< those that end in it, ascending
     std::vector<float> sums; ///< what they and its fronts contribute to rows from its first one on
   };
-  void copy_values(const FactorView& view);
+  void copy_front(SingleFront& front, const double* l);
   void make_branches();
   void forward(Branch& branch, const SingleKernel& kernel);
   void backward(const Branch& branch, const SingleKernel& kernel);
@@ -57,7 +67,7 @@ private:
   }
 
   std::vector<std::int16_t> values_;
-  std::vector<float> scale_, inverse_; ///< by column
+  std::vector<float> squares_;
   std::vector<SingleFront> fronts_;
   std::vector<std::size_t> first_; ///< own row of each front
   std::vector<std::size_t> start_; ///< of its rows below, in

@@ -7,11 +7,14 @@
 
 namespace gewebe {
 
+/// Of a front's rows, its own first, with SingleFront::step numbers behind them that are there to
+/// be read and written.
 struct SingleKernel {
-  /// own = L⁻¹ own of the front's own rows; the rows below lose what that contributes.
-  void (*forward)(const SingleFront& front, float* own, float* below);
-  /// own = L⁻ᵀ (own - what the rows below contribute).
-  void (*backward)(const SingleFront& front, float* own, const float* below);
+  /// Its own rows become L⁻¹ of them; those below lose what that contributes.
+  void (*forward)(const SingleFront& front, float* rows);
+  /// Its own rows become L⁻ᵀ of them less what those below contribute. \pre the numbers behind are
+  /// 0
+  void (*backward)(const SingleFront& front, float* rows);
 };
 
 extern const SingleKernel single_kernel_baseline, single_kernel_avx2;

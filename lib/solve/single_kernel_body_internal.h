@@ -36,86 +36,124 @@ inline void read(const std::int16_t* at, Eight& to) {
 #endif
 }
 
-/// y loses `Columns` columns, `step` entries from one to the next, times x.
-template <std::size_t Columns>
-inline void lose(const std::int16_t* l, std::size_t step, const float* x, std::size_t count,
-                 float* y) {
+/// The sums of eight vectors.
+inline void sums_of(const Eight (&v)[8], float* sums) {
+  Eight two[4], four[2];
+  for (std::size_t k = 0; k < 4; ++k)
+    two[k] = __builtin_shufflevector(v[2 * k], v[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14) +
+             __builtin_shufflevector(v[2 * k], v[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+  for (std::size_t k = 0; k < 2; ++k)
+    four[k] = __builtin_shufflevector(two[2 * k], two[2 * k + 1], 0, 1, 8, 9, 4, 5, 12, 13) +
+              __builtin_shufflevector(two[2 * k], two[2 * k + 1], 2, 3, 10, 11, 6, 7, 14, 15);
+  eight(sums) = __builtin_shufflevector(four[0], four[1], 0, 1, 2, 3, 8, 9, 10, 11) +
+                __builtin_shufflevector(four[0], four[1], 4, 5, 6, 7, 12, 13, 14, 15);
+}
+
+/// to = a square matrix by columns, times x.
+template <std::size_t Width>
+inline void times(const float* square, const float* x, float* to) {
+  float even[Width]{}, odd[Width]{};
+  for (std::size_t c = 0; c < Width; c += 2)
+    for (std::size_t r = 0; r < Width; ++r) {
+      even[r] += square[c * Width + r] * x[c];
+      odd[r] += square[(c + 1) * Width + r] * x[c + 1];
+    }
+  for (std::size_t r = 0; r < Width; ++r)
+    to[r] = even[r] + odd[r];
+}
+
+/// Numbers of a panel in `squares`.
+template <std::size_t Width>
+inline constexpr std::size_t of_square = 2 * Width * Width + Width;
+
+template <std::size_t Width>
+inline void forward_panel(const SingleFront& f, std::size_t c, const std::int16_t*& l,
+                          const float*& square, float* rows) {
+  const std::size_t own = f.own(c), steps = f.steps(c);
+  const float* const scale = square + 2 * Width * Width;
+  float x[Width]{}, z[Width];
+  for (std::size_t k = 0; k < own; ++k)
+    x[k] = rows[c + k];
+  times<Width>(square, x, z);
+  for (std::size_t k = 0; k < own; ++k)
+    rows[c + k] = z[k];
+  for (std::size_t k = 0; k < Width; ++k)
+    z[k] *= scale[k];
+  float* y = rows + c + own;
   Eight entries;
-  std::size_t r = 0;
-  for (; r + 8 <= count; r += 8) {
-    Eight sum = eight(y + r);
-    for (std::size_t c = 0; c < Columns; ++c) {
-      read(l + c * step + r, entries);
-      sum -= entries * x[c];
+  for (std::size_t n = 0; n < steps; ++n) {
+    Eight even = eight(y), odd{};
+    for (std::size_t k = 0; k < Width; k += 2) {
+      read(l + 8 * k, entries);
+      even -= entries * z[k];
+      read(l + 8 * k + 8, entries);
+      odd += entries * z[k + 1];
     }
-    eight(y + r) = sum;
+    eight(y) = even - odd;
+    l += 8 * Width;
+    y += 8;
   }
-  for (; r < count; ++r)
-    for (std::size_t c = 0; c < Columns; ++c)
-      y[r] -= static_cast<float>(l[c * step + r]) * x[c];
+  square += of_square<Width>;
 }
 
-/// sums += columns · y
-template <std::size_t Columns>
-inline void gain(const std::int16_t* l, std::size_t step, const float* y, std::size_t count,
-                 float* sums) {
-  Eight sum[Columns]{}, entries;
-  std::size_t r = 0;
-  for (; r + 8 <= count; r += 8)
-    for (std::size_t c = 0; c < Columns; ++c) {
-      read(l + c * step + r, entries);
-      sum[c] += entries * eight(y + r);
+/// `l` and `square` are those behind the panel.
+template <std::size_t Width>
+inline void backward_panel(const SingleFront& f, std::size_t c, const std::int16_t*& l,
+                           const float*& square, float* rows) {
+  const std::size_t own = f.own(c), steps = f.steps(c);
+  square -= of_square<Width>;
+  l -= 8 * Width * steps;
+  const float* const scale = square + 2 * Width * Width;
+  const float* y = rows + c + own;
+  const std::int16_t* at = l;
+  Eight sum[8]{}, entries;
+  for (std::size_t n = 0; n < steps; ++n) {
+    const Eight values = eight(y);
+    for (std::size_t k = 0; k < Width; ++k) {
+      read(at + 8 * k, entries);
+      sum[k] += entries * values;
     }
-  for (std::size_t c = 0; c < Columns; ++c) {
-    const Eight& s = sum[c];
-    float rest = 0;
-    for (std::size_t k = r; k < count; ++k)
-      rest += static_cast<float>(l[c * step + k]) * y[k];
-    sums[c] += ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7])) + rest;
+    at += 8 * Width;
+    y += 8;
   }
+  float sums[8], x[Width]{}, z[Width];
+  sums_of(sum, sums);
+  for (std::size_t k = 0; k < own; ++k)
+    x[k] = rows[c + k] - sums[k] * scale[k];
+  times<Width>(square + Width * Width, x, z);
+  for (std::size_t k = 0; k < own; ++k)
+    rows[c + k] = z[k];
 }
 
-template <std::size_t Columns>
-inline void forward_some(const SingleFront& f, std::size_t c, float* own, float* below) {
-  const std::int16_t* const l = f.l + c * f.rows;
-  float x[Columns];
-  for (std::size_t k = 0; k < Columns; ++k) {
-    for (std::size_t j = 0; j < k; ++j)
-      own[c + k] -= static_cast<float>(l[j * f.rows + c + k]) * x[j];
-    own[c + k] *= f.inverse[c + k];
-    x[k] = own[c + k] * f.scale[c + k];
+inline void forward(const SingleFront& f, float* rows) {
+  const std::int16_t* l = f.l;
+  const float* square = f.squares;
+  for (std::size_t c = 0; c < f.columns;)
+    if (f.width(c) == 8) {
+      forward_panel<8>(f, c, l, square, rows);
+      c += 8;
+    } else {
+      forward_panel<4>(f, c, l, square, rows);
+      c += 4;
+    }
+}
+
+inline void backward(const SingleFront& f, float* rows) {
+  const std::int16_t* l = f.l;
+  const float* square = f.squares;
+  std::size_t c = 0; // behind the last panel
+  for (; c < f.columns; c += f.width(c)) {
+    l += 8 * f.width(c) * f.steps(c);
+    square += f.width(c) == 8 ? of_square<8> : of_square<4>;
   }
-  lose<Columns>(l + c + Columns, f.rows, x, f.columns - c - Columns, own + c + Columns);
-  lose<Columns>(l + f.columns, f.rows, x, f.rows - f.columns, below);
-}
-
-template <std::size_t Columns>
-inline void backward_some(const SingleFront& f, std::size_t c, float* own, const float* below) {
-  const std::int16_t* const l = f.l + c * f.rows;
-  float sums[Columns]{};
-  gain<Columns>(l + f.columns, f.rows, below, f.rows - f.columns, sums);
-  gain<Columns>(l + c + Columns, f.rows, own + c + Columns, f.columns - c - Columns, sums);
-  for (std::size_t k = Columns; k-- > 0;) {
-    for (std::size_t j = k + 1; j < Columns; ++j)
-      sums[k] += static_cast<float>(l[k * f.rows + c + j]) * own[c + j];
-    own[c + k] = (own[c + k] - sums[k] * f.scale[c + k]) * f.inverse[c + k];
+  while (c > 0) {
+    const bool narrow = c % 8 == 4; // as none but the last one is
+    c -= narrow ? 4 : 8;
+    if (narrow)
+      backward_panel<4>(f, c, l, square, rows);
+    else
+      backward_panel<8>(f, c, l, square, rows);
   }
-}
-
-inline void forward(const SingleFront& f, float* own, float* below) {
-  std::size_t c = 0;
-  for (; c + 4 <= f.columns; c += 4)
-    forward_some<4>(f, c, own, below);
-  for (; c < f.columns; ++c)
-    forward_some<1>(f, c, own, below);
-}
-
-inline void backward(const SingleFront& f, float* own, const float* below) {
-  std::size_t c = f.columns;
-  for (; c % 4 != 0; --c)
-    backward_some<1>(f, c - 1, own, below);
-  for (; c > 0; c -= 4)
-    backward_some<4>(f, c - 4, own, below);
 }
 
 } // namespace
