@@ -68,7 +68,8 @@ double error_of(const StiffnessMatrix& matrix, const std::vector<double>& x) {
   return backward_error(matrix, stiffness_norm(matrix), x, some_load(matrix.order()));
 }
 
-/// In a process of its own, whose memory above that of one that does nothing is told.
+/// In a process of its own, whose memory above that of one that does nothing is told. The threads
+/// of this one would not go along, and those of the other would be missing: so this one has none.
 std::optional<Measured> apart(const std::function<Measured()>& work) {
   const auto child = [](const std::function<Measured()>& measure, rusage& used) {
     std::array<int, 2> ends{};
@@ -167,7 +168,7 @@ Model spleen(const std::string& surface, const std::string& programs, double cel
   if (std::system(call.c_str()) != 0)
     throw Error(surface, "is not filled by exp2ela");
   Input input(path);
-  return read_ela(input, {});
+  return read_ela(input, with_threads(1));
 }
 
 Model box(std::size_t tetrahedra) {
@@ -175,7 +176,7 @@ Model box(std::size_t tetrahedra) {
       static_cast<std::uint32_t>(std::cbrt(static_cast<double>(tetrahedra) / 6)); // per cube
   SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 5000, 1, 0.2, 0.45}};
-  Model model = solid_model(test::box_tetrahedra(side, side, side), options, {});
+  Model model = solid_model(test::box_tetrahedra(side, side, side), options, with_threads(1));
   for (Node& node : model.nodes)
     if (node.position.z == 0)
       node.fixed = fixed_all;
@@ -190,7 +191,7 @@ struct Size {
 };
 
 void bench(const Size& size, const Model& model, const std::string& folder) {
-  const StiffnessMatrix matrix = stiffness_matrix(model);
+  const StiffnessMatrix matrix = stiffness_matrix(model, {}, with_threads(1));
   const std::string path = folder + "/matrix";
   write_matrix(path, matrix);
   struct Line {
