@@ -386,6 +386,8 @@ TEST(StepLatency, QuantilesAreThoseOfTheSteps) {
   EXPECT_LE(latency.quantile(0.5), latency.quantile(0.99));
   EXPECT_LE(latency.quantile(0.999), latency.largest());
   EXPECT_EQ(latency.quantile(1), latency.largest());
+  EXPECT_GE(latency.sum(), latency.largest());
+  EXPECT_LE(latency.sum(), 1000 * latency.largest());
   StepLatency strict(1e15);
   strict.line_arrived();
   strict.answered(1, 0);

@@ -82,6 +82,10 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
   stats.seconds("step_p99", latency.quantile(0.99));
   stats.seconds("step_p999", latency.quantile(0.999));
   stats.seconds("step_largest", latency.largest());
+  stats.seconds("steps", latency.sum());
+  // Of the clock, as all that stands here; nothing where no step took any time.
+  if (latency.sum() > 0)
+    stats.seconds("real_time_factor", scene.simulation().time() / latency.sum());
 }
 
 void require_verified(const ElastostaticCounts& errors, double tolerance) {

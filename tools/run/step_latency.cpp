@@ -41,6 +41,7 @@ void StepLatency::answered(std::uint64_t step, double time) {
   ++steps_;
   ++counts_[bin(latency)];
   largest_ = std::max(largest_, latency);
+  sum_ += latency;
   missed_ += latency * rate_ > 1 ? 1 : 0;
   if (log_)
     log_->write(std::to_string(step) + "," + number_text(time) + "," + number_text(latency) + "\n");

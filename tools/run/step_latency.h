@@ -28,6 +28,7 @@ public:
   std::uint64_t steps() const noexcept { return steps_; }
   std::uint64_t missed() const noexcept { return missed_; } ///< that took longer than 1/rate
   double largest() const noexcept { return largest_; }      ///< s
+  double sum() const noexcept { return sum_; }              ///< s
   /// The latency that this part of the steps did not exceed, to 0.1 %; 0 before the first step.
   /// \pre 0 <= part <= 1
   double quantile(double part) const;
@@ -38,7 +39,7 @@ private:
   static double now();
   static std::size_t bin(double seconds);
 
-  double rate_, arrived_ = 0, answered_ = 0, largest_ = 0;
+  double rate_, arrived_ = 0, answered_ = 0, largest_ = 0, sum_ = 0;
   std::uint64_t steps_ = 0, missed_ = 0;
   std::vector<std::uint64_t> counts_; ///< by power of two and part of it
   std::optional<Output> log_;
