@@ -38,10 +38,10 @@ void MotionObjective::evaluate(MotionPoint& point, const Context& context, bool 
                  1e-13 * (std::abs(energy) + std::abs(inertial) + std::abs(work));
 }
 
-double MotionObjective::value_of_standing(double elastic) const {
-  double value = elastic - work_of_load(body_, state_.load, state_.place);
+double MotionObjective::value_of_shape(const Numbers& at, double elastic) const {
+  double value = elastic - work_of_load(body_, state_.load, at);
   for (std::size_t axis = 0; axis < body_.axes(); ++axis)
-    if (const double off = state_.place[axis] - ahead_[axis]; state_.held[axis] == 0)
+    if (const double off = at[axis] - ahead_[axis]; state_.held[axis] == 0)
       value += mass_[axis / 3] * off * off / 2;
   return value;
 }

@@ -26,8 +26,8 @@ public:
 
   /// At point.at, with what MotionQuick::turn() needs, if `turns`. Counted by evaluations().
   void evaluate(MotionPoint& point, const Context& context, bool turns = false) const;
-  /// The value where the state is, its elastic energy given.
-  double value_of_standing(double elastic) const;
+  /// The value of the state's shape, moved without a turn to `at`, its elastic energy given.
+  double value_of_shape(const Numbers& at, double elastic) const;
   /// A free body goes on with its momentum and the load's: moves it by what unfinished rounds took
   /// or gave.
   void keep_momentum(MotionPoint& point) const;

@@ -145,10 +145,16 @@ SolidStep SolidMotion::step(double h, const Context& context) {
     if (s.now.held[axis] != 0)
       found.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
   objective.evaluate(found, context, true);
-  if (!(found.value <= objective.value_of_standing(s.elastic))) {
+  // The shape of now, moved as its momentum has it: what rounds get below leaves speeds of the body
+  // as a whole to themselves.
+  MotionPoint stiff;
+  stiff.at = s.now.place;
+  if (!s.now.any_held())
+    objective.keep_momentum(stiff);
+  if (!(found.value <= objective.value_of_shape(stiff.at, s.elastic))) {
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       if (s.now.held[axis] == 0)
-        found.at[axis] = s.now.place[axis];
+        found.at[axis] = stiff.at[axis];
     objective.evaluate(found, context, true);
   }
   if (s.options.reference)
@@ -175,10 +181,11 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.now.place = std::move(found.at);
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
   if (!s.moved)
-    step.limited =
-        limit_energy(s.body, s.now, s.elastic, energy,
-                     1e-12 * (motion_energy(s.body, s.now.velocity) + s.elastic + std::abs(energy) +
-                              std::abs(work_of_load(s.body, s.now.load, s.now.place))));
+    step.limited = limit_energy(
+        s.body, s.now, s.elastic, energy,
+        s.energy.unsure_at_rest() +
+            1e-12 * (motion_energy(s.body, s.now.velocity) + s.elastic + std::abs(energy) +
+                     std::abs(work_of_load(s.body, s.now.load, s.now.place))));
   step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;

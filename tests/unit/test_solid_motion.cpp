@@ -371,6 +371,32 @@ TEST(SolidMotion, EnergyThatBucklingWouldAddIsTakenBack) {
   EXPECT_GT(limited, 0);
 }
 
+/// Speeds from which the energy is taken that they would add are not those of the body as a whole.
+TEST(SolidMotion, UnfinishedStepsKeepTheMomentumOfFreeBodies) {
+  const TetMesh m = test::box_tetrahedra(3, 2, 2, 5);
+  SolidMotionOptions options;
+  options.max_rounds = 1;
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0.45, 1e-3}}, options);
+    Numbers load = random_numbers(3 * m.points.size(), 3e5 * moving.masses()[20], random);
+    moving.set_load(load);
+    moving.set_state(random_numbers(load.size(), 0.5, random),
+                     random_numbers(load.size(), 300, random));
+    for (int n = 0; n < 8; ++n) {
+      const double h = n % 2 == 0 ? 0.02 : 0.2;
+      Vec3 expected = momentum(moving)[0];
+      double size = 0;
+      for (std::size_t axis = 0; axis < load.size(); ++axis) {
+        expected[static_cast<int>(axis % 3)] += h * load[axis];
+        size += h * std::abs(load[axis]);
+      }
+      (void)moving.step(h, {});
+      EXPECT_LT(norm(momentum(moving)[0] - expected), 1e-8 * size) << seed << ' ' << n;
+    }
+  }
+}
+
 struct Swings {
   double frequency, decay; ///< Hz, 1/s
 };

@@ -1,0 +1,353 @@
+// Strains solids in motion: random small bodies of either law and order, nu up to 0.49, E over
+// four decades, that are thrown, loaded, held and let go in steps of 1e-5 to 1 s, some with damping
+// and drag, some with fewer rounds than they want.
+//
+// Of every step: energy (of motion, of elements and of the load) doesn't grow, by more than 1e-10
+// of what it is made of, where nothing moved held nodes; a body that is held nowhere has the
+// momentum that load and drag leave it, to 1e-9 of the sum over its nodes; no number is lost.
+//
+// Then bodies whose nodes are anywhere in their box, let go: no number is lost, energy falls, in
+// each step and in the end. Where they end is counted, not judged: at rest in their own shape;
+// elsewhere with every element right side out (wound up, a minimum of their own); or with elements
+// inside out (corotational ones whose rotations jump).
+//
+// Arguments: number of bodies (default 1500, of 40 steps), of scrambled states for each law and
+// order (default 24; a quarter of Neo-Hookean ones).
+
+#include "solid/solid_motion.h"
+#include "tests/unit/larger.h"
+#include "tests/unit/tet_fixtures.h"
+#include "tetrahedra/order.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <random>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using namespace gewebe;
+using Numbers = std::vector<double>;
+
+constexpr int steps_of_body = 40;
+constexpr double energy_tolerance = 1e-10, momentum_tolerance = 1e-9;
+constexpr double cell = 5; // mm
+
+struct Chance {
+  std::mt19937 random;
+
+  double from(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
+  }
+  double over_decades(double low, double high) {
+    return std::exp(from(std::log(low), std::log(high)));
+  }
+  bool one_in(std::uint32_t n) { return random() % n == 0; }
+  Numbers numbers(std::size_t count, double by) {
+    Numbers all(count);
+    for (double& one : all)
+      one = from(-by, by);
+    return all;
+  }
+};
+
+struct Kind {
+  SolidLaw law;
+  bool quadratic;
+
+  bool slow() const { return law != SolidLaw::corotational && quadratic; }
+  const char* name() const {
+    return law == SolidLaw::corotational ? quadratic ? "corotational quadratic" : "corotational"
+           : quadratic                   ? "Neo-Hookean quadratic"
+                                         : "Neo-Hookean";
+  }
+};
+constexpr std::array<Kind, 4> kinds = {{{SolidLaw::corotational, false},
+                                        {SolidLaw::corotational, true},
+                                        {SolidLaw::stable_neo_hookean, false},
+                                        {SolidLaw::stable_neo_hookean, true}}};
+
+/// A box whose inner nodes, and those of its faces within them, are shifted.
+TetMesh some_mesh(Chance& chance, const Kind& kind) {
+  const std::uint32_t most = kind.slow() ? 1 : kind.quadratic ? 2 : 3;
+  std::array<std::uint32_t, 3> size{};
+  for (std::uint32_t& n : size)
+    n = 1 + static_cast<std::uint32_t>(chance.random()) % most;
+  TetMesh mesh = test::box_tetrahedra(size[0], size[1], size[2], cell);
+  for (Vec3& p : mesh.points)
+    for (int a = 0; a < 3; ++a)
+      if (p[a] > 0 && p[a] < cell * size[static_cast<std::size_t>(a)])
+        p[a] += chance.from(-0.15, 0.15) * cell;
+  if (kind.quadratic)
+    make_quadratic(mesh);
+  return mesh;
+}
+
+std::vector<std::uint8_t> held_end(const TetMesh& mesh) {
+  std::vector<std::uint8_t> held;
+  for (const Vec3& p : mesh.points)
+    held.insert(held.end(), 3, p.x == 0 ? 1 : 0);
+  return held;
+}
+
+bool sound(std::span<const double> numbers) {
+  return std::ranges::all_of(numbers, [](double n) { return std::isfinite(n); });
+}
+
+double energy(const SolidMotion& body) {
+  return body.kinetic_energy() + body.potential_energy();
+}
+
+struct Momentum {
+  Vec3 sum;
+  double size = 0; ///< of its parts
+};
+Momentum momentum(const SolidMotion& body) {
+  Momentum all;
+  for (std::size_t i = 0; i < body.masses().size(); ++i) {
+    const auto v = body.velocity().subspan(3 * i, 3);
+    const Vec3 part = body.masses()[i] * Vec3{v[0], v[1], v[2]};
+    all.sum += part;
+    all.size += norm(part);
+  }
+  return all;
+}
+
+struct Totals {
+  std::uint64_t bodies = 0, steps = 0, limited = 0, unfinished = 0, failed = 0;
+  double growth = 0, momentum = 0; ///< largest, over what they are made of
+};
+
+/// A body with what acts on it.
+struct Thrown {
+  Kind kind;
+  TetMesh mesh;
+  SolidMotionOptions options;
+  SolidMotion body;
+  std::vector<std::uint8_t> held;
+  Numbers load;
+  double size = 0; ///< of forces on an axis
+  /// What rounding of strains and of places is told against.
+  double rest_energy = 0, rest_momentum = 0;
+
+  Thrown(Chance& chance, const Kind& of)
+      : Thrown(chance, of, some_mesh(chance, of), some(chance, of)) {}
+
+  /// Something else acts from now on.
+  void change(Chance& chance) {
+    const std::size_t axes = held.size();
+    switch (chance.random() % 4) {
+    case 0:
+      std::ranges::fill(load, 0.0);
+      break;
+    case 1:
+      load = chance.numbers(axes, size);
+      break;
+    case 2:
+      held = chance.one_in(2) ? held_end(mesh) : std::vector<std::uint8_t>(axes);
+      body.hold(held);
+      break;
+    default:
+      body.set_state(chance.numbers(axes, 0.1 * cell),
+                     chance.numbers(axes, chance.over_decades(1, 1000)));
+      body.hold(held); // what is held doesn't move
+    }
+    body.set_load(load);
+  }
+  bool any_held() const {
+    return std::ranges::any_of(held, [](std::uint8_t h) { return h != 0; });
+  }
+
+private:
+  static SolidMotionOptions some(Chance& chance, const Kind& kind) {
+    SolidMotionOptions options;
+    options.law = kind.law;
+    options.drag = chance.one_in(3) ? chance.over_decades(0.1, 100) : 0;
+    options.damping = chance.one_in(3) ? chance.over_decades(1e-4, 0.1) : 0;
+    options.tolerance = chance.over_decades(1e-6, 0.1);
+    options.max_rounds = 1 + static_cast<int>(chance.random() % 10);
+    return options;
+  }
+  Thrown(Chance& chance, const Kind& of, TetMesh shape, const SolidMotionOptions& with)
+      : Thrown(of, std::move(shape), with, chance.over_decades(1e2, 1e6),
+               std::array{0.0, 0.3, 0.45, 0.49}.at(chance.random() % 4)) {}
+  Thrown(const Kind& of, TetMesh shape, const SolidMotionOptions& with, double young,
+         double poisson)
+      : kind(of), mesh(std::move(shape)), options(with),
+        body(mesh, std::vector<SolidMaterial>{{young, poisson, 1e-3}}, options),
+        held(3 * mesh.points.size()), load(held.size()) {
+    double mass = 0;
+    for (const double m : body.masses())
+      mass += m;
+    size = 1e5 * mass / static_cast<double>(mesh.points.size());
+    rest_energy = 1e-3 * young * mass / 1e-3;
+    rest_momentum = 1e-2 * cell * mass;
+  }
+};
+
+void throw_body(std::uint32_t seed, Totals& totals) {
+  Chance chance{std::mt19937(seed)};
+  Thrown t(chance, kinds[seed % 64 == 63 ? 3 : seed % 3]); // the slow ones seldom
+  SolidMotion& body = t.body;
+  ++totals.bodies;
+  double h = chance.over_decades(1e-5, 1);
+  for (int n = 0; n < (t.kind.slow() ? steps_of_body / 8 : steps_of_body); ++n) {
+    const auto far = [](double x) { return std::abs(x) > 1e4 * cell; };
+    if (std::ranges::any_of(body.places(), far)) // where rounding of places would be judged
+      body.set_state(Numbers(t.held.size()), Numbers(t.held.size()));
+    if (n % 8 == 0)
+      t.change(chance);
+    if (chance.one_in(20))
+      h = chance.over_decades(1e-5, 1);
+    const bool led = t.any_held() && chance.one_in(20);
+    if (led) {
+      Numbers target = body.displacement();
+      for (double& u : target)
+        u += chance.from(-0.05, 0.05) * cell;
+      body.move_held(target);
+    }
+    const double before = energy(body);
+    const Momentum was = momentum(body);
+    const SolidStep step = body.step(h, {});
+    ++totals.steps;
+    totals.limited += step.limited ? 1 : 0;
+    totals.unfinished += step.left <= t.options.tolerance ? 0 : 1;
+    const double work = body.elastic_energy() - body.potential_energy(), after = energy(body);
+    const double scale = t.rest_energy + std::abs(before) + body.kinetic_energy() +
+                         body.elastic_energy() + std::abs(work) + std::abs(before + work);
+    const double growth = led ? 0 : (after - before) / scale;
+    double off = 0;
+    if (!t.any_held()) {
+      const Momentum is = momentum(body);
+      Vec3 expected = was.sum;
+      double pushed = 0;
+      for (std::size_t axis = 0; axis < t.load.size(); ++axis) {
+        expected[static_cast<int>(axis % 3)] += h * t.load[axis];
+        pushed += h * std::abs(t.load[axis]);
+      }
+      expected = 1 / (1 + t.options.drag * h) * expected;
+      off = norm(is.sum - expected) / (was.size + is.size + pushed + t.rest_momentum / h);
+    }
+    totals.growth = test::larger(totals.growth, growth);
+    totals.momentum = test::larger(totals.momentum, off);
+    if (sound(body.places()) && sound(body.velocity()) && growth <= energy_tolerance &&
+        off <= momentum_tolerance)
+      continue;
+    ++totals.failed;
+    std::printf(
+        "body %u (%s), step %d of %g s: FAILED (energy grows by %.3g of its parts, momentum "
+        "is off by %.3g)\n",
+        seed, t.kind.name(), n, h, growth, off);
+    return;
+  }
+}
+
+int inverted(const TetMesh& mesh, std::span<const double> x) {
+  int count = 0;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    std::array<Vec3, 4> p;
+    for (std::size_t k = 0; k < 4; ++k)
+      p[k] = {x[3 * std::size_t{t[k]}], x[3 * std::size_t{t[k]} + 1], x[3 * std::size_t{t[k]} + 2]};
+    count += tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
+  }
+  return count;
+}
+
+struct Ends {
+  std::uint64_t states = 0, at_rest = 0, wound_up = 0, inside_out = 0, failed = 0;
+};
+
+void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
+  Chance chance{std::mt19937(1000000 + seed)};
+  const TetMesh mesh = some_mesh(chance, kind);
+  SolidMotionOptions options;
+  options.law = kind.law;
+  options.max_rounds = 20;
+  const double poisson = std::array{0.0, 0.3, 0.45, 0.49}.at(seed % 4);
+  SolidMotion body(mesh, std::vector<SolidMaterial>{{2e4, poisson, 1e-3}}, options);
+  Vec3 most;
+  for (const Vec3& p : mesh.points)
+    for (int a = 0; a < 3; ++a)
+      most[a] = test::larger(most[a], p[a]);
+  Numbers u;
+  for (const Vec3& p : mesh.points)
+    for (int a = 0; a < 3; ++a)
+      u.push_back(chance.from(0, most[a]) - p[a]);
+  body.set_state(u, Numbers(u.size()));
+  ++ends.states;
+  const double first = body.elastic_energy();
+  double before = first;
+  bool good = true;
+  for (int n = 0; n < 200 && good && !(body.elastic_energy() <= 1e-9 * first); ++n) {
+    (void)body.step(0.05, {});
+    const double after = energy(body);
+    good = after <= before + energy_tolerance * first && sound(body.places());
+    before = after;
+  }
+  good = good && body.elastic_energy() < first;
+  if (!good) {
+    ++ends.failed;
+    std::printf("scrambled %u (%s): FAILED (energy %.6g of the first)\n", seed, kind.name(),
+                before / first);
+  } else if (inverted(mesh, body.places()) > 0)
+    ++ends.inside_out;
+  else if (body.elastic_energy() <= 1e-6 * first)
+    ++ends.at_rest;
+  else
+    ++ends.wound_up;
+}
+
+int run(std::uint32_t bodies, std::uint32_t scrambled) {
+  Totals totals;
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  for (std::uint32_t seed = 0; seed < bodies; ++seed)
+    throw_body(seed, totals);
+  const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  std::printf(
+      "%llu bodies, %llu steps (%llu limited, %llu unfinished): energy grew by at most %.3g "
+      "of its parts, momentum was off by %.3g; %llu failed\n",
+      number(totals.bodies), number(totals.steps), number(totals.limited),
+      number(totals.unfinished), totals.growth, totals.momentum, number(totals.failed));
+  std::uint64_t failed = totals.failed;
+  for (const Kind& kind : kinds) {
+    Ends ends;
+    for (std::uint32_t seed = 0;
+         seed < (kind.law == SolidLaw::corotational ? scrambled : scrambled / 4); ++seed)
+      scramble(seed, kind, ends);
+    std::printf(
+        "%llu scrambled, %s: %llu at rest in their shape, %llu wound up, %llu with elements "
+        "inside out, %llu failed\n",
+        number(ends.states), kind.name(), number(ends.at_rest), number(ends.wound_up),
+        number(ends.inside_out), number(ends.failed));
+    failed += ends.failed;
+  }
+  return failed == 0 ? 0 : 1;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  std::array<std::uint32_t, 2> counts = {1500, 24};
+  for (int k = 1; k < argc; ++k) {
+    const std::string_view text = argv[k];
+    std::uint32_t count = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
+    if (k > 2 || parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() || count < 1) {
+      (void)std::fputs("stress_solid_motion: expected numbers of bodies and of scrambled states\n",
+                       stderr);
+      return 2;
+    }
+    counts.at(static_cast<std::size_t>(k - 1)) = count;
+  }
+  try {
+    return run(counts[0], counts[1]);
+  } catch (const std::exception& error) {
+    (void)std::fprintf(stderr, "stress_solid_motion: %s\n", error.what());
+    return 1;
+  }
+}
