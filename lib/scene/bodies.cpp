@@ -265,8 +265,13 @@ void move_bodies(World& w, double to) {
       raise(w, *body);
   end_guiding(w, to);
   SimulationCounts& counts = w.now.counts;
-  for (Body* const body : awake)
-    add_counts(counts.solids, body->moving->take_counts());
+  for (Body* const body : awake) {
+    const SolidStepCounts took = body->moving->take_counts();
+    add_counts(counts.solids, took);
+    if (took.unfinished > 0)
+      w.now.news.unfinished.insert(w.now.news.unfinished.end(), body->parts.begin(),
+                                   body->parts.end());
+  }
   for (const Object& object : w.now.objects)
     counts.resting += object.method == Method::ela && object.body == nullptr ? 1 : 0;
   for (const auto& body : w.now.bodies) {

@@ -107,6 +107,7 @@ struct ObjectFacts {
 struct News {
   std::vector<MethodJump> jumps;
   std::vector<Cutting> cuttings;
+  std::vector<std::size_t> unfinished; ///< objects: rounds of a step of their solids ran out
 };
 
 /// An instrument at the end of the last step.

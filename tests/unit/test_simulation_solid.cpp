@@ -1,6 +1,7 @@
 // Solids that move, as scenes have them: at rest they stand where statics says, keep their volume,
 // follow what acts on them, change their method, and go back.
 
+#include "base/context.h"
 #include "base/error.h"
 #include "base/vector_at.h"
 #include "larger.h"
@@ -342,7 +343,7 @@ TEST(SimulationSolid, TheSameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(one, end_shape(2));
 }
 
-TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
+TEST(SimulationSolid, AStepThatCannotBeginIsTakenBack) {
   const Model model = bar();
   const std::vector<std::uint32_t> end = end_of(model);
   const auto run = [&](bool fails) {
@@ -364,6 +365,47 @@ TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
     return shape(*s, 0);
   };
   EXPECT_EQ(run(true), run(false));
+}
+
+TEST(SimulationSolid, AStepThatFailsIsTakenBack) {
+  const Model model = bar();
+  const std::vector<std::uint32_t> end = end_of(model);
+  // A step of ten integration steps is given up when it was asked for the `last` time: in the midst
+  // of the rounds of one of them.
+  int asked = 0, first = 0;
+  const auto run = [&](bool fails, int last) {
+    Context context = one_thread();
+    asked = 0;
+    context.cancelled = [&] { return ++asked == last; };
+    const auto s = scene(model, Method::ela, {}, {.guard = true}, context);
+    s->apply(SetGravity{{0, 0, -9810}});
+    s->step(0.05);
+    const Numbers before = shape(*s, 0);
+    const std::uint64_t taken = s->counts().integration;
+    s->apply(SetTimestep{0.002});
+    first = asked;
+    if (fails) {
+      s->apply(SetForce{0, {end[1]}, {0, 0, 1e4}});
+      EXPECT_THROW(s->step(0.02), Cancelled);
+      EXPECT_EQ(asked, last);
+      EXPECT_GT(last, first + 20);
+      EXPECT_EQ(shape(*s, 0), before);
+      EXPECT_EQ(s->time(), 0.05);
+      EXPECT_EQ(s->counts().integration, taken);
+      EXPECT_EQ(s->take_renewed(), (std::vector<std::size_t>{0}));
+      s->apply(SetForce{0, {end[1]}, {}});
+    } else {
+      s->apply(Renew{0}); // as a record has it
+    }
+    s->step(0.02);
+    EXPECT_GT(s->counts().integration, taken + 5);
+    EXPECT_NE(shape(*s, 0), before);
+    return shape(*s, 0);
+  };
+  const Numbers expected = run(false, -1);
+  const int of_step = asked - first;
+  for (const double part : {0.3, 0.6, 0.9})
+    EXPECT_EQ(run(true, first + static_cast<int>(part * of_step)), expected) << part;
 }
 
 /// Of a body that has turned as a whole stresses are those of its strain, told in space.

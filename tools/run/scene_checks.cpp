@@ -46,6 +46,14 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
          " s: its shape jumped by " + rounded_text(jump.size) +
          " mm as its method changed, and its forces with it");
   }
+  for (const std::size_t number : simulation.news().unfinished) {
+    Object& object = objects_[number];
+    if (object.unfinished || !warn)
+      continue;
+    object.unfinished = true;
+    warn("object " + simulation.object(number).name + " at " + number_text(simulation.time()) +
+         " s: the rounds of a step ran out before its tolerance, its motion may be off by more");
+  }
   for (std::size_t n = 0; n < simulation.object_count(); ++n)
     if (simulation.object(n).known)
       look_at(simulation, n, shapes, warn, distrust);

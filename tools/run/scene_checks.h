@@ -20,8 +20,9 @@ public:
   void instrument(std::size_t number, const InstrumentShape& shape);
   /// Behind a step. `distrust` is told of triangles turned over, of volumes that changed by more
   /// than 10 % and of edges of elastodynamic objects strained by more than half, `warn` of a change
-  /// of method by which an object jumps by over a tenth of its displacement, and of instruments
-  /// thinner than an edge. \param shapes whether shapes of elastostatic objects are computed anyway
+  /// of method by which an object jumps by over a tenth of its displacement, of solids whose steps
+  /// ran out of rounds, and of instruments thinner than an edge. \param shapes whether shapes of
+  /// elastostatic objects are computed anyway
   void look(const Simulation& simulation, bool shapes, const Tell& warn, const Tell& distrust);
 
 private:
@@ -31,7 +32,8 @@ private:
     std::unique_ptr<ShapeCheck> check;
     double looked_at = 0; ///< largest displacement when it was last looked at
     int not_looked = 0;
-    bool turned = false, volume = false, strain = false, jump = false, thin = false; ///< told
+    bool turned = false, volume = false, strain = false, jump = false, thin = false,
+         unfinished = false; ///< told
   };
   void look_at(const Simulation& simulation, std::size_t number, bool shapes, const Tell& warn,
                const Tell& distrust);
