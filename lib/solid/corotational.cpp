@@ -188,6 +188,7 @@ struct Groups {
 struct CorotationalSolid::State {
   Groups<4> linear;
   Groups<10> quadratic;
+  std::vector<std::array<double[4], 9>> turning; ///< of node_rotations(), kept for its memory
   bool is_quadratic = false;
   std::size_t nodes = 0;
 
@@ -229,7 +230,8 @@ void CorotationalSolid::remember() {
 void CorotationalSolid::node_rotations(std::span<double> rotations, const Context& context) {
   State& s = *state_;
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
-  auto sums = s.with([](auto& of) { return of.turns; });
+  auto& sums = s.turning;
+  s.with([&](auto& of) { sums = of.turns; });
   parallel_blocks(context, sums.size(), 256, [&](std::size_t begin, std::size_t end) {
     kernel.turn(sums[begin].data(), end - begin);
     for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)

@@ -59,12 +59,15 @@ double search(const MotionObjective& o, const MotionPoint& now, const Numbers& d
 }
 
 /// What a round learned, into the secants.
-void learn(const MotionPoint& from, const MotionPoint& to, const Way& way, const Context& context) {
-  Numbers moved = to.at, turned = to.gradient;
+void learn(const MotionPoint& from, const MotionPoint& to, const Way& way, MotionScratch& scratch,
+           const Context& context) {
+  Numbers &moved = scratch.moved, &turned = scratch.turned;
+  moved.resize(to.at.size());
+  turned.resize(to.at.size());
   parallel_blocks(context, moved.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t axis = begin; axis < end; ++axis) {
-      moved[axis] -= from.at[axis];
-      turned[axis] -= from.gradient[axis];
+      moved[axis] = to.at[axis] - from.at[axis];
+      turned[axis] = to.gradient[axis] - from.gradient[axis];
     }
   });
   way.into(moved);
@@ -85,12 +88,12 @@ void expect(const Way& way, SolidStep& step, double before) {
   step.left = step.change * std::clamp(measured, least_later, 1.0);
 }
 
-void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidStep& step,
-             const Context& context) {
+void descend(const MotionObjective& o, MotionPoint& now, const Way& way, MotionScratch& scratch,
+             SolidStep& step, const Context& context) {
   // Rounding of places, which no round gets below.
   const double rounding = 1e-15 * std::sqrt(product(o.body().rest, o.body().rest));
-  MotionPoint next;
-  Numbers direction;
+  MotionPoint& next = scratch.next;
+  Numbers& direction = scratch.direction;
   double before = HUGE_VAL;
   bool stuck = true, fresh = false; // the matrix is of here
   while (step.rounds < way.most) {
@@ -114,7 +117,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
       return;
     }
     const double s = search(o, now, direction, slope, next, context);
-    if (!(s > 0)) {             // nothing to be gained, but perhaps with a matrix of here
+    if (!(s > 0)) {                   // nothing to be gained, but perhaps with a matrix of here
       o.evaluate(now, context, true); // frames, strains and bubbles are those of the last one
       if (fresh)
         return;
@@ -126,7 +129,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, SolidSt
     step.change = s * length / distance(next.at, o.state().place, context);
     if (s < 1)
       way.secants.forget_earlier();
-    learn(now, next, way, context);
+    learn(now, next, way, scratch, context);
     std::swap(now, next);
     expect(way, step, before);
     if (s == 1 && step.left <= way.tolerance)
@@ -155,7 +158,7 @@ void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQ
                 [&](Numbers& v) { quick.out_of_frames(v, context); },
                 quick.secants(),
                 rate};
-  descend(objective, now, way, step, context);
+  descend(objective, now, way, quick.scratch(), step, context);
   quick.set_rate(rate);
 }
 
@@ -177,7 +180,8 @@ void descend_as_reference(const MotionObjective& objective, MotionPoint& now,
                 stay,
                 secants,
                 rate};
-  descend(objective, now, way, step, context);
+  MotionScratch scratch;
+  descend(objective, now, way, scratch, step, context);
 }
 
 } // namespace gewebe

@@ -15,6 +15,12 @@
 
 namespace gewebe {
 
+/// What rounds write to, kept for its memory.
+struct MotionScratch {
+  MotionPoint next;
+  Numbers direction, moved, turned;
+};
+
 /// A⁻¹ in frames that turn with the nodes, and what rounds have learned since A was made: secants
 /// stand in the frames, where they hold on as the body turns.
 class MotionQuick {
@@ -36,6 +42,7 @@ public:
   /// What was learned from other motions.
   void forget();
   Secants& secants() noexcept { return secants_; }
+  MotionScratch& scratch() noexcept { return scratch_; }
   /// What the second round of a step changes, over the first one's change, as far as is known.
   double rate() const noexcept { return rate_; }
   void set_rate(double rate) noexcept { rate_ = rate; }
@@ -48,6 +55,7 @@ private:
   std::optional<SingleFactor> single_;
   Numbers rotations_, rows_;
   Secants secants_;
+  MotionScratch scratch_;
   double rate_ = 1;
 };
 
