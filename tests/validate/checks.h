@@ -39,10 +39,11 @@ struct Curve {
   std::string name;
   std::vector<Point> points;
 };
-/// Curves on logarithmic axes.
+/// Curves on logarithmic axes, with marks; or on even ones, without.
 struct Plot {
   std::string file, title, x, y;
   std::vector<Curve> curves;
+  bool even = false;
 };
 
 struct Section {
@@ -87,6 +88,7 @@ Section benchmarks();
 Section hertz();
 Section peers();
 Section silicone();
+Section swings();
 Section organs();
 
 } // namespace gewebe::validate

@@ -19,12 +19,13 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 7> all{{{"patch", constant_strain},
+  const std::array<std::pair<std::string, Section (*)()>, 8> all{{{"patch", constant_strain},
                                                                   {"order", manufactured},
                                                                   {"benchmarks", benchmarks},
                                                                   {"contact", hertz},
                                                                   {"peers", peers},
                                                                   {"beam", silicone},
+                                                                  {"swing", swings},
                                                                   {"organs", organs}}};
   if (count < 2) {
     (void)std::fputs("usage: validate FOLDER [SECTION…]\n", stderr);

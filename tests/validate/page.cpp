@@ -59,19 +59,32 @@ struct Axis {
   double low = HUGE_VAL, high = -HUGE_VAL; ///< decadic logarithms
   double from, length;                     ///< pixels; a negative length goes up
 
+  bool even = false; ///< not logarithmic
+
+  double scaled(double value) const { return even ? value : std::log10(value); }
   void add(double value) {
-    low = test::smaller(low, std::log10(value));
-    high = test::larger(high, std::log10(value));
+    low = test::smaller(low, scaled(value));
+    high = test::larger(high, scaled(value));
   }
   void round() {
-    const double room = 0.04 * std::max(high - low, 0.5);
+    const double room = 0.04 * (even ? high - low : std::max(high - low, 0.5));
     low -= room;
     high += room;
   }
-  double at(double value) const { return from + (std::log10(value) - low) / (high - low) * length; }
-  /// Powers of ten, with 2 and 5 times them where there are few.
+  double at(double value) const { return from + (scaled(value) - low) / (high - low) * length; }
+  /// Powers of ten, with 2 and 5 times them where there are few; multiples of one of these, if
+  /// even.
   std::vector<double> ticks() const {
     std::vector<double> result;
+    if (even) {
+      double step = std::pow(10.0, std::floor(std::log10(high - low)));
+      for (const double part : {0.5, 0.4, 0.5}) // 5, 2, 1 of the power below
+        if ((high - low) / step < 4)
+          step *= part;
+      for (double k = std::ceil(low / step); k * step <= high; ++k)
+        result.push_back(k == 0 ? 0 : k * step); // no -0
+      return result;
+    }
     for (const bool fine : {false, true}) {
       result.clear();
       for (int power = static_cast<int>(std::floor(low)); power <= high; ++power)
@@ -110,8 +123,8 @@ std::string mark(std::size_t kind, double x, double y, const std::string& colour
 } // namespace
 
 std::string svg(const Plot& plot) {
-  Axis x{.from = left, .length = panel_width},
-      y{.from = top + panel_height, .length = -panel_height};
+  Axis x{.from = left, .length = panel_width, .even = plot.even},
+      y{.from = top + panel_height, .length = -panel_height, .even = plot.even};
   for (const Curve& curve : plot.curves)
     for (const Point& p : curve.points) {
       x.add(p.x);
@@ -148,12 +161,12 @@ std::string svg(const Plot& plot) {
     for (const Point& p : curve.points)
       out << x.at(p.x) << ',' << y.at(p.y) << ' ';
     out << "'/>\n";
-    for (const Point& p : curve.points)
+    for (const Point& p : plot.even ? std::vector<Point>{} : curve.points)
       out << mark(k, x.at(p.x), y.at(p.y), colour);
     const double line = top + 14 + 20 * static_cast<double>(k);
     out << "\n<path d='M" << right + 14 << ',' << line << " h24' stroke-width='1.6' stroke='"
-        << colour << "'/>" << mark(k, right + 26, line, colour) << "<text x='" << right + 44
-        << "' y='" << line + 4 << "'>" << escaped(curve.name) << "</text>\n";
+        << colour << "'/>" << (plot.even ? "" : mark(k, right + 26, line, colour)) << "<text x='"
+        << right + 44 << "' y='" << line + 4 << "'>" << escaped(curve.name) << "</text>\n";
   }
   out << "</svg>\n";
   return out.str();

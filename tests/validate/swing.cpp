@@ -1,0 +1,223 @@
+// Against an experiment in time: a silicone beam that is let go and swings.
+
+#include "solid/solid_motion.h"
+#include "solid/swing_fit.h"
+#include "tests/bench/timing.h"
+#include "tests/unit/mesh_fixtures.h"
+#include "tests/validate/checks.h"
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe::validate {
+
+namespace {
+
+constexpr double step = 1.0 / 3200;  ///< s; backward Euler damps by a ratio of 3 f times it
+constexpr double ratio = 0.055;      ///< the one damping ratio, of both recordings
+constexpr double seen = 1.5;         ///< s behind the release
+constexpr int every = 16;            ///< steps between samples
+constexpr double started = 1;        ///< mm down: from then on times are compared
+constexpr std::size_t compared = 12; ///< half swings
+const char* const source =
+    "Dubied et al., Sim-to-Real for Soft Robots using Differentiable FEM, IEEE RA-L 2022";
+
+/// How far the marker on the upper edge of the free end is below where it was held.
+struct Path {
+  std::vector<double> time, down;
+};
+
+/// Nothing where there is no file.
+std::optional<Path> recording(const std::string& name) {
+  std::ifstream file(test::shared_folder() + "/data/eth_beam/" + name + ".csv");
+  if (!file)
+    return {};
+  Path path;
+  std::string line;
+  std::getline(file, line);
+  while (std::getline(file, line)) {
+    std::istringstream words(line);
+    std::string time, up;
+    std::getline(words, time, ',');
+    std::getline(words, up, ',');
+    path.time.push_back(std::stod(time));
+    path.down.push_back(std::stod(up));
+  }
+  for (std::size_t k = path.down.size(); k-- > 0;)
+    path.down[k] = path.down[0] - path.down[k];
+  return path;
+}
+
+/// Its times count from where it is `started` down; what is before, and after `seen`, is dropped.
+Path from_its_start(const Path& path) {
+  std::size_t first = 0;
+  while (first < path.down.size() && !(path.down[first] > started))
+    ++first;
+  Path result;
+  if (first == 0 || first == path.down.size())
+    return result;
+  const double part = (started - path.down[first - 1]) / (path.down[first] - path.down[first - 1]),
+               zero = path.time[first - 1] + part * (path.time[first] - path.time[first - 1]);
+  for (std::size_t k = first; k < path.time.size() && path.time[k] - zero <= seen; ++k) {
+    result.time.push_back(path.time[k] - zero);
+    result.down.push_back(path.down[k]);
+  }
+  return result;
+}
+
+/// 540 quadratic tetrahedra; loaded, the upper third of the last 3 mm is heavier by 52 g.
+test::Solid beam(bool loaded) {
+  TetMesh mesh = test::box_tetrahedra(10, 3, 3, 10);
+  for (Vec3& p : mesh.points)
+    p.x = loaded && p.x == 90 ? 97 : p.x;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    double least = HUGE_VAL, up = 0;
+    for (const std::uint32_t k : t) {
+      least = test::smaller(least, mesh.points[k].x);
+      up += mesh.points[k].z / 4;
+    }
+    mesh.material.push_back(loaded && least >= 97 && up > 20 ? 1 : 0);
+  }
+  const double silicone = 1.07e-3, heavy = silicone + 52 / (3.0 * 30 * 10);
+  test::Solid solid{mesh, true, {{270000, 0.499, silicone}, {270000, 0.499, heavy}}};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    solid.hold(axis, [](const Vec3& p) { return p.x == 0; });
+  return solid;
+}
+
+/// The marker stands 6 mm above the middle of the edge, carried by the end.
+Path simulated(const test::Solid& solid, double frequency, Cost& cost) {
+  SolidMotionOptions options;
+  options.damping = damping_per_stiffness(ratio - 3 * frequency * step, frequency);
+  SolidMotion moving(solid.mesh, solid.materials, options, timing::with_threads(1));
+  moving.hold(solid.fixed);
+  moving.set_load(gravity_load(solid.mesh, solid.materials, solid.elements, {0, 0, -9807.09}));
+  const auto place = [&](std::size_t node) {
+    return Vec3{moving.places()[3 * node], moving.places()[3 * node + 1],
+                moving.places()[3 * node + 2]};
+  };
+  const std::size_t top = solid.node_at({100, 15, 30}), bottom = solid.node_at({100, 15, 0});
+  Path path;
+  cost.unknowns = solid.unknowns();
+  const int steps = static_cast<int>((seen + 0.1) / step);
+  cost.solve = timing::processor_milliseconds([&] {
+    for (int k = 0; k < steps; ++k) {
+      (void)moving.step(step, timing::with_threads(1));
+      if ((k + 1) % every != 0)
+        continue;
+      const Vec3 up = place(top) - place(bottom);
+      path.time.push_back((k + 1) * step);
+      path.down.push_back(36 - (place(top) + 6 / norm(up) * up).z);
+    }
+  });
+  return path;
+}
+
+/// How far it goes from one turning point to the next, over the first such way: silicone creeps, so
+/// that the middle of its swings moves, which these ways don't see.
+std::vector<double> half_swings(const Path& path, double middle) {
+  std::vector<double> most; // of the first, where it begins
+  double sign = 0;
+  for (const double down : path.down) {
+    const double off = down - middle;
+    if (off * sign > 0) {
+      most.back() = test::larger(most.back(), std::abs(off));
+    } else {
+      sign = off;
+      most.push_back(std::abs(off));
+    }
+  }
+  std::vector<double> ways;
+  for (std::size_t k = 1; k + 1 < most.size(); ++k)
+    ways.push_back((most[k] + most[k + 1]) / (most[1] + most[2]));
+  return ways;
+}
+
+} // namespace
+
+Section swings() {
+  Section section{
+      "The silicone beam, let go",
+      "The same beam, held straight and let go: its free end falls and swings. 540 quadratic "
+      "tetrahedra, corotational, E = 270,000 Pa, ν = 0.499, steps of 1/3200 s, so short that they "
+      "damp little themselves, and one damping ratio, " +
+          text_of(ratio) +
+          ", for both loads, of which the steps' own share is taken off. Frequencies and rest are "
+          "those of a swing that dies away, fitted to each path alike (`lib/solid/swing_fit.h`), "
+          "measured ones the mean of two trials. Decay: the way from each turning point to the "
+          "next, over the first such way of its own path, and the largest difference from what "
+          "was measured among the first 12, six swings; the hand that lets go is not as quick as "
+          "the simulation, so that measured swings begin smaller. Times count from where the end "
+          "is 1 mm down.",
+      {},
+      {}};
+  for (const bool loaded : {false, true}) {
+    const std::string name = loaded ? "load52" : "gravity",
+                      what = loaded ? "with 52 g" : "own weight";
+    const auto a = recording(name + "_a"), b = recording(name + "_b");
+    if (!a || !b) {
+      section.checks.push_back(skipped("swing, " + what, source, "no recordings"));
+      continue;
+    }
+    const Path first = from_its_start(*a), second = from_its_start(*b);
+    const SwingFit of_first = fit_swing(first.time, first.down),
+                   of_second = fit_swing(second.time, second.down);
+    const double frequency = (of_first.frequency + of_second.frequency) / 2,
+                 rest = (of_first.rest + of_second.rest) / 2;
+    Cost cost;
+    const Path ours = from_its_start(simulated(beam(loaded), frequency, cost));
+    const SwingFit fit = fit_swing(ours.time, ours.down);
+    const auto check = [&](const std::string& of, double reference, double found, double bound) {
+      section.checks.push_back({of + ", " + what,
+                                source,
+                                text_of(reference, 3),
+                                text_of(found, 3),
+                                std::abs(found / reference - 1),
+                                bound,
+                                {},
+                                cost});
+    };
+    check("frequency, Hz", frequency, fit.frequency, 0.05);
+    check("rest, mm down", rest, fit.rest, 0.07);
+    const std::vector<double> mine = half_swings(ours, fit.rest),
+                              one = half_swings(first, of_first.rest),
+                              other = half_swings(second, of_second.rest);
+    double apart = 0;
+    for (std::size_t k = 0; k < compared && k < std::min({mine.size(), one.size(), other.size()});
+         ++k)
+      apart = test::larger(apart, std::abs(mine[k] - (one[k] + other[k]) / 2));
+    section.checks.push_back({"decay, " + what,
+                              source,
+                              "as measured",
+                              percent(apart) + " of the first way off",
+                              apart,
+                              0.1,
+                              {},
+                              cost});
+    Plot plot{"swing-" + name + ".svg",
+              "The beam's end, " + what,
+              "seconds since it was 1 mm down",
+              "mm above where it was held",
+              {},
+              true};
+    const auto add = [&](const char* of, const Path& path) {
+      Curve curve{of, {}};
+      for (std::size_t k = 0; k < path.time.size(); ++k)
+        curve.points.push_back({path.time[k], -path.down[k]});
+      plot.curves.push_back(std::move(curve));
+    };
+    add("Gewebe", ours);
+    add("measured", first);
+    add("measured again", second);
+    section.plots.push_back(std::move(plot));
+  }
+  return section;
+}
+
+} // namespace gewebe::validate
