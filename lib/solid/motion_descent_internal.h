@@ -8,8 +8,9 @@
 
 namespace gewebe {
 
-/// From `now`, evaluated with turns, until the last round's change is within the tolerance, the rounds have
-/// run out or nothing is to be gained. \pre quick is prepared \throw as Factor; Cancelled
+/// From `now`, evaluated with turns, until the last round's change is within the tolerance, the
+/// rounds have run out or nothing is to be gained. \pre quick is prepared \throw as Factor;
+/// Cancelled
 void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQuick& quick,
                      const SolidMotionOptions& options, SolidStep& step, const Context& context);
 /// The same with a tangent, anew as the body moves, until rounding.

@@ -13,7 +13,8 @@ namespace gewebe {
 
 using Numbers = std::vector<double>;
 
-/// Of 3 n axes: what a thread does at once, whole nodes; for less, a thread costs more than it does.
+/// Of 3 n axes: what a thread does at once, whole nodes; for less, a thread costs more than it
+/// does.
 inline constexpr std::size_t axes_grain = 49152;
 
 /// Four sums side by side: always the same, and not one addition after the other.
