@@ -235,6 +235,37 @@ TEST(SwingFit, FindsFrequencyAndDamping) {
   }
 }
 
+TEST(SwingFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  constexpr int trials = 400;
+  const double frequency = 7.76;
+  for (const double ratio : {0.01, 0.05, 0.2}) {
+    const double w = 2 * std::numbers::pi * frequency,
+                 decay = ratio / std::sqrt(1 - ratio * ratio) * w;
+    std::mt19937 random(11);
+    std::normal_distribution<double> normal(0, 0.1);
+    int frequencies = 0, ratios = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      std::vector<double> t, y;
+      for (int k = 0; k < 100; ++k) {
+        t.push_back(0.01 * k);
+        y.push_back(-6.6 + 6.6 * std::exp(-decay * t.back()) * std::cos(w * t.back() + 0.2) +
+                    normal(random));
+      }
+      const SwingFit fit = fit_swing(t, y);
+      const auto holds = [](const std::array<double, 2>& interval, double truth) {
+        return interval[0] <= truth && truth <= interval[1] ? 1 : 0;
+      };
+      frequencies += holds(fit.frequency_interval, frequency);
+      ratios += holds(fit.ratio_interval, ratio);
+    }
+    // 95 % of 400 are 380; the number's own spread is 4.4.
+    for (const int held : {frequencies, ratios}) {
+      EXPECT_GE(held, 365) << ratio;
+      EXPECT_LE(held, 394) << ratio;
+    }
+  }
+}
+
 TEST(SwingFit, RefusesWhatIsNoSwing) {
   const auto refused = [](const std::function<double(double)>& y, int count, double step) {
     std::vector<double> t, v;
