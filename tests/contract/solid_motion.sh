@@ -134,3 +134,76 @@ P
   printf '%s\n' 'object liver liver.ela' 'gravity 0 0 -9810' 'pressure liver surface -200' 'timestep 0.01' 'run 0.4 every 0.02' | ffe-run -q - -o run.h5
   ! "$python" judge.py '0.1' 2>/dev/null || fail 'the check sees nothing'
 }
+
+# organ.ela: a ball of 30 mm radius, held below.
+held_organ() {
+  exp2ela -q --primitive sphere:16x12 --size 30 --solid --cell 8 --young 5000 --poisson 0.45 --fix 'z<-20' --name organ -o organ.ela
+}
+
+# What is wrong is answered and changes nothing: the answers are those of the right lines alone.
+test_wrong_lines_do_not_touch_a_solid_that_moves() {
+  need ffe-run exp2ela
+  held_organ
+  cat >right <<'END'
+object organ organ.ela damping=0.1@4
+emit shapes
+gravity 0 0 -9810
+step 0.02
+force organ z>25 100 0 0
+instrument tongs sphere 3 0 0 36
+step 0.02
+displace organ near:30,0,0,8 1 0 2 over 0.05
+step 0.02
+step 0.04
+release organ all
+move tongs 0 0 30 over 0.02
+step 0.04
+method organ ffe
+step 0.02
+method organ ela
+step 0.02
+END
+  awk '{ print }
+    NR == 4 { print "force organ nobody 1 2 3"; print "cut organ plane 0 0 0 1 0 0"; print "displace organ 0 nan 0 0" }
+    NR == 9 { print "object organ organ.ela"; print "attach organ 1 organ 2 100"; print "step -1"; print "force organ z>25 inf 0 0" }
+    NR == 14 { print "grasp nothing organ all"; print "tear organ 3" }' right >mixed
+  ffe-run -q --serve <right >expected || fail 'a right line is refused'
+  ! ffe-run -q --serve <mixed >answers || fail 'status 0 with wrong lines'
+  (($(grep -c '^error ' answers) >= 8)) || fail "$(grep -c '^error ' answers) errors"
+  (($(grep -c '^step ' expected) == 7)) || fail 'steps are missing'
+  grep -v '^error ' answers | cmp - expected || fail 'wrong lines change the motion'
+}
+
+# Displacements, stresses and times in HDF5 and VTU are those of the answers; what is held stays.
+test_results_of_a_solid_that_moves() {
+  local python
+  need ffe-run exp2ela
+  python=$(python_with_h5py) || skip 'no h5py for python3'
+  held_organ
+  printf '%s\n' 'object organ organ.ela damping=0.1@4' 'emit shapes' 'emit stress organ' 'gravity 0 0 -9810' 'run 0.1 every 0.02' >fall.scene
+  ffe-run -q fall.scene >answers
+  ffe-run -q fall.scene -o fall.h5 >/dev/null
+  ffe-run -q fall.scene -o fall_%02d.vtu >/dev/null
+  local frames=(fall_*.vtu)
+  ((${#frames[@]} == $(grep -c '^step ' answers) + 1)) || fail "${#frames[@]} frames" # one at rest
+  cat >judge.py <<'P'
+import h5py, numpy
+times = [float(line.split()[2]) for line in open('answers') if line.startswith('step ')]
+with h5py.File('fall.h5') as f:
+    t, o = f['time'][:], f['objects/organ']
+    u, p = o['displacement'][:], o['points'][:]
+    names = []
+    o.visit(names.append)
+assert list(t[-len(times):]) == times, (t, times)
+held = p[:, 2] < -20
+assert held.any() and not u[:, held].any()
+sink = -u[-len(times):, :, 2].mean(1)
+assert sink.min() > 0.5 and (numpy.diff(sink) < 0).any(), sink # it sags and swings back
+assert any('mises' in name for name in names), names
+lines = open('answers').read().splitlines()
+at = max(k for k, line in enumerate(lines) if line.startswith('shape'))
+shape = numpy.array([[float(x) for x in line.split()] for line in lines[at + 1 : at + 1 + len(p)]])
+assert shape.shape == p.shape and abs(shape - (p + u[-1])).max() < 1e-4 * abs(p).max(), (shape[:2], p[0] + u[-1][0])
+P
+  "$python" judge.py || fail 'results tell something else'
+}
