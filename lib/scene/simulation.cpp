@@ -295,9 +295,10 @@ SimulationState Simulation::state() const {
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)
       continue;
-    if (const auto energies = object.body->moving->energies()) {
-      state.kinetic_energy += energies->kinetic;
-      state.elastic_energy += energies->elastic;
+    if (const auto energies = object.body->moving->energies()) { // of all parts
+      const bool first = object.body->parts[0] == i;
+      state.kinetic_energy += first ? energies->kinetic : 0;
+      state.elastic_energy += first ? energies->elastic : 0;
       continue;
     }
     const std::span<const NodeMotion> motion = motion_of(object);

@@ -285,6 +285,27 @@ TEST(SolidNet, TwoHalvesThatAreTiedBendAsOne) {
   EXPECT_EQ(droop_of_halves(1e5, 1), droop_of_halves(1e5, 2));
 }
 
+/// The energy of bodies that move as one is told once.
+TEST(SolidNet, TiedBodiesThatFallHaveTheirEnergyOnce) {
+  Model left = bar(0, 3), right = bar(3, 6);
+  double mass = 0;
+  for (Model* const model : {&left, &right})
+    for (Node& node : model->nodes) {
+      node.fixed = 0;
+      node.drag = 0;
+      mass += node.mass;
+    }
+  Simulation s(one_thread(), {});
+  s.add_object("left", left, Method::ela);
+  s.add_object("right", right, Method::ela);
+  s.apply(Attach{0, nodes_at(left, 3 * cell), 1, nodes_at(right, 3 * cell), 1e5});
+  s.apply(SetGravity{{0, 0, -1000}});
+  s.step(0.1);
+  const double expected = mass * 100 * 100 / 2;
+  EXPECT_NEAR(s.state().kinetic_energy, expected, 1e-6 * expected);
+  EXPECT_LT(s.state().elastic_energy, 1e-4 * expected); // weight is not by lumped masses
+}
+
 /// A net that hangs on a solid by ties: they carry its weight.
 TEST(SolidNet, ANetHangsOnASolid) {
   const Model beam = bar(0, 6);
