@@ -170,10 +170,12 @@ private:
   void run() {
     SolidMotion& engine = step_.engine;
     const std::vector<double> end(engine.places().begin(), engine.places().end());
-    if (ran_ || step_.clearing)
-      engine.restore(places_, velocity_, context_);
-    if (ran_) // once more, from where it led
+    if (ran_) { // once more, from where it led
+      engine.begin_again(places_, velocity_, context_);
       engine.guess(end);
+    } else if (step_.clearing) {
+      engine.restore(places_, velocity_, context_);
+    }
     std::vector<double> forces(step_.forces.begin(), step_.forces.end());
     for (const NodeTouch& t : force_)
       for (int a = 0; a < 3; ++a)

@@ -219,11 +219,16 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
                           const Context& context) {
+  state_->quick.forget();
+  begin_again(places, velocity, context);
+}
+
+void SolidMotion::begin_again(std::span<const double> places, std::span<const double> velocity,
+                              const Context& context) {
   State& s = *state_;
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
   s.forecast.clear();
-  s.quick.forget();
   s.energy.forget_bubbles();
   s.last_step = 0;
   Numbers forces(s.body.axes());

@@ -140,6 +140,11 @@ public:
   /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {});
+  /// The same where the last step began, to take it once more under another load: what its rounds
+  /// learned of the body serves on, so that results depend on what was tried before, within the
+  /// tolerance.
+  void begin_again(std::span<const double> places, std::span<const double> velocity,
+                   const Context& context = {});
   /// The next step is sought from these places on, in place of where the motion leads. \pre 3 n
   void guess(std::span<const double> places);
   /// From now on, in place of the options'.
