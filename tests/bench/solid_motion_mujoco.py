@@ -6,6 +6,7 @@ FILE: numbers of nodes, of tetrahedra and of held nodes (uint64), then places in
 and after each EVERY steps the mean z, in mm, of the nodes that are farthest along x. Status 3 if there is no MuJoCo.
 """
 
+import os
 import sys
 import tempfile
 import time
@@ -16,6 +17,8 @@ try:
 except ImportError:
     sys.exit(3)
 
+scratch = tempfile.TemporaryDirectory()  # it writes a log where it stands
+os.chdir(scratch.name)
 path, young, poisson, step, integrator, steps, every = sys.argv[1:]
 sizes = numpy.fromfile(path, numpy.uint64, 3).astype(int)
 points = numpy.fromfile(path, numpy.float64, 3 * sizes[0], offset=24).reshape(-1, 3) * 1e-3

@@ -89,7 +89,7 @@ Pressed press(std::uint32_t across, bool quadratic, double poisson) {
     sum -= t.force.z;
     moment -= t.force.z * (p.x * p.x + p.y * p.y);
   }
-  found.force = 4 * sum;
+  found.force = contact.solved() ? 4 * sum : NAN;
   // The pressure goes by sqrt(1 - r^2/a^2), so that the mean of r^2 over it is 2/5 a^2.
   found.radius = contact.solved() ? std::sqrt(2.5 * moment / sum) : NAN;
   return found;

@@ -6,6 +6,7 @@
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/validate/checks.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -188,9 +189,8 @@ Section swings() {
     const std::vector<double> mine = half_swings(ours, fit.rest),
                               one = half_swings(first, of_first.rest),
                               other = half_swings(second, of_second.rest);
-    double apart = 0;
-    for (std::size_t k = 0; k < compared && k < std::min({mine.size(), one.size(), other.size()});
-         ++k)
+    double apart = std::min({mine.size(), one.size(), other.size()}) < compared ? NAN : 0;
+    for (std::size_t k = 0; k < compared && !std::isnan(apart); ++k)
       apart = test::larger(apart, std::abs(mine[k] - (one[k] + other[k]) / 2));
     section.checks.push_back({"decay, " + what,
                               source,
