@@ -67,7 +67,6 @@ Net net_of(const Model& model) {
 
 SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context)
     : model_(model), context_(context), motion_(model.nodes.size()) {
-  (void)net_of(model); // refuses what does not go
   options_.law = choice.law.value_or(options_.law);
   options_.damping = choice.damping.value_or(options_.damping);
   if (!model.springs.empty())

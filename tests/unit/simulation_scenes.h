@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <gtest/gtest.h>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,18 @@ namespace gewebe::test {
 inline std::vector<double> shape(const Simulation& s, std::size_t object) {
   const std::span<const double> u = s.displacement(object);
   return {u.begin(), u.end()};
+}
+
+/// Until it rests.
+inline void settle(Simulation& s) {
+  std::uint64_t before = 0;
+  for (int k = 0; k < 400; ++k) {
+    s.step(0.1);
+    if (k > 0 && s.counts().integration == before)
+      return;
+    before = s.counts().integration;
+  }
+  ADD_FAILURE() << "it doesn't come to rest";
 }
 
 /// An organ whose upper part hangs on springs of the surface alone once it is cut.

@@ -29,7 +29,7 @@
 namespace gewebe {
 namespace {
 
-using test::one_thread, test::shape;
+using test::one_thread, test::settle, test::shape;
 using Numbers = std::vector<double>;
 
 /// A bar 20 × 8 × 8 mm along x, held at x = 0.
@@ -79,18 +79,6 @@ std::unique_ptr<Simulation> scene(const Model& model, Method method, const Solid
   auto s = std::make_unique<Simulation>(context, std::move(options));
   s->add_object("o", model, method, {}, Integration::semi_implicit, choice);
   return s;
-}
-
-/// Until it rests.
-void settle(Simulation& s) {
-  std::uint64_t before = 0;
-  for (int k = 0; k < 400; ++k) {
-    s.step(0.1);
-    if (k > 0 && s.counts().integration == before)
-      return;
-    before = s.counts().integration;
-  }
-  ADD_FAILURE() << "it doesn't come to rest";
 }
 
 double volume(const Model& model, std::span<const double> u) {

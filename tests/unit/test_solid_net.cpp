@@ -26,7 +26,7 @@
 namespace gewebe {
 namespace {
 
-using test::one_thread;
+using test::one_thread, test::settle;
 using Numbers = std::vector<double>;
 
 double largest_difference(std::span<const double> a, std::span<const double> b) {
@@ -236,17 +236,6 @@ SolidChoice damped() {
   SolidChoice choice;
   choice.damping = damping_per_stiffness(0.5, 20);
   return choice;
-}
-
-void settle(Simulation& s) {
-  std::uint64_t before = 0;
-  for (int k = 0; k < 400; ++k) {
-    s.step(0.1);
-    if (k > 0 && s.counts().integration == before)
-      return;
-    before = s.counts().integration;
-  }
-  ADD_FAILURE() << "it doesn't come to rest";
 }
 
 /// Where the middle of a bar's end hangs.
