@@ -14,7 +14,7 @@ namespace gewebe {
 struct ObjectCommand {
   std::string name, model, store; ///< files as the scene names them; no store: ""
   Method method = Method::ela;
-  bool implicit = false;
+  Integration integration = Integration::semi_implicit;
   bool warp = false; ///< large rotations
   SolidChoice solid; ///< how a solid moves
 };

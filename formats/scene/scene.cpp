@@ -55,8 +55,10 @@ What parse_object(Words& in) {
     const std::string word = in.word("");
     if (word.starts_with("store=") && word.size() > 6 && c.store.empty())
       c.store = word.substr(6);
-    else if (word == "integration=implicit" && !c.implicit)
-      c.implicit = true;
+    else if ((word == "integration=implicit" || word == "integration=auto") &&
+             c.integration == Integration::semi_implicit)
+      c.integration =
+          word == "integration=implicit" ? Integration::implicit : Integration::automatic;
     else if (word == "rotation=warp" && !c.warp)
       c.warp = true;
     else if ((word == "law=corotational" || word == "law=neo-hookean") && !c.solid.law)
@@ -335,7 +337,7 @@ struct Verb {
 const std::array<Verb, 22>& verbs() {
   static const std::array<Verb, 22> all{{
       {"object",
-       "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit] "
+       "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},

@@ -255,44 +255,6 @@ void DynamicContact::push(std::size_t row, const ContactMoment& moment, const No
   put(v, state.v);
 }
 
-bool DynamicContact::any() const {
-  return std::any_of(state_.instruments.begin(), state_.instruments.end(),
-                     [](const auto& i) { return i.has_value(); });
-}
-
-void DynamicContact::clear_way(const ContactMoment& moment, const NodeTraits* traits,
-                               std::span<NodeMotion> motion) const {
-  for (const ContactMoment::There& t : moment.there) {
-    std::vector<PlacedInstrument> places = t.on_its_way;
-    places.emplace_back(state_.instruments[t.instrument]->shape, t.from);
-    for (std::size_t row = 0; row < layout_.movable; ++row) {
-      const std::uint32_t node = layout_.node_of_row[row];
-      const Vec3 inverse = vector_of(traits[row].inverse_mass), rest = model_.nodes[node].position;
-      if (node >= surface_ || inverse == Vec3{})
-        continue;
-      Vec3 p = rest + motion[node].displacement;
-      bool moved = false;
-      for (const PlacedInstrument& place : places)
-        if (place.distance(p) < -on_surface * place.radius) {
-          out(place, inward_[node], inverse, p);
-          moved = true;
-        }
-      if (moved)
-        motion[node].displacement = p - rest;
-    }
-  }
-}
-
-void DynamicContact::add(std::vector<NodeTouch> touched, std::span<const NodeTouch> impulses,
-                         bool exact) {
-  state_.touched = std::move(touched);
-  state_.exact = state_.exact && exact;
-  for (NodeTouch t : impulses) {
-    t.node = static_cast<std::uint32_t>(layout_.row_of_node[t.node]);
-    state_.impulses[0].push_back(t);
-  }
-}
-
 bool DynamicContact::still(double start) const {
   for (const auto& i : state_.instruments)
     if (i && ((start < i->way.end && i->way.from != i->way.to) || i->before != i->way.at(start)))

@@ -1,5 +1,5 @@
 #pragma once
-// Instruments against nodes that move (in explicit steps; implicit_contact.h has the others).
+// Instruments against nodes that move in explicit steps (solid_contact.h has implicit ones).
 // Behind each integration step a node inside one
 //
 //   loses the part of its velocity that leads into the instrument, against the instrument's own
@@ -60,8 +60,6 @@ public:
     std::vector<NodeTouch> held;                  ///< forces
     double held_time = 0;                         ///< that they acted since the last take
     std::vector<NodeTouch> resting;               ///< impulses of those before
-    std::vector<NodeTouch> touched;               ///< forces in the last implicit step
-    bool exact = true;                            ///< all forces of implicit steps so far
   };
   const State& state() const noexcept { return state_; }
   void restore(const State& state) { state_ = state; }
@@ -75,14 +73,6 @@ public:
   /// Behind the step of a block, before the next one. Safe for different blocks at once.
   void keep_out(std::size_t block, const ContactMoment& moment, const NodeTraits* traits,
                 NodeRow* next);
-
-  /// Before an implicit step: moves what instruments jump over, or stand on, out of their way.
-  void clear_way(const ContactMoment& moment, const NodeTraits* traits,
-                 std::span<NodeMotion> motion) const;
-  /// Whether there are any.
-  bool any() const;
-  /// What an implicit step found: the forces at its end, and its impulses.
-  void add(std::vector<NodeTouch> touched, std::span<const NodeTouch> impulses, bool exact);
 
   /// Whether no instrument moves from `start` on.
   bool still(double start) const;

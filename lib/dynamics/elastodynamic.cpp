@@ -57,7 +57,7 @@ std::pair<std::size_t, std::size_t> share(const SpringLayout& layout, int thread
 
 } // namespace
 
-Elastodynamic::Elastodynamic(const Model& model, Integration integration)
+Elastodynamic::Elastodynamic(const Model& model)
     : model_(model), network_(spring_network(model)), layout_(spring_layout(model)),
       rows_(std::vector<NodeRow>(model.nodes.size())),
       next_(std::vector<NodeRow>(model.nodes.size())), motion_(model.nodes.size()) {
@@ -70,8 +70,6 @@ Elastodynamic::Elastodynamic(const Model& model, Integration integration)
                   " can move but has no mass, expected more than 0 g");
   }
   size_ = box.longest_side();
-  if (integration == Integration::implicit)
-    implicit_ = std::make_unique<ImplicitEuler>(model);
   apply_load();
 }
 
@@ -193,12 +191,6 @@ void Elastodynamic::restore(const State& state) {
   motion_shown_ = false;
 }
 
-void Elastodynamic::renew() {
-  implicit_touch_.reset();
-  if (implicit_)
-    implicit_ = std::make_unique<ImplicitEuler>(model_);
-}
-
 template <class At>
 Vec3 Elastodynamic::outer_force(const Driven& driven, double time, const At& position) const {
   Vec3 force = driven.steady + pulse(time, driven.period) * driven.pulsing;
@@ -284,10 +276,7 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
   motion_shown_ = false;
   if (touch_)
     touch_->hold({});
-  if (implicit_)
-    run_implicit(steps, h, start, context);
-  else
-    run_steps(steps, h, start, context);
+  run_steps(steps, h, start, context);
   time_ = start + duration;
   return steps;
 }
@@ -382,76 +371,6 @@ std::optional<std::vector<NodeTouch>> Elastodynamic::held_touches(double duratio
   if (!touch_ || !(touch_->held_time() >= duration * (1 - same_duration)))
     return std::nullopt;
   return touch_->held();
-}
-
-bool Elastodynamic::step_implicit(std::uint64_t step, std::uint64_t steps, double h, double start,
-                                  std::span<NodeMotion> now, const ImplicitContact::Step& what,
-                                  const Context& context, std::uint32_t& worst) {
-  if (!touch_ || !touch_->any()) {
-    if (touch_)
-      touch_->add({}, {}, true);
-    return implicit_->step(now, what.outer, what.held, h, context, worst);
-  }
-  if (!implicit_touch_)
-    implicit_touch_ = std::make_unique<ImplicitContact>(model_, *implicit_);
-  touch_->clear_way(touch_->moment(step, steps, start, h), traits_.data(), now);
-  std::vector<NodeTouch> touched = touch_->state().touched;
-  ImplicitContact::Result result = implicit_touch_->step(what, now, touched, context);
-  worst = result.worst;
-  touch_->add(std::move(touched), result.impulses, result.exact);
-  return result.solved;
-}
-
-void Elastodynamic::run_implicit(std::uint64_t steps, double h, double start,
-                                 const Context& context) {
-  const std::size_t n = model_.nodes.size();
-  std::vector<NodeMotion> now(motion().begin(), motion().end());
-  std::vector<std::uint8_t> held(3 * n);
-  std::vector<Vec3> outer(n);
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::size_t a = 0; a < 3; ++a)
-      held[3 * std::size_t{i} + a] =
-          is_fixed(model_, i, static_cast<int>(a)) || load_->displacement.contains(i) ? 1 : 0;
-  for (std::uint64_t s = 0; s < steps; ++s) {
-    const double time = start + static_cast<double>(s + 1) * h;
-    for (std::uint32_t row = 0; row < layout_.movable; ++row)
-      outer[layout_.node_of_row[row]] = vector_of(traits_[row].constant);
-    const auto position = [&](std::uint32_t i) {
-      return model_.nodes[i].position + now[i].displacement;
-    };
-    for (const Drive& drive : drives_) {
-      for (const Driven& driven : drive.driven)
-        outer[driven.node] = outer_force(driven, time, position);
-      for (const RampedNode& t : drive.ramped) {
-        NodeMotion& m = now[t.node];
-        const Vec3 u = t.way.at(time);
-        m.velocity = time < t.way.end ? (u - m.displacement) / h : Vec3{};
-        m.displacement = u;
-      }
-    }
-    std::uint32_t worst = 0;
-    const double from = start + static_cast<double>(s) * h;
-    const bool solved = step_implicit(s, steps, h, from, now,
-                                      {outer, held, load_->displacement,
-                                       touch_ ? std::span(touch_->state().instruments)
-                                              : std::span<const std::optional<MovingInstrument>>{},
-                                       from, h},
-                                      context, worst);
-    std::vector<NodeRow>& rows = rows_.write();
-    for (std::size_t row = 0; row < n; ++row) {
-      const NodeMotion& m = now[layout_.node_of_row[row]];
-      put(m.displacement, rows[row].u);
-      put(m.velocity, rows[row].v);
-    }
-    motion_shown_ = false;
-    for (const NodeMotion& m : now)
-      if (!is_finite(m.displacement) || !is_finite(m.velocity))
-        fail(time, "is no longer finite, expected a smaller load or timestep");
-    if (!solved)
-      throw MotionError(
-          worst, time,
-          "moves most where the implicit step finds no solution, expected a smaller timestep");
-  }
 }
 
 void Elastodynamic::fail(double time, const char* what) const {

@@ -3,19 +3,17 @@
 //
 // Semi-implicit Euler, with all F of the old state:
 //
-//   v' = v + h/m (F(u, v) + f + m g),   u' = u + h v'
+//   v' = v + h/m (F(u, v) + f + m g),   u' = u + h v'.
 //
-// or, for models too stiff for that, backward Euler with F of the new state
-// (dynamics/implicit_euler.h). Axes that the model holds stay, a displaced node stands at its
-// displacement with velocity 0, or is on its way there. The same bytes for any number of threads.
+// Models too stiff for that move by the steps of solids (dynamics/solid_dynamic.h). Axes that the
+// model holds stay, a displaced node stands at its displacement with velocity 0, or is on its way
+// there. The same bytes for any number of threads.
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
 #include "contact/load.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/dynamic_contact.h"
-#include "dynamics/implicit_contact.h"
-#include "dynamics/implicit_euler.h"
 #include "dynamics/spring_force.h"
 #include "dynamics/spring_layout.h"
 #include "model/model.h"
@@ -34,13 +32,11 @@ namespace gewebe {
 /// model at rest alone.
 inline constexpr double safe_step_fraction = 0.9;
 
-enum class Integration { semi_implicit, implicit };
-
 class Elastodynamic final : public BodyMotion {
 public:
   /// At rest. Keeps a reference to the model.
   /// \pre check_model(model) passes   \throw Error if a node can move but has no mass
-  explicit Elastodynamic(const Model& model, Integration integration = Integration::semi_implicit);
+  explicit Elastodynamic(const Model& model);
 
   void set_load(const Load& load, double time = 0) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
@@ -70,15 +66,14 @@ public:
   void go_back(const std::any& snapshot) override {
     restore(std::any_cast<const State&>(snapshot));
   }
-  /// Of an implicit step the matrix and factor, which serve for several steps.
-  void renew() override;
+  void renew() override {} // nothing is kept
 
   std::vector<NodeVector> contact_forces() const override;
 
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
-  bool touches_exact() const override { return !touch_ || touch_->state().exact; }
+  bool touches_exact() const override { return true; } // each step's are
   std::optional<std::vector<NodeTouch>> held_touches(double duration) const override;
 
 private:
@@ -105,10 +100,6 @@ private:
   template <class At>
   Vec3 outer_force(const Driven& driven, double time, const At& position) const;
   void run_steps(std::uint64_t steps, double h, double start, const Context& context);
-  void run_implicit(std::uint64_t steps, double h, double start, const Context& context);
-  bool step_implicit(std::uint64_t step, std::uint64_t steps, double h, double start,
-                     std::span<NodeMotion> now, const ImplicitContact::Step& what,
-                     const Context& context, std::uint32_t& worst);
   bool step_block(std::size_t block, const NodeRow* now, NodeRow* next, double h, double time,
                   CpuLevel cpu);
   Vec3 outer_force(std::uint32_t node, double time) const;
@@ -122,10 +113,8 @@ private:
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
   CopyOnWrite<std::vector<NodeRow>> rows_, next_;
-  std::vector<Drive> drives_; ///< by block; empty where nothing changes
-  std::unique_ptr<ImplicitEuler> implicit_;
-  std::unique_ptr<DynamicContact> touch_;           ///< while there are instruments
-  std::unique_ptr<ImplicitContact> implicit_touch_; ///< of implicit_, when needed
+  std::vector<Drive> drives_;             ///< by block; empty where nothing changes
+  std::unique_ptr<DynamicContact> touch_; ///< while there are instruments
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

@@ -2,6 +2,9 @@
 
 #include "base/vector_at.h"
 
+#include <Eigen/Core>
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 
@@ -36,32 +39,17 @@ public:
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
     if (!ran_)
       run();
-    const std::size_t size = 3 * nodes.size(), axes = places_.size();
-    for (const std::uint32_t node : nodes) {
-      std::vector<double>& columns = all_.columns_[node];
-      if (!columns.empty())
-        continue;
-      columns.resize(3 * axes);
-      for (int a = 0; a < 3; ++a) {
-        const std::span<double> column =
-            std::span(columns).subspan(static_cast<std::size_t>(a) * axes, axes);
-        column[axis_of(node, a)] = 1;
-        step_.engine.respond(column, context_);
-      }
-    }
+    const std::size_t size = 3 * nodes.size();
+    need_columns(nodes);
     DelassusOperator delassus;
     delassus.nodes.assign(nodes.begin(), nodes.end());
     if (all_.learned_of_ != delassus.nodes) {
       all_.learned_of_ = delassus.nodes;
       all_.learned_.resize(size * size);
-      const auto entry = [&](std::size_t r, std::size_t c) {
-        return all_.columns_.at(
-            nodes[c / 3])[(c % 3) * axes + 3 * std::size_t{nodes[r / 3]} + r % 3];
-      };
       for (std::size_t c = 0; c < size; ++c)
         for (std::size_t r = c; r < size; ++r) // columns are of single precision
           all_.learned_[c * size + r] = all_.learned_[r * size + c] =
-              (entry(r, c) + entry(c, r)) / 2;
+              (entry(nodes, r, c) + entry(nodes, c, r)) / 2;
     }
     delassus.compliance = all_.learned_;
     nodes_ = delassus.nodes;
@@ -93,6 +81,8 @@ public:
     }
     learn();
     const bool agreed = miss <= tolerance_;
+    if (agreed && miss > 0)
+      put(at);
     if (agreed || ++pushes_ == max_pushes) {
       exact_ = exact_ && agreed;
       pushes_ = 0;
@@ -141,6 +131,56 @@ private:
   void note() {
     noted_force_ = forces_now();
     noted_place_ = places_now();
+  }
+  /// Columns of A⁻¹.
+  void need_columns(std::span<const std::uint32_t> nodes) {
+    const std::size_t axes = places_.size();
+    for (const std::uint32_t node : nodes) {
+      std::vector<double>& columns = all_.columns_[node];
+      if (!columns.empty())
+        continue;
+      columns.resize(3 * axes);
+      for (int a = 0; a < 3; ++a) {
+        const std::span<double> column =
+            std::span(columns).subspan(static_cast<std::size_t>(a) * axes, axes);
+        column[axis_of(node, a)] = 1;
+        step_.engine.respond(column, context_);
+      }
+    }
+  }
+  /// Of H A⁻¹ Hᵀ as the columns have it: of single precision, symmetric to that.
+  double entry(std::span<const std::uint32_t> nodes, std::size_t r, std::size_t c) const {
+    return all_.columns_.at(
+        nodes[c / 3])[(c % 3) * places_.size() + 3 * std::size_t{nodes[r / 3]} + r % 3];
+  }
+  /// The touched nodes stand where the contacts have them, to rounding; what is missing to there is
+  /// as small as what a step leaves, and takes what is around along as forces there would.
+  void put(std::span<const Vec3> at) {
+    need_columns(nodes_);
+    const auto size = static_cast<Eigen::Index>(3 * nodes_.size());
+    Eigen::MatrixXd w(size, size);
+    Eigen::VectorXd missing(size);
+    const std::vector<double> now = places_now();
+    for (Eigen::Index c = 0; c < size; ++c) {
+      const auto k = static_cast<std::size_t>(c);
+      missing[c] = at[k / 3][static_cast<int>(k % 3)] - now[k];
+      for (Eigen::Index r = 0; r < size; ++r)
+        w(r, c) = entry(nodes_, static_cast<std::size_t>(r), k);
+    }
+    for (Eigen::Index k = 0; k < size; ++k)
+      if (!(w(k, k) > 0)) { // held
+        w(k, k) = 1;
+        missing[k] = 0;
+      }
+    const Eigen::VectorXd force = w.partialPivLu().solve(missing);
+    std::vector<double> by(places_.size());
+    for (std::size_t k = 0; k < nodes_.size(); ++k)
+      for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t axis = 0; axis < by.size(); ++axis)
+          by[axis] += force[static_cast<Eigen::Index>(3 * k + a)] *
+                      all_.columns_.at(nodes_[k])[a * by.size() + axis];
+    if (std::ranges::all_of(by, [](double b) { return std::isfinite(b); }))
+      step_.engine.nudge(by, context_);
   }
   /// What the last forces have moved corrects W: the update of BFGS, with forces for places.
   void learn() {

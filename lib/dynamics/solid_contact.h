@@ -1,7 +1,7 @@
 #pragma once
 // Instruments in a step of a solid that moves (solid/solid_motion.h).
 //
-// As in dynamics/implicit_contact.h: in turn the step under the last forces λ of the instruments;
+// In turn the step under the last forces λ of the instruments;
 // W = H A⁻¹ Hᵀ of the touched nodes, with the constant matrix A of the step, in frames that turn
 // with the nodes; λ for where W puts them (statics/static_contact.h); the step under these, until
 // its nodes stand where W put them, within 1e-4 of the smallest radius. A is not the tangent,

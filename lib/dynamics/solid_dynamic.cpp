@@ -29,6 +29,9 @@ constexpr int rounds_for_tolerance = 200;
 /// With springs, whose part of the constant matrix is a bound and not a tangent.
 constexpr int rounds_with_springs = 40;
 
+/// Of a step of a net, where none is asked for: forces of springs are as rough as their model.
+constexpr double tolerance_of_nets = 0.02;
+
 bool about(double value, double expected) {
   return std::abs(value - expected) <= same_mass * expected;
 }
@@ -51,7 +54,7 @@ Net net_of(const Model& model) {
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
     const std::string name = "node " + std::to_string(i);
-    if (!(masses[i] > 0) && tied[i] == 0)
+    if (!(masses[i] > 0) && tied[i] == 0 && !model.tetrahedra.empty())
       throw Error(name + " is in no tetrahedron, expected none such of a solid that moves");
     if (masses[i] > 0 && !about(node.mass, masses[i]))
       throw Error(name + " has a mass of " + number_text(node.mass) +
@@ -71,6 +74,8 @@ SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const 
   options_.damping = choice.damping.value_or(options_.damping);
   if (!model.springs.empty())
     options_.max_rounds = rounds_with_springs;
+  if (model.tetrahedra.empty())
+    options_.tolerance = tolerance_of_nets;
   if (choice.tolerance) {
     options_.tolerance = *choice.tolerance;
     options_.max_rounds = rounds_for_tolerance;

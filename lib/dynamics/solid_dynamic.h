@@ -1,6 +1,7 @@
 #pragma once
-// The elastodynamic method of a solid: a model of tetrahedra, and springs beside them, moves by the
-// implicit steps of solid/solid_motion.h, under what acts on objects of a scene.
+// The elastodynamic method of a solid, a model of tetrahedra, perhaps with springs beside them, and
+// of a net of springs alone that is too stiff for explicit steps: they move by the implicit steps
+// of solid/solid_motion.h, under what acts on objects of a scene.
 //
 // Nodes have the masses of their tetrahedra and the model's drag per mass; weight acts by the loads
 // that statics has (weight_of), so that at rest a solid stands where statics says. Forces and
@@ -30,13 +31,13 @@ namespace gewebe {
 class SolidDynamic final : public BodyMotion {
 public:
   /// At rest. Keeps a reference to the model.
-  /// \pre check_model(model) passes, it has tetrahedra \throw Error if it has a node of no
-  /// tetrahedron and no spring, or of another mass than its tetrahedra's; as SolidMotion
+  /// \pre check_model(model) passes \throw Error if a node can't move: in a model with tetrahedra
+  /// one of none of them and no spring, or of another mass than its tetrahedra's; as SolidMotion
   SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
 
   void set_load(const Load& load, double time) override;
   std::uint64_t advance(double duration, double largest_step, const Context& context,
-                        double start) override;
+                        double start = 0) override;
 
   /// At rest two steps in a row moved nothing by more than 1e-9 of the largest displacement, or
   /// 1e-13 of its size.

@@ -12,6 +12,7 @@ namespace gewebe::simulation {
 
 namespace {
 
+constexpr double worth_implicit = 20;       ///< explicit steps for one implicit one
 constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a tenth of a picture
 
 /// All parts as one model, without what ties them. \param offset of each part's nodes
@@ -155,7 +156,8 @@ std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::si
     if (object.matter->solid.said())
       throw Error("object " + object.name() +
                   " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
-    return std::make_unique<Elastodynamic>(model, object.matter->integration);
+    if (!moves_implicitly(object))
+      return std::make_unique<Elastodynamic>(model);
   }
   try {
     return std::make_unique<SolidDynamic>(model, object.matter->solid, w.context);
@@ -203,11 +205,44 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   return body;
 }
 
+namespace {
+
+/// Steps of solids where explicit ones would be many for each. Once: it keeps to them.
+void choose_integration(const World& w, Object& object) {
+  Integration& way = object.matter->integration;
+  if (way != Integration::automatic)
+    return;
+  const double wish = w.now.settings.timestep.value_or(implicit_step);
+  way = !is_solid(object) && safe_step(object.model()) * worth_implicit < wish
+            ? Integration::implicit
+            : Integration::semi_implicit;
+}
+
+/// Who is free to choose moves as the other does; of two, both implicitly if one would.
+void choose_together(const World& w, Object& a, Object& b) {
+  const bool is_free = a.matter->integration == Integration::automatic,
+             other_is = b.matter->integration == Integration::automatic;
+  choose_integration(w, a);
+  choose_integration(w, b);
+  const auto follow = [](Object& one, const Object& leader) {
+    if (!is_solid(one))
+      one.matter->integration =
+          moves_implicitly(leader) ? Integration::implicit : Integration::semi_implicit;
+  };
+  if (is_free && (!other_is || moves_implicitly(b)))
+    follow(a, b);
+  else if (other_is)
+    follow(b, a);
+}
+
+} // namespace
+
 /// An elastodynamic object has a body from when something first acts on it.
 void need_body(World& w, std::size_t object) {
   if (w.now.objects[object].body != nullptr)
     return;
   need_model(w.now.objects[object]);
+  choose_integration(w, w.now.objects[object]);
   w.now.bodies.push_back(make_body(w, {object}));
 }
 
@@ -321,6 +356,7 @@ void Rule<Attach>::check(World& w, const Attach& c) {
   }
   if (&a == &b)
     throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
+  choose_together(w, a, b);
   if (moves_implicitly(a) != moves_implicitly(b))
     throw Error("one of " + a.name() + " and " + b.name() +
                 " is implicit and the other is not, expected both alike");

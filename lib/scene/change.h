@@ -24,6 +24,10 @@ constexpr const char* method_name(Method method) {
   return method == Method::ffe ? "ffe" : "ela";
 }
 
+/// How an elastodynamic net moves: by explicit steps (dynamics/elastodynamic.h), by those of solids
+/// (dynamics/solid_dynamic.h), or by these where explicit ones are far too short.
+enum class Integration { semi_implicit, implicit, automatic };
+
 struct SetForce {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;

@@ -47,6 +47,11 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
 
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
   rotations_.resize(3 * held_.size());
+  if (std::ranges::all_of(still_, [](std::uint8_t still) { return still != 0; })) {
+    for (std::size_t at = 0; at < rotations_.size(); ++at)
+      rotations_[at] = at % 9 % 4 == 0 ? 1 : 0;
+    return;
+  }
   energy.node_rotations(rotations_, context);
   for (std::size_t i = 0; i < still_.size(); ++i)
     if (still_[i] != 0)

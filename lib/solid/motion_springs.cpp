@@ -69,21 +69,40 @@ MotionSprings::MotionSprings(std::span<const SolidSpring> springs)
     : springs_(springs.begin(), springs.end()), lengths_(springs.size()), kept_(springs.size()) {}
 
 double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<double> forces) {
+  // In turn for some springs: from here, by the compiler several at a time, and to there.
+  constexpr std::size_t some = 64;
+  std::array<double, some> x{}, y{}, z{}, pull{};
   double damped = 0;
   elastic_ = 0;
-  for (std::size_t k = 0; k < springs_.size(); ++k) {
-    const SolidSpring& s = springs_[k];
-    const Vec3 d = vector_at(at, s.j) - vector_at(at, s.i);
-    const double length = lengths_[k] = norm(d), off = length - s.rest, grown = length - kept_[k],
-                 viscous = s.damping * per_time;
-    elastic_ += s.stiffness * off * off / 2;
-    damped += viscous * grown * grown / 2;
-    if (length == 0)
-      continue; // no direction
-    const Vec3 pull = (s.stiffness * off + viscous * grown) / length * d;
-    for (int a = 0; a < 3; ++a) {
-      forces[3 * std::size_t{s.i} + static_cast<std::size_t>(a)] += pull[a];
-      forces[3 * std::size_t{s.j} + static_cast<std::size_t>(a)] -= pull[a];
+  for (std::size_t first = 0; first < springs_.size(); first += some) {
+    const std::size_t count = std::min(some, springs_.size() - first);
+    const SolidSpring* const s = springs_.data() + first;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double *const from = at.data() + 3 * std::size_t{s[k].i}, *const to =
+                                                                          at.data() +
+                                                                          3 * std::size_t{s[k].j};
+      x[k] = to[0] - from[0];
+      y[k] = to[1] - from[1];
+      z[k] = to[2] - from[2];
+    }
+    for (std::size_t k = 0; k < some; ++k)
+      pull[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double length = lengths_[first + k] = pull[k], off = length - s[k].rest,
+                   grown = length - kept_[first + k], viscous = s[k].damping * per_time;
+      elastic_ += s[k].stiffness * off * off / 2;
+      damped += viscous * grown * grown / 2;
+      pull[k] = length > 0 ? (s[k].stiffness * off + viscous * grown) / length : 0; // no direction
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      double *const from = forces.data() + 3 * std::size_t{s[k].i}, *const to =
+                                                                        forces.data() +
+                                                                        3 * std::size_t{s[k].j};
+      const std::array<double, 3> force = {pull[k] * x[k], pull[k] * y[k], pull[k] * z[k]};
+      for (std::size_t a = 0; a < 3; ++a) {
+        from[a] += force[a];
+        to[a] -= force[a];
+      }
     }
   }
   return elastic_ + damped;

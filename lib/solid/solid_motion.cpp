@@ -236,6 +236,18 @@ void SolidMotion::begin_again(std::span<const double> places, std::span<const do
   s.energy.keep();
 }
 
+void SolidMotion::nudge(std::span<const double> displacement, const Context& context) {
+  State& s = *state_;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] == 0) {
+      s.now.place[axis] += displacement[axis];
+      s.now.velocity[axis] += displacement[axis] / s.last_step;
+    }
+  Numbers forces(s.body.axes());
+  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
+  s.energy.keep();
+}
+
 void SolidMotion::guess(std::span<const double> places) {
   state_->guess.assign(places.begin(), places.end());
 }

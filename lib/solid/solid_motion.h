@@ -145,6 +145,9 @@ public:
   /// tolerance.
   void begin_again(std::span<const double> places, std::span<const double> velocity,
                    const Context& context = {});
+  /// The end of the last step is moved by these displacements, held axes not, and the speeds that
+  /// led there with it: for what stands beyond the tolerance of a step. \pre 3 n, a step was taken
+  void nudge(std::span<const double> displacement, const Context& context = {});
   /// The next step is sought from these places on, in place of where the motion leads. \pre 3 n
   void guess(std::span<const double> places);
   /// From now on, in place of the options'.

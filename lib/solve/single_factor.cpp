@@ -15,7 +15,7 @@ constexpr std::uint32_t none = UINT32_MAX;
 /// Of all entries, that a branch of each level has at most with all that ends in it: first enough
 /// of them for some threads, then what is left of each half, then the rest.
 constexpr std::array<double, 4> parts = {0.06, 0.25, 0.6, HUGE_VAL};
-constexpr std::size_t worth_threads = 1U << 18; // entries
+constexpr std::size_t worth_threads = 1U << 20; // entries
 constexpr double most = INT16_MAX;
 
 } // namespace

@@ -96,7 +96,10 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(said("attach a 1 b z<3 500").other, "b");
   EXPECT_EQ(said("attach a 1 b z<3 500").others.value().text, "z<3");
   EXPECT_EQ(said("grasp a z<3 tongs").instrument, "tongs");
-  EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela integration=implicit").implicit);
+  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela integration=implicit").integration,
+            Integration::implicit);
+  EXPECT_EQ(parsed<ObjectCommand>("object a a.ela integration=auto").integration,
+            Integration::automatic);
   EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela method=ffe rotation=warp").warp);
   EXPECT_TRUE(parsed<ObjectCommand>("object a a.ela rotation=warp store=a.h5").warp);
   EXPECT_FALSE(parsed<ObjectCommand>("object a a.ela store=a.h5").warp);

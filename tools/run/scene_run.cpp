@@ -142,8 +142,7 @@ struct SceneRun::State {
       stored.factor = [at, factor = std::move(stored.factor)] { return of_object(at, factor); };
       return compliance_of_store(std::move(stored));
     };
-    simulation.add_object(c.name, std::move(source), c.method,
-                          c.implicit ? Integration::implicit : Integration::semi_implicit, c.solid);
+    simulation.add_object(c.name, std::move(source), c.method, c.integration, c.solid);
     if (c.warp)
       simulation.apply(SetWarp{simulation.object_count() - 1});
     stores.resize(simulation.object_count()); // parts that came off have none
