@@ -44,6 +44,13 @@ double parse_tolerance(Words& in, std::string_view text) {
   return tolerance;
 }
 
+double parse_bulk(Words& in, std::string_view text) {
+  const double bulk = in.number_in(text, "bulk modulus");
+  if (!(bulk > 0 && bulk <= 1e12))
+    in.fail("a bulk modulus that is not above 0 and up to 1e12 Pa");
+  return bulk;
+}
+
 What parse_object(Words& in) {
   ObjectCommand c;
   c.name = in.name();
@@ -66,6 +73,8 @@ What parse_object(Words& in) {
           word == "law=corotational" ? SolidLaw::corotational : SolidLaw::stable_neo_hookean;
     else if (word.starts_with("damping=") && !c.solid.damping)
       c.solid.damping = parse_damping(in, std::string_view(word).substr(8));
+    else if (word.starts_with("bulk=") && !c.solid.bulk)
+      c.solid.bulk = parse_bulk(in, std::string_view(word).substr(5));
     else if (word.starts_with("tolerance=") && !c.solid.tolerance)
       c.solid.tolerance = parse_tolerance(in, std::string_view(word).substr(10));
     else if ((word == "method=ffe" || word == "method=ela") && !method)
@@ -74,6 +83,8 @@ What parse_object(Words& in) {
       in.fail(shown(word) + " is no use here");
   }
   c.method = method.value_or(c.store.empty() ? Method::ela : Method::ffe);
+  if (c.solid.bulk && c.method == Method::ffe)
+    in.fail("bulk= with method=ffe");
   if (c.warp && c.method == Method::ela)
     in.fail("rotation=warp with method=ela");
   return c;
@@ -338,7 +349,8 @@ const std::array<Verb, 22>& verbs() {
   static const std::array<Verb, 22> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
-       "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E]",
+       "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
+       "[bulk=K]",
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
       {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},

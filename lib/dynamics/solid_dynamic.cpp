@@ -76,6 +76,11 @@ SolidDynamic::SolidDynamic(const Model& model, const SolidChoice& choice, const 
     options_.max_rounds = rounds_with_springs;
   if (model.tetrahedra.empty())
     options_.tolerance = tolerance_of_nets;
+  if (choice.bulk) {
+    if (!model.tetrahedra.empty())
+      throw Error("is a solid, whose Poisson's ratio keeps its volume, expected a net for bulk=");
+    bulk_ = *choice.bulk;
+  }
   if (choice.tolerance) {
     options_.tolerance = *choice.tolerance;
     options_.max_rounds = rounds_for_tolerance;
@@ -97,7 +102,8 @@ SolidMotion& SolidDynamic::engine(const Context& context) {
   if (!engine_) {
     const Net net = net_of(model_);
     engine_.emplace(element_mesh(model_), element_materials(model_),
-                    SolidNet{net.springs, net.masses, net.drag}, options_, context);
+                    SolidNet{net.springs, net.masses, net.drag, model_.triangles, bulk_}, options_,
+                    context);
     engine_->hold(held_);
     engine_->restore(*state_.places, *state_.velocity, context);
   }

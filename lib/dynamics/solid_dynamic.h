@@ -93,6 +93,7 @@ private:
 
   const Model& model_;
   SolidMotionOptions options_;
+  double bulk_ = 0; ///< of what fills a net; 0: nothing
   Context context_;
   double size_ = 0; ///< longest side of the box at rest
   State state_;

@@ -156,6 +156,9 @@ std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::si
     if (object.matter->solid.said())
       throw Error("object " + object.name() +
                   " has no tetrahedra, expected a solid for law=, damping= and tolerance=");
+    if (!moves_implicitly(object) && object.matter->solid.bulk)
+      throw Error("object " + object.name() +
+                  " moves by explicit steps, expected integration=implicit or auto for bulk=");
     if (!moves_implicitly(object))
       return std::make_unique<Elastodynamic>(model);
   }
@@ -213,7 +216,8 @@ void choose_integration(const World& w, Object& object) {
   if (way != Integration::automatic)
     return;
   const double wish = w.now.settings.timestep.value_or(implicit_step);
-  way = !is_solid(object) && safe_step(object.model()) * worth_implicit < wish
+  const bool asks = object.matter->solid.bulk.has_value();
+  way = !is_solid(object) && (asks || safe_step(object.model()) * worth_implicit < wish)
             ? Integration::implicit
             : Integration::semi_implicit;
 }

@@ -38,6 +38,8 @@ bool goes(const Object& object, Way way) {
     return moves && object.matter->known && is_solid(object);
   case Way::warped:
     return object.warp;
+  case Way::filled:
+    return object.matter->solid.bulk.has_value();
   }
   return false;
 }

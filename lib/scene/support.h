@@ -20,12 +20,13 @@ enum class Way : std::uint8_t {
   solid,        ///< of tetrahedra, or with some
   net,          ///< of none
   solid_motion, ///< a solid that moves
-  warped        ///< with large rotations
+  warped,       ///< with large rotations
+  filled        ///< a net that keeps the volume it encloses
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic, Way::two_step,
     Way::two_step_stored, Way::whole,           Way::cut,      Way::solid,        Way::net,
-    Way::solid_motion,    Way::warped};
+    Way::solid_motion,    Way::warped,          Way::filled};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -64,6 +65,13 @@ inline constexpr std::array gaps{
     Gap{Way::solid, Feature::cut, true,
         "holds tetrahedra, expected springs and triangles alone to cut"},
     Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
+    Gap{Way::filled, Feature::cut, true,
+        "keeps the volume it encloses (bulk=), expected none to cut"},
+    Gap{Way::filled, Feature::blade, false, "keeps the volume it encloses (bulk=): it is not cut"},
+    Gap{Way::filled, Feature::attach, true,
+        "keeps the volume it encloses (bulk=), expected none to attach"},
+    Gap{Way::filled, Feature::method, true,
+        "keeps the volume it encloses (bulk=) as long as it moves, expected none for method"},
     Gap{Way::elastostatic, Feature::attach, true,
         "is elastostatic (ffe) and has no motion to tie, expected ela objects"},
     Gap{Way::explicit_motion, Feature::two_step, true,

@@ -144,6 +144,7 @@ void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQ
   bool first = true;
   const auto turn = [&](const Numbers&) {
     quick.turn(objective.energy(), context);
+    quick.fill(objective.energy().volumes(), context);
     if (!std::exchange(first, false))
       quick.forget();
   };

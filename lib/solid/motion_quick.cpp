@@ -86,7 +86,21 @@ void MotionQuick::out_of_frames(Numbers& v, const Context& context) const {
   });
 }
 
+void MotionQuick::fill(MotionVolumes& volumes, const Context& context) {
+  filled_ = nullptr;
+  if (volumes.empty())
+    return;
+  volumes.linearise([&](Numbers& v) { solve_constant(v, context); });
+  filled_ = &volumes;
+}
+
 void MotionQuick::solve(Numbers& v, const Context& context) {
+  solve_constant(v, context);
+  if (filled_ != nullptr)
+    filled_->correct(v);
+}
+
+void MotionQuick::solve_constant(Numbers& v, const Context& context) {
   const std::size_t order = stiffness_.order();
   rows_.resize(order);
   double scale = 0; // whatever the numbers are, single precision holds them

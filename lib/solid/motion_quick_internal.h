@@ -38,6 +38,8 @@ public:
   void out_of_frames(Numbers& v, const Context& context) const;
   /// In frames and in place, to single precision.
   void solve(Numbers& v, const Context& context);
+  /// The volumes' part of the matrix joins at the places of the last evaluation. \pre turned
+  void fill(MotionVolumes& volumes, const Context& context);
 
   /// What was learned from other motions.
   void forget();
@@ -53,6 +55,9 @@ private:
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;
+  void solve_constant(Numbers& v, const Context& context);
+
+  const MotionVolumes* filled_ = nullptr;
   Numbers rotations_, rows_;
   Secants secants_;
   MotionScratch scratch_;

@@ -12,12 +12,14 @@
 
 namespace gewebe {
 
-SolidEnergy::SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs,
+SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
                          const SolidMotionOptions& options)
-    : body_(body), law_(options.law), springs_(springs),
+    : body_(body), law_(options.law), springs_(net.springs),
       frames_(body.mesh, body.elements,
               {options.damping > 0 || options.reference,
                options.law != SolidLaw::corotational || options.reference}) {
+  if (net.bulk > 0)
+    volumes_ = MotionVolumes(net.enclosing, body.rest, net.bulk);
   if (law_ != SolidLaw::stable_neo_hookean)
     return;
   if (!body.mesh.middles.empty())
@@ -128,6 +130,10 @@ double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,
   } else {
     elastic_ = hyperelastic(at, forces, context);
     energy += elastic_;
+  }
+  if (!volumes_.empty()) {
+    energy += volumes_.evaluate(at, forces);
+    elastic_ += volumes_.elastic();
   }
   if (springs_.empty())
     return energy;

@@ -5,6 +5,7 @@
 #include "solid/corotational.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_springs_internal.h"
+#include "solid/motion_volumes_internal.h"
 #include "solid/solid_motion.h"
 
 #include <array>
@@ -23,8 +24,7 @@ struct StepDamping {
 class SolidEnergy {
 public:
   /// \pre the body outlives this and stays where it is
-  SolidEnergy(const MotionBody& body, std::span<const SolidSpring> springs,
-              const SolidMotionOptions& options);
+  SolidEnergy(const MotionBody& body, const SolidNet& net, const SolidMotionOptions& options);
 
   SolidLaw law() const noexcept { return law_; }
   /// The energy at the places `at`, and that of damping from the strains and lengths kept; -dE/dx
@@ -41,6 +41,7 @@ public:
   /// numbers of the size of mu.
   double unsure_at_rest() const noexcept { return unsure_at_rest_; }
   const MotionSprings& springs() const noexcept { return springs_; }
+  MotionVolumes& volumes() noexcept { return volumes_; }
 
   // As in the last evaluation.
   double elastic() const noexcept { return elastic_; }
@@ -61,6 +62,7 @@ private:
   const MotionBody& body_;
   SolidLaw law_;
   MotionSprings springs_;
+  MotionVolumes volumes_;
   CorotationalSolid frames_;                ///< and corotational energy, and damping
   std::vector<Vec3> bubbles_, new_bubbles_; ///< of quadratic Neo-Hookean elements
   double elastic_ = 0, unsure_at_rest_ = 0;

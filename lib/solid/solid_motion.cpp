@@ -64,7 +64,7 @@ struct SolidMotion::State {
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
-        energy(body, net.springs, with) {
+        energy(body, net, with) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
@@ -86,6 +86,8 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
   const auto sound = [](double value) { return value >= 0 && std::isfinite(value); };
   if (!sound(options.drag) || !sound(options.damping))
     throw Error("the damping of a solid is not a number of 0 or more");
+  if (net.bulk > 0 && options.reference)
+    throw Error("Newton's method has no volumes that nets enclose");
   if (!(options.tolerance > 0) || options.max_rounds < 1)
     throw Error("a step of a solid has no tolerance or no rounds");
   for (const double mass : state_->body.masses)

@@ -76,6 +76,10 @@ struct SolidNet {
   /// By node: of those in no tetrahedron, what is read; else the mass of its tetrahedra counts.
   std::span<const double> masses{};
   std::span<const double> drag{}; ///< by node, per mass, 1/s, in place of the options'; or none
+  /// A closed surface, counter-clockwise from outside, whose parts keep their volumes, and the bulk
+  /// modulus of what fills them, Pa; none: there is no such surface.
+  std::span<const Triangle> enclosing{};
+  double bulk = 0;
 };
 
 /// What is said of how a solid moves; SolidMotionOptions has the rest.
@@ -83,7 +87,9 @@ struct SolidChoice {
   std::optional<SolidLaw> law;
   std::optional<double> damping;   ///< per stiffness, s
   std::optional<double> tolerance; ///< of a step: it takes as many rounds as this needs
+  std::optional<double> bulk;      ///< of what fills a net, Pa
 
+  /// Of what a net has not.
   bool said() const { return law || damping || tolerance; }
   bool operator==(const SolidChoice&) const = default;
 };
@@ -107,7 +113,8 @@ class SolidMotion {
 public:
   /// At rest, nothing held. \pre check_mesh(mesh) passes, each node is in a tetrahedron or, with a
   /// mass, in the net; ends of springs are nodes
-  /// \throw Error as solid_elements; if an option is out of its range, or a node has no mass
+  /// \throw Error as solid_elements and MotionVolumes; if an option is out of its range, or a node
+  /// has no mass
   SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials,
               const SolidMotionOptions& options, const Context& context = {});
   SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,

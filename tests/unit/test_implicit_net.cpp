@@ -1,15 +1,20 @@
 // Nets that move by the steps of solids: order, energy, momentum, stiffness of any ratio, and when
 // that way is chosen.
 
+#include "base/error.h"
+#include "base/vector_at.h"
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
 #include "larger.h"
 #include "random_nets.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
+#include "solid/motion_volumes_internal.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <gtest/gtest.h>
 #include <random>
@@ -189,6 +194,136 @@ TEST(ImplicitNet, IsChosenWhereExplicitStepsWouldBeTooMany) {
     s.step(1.0 / 60);
     EXPECT_EQ(s.counts().integration <= 20, implicit) << s.counts().integration; // 10 of each
   }
+}
+
+// ---- what fills them
+
+double enclosed(const Model& model, std::span<const NodeMotion> motion) {
+  double six = 0;
+  const auto at = [&](std::uint32_t i) { return model.nodes[i].position + motion[i].displacement; };
+  for (const Triangle& t : model.triangles)
+    six += dot(at(t[0]), cross(at(t[1]), at(t[2])));
+  return six / 6;
+}
+
+/// A membrane without what is inside, and of a tenth of the stiffness, held at some nodes below.
+Model membrane() {
+  Model model = organ(3);
+  std::erase_if(model.springs,
+                [&](const Spring& s) { return std::max(s.i, s.j) >= surface_count(model); });
+  for (Spring& s : model.springs)
+    s.stiffness *= 0.1;
+  return model;
+}
+
+SolidChoice filled(double bulk) {
+  SolidChoice choice;
+  choice.bulk = bulk;
+  return choice;
+}
+
+/// What it has of its volume where it rests under its weight.
+double rests_with(const Model& model, const SolidChoice& choice) {
+  SolidDynamic object(model, choice, one_thread());
+  Load load;
+  load.gravity = {0, 0, -9810};
+  object.set_load(load, 0);
+  for (int k = 0; k < 400 && !object.resting(); ++k)
+    (void)object.advance(0.05, 1.0 / 60, one_thread());
+  return enclosed(model, object.motion()) /
+         enclosed(model, std::vector<NodeMotion>(model.nodes.size()));
+}
+
+TEST(FilledNet, KeepsItsVolumeUnderItsWeight) {
+  const Model model = membrane();
+  const double empty = rests_with(model, {}), soft = rests_with(model, filled(1e3)),
+               hard = rests_with(model, filled(1e6)), tissue = rests_with(model, filled(2e9));
+  std::printf("volume at rest: empty %.4f, filled %.4f, %.6f, %.8f\n", empty, soft, hard, tissue);
+  EXPECT_LT(empty, 0.97);
+  EXPECT_GT(soft, empty);
+  EXPECT_NEAR(hard, 1, 1e-3);
+  EXPECT_NEAR(tissue, 1, 1e-6);
+}
+
+TEST(FilledNet, PushesWithTheGradientOfItsEnergyAndNothingAsAWhole) {
+  const Model model = membrane();
+  const std::vector<NodeMotion> motion = kicked(model, 0.5, 0);
+  std::vector<double> rest, at;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      rest.push_back(model.nodes[i].position[a]);
+      at.push_back(rest.back() + motion[i].displacement[a]);
+    }
+  MotionVolumes volumes(model.triangles, rest, 5e4);
+  std::vector<double> forces(at.size()), scratch(at.size());
+  const double energy = volumes.evaluate(at, forces);
+  const double whole = enclosed(model, std::vector<NodeMotion>(motion.size())),
+               off = enclosed(model, motion) - whole;
+  EXPECT_NEAR(energy, 5e4 * off * off / (2 * whole), 1e-9 * energy);
+  Vec3 sum, turn;
+  double size = 0;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    const Vec3 force = vector_at(forces, i);
+    sum += force;
+    turn += cross(vector_at(at, i), force);
+    size = test::larger(size, norm(force));
+  }
+  EXPECT_GT(size, 0);
+  EXPECT_LT(norm(sum), 1e-11 * size * static_cast<double>(motion.size()));
+  EXPECT_LT(norm(turn), 1e-9 * size * static_cast<double>(motion.size()));
+  for (std::size_t axis = 0; axis < at.size(); axis += 7) {
+    std::vector<double> up = at, down = at;
+    up[axis] += 1e-4;
+    down[axis] -= 1e-4;
+    EXPECT_NEAR((volumes.evaluate(down, scratch) - volumes.evaluate(up, scratch)) / 2e-4,
+                forces[axis], 1e-5 * size)
+        << axis;
+  }
+}
+
+TEST(FilledNet, GainsNeitherEnergyNorMomentum) {
+  Model model = membrane();
+  for (Node& n : model.nodes) {
+    n.fixed = fixed_none;
+    n.drag = 0;
+  }
+  // Springs at rest where they are would pull: of what fills it alone.
+  const std::vector<NodeMotion> start = kicked(model, 0.5, 0);
+  const auto energy = [&](double bulk, std::span<const NodeMotion> motion) {
+    SolidDynamic object(model, filled(bulk), one_thread());
+    object.set_motion(motion);
+    (void)object.advance(1e-9, 1e-9, one_thread());
+    return object.energies()->elastic;
+  };
+  const double bulk = 5e4, off = 1 - enclosed(model, start) /
+                                         enclosed(model, std::vector<NodeMotion>(start.size()));
+  const double volume = enclosed(model, std::vector<NodeMotion>(start.size()));
+  EXPECT_NEAR(energy(bulk, start) - energy(bulk / 2, start), bulk / 4 * off * off * volume,
+              1e-3 * bulk * off * off * volume);
+  SolidDynamic object(model, filled(bulk), one_thread());
+  object.set_motion(kicked(model, 0.5, 20));
+  const Vec3 before = momentum(model, object.motion());
+  double all = 0;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    all += model.nodes[i].mass * norm(object.motion()[i].velocity);
+  double last = HUGE_VAL;
+  for (int k = 0; k < 100; ++k) {
+    (void)object.advance(1.0 / 600, 1.0 / 600, one_thread());
+    const double now = object.energies()->kinetic + object.energies()->elastic;
+    EXPECT_LE(now, last * (1 + 1e-9)) << k;
+    last = now;
+  }
+  EXPECT_LT(norm(momentum(model, object.motion()) - before), 1e-9 * all);
+}
+
+TEST(FilledNet, RefusesWhatEnclosesNothing) {
+  Model open = membrane();
+  open.triangles.pop_back();
+  EXPECT_THROW(SolidDynamic(open, filled(1e3), one_thread()), Error);
+  Simulation s(one_thread(), {});
+  EXPECT_THROW(
+      s.add_object("o", membrane(), Method::ela, {}, Integration::semi_implicit, filled(1e3)),
+      Error);
 }
 
 } // namespace

@@ -45,6 +45,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole, Way::warped};
   case Way::net:
     return {Way::elastostatic, Way::whole};
+  case Way::filled:
+    return {Way::implicit_motion, Way::whole, Way::filled};
   case Way::solid_motion:
     return {Way::explicit_motion, Way::whole, Way::solid_motion};
   default:
@@ -98,10 +100,14 @@ public:
       : model_(is_solid(way) ? solid(test::organ(3)) : test::organ(3)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
     const bool moves = way == Way::explicit_motion || way == Way::implicit_motion ||
-                       way == Way::attached || way == Way::solid_motion;
-    const Integration integration =
-        way == Way::implicit_motion ? Integration::implicit : Integration::semi_implicit;
-    scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration);
+                       way == Way::attached || way == Way::solid_motion || way == Way::filled;
+    const Integration integration = way == Way::implicit_motion || way == Way::filled
+                                        ? Integration::implicit
+                                        : Integration::semi_implicit;
+    SolidChoice choice;
+    if (way == Way::filled)
+      choice.bulk = 1000;
+    scene_.add_object("o", model_, moves ? Method::ela : Method::ffe, {}, integration, choice);
     Model beside = test::organ(3);
     for (Node& n : beside.nodes)
       n.position.x += 100;
