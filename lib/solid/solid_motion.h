@@ -59,7 +59,7 @@ struct SolidMotionOptions {
   /// A round that is expected to leave less than this part of the step's whole displacement is the
   /// last one.
   double tolerance = 0.005;
-  int max_rounds = 8;     ///< of the quick way
+  int max_rounds = 32;    ///< of the quick way
   bool reference = false; ///< Newton's method until rounding; no limit of time
 };
 

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <functional>
 #include <memory>
 #include <span>
@@ -528,6 +529,30 @@ TEST(SimulationSolid, WhatInstrumentsDoIsTheSameOnAnyThreadsAndBehindAStepBack) 
   const Numbers one = run(1, false);
   EXPECT_EQ(one, run(2, false));
   EXPECT_EQ(one, run(2, true));
+}
+
+/// Pulled aside by 20 mm, its own length, within 0.05 s: steps by the tolerance that
+/// is usual against solved ones.
+TEST(SolidScene, FollowsALongPullAsSolvedStepsDo) {
+  const Model model = bar(true, 0.49);
+  std::vector<Numbers> path[2];
+  for (const bool solved : {false, true}) {
+    SolidChoice choice = damped();
+    if (solved)
+      choice.tolerance = 1e-8;
+    Simulation s(one_thread(), {});
+    s.add_object("o", model, Method::ela, {}, Integration::semi_implicit, choice);
+    s.apply(SetDisplacement{0, end_of(model), {-8, 0, 20}, 0.05});
+    for (int k = 0; k < 12; ++k) {
+      s.step(1.0 / 60);
+      path[solved ? 1 : 0].emplace_back(s.displacement(0).begin(), s.displacement(0).end());
+    }
+  }
+  double most = 0;
+  for (std::size_t k = 0; k < path[0].size(); ++k)
+    most = test::larger(most, difference(path[0][k], path[1][k]) / largest(path[1][k]));
+  std::printf("a long pull: off by %.2e of the displacement at most\n", most);
+  EXPECT_LT(most, 0.01);
 }
 
 } // namespace
