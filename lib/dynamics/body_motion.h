@@ -31,7 +31,7 @@ private:
   double time_;
 };
 
-/// What solids took to move.
+/// What solids, and nets that move implicitly, took to move.
 struct SolidStepCounts {
   std::uint64_t steps = 0, rounds = 0; ///< of integration; solutions with a factor in them
   std::uint64_t factors = 0;
@@ -95,9 +95,9 @@ public:
   /// The forces of the instruments, if it rested for these last `duration` s, all since that call.
   virtual std::optional<std::vector<NodeTouch>> held_touches(double duration) const = 0;
 
-  /// Of a solid, since the last call.
+  /// Of what moves by the steps of solids, since the last call.
   virtual SolidStepCounts take_counts() { return {}; }
-  /// Of a solid; those of a net are sums over its springs.
+  /// Of the same; those of a net that moves explicitly are sums over its springs.
   virtual std::optional<MotionEnergies> energies() const { return std::nullopt; }
 };
 

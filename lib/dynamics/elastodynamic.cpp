@@ -62,13 +62,9 @@ Elastodynamic::Elastodynamic(const Model& model)
       rows_(std::vector<NodeRow>(model.nodes.size())),
       next_(std::vector<NodeRow>(model.nodes.size())), motion_(model.nodes.size()) {
   Box3 box;
-  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
-    const Node& node = model.nodes[i];
+  require_masses(model);
+  for (const Node& node : model.nodes)
     box.add(node.position);
-    if (node.fixed != fixed_all && !(node.mass > 0))
-      throw Error("node " + std::to_string(i) +
-                  " can move but has no mass, expected more than 0 g");
-  }
   size_ = box.longest_side();
   apply_load();
 }

@@ -12,9 +12,8 @@ namespace gewebe {
 
 namespace {
 
-constexpr double same_place = 1e-4;  ///< of the smallest radius
-constexpr double sure = 3e-4;        ///< tolerance of a step that instruments touch
-constexpr int rounds_of_a_step = 16; ///< so that it is reached
+constexpr double same_place = 1e-4; ///< of the smallest radius
+constexpr double sure = 3e-4;       ///< tolerance of a step that instruments touch
 constexpr int max_pushes = 40;
 
 } // namespace
@@ -80,9 +79,7 @@ public:
       miss = error <= miss ? miss : error;
     }
     learn();
-    const bool agreed = miss <= tolerance_;
-    if (agreed && miss > 0)
-      put(at);
+    const bool agreed = miss <= tolerance_ && (miss == 0 || put(at));
     if (agreed || ++pushes_ == max_pushes) {
       exact_ = exact_ && agreed;
       pushes_ = 0;
@@ -155,7 +152,8 @@ private:
   }
   /// The touched nodes stand where the contacts have them, to rounding; what is missing to there is
   /// as small as what a step leaves, and takes what is around along as forces there would.
-  void put(std::span<const Vec3> at) {
+  /// \return whether it can be done
+  bool put(std::span<const Vec3> at) {
     need_columns(nodes_);
     const auto size = static_cast<Eigen::Index>(3 * nodes_.size());
     Eigen::MatrixXd w(size, size);
@@ -179,8 +177,10 @@ private:
         for (std::size_t axis = 0; axis < by.size(); ++axis)
           by[axis] += force[static_cast<Eigen::Index>(3 * k + a)] *
                       all_.columns_.at(nodes_[k])[a * by.size() + axis];
-    if (std::ranges::all_of(by, [](double b) { return std::isfinite(b); }))
-      step_.engine.nudge(by, context_);
+    if (!std::ranges::all_of(by, [](double b) { return std::isfinite(b); }))
+      return false;
+    step_.engine.nudge(by, context_);
+    return true;
   }
   /// What the last forces have moved corrects W: the update of BFGS, with forces for places.
   void learn() {
@@ -225,8 +225,7 @@ private:
       engine.move_held(step_.target);
     const bool pushed = !force_.empty() || ran_;
     engine.set_tolerance(pushed ? std::min(sure, step_.options.tolerance) : step_.options.tolerance,
-                         pushed ? std::max(rounds_of_a_step, step_.options.max_rounds)
-                                : step_.options.max_rounds);
+                         step_.options.max_rounds);
     const SolidStep took = engine.step(step_.h, context_);
     ran_ = true;
     took_.rounds += took.rounds;

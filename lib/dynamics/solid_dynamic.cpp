@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/vector_at.h"
+#include "dynamics/spring_force.h"
 #include "solid/assembly.h"
 #include "solid/model_stiffness.h"
 #include "solid/solid_model.h"
@@ -60,9 +61,11 @@ Net net_of(const Model& model) {
       throw Error(name + " has a mass of " + number_text(node.mass) +
                   " g, expected that of its tetrahedra, " + number_text(masses[i]) +
                   " g, of a solid that moves");
-    net.masses.push_back(node.mass);
-    net.drag.push_back(node.drag / node.mass);
+    const bool massless = node.mass == 0; // and stays where it is: any mass will do
+    net.masses.push_back(massless ? 1 : node.mass);
+    net.drag.push_back(massless ? 0 : node.drag / node.mass);
   }
+  require_masses(model);
   return net;
 }
 

@@ -31,8 +31,9 @@ namespace gewebe {
 class SolidDynamic final : public BodyMotion {
 public:
   /// At rest. Keeps a reference to the model.
-  /// \pre check_model(model) passes \throw Error if a node can't move: in a model with tetrahedra
-  /// one of none of them and no spring, or of another mass than its tetrahedra's; as SolidMotion
+  /// \pre check_model(model) passes \throw Error if a node can move but has no mass, or, in a
+  /// model with tetrahedra, is in none of them and of no spring, or has another mass than its
+  /// tetrahedra's; as SolidMotion
   SolidDynamic(const Model& model, const SolidChoice& choice, const Context& context);
 
   void set_load(const Load& load, double time) override;

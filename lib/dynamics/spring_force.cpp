@@ -1,8 +1,10 @@
 #include "dynamics/spring_force.h"
 
+#include "base/error.h"
 #include "dynamics/spring_kernel.h"
 
 #include <cmath>
+#include <string>
 
 namespace gewebe {
 
@@ -29,6 +31,13 @@ SpringNetwork spring_network(const Model& model) {
     network.halves[next[s.j]++] = {s.i, s.stiffness, s.damping, s.rest};
   }
   return network;
+}
+
+void require_masses(const Model& model) {
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    if (const Node& node = model.nodes[i]; node.fixed != fixed_all && !(node.mass > 0))
+      throw Error("node " + std::to_string(i) +
+                  " can move but has no mass, expected more than 0 g");
 }
 
 Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> motion, std::size_t i) {

@@ -37,6 +37,9 @@ struct SpringNetwork {
 /// \pre check_model(model) passes
 SpringNetwork spring_network(const Model& model);
 
+/// \throw Error that names the first node that can move and has no mass
+void require_masses(const Model& model);
+
 /// Force of springs and drag on node i. \pre as many motions as nodes
 Vec3 spring_force(const SpringNetwork& network, std::span<const NodeMotion> motion, std::size_t i);
 

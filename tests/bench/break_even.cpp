@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "compliance/compliance_columns.h"
 #include "compliance/compliance_source.h"
+#include "dynamics/solid_dynamic.h"
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/store/stiffness_store_writer.h"

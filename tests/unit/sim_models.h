@@ -2,10 +2,12 @@
 // Models for the tests of the simulation.
 
 #include "base/context.h"
+#include "dynamics/body_motion.h"
 #include "dynamics/spring_force.h"
 #include "model/build.h"
 #include "model_meshes.h"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -45,6 +47,33 @@ inline Model organ(int rounds = 2, bool bend = true) {
     if (model.nodes[i].position.z < 14)
       model.nodes[i].fixed = i % 3 == 0 ? fixed_z : fixed_all;
   return model;
+}
+
+/// Held nowhere, and braked by nothing but springs.
+inline Model freed(Model model) {
+  for (Node& n : model.nodes) {
+    n.fixed = fixed_none;
+    n.drag = 0;
+  }
+  return model;
+}
+
+inline Model damped_pair() {
+  return two_masses(2, 50, 1, 0.4);
+}
+/// Where mass 1 of it, thrown apart, is at time 1 by steps of 1/n, against the analytic motion.
+inline double error_of_damped_pair(BodyMotion& object, int n) {
+  const double mass = 2, stiffness = 50, damping = 1, drag = 0.4, v = 0.3;
+  std::vector<NodeMotion> motion(2);
+  motion[0].velocity.x = -v;
+  motion[1].velocity.x = v;
+  object.set_motion(motion);
+  (void)object.advance(1, 1.0 / n, one_thread(), 0);
+  // x'' = -(2k/m) x - ((2c + d)/m) x'
+  const double decay = (2 * damping + drag) / mass / 2;
+  const double omega = std::sqrt(2 * stiffness / mass - decay * decay);
+  return std::abs(object.motion()[1].displacement.x -
+                  v / omega * std::exp(-decay) * std::sin(omega));
 }
 
 /// The nodes of the surface that no axis holds.

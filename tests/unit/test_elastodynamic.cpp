@@ -132,21 +132,10 @@ TEST(Elastodynamic, EnergyIsBoundedAndItsErrorIsOfOrderOne) {
   EXPECT_GT(energy_error(1.01), 10); // beyond the safe step it explodes
 }
 
-/// Where mass 1 of a damped pair is at time 1, against the analytic motion, for a step of 1/n.
 double position_error(int n) {
-  const double mass = 2, stiffness = 50, damping = 1, drag = 0.4, v = 0.3;
-  const Model model = two_masses(mass, stiffness, damping, drag);
+  const Model model = test::damped_pair();
   Elastodynamic object(model);
-  std::vector<NodeMotion> motion(2);
-  motion[0].velocity.x = -v;
-  motion[1].velocity.x = v;
-  object.set_motion(motion);
-  (void)object.advance(1, 1.0 / n, one_thread());
-  // x'' = -(2k/m) x - ((2c + d)/m) x'
-  const double decay = (2 * damping + drag) / mass / 2;
-  const double omega = std::sqrt(2 * stiffness / mass - decay * decay);
-  return std::abs(object.motion()[1].displacement.x -
-                  v / omega * std::exp(-decay) * std::sin(omega));
+  return test::error_of_damped_pair(object, n);
 }
 
 TEST(Elastodynamic, FollowsTheAnalyticDampedMotionWithOrderOne) {

@@ -2,6 +2,7 @@
 // that way is chosen.
 
 #include "base/error.h"
+#include "base/mesh.h"
 #include "base/vector_at.h"
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
@@ -25,7 +26,7 @@
 namespace gewebe {
 namespace {
 
-using test::kicked, test::one_thread, test::organ, test::two_masses;
+using test::kicked, test::one_thread, test::organ;
 
 SolidChoice to(double tolerance) {
   SolidChoice choice;
@@ -33,34 +34,14 @@ SolidChoice to(double tolerance) {
   return choice;
 }
 
-Model free_organ(int rounds) {
-  Model model = organ(rounds);
-  for (Node& n : model.nodes) {
-    n.fixed = fixed_none;
-    n.drag = 0;
-  }
-  return model;
-}
-
 double energy_of(const Model& model, const BodyMotion& object) {
   return kinetic_energy(model, object.motion()) + elastic_energy(model, object.motion());
 }
 
-/// Where mass 1 of a damped pair is at time 1 by backward Euler steps of 1/n, against the analytic
-/// motion.
 double implicit_error(int n) {
-  const double mass = 2, stiffness = 50, damping = 1, drag = 0.4, v = 0.3;
-  const Model model = two_masses(mass, stiffness, damping, drag);
+  const Model model = test::damped_pair();
   SolidDynamic object(model, to(1e-9), one_thread());
-  std::vector<NodeMotion> motion(2);
-  motion[0].velocity.x = -v;
-  motion[1].velocity.x = v;
-  object.set_motion(motion);
-  (void)object.advance(1, 1.0 / n, one_thread());
-  const double decay = (2 * damping + drag) / mass / 2;
-  const double omega = std::sqrt(2 * stiffness / mass - decay * decay);
-  return std::abs(object.motion()[1].displacement.x -
-                  v / omega * std::exp(-decay) * std::sin(omega));
+  return test::error_of_damped_pair(object, n);
 }
 
 TEST(ImplicitNet, FollowsTheAnalyticDampedMotionWithOrderOne) {
@@ -91,7 +72,7 @@ TEST(ImplicitNet, NeverGainsEnergyHoweverLongTheStep) {
 }
 
 TEST(ImplicitNet, KeepsMomentumAndAgreesWithManySmallSteps) {
-  const Model model = free_organ(1);
+  const Model model = test::freed(organ(1));
   const std::vector<NodeMotion> start = kicked(model, 0.2, 3);
   SolidDynamic object(model, to(1e-6), one_thread());
   Elastodynamic fine(model);
@@ -122,7 +103,7 @@ Vec3 angular_momentum(const Model& model, std::span<const NodeMotion> motion) {
 
 /// The part of its angular momentum that a body turning at 4 rad/s loses in 0.25 s.
 double lost_turning(double h) {
-  Model model = free_organ(2);
+  Model model = test::freed(organ(2));
   Vec3 middle;
   double mass = 0;
   for (const Node& n : model.nodes) {
@@ -196,14 +177,32 @@ TEST(ImplicitNet, IsChosenWhereExplicitStepsWouldBeTooMany) {
   }
 }
 
+/// As explicit steps have it.
+TEST(ImplicitNet, WhatStaysWhereItIsNeedsNoMass) {
+  const Model whole = organ(2);
+  Model model = whole;
+  for (Node& n : model.nodes)
+    if (n.fixed == fixed_all)
+      n.mass = 0;
+  SolidDynamic object(model, {}, one_thread()), other(whole, {}, one_thread());
+  for (SolidDynamic* const one : {&object, &other}) {
+    one->set_motion(kicked(whole, 0.05, 20));
+    (void)one->advance(0.1, 1.0 / 600, one_thread());
+  }
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    EXPECT_EQ(object.motion()[i].displacement, other.motion()[i].displacement) << i;
+  model.nodes[test::free_nodes(model)[0]].mass = 0;
+  EXPECT_THROW(SolidDynamic(model, {}, one_thread()), Error);
+}
+
 // ---- what fills them
 
 double enclosed(const Model& model, std::span<const NodeMotion> motion) {
-  double six = 0;
-  const auto at = [&](std::uint32_t i) { return model.nodes[i].position + motion[i].displacement; };
-  for (const Triangle& t : model.triangles)
-    six += dot(at(t[0]), cross(at(t[1]), at(t[2])));
-  return six / 6;
+  TriangleMesh mesh;
+  for (std::size_t i = 0; i < motion.size(); ++i)
+    mesh.points.push_back(model.nodes[i].position + motion[i].displacement);
+  mesh.triangles = model.triangles;
+  return signed_volume(mesh);
 }
 
 /// A membrane without what is inside, and of a tenth of the stiffness, held at some nodes below.
@@ -282,11 +281,7 @@ TEST(FilledNet, PushesWithTheGradientOfItsEnergyAndNothingAsAWhole) {
 }
 
 TEST(FilledNet, GainsNeitherEnergyNorMomentum) {
-  Model model = membrane();
-  for (Node& n : model.nodes) {
-    n.fixed = fixed_none;
-    n.drag = 0;
-  }
+  const Model model = test::freed(membrane());
   // Springs at rest where they are would pull: of what fills it alone.
   const std::vector<NodeMotion> start = kicked(model, 0.5, 0);
   const auto energy = [&](double bulk, std::span<const NodeMotion> motion) {
