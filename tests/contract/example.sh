@@ -217,6 +217,24 @@ test_instrument_is_drawn_along() {
   done
 }
 
+# A liver under its weight: what fills a net keeps its volume, where the same net without loses a tenth of it.
+test_gravity_is_borne_by_what_fills_a_net() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  cp "$GEWEBE_ROOT"/examples/gravity/{Makefile,*.awk,*.scene,*.particles} .
+  make SIZE=300x90 VOXEL=5 CELL=14 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  share() { sed -n "s/^$1: *\\([0-9.]*\\) % of its volume\$/\\1/p" log; }
+  awk -v net="$(share net)" -v filled="$(share filled)" -v solid="$(share solid)" 'BEGIN {
+    exit !(net > 60 && net < 96 && filled > 99 && filled < 101 && solid > 98 && solid < 101) }' ||
+    fail 'other volumes' "$(tail -4 log)"
+  ! cmp -s before.png after.png || fail 'the weight is not to be seen'
+  make -s clean
+  for file in *; do
+    [[ $file == log || -e $GEWEBE_ROOT/examples/gravity/$file ]] || fail "clean left $file"
+  done
+}
+
 # The relief of two pictures, as what light adds to the same look without heights: their correlation.
 rims() { # FLAT A B (PPMs)
   python3 - "$@" <<'END'
