@@ -3,6 +3,7 @@
 #include "formats/scene/scene.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "tools/run/scene_lines.h"
 #include "tools/run/scene_run.h"
 
 #include <fstream>

@@ -5,7 +5,6 @@
 #include "base/error.h"
 #include "compliance/compliance_source.h"
 #include "formats/results/results_writer.h"
-#include "formats/stream/stream.h"
 #include "model/selector.h"
 #include "scene/simulation.h"
 
@@ -102,9 +101,5 @@ private:
   void numbered(Work&& work);
   std::unique_ptr<State> state_;
 };
-
-/// Feeds every line of the input to the run as soon as it is there, then finishes.
-/// \throw Error as SceneRun, among others for a line of over 16 MiB
-void run_scene(Input& input, SceneRun& run);
 
 } // namespace gewebe

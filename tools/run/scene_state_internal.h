@@ -1,0 +1,81 @@
+#pragma once
+// What a run of a scene keeps, and what it does with one command.
+
+#include "base/digest.h"
+#include "base/error.h"
+#include "formats/scene/command.h"
+#include "tools/run/scene_checks.h"
+#include "tools/run/scene_result.h"
+#include "tools/run/scene_run.h"
+#include "tools/run/scene_stress.h"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gewebe {
+
+/// A file that a line names may be wrong in a place of its own: both places count.
+std::string with_place(const Error& error);
+
+/// A file of an object, read late, is the fault of the line that named it.
+struct WrongFile {
+  std::uint64_t line = 0;
+  std::string text;
+};
+
+struct SceneRun::State {
+  std::string name;
+  SceneOptions options;
+  Simulation simulation;
+  SceneCounts counts;
+  Digest digest;
+  std::uint64_t line = 0, steps = 0;
+  std::map<std::string, std::string> lists; // node lists that the line named
+  std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
+  std::uint64_t first_error = 0;
+  std::string first_error_text;
+  SceneChecks checks;
+  SceneStress stress;
+  Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
+  std::optional<SceneResult> result;
+  std::vector<std::string> stores; ///< by object; "" where it has none
+  std::vector<std::string> models; ///< files that objects were made of
+
+  State(std::string n, const Context& context, SceneOptions o);
+
+  SimulationOptions simulation_options();
+  void warn(const std::string& text);
+  void distrust(const std::string& text);
+  /// \throw Error without one
+  void require_object() const;
+
+  // One command, scene_commands.cpp. Each throws Error if it can't be carried out.
+  void execute(const Command& command);
+  void add(const ObjectCommand& c);
+  /// Two-step asks the object's store for its second stage, where it has no model.
+  void add_stage(SetTwoStep& set, const std::string& file);
+  void write(const EmitModelCommand& c);
+  void tell_stress(const EmitStressCommand& c);
+  void schedule(const Command& command, const ChangeCommand& what);
+  void step(const StepCommand& c);
+  void run(const RunCommand& c);
+  /// A step and its answer, behind the first frame. Only when the step is done, so that one that
+  /// fails leaves nothing.
+  template <class Step>
+  void go_on(Step&& step);
+
+  // What follows, scene_run.cpp.
+  void sync();
+  void answer();
+  void measure();
+  /// The line was carried out.
+  void accept(std::string_view text, const Command& command);
+  /// The line was not carried out, or only in part if it asked for many steps.
+  void refuse(std::uint64_t at, const std::string& text);
+};
+
+} // namespace gewebe
