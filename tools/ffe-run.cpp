@@ -20,7 +20,7 @@ namespace {
 
 struct Arguments {
   std::string scene = "-";
-  bool serve = false, binary = false, verify = false;
+  bool serve = false, acknowledge = false, binary = false, verify = false;
   std::optional<double> rate;
   double tolerance = 0;
   std::string events, record, latencies;
@@ -65,6 +65,7 @@ void work(cli::Run& run, const Arguments& in) {
   options.warn = [&](const std::string& text) { run.warn(text); };
   options.distrust = [&](const std::string& text) { cli::distrust(run, "ffe-run", text); };
   options.serve = in.serve;
+  options.acknowledge = in.acknowledge;
   options.binary = in.binary;
   options.rate = in.rate.value_or(0);
   options.result = result.get();
@@ -115,6 +116,7 @@ int main(int argc, char** argv) {
   Arguments in;
   p.output_kinds(result_kinds());
   p.flag("--serve", in.serve, "answer a wrong line and go on");
+  p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
   p.flag("--binary", in.binary, "answer in binary frames of float32");
   p.option("--events", in.events, "FILE", "who touched what when, as CSV");
   p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
@@ -125,5 +127,9 @@ int main(int argc, char** argv) {
   p.option("--rate", in.rate, "HZ", "steps a second that are wanted").positive();
   p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
   p.operand("SCENE", in.scene, "the scene");
+  p.check([&] {
+    if (in.acknowledge && !in.serve)
+      throw UsageError("--ack without --serve, expected both");
+  });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }

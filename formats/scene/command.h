@@ -45,11 +45,26 @@ struct RunCommand {
 /// Asks where the scene is, without a step.
 struct SyncCommand {};
 
+/// Asks what there is; nothing changes.
+struct QueryCommand {
+  enum class Kind {
+    nodes,      ///< of an object: how many, and where if that is asked for
+    select,     ///< of an object: those that a selector names
+    objects,    ///< all of them
+    instruments ///< that are there
+  };
+  enum class Positions { none, rest, now };
+  Kind kind = Kind::nodes;
+  std::string object{};
+  std::optional<Selector> nodes{};
+  Positions positions = Positions::none;
+};
+
 struct Command {
   std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, EmitStressCommand, StepCommand,
-               RunCommand, SyncCommand>
+               RunCommand, SyncCommand, QueryCommand>
       what;
 };
 

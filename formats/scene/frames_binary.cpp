@@ -54,6 +54,15 @@ void append_cutting(std::string& bytes, const Cutting& c, std::uint64_t step) {
   }
 }
 
+std::string text_frame(FrameKind kind, std::uint64_t step, std::string_view text) {
+  const std::size_t words = (text.size() + 3) / 4;
+  std::string bytes;
+  append_head(bytes, {kind, 0, step, words});
+  bytes += text;
+  bytes.resize(28 + 4 * words, '\0');
+  return bytes;
+}
+
 } // namespace
 
 std::string binary_answer(const Simulation& simulation, std::uint64_t step,
@@ -126,11 +135,17 @@ std::string binary_sync(const Simulation& simulation, std::uint64_t step) {
 }
 
 std::string binary_error(std::uint64_t step, std::string_view text) {
-  const std::size_t words = (text.size() + 3) / 4;
+  return text_frame(FrameKind::error, step, text);
+}
+
+std::string binary_told(std::uint64_t step, std::string_view text) {
+  return text_frame(FrameKind::told, step, text);
+}
+
+std::string binary_ok(std::uint64_t step, std::uint64_t line) {
   std::string bytes;
-  append_head(bytes, {FrameKind::error, 0, step, words});
-  bytes += text;
-  bytes.resize(28 + 4 * words, '\0');
+  append_head(bytes, {FrameKind::ok, 0, step, 2});
+  append(bytes, line);
   return bytes;
 }
 

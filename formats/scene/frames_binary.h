@@ -28,7 +28,9 @@ enum class FrameKind : std::uint32_t {
   restored = 10,  ///< 1 uint32, its nodes: the model is as it came
   triangles = 11, ///< 3 uint32 of each triangle, where they have changed
   stress =
-      12, ///< 7 float32 of each node: the tensor, von Mises's stress; those of the frame before
+      12,    ///< 7 float32 of each node: the tensor, von Mises's stress; those of the frame before
+  ok = 13,   ///< one uint64: the line of this number is done
+  told = 14, ///< text, filled up with zero bytes: what a line asked for
 };
 
 /// The head of each frame, without gaps: 28 bytes.
@@ -51,5 +53,9 @@ std::string binary_sync(const Simulation& simulation, std::uint64_t step);
 
 /// The frame that refuses a line, behind `step` answered steps; its text is text_error's.
 std::string binary_error(std::uint64_t step, std::string_view text);
+
+/// The frame that acknowledges a line, and the one of what text_query tells; behind so many steps.
+std::string binary_ok(std::uint64_t step, std::uint64_t line);
+std::string binary_told(std::uint64_t step, std::string_view text);
 
 } // namespace gewebe

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "formats/scene/verbs_internal.h"
 #include "formats/scene/words.h"
 #include "solid/solid_motion.h"
 
@@ -19,8 +20,6 @@ namespace {
 bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
 }
-
-using What = decltype(Command::what);
 
 /// RATIO@HZ: what a motion of this frequency decays by.
 double parse_damping(Words& in, std::string_view text) {
@@ -237,53 +236,6 @@ What parse_two_step(Words& in) {
   return c;
 }
 
-What parse_emit(Words& in) {
-  const std::string& word = in.word("word");
-  if (word == "model") {
-    EmitModelCommand c;
-    c.object = in.name();
-    c.file = in.word("FILE");
-    if (c.file.empty())
-      in.fail("an empty name of a file");
-    return c;
-  }
-  if (word == "stress") {
-    EmitStressCommand c;
-    c.object = in.name();
-    if (!in.done())
-      c.nodes = in.nodes();
-    return c;
-  }
-  if (word != "shapes" && word != "surfaces" && word != "forces" && word != "instruments")
-    in.fail(shown(word) + " can't be emitted");
-  return ChangeCommand{.change = Emit{word == "forces", word == "instruments", word == "surfaces"}};
-}
-
-What parse_step(Words& in) {
-  StepCommand c;
-  if (in.done())
-    return c;
-  c.dt = in.number("time");
-  if (!(*c.dt >= 0))
-    in.fail("a step back in time");
-  return c;
-}
-
-What parse_run(Words& in) {
-  RunCommand c;
-  c.until = in.number("time");
-  if (!in.take("every"))
-    in.fail(in.done() ? "no 'every'" : shown(in.word("")) + " is not 'every'");
-  c.every = in.number("time");
-  if (!(c.every > 0))
-    in.fail("DT is not positive");
-  return c;
-}
-
-What parse_sync(Words&) {
-  return SyncCommand{};
-}
-
 What parse_method(Words& in) {
   ChangeCommand c;
   c.object = in.name();
@@ -345,8 +297,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 22>& verbs() {
-  static const std::array<Verb, 22> all{{
+const std::array<Verb, 26>& verbs() {
+  static const std::array<Verb, 26> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -380,6 +332,10 @@ const std::array<Verb, 22>& verbs() {
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
       {"sync", "sync", false, parse_sync},
+      {"nodes", "nodes NAME [rest|positions]", false, parse_nodes},
+      {"select", "select NAME NODES", false, parse_select},
+      {"objects", "objects", false, parse_objects},
+      {"instruments", "instruments", false, parse_instruments},
   }};
   return all;
 }

@@ -135,6 +135,10 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
   return text + "done\n";
 }
 
+std::string text_ok(std::uint64_t line) {
+  return "ok " + std::to_string(line) + "\n";
+}
+
 std::string text_sync(const Simulation& simulation) {
   std::string text = "sync ";
   append(text, simulation.time());

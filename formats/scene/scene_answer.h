@@ -30,6 +30,9 @@ struct StressAnswer {
 std::string text_answer(const Simulation& simulation, std::uint64_t step,
                         std::span<const StressAnswer> stresses = {});
 
+/// "ok LINE": it is done.
+std::string text_ok(std::uint64_t line);
+
 /// "sync T": where the scene is.
 std::string text_sync(const Simulation& simulation);
 

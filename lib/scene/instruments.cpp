@@ -74,6 +74,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
   const Instrument& i = w.now.instruments.at(instrument);
   InstrumentReport report{.name = i.name,
                           .present = i.present,
+                          .shape = i.shape,
                           .pose = i.way.at(w.now.clock.time),
                           .force = {},
                           .torque = {}};

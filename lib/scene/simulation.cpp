@@ -105,9 +105,15 @@ const Model& Simulation::first_model(std::size_t object) const {
 
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
+  const Shown& shown = one.shown;
+  const auto whole = [&] {
+    return !shown.whole->empty() || shown.displacement->size() == 3 * one.model().nodes.size();
+  };
   return {one.name(),
           one.method,
           one.matter->known,
+          one.matter->known && shown.shaped && whole(),
+          one.body != nullptr && !one.body->moving->resting(),
           one.stages.model != nullptr,
           one.warp,
           one.method == Method::ela && one.matter->known && is_solid(one),

@@ -93,6 +93,8 @@ struct ObjectFacts {
   const std::string& name;
   Method method = Method::ela;
   bool known = false;                    ///< its model was needed so far
+  bool shaped = false;                   ///< and displacement() costs nothing, changes nothing
+  bool awake = false;                    ///< elastodynamic, and not at rest
   bool staged = false;                   ///< that of its second stage is known
   bool warp = false;                     ///< with large rotations
   bool moving_solid = false;             ///< of tetrahedra, and elastodynamic
@@ -114,6 +116,7 @@ struct News {
 struct InstrumentReport {
   std::string name{};
   bool present = false;
+  InstrumentShape shape;
   Pose pose;
   Vec3 force, torque;    ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
   std::size_t nodes = 0; ///< that it touches or grasps

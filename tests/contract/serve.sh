@@ -303,3 +303,25 @@ P
   ! python3 in.py 2>/dev/null || fail 'changed frames were not seen'
   rm organ.ela in.scene in.py text frames
 }
+
+test_each_line_is_acknowledged_and_questions_change_nothing() {
+  need ffe-run exp2ela
+  organ
+  printf '%s\n' 'object o organ.ela method=ffe' 'emit forces' 'displace o 6 0 0 0.01' 'step 0.25' '' 'nonsense' 'step 0.25' >in.scene
+  awk '{ print; print "objects"; print "nodes o rest"; print "select o z>0"; print "select p all"; print "instruments" }' in.scene >asked.scene
+  local status=0
+  ffe-run --serve --ack --record asked.record --events asked.csv asked.scene >asked 2>stderr.txt || status=$?
+  [[ $status == 1 && $(grep -cE '^(ok|error) ' asked) == 42 ]] || fail "status $status" "$(<asked)"
+  # Each line once, in its turn.
+  grep -E '^(ok|error) ' asked | sed 's/^[a-z]* \([0-9]*\).*/\1/' | cmp - <(seq 42) || fail 'not each line in its turn' "$(<asked)"
+  [[ $(grep -c "^error [0-9]*: there is no object 'p', expected one of o$" asked) == 7 ]] || fail "$(grep ^error asked)"
+  [[ $(grep -A 4 '^select o' asked | head -5 | tr '\n' ' ') == 'select o 4 4 5 6 7 ' ]] || fail "$(<asked)"
+  # The run is the one that was not asked.
+  ffe-run --serve --record calm.record --events calm.csv in.scene >calm 2>/dev/null || true
+  sed -n '/^step/,/^done/p' calm >steps
+  sed -n '/^step/,/^done/p' asked | cmp - steps
+  cmp asked.record calm.record
+  cmp <(grep -v ,error, asked.csv) <(grep -v ,error, calm.csv)
+  expect_failure 2 ffe-run ffe-run --ack in.scene
+  rm organ.ela in.scene asked.* calm.* asked calm steps
+}

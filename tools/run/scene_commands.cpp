@@ -167,6 +167,8 @@ void SceneRun::State::execute(const Command& command) {
     step(*one);
   else if (const auto* const many = std::get_if<RunCommand>(&command.what))
     run(*many);
+  else if (const auto* const query = std::get_if<QueryCommand>(&command.what))
+    tell(*query);
   else
     sync();
 }

@@ -4,6 +4,7 @@
 #include "formats/scene/frames_binary.h"
 #include "formats/scene/scene.h"
 #include "formats/scene/scene_answer.h"
+#include "formats/scene/scene_query.h"
 #include "tools/run/event_log.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_state_internal.h"
@@ -73,6 +74,18 @@ void SceneRun::State::sync() {
     });
 }
 
+/// Also where nobody hears it, so that a wrong question is one everywhere.
+void SceneRun::State::tell(const QueryCommand& query) {
+  const std::string text = text_query(simulation, query, options.files.node_list);
+  if (options.reply)
+    deliver([&] { options.reply(options.binary ? binary_told(steps, text) : text); });
+}
+
+void SceneRun::State::acknowledge() {
+  if (options.acknowledge && options.reply)
+    deliver([&] { options.reply(options.binary ? binary_ok(steps, line) : text_ok(line)); });
+}
+
 void SceneRun::State::require_object() const {
   if (simulation.object_count() == 0)
     throw Error("there is no object, expected an object command first");
@@ -130,7 +143,7 @@ void SceneRun::State::accept(std::string_view text, const Command& command) {
   ++counts.commands;
   answered_gravity = gravity;
   deliver([&] {
-    if (options.record != nullptr)
+    if (options.record != nullptr && !std::holds_alternative<QueryCommand>(command.what))
       options.record->line(text, command, lists);
     if (options.events != nullptr)
       options.events->keep();
@@ -179,6 +192,7 @@ void SceneRun::numbered(Work&& work) {
   try {
     try {
       work();
+      s.acknowledge();
     } catch (const Cancelled&) {
       throw;
     } catch (const Error& error) {

@@ -46,6 +46,7 @@ struct SceneOptions {
   SceneFiles files;
   std::function<void(std::string_view)> reply; ///< told each answer, whole; none: not answered
   bool binary = false;                         ///< answers are frames_binary.h's, else text
+  bool acknowledge = false; ///< each line is answered by its number, last of all
   bool serve = false; ///< a wrong line is answered, changes nothing, and the run goes on
   std::function<void(const std::string&)> warn;
   /// Told, once of each object, why its shape is not to be trusted; without it `warn` is.

@@ -70,7 +70,9 @@ struct SceneRun::State {
 
   // What follows, scene_run.cpp.
   void sync();
+  void tell(const QueryCommand& query);
   void answer();
+  void acknowledge();
   void measure();
   /// The line was carried out.
   void accept(std::string_view text, const Command& command);

@@ -1,0 +1,112 @@
+#include "formats/scene/scene_query.h"
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "base/vector_at.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+void append(std::string& line, std::initializer_list<double> values) {
+  for (const double value : values)
+    line += ' ' + number_text(value + 0.0); // -0 as 0
+}
+
+void append(std::string& line, const Vec3& v) {
+  append(line, {v.x, v.y, v.z});
+}
+
+std::string told_nodes(const Simulation& simulation, const QueryCommand& query) {
+  const std::size_t object = find_object(simulation, query.object);
+  const std::vector<Node>& nodes = simulation.model(object).nodes;
+  std::string text = "nodes " + query.object + " " + std::to_string(nodes.size()) + "\n";
+  if (query.positions == QueryCommand::Positions::none)
+    return text;
+  const bool now = query.positions == QueryCommand::Positions::now;
+  // To compute it here would leave traces in the last digits of later shapes.
+  if (now && !simulation.object(object).shaped)
+    throw Error("the last answer had no use for the shape of object " + query.object +
+                ", expected emit shapes before that step, or nodes " + query.object + " rest");
+  const std::span<const double> u = now ? simulation.displacement(object) : std::span<double>();
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const Vec3 p = now ? nodes[k].position + vector_at(u, k) : nodes[k].position;
+    text += number_text(p.x) + ' ' + number_text(p.y) + ' ' + number_text(p.z) + '\n';
+  }
+  return text;
+}
+
+std::string told_selection(const Simulation& simulation, const QueryCommand& query,
+                           const LoadNodeList& lists) {
+  const Model& model = simulation.model(find_object(simulation, query.object));
+  const std::vector<std::uint32_t> nodes = select_nodes(model, query.nodes.value(), lists);
+  std::string text = "select " + query.object + " " + std::to_string(nodes.size()) + "\n";
+  for (const std::uint32_t node : nodes)
+    text += std::to_string(node) + '\n';
+  return text;
+}
+
+std::string told_objects(const Simulation& simulation) {
+  std::string text = "objects " + std::to_string(simulation.object_count()) + "\n";
+  for (std::size_t i = 0; i < simulation.object_count(); ++i) {
+    const ObjectFacts object = simulation.object(i);
+    text += object.name + ' ' + method_name(object.method);
+    if (object.known) { // its file is not read for this
+      const Model& model = simulation.model(i);
+      for (const std::size_t count :
+           {model.nodes.size(), model.triangles.size(), model.tetrahedra.size()})
+        text += ' ' + std::to_string(count);
+    } else {
+      text += " - - -";
+    }
+    text += object.method == Method::ffe ? " -\n" : object.awake ? " awake\n" : " asleep\n";
+  }
+  return text;
+}
+
+std::string told_instruments(const Simulation& simulation) {
+  std::size_t count = 0;
+  std::string lines;
+  for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
+    const InstrumentReport report = simulation.instrument(k);
+    if (!report.present)
+      continue;
+    ++count;
+    const InstrumentShape& shape = report.shape;
+    lines += report.name + (shape.blade ? " blade" : shape.axis == Vec3{} ? " sphere" : " capsule");
+    append(lines, {shape.radius, shape.friction});
+    append(lines, report.pose.place);
+    append(lines, report.pose(shape.axis));
+    const Quaternion& turn = report.pose.turn;
+    append(lines, {turn.w, turn.x, turn.y, turn.z});
+    append(lines, report.force);
+    append(lines, report.torque);
+    lines += ' ' + std::to_string(report.nodes) + '\n';
+  }
+  return "instruments " + std::to_string(count) + "\n" + lines;
+}
+
+} // namespace
+
+std::string text_query(const Simulation& simulation, const QueryCommand& query,
+                       const LoadNodeList& lists) {
+  switch (query.kind) {
+  case QueryCommand::Kind::nodes:
+    return told_nodes(simulation, query);
+  case QueryCommand::Kind::select:
+    return told_selection(simulation, query, lists);
+  case QueryCommand::Kind::objects:
+    return told_objects(simulation);
+  case QueryCommand::Kind::instruments:
+    break;
+  }
+  return told_instruments(simulation);
+}
+
+} // namespace gewebe

@@ -1,0 +1,20 @@
+#pragma once
+// What follows the first word of a line, by that word: what asks for something.
+
+#include "formats/scene/command.h"
+#include "formats/scene/words.h"
+
+namespace gewebe {
+
+using What = decltype(Command::what);
+
+What parse_emit(Words& in);
+What parse_step(Words& in);
+What parse_run(Words& in);
+What parse_sync(Words& in);
+What parse_nodes(Words& in);
+What parse_select(Words& in);
+What parse_objects(Words& in);
+What parse_instruments(Words& in);
+
+} // namespace gewebe
