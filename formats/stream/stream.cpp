@@ -4,21 +4,21 @@
 #include "base/error.h"
 #include "formats/stream/file_names.h"
 #include "formats/stream/program_start.h"
+#include "formats/stream/removal.h"
 
 #include <array>
-#include <atomic>
 #include <cerrno>
-#include <climits>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <istream>
+#include <optional>
 #include <ostream>
 #include <streambuf>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -32,37 +32,6 @@ bool is_pipe_name(const std::string& path) {
 
 std::string error_text(int error) {
   return std::strerror(error);
-}
-
-// Temporary files that a signal handler must remove: fixed slots, because a handler may not
-// allocate.
-struct TemporarySlot {
-  std::atomic<bool> used{false};
-  std::array<char, PATH_MAX> path{};
-};
-std::array<TemporarySlot, 8> temporary_slots;
-
-int remember_temporary(const std::string& path) {
-  for (std::size_t i = 0; i < temporary_slots.size(); ++i) {
-    TemporarySlot& slot = temporary_slots.at(i);
-    if (slot.used.load() || path.size() >= slot.path.size())
-      continue;
-    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
-    slot.used.store(true);
-    return static_cast<int>(i);
-  }
-  return -1;
-}
-
-void forget_temporary(int slot) {
-  if (slot >= 0)
-    temporary_slots.at(static_cast<std::size_t>(slot)).used.store(false);
-}
-
-extern "C" void gewebe_remove_temporaries(int signal_number) {
-  remove_temporaries();
-  (void)std::signal(signal_number, SIG_DFL);
-  (void)std::raise(signal_number);
 }
 
 bool same_bytes(const std::string& a, const std::string& b) {
@@ -235,7 +204,7 @@ struct Output::State final : std::streambuf {
       (void)::close(fd);
     if (!temporary.empty() && !kept) {
       (void)::unlink(temporary.c_str());
-      forget_temporary(slot);
+      forget_removal(slot);
     }
   }
 
@@ -266,11 +235,8 @@ struct Output::State final : std::streambuf {
     const std::string base = slash == std::string::npos ? target : target.substr(slash + 1);
     std::string path =
         options.part ? target + ".part" : folder + "." + base.substr(0, 200) + ".XXXXXX";
-    // Blocked until the slot is filled, so that no signal can leave the file behind.
-    sigset_t all{};
-    sigset_t old{};
-    (void)::sigfillset(&all);
-    (void)::pthread_sigmask(SIG_SETMASK, &all, &old);
+    // Until the name is remembered, so that no signal can leave the file behind.
+    std::optional<SignalsWait> wait(std::in_place);
     fd = options.part ? open_part(path) : ::mkostemp(path.data(), O_CLOEXEC);
     int error = errno;
     if (fd >= 0 && options.part && !lock_part(path)) {
@@ -281,9 +247,9 @@ struct Output::State final : std::streambuf {
     if (fd >= 0) {
       temporary = path;
       kept = found;
-      slot = found ? -1 : remember_temporary(path);
+      slot = found ? -1 : remember_removal(path);
     }
-    (void)::pthread_sigmask(SIG_SETMASK, &old, nullptr);
+    wait.reset();
     errno = error;
     if (fd < 0 && errno == EBUSY)
       throw Error(name, "is being made by another program: " + path + " is locked");
@@ -440,7 +406,7 @@ const std::string& Output::temporary() const {
 
 void Output::keep_part(bool keep) {
   state_->kept = keep;
-  forget_temporary(state_->slot);
+  forget_removal(state_->slot);
   state_->slot = -1;
 }
 
@@ -483,31 +449,8 @@ void Output::commit() {
   state.use = FileUse(state.name);
   if (::rename(state.temporary.c_str(), state.target.c_str()) != 0)
     state.fail("cannot rename");
-  forget_temporary(state.slot);
+  forget_removal(state.slot);
   state.temporary.clear();
-}
-
-void install_signal_cleanup() {
-  struct sigaction action {};
-  action.sa_handler = gewebe_remove_temporaries;
-  (void)::sigfillset(&action.sa_mask);
-  action.sa_flags = 0;
-  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU}) {
-    struct sigaction old {};
-    // What the caller ignores on purpose (nohup) stays ignored; a broken pipe always ends a
-    // program.
-    if (signal_number != SIGPIPE && ::sigaction(signal_number, nullptr, &old) == 0 &&
-        old.sa_handler == SIG_IGN)
-      continue;
-    (void)::sigaction(signal_number, &action, nullptr);
-  }
-  (void)std::signal(SIGXFSZ, SIG_IGN); // then write(2) says EFBIG
-}
-
-void remove_temporaries() noexcept {
-  for (TemporarySlot& slot : temporary_slots)
-    if (slot.used.load())
-      (void)::unlink(slot.path.data());
 }
 
 void hold_standard_streams() {

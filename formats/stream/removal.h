@@ -1,0 +1,27 @@
+#pragma once
+// Names of files that must not outlive the program, whatever ends it.
+
+#include <string>
+
+namespace gewebe {
+
+/// From now on signals (those of install_signal_cleanup) and remove_temporaries() remove this file.
+/// \return a number for forget_removal; -1 if too many names, or too long a one, are remembered
+int remember_removal(const std::string& path);
+/// -1 is nothing.
+void forget_removal(int number) noexcept;
+
+/// While it lives all signals of this thread wait: what is made and remembered under it is not left
+/// behind.
+class SignalsWait {
+public:
+  SignalsWait();
+  ~SignalsWait();
+  SignalsWait(const SignalsWait&) = delete;
+  SignalsWait& operator=(const SignalsWait&) = delete;
+
+private:
+  alignas(16) unsigned char old_[128]; // a sigset_t
+};
+
+} // namespace gewebe
