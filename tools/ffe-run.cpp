@@ -3,7 +3,7 @@
 #include "formats/results/results_writer.h"
 #include "tools/run/event_log.h"
 #include "tools/run/run_report.h"
-#include "tools/run/scene_lines.h"
+#include "tools/run/scene_answers.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
@@ -23,7 +23,7 @@ struct Arguments {
   bool serve = false, acknowledge = false, binary = false, verify = false;
   std::optional<double> rate;
   double tolerance = 0;
-  std::string events, record, latencies;
+  std::string listen, events, record, latencies;
 };
 
 /// The kind of result, or unknown where there is none but replies.
@@ -39,30 +39,34 @@ Kind result_kind(const cli::Run& run) {
 
 void work(cli::Run& run, const Arguments& in) {
   const Kind kind = result_kind(run);
+  const auto warn = [&](const std::string& text) { run.warn(text); };
   std::unique_ptr<ResultWriter> result;
   if (kind != Kind::unknown)
     result = open_result(kind, run.output(), run.output_options(is_binary(kind)));
-  std::optional<Output> replies;
-  if (kind == Kind::unknown || (run.output() != "-" && !run.quiet()))
-    replies.emplace("-", Output::Options{.binary = in.binary});
-  else if (in.serve || in.binary)
+  const bool reads = in.listen.empty() || in.scene != "-";
+  const bool spoken = reads && (kind == Kind::unknown || (run.output() != "-" && !run.quiet()));
+  if (!spoken && in.listen.empty() && (in.serve || in.binary))
     throw UsageError(std::string(in.serve ? "--serve" : "--binary") +
                      " is about answers, of which there are none here, expected it without --to, "
                      "and without -q beside -o");
+  SceneAnswers answers(spoken, in.binary, in.listen, {.warn = warn});
   std::optional<EventLog> events;
   if (!in.events.empty())
     events.emplace(in.events, run.output_options(false));
   StepLatency latency(in.rate.value_or(0));
   if (!in.latencies.empty())
     latency.log_to(in.latencies, run.output_options(false));
-  Input input(in.scene, false);
+  std::optional<Input> input;
+  if (reads)
+    input.emplace(in.scene, false);
+  const std::string name = input ? input->name() : "-"; // where names of files count from
   std::optional<SceneRecord> record;
   if (!in.record.empty())
-    record.emplace(in.record, run.output_options(false), input.name());
+    record.emplace(in.record, run.output_options(false), name);
 
   SceneOptions options;
-  options.files = scene_files(input.name(), run.context());
-  options.warn = [&](const std::string& text) { run.warn(text); };
+  options.files = scene_files(name, run.context());
+  options.warn = warn;
   options.distrust = [&](const std::string& text) { cli::distrust(run, "ffe-run", text); };
   options.serve = in.serve;
   options.acknowledge = in.acknowledge;
@@ -75,12 +79,10 @@ void work(cli::Run& run, const Arguments& in) {
   options.measure = run.stats_wanted();
   options.measure_error = in.verify || (run.stats_wanted() && !in.rate);
   options.tolerance = in.tolerance;
-  if (replies)
-    options.reply = [&](std::string_view bytes) {
-      replies->write(bytes);
-      replies->stream().flush(); // at once: who asked waits for it
-    };
-  SceneRun scene(input.name(), run.context(), options);
+  options.gone = [&] { return answers.unheard(); };
+  if (answers.any())
+    options.reply = [&](std::string_view bytes) { answers.write(bytes); };
+  SceneRun scene(input ? name : in.listen, run.context(), options);
   const auto keep_logs = [&] {
     if (events)
       events->commit();
@@ -89,7 +91,10 @@ void work(cli::Run& run, const Arguments& in) {
     latency.commit();
   };
   try {
-    run.timed("run", [&] { run_scene(input, scene); });
+    run.timed("run", [&] {
+      answers.run(input ? &*input : nullptr, scene);
+      scene.finish();
+    });
   } catch (const Error&) {
     keep_logs(); // they tell how it came to this
     throw;
@@ -97,8 +102,7 @@ void work(cli::Run& run, const Arguments& in) {
   run.timed("write", [&] {
     if (result)
       result->commit();
-    if (replies)
-      replies->commit();
+    answers.commit();
     keep_logs();
   });
   if (run.stats_wanted())
@@ -117,6 +121,7 @@ int main(int argc, char** argv) {
   p.output_kinds(result_kinds());
   p.flag("--serve", in.serve, "answer a wrong line and go on");
   p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
+  p.option("--listen", in.listen, "PATH", "with --serve, a socket for clients, one at a time");
   p.flag("--binary", in.binary, "answer in binary frames of float32");
   p.option("--events", in.events, "FILE", "who touched what when, as CSV");
   p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
@@ -128,8 +133,9 @@ int main(int argc, char** argv) {
   p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
   p.operand("SCENE", in.scene, "the scene");
   p.check([&] {
-    if (in.acknowledge && !in.serve)
-      throw UsageError("--ack without --serve, expected both");
+    if (!in.serve && (in.acknowledge || !in.listen.empty()))
+      throw UsageError(std::string(in.acknowledge ? "--ack" : "--listen") +
+                       " without --serve, expected both");
   });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }

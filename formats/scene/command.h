@@ -60,11 +60,14 @@ struct QueryCommand {
   Positions positions = Positions::none;
 };
 
+/// What follows is not read.
+struct EndCommand {};
+
 struct Command {
   std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, EmitStressCommand, StepCommand,
-               RunCommand, SyncCommand, QueryCommand>
+               RunCommand, SyncCommand, QueryCommand, EndCommand>
       what;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a scene answers to a step, as binary frames: scene(5). All numbers are little-endian.
+// What a scene answers to a step, as binary frames: gewebe_serve(5). All numbers are little-endian.
 
 #include "formats/scene/scene_answer.h"
 #include "scene/simulation.h"

@@ -297,8 +297,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 26>& verbs() {
-  static const std::array<Verb, 26> all{{
+const std::array<Verb, 27>& verbs() {
+  static const std::array<Verb, 27> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -332,6 +332,7 @@ const std::array<Verb, 26>& verbs() {
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
       {"sync", "sync", false, parse_sync},
+      {"end", "end", false, parse_end},
       {"nodes", "nodes NAME [rest|positions]", false, parse_nodes},
       {"select", "select NAME NODES", false, parse_select},
       {"objects", "objects", false, parse_objects},

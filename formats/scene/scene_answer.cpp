@@ -26,7 +26,7 @@ void append(std::string& text, const Vec3& v, char end) {
   text += end;
 }
 
-/// The lines of `emit instruments`, scene(5).
+/// The lines of `emit instruments`.
 std::string instrument_reply(const Simulation& simulation) {
   std::size_t count = 0;
   std::string lines;
@@ -141,6 +141,12 @@ std::string text_ok(std::uint64_t line) {
 
 std::string text_sync(const Simulation& simulation) {
   std::string text = "sync ";
+  append(text, simulation.time());
+  return text + "\n";
+}
+
+std::string text_ready(const Simulation& simulation) {
+  std::string text = "ready ";
   append(text, simulation.time());
   return text + "\n";
 }

@@ -1,5 +1,5 @@
 #pragma once
-// What a scene answers to a step, as text: scene(5).
+// What a scene answers to a step, as text: gewebe_serve(5).
 
 #include "scene/simulation.h"
 #include "solid/stress.h"
@@ -33,8 +33,9 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
 /// "ok LINE": it is done.
 std::string text_ok(std::uint64_t line);
 
-/// "sync T": where the scene is.
+/// "sync T": where the scene is; and what a client is told that may drive it, "ready T".
 std::string text_sync(const Simulation& simulation);
+std::string text_ready(const Simulation& simulation);
 
 /// "error LINE: TEXT", one line whatever the text holds.
 std::string text_error(std::uint64_t line, std::string_view text);

@@ -52,6 +52,10 @@ What parse_sync(Words&) {
   return SyncCommand{};
 }
 
+What parse_end(Words&) {
+  return EndCommand{};
+}
+
 What parse_nodes(Words& in) {
   QueryCommand c{.kind = QueryCommand::Kind::nodes, .object = in.name()};
   if (in.take("rest"))

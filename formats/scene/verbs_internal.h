@@ -12,6 +12,7 @@ What parse_emit(Words& in);
 What parse_step(Words& in);
 What parse_run(Words& in);
 What parse_sync(Words& in);
+What parse_end(Words& in);
 What parse_nodes(Words& in);
 What parse_select(Words& in);
 What parse_objects(Words& in);

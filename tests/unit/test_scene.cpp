@@ -148,7 +148,7 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known =
       "expected one of object, force, pressure, displace, attach, release, "
       "instrument, move, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
-      "two-step, emit, step, run, renew, sync, nodes, select, objects, instruments, at";
+      "two-step, emit, step, run, renew, sync, end, nodes, select, objects, instruments, at";
   for (const char* word : {"slice", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{

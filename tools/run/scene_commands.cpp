@@ -18,7 +18,7 @@ constexpr double max_samples = 1e9;
 constexpr double default_step = 1.0 / 60;
 
 template <class Work>
-auto of_object(std::uint64_t line, Work&& work) {
+auto of_object(const LinePlace& line, Work&& work) {
   try {
     return work();
   } catch (const Cancelled&) {
@@ -141,6 +141,8 @@ void SceneRun::State::run(const RunCommand& c) {
   if (!(exact <= max_samples))
     throw Error("over 1e9 steps, expected fewer");
   const auto sample = [&](double time) {
+    if (options.gone && options.gone())
+      throw Error("who asked for these steps has gone");
     go_on([&] {
       simulation.step_to(time);
       under_way = RunCommand{time, c.every};
@@ -169,6 +171,8 @@ void SceneRun::State::execute(const Command& command) {
     run(*many);
   else if (const auto* const query = std::get_if<QueryCommand>(&command.what))
     tell(*query);
+  else if (std::holds_alternative<EndCommand>(command.what))
+    ended = true;
   else
     sync();
 }

@@ -15,19 +15,20 @@ constexpr std::uint64_t longest_rest = 1U << 30U; // of one that is not, to be p
 
 } // namespace
 
-void SceneLines::take(char c) {
+bool SceneLines::take(char c) {
   if (c != '\n') {
     if (++size_ <= longest_line)
       line_ += c;
     else if (size_ == longest_line + 1)
       run_.overlong_line(); // now: there may be no end to it
     else if (size_ > longest_rest)
-      throw Error(name_, "a line of over 1 GiB, expected an end");
-    return;
+      return false;
+    return true;
   }
   if (size_ <= longest_line)
     run_.line(line_);
   drop();
+  return true;
 }
 
 void SceneLines::end() {
@@ -44,15 +45,16 @@ void SceneLines::drop() {
 void run_lines(Input& input, SceneRun& run) {
   // The stream's buffer hands out what has come so far and waits only for more.
   std::streambuf& bytes = *input.stream().rdbuf();
-  SceneLines lines(run, input.name());
-  for (;;) {
+  SceneLines lines(run);
+  while (!run.ended()) {
     const bool waits = bytes.in_avail() <= 0;
     const auto c = bytes.sbumpc();
     if (waits && run.latency() != nullptr)
       run.latency()->line_arrived();
     if (c == std::streambuf::traits_type::eof())
       break;
-    lines.take(static_cast<char>(c));
+    if (!lines.take(static_cast<char>(c)))
+      throw Error(input.name(), "a line of over 1 GiB, expected an end");
   }
   lines.end();
 }

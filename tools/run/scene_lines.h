@@ -6,18 +6,16 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 
 namespace gewebe {
 
 /// Hands each line to a run as soon as its end is there.
 class SceneLines {
 public:
-  /// Keeps a reference. \param name what messages call the input
-  SceneLines(SceneRun& run, std::string name) : run_(run), name_(std::move(name)) {}
+  explicit SceneLines(SceneRun& run) : run_(run) {} ///< keeps a reference
 
-  /// \throw Error as the run, and for a line of over 1 GiB
-  void take(char c);
+  /// False, and nothing is done, where a line is over 1 GiB long. \throw Error as the run
+  bool take(char c);
   /// The last line may have no end.
   void end();
   /// What has come of a line is forgotten.
@@ -25,11 +23,12 @@ public:
 
 private:
   SceneRun& run_;
-  std::string name_, line_;
+  std::string line_;
   std::uint64_t size_ = 0; ///< of the line, also of what is not kept
 };
 
-/// Feeds every line of the input to the run as soon as it is there. \throw Error as SceneLines
+/// Feeds every line of the input, up to one that ends it, to the run as soon as it is there.
+/// \throw Error as the run, and for a line of over 1 GiB
 void run_lines(Input& input, SceneRun& run);
 /// The same, then finishes it.
 void run_scene(Input& input, SceneRun& run);

@@ -83,7 +83,8 @@ void SceneRun::State::tell(const QueryCommand& query) {
 
 void SceneRun::State::acknowledge() {
   if (options.acknowledge && options.reply)
-    deliver([&] { options.reply(options.binary ? binary_ok(steps, line) : text_ok(line)); });
+    deliver(
+        [&] { options.reply(options.binary ? binary_ok(steps, line.line) : text_ok(line.line)); });
 }
 
 void SceneRun::State::require_object() const {
@@ -143,20 +144,19 @@ void SceneRun::State::accept(std::string_view text, const Command& command) {
   ++counts.commands;
   answered_gravity = gravity;
   deliver([&] {
-    if (options.record != nullptr && !std::holds_alternative<QueryCommand>(command.what))
+    if (options.record != nullptr && !std::holds_alternative<QueryCommand>(command.what) &&
+        !std::holds_alternative<EndCommand>(command.what))
       options.record->line(text, command, lists);
     if (options.events != nullptr)
       options.events->keep();
   });
 }
 
-void SceneRun::State::refuse(std::uint64_t at, const std::string& text) {
+void SceneRun::State::refuse(const LinePlace& at, const std::string& text) {
   ++counts.errors;
   gravity = answered_gravity;
-  if (first_error == 0) {
-    first_error = at;
-    first_error_text = text;
-  }
+  if (counts.errors == 1)
+    first_error = Error(named(at), text);
   deliver([&] {
     if (options.record != nullptr) {
       if (under_way)
@@ -166,17 +166,26 @@ void SceneRun::State::refuse(std::uint64_t at, const std::string& text) {
     }
     if (options.events != nullptr) {
       options.events->drop();
-      options.events->message(simulation.time(), "error", std::to_string(at) + ": " + text);
+      const std::string client =
+          at.client == 0 ? "" : "client " + std::to_string(at.client) + " line ";
+      options.events->message(simulation.time(), "error",
+                              client + std::to_string(at.line) + ": " + text);
       options.events->keep();
     }
     if (!options.serve)
-      throw Error(name + ":" + std::to_string(at), text);
+      throw Error(named(at), text);
     if (options.reply) {
-      const std::string said = at == line ? text : "line " + std::to_string(at) + ": " + text;
-      options.reply(options.binary ? binary_error(steps, text_error(line, said))
-                                   : text_error(line, said));
+      const std::string other = at.client == line.client ? ": " : " of an earlier client: ";
+      const std::string said = at == line ? text : "line " + std::to_string(at.line) + other + text;
+      const std::string reply = text_error(line.line, said);
+      options.reply(options.binary ? binary_error(steps, reply) : reply);
     }
   });
+}
+
+std::string SceneRun::State::named(const LinePlace& at) const {
+  return name + (at.client == 0 ? "" : ", client " + std::to_string(at.client)) + ":" +
+         std::to_string(at.line);
 }
 
 SceneRun::SceneRun(std::string name, const Context& context, SceneOptions options)
@@ -186,7 +195,7 @@ SceneRun::~SceneRun() = default;
 template <class Work>
 void SceneRun::numbered(Work&& work) {
   State& s = *state_;
-  ++s.line;
+  ++s.line.line;
   s.lists.clear();
   s.under_way.reset();
   try {
@@ -198,7 +207,7 @@ void SceneRun::numbered(Work&& work) {
     } catch (const Error& error) {
       s.refuse(s.line, with_place(error));
     } catch (const WrongFile& file) {
-      s.refuse(file.line, file.text);
+      s.refuse(file.at, file.text);
     }
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
@@ -233,7 +242,7 @@ void SceneRun::finish() {
   } catch (const Undelivered& failure) {
     std::rethrow_exception(failure.error);
   } catch (const WrongFile& file) {
-    throw Error(s.name + ":" + std::to_string(file.line), file.text);
+    throw Error(s.named(file.at), file.text);
   }
   s.simulation.warn_of_thresholds();
   if (!s.options.warn)
@@ -250,11 +259,23 @@ std::optional<Error> SceneRun::first_error() const {
   const State& s = *state_;
   if (s.counts.errors == 0)
     return std::nullopt;
-  return Error(s.name + ":" + std::to_string(s.first_error),
-               s.first_error_text +
+  return Error(s.first_error.place(),
+               s.first_error.what() +
                    (s.counts.errors == 1
                         ? ""
                         : " (the first of " + std::to_string(s.counts.errors) + " errors)"));
+}
+
+bool SceneRun::ended() const noexcept {
+  return state_->ended;
+}
+
+std::uint64_t SceneRun::steps() const noexcept {
+  return state_->steps;
+}
+
+void SceneRun::next_client() {
+  state_->line = {0, state_->line.client + 1};
 }
 
 const Simulation& SceneRun::simulation() const {

@@ -46,8 +46,9 @@ struct SceneOptions {
   SceneFiles files;
   std::function<void(std::string_view)> reply; ///< told each answer, whole; none: not answered
   bool binary = false;                         ///< answers are frames_binary.h's, else text
-  bool acknowledge = false; ///< each line is answered by its number, last of all
-  bool serve = false; ///< a wrong line is answered, changes nothing, and the run goes on
+  bool acknowledge = false;                    ///< each line is answered by its number, last of all
+  std::function<bool()> gone{}; ///< whether nobody waits for the steps of a run any more
+  bool serve = false;           ///< a wrong line is answered, changes nothing, and the run goes on
   std::function<void(const std::string&)> warn;
   /// Told, once of each object, why its shape is not to be trusted; without it `warn` is.
   std::function<void(const std::string&)> distrust{};
@@ -89,6 +90,12 @@ public:
   void overlong_line();
   /// Behind the last line. \throw Error, place NAME, if there was no command or no object
   void finish();
+  /// A line asked that no more follow.
+  bool ended() const noexcept;
+  /// That were answered.
+  std::uint64_t steps() const noexcept;
+  /// The lines of another client follow, counted from 1.
+  void next_client();
   /// About the lines that were refused under `serve`, naming the first; nothing if there is none.
   std::optional<Error> first_error() const;
 

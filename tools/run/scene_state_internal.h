@@ -21,9 +21,16 @@ namespace gewebe {
 /// A file that a line names may be wrong in a place of its own: both places count.
 std::string with_place(const Error& error);
 
+/// A line of the input, or of the client of this number.
+struct LinePlace {
+  std::uint64_t line = 0, client = 0;
+
+  bool operator==(const LinePlace&) const = default;
+};
+
 /// A file of an object, read late, is the fault of the line that named it.
 struct WrongFile {
-  std::uint64_t line = 0;
+  LinePlace at;
   std::string text;
 };
 
@@ -33,11 +40,12 @@ struct SceneRun::State {
   Simulation simulation;
   SceneCounts counts;
   Digest digest;
-  std::uint64_t line = 0, steps = 0;
+  LinePlace line;
+  std::uint64_t steps = 0;
+  bool ended = false;
   std::map<std::string, std::string> lists; // node lists that the line named
   std::optional<RunCommand> under_way;      // of a run of several steps, as far as it came
-  std::uint64_t first_error = 0;
-  std::string first_error_text;
+  Error first_error{""};
   SceneChecks checks;
   SceneStress stress;
   Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
@@ -77,7 +85,9 @@ struct SceneRun::State {
   /// The line was carried out.
   void accept(std::string_view text, const Command& command);
   /// The line was not carried out, or only in part if it asked for many steps.
-  void refuse(std::uint64_t at, const std::string& text);
+  void refuse(const LinePlace& at, const std::string& text);
+  /// How messages name it.
+  std::string named(const LinePlace& at) const;
 };
 
 } // namespace gewebe

@@ -1,0 +1,171 @@
+#include "tools/run/local_socket.h"
+
+#include "base/error.h"
+#include "formats/stream/removal.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <pwd.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+namespace gewebe {
+
+namespace {
+
+constexpr int waiting_clients = 16; // until they are let in or turned away
+
+sockaddr_un address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path)
+    throw Error(path, "a name of " + std::to_string(path.size()) +
+                          " bytes for a socket, expected 1 to " +
+                          std::to_string(sizeof address.sun_path - 1));
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  return address;
+}
+
+[[noreturn]] void fail(const std::string& path, const char* what) {
+  throw Error(path, std::string(what) + ": " + std::strerror(errno));
+}
+
+/// Nobody else makes or replaces a socket in this folder as long as it is held; a folder that can't
+/// be read has no such lock.
+Descriptor lock_folder(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  while (lock && ::flock(lock.get(), LOCK_EX) != 0 && errno == EINTR) {
+  }
+  return lock;
+}
+
+/// Removes a socket that nobody listens on. \throw Error if somebody does, or it is none
+void remove_stale(const std::string& path, const sockaddr_un& address) {
+  struct stat info {};
+  if (::lstat(path.c_str(), &info) != 0)
+    return; // bind tells what is wrong
+  if (!S_ISSOCK(info.st_mode))
+    throw Error(path, "is there and is no socket, expected another name");
+  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!probe)
+    fail(path, "cannot make a socket");
+  if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
+      errno == EAGAIN)
+    throw Error(path, "another program listens there, expected another name");
+  if (errno == ENOENT)
+    return;
+  if (errno != ECONNREFUSED)
+    fail(path, "is there and cannot be looked at");
+  if (::unlink(path.c_str()) != 0 && errno != ENOENT)
+    fail(path, "nobody listens there, but it cannot be removed");
+}
+
+std::string user_name(uid_t user) {
+  std::array<char, 4096> memory{};
+  passwd entry{};
+  passwd* found = nullptr;
+  const bool known =
+      ::getpwuid_r(user, &entry, memory.data(), memory.size(), &found) == 0 && found != nullptr;
+  return (known ? std::string(entry.pw_name) + " " : "") + "(" + std::to_string(user) + ")";
+}
+
+} // namespace
+
+Descriptor::~Descriptor() {
+  if (fd_ >= 0)
+    (void)::close(fd_);
+}
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+
+LocalListener::LocalListener(const std::string& path) : path_(path) {
+  const sockaddr_un address = address_of(path);
+  const Descriptor lock = lock_folder(path);
+  remove_stale(path, address);
+  socket_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  // Linux gives the path the mode of the socket, so that it is never open to others.
+  if (!socket_ || ::fchmod(socket_.get(), 0600) != 0)
+    fail(path, "cannot make a socket");
+  {
+    const SignalsWait wait;
+    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      fail(path, "cannot listen there");
+    removal_ = remember_removal(path);
+  }
+  struct stat info {};
+  const bool seen = ::lstat(path.c_str(), &info) == 0;
+  device_ = info.st_dev;
+  file_ = info.st_ino;
+  if (seen && (info.st_mode & 0077U) == 0 && ::listen(socket_.get(), waiting_clients) == 0)
+    return;
+  const int error = errno;
+  (void)::unlink(path.c_str());
+  forget_removal(removal_);
+  errno = error;
+  fail(path, "cannot listen there for its owner alone");
+}
+
+LocalListener::~LocalListener() {
+  forget_removal(removal_);
+  struct stat info {}; // what another has put there stays
+  if (::lstat(path_.c_str(), &info) == 0 && info.st_dev == device_ && info.st_ino == file_)
+    (void)::unlink(path_.c_str());
+}
+
+Descriptor LocalListener::accept() const {
+  return Descriptor(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+}
+
+std::optional<std::string> foreign_peer(const Descriptor& client) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (::getsockopt(client.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
+    return "a user who is not known may not drive the scene";
+  if (peer.uid == ::geteuid())
+    return std::nullopt;
+  return "user " + user_name(peer.uid) + " may not drive the scene, expected " +
+         user_name(::geteuid());
+}
+
+Transfer send_some(const Descriptor& to, std::string& bytes) {
+  std::size_t done = 0;
+  Transfer result = Transfer::none_now;
+  while (done < bytes.size()) {
+    const ssize_t count = ::send(to.get(), bytes.data() + done, bytes.size() - done, MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR)
+      continue;
+    if (count < 0) {
+      if (errno != EAGAIN && errno != EWOULDBLOCK)
+        return Transfer::over;
+      break;
+    }
+    done += static_cast<std::size_t>(count);
+    result = Transfer::some;
+  }
+  bytes.erase(0, done);
+  return result;
+}
+
+Transfer receive_some(const Descriptor& from, std::string& bytes, std::size_t most) {
+  const std::size_t before = bytes.size();
+  bytes.resize(before + most);
+  ssize_t count = 0;
+  do
+    count = ::recv(from.get(), bytes.data() + before, most, 0);
+  while (count < 0 && errno == EINTR);
+  const bool now = count >= 0 || (errno != EAGAIN && errno != EWOULDBLOCK);
+  bytes.resize(before + static_cast<std::size_t>(count > 0 ? count : 0));
+  return count > 0 ? Transfer::some : now ? Transfer::over : Transfer::none_now;
+}
+
+} // namespace gewebe

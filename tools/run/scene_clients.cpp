@@ -1,0 +1,160 @@
+#include "tools/run/scene_clients.h"
+
+#include "base/number_text.h"
+#include "formats/scene/frames_binary.h"
+#include "formats/scene/scene_answer.h"
+#include "tools/run/step_latency.h"
+
+#include <array>
+#include <chrono>
+#include <poll.h>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t block = 1U << 16U;
+
+/// Waits for one of them. \return false where it took longer
+bool wait_for(std::array<pollfd, 2>& who, double seconds) {
+  const int limit = seconds < 0 ? -1 : static_cast<int>(seconds * 1000) + 1;
+  return ::poll(who.data(), who.size(), limit) != 0; // an interruption is no end of patience
+}
+
+} // namespace
+
+SceneClients::SceneClients(const std::string& path, SceneClientsOptions options)
+    : options_(std::move(options)), listener_(path) {}
+
+void SceneClients::serve(SceneRun& run) {
+  serving_ = true;
+  while (!run.ended()) {
+    wait();
+    if (client_ && !leaving_)
+      take_lines(run);
+    if (client_ && leaving_ && unread_.empty())
+      client_ = Descriptor();
+    if (client_)
+      turn_away();
+    else
+      let_in(run);
+  }
+  flush(0);
+  client_ = Descriptor();
+  serving_ = false;
+}
+
+/// For a client, or what is to be done for the one that is there.
+void SceneClients::wait() {
+  const short client =
+      static_cast<short>((leaving_ ? 0 : POLLIN) | (unread_.empty() ? 0 : POLLOUT));
+  std::array<pollfd, 2> who{pollfd{client_.get(), client, 0}, others()};
+  if (!wait_for(who, leaving_ ? options_.patience : -1))
+    return drop("read nothing more for " + number_text(options_.patience) + " s");
+  if (client_ && !unread_.empty() && send_some(client_, unread_) == Transfer::over)
+    drop("");
+}
+
+void SceneClients::take_lines(SceneRun& run) {
+  std::string bytes;
+  const Transfer came = receive_some(client_, bytes, block);
+  if (came == Transfer::some && run.latency() != nullptr)
+    run.latency()->line_arrived();
+  for (const char c : bytes) {
+    if (!client_ || run.ended())
+      return;
+    if (!lines_->take(c))
+      return drop("sent a line of over 1 GiB");
+  }
+  if (came != Transfer::over)
+    return;
+  lines_->drop(); // a line without its end may be half of one
+  leaving_ = true;
+}
+
+void SceneClients::let_in(SceneRun& run) {
+  Descriptor next = listener_.accept();
+  if (!next)
+    return;
+  if (const std::optional<std::string> foreign = foreign_peer(next)) {
+    say(next, *foreign);
+    if (options_.warn)
+      options_.warn(*foreign);
+    return;
+  }
+  client_ = std::move(next);
+  lines_.emplace(run);
+  unread_.clear();
+  leaving_ = false;
+  ++clients_;
+  run.next_client();
+  reply(options_.binary ? binary_sync(run.simulation(), run.steps())
+                        : text_ready(run.simulation()));
+}
+
+/// Who connects; but who waits until the client has gone must not wake us meanwhile.
+pollfd SceneClients::others() const {
+  return {client_ && hung_up() ? -1 : listener_.descriptor(), POLLIN, 0};
+}
+
+/// Those that come while the scene has its client; not while that one is on its way out.
+void SceneClients::turn_away() {
+  if (hung_up())
+    return;
+  while (const Descriptor other = listener_.accept())
+    say(other, foreign_peer(other).value_or("busy, the scene has a client, expected none"));
+}
+
+/// One line that fits into any buffer, to somebody who is not let in.
+void SceneClients::say(const Descriptor& to, const std::string& text) const {
+  std::string line = text_error(0, text);
+  if (options_.binary)
+    line = binary_error(0, line);
+  (void)send_some(to, line);
+}
+
+bool SceneClients::hung_up() const {
+  pollfd client{client_.get(), POLLRDHUP, 0};
+  return ::poll(&client, 1, 0) > 0;
+}
+
+void SceneClients::drop(const std::string& why) {
+  client_ = Descriptor();
+  unread_.clear();
+  leaving_ = false;
+  if (!why.empty() && options_.warn)
+    options_.warn("client " + std::to_string(clients_) + " " + why + ", it is dropped");
+}
+
+/// Until at most so many bytes wait to be read, or the client is dropped.
+void SceneClients::flush(std::size_t most) {
+  double left = options_.patience;
+  while (client_ && !unread_.empty()) {
+    const Transfer sent = send_some(client_, unread_);
+    if (sent == Transfer::over)
+      return drop("");
+    if (unread_.size() <= most)
+      return;
+    if (sent == Transfer::some)
+      left = options_.patience;
+    if (!(left > 0))
+      return drop("read nothing for " + number_text(options_.patience) + " s while answers waited");
+    std::array<pollfd, 2> who{pollfd{client_.get(), POLLOUT, 0}, others()};
+    const auto start = std::chrono::steady_clock::now();
+    (void)wait_for(who, left);
+    left -= std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    turn_away();
+  }
+}
+
+void SceneClients::reply(std::string_view bytes) {
+  if (!client_)
+    return;
+  unread_ += bytes;
+  flush(options_.most_unread);
+  if (client_)
+    turn_away();
+}
+
+} // namespace gewebe
