@@ -21,7 +21,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // Of the largest diagonal entry: keeps contacts of one node that say the same solvable.
-constexpr double regular = 1e-13;
+constexpr double regular = 1e-12;
+
+// Of the same, in a Newton step alone: forces that contacts can share anyhow stay small.
+constexpr double regular_step = 1e-7;
+
+constexpr int max_vain = 5; ///< rounds that don't halve the residual
 
 using Block = Eigen::Matrix3d;
 
@@ -106,16 +111,34 @@ Eigen::Vector3d alone(const Block& w, const Eigen::Vector3d& b, double friction)
     return f.tail<2>().norm() - friction * f[0];
   };
   double low = 0, high = std::max(s.trace(), 1e-300);
-  while (excess(at(high)) > 0 && std::isfinite(high))
+  double above = excess(stick), below = excess(at(high)); // at low, at high
+  while (below > 0 && std::isfinite(high)) {
+    low = high;
+    above = below;
     high *= 4;
-  for (int k = 0; k < 200; ++k) {
-    // Halved by its logarithm while the ends differ by much.
-    const double middle = low > 0 && high > 4 * low              ? std::sqrt(low * high)
-                          : low == 0 && high > 1e-12 * s.trace() ? high / 16
-                                                                 : (low + high) / 2;
-    if (!(middle > low && middle < high))
+    below = excess(at(high));
+  }
+  // The chord's root, with an end that stays weighed less and less (Illinois's way).
+  for (int k = 0, side = 0; k < 60; ++k) {
+    const double chord = high - below * (high - low) / (below - above);
+    const double next = chord > low && chord < high && k % 8 != 7 ? chord : low + (high - low) / 2;
+    if (!(next > low && next < high))
       break;
-    (excess(at(middle)) > 0 ? low : high) = middle;
+    const Eigen::Vector3d f = at(next);
+    const double value = excess(f);
+    if (value > 0) {
+      low = next;
+      above = value;
+      below /= side == 1 ? 2 : 1;
+      side = 1;
+    } else {
+      high = next;
+      below = value;
+      above /= side == -1 ? 2 : 1;
+      side = -1;
+      if (-value <= 1e-15 * friction * f[0])
+        break;
+    }
   }
   return at(high);
 }
@@ -162,6 +185,7 @@ bool newton(const Local& l, std::span<const Contact> contacts, VectorXd& f, Resi
     else
       base.segment<3>(3 * i).setZero();
   const VectorXd rb = l.q + l.w * base;
+  const double soft = regular_step * l.w.diagonal().maxCoeff();
   const auto size = static_cast<Index>(3 * on.size());
   MatrixXd jacobian(size, size);
   VectorXd rhs(size);
@@ -194,7 +218,7 @@ bool newton(const Local& l, std::span<const Contact> contacts, VectorXd& f, Resi
     for (std::size_t b = 0; b < on.size(); ++b)
       jacobian.block<3, 3>(row, static_cast<Index>(3 * b)) =
           of_r * l.w.block<3, 3>(3 * i, 3 * on[b]);
-    jacobian.block<3, 3>(row, row) += of_f;
+    jacobian.block<3, 3>(row, row) += of_f + soft * of_r;
     rhs.segment<3>(row) = -value;
   }
   const VectorXd by = jacobian.partialPivLu().solve(rhs);
@@ -321,18 +345,22 @@ ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
     rough = rough || contacts[i].friction > 0;
   }
   if (!push_out(l, f))
-    for (int k = 0; k < 1000; ++k)
+    for (int k = 0; k < 200; ++k)
       sweep(l, contacts, f);
   Residual e = equations(l, contacts, f);
-  for (int round = 0; rough && round < 60 && !(e.size <= contact_solver_tolerance); ++round) {
+  double best = HUGE_VAL;
+  for (int round = 0, vain = 0; rough && vain < max_vain && !(e.size <= contact_solver_tolerance);
+       ++round) {
     bool on = true;
     for (int k = 0; on && k < 12 && !(e.size <= contact_solver_tolerance); ++k)
       on = newton(l, contacts, f, e);
     if (e.size <= contact_solver_tolerance)
       break;
-    for (int k = 0; k < 10; ++k)
+    for (int k = 0; k < (round < 4 ? 10 : 40); ++k) // more where Newton's steps don't help
       sweep(l, contacts, f);
     e = equations(l, contacts, f);
+    vain = e.size < 0.5 * best ? 0 : vain + 1;
+    best = e.size < best ? e.size : best;
   }
   // Whatever friction does, nothing stays inside.
   if (rough && !(e.size <= contact_solver_tolerance) && push_out(l, f))

@@ -1,20 +1,26 @@
 #include "dynamics/dynamic_contact.h"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
+#include "contact/surface_facets.h"
+#include "dynamics/contact_impulses_internal.h"
 
-// Based on: J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988
-// (contact by velocities).
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+#include <utility>
 
 namespace gewebe {
 
 namespace {
 
-constexpr double on_surface = 1e-9; ///< of the radius
+constexpr double on_surface = 1e-9; ///< of the radius: so deep is not inside
+constexpr double at_surface = 1e-6; ///< so far it touches
+constexpr double rounding = 1e-14;
+constexpr double nothing = 1e-13; ///< of the largest impulse
 constexpr std::uint64_t max_unseen = 16;
 constexpr std::size_t max_parts = 256;
-constexpr int max_passes = 32; ///< between instruments that touch one node
+constexpr int few_sweeps = 20, many_sweeps = 400, sweeps_at_rest = 4000;
+constexpr double exact_impulse = 1e-6, exact_at_rest = 1e-13; ///< of the largest
 
 Vec3 vector_of(const double* row) {
   return {row[0], row[1], row[2]};
@@ -31,12 +37,6 @@ Vec3 free_part(const Vec3& v, const Vec3& inverse_mass) {
   return {inverse_mass.x > 0 ? v.x : 0, inverse_mass.y > 0 ? v.y : 0, inverse_mass.z > 0 ? v.z : 0};
 }
 
-/// m v, 0 along axes without inverse mass.
-Vec3 over(const Vec3& v, const Vec3& inverse_mass) {
-  return {v.x != 0 ? v.x / inverse_mass.x : 0, v.y != 0 ? v.y / inverse_mass.y : 0,
-          v.z != 0 ? v.z / inverse_mass.z : 0};
-}
-
 /// From a point inside onto the surface along `way`, a unit vector that leads out.
 void leave(const PlacedInstrument& instrument, const Vec3& way, Vec3& p) {
   // The distance is convex along the way, so Newton's steps overshoot once and then come back.
@@ -48,27 +48,17 @@ void leave(const PlacedInstrument& instrument, const Vec3& way, Vec3& p) {
   }
 }
 
-/// Moves p out along the normal, or what the node's axes leave of it.
-void out(const PlacedInstrument& instrument, const Vec3& inward, const Vec3& inverse_mass,
-         Vec3& p) {
-  const Vec3 n = instrument.normal(p, inward), way = free_part(n, inverse_mass);
-  if (way == n) {
-    p -= instrument.distance(p) * n;
-  } else if (norm(way) > 1e-3) {
-    leave(instrument, way / norm(way), p);
-  }
+auto key_of(const DynamicContact::Guess& g) {
+  return std::tuple(g.instrument, g.part, g.rows);
 }
 
-/// What contact leaves of the velocity v.
-Vec3 after_contact(const Vec3& v, const Vec3& velocity, const Vec3& n, double friction) {
-  const Vec3 against = v - velocity;
-  const double into = -dot(against, n);
-  if (!(into > 0))
-    return v;
-  const Vec3 along = against + into * n;
-  const double size = norm(along);
-  const double left = size > friction * into ? 1 - friction * into / size : 0;
-  return velocity + left * along;
+/// The part of a force that pushes along n, and what of the rest friction holds.
+Vec3 turned(const Vec3& force, const Vec3& n, double friction) {
+  const double push = std::max(0.0, dot(force, n));
+  Vec3 drag = force - dot(force, n) * n;
+  if (const double size = norm(drag); size > friction * push)
+    drag *= friction * push / size;
+  return push * n + drag;
 }
 
 double apart(const Box3& a, const Box3& b) {
@@ -80,11 +70,35 @@ double apart(const Box3& a, const Box3& b) {
 
 } // namespace
 
+/// Pieces near instruments, with the rows of their nodes.
+struct DynamicContact::Near {
+  std::vector<std::uint32_t> rows; ///< ascending
+  MassPoints points;
+};
+
 DynamicContact::DynamicContact(const Model& model, const SpringLayout& layout)
-    : model_(model), layout_(layout), surface_(surface_count(model)),
-      inward_(inward_directions(model)) {
+    : model_(model), layout_(layout), inward_(layout.node_of_row.size()) {
+  const std::vector<Vec3> inward = inward_directions(model);
+  for (std::size_t row = 0; row < inward_.size(); ++row)
+    inward_[row] = inward[layout.node_of_row[row]];
+  // A piece belongs to the block of its first row, which no other thread has to know of.
+  const SurfaceFacets surface(model);
+  for (Facet f : surface.facets()) {
+    for (std::uint32_t& corner : f)
+      corner = layout.row_of_node[corner];
+    pieces_.push_back(f);
+  }
+  const auto first_row = [](const Facet& f) { return std::ranges::min(f); };
+  std::ranges::stable_sort(pieces_, {}, first_row);
+  std::size_t next = 0;
+  for (const SpringBlock& b : layout.blocks) {
+    first_.push_back(next);
+    while (next < pieces_.size() && first_row(pieces_[next]) < b.first + b.count)
+      ++next;
+  }
+  pieces_.resize(next); // behind the last block nothing moves
+  first_.push_back(next);
   state_.next_look.resize(layout.blocks.size());
-  state_.impulses.resize(layout.blocks.size());
 }
 
 void DynamicContact::begin(std::vector<std::optional<MovingInstrument>> instruments) {
@@ -131,128 +145,195 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
   return m;
 }
 
-void DynamicContact::keep_out(std::size_t block, const ContactMoment& moment,
-                              const NodeTraits* traits, NodeRow* next) {
-  if (moment.there.empty() || (moment.step < state_.next_look[block] && !moment.last))
-    return;
-  const SpringBlock& b = layout_.blocks[block];
-  Box3 box;
-  double fastest = 0;
-  for (std::size_t row = b.first; row < b.first + b.count; ++row) {
-    if (layout_.node_of_row[row] >= surface_)
-      continue;
-    box.add(vector_of(layout_.rest[row].p) + vector_of(next[row].u));
-    const Vec3 v = vector_of(next[row].v);
-    fastest = std::max(fastest, dot(v, v));
-  }
-  if (box.empty())
-    return;
-  fastest = std::sqrt(fastest);
-  std::uint64_t unseen = max_unseen;
-  bool any = false;
-  for (const ContactMoment::There& t : moment.there) {
-    const double gap = apart(box, t.box);
-    if (!(gap > 0)) {
-      any = true;
-      break;
-    }
-    const double steps = gap / (moment.h * (4 * fastest + t.speed) + 1e-300);
-    if (steps < static_cast<double>(unseen))
-      unseen = static_cast<std::uint64_t>(steps);
-  }
-  state_.next_look[block] = any ? 0 : moment.step + unseen;
-  if (!any)
-    return;
-  for (std::size_t row = b.first; row < b.first + b.count; ++row)
-    if (layout_.node_of_row[row] < surface_)
-      push(row, moment, traits[row], next[row], state_.impulses[block]);
+Vec3 DynamicContact::place(std::span<const NodeRow> rows, std::uint32_t row) const {
+  return vector_of(layout_.rest[row].p) + vector_of(rows[row].u);
 }
 
-void DynamicContact::push(std::size_t row, const ContactMoment& moment, const NodeTraits& traits,
-                          NodeRow& state, std::vector<NodeTouch>& impulses) const {
-  const Vec3 inverse = vector_of(traits.inverse_mass);
-  const Vec3 rest = vector_of(layout_.rest[row].p), before = rest + vector_of(state.u);
-  const auto inside = [](const PlacedInstrument& i, const Vec3& p) {
-    return i.distance(p) < -on_surface * i.radius;
-  };
-  Vec3 p = before, v = vector_of(state.v);
-  const Vec3& inward = inward_[layout_.node_of_row[row]];
-  bool moved = false;
-  for (const ContactMoment::There& t : moment.there) {
-    const auto in_box = [&] {
-      return p.x >= t.box.min.x && p.x <= t.box.max.x && p.y >= t.box.min.y && p.y <= t.box.max.y &&
-             p.z >= t.box.min.z && p.z <= t.box.max.z;
-    };
-    if (inverse == Vec3{} || !in_box())
+bool DynamicContact::due(const ContactMoment& moment) const {
+  return !moment.there.empty() &&
+         (moment.last || std::ranges::any_of(state_.next_look, [&](std::uint64_t step) {
+            return moment.step >= step;
+          }));
+}
+
+/// The pieces of blocks that may be in an instrument now, and when to look again at the others.
+void DynamicContact::look(const ContactMoment& moment, std::span<const NodeRow> next,
+                          std::vector<std::uint32_t>& numbers) {
+  for (std::size_t block = 0; block + 1 < first_.size(); ++block) {
+    if (moment.step < state_.next_look[block] && !moment.last)
       continue;
-    for (const PlacedInstrument& place : t.on_its_way)
-      if (inside(place, p)) {
-        out(place, inward, inverse, p);
-        moved = true;
+    Box3 box;
+    double fastest = 0;
+    for (std::size_t k = first_[block]; k < first_[block + 1]; ++k)
+      for (const std::uint32_t row : pieces_[k]) {
+        box.add(place(next, row));
+        const Vec3 v = vector_of(next[row].v);
+        fastest = std::max(fastest, dot(v, v));
       }
-  }
-  // The velocity once per instrument; between several the place in turns.
-  std::size_t hits = 0;
-  for (int pass = 0; pass < max_passes; ++pass) {
-    bool clear = true;
-    for (const ContactMoment::There& t : moment.there) {
-      if (inverse == Vec3{} || !(t.placed.distance(p) < 0) || (pass > 0 && !inside(t.placed, p)))
-        continue;
-      clear = false;
-      moved = true;
-      ++hits;
-      const Vec3 n = t.placed.normal(p, inward);
-      const Vec3 velocity = (p - carried(t.to, t.from, p)) / moment.h;
-      const Vec3 after = after_contact(v, velocity, n, t.placed.friction);
-      const Vec3 by = free_part(after - v, inverse);
-      p += moment.h * (by - dot(by, n) * n);
-      v += by;
-      if (t.placed.distance(p) < 0)
-        out(t.placed, inward, inverse, p);
-      if (by == Vec3{})
-        continue;
-      const Vec3 impulse = over(by, inverse);
-      const NodeTouch touch{static_cast<std::uint32_t>(row), t.instrument, impulse};
-      const auto at = std::lower_bound(
-          impulses.begin(), impulses.end(), touch, [](const NodeTouch& a, const NodeTouch& b) {
-            return a.node != b.node ? a.node < b.node : a.instrument < b.instrument;
-          });
-      if (at != impulses.end() && at->node == touch.node && at->instrument == touch.instrument)
-        at->force += impulse;
-      else
-        impulses.insert(at, touch);
+    if (box.empty()) {
+      state_.next_look[block] = UINT64_MAX;
+      continue;
     }
-    if (clear || moment.there.size() == 1)
-      break;
+    fastest = std::sqrt(fastest);
+    std::uint64_t unseen = max_unseen;
+    bool any = false;
+    for (const ContactMoment::There& t : moment.there) {
+      const double gap = apart(box, t.box);
+      if (!(gap > 0)) {
+        any = true;
+        break;
+      }
+      const double steps = gap / (moment.h * (4 * fastest + t.speed) + 1e-300);
+      if (steps < static_cast<double>(unseen))
+        unseen = static_cast<std::uint64_t>(steps);
+    }
+    state_.next_look[block] = any ? 0 : moment.step + unseen;
+    for (std::size_t k = first_[block]; any && k < first_[block + 1]; ++k) {
+      Box3 own;
+      for (const std::uint32_t row : pieces_[k])
+        own.add(place(next, row));
+      if (std::ranges::any_of(moment.there, [&](const auto& t) { return near(own, t.box); }))
+        numbers.push_back(static_cast<std::uint32_t>(k));
+    }
   }
-  if (!moved)
-    return;
-  if (hits > 1) {
-    // Pinched: out across the line from one instrument to the other.
+}
+
+DynamicContact::Near DynamicContact::near_pieces(std::span<const std::uint32_t> numbers,
+                                                 std::span<const NodeTraits> traits,
+                                                 std::span<const NodeRow> rows) const {
+  Near near;
+  for (const std::uint32_t k : numbers)
+    near.rows.insert(near.rows.end(), pieces_[k].begin(), pieces_[k].end());
+  std::ranges::sort(near.rows);
+  near.rows.erase(std::ranges::unique(near.rows).begin(), near.rows.end());
+  for (const std::uint32_t row : near.rows) {
+    near.points.place.push_back(place(rows, row));
+    near.points.velocity.push_back(vector_of(rows[row].v));
+    near.points.inverse_mass.push_back(row < layout_.movable ? vector_of(traits[row].inverse_mass)
+                                                             : Vec3{});
+    near.points.inward.push_back(inward_[row]);
+  }
+  for (const std::uint32_t k : numbers) {
+    Facet f = pieces_[k];
+    for (std::uint32_t& corner : f)
+      corner = static_cast<std::uint32_t>(std::ranges::lower_bound(near.rows, corner) -
+                                          near.rows.begin());
+    near.points.pieces.push_back(f);
+  }
+  return near;
+}
+
+/// Nodes between instruments that leave no room leave them across the line between them.
+void DynamicContact::take_part_pinched(Near& near, const ContactMoment& moment) const {
+  for (std::size_t i = 0; i < near.rows.size(); ++i) {
+    Vec3& p = near.points.place[i];
+    const Vec3 &inward = near.points.inward[i], &inverse = near.points.inverse_mass[i];
     const ContactMoment::There *a = nullptr, *b = nullptr;
     for (const ContactMoment::There& t : moment.there)
-      if (inside(t.placed, p))
+      if (t.placed.distance(p) < -on_surface * t.placed.radius)
         (a == nullptr ? a : b) = &t;
       else if (b == nullptr && t.placed.distance(p) < 1e-3 * t.placed.radius)
         b = &t;
-    if (a != nullptr) {
-      const Vec3 n = a->placed.normal(p, inward);
-      const Vec3 along = b == nullptr ? n : n - b->placed.normal(p, inward);
-      Vec3 way = inward - dot(inward, along) / std::max(dot(along, along), 1e-300) * along;
-      way = free_part(way, inverse);
-      if (!(norm(way) > 1e-6 * norm(inward)))
-        way = free_part(std::abs(along.x) < 0.6 * norm(along) ? cross(along, {1, 0, 0})
-                                                              : cross(along, {0, 1, 0}),
-                        inverse);
-      if (norm(way) > 0)
-        for (std::size_t k = 0; k < moment.there.size(); ++k)
-          for (const ContactMoment::There& t : moment.there)
-            if (inside(t.placed, p))
-              leave(t.placed, way / norm(way), p);
-    }
+    if (a == nullptr || inverse == Vec3{})
+      continue;
+    const Vec3 n = a->placed.normal(p, inward);
+    const Vec3 along = b == nullptr ? n : n - b->placed.normal(p, inward);
+    Vec3 way = inward - dot(inward, along) / std::max(dot(along, along), 1e-300) * along;
+    way = free_part(way, inverse);
+    if (!(norm(way) > 1e-6 * norm(inward)))
+      way = free_part(std::abs(along.x) < 0.6 * norm(along) ? cross(along, {1, 0, 0})
+                                                            : cross(along, {0, 1, 0}),
+                      inverse);
+    if (!(norm(way) > 0))
+      continue;
+    for (std::size_t k = 0; k < moment.there.size(); ++k)
+      for (const ContactMoment::There& t : moment.there)
+        if (t.placed.distance(p) < -on_surface * t.placed.radius)
+          leave(t.placed, way / norm(way), p);
   }
-  put(p - rest, state.u);
-  put(v, state.v);
+}
+
+void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeTraits> traits,
+                              std::span<const NodeRow> now, std::span<NodeRow> next) {
+  std::vector<std::uint32_t> numbers;
+  look(moment, next, numbers);
+  if (numbers.empty()) {
+    state_.guesses.clear();
+    return;
+  }
+  Near near = near_pieces(numbers, traits, next);
+  MassPoints& points = near.points;
+  const std::vector<Vec3> place_before = points.place, velocity_before = points.velocity;
+  // What is in the way of a jump moves first, and the step's own way goes on from there.
+  std::vector<Vec3> from;
+  for (const std::uint32_t row : near.rows)
+    from.push_back(place(now, row));
+  std::vector<MovingCore> cores;
+  for (const ContactMoment::There& t : moment.there)
+    cores.push_back({t.placed, t.from, t.to, moment.h});
+  if (std::ranges::any_of(moment.there, [](const auto& t) { return !t.on_its_way.empty(); })) {
+    const std::vector<Vec3> begin = from;
+    points.place.swap(from);
+    for (const ContactMoment::There& t : moment.there)
+      for (const PlacedInstrument& on_its_way : t.on_its_way)
+        move_out(points, std::array{MovingCore{on_its_way, {}, {}, 0}}, on_surface, few_sweeps);
+    points.place.swap(from);
+    for (std::size_t i = 0; i < from.size(); ++i)
+      points.place[i] += from[i] - begin[i];
+  }
+  std::vector<PieceTouch> touches = touches_of(points, cores, 0);
+  points.place.swap(from);
+  for (PieceTouch& t : touches)
+    locate(points, cores, t);
+  points.place.swap(from);
+  const auto rows_of = [&](const Facet& piece) {
+    return Facet{near.rows[piece[0]], near.rows[piece[1]], near.rows[piece[2]]};
+  };
+  for (PieceTouch& t : touches)
+    if (const auto known = std::ranges::lower_bound(
+            state_.guesses,
+            std::tuple(moment.there[t.instrument].instrument, t.part, rows_of(t.piece)), {},
+            key_of);
+        known != state_.guesses.end() &&
+        key_of(*known) ==
+            std::tuple(moment.there[t.instrument].instrument, t.part, rows_of(t.piece)))
+      t.impulse = moment.h * turned(known->force, t.normal, cores[t.instrument].placed.friction);
+  exchange_impulses(points, cores, touches, exact_impulse, many_sweeps);
+  state_.guesses.clear();
+  for (const PieceTouch& t : touches)
+    if (t.impulse != Vec3{})
+      state_.guesses.push_back(
+          {moment.there[t.instrument].instrument, t.part, rows_of(t.piece), t.impulse / moment.h});
+  std::ranges::sort(state_.guesses, {}, key_of);
+  for (std::size_t i = 0; i < points.place.size(); ++i)
+    points.place[i] += moment.h * (points.velocity[i] - velocity_before[i]);
+  if (!move_out(points, cores, rounding, few_sweeps) &&
+      !move_out(points, cores, on_surface, moment.last ? many_sweeps : few_sweeps) &&
+      moment.there.size() > 1) {
+    take_part_pinched(near, moment);
+    move_out(points, cores, on_surface, many_sweeps);
+  }
+  for (std::size_t i = 0; i < near.rows.size(); ++i) {
+    NodeRow& row = next[near.rows[i]];
+    if (points.place[i] != place_before[i])
+      put(points.place[i] - vector_of(layout_.rest[near.rows[i]].p), row.u);
+    if (points.velocity[i] != velocity_before[i])
+      put(points.velocity[i], row.v);
+  }
+  double largest = 0;
+  for (const PieceTouch& t : touches)
+    largest = std::max(largest, norm(t.impulse));
+  std::vector<NodeTouch> impulses;
+  for (const PieceTouch& t : touches)
+    if (norm(t.impulse) > nothing * largest)
+      for (std::size_t c = 0; c < 3; ++c)
+        if (t.point.weights[c] > 0)
+          impulses.push_back({near.rows[t.piece[c]], moment.there[t.instrument].instrument,
+                              t.point.weights[c] * t.impulse});
+  if (impulses.empty())
+    return;
+  state_.impulses.insert(state_.impulses.end(), impulses.begin(), impulses.end());
+  state_.impulses = sums_of_touches(std::move(state_.impulses));
 }
 
 bool DynamicContact::still(double start) const {
@@ -262,34 +343,68 @@ bool DynamicContact::still(double start) const {
   return true;
 }
 
-bool DynamicContact::inside(std::uint32_t node, const Vec3& displacement) const {
-  const Vec3 p = model_.nodes[node].position + displacement;
-  return node < surface_ &&
-         std::any_of(state_.instruments.begin(), state_.instruments.end(), [&](const auto& i) {
-           return i &&
-                  PlacedInstrument(i->shape, i->way.to).distance(p) < -on_surface * i->shape.radius;
-         });
+std::vector<std::uint32_t> DynamicContact::pieces_near(const Box3& box,
+                                                       std::span<const NodeRow> rows) const {
+  std::vector<std::uint32_t> numbers;
+  for (std::uint32_t k = 0; k < pieces_.size(); ++k) {
+    Box3 own;
+    for (const std::uint32_t row : pieces_[k])
+      own.add(place(rows, row));
+    if (near(own, box))
+      numbers.push_back(k);
+  }
+  return numbers;
 }
 
-Vec3 DynamicContact::left_of(std::uint32_t node, const Vec3& displacement, const Vec3& inverse_mass,
-                             const Vec3& acceleration, std::vector<NodeTouch>& touches) const {
-  Vec3 left = acceleration;
-  const Vec3 p = model_.nodes[node].position + displacement;
-  if (node >= surface_)
-    return left;
+bool DynamicContact::inside(std::span<const NodeTraits> traits,
+                            std::span<const NodeRow> rows) const {
+  for (const auto& i : state_.instruments) {
+    if (!i)
+      continue;
+    const PlacedInstrument placed(i->shape, i->way.to);
+    const Near near = near_pieces(pieces_near(placed.box(), rows), traits, rows);
+    if (!touches_of(near.points, std::array{MovingCore{placed, {}, {}, 0}}, -2 * on_surface)
+             .empty())
+      return true;
+  }
+  return false;
+}
+
+void DynamicContact::balance(std::span<const NodeTraits> traits, std::span<const NodeRow> rows,
+                             std::span<Vec3> acceleration, std::vector<NodeTouch>& touches) const {
+  std::vector<MovingCore> cores;
+  std::vector<std::uint32_t> instrument, numbers;
   for (std::uint32_t k = 0; k < state_.instruments.size(); ++k) {
     if (!state_.instruments[k])
       continue;
-    const PlacedInstrument placed(state_.instruments[k]->shape, state_.instruments[k]->way.to);
-    if (!(std::abs(placed.distance(p)) < on_surface * placed.radius))
-      continue;
-    const Vec3 after = after_contact(left, {}, placed.normal(p, inward_[node]), placed.friction);
-    const Vec3 by = free_part(after - left, inverse_mass);
-    left += by;
-    if (by != Vec3{})
-      touches.push_back({node, k, over(by, inverse_mass)});
+    const MovingInstrument& i = *state_.instruments[k];
+    cores.push_back({PlacedInstrument(i.shape, i.way.to), {}, {}, 0});
+    instrument.push_back(k);
+    const double more = 2 * at_surface * i.shape.radius;
+    Box3 box = cores.back().placed.box();
+    box.min -= {more, more, more};
+    box.max += {more, more, more};
+    const std::vector<std::uint32_t> some = pieces_near(box, rows);
+    numbers.insert(numbers.end(), some.begin(), some.end());
   }
-  return left;
+  std::ranges::sort(numbers);
+  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
+  Near near = near_pieces(numbers, traits, rows);
+  for (std::size_t i = 0; i < near.rows.size(); ++i)
+    near.points.velocity[i] =
+        near.rows[i] < acceleration.size() ? acceleration[near.rows[i]] : Vec3{};
+  std::vector<PieceTouch> found = touches_of(near.points, cores, at_surface);
+  exchange_impulses(near.points, cores, found, exact_at_rest, sweeps_at_rest);
+  for (std::size_t i = 0; i < near.rows.size(); ++i)
+    if (near.rows[i] < acceleration.size())
+      acceleration[near.rows[i]] = near.points.velocity[i];
+  for (const PieceTouch& t : found)
+    if (t.impulse != Vec3{})
+      for (std::size_t c = 0; c < 3; ++c)
+        if (t.point.weights[c] > 0)
+          touches.push_back({layout_.node_of_row[near.rows[t.piece[c]]], instrument[t.instrument],
+                             t.point.weights[c] * t.impulse});
+  touches = sums_of_touches(std::move(touches));
 }
 
 void DynamicContact::hold(std::vector<NodeTouch> touches) {
@@ -304,12 +419,9 @@ void DynamicContact::hold(std::vector<NodeTouch> touches) {
 std::vector<NodeTouch> DynamicContact::take() {
   hold(std::vector<NodeTouch>(state_.held)); // that it counts
   std::vector<NodeTouch> all = std::exchange(state_.resting, {});
-  for (std::vector<NodeTouch>& some : state_.impulses) {
-    for (NodeTouch t : some) {
-      t.node = layout_.node_of_row[t.node];
-      all.push_back(t);
-    }
-    some.clear();
+  for (NodeTouch t : std::exchange(state_.impulses, {})) {
+    t.node = layout_.node_of_row[t.node];
+    all.push_back(t);
   }
   return sums_of_touches(std::move(all));
 }

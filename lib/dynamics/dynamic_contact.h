@@ -1,16 +1,18 @@
 #pragma once
-// Instruments against nodes that move in explicit steps (solid_contact.h has implicit ones).
-// Behind each integration step a node inside one
+// Instruments against a surface that moves in explicit steps (solid_contact.h has implicit ones).
+// Behind each integration step the pieces of surface that are in one (contact/surface_point.h)
 //
-//   loses the part of its velocity that leads into the instrument, against the instrument's own
-//   surface, and of the part along the surface up to μ times as much (Coulomb); then it moves out
-//   along the normal, onto the surface.
+//   exchange impulses with it: no point's velocity leads into the instrument, against the
+//   instrument's own surface, and what slides along it is braked by up to μ times the push
+//   (Coulomb); nodes move by what their velocities change, then out of what is left, the less the
+//   heavier they are.
 //
-// The force on it is m Δv/h. Blocks of nodes that are far from all instruments are looked at every
-// few steps only; behind the last step of an advance all that may be near are, so that no shape is
-// shown with a node inside.
+// The force on a node is m Δv/h. Blocks of surface that are far from all instruments are looked at
+// every few steps only; behind the last step of an advance all that may be near are, so that no
+// shape is shown with an instrument in it.
 
 #include "contact/instrument.h"
+#include "contact/surface_point.h"
 #include "dynamics/spring_force.h"
 #include "dynamics/spring_layout.h"
 #include "model/model.h"
@@ -52,14 +54,22 @@ public:
   /// Keeps references to both.
   DynamicContact(const Model& model, const SpringLayout& layout);
 
+  /// Where an instrument pushed in the last step, from which the next one starts to guess.
+  struct Guess {
+    std::uint32_t instrument = 0;
+    CorePart part = CorePart::first_end;
+    Facet rows{};
+    Vec3 force;
+  };
   /// All that changes, to go back to.
   struct State {
     std::vector<std::optional<MovingInstrument>> instruments;
-    std::vector<std::uint64_t> next_look;         ///< step, by block
-    std::vector<std::vector<NodeTouch>> impulses; ///< by block: row and instrument ascending
-    std::vector<NodeTouch> held;                  ///< forces
-    double held_time = 0;                         ///< that they acted since the last take
-    std::vector<NodeTouch> resting;               ///< impulses of those before
+    std::vector<std::uint64_t> next_look; ///< step, by block
+    std::vector<NodeTouch> impulses;      ///< row and instrument ascending
+    std::vector<Guess> guesses;           ///< ascending
+    std::vector<NodeTouch> held;          ///< forces
+    double held_time = 0;                 ///< that they acted since the last take
+    std::vector<NodeTouch> resting;       ///< impulses of those before
   };
   const State& state() const noexcept { return state_; }
   void restore(const State& state) { state_ = state; }
@@ -70,18 +80,22 @@ public:
   /// \param time where step number `step` of `steps` begins, h its length
   ContactMoment moment(std::uint64_t step, std::uint64_t steps, double time, double h) const;
 
-  /// Behind the step of a block, before the next one. Safe for different blocks at once.
-  void keep_out(std::size_t block, const ContactMoment& moment, const NodeTraits* traits,
-                NodeRow* next);
+  /// Whether keep_out has to look at anything behind this step. Nothing that it asks changes before
+  /// keep_out is called.
+  bool due(const ContactMoment& moment) const;
+  /// Behind the step of all blocks from `now` to `next`, before the next one. \param traits, now,
+  /// next by row
+  void keep_out(const ContactMoment& moment, std::span<const NodeTraits> traits,
+                std::span<const NodeRow> now, std::span<NodeRow> next);
 
   /// Whether no instrument moves from `start` on.
   bool still(double start) const;
-  /// Whether a node is inside one, as they stand in the end.
-  bool inside(std::uint32_t node, const Vec3& displacement) const;
-  /// What is left of the acceleration of a node at rest by the instruments that it touches, whose
-  /// forces on it join `touches`. \pre still
-  Vec3 left_of(std::uint32_t node, const Vec3& displacement, const Vec3& inverse_mass,
-               const Vec3& acceleration, std::vector<NodeTouch>& touches) const;
+  /// Whether a piece is inside one, as they stand in the end.
+  bool inside(std::span<const NodeTraits> traits, std::span<const NodeRow> rows) const;
+  /// What is left of accelerations of nodes at rest by the instruments that they touch, whose
+  /// forces on them join `touches`, by ascending node. \param acceleration by row \pre still
+  void balance(std::span<const NodeTraits> traits, std::span<const NodeRow> rows,
+               std::span<Vec3> acceleration, std::vector<NodeTouch>& touches) const;
   /// From now on these forces, by ascending node, act on nodes at rest; none: they move.
   void hold(std::vector<NodeTouch> touches);
   /// They did so for `duration` s.
@@ -93,12 +107,20 @@ public:
   std::vector<NodeTouch> take();
 
 private:
-  void push(std::size_t row, const ContactMoment& moment, const NodeTraits& traits, NodeRow& state,
-            std::vector<NodeTouch>& impulses) const;
+  struct Near;
+  Near near_pieces(std::span<const std::uint32_t> numbers, std::span<const NodeTraits> traits,
+                   std::span<const NodeRow> rows) const;
+  std::vector<std::uint32_t> pieces_near(const Box3& box, std::span<const NodeRow> rows) const;
+  Vec3 place(std::span<const NodeRow> rows, std::uint32_t row) const;
+  void look(const ContactMoment& moment, std::span<const NodeRow> next,
+            std::vector<std::uint32_t>& numbers);
+  void take_part_pinched(Near& near, const ContactMoment& moment) const;
+
   const Model& model_;
   const SpringLayout& layout_;
-  std::size_t surface_ = 0;
-  std::vector<Vec3> inward_; ///< at rest, by node
+  std::vector<Facet> pieces_;      ///< by rows, block by block
+  std::vector<std::size_t> first_; ///< piece of each block, and the end
+  std::vector<Vec3> inward_;       ///< at rest, by row
   State state_;
 };
 

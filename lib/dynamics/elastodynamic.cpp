@@ -226,22 +226,27 @@ bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>&
     if (!within(vector_of(row.v), speed))
       return false;
   const std::span<const NodeMotion> now = motion();
-  for (std::uint32_t row = 0; row < layout_.movable; ++row) {
+  std::vector<Vec3> left(layout_.movable);
+  bool balanced = true;
+  for (std::uint32_t row = 0; row < layout_.movable && (balanced || touch_); ++row) {
     const Vec3 inverse = vector_of(traits_[row].inverse_mass);
     if (inverse == Vec3{})
       continue;
     const std::uint32_t node = layout_.node_of_row[row];
-    if (touch_ && touch_->inside(node, now[node].displacement))
-      return false;
     const Vec3 outer = drives_.empty() ? vector_of(traits_[row].constant) : outer_force(node, time);
     const Vec3 force = spring_force(network_, now, node) + outer;
     const Vec3 a{force.x * inverse.x, force.y * inverse.y, force.z * inverse.z};
-    if (!within(a, acceleration) &&
-        !(touch_ &&
-          within(touch_->left_of(node, now[node].displacement, inverse, a, touches), acceleration)))
-      return false;
+    left[row] = a;
+    balanced = balanced && within(a, acceleration);
   }
-  return true;
+  if (touch_ && touch_->inside(traits_, *rows_))
+    return false;
+  if (balanced)
+    return true;
+  if (!touch_)
+    return false;
+  touch_->balance(traits_, *rows_, left, touches);
+  return std::ranges::all_of(left, [&](const Vec3& a) { return within(a, acceleration); });
 }
 
 std::uint64_t Elastodynamic::advance(double duration, double largest_step, const Context& context,
@@ -256,8 +261,6 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
   const double h = duration / count;
   std::vector<NodeTouch> touches;
   if (found_at_rest(h, start, touches)) {
-    std::sort(touches.begin(), touches.end(),
-              [](const NodeTouch& a, const NodeTouch& b) { return a.node < b.node; });
     if (touch_) {
       touch_->hold(std::move(touches));
       touch_->stay(duration);
@@ -299,15 +302,20 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
     for (bool stop = false; s < steps && !stop; ++s) {
       const double time = start + static_cast<double>(s) * h;
       const ContactMoment moment = touch_ ? touch_->moment(s, steps, time, h) : ContactMoment{};
+      const bool look = touch_ && touch_->due(moment);
       for (std::size_t b = first; b < last; ++b) {
         if (!step_block(b, now, next, h, time, context.cpu))
           odd[s % 2].store(true, std::memory_order_relaxed);
-        if (touch_)
-          touch_->keep_out(b, moment, traits_.data(), next);
       }
       if (thread == 0 && context.cancelled && context.cancelled())
         cancelled[s % 2].store(true, std::memory_order_relaxed);
       point.meet(round);
+      if (look) {
+        if (thread == 0)
+          touch_->keep_out(moment, traits_, {now, layout_.rest.size()},
+                           {next, layout_.rest.size()});
+        point.meet(round);
+      }
       stop = odd[s % 2].load(std::memory_order_relaxed) ||
              cancelled[s % 2].load(std::memory_order_relaxed);
       std::swap(now, next);

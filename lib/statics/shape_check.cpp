@@ -61,13 +61,6 @@ ShapeCheck::ShapeCheck(const Model& model) {
   turned_ = std::move(faces.turned);
   volume_ = faces.volume;
   closed_ = is_closed(model);
-  std::size_t edges = 0;
-  for (const Spring& s : model.springs)
-    if (s.kind == SpringKind::edge) {
-      mean_edge_ += norm(model.nodes[s.j].position - model.nodes[s.i].position);
-      ++edges;
-    }
-  mean_edge_ = edges > 0 ? mean_edge_ / static_cast<double>(edges) : 0;
   const double shortest = gewebe::shortest_edge(model);
   shortest_edge_ = std::isfinite(shortest) ? shortest : 0;
 }

@@ -29,13 +29,12 @@ public:
   /// has 3 numbers for each of its nodes, or for the first ones, with all corners of triangles and
   /// ends of springs among them
   ShapeFaults look(const Model& model, std::span<const double> displacement) const;
-  double mean_edge() const noexcept { return mean_edge_; } ///< mm
   double shortest_edge() const noexcept { return shortest_edge_; }
 
 private:
   std::vector<bool> turned_; ///< by triangle, at rest
   bool closed_ = false;
-  double volume_ = 0, mean_edge_ = 0, shortest_edge_ = 0;
+  double volume_ = 0, shortest_edge_ = 0;
 };
 
 } // namespace gewebe

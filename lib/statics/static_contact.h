@@ -12,10 +12,11 @@
 
 #include "contact/instrument.h"
 #include "contact/load.h"
-#include "contact/surface_blocks.h"
+#include "contact/surface_facets.h"
 #include "model/model.h"
 #include "statics/elastostatic.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -34,6 +35,14 @@ struct NodeTouch {
   bool operator==(const NodeTouch&) const = default;
 };
 
+/// A point of the surface that an instrument pushes.
+struct PointTouch {
+  Facet nodes{};                   ///< of the piece that it is on
+  std::array<double, 3> weights{}; ///< by which its place is theirs, and its force is on them
+  std::uint32_t instrument = 0;
+  Vec3 force; ///< 1e-6 N
+};
+
 /// One for each node and instrument, by ascending ones, with the sum of its forces in their order.
 std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches);
 
@@ -46,6 +55,8 @@ struct MovedInstrument {
 /// The way in parts in which no instrument moves further than half its radius. \return how many, at
 /// most `max`
 std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t max);
+
+struct ContactNodes;
 
 /// What gives way to forces of contact.
 class Yielding {
@@ -85,10 +96,12 @@ public:
   /// From another state: its shape and what is touched in it.
   void restart(std::span<const double> shape, std::vector<NodeTouch> touches);
   /// Of the last shape.
-  const Box3& box() const noexcept { return blocks_.box(); }
+  const Box3& box() const noexcept { return facets_.box(); }
 
   /// By ascending node and instrument; forces that don't vanish.
   const std::vector<NodeTouch>& touches() const noexcept { return touches_; }
+  /// The points that these are of; none behind a restart.
+  const std::vector<PointTouch>& points() const noexcept { return points_; }
   /// A node inside an instrument, by more than 1e-6 of its radius, that can't be moved out: it is
   /// held.
   std::optional<NodeTouch> stuck() const { return stuck_; }
@@ -96,28 +109,23 @@ public:
   bool solved() const noexcept { return solved_; }
 
 private:
-  struct Pair {
-    std::uint32_t place = 0; ///< of the node among the candidates
-    std::uint32_t instrument = 0;
-    Vec3 normal, force;
-  };
   using Placed = std::vector<std::optional<PlacedInstrument>>;
   void find(const Placed& placed, const std::map<std::uint32_t, Vec3>& displaced,
             std::span<const double> shape, double depth, std::vector<std::uint32_t>& inside);
-  bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes, const Placed& placed,
+  ContactNodes around(std::span<const std::uint32_t> nodes,
+                      const std::map<std::uint32_t, Vec3>& displaced,
+                      std::span<const double> before) const;
+  bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
+                 const std::map<std::uint32_t, Vec3>& displaced, const Placed& placed,
                  std::span<const std::optional<MovedInstrument>> moved,
                  std::span<const double> before, std::vector<Vec3>& at);
-  void solve(const DelassusOperator& delassus, const Placed& placed,
-             std::span<const std::optional<MovedInstrument>> moved, std::vector<Pair>& pairs,
-             std::span<const double> before, std::vector<Vec3>& at);
-  void part_pinched(const Placed& placed, std::vector<Pair>& pairs,
-                    std::span<const std::uint32_t> nodes) const;
   Vec3 rest(std::uint32_t node) const { return model_.nodes[node].position; }
 
   const Model& model_;
-  SurfaceBlocks blocks_;
+  SurfaceFacets facets_;
   std::vector<Vec3> inward_; ///< at rest, by node
   std::vector<NodeTouch> touches_;
+  std::vector<PointTouch> points_;
   std::optional<NodeTouch> stuck_;
   bool solved_ = true;
 };

@@ -1,6 +1,6 @@
+#include "contact_checks.h"
 #include "dynamics/dynamic_contact.h"
 #include "dynamics/elastodynamic.h"
-#include "larger.h"
 #include "sim_models.h"
 #include "statics/elastostatic.h"
 #include "statics/static_contact.h"
@@ -15,14 +15,6 @@ const Vec3 middle{100, -50, 30}; // of the organ, a ball of radius 20
 
 Vec3 place(const Model& model, std::span<const double> u, std::size_t i) {
   return model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
-}
-
-/// Of the free node that is deepest inside, over the radius.
-double depth(const Model& model, std::span<const double> u, const PlacedInstrument& placed) {
-  double min = HUGE_VAL;
-  for (const std::uint32_t i : test::free_nodes(model))
-    min = test::smaller(min, placed.distance(place(model, u, i)));
-  return -min / placed.radius;
 }
 
 TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
@@ -40,15 +32,25 @@ TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
       before = now;
       const PlacedInstrument placed(shape, now);
       EXPECT_TRUE(contact.solved());
-      EXPECT_LT(depth(model, u, placed), 1e-6);
-      EXPECT_GT(depth(model, u, PlacedInstrument({8.1, {}, 0}, now)), 1e-3); // it would show
-      ASSERT_GT(contact.touches().size(), 2U);
-      for (const NodeTouch& t : contact.touches()) {
-        const Vec3 n = placed.normal(place(model, u, t.node));
+      EXPECT_LT(test::surface_depth(model, u, placed), 1e-6);
+      EXPECT_GT(test::surface_depth(model, u, PlacedInstrument({8.1, {}, 0}, now)),
+                1e-3); // it would show
+      ASSERT_GT(contact.points().size(), 2U);
+      std::vector<NodeTouch> sums;
+      for (const PointTouch& t : contact.points()) {
+        Vec3 p;
+        for (std::size_t c = 0; c < 3; ++c) {
+          p += t.weights[c] * place(model, u, t.nodes[c]);
+          if (t.weights[c] > 0)
+            sums.push_back({t.nodes[c], t.instrument, t.weights[c] * t.force});
+        }
+        EXPECT_NEAR(placed.distance(p), 0, 1e-6 * placed.radius); // f g = 0
+        const Vec3 n = placed.normal(p);
         const double push = dot(t.force, n), drag = norm(t.force - push * n);
         EXPECT_GT(push, 0);
         EXPECT_LE(drag, friction * push + 1e-6 * norm(t.force));
       }
+      EXPECT_EQ(sums_of_touches(sums), contact.touches());
     }
   contact.update([&]() -> Elastostatic& { return solver; }, {}, {}, u); // gone
   EXPECT_TRUE(contact.touches().empty());
@@ -76,7 +78,8 @@ TEST(DynamicContact, KeepsMovingNodesOutAndBalancesThemAtRest) {
     moving.wake();
     moving.advance(0.01, h, Context{}, time);
     before = way.at(time + 0.01);
-    EXPECT_LT(depth(model, displacement(), PlacedInstrument(shape, before)), 1e-6) << k;
+    EXPECT_LT(test::surface_depth(model, displacement(), PlacedInstrument(shape, before)), 1e-6)
+        << k;
     for (const NodeTouch& t : moving.take_impulses()) {
       const Vec3 at = model.nodes[t.node].position + moving.motion()[t.node].displacement;
       EXPECT_GT(dot(t.force, at - before.place), 0); // never pulls

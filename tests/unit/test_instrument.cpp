@@ -1,7 +1,7 @@
 #include "contact/instrument.h"
 
 #include "contact/load.h"
-#include "contact/surface_blocks.h"
+#include "contact/surface_facets.h"
 #include "sim_models.h"
 
 #include <cmath>
@@ -109,9 +109,9 @@ TEST(Instrument, ACarriedNodeFollowsTheTurn) {
   EXPECT_LT(norm(middle - Vec3{0, 1, 1}), 1e-15); // on the circle, not through its middle
 }
 
-TEST(SurfaceBlocks, FindAllNodesInABox) {
+TEST(SurfaceFacets, FindAllNodesInABox) {
   const Model model = test::organ(3);
-  SurfaceBlocks blocks(model);
+  SurfaceFacets blocks(model);
   std::vector<double> u(3 * model.nodes.size());
   for (std::size_t k = 0; k < u.size(); ++k)
     u[k] = std::sin(static_cast<double>(k));
@@ -127,7 +127,12 @@ TEST(SurfaceBlocks, FindAllNodesInABox) {
       const Vec3 c = place(i), r{1.5, 1.5, 1.5};
       const Box3 box{c - r, c + r};
       std::set<std::uint32_t> found;
-      blocks.visit_near(box, [&](std::uint32_t node) { EXPECT_TRUE(found.insert(node).second); });
+      std::set<std::uint32_t> pieces;
+      blocks.visit_near(box, [&](std::uint32_t piece) {
+        EXPECT_TRUE(pieces.insert(piece).second);
+        for (const std::uint32_t node : blocks.facets()[piece])
+          found.insert(node);
+      });
       asked += found.size();
       for (std::uint32_t j = 0; j < surface_count(model); ++j) {
         const Vec3 p = place(j);

@@ -1,4 +1,5 @@
 #include "base/error.h"
+#include "contact_checks.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
@@ -29,17 +30,19 @@ SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
   return {0, {radius, {}, friction}, {at, {}}};
 }
 
-/// Of the node that is deepest in the instrument, over its radius; nodes that no force moves count
-/// for nothing.
+/// Of the surface in the instrument, over its radius; what no force moves counts for nothing.
 double depth(const Simulation& s, std::size_t object, const InstrumentShape& shape,
              const Pose& pose) {
-  const PlacedInstrument placed(shape, pose);
-  double min = HUGE_VAL;
-  const Model& model = s.model(object);
-  for (std::size_t i = 0; i < surface_count(model); ++i)
-    if (model.nodes[i].fixed == fixed_none)
-      min = test::smaller(min, placed.distance(place(s, object, i)));
-  return -min / shape.radius;
+  return test::surface_depth(s.model(object), s.displacement(object),
+                             PlacedInstrument(shape, pose));
+}
+
+/// Of all forces on nodes, as they are on points of the surface: norms.
+double sum_of_sizes(const std::vector<NodeVector>& forces) {
+  double sum = 0;
+  for (const NodeVector& f : forces)
+    sum += norm(f.value);
+  return sum;
 }
 
 /// Both methods, the elastodynamic one by both of its integrations.
@@ -145,11 +148,10 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
     for (const NodeVector& f : forces) {
       const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
       EXPECT_GT(dot(f.value, n), 0);
-      if (method == Method::ffe) {
-        EXPECT_LT(norm(cross(f.value, n)), 1e-7 * norm(f.value));
-      }
       sum += f.value;
     }
+    // All forces pass through the centre.
+    EXPECT_LT(norm(tool.torque), (method == Method::ffe ? 1e-9 : 3e-2) * 8 * norm(sum));
     EXPECT_LT(norm(tool.force + sum), 1e-12 * norm(sum));
     if (method == Method::ela)
       continue;
@@ -202,9 +204,11 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
       for (const NodeVector& f : s->contact_forces(0)) {
         const Vec3 n = (place(*s, 0, f.node) - s->instrument(0).pose.place) / 8;
         push += dot(f.value, n);
-        EXPECT_LE(norm(f.value - dot(f.value, n) * n), (friction + 1e-6) * dot(f.value, n)) << k;
       }
       EXPECT_GT(push, 0);
+      EXPECT_LE(norm(s->instrument(0).torque),
+                (friction + 1e-6) * 8 * sum_of_sizes(s->contact_forces(0)))
+          << k;
     }
     // With friction where it stopped depends on its way, by which it differs a little.
     const double exact = friction > 0 ? 1e-2 : 1e-6;
@@ -270,35 +274,40 @@ TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
     for (const double friction : {0.2, 5.0}) {
       const auto s = pressed(method, friction, 2, 8, 3);
       const Vec3 from = s->instrument(0).pose.place;
-      const std::vector<NodeVector> before = s->contact_forces(0);
-      const Vec3 at = place(*s, 0, before[before.size() / 2].node);
+      std::vector<Vec3> was;
+      for (std::size_t i = 0; i < s->model(0).nodes.size(); ++i)
+        was.push_back(moved(*s, 0, i));
       s->apply(MoveInstrument{0, from + Vec3{1.5, 0, 0}, {}, 0.5});
       s->step(0.5);
       const InstrumentReport tool = s->instrument(0);
       EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), 1e-6);
-      std::size_t slipping = 0;
-      Vec3 drag;
+      Vec3 drag, went;
+      double weight = 0;
       for (const NodeVector& f : s->contact_forces(0)) {
         const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
         const double fn = dot(f.value, n);
         const Vec3 ft = f.value - fn * n;
-        EXPECT_GE(fn, 0);
-        if (method == Method::ffe) {
-          EXPECT_LE(norm(ft), friction * fn * (1 + 1e-6));
-        }
-        slipping += norm(ft) > 0.99 * friction * fn ? 1 : 0;
+        weight += f.value.z;
+        went += f.value.z * (moved(*s, 0, f.node) - was[f.node]);
         drag += ft;
       }
       EXPECT_GT(drag.x, 0); // nodes are dragged along, against their slip
       EXPECT_LT(tool.force.x, 0);
-      const double gone = (place(*s, 0, before[before.size() / 2].node) - at).x;
+      // The torque of friction, about the centre.
+      if (method == Method::ffe) {
+        EXPECT_LE(norm(tool.torque), friction * 8 * sum_of_sizes(s->contact_forces(0)));
+      }
+      EXPECT_LT(weight, 0);
+      const double gone = went.x / weight;
       if (friction < 1) {
-        EXPECT_GT(slipping, 0U);
-        EXPECT_LT(gone, 1.2);
+        EXPECT_GT(norm(tool.torque), 0.5 * friction * 8 * norm(tool.force)); // it slips
+        EXPECT_LT(gone, 0.2);
       } else if (method == Method::ffe) {
-        EXPECT_NEAR(gone, 1.5, 1e-6); // sticks
+        EXPECT_NEAR(gone, 1.5, 0.05); // sticks
       } else {
-        EXPECT_NEAR(gone, 1.5, 0.3);
+        // The net folds, and its pieces roll on the ball.
+        EXPECT_GT(gone, 0.4);
+        EXPECT_LT(gone, 1.7);
       }
     }
 }
@@ -374,7 +383,8 @@ TEST(SimulationContact, TheForceIsTheMeanOverTheStepWhateverCameBefore) {
     EXPECT_NEAR(first_force(before, false, false), force, 1e-6 * force) << before;
     EXPECT_EQ(first_force(before, true, false), first_force(before, false, false));
   }
-  EXPECT_NEAR(first_force(1, false, true), force, 0.2 * force); // other integration steps
+  // One of two steps feels it: another one of them is longer.
+  EXPECT_NEAR(first_force(1, false, true), force, 0.21 * force);
 }
 
 TEST(SimulationContact, ACutWithinAStepLeavesTheForceItsMean) {

@@ -102,8 +102,8 @@ Section hertz() {
       "A ball pressed into a block",
       "A rigid ball of 100 mm, pressed 0.04 mm into a quarter of a block that is 300 times as "
       "large "
-      "as the touched circle, by the contact of `ffe-run`: nodes against the ball, without "
-      "friction. The radius of the circle is that of the pressure's second moment. Linear elements "
+      "as the touched circle, by the contact of `ffe-run`: the surface against the ball, "
+      "without friction. The radius of the circle is that of the pressure's second moment. Linear elements "
       "are beside it in the plot.",
       {},
       {}};

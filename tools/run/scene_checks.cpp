@@ -27,13 +27,6 @@ std::string percent(double share) {
 
 } // namespace
 
-void SceneChecks::instrument(std::size_t number, const InstrumentShape& shape) {
-  if (shape.blade)
-    radius_.erase(number);
-  else
-    radius_[number] = shape.radius;
-}
-
 void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& warn,
                        const Tell& distrust) {
   for (const MethodJump& jump : simulation.news().jumps) {
@@ -56,15 +49,14 @@ void SceneChecks::look(const Simulation& simulation, bool shapes, const Tell& wa
   }
   for (std::size_t n = 0; n < simulation.object_count(); ++n)
     if (simulation.object(n).known)
-      look_at(simulation, n, shapes, warn, distrust);
+      look_at(simulation, n, shapes, distrust);
 }
 
 void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool shapes,
-                          const Tell& warn, const Tell& distrust) {
+                          const Tell& distrust) {
   Object& object = objects_[number];
   const bool wanted = simulation.object(number).method == Method::ela || shapes;
-  const bool thin = !radius_.empty() && !object.thin;
-  if ((!wanted || (object.turned && object.volume && object.strain)) && !thin)
+  if (!wanted || (object.turned && object.volume && object.strain))
     return;
   const Model& model = simulation.model(number);
   if (object.model != &model || object.nodes != model.nodes.size() ||
@@ -75,20 +67,7 @@ void SceneChecks::look_at(const Simulation& simulation, std::size_t number, bool
     object.check = std::make_unique<ShapeCheck>(model);
     object.looked_at = 0;
   }
-  for (const auto& [instrument, radius] : radius_) {
-    if (object.thin || !warn || !(2 * radius < object.check->mean_edge()))
-      continue;
-    const InstrumentReport report = simulation.instrument(instrument);
-    if (!report.present)
-      continue;
-    object.thin = true;
-    warn("object " + simulation.object(number).name + ": the instrument " +
-         simulation.instrument(instrument).name + " is " + number_text(2 * radius) +
-         " mm thick, less than an edge (" + rounded_text(object.check->mean_edge()) +
-         " mm in the mean), it can pass between nodes");
-  }
-  if (wanted)
-    look_at_shape(simulation, number, distrust);
+  look_at_shape(simulation, number, distrust);
 }
 
 void SceneChecks::look_at_shape(const Simulation& simulation, std::size_t number,

@@ -17,12 +17,11 @@ class SceneChecks {
 public:
   using Tell = std::function<void(const std::string&)>;
 
-  void instrument(std::size_t number, const InstrumentShape& shape);
   /// Behind a step. `distrust` is told of triangles turned over, of volumes that changed by more
   /// than 10 % and of edges of elastodynamic objects strained by more than half, `warn` of a change
-  /// of method by which an object jumps by over a tenth of its displacement, of solids whose steps
-  /// ran out of rounds, and of instruments thinner than an edge. \param shapes whether shapes of
-  /// elastostatic objects are computed anyway
+  /// of method by which an object jumps by over a tenth of its displacement, and of solids whose
+  /// steps ran out of rounds. \param shapes whether shapes of elastostatic objects are computed
+  /// anyway
   void look(const Simulation& simulation, bool shapes, const Tell& warn, const Tell& distrust);
 
 private:
@@ -32,15 +31,13 @@ private:
     std::unique_ptr<ShapeCheck> check;
     double looked_at = 0; ///< largest displacement when it was last looked at
     int not_looked = 0;
-    bool turned = false, volume = false, strain = false, jump = false, thin = false,
+    bool turned = false, volume = false, strain = false, jump = false,
          unfinished = false; ///< told
   };
-  void look_at(const Simulation& simulation, std::size_t number, bool shapes, const Tell& warn,
-               const Tell& distrust);
+  void look_at(const Simulation& simulation, std::size_t number, bool shapes, const Tell& distrust);
   void look_at_shape(const Simulation& simulation, std::size_t number, const Tell& distrust);
 
   std::map<std::size_t, Object> objects_;
-  std::map<std::size_t, double> radius_; ///< by instrument; none of a blade
 };
 
 } // namespace gewebe

@@ -43,9 +43,7 @@ SimulationOptions SceneRun::State::simulation_options() {
     s.warn = [this](const std::string& text) { warn(text); };
   s.distrust = [this](const std::string& text) { distrust(text); };
   s.applied = [this](const Change& change) {
-    if (const auto* const set = std::get_if<SetInstrument>(&change))
-      checks.instrument(set->instrument, set->shape);
-    else if (const auto* const set_gravity = std::get_if<SetGravity>(&change))
+    if (const auto* const set_gravity = std::get_if<SetGravity>(&change))
       gravity = set_gravity->gravity;
   };
   if (options.events != nullptr)

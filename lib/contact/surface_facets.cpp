@@ -1,0 +1,121 @@
+#include "contact/surface_facets.h"
+
+#include "base/vector_at.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t max_in_block = 64;
+
+/// Nodes that belong to the surface without a triangle.
+std::vector<std::uint32_t> loose_nodes(const Model& model) {
+  std::vector<std::uint8_t> taken(model.nodes.size());
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (const std::uint32_t corner : t)
+      taken[corner] = 1;
+  for (const EdgeMiddles& middles : model.middles)
+    for (const std::uint32_t middle : middles)
+      taken[middle] = 1;
+  for (const Triangle& t : model.triangles)
+    for (const std::uint32_t corner : t)
+      taken[corner] = 1;
+  std::vector<std::uint32_t> loose;
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    if (taken[i] == 0)
+      loose.push_back(i);
+  return loose;
+}
+
+} // namespace
+
+std::vector<Vec3> inward_directions(const Model& model) {
+  std::vector<Vec3> inward(model.nodes.size());
+  for (const Triangle& t : model.triangles) {
+    const Vec3 a = model.nodes[t[0]].position, b = model.nodes[t[1]].position,
+               c = model.nodes[t[2]].position;
+    for (const std::uint32_t corner : t)
+      inward[corner] -= cross(b - a, c - a);
+  }
+  return inward;
+}
+
+SurfaceFacets::SurfaceFacets(const Model& model) {
+  for (const Triangle& t : model.triangles)
+    facets_.push_back({t[0], t[1], t[2]});
+  for (const std::uint32_t i : loose_nodes(model))
+    facets_.push_back({i, i, i});
+  std::vector<Vec3> middle;
+  for (const Facet& f : facets_)
+    middle.push_back(model.nodes[f[0]].position + model.nodes[f[1]].position +
+                     model.nodes[f[2]].position);
+  std::vector<std::uint32_t> order(facets_.size());
+  for (std::uint32_t k = 0; k < order.size(); ++k)
+    order[k] = k;
+  // Halved along the longest side until small; ties by number, so that the order is one.
+  std::vector<std::pair<std::size_t, std::size_t>> open{{0, order.size()}};
+  while (!open.empty()) {
+    const auto [begin, end] = open.back();
+    open.pop_back();
+    if (end - begin <= max_in_block) {
+      first_.push_back(begin);
+      continue;
+    }
+    Box3 box;
+    for (std::size_t k = begin; k < end; ++k)
+      box.add(middle[order[k]]);
+    const Vec3 size = box.size();
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::size_t half = begin + (end - begin) / 2;
+    const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
+    std::nth_element(at(begin), at(half), at(end), [&](std::uint32_t i, std::uint32_t j) {
+      const double a = middle[i][axis], b = middle[j][axis];
+      return a < b || (a == b && i < j);
+    });
+    open.emplace_back(begin, half);
+    open.emplace_back(half, end);
+  }
+  std::sort(first_.begin(), first_.end());
+  boxes_.resize(first_.size());
+  first_.push_back(order.size());
+  for (std::size_t b = 0; b < boxes_.size(); ++b)
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(first_[b]),
+              order.begin() + static_cast<std::ptrdiff_t>(first_[b + 1]));
+  std::vector<Facet> sorted;
+  for (const std::uint32_t k : order)
+    sorted.push_back(facets_[k]);
+  facets_ = std::move(sorted);
+
+  first_of_node_.assign(model.nodes.size() + 1, 0);
+  const auto for_corners = [&](auto&& visit) {
+    for (std::uint32_t k = 0; k < facets_.size(); ++k)
+      for (int c = 0; c < corner_count(facets_[k]); ++c)
+        visit(facets_[k][static_cast<std::size_t>(c)], k);
+  };
+  for_corners([&](std::uint32_t node, std::uint32_t) { ++first_of_node_[node + 1]; });
+  for (std::size_t i = 1; i < first_of_node_.size(); ++i)
+    first_of_node_[i] += first_of_node_[i - 1];
+  of_node_.resize(first_of_node_.back());
+  std::vector<std::size_t> next(first_of_node_.begin(), first_of_node_.end() - 1);
+  for_corners([&](std::uint32_t node, std::uint32_t k) { of_node_[next[node]++] = k; });
+  set_shape(model, {});
+}
+
+void SurfaceFacets::set_shape(const Model& model, std::span<const double> displacement) {
+  box_ = {};
+  for (std::size_t b = 0; b < boxes_.size(); ++b) {
+    Box3 box;
+    for (std::size_t k = first_[b]; k < first_[b + 1]; ++k)
+      for (const std::uint32_t i : facets_[k])
+        box.add(model.nodes[i].position +
+                (displacement.empty() ? Vec3{} : vector_at(displacement, i)));
+    boxes_[b] = box;
+    box_.add(box.min);
+    box_.add(box.max);
+  }
+}
+
+} // namespace gewebe

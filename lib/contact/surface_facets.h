@@ -1,0 +1,58 @@
+#pragma once
+// The surface of a model in blocks of neighbouring pieces, each with the box of its shape, so that
+// who looks for surface near something asks little of it.
+
+#include "base/vec3.h"
+#include "contact/instrument.h"
+#include "contact/surface_point.h"
+#include "model/model.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// By node: the normal at rest that points into the object, as long as the area around; 0 without
+/// triangles.
+std::vector<Vec3> inward_directions(const Model& model);
+
+class SurfaceFacets {
+public:
+  /// Of all triangles, and of each node that has none, but for central nodes and those inside of
+  /// tetrahedra. \pre check_model(model) passes
+  explicit SurfaceFacets(const Model& model);
+
+  /// The shape from now on: 3 n displacements from rest, of the nodes of the surface at least.
+  void set_shape(const Model& model, std::span<const double> displacement);
+
+  const Box3& box() const noexcept { return box_; }
+  std::span<const Facet> facets() const noexcept { return facets_; }
+  /// Numbers of the pieces at a node, ascending.
+  std::span<const std::uint32_t> at_node(std::uint32_t node) const {
+    return std::span(of_node_).subspan(first_of_node_[node],
+                                       first_of_node_[node + 1] - first_of_node_[node]);
+  }
+
+  /// Calls visit(number) for all pieces that may reach into the box.
+  template <class Visit>
+  void visit_near(const Box3& box, Visit&& visit) const {
+    if (!near(box, box_))
+      return;
+    for (std::size_t b = 0; b < boxes_.size(); ++b)
+      if (near(box, boxes_[b]))
+        for (std::size_t k = first_[b]; k < first_[b + 1]; ++k)
+          visit(static_cast<std::uint32_t>(k));
+  }
+
+private:
+  std::vector<Facet> facets_;
+  std::vector<std::size_t> first_; ///< piece of each block, and the end
+  std::vector<Box3> boxes_;
+  Box3 box_;
+  std::vector<std::uint32_t> of_node_;
+  std::vector<std::size_t> first_of_node_;
+};
+
+} // namespace gewebe
