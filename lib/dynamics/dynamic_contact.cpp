@@ -77,7 +77,7 @@ struct DynamicContact::Near {
 };
 
 DynamicContact::DynamicContact(const Model& model, const SpringLayout& layout)
-    : model_(model), layout_(layout), inward_(layout.node_of_row.size()) {
+    : layout_(layout), inward_(layout.node_of_row.size()) {
   const std::vector<Vec3> inward = inward_directions(model);
   for (std::size_t row = 0; row < inward_.size(); ++row)
     inward_[row] = inward[layout.node_of_row[row]];

@@ -51,7 +51,7 @@ struct ContactMoment {
 
 class DynamicContact {
 public:
-  /// Keeps references to both.
+  /// Keeps a reference to the layout.
   DynamicContact(const Model& model, const SpringLayout& layout);
 
   /// Where an instrument pushed in the last step, from which the next one starts to guess.
@@ -116,7 +116,6 @@ private:
             std::vector<std::uint32_t>& numbers);
   void take_part_pinched(Near& near, const ContactMoment& moment) const;
 
-  const Model& model_;
   const SpringLayout& layout_;
   std::vector<Facet> pieces_;      ///< by rows, block by block
   std::vector<std::size_t> first_; ///< piece of each block, and the end
