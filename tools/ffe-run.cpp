@@ -1,6 +1,7 @@
 // ffe-run: scene -> replies, shapes, forces.
 
 #include "formats/results/results_writer.h"
+#include "formats/results/shared_shapes.h"
 #include "tools/run/event_log.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_answers.h"
@@ -13,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 using namespace gewebe;
 
@@ -23,7 +25,7 @@ struct Arguments {
   bool serve = false, acknowledge = false, binary = false, verify = false;
   std::optional<double> rate;
   double tolerance = 0;
-  std::string listen, events, record, latencies;
+  std::string listen, shapes, events, record, latencies;
 };
 
 /// The kind of result, or unknown where there is none but replies.
@@ -49,6 +51,8 @@ void work(cli::Run& run, const Arguments& in) {
     throw UsageError(std::string(in.serve ? "--serve" : "--binary") +
                      " is about answers, of which there are none here, expected it without --to, "
                      "and without -q beside -o");
+  const auto shared = // there when the first client comes
+      in.shapes.empty() ? nullptr : std::make_unique<SharedShapes>(in.shapes);
   SceneAnswers answers(spoken, in.binary, in.listen, {.warn = warn});
   std::optional<EventLog> events;
   if (!in.events.empty())
@@ -76,6 +80,7 @@ void work(cli::Run& run, const Arguments& in) {
   options.events = events ? &*events : nullptr;
   options.record = record ? &*record : nullptr;
   options.latency = &latency;
+  options.shared = shared.get();
   options.measure = run.stats_wanted();
   options.measure_error = in.verify || (run.stats_wanted() && !in.rate);
   options.tolerance = in.tolerance;
@@ -122,6 +127,7 @@ int main(int argc, char** argv) {
   p.flag("--serve", in.serve, "answer a wrong line and go on");
   p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
   p.option("--listen", in.listen, "PATH", "with --serve, a socket for clients, one at a time");
+  p.option("--shapes-in", in.shapes, "FILE", "with --serve, where others map all shapes");
   p.flag("--binary", in.binary, "answer in binary frames of float32");
   p.option("--events", in.events, "FILE", "who touched what when, as CSV");
   p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
@@ -133,9 +139,11 @@ int main(int argc, char** argv) {
   p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
   p.operand("SCENE", in.scene, "the scene");
   p.check([&] {
-    if (!in.serve && (in.acknowledge || !in.listen.empty()))
-      throw UsageError(std::string(in.acknowledge ? "--ack" : "--listen") +
-                       " without --serve, expected both");
+    for (const auto& [given, option] : {std::pair{in.acknowledge, "--ack"},
+                                        {!in.listen.empty(), "--listen"},
+                                        {!in.shapes.empty(), "--shapes-in"}})
+      if (given && !in.serve)
+        throw UsageError(std::string(option) + " without --serve, expected both");
   });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }

@@ -6,9 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <pwd.h>
-#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -33,17 +31,6 @@ sockaddr_un address_of(const std::string& path) {
 
 [[noreturn]] void fail(const std::string& path, const char* what) {
   throw Error(path, std::string(what) + ": " + std::strerror(errno));
-}
-
-/// Nobody else makes or replaces a socket in this folder as long as it is held; a folder that can't
-/// be read has no such lock.
-Descriptor lock_folder(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
-  Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  while (lock && ::flock(lock.get(), LOCK_EX) != 0 && errno == EINTR) {
-  }
-  return lock;
 }
 
 /// Removes a socket that nobody listens on. \throw Error if somebody does, or it is none
@@ -78,19 +65,9 @@ std::string user_name(uid_t user) {
 
 } // namespace
 
-Descriptor::~Descriptor() {
-  if (fd_ >= 0)
-    (void)::close(fd_);
-}
-
-Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
-}
-
 LocalListener::LocalListener(const std::string& path) : path_(path) {
   const sockaddr_un address = address_of(path);
-  const Descriptor lock = lock_folder(path);
+  const Descriptor lock = lock_folder_of(path);
   remove_stale(path, address);
   socket_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   // Linux gives the path the mode of the socket, so that it is never open to others.

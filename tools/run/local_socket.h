@@ -1,31 +1,14 @@
 #pragma once
 // A Unix stream socket by name: who listens, who may connect, and what is between them.
 
+#include "formats/stream/descriptor.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <utility>
 
 namespace gewebe {
-
-/// A file descriptor that is closed at the end.
-class Descriptor {
-public:
-  explicit Descriptor(int fd = -1) noexcept : fd_(fd) {}
-  ~Descriptor();
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept;
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int get() const noexcept { return fd_; }
-  explicit operator bool() const noexcept { return fd_ >= 0; }
-
-private:
-  int fd_;
-};
 
 /// Listens at a path, that its owner alone may connect to. The path is gone at the end, as
 /// formats/stream/removal.h has it.

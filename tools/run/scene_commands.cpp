@@ -36,6 +36,8 @@ void SceneRun::State::go_on(Step&& step) {
   const std::size_t objects = simulation.object_count(); // before parts come off
   if (result)
     result->need_models(simulation, objects); // a file that is wrong fails the step
+  if (shared)
+    SceneShapes::need_models(simulation, objects);
   step();
   if (result)
     result->first_frame(simulation, objects);

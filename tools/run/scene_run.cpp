@@ -28,6 +28,8 @@ SceneRun::State::State(std::string n, const Context& context, SceneOptions o)
     : name(std::move(n)), options(std::move(o)), simulation(context, simulation_options()) {
   if (options.result != nullptr)
     result.emplace(*options.result, stress);
+  if (options.shared != nullptr)
+    shared.emplace(*options.shared);
 }
 
 SimulationOptions SceneRun::State::simulation_options() {
@@ -36,7 +38,8 @@ SimulationOptions SceneRun::State::simulation_options() {
   s.tolerance = options.tolerance;
   s.guard = options.serve;
   // Now, so that one that can't be made is the fault of its step.
-  s.shapes = options.measure_error || (options.result != nullptr && options.result->wants_models());
+  s.shapes = options.measure_error || options.shared != nullptr ||
+             (options.result != nullptr && options.result->wants_models());
   s.surfaces = options.serve && options.measure;
   s.rate = options.rate;
   if (options.warn)
@@ -99,6 +102,8 @@ void SceneRun::State::answer() {
       [this](const std::string& text) { distrust(text); });
   stress.find(simulation, gravity);
   answered_gravity = gravity;
+  if (shared) // before who waits for the answer looks
+    shared->frame(simulation, steps);
   if (options.reply)
     deliver([&] {
       options.reply(options.binary ? binary_answer(simulation, steps, stress.answers())

@@ -19,6 +19,7 @@ namespace gewebe {
 
 class EventLog;
 class SceneRecord;
+class SharedShapes;
 class StepLatency;
 
 /// How a scene comes to what its file names stand for.
@@ -57,9 +58,10 @@ struct SceneOptions {
   EventLog* events = nullptr;
   SceneRecord* record = nullptr;
   StepLatency* latency = nullptr;
-  bool measure = false;       ///< digest and largest displacement
-  bool measure_error = false; ///< of every shape
-  double tolerance = 0;       ///< see ElastostaticOptions
+  SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is told
+  bool measure = false;           ///< digest and largest displacement
+  bool measure_error = false;     ///< of every shape
+  double tolerance = 0;           ///< see ElastostaticOptions
 };
 
 struct SceneCounts {

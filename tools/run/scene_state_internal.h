@@ -7,6 +7,7 @@
 #include "tools/run/scene_checks.h"
 #include "tools/run/scene_result.h"
 #include "tools/run/scene_run.h"
+#include "tools/run/scene_shapes.h"
 #include "tools/run/scene_stress.h"
 
 #include <cstdint>
@@ -50,6 +51,7 @@ struct SceneRun::State {
   SceneStress stress;
   Vec3 gravity, answered_gravity; ///< now, and at the last answer or accepted line
   std::optional<SceneResult> result;
+  std::optional<SceneShapes> shared;
   std::vector<std::string> stores; ///< by object; "" where it has none
   std::vector<std::string> models; ///< files that objects were made of
 
