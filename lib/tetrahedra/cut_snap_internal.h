@@ -1,0 +1,31 @@
+#pragma once
+// Which nodes stand in for crossings near them, so that no tetrahedron becomes too sharp.
+
+#include "tetrahedra/cut_region_internal.h"
+#include "tetrahedra/cut_split_internal.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// By local nodes.
+struct SnappedRegion {
+  std::vector<Vec3> points;          ///< at rest, some of them moved
+  std::vector<bool> on;              ///< does the wound pass through the node?
+  std::vector<TetNodeOrigin> origin; ///< nodes as numbered in the mesh
+  std::uint64_t moved = 0, kept = 0;
+  double largest_miss = 0;
+};
+
+/// The crossings of a tetrahedron that are left, in the order in which it is halved at them.
+/// `node` is the number of local nodes plus that of the crossed edge.
+std::vector<EdgeNode> edge_nodes(const CutRegion& region, const std::vector<bool>& on,
+                                 const RegionTet& tet);
+
+/// \throw Error as cut_tetrahedra, of the region
+SnappedRegion snap_region(const TetMesh& mesh, const CutRegion& region,
+                          const BladeCutOptions& options);
+
+} // namespace gewebe

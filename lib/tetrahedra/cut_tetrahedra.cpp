@@ -1,0 +1,212 @@
+#include "tetrahedra/cut_tetrahedra.h"
+
+#include "base/error.h"
+#include "tetrahedra/cut_blade_internal.h"
+#include "tetrahedra/cut_region_internal.h"
+#include "tetrahedra/cut_snap_internal.h"
+#include "tetrahedra/cut_wall_internal.h"
+#include "tetrahedra/faces.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+namespace gewebe {
+namespace {
+
+void check(const TetMesh& mesh, const BladeCutOptions& options) {
+  if (!mesh.middles.empty())
+    throw Error("quadratic tetrahedra, expected linear ones to cut");
+  if (!options.places.empty() && options.places.size() != mesh.points.size())
+    throw Error(std::to_string(options.places.size()) +
+                " places, expected none or one for each of "
+                "the " +
+                std::to_string(mesh.points.size()) + " nodes");
+  for (std::size_t n = 0; n < options.places.size(); ++n)
+    if (!is_finite(options.places[n]))
+      throw Error("the place of node " + std::to_string(n) + " is not finite");
+  if (!(options.snap >= 0 && options.snap <= 0.5))
+    throw Error("a share of " + std::to_string(options.snap) +
+                " of an edge to move nodes within, expected 0 to 0.5");
+  if (!(options.least_angle >= 0 && options.least_angle < 60))
+    throw Error("a least angle of " + std::to_string(options.least_angle) +
+                " degrees, expected 0 to below 60");
+  for (const std::uint32_t node : options.held)
+    if (node >= mesh.points.size())
+      throw Error("node " + std::to_string(node) + " is to be held, expected one below " +
+                  std::to_string(mesh.points.size()));
+}
+
+/// Writes the parts of a region back into the mesh.
+class Assembler {
+public:
+  Assembler(const TetMesh& mesh, const CutRegion& region, const SnappedRegion& snapped,
+            const PartedRegion& parted)
+      : region_(region), snapped_(snapped), parted_(parted) {
+    cut_.mesh = mesh;
+    cut_.origin.resize(mesh.points.size());
+    for (std::uint32_t n = 0; n < cut_.origin.size(); ++n)
+      cut_.origin[n] = {n, n, 0};
+    cut_.tetrahedron.resize(mesh.tetrahedra.size());
+    for (std::uint32_t t = 0; t < cut_.tetrahedron.size(); ++t)
+      cut_.tetrahedron[t] = t;
+    cut_.report.tested = region.tested;
+    cut_.report.folded = region.folded;
+    cut_.report.moved = snapped.moved;
+    cut_.report.kept = snapped.kept;
+    cut_.report.largest_miss = snapped.largest_miss;
+    cut_.report.rejoined = parted.rejoined;
+  }
+
+  TetCut assemble() {
+    move_nodes();
+    add_crossings();
+    add_copies();
+    write_parts();
+    write_wall();
+    return std::move(cut_);
+  }
+
+private:
+  std::uint32_t add_node(const Vec3& point, const TetNodeOrigin& origin) {
+    if (cut_.mesh.points.size() >= UINT32_MAX - 1)
+      throw Error("too many nodes after the cut, expected fewer than " +
+                  std::to_string(UINT32_MAX));
+    cut_.mesh.points.push_back(point);
+    cut_.origin.push_back(origin);
+    return static_cast<std::uint32_t>(cut_.mesh.points.size() - 1);
+  }
+
+  void move_nodes() {
+    number_ = region_.nodes;
+    for (std::size_t n = 0; n < region_.nodes.size(); ++n) {
+      cut_.mesh.points[number_[n]] = snapped_.points[n];
+      cut_.origin[number_[n]] = snapped_.origin[n];
+    }
+  }
+
+  void add_crossings() {
+    for (const CrossedEdge& edge : region_.edges) {
+      if (snapped_.on[edge.ends[0]] || snapped_.on[edge.ends[1]]) {
+        number_.push_back(UINT32_MAX); // given up
+        continue;
+      }
+      std::uint32_t near = region_.nodes[edge.ends[0]], far = region_.nodes[edge.ends[1]];
+      double share = edge.share;
+      if (!(share <= 0.5)) {
+        std::swap(near, far);
+        share = 1 - share;
+      }
+      number_.push_back(add_node(edge.point, {near, far, share}));
+    }
+  }
+
+  /// The largest piece keeps the number, the others get new ones in their order.
+  void add_copies() {
+    for (const PartedRegion::Piece& node : parted_.nodes) {
+      first_copy_.push_back(static_cast<std::uint32_t>(cut_.mesh.points.size()));
+      const std::uint32_t number = number_[node.node];
+      for (std::uint32_t copy = 1; copy < node.pieces; ++copy) {
+        const Vec3 point = cut_.mesh.points[number];
+        const TetNodeOrigin origin = cut_.origin[number];
+        add_node(point, origin);
+        ++cut_.report.doubled;
+      }
+    }
+  }
+
+  std::uint32_t node_at(const TetPart& part, std::size_t corner) const {
+    const std::uint32_t local = part.corners[corner];
+    const auto at = std::ranges::lower_bound(parted_.nodes, local, {}, &PartedRegion::Piece::node);
+    if (at == parted_.nodes.end() || at->node != local || part.piece[corner] == at->largest)
+      return number_[local];
+    const std::uint32_t before =
+        part.piece[corner] < at->largest ? part.piece[corner] : part.piece[corner] - 1;
+    return first_copy_[static_cast<std::size_t>(at - parted_.nodes.begin())] + before;
+  }
+
+  void write_parts() {
+    for (std::size_t p = 0; p < parted_.parts.size(); ++p) {
+      const TetPart& part = parted_.parts[p];
+      const RegionTet& tet = region_.tets[part.parent];
+      const bool first = p == 0 || parted_.parts[p - 1].parent != part.parent;
+      Tetrahedron corners{};
+      bool changed = false;
+      for (std::size_t k = 0; k < 4; ++k) {
+        corners[k] = node_at(part, k);
+        const std::uint32_t local = part.corners[k];
+        changed = changed || corners[k] != cut_.mesh.tetrahedra[tet.number][k] ||
+                  (local < snapped_.origin.size() && snapped_.origin[local].share > 0);
+      }
+      if (first) {
+        number_of_part_.push_back(tet.number);
+        cut_.report.separated += tet.separated() ? 1 : 0;
+        if (changed)
+          cut_.changed.push_back(tet.number);
+        cut_.mesh.tetrahedra[tet.number] = corners;
+        continue;
+      }
+      if (cut_.mesh.tetrahedra.size() >= UINT32_MAX / 4)
+        throw Error("too many tetrahedra after the cut");
+      cut_.report.split += number_of_part_.back() == tet.number ? 1 : 0;
+      number_of_part_.push_back(static_cast<std::uint32_t>(cut_.mesh.tetrahedra.size()));
+      cut_.mesh.tetrahedra.push_back(corners);
+      cut_.tetrahedron.push_back(tet.number);
+      if (!cut_.mesh.material.empty())
+        cut_.mesh.material.push_back(cut_.mesh.material[tet.number]);
+    }
+  }
+
+  void write_wall() {
+    for (std::uint32_t p = 0; p < parted_.parts.size(); ++p)
+      for (std::uint32_t k = 0; k < 4; ++k) {
+        const TetPart& part = parted_.parts[p];
+        if (!part.wall[k] || part.neighbour[k] / 4 < p)
+          continue;
+        const TetPart& beyond = parted_.parts[part.neighbour[k] / 4];
+        WallTriangle wall;
+        // Turned so that corner c here is 2 - c there.
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t here = tetrahedron_faces[k][c];
+          wall.corners[0][c] = node_at(part, here);
+          const auto there = std::ranges::find(beyond.corners, part.corners[here]);
+          wall.corners[1][2 - c] =
+              node_at(beyond, static_cast<std::size_t>(there - beyond.corners.begin()));
+        }
+        wall.tetrahedron = {number_of_part_[p], number_of_part_[part.neighbour[k] / 4]};
+        if (!is_above(part, beyond)) {
+          std::swap(wall.corners[0], wall.corners[1]);
+          std::swap(wall.tetrahedron[0], wall.tetrahedron[1]);
+        }
+        cut_.wall.push_back(wall);
+      }
+  }
+
+  /// At least one of both has a side.
+  static bool is_above(const TetPart& part, const TetPart& beyond) {
+    return part.side != 0 ? part.side > 0 : beyond.side < 0;
+  }
+
+  const CutRegion& region_;
+  const SnappedRegion& snapped_;
+  const PartedRegion& parted_;
+  std::vector<std::uint32_t> number_;         // of local nodes and crossings, in the cut mesh
+  std::vector<std::uint32_t> first_copy_;     // of parted_.nodes
+  std::vector<std::uint32_t> number_of_part_; // in the cut mesh
+  TetCut cut_;
+};
+
+} // namespace
+
+TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
+                      const BladeCutOptions& options) {
+  check(mesh, options);
+  const Blade swept(blade);
+  const CutRegion region = cut_region(mesh, options.places, swept);
+  const SnappedRegion snapped = snap_region(mesh, region, options);
+  const PartedRegion parted = part_region(region, snapped);
+  return Assembler(mesh, region, snapped, parted).assemble();
+}
+
+} // namespace gewebe

@@ -1,0 +1,596 @@
+// Solids cut by blades: sound whatever the blade, exact where formulas or the clipping of solids by
+// planes (tetrahedra/clip.h, other code) say what comes out.
+
+#include "base/error.h"
+#include "stuffing/stuffing.h"
+#include "surface_scenes.h"
+#include "tet_cut_checks.h"
+#include "tet_fixtures.h"
+#include "tetrahedra/clip.h"
+#include "tetrahedra/components.h"
+#include "tetrahedra/cut_blade_internal.h"
+#include "tetrahedra/cut_split_internal.h"
+#include "tetrahedra/order.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::blade_strip;
+using test::box_tetrahedra;
+using test::fault_of;
+using test::same_bytes;
+using test::wall_area;
+
+Vec3 direction(std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (;;) {
+    const Vec3 v{unit(random), unit(random), unit(random)};
+    if (norm(v) < 1 && norm(v) > 0.1)
+      return v / norm(v);
+  }
+}
+
+/// A square blade with sides of 2 · reach, and the plane that it lies in.
+struct FlatBlade {
+  Vec3 centre, normal;
+  TriangleMesh surface;
+
+  FlatBlade(const Vec3& at, const Vec3& u, const Vec3& beside, double reach) : centre(at) {
+    const Vec3 w = beside - u * dot(u, beside);
+    const Vec3 v = w / norm(w);
+    normal = cross(u, v);
+    surface = blade_strip(at, u * reach, v * reach);
+  }
+};
+
+FlatBlade random_flat(const TetMesh& mesh, double reach, std::mt19937& random) {
+  const Box3 box = bounding_box(mesh);
+  std::uniform_real_distribution<double> share(0.2, 0.8);
+  const Vec3 size = box.size();
+  const Vec3 at =
+      box.min + Vec3{share(random) * size.x, share(random) * size.y, share(random) * size.z};
+  const Vec3 u = direction(random);
+  Vec3 v = direction(random);
+  while (std::fabs(dot(u, v)) > 0.9)
+    v = direction(random);
+  return FlatBlade(at, u, v, reach * box.longest_side());
+}
+
+TetMesh ball() {
+  return stuff(Context{}, scenes::metaballs(12, 1, 0.3), {});
+}
+
+/// Materials in slabs along x whose interfaces are faces of a box of cubes.
+TetMesh slabs(std::uint32_t n, std::uint32_t first) {
+  TetMesh mesh = box_tetrahedra(n, n, n, 1.0 / n);
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    double x = 0;
+    for (const std::uint32_t corner : t)
+      x += mesh.points[corner].x / 4;
+    mesh.material.push_back(x * n < first ? 3 : 7);
+  }
+  return mesh;
+}
+
+double area_of_clip(const TetMesh& mesh, const ClipPlane& plane) {
+  const TetClip clip = clip_tetrahedra(mesh, plane);
+  double sum = 0;
+  for (std::size_t f = clip.cut_begin; f < clip.mesh.triangles.size(); ++f) {
+    const auto& [a, b, c] = clip.mesh.triangles[f];
+    sum += norm(cross(clip.mesh.points[b] - clip.mesh.points[a],
+                      clip.mesh.points[c] - clip.mesh.points[a])) /
+           2;
+  }
+  return sum;
+}
+
+/// Volumes of what lies above and below a plane; NaN where a tetrahedron reaches far over it.
+std::array<double, 2> volumes_beside(const TetMesh& mesh, const Vec3& at, const Vec3& normal) {
+  std::array<double, 2> sums{};
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    for (const Vec3& p : test::places_of(mesh, t)) {
+      least = test::smaller(least, dot(p - at, normal));
+      most = test::larger(most, dot(p - at, normal));
+    }
+    const double reach = std::fmin(-least, most);
+    sums[most > -least ? 0 : 1] +=
+        reach <= 1e-12 ? test::volume_at(mesh, t) : std::numeric_limits<double>::quiet_NaN();
+  }
+  return sums;
+}
+
+// ---- Planes
+
+void expect_planar_cut(const TetMesh& mesh, const FlatBlade& blade, const BladeCutOptions& options,
+                       int& exact) {
+  const TetCut cut = cut_tetrahedra(mesh, blade.surface, options);
+  ASSERT_EQ(fault_of(mesh, cut, options.least_angle), "");
+  EXPECT_EQ(cut.report.folded, 0U);
+  EXPECT_EQ(cut.report.rejoined, 0U);
+  if (cut.report.kept > 0)
+    return;
+  ++exact;
+  const double whole = volume(mesh);
+  const TetClip clip = clip_tetrahedra(mesh, {blade.centre, blade.normal});
+  EXPECT_NEAR(wall_area(cut), area_of_clip(mesh, {blade.centre, blade.normal}),
+              1e-11 * std::pow(whole, 2.0 / 3));
+  const auto [above, below] = volumes_beside(cut.mesh, blade.centre, blade.normal);
+  EXPECT_NEAR(below, signed_volume(clip.mesh), 1e-12 * whole);
+  EXPECT_NEAR(above, whole - signed_volume(clip.mesh), 1e-12 * whole);
+  for (const WallTriangle& wall : cut.wall)
+    for (std::size_t side = 0; side < 2; ++side)
+      for (const Vec3& p : test::places_of(cut.mesh, wall.tetrahedron[side]))
+        EXPECT_GE(dot(p - blade.centre, blade.normal) * (side == 0 ? 1 : -1), -1e-12);
+}
+
+TEST(TetCut, PlanesThroughABox) {
+  const TetMesh mesh = box_tetrahedra(6, 6, 6, 1.0 / 6);
+  std::mt19937 random(1);
+  int exact = 0;
+  for (int n = 0; n < 40; ++n)
+    expect_planar_cut(mesh, random_flat(mesh, 3, random), {}, exact);
+  EXPECT_GE(exact, 12);
+}
+
+TEST(TetCut, PlanesThroughDistortedAndRoundBodies) {
+  const TetMesh box = test::distorted_box(), round = ball();
+  std::mt19937 random(2);
+  int exact = 0;
+  for (int n = 0; n < 25; ++n) {
+    expect_planar_cut(box, random_flat(box, 3, random), {}, exact);
+    expect_planar_cut(round, random_flat(round, 3, random), {0.3, 0, {}, {}}, exact);
+  }
+  EXPECT_GE(exact, 25);
+}
+
+TEST(TetCut, APlaneParts) {
+  const TetMesh mesh = box_tetrahedra(6, 6, 6, 1.0 / 6);
+  std::mt19937 random(3);
+  for (int n = 0; n < 20; ++n) {
+    const TetCut cut = cut_tetrahedra(mesh, random_flat(mesh, 3, random).surface);
+    EXPECT_EQ(component_count(cut.mesh), 2U);
+    const TetReport report = examine_tetrahedra(cut.mesh);
+    EXPECT_TRUE(report.sound() && report.manifold_boundary());
+  }
+}
+
+TEST(TetCut, APlaneOfNodesSplitsNothing) {
+  const TetMesh mesh = box_tetrahedra(4, 4, 4, 0.25);
+  const TetCut cut = cut_tetrahedra(mesh, blade_strip({0.5, 0.5, 0.5}, {2, 0, 0}, {0, 2, 0}, 3));
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_EQ(cut.mesh.tetrahedra.size(), mesh.tetrahedra.size());
+  EXPECT_EQ(cut.mesh.points.size(), mesh.points.size() + 25);
+  EXPECT_EQ(cut.wall.size(), 32U);
+  EXPECT_NEAR(wall_area(cut), 1, 1e-14);
+  EXPECT_EQ(component_count(cut.mesh), 2U);
+  EXPECT_EQ(cut.report.moved + cut.report.kept + cut.report.split, 0U);
+  // Exactly as large as the body, and a hair beside the nodes.
+  for (const double z : {0.5, 0.5 + 1e-13, 0.5 - 1e-13}) {
+    const TetCut tight = cut_tetrahedra(mesh, blade_strip({0.5, 0.5, z}, {0.5, 0, 0}, {0, 0.5, 0}));
+    EXPECT_EQ(fault_of(mesh, tight, blade_cut_least_angle), "");
+    EXPECT_NEAR(wall_area(tight), 1, 1e-12);
+    EXPECT_EQ(component_count(tight.mesh), 2U);
+  }
+}
+
+TEST(TetCut, AnglesStayWithinTheirBound) {
+  const TetMesh mesh = ball();
+  std::mt19937 random(4);
+  for (const double bound : {0.0, 4.0, 8.0, 10.0})
+    for (int n = 0; n < 5; ++n) {
+      const TetCut cut =
+          cut_tetrahedra(mesh, random_flat(mesh, 3, random).surface, {0.3, bound, {}, {}});
+      EXPECT_EQ(fault_of(mesh, cut, bound), "");
+      EXPECT_EQ(fault_of(mesh, cut, bound + 20).substr(0, 21), "angles of tetrahedron");
+    }
+}
+
+// ---- Blades that end in the tissue, one after the other
+
+TEST(TetCut, ABladeThatEndsInsideLeavesTheFrontJoined) {
+  const TetMesh mesh = box_tetrahedra(8, 8, 8, 0.125);
+  const TetCut cut = cut_tetrahedra(mesh, blade_strip({0.3, 0.5, 0.53}, {0.4, 0, 0.05}, {0, 1, 0}));
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_EQ(component_count(cut.mesh), 1U);
+  // From x = 0 to 0.7, less an element at most.
+  EXPECT_GT(wall_area(cut), 0.55);
+  EXPECT_LT(wall_area(cut), 0.72);
+  std::size_t joined = 0, apart = 0;
+  for (const WallTriangle& wall : cut.wall)
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_LE(cut.mesh.points[wall.corners[0][k]].x, 0.7 + 0.07);
+      (wall.corners[0][k] == wall.corners[1][2 - k] ? joined : apart) += 1;
+    }
+  EXPECT_GT(joined, 10U);
+  EXPECT_GT(apart, 10 * joined / 2);
+}
+
+TEST(TetCut, ASlitInsideHasNoRimOnTheBoundary) {
+  const TetMesh mesh = box_tetrahedra(8, 8, 8, 0.125);
+  const TetCut cut =
+      cut_tetrahedra(mesh, blade_strip({0.5, 0.5, 0.5}, {0.3, 0, 0.02}, {0.01, 0.3, 0}));
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_GT(cut.wall.size(), 20U);
+  EXPECT_EQ(component_count(cut.mesh), 1U);
+  TriangleMesh outer = boundary(cut.mesh).mesh;
+  EXPECT_NEAR(signed_volume(outer), 1, 1e-12);
+}
+
+TEST(TetCut, StepsThatGoBackToTheFrontPartTheBody) {
+  TetMesh mesh = box_tetrahedra(8, 8, 8, 0.125);
+  const TriangleMesh whole = blade_strip({0.5, 0.5, 0.53}, {0.6, 0.05, 0.05}, {0, 0.7, 0.1}, 24);
+  double area = 0;
+  for (std::size_t step = 1; step <= 24; ++step) {
+    TriangleMesh swept = whole;
+    swept.triangles.resize(2 * step);
+    const TetCut cut = cut_tetrahedra(mesh, swept);
+    ASSERT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "") << step;
+    EXPECT_EQ(component_count(cut.mesh), step < 22 ? 1U : component_count(cut.mesh));
+    area += wall_area(cut);
+    mesh = cut.mesh;
+  }
+  EXPECT_EQ(component_count(mesh), 2U);
+  const TetCut again = cut_tetrahedra(mesh, whole);
+  EXPECT_EQ(again.wall.size(), 0U);
+  EXPECT_EQ(component_count(again.mesh), 2U);
+  EXPECT_GT(area, 1.0);
+}
+
+TEST(TetCut, CutsOfCuts) {
+  TetMesh mesh = slabs(6, 2);
+  const std::array<TriangleMesh, 3> blades{blade_strip({0.5, 0.5, 0.47}, {1, 0, 0.1}, {0, 1, 0.2}),
+                                           blade_strip({0.5, 0.52, 0.5}, {1, 0.1, 0}, {0, 0.1, 1}),
+                                           blade_strip({0.55, 0.5, 0.5}, {0, 1, 0}, {0.15, 0, 1})};
+  std::uint64_t parts = 1;
+  for (const TriangleMesh& blade : blades) {
+    const TetCut cut = cut_tetrahedra(mesh, blade);
+    EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+    mesh = cut.mesh;
+    parts *= 2;
+    EXPECT_EQ(component_count(mesh), parts);
+  }
+}
+
+TEST(TetCut, HundredRandomCutsOneAfterTheOther) {
+  TetMesh mesh = slabs(9, 4);
+  ASSERT_GE(mesh.tetrahedra.size(), 4000U);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> reach(0.05, 0.22), bend(-0.5, 0.5);
+  std::size_t walls = 0;
+  for (int n = 0; n < 100; ++n) {
+    FlatBlade blade = random_flat(mesh, reach(random), random);
+    const double curved = bend(random);
+    for (Vec3& p : blade.surface.points)
+      p += blade.normal * (curved * dot(p - blade.centre, p - blade.centre));
+    const TetCut cut = cut_tetrahedra(mesh, blade.surface);
+    ASSERT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "") << n;
+    walls += cut.wall.size();
+    mesh = cut.mesh;
+  }
+  EXPECT_GT(walls, 1000U);
+}
+
+// ---- Other shapes of blades
+
+/// A tube about the z axis through `centre`, closed round it, open at its ends.
+TriangleMesh tube(const Vec3& centre, double radius, double half, std::uint32_t sides) {
+  TriangleMesh blade;
+  for (std::uint32_t n = 0; n < sides; ++n) {
+    const double angle = 2 * std::numbers::pi * n / sides;
+    for (const double z : {-half, half})
+      blade.points.push_back(centre + Vec3{radius * std::cos(angle), radius * std::sin(angle), z});
+    const std::uint32_t a = 2 * n, b = 2 * ((n + 1) % sides);
+    blade.triangles.push_back({a, b, a + 1});
+    blade.triangles.push_back({b, b + 1, a + 1});
+  }
+  return blade;
+}
+
+TEST(TetCut, ATubeCutsOutACore) {
+  const TetMesh mesh = box_tetrahedra(10, 10, 10, 0.1);
+  const TetCut cut = cut_tetrahedra(mesh, tube({0.5, 0.5, 0.5}, 0.31, 0.7, 24));
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  ASSERT_EQ(component_count(cut.mesh), 2U);
+  TetMesh rest = cut.mesh;
+  const TetComponentReport parts = keep_components(rest, {1, 0});
+  const double polygon = 12 * 0.31 * 0.31 * std::sin(2 * std::numbers::pi / 24);
+  EXPECT_NEAR(parts.dropped_volume, polygon, 0.02 * polygon);
+  EXPECT_NEAR(wall_area(cut), 48 * 0.31 * std::sin(std::numbers::pi / 24), 0.05);
+}
+
+TEST(TetCut, ANarrowBladeLeavesTheSolidSound) {
+  const TetMesh mesh = box_tetrahedra(6, 6, 6, 1.0 / 6);
+  std::mt19937 random(8);
+  std::uint64_t rejoined = 0;
+  for (int n = 0; n < 60; ++n) {
+    const double width = 0.02 + 0.004 * n;
+    const FlatBlade at = random_flat(mesh, 1, random);
+    const Vec3 u = direction(random), v = cross(u, at.normal) / norm(cross(u, at.normal));
+    const TetCut cut = cut_tetrahedra(mesh, blade_strip(at.centre, u * 0.6, v * width, 7));
+    ASSERT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "") << n;
+    rejoined += cut.report.rejoined;
+  }
+  EXPECT_GT(rejoined, 0U); // the case occurs
+}
+
+TEST(TetCut, ASecondLeafWithinAnEdgeIsTold) {
+  const TetMesh mesh = box_tetrahedra(2, 2, 2, 0.5);
+  TriangleMesh blade = blade_strip({0.5, 0.5, 0.7}, {1, 0, 0}, {0, 1, 0});
+  const TriangleMesh second = blade_strip({0.5, 0.5, 0.8}, {0, 1, 0}, {1, 0, 0});
+  for (const Triangle& t : second.triangles)
+    blade.triangles.push_back({t[0] + 4, t[1] + 4, t[2] + 4});
+  blade.points.insert(blade.points.end(), second.points.begin(), second.points.end());
+  const TetCut cut = cut_tetrahedra(mesh, blade);
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_GT(cut.report.folded, 8U);
+  EXPECT_EQ(cut.wall.size(), 0U);
+  EXPECT_TRUE(same_bytes(cut.mesh, mesh));
+}
+
+TEST(TetCut, ABladeBesideTheBodyChangesNothing) {
+  const TetMesh mesh = slabs(3, 1);
+  for (const TriangleMesh& blade :
+       {blade_strip({0.5, 0.5, 1.2}, {1, 0, 0}, {0, 1, 0}), TriangleMesh{},
+        blade_strip({0.5, 0.5, 0.5}, {0.01, 0, 0}, {0, 0.01, 0})}) {
+    const TetCut cut = cut_tetrahedra(mesh, blade);
+    EXPECT_TRUE(same_bytes(cut.mesh, mesh));
+    EXPECT_TRUE(cut.changed.empty() && cut.wall.empty());
+    EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  }
+}
+
+// ---- Options
+
+TEST(TetCut, HeldNodesAreNotMoved) {
+  const TetMesh mesh = box_tetrahedra(6, 6, 6, 1.0 / 6);
+  const TriangleMesh blade = blade_strip({0.5, 0.5, 0.54}, {1, 0, 0.1}, {0, 1, 0.05});
+  const TetCut free = cut_tetrahedra(mesh, blade);
+  ASSERT_GT(free.report.moved, 10U);
+  std::vector<std::uint32_t> held;
+  for (std::uint32_t n = 0; n < mesh.points.size(); n += 2)
+    held.push_back(static_cast<std::uint32_t>(mesh.points.size() - 1 - n));
+  BladeCutOptions options;
+  options.held = held;
+  const TetCut cut = cut_tetrahedra(mesh, blade, options);
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  std::size_t moved = 0;
+  for (const std::uint32_t n : held) {
+    EXPECT_EQ(cut.mesh.points[n], mesh.points[n]);
+    moved += free.mesh.points[n] == mesh.points[n] ? 0 : 1;
+  }
+  EXPECT_GT(moved, 0U);
+  EXPECT_GT(cut.report.moved, 0U);
+}
+
+TEST(TetCut, ABodyThatIsElsewhereIsCutThere) {
+  const TetMesh mesh = slabs(6, 2);
+  const TriangleMesh blade = blade_strip({0.5, 0.5, 0.54}, {0.4, 0, 0.1}, {0, 1, 0.05}, 3);
+  const auto map = [](const Vec3& p) { return Vec3{2 * p.z, 2 * p.x, 2 * p.y}; };
+  std::vector<Vec3> places;
+  for (const Vec3& p : mesh.points)
+    places.push_back(map(p));
+  TriangleMesh there = blade;
+  for (Vec3& p : there.points)
+    p = map(p);
+  BladeCutOptions options;
+  options.places = places;
+  const TetCut a = cut_tetrahedra(mesh, blade), b = cut_tetrahedra(mesh, there, options);
+  EXPECT_EQ(fault_of(mesh, b, blade_cut_least_angle), "");
+  EXPECT_EQ(a.mesh.tetrahedra, b.mesh.tetrahedra);
+  ASSERT_EQ(a.mesh.points.size(), b.mesh.points.size());
+  for (std::size_t n = 0; n < a.mesh.points.size(); ++n)
+    EXPECT_LE(norm(a.mesh.points[n] - b.mesh.points[n]), 1e-14);
+  // Bent out of shape the body is as sound.
+  for (Vec3& p : places)
+    p = {p.x + p.y * p.y, p.y * (1 + p.z), p.z - p.x * p.y / 2};
+  const TetCut bent = cut_tetrahedra(mesh, there, options);
+  EXPECT_EQ(fault_of(mesh, bent, blade_cut_least_angle), "");
+  EXPECT_GT(bent.wall.size(), 20U);
+}
+
+TEST(TetCut, ComparesWhatIsNearTheBladeAlone) {
+  std::array<std::uint64_t, 2> tested{};
+  for (std::uint32_t n = 0; n < 2; ++n) {
+    const TetMesh mesh = box_tetrahedra(8 + 8 * n, 8 + 8 * n, 8 + 8 * n);
+    const TetCut cut = cut_tetrahedra(mesh, blade_strip({4, 4, 4.4}, {1.5, 0, 0}, {0, 1.5, 0.2}));
+    EXPECT_GT(cut.wall.size(), 8U);
+    tested[n] = cut.report.tested;
+  }
+  EXPECT_EQ(tested[0], tested[1]);
+  EXPECT_LT(tested[0], 400U);
+}
+
+std::string complaint(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(TetCut, RefusesByName) {
+  const TetMesh mesh = box_tetrahedra(2, 2, 2);
+  const TriangleMesh blade = blade_strip({1, 1, 1.1}, {2, 0, 0}, {0, 2, 0});
+  const auto refusal = [&](const TetMesh& solid, const TriangleMesh& surface,
+                           const BladeCutOptions& options = {}) {
+    return complaint([&] { cut_tetrahedra(solid, surface, options); });
+  };
+  TetMesh quadratic = mesh;
+  make_quadratic(quadratic);
+  EXPECT_EQ(refusal(quadratic, blade), "quadratic tetrahedra, expected linear ones to cut");
+  TetMesh turned = mesh;
+  std::swap(turned.tetrahedra[9][0], turned.tetrahedra[9][1]);
+  EXPECT_NE(refusal(turned, blade).find("no positive volume"), std::string::npos);
+  TriangleMesh odd = blade;
+  std::swap(odd.triangles[1][0], odd.triangles[1][1]);
+  EXPECT_NE(refusal(mesh, odd).find("the same way"), std::string::npos);
+  odd = blade;
+  odd.points.push_back({1, 1, 3});
+  odd.triangles.push_back({odd.triangles[0][1], odd.triangles[0][2], 4});
+  EXPECT_NE(refusal(mesh, odd).find("3 triangles"), std::string::npos);
+  odd = blade;
+  odd.points[2].y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal(mesh, odd), "");
+  odd.points[2].y = 1e13;
+  EXPECT_NE(refusal(mesh, odd).find("2^40"), std::string::npos);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double snap : {-0.1, 0.6, nan})
+    EXPECT_NE(refusal(mesh, blade, {snap, 8, {}, {}}).find("0 to 0.5"), std::string::npos);
+  for (const double angle : {-1.0, 60.0, nan})
+    EXPECT_NE(refusal(mesh, blade, {0.3, angle, {}, {}}).find("degrees"), std::string::npos);
+  const std::vector<Vec3> places(3);
+  BladeCutOptions options;
+  options.places = places;
+  EXPECT_NE(refusal(mesh, blade, options).find("3 places"), std::string::npos);
+  const std::vector<std::uint32_t> held{27};
+  options = {};
+  options.held = held;
+  EXPECT_NE(refusal(mesh, blade, options).find("node 27"), std::string::npos);
+  std::vector<Vec3> lost = mesh.points;
+  lost[13].z = nan;
+  options = {};
+  options.places = lost;
+  EXPECT_NE(refusal(mesh, blade, options), "");
+}
+
+// ---- Parts of it
+
+TEST(TetCut, PartsOfATetrahedronAgreeOnFacesInAnyPattern) {
+  TetMesh whole;
+  whole.points = {{0, 0, 0}, {1, 0, 0}, {0.2, 0.9, 0}, {0.3, 0.4, 0.8}};
+  whole.tetrahedra = {{0, 1, 2, 3}};
+  std::array<std::uint32_t, 6> order{0, 1, 2, 3, 4, 5};
+  std::mt19937 random(9);
+  for (std::uint32_t pattern = 0; pattern < 64; ++pattern) {
+    std::ranges::shuffle(order, random);
+    TetMesh parts;
+    parts.points = whole.points;
+    std::vector<EdgeNode> nodes;
+    for (const std::uint32_t e : order)
+      if ((pattern >> e & 1U) != 0) {
+        const auto& [a, b] = tetrahedron_edges[e];
+        nodes.push_back({{a, b}, static_cast<std::uint32_t>(parts.points.size())});
+        parts.points.push_back(whole.points[a] * 0.4 + whole.points[b] * 0.6);
+      }
+    split_tetrahedron(whole.tetrahedra[0], nodes,
+                      [&](const Tetrahedron& part) { parts.tetrahedra.push_back(part); });
+    const TetReport report = examine_tetrahedra(parts);
+    EXPECT_TRUE(report.sound() && report.manifold_boundary()) << pattern;
+    EXPECT_EQ(report.unused_points.count, 0U);
+    EXPECT_NEAR(report.volume, volume(whole), 1e-15);
+    // Every corner adds one triangle to each of the two faces at its edge.
+    EXPECT_EQ(report.boundary_triangles, 4 + 2 * nodes.size());
+  }
+}
+
+TEST(TetCut, SharpnessIsTheCosineOfTheWorstAngle) {
+  std::mt19937 random(10);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int n = 0; n < 500; ++n) {
+    std::array<Vec3, 4> p;
+    for (Vec3& point : p)
+      point = {unit(random), unit(random), unit(random)};
+    if (!(tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0)) {
+      EXPECT_EQ(sharpness(p[0], p[1], p[2], p[3]), 2);
+      continue;
+    }
+    double worst = 0;
+    for (const double angle : dihedral_angles(p[0], p[1], p[2], p[3]))
+      worst = test::larger(worst, std::fabs(std::cos(angle)));
+    EXPECT_NEAR(sharpness(p[0], p[1], p[2], p[3]), worst, 1e-12);
+  }
+}
+
+TEST(TetCut, EdgesPassABladeBetweenItsTrianglesOnce) {
+  // A roof over a fan, whose ridges and tip edges pass exactly, and its border.
+  TriangleMesh roof;
+  roof.points = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
+  roof.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
+  const Blade blade(roof);
+  for (int i = -4; i <= 4; ++i)
+    for (int j = -4; j <= 4; ++j) {
+      const double x = i / 4.0, y = j / 4.0;
+      const BladeCrossing up = blade.crossing({x, y, -1}, {x, y, 2});
+      const bool within = std::abs(i) + std::abs(j) <= 4;
+      EXPECT_EQ(up.passes, within ? 1U : 0U) << x << " " << y;
+      EXPECT_EQ(up.direction, within ? 1 : 0);
+      EXPECT_NEAR(up.share, within ? (2 - std::fabs(x) - std::fabs(y)) / 3 : 0, 1e-15);
+      const BladeCrossing down = blade.crossing({x, y, 2}, {x, y, -1});
+      EXPECT_EQ(down.direction, -up.direction);
+    }
+  EXPECT_EQ(blade.crossing({-2, 0, 0.5}, {2, 0, 0.5}).passes, 2U);
+  EXPECT_EQ(blade.crossing({-2, 0, 0.5}, {2, 0, 0.5}).direction, 0);
+}
+
+/// The checks themselves: each catches the fault that it is for.
+TEST(TetCut, ChecksSeePlantedFaults) {
+  const TetMesh mesh = slabs(5, 2);
+  const TetCut cut =
+      cut_tetrahedra(mesh, blade_strip({0.4, 0.5, 0.54}, {0.5, 0, 0.1}, {0, 1, 0.05}));
+  const auto fault = [&](const std::function<void(TetCut&)>& plant) {
+    TetCut spoilt = cut;
+    plant(spoilt);
+    const std::string what = fault_of(mesh, spoilt, blade_cut_least_angle);
+    return what.substr(0, what.find_last_not_of("0123456789 ") + 1);
+  };
+  EXPECT_EQ(fault([](TetCut&) {}), "");
+  const std::size_t added = mesh.tetrahedra.size();
+  ASSERT_GT(cut.mesh.tetrahedra.size(), added);
+  EXPECT_EQ(fault([&](TetCut& c) {
+              std::swap(c.mesh.tetrahedra[added][0], c.mesh.tetrahedra[added][1]);
+            }),
+            "inverted tetrahedron");
+  EXPECT_EQ(fault([&](TetCut& c) { c.mesh.material[added] = 10 - c.mesh.material[added]; }),
+            "material of tetrahedron");
+  EXPECT_EQ(fault([](TetCut& c) { c.mesh.points.back().z += 1e-6; }), "place of node");
+  EXPECT_EQ(fault([](TetCut& c) { c.origin.back().share = 0.7; }), "origin of node");
+  EXPECT_EQ(fault([](TetCut& c) { c.changed.pop_back(); }), "tetrahedron told to be unchanged");
+  EXPECT_EQ(fault([](TetCut& c) { c.wall.pop_back(); }), "area of what was the boundary before");
+  EXPECT_EQ(fault([](TetCut& c) { std::swap(c.wall[0].corners[0][0], c.wall[0].corners[0][1]); }),
+            "wall inside the tissue");
+  EXPECT_EQ(fault([](TetCut& c) { c.wall.push_back(c.wall[0]); }), "wall told twice");
+  EXPECT_EQ(fault([](TetCut& c) { std::swap(c.wall[0].tetrahedron[0], c.wall[0].tetrahedron[1]); }),
+            "tetrahedron of wall");
+  EXPECT_EQ(fault([](TetCut& c) {
+              const Triangle t = c.wall[0].corners[1];
+              c.wall[0].corners[1] = {t[1], t[2], t[0]};
+            }),
+            "sides of wall");
+  EXPECT_EQ(fault([&](TetCut& c) {
+              const auto t = c.mesh.tetrahedra.size() - 1;
+              c.mesh.tetrahedra.erase(c.mesh.tetrahedra.begin() + static_cast<std::ptrdiff_t>(t));
+              c.mesh.material.pop_back();
+              c.tetrahedron.pop_back();
+            }),
+            "volume of material");
+  // A copy glued to its node again at one of its tetrahedra.
+  const std::string glued = fault([&](TetCut& c) {
+    const auto copy = static_cast<std::uint32_t>(c.mesh.points.size() - 1);
+    const auto node =
+        static_cast<std::uint32_t>(std::ranges::find(c.origin, c.origin[copy]) - c.origin.begin());
+    for (std::size_t t = 0; t < c.mesh.tetrahedra.size(); ++t)
+      for (std::uint32_t& corner : c.mesh.tetrahedra[t])
+        if (corner == copy) {
+          corner = node;
+          return;
+        }
+  });
+  EXPECT_NE(glued, "");
+}
+
+} // namespace
+} // namespace gewebe

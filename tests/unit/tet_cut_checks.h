@@ -1,0 +1,196 @@
+#pragma once
+// What must hold of every solid that a blade has cut, by code that knows nothing of how it is done.
+
+#include "larger.h"
+#include "tetrahedra/check.h"
+#include "tetrahedra/cut_tetrahedra.h"
+#include "tetrahedra/quality.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace gewebe::test {
+
+inline std::array<Vec3, 4> places_of(const TetMesh& mesh, std::size_t t) {
+  const Tetrahedron& c = mesh.tetrahedra[t];
+  return {mesh.points[c[0]], mesh.points[c[1]], mesh.points[c[2]], mesh.points[c[3]]};
+}
+
+inline double volume_at(const TetMesh& mesh, std::size_t t) {
+  const auto [a, b, c, d] = places_of(mesh, t);
+  return tetrahedron_volume(a, b, c, d);
+}
+
+/// How far its dihedral angles keep from 0 and 180 degrees.
+inline double least_margin(const TetMesh& mesh, std::size_t t) {
+  const auto [a, b, c, d] = places_of(mesh, t);
+  double least = 180;
+  for (const double angle : dihedral_angles(a, b, c, d)) {
+    const double degrees = angle * 180 / std::numbers::pi;
+    least = smaller(least, smaller(degrees, 180 - degrees));
+  }
+  return least;
+}
+
+inline double area(const TetMesh& mesh, const Triangle& t) {
+  return norm(cross(mesh.points[t[1]] - mesh.points[t[0]], mesh.points[t[2]] - mesh.points[t[0]])) /
+         2;
+}
+
+inline double wall_area(const TetCut& cut) {
+  double sum = 0;
+  for (const WallTriangle& wall : cut.wall)
+    sum += area(cut.mesh, wall.corners[0]);
+  return sum;
+}
+
+inline std::map<std::int32_t, long double> volumes(const TetMesh& mesh) {
+  std::map<std::int32_t, long double> sums;
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+    sums[mesh.material.empty() ? 0 : mesh.material[t]] += volume_at(mesh, t);
+  return sums;
+}
+
+inline Triangle turned(Triangle face) {
+  std::ranges::rotate(face, std::ranges::min_element(face));
+  return face;
+}
+
+/// Faces of one tetrahedron, counter-clockwise from outside, each turned so that its least corner
+/// comes first.
+inline std::set<Triangle> outer_faces(const TetMesh& mesh) {
+  std::vector<std::array<Triangle, 2>> all; // ascending, turned
+  for (const Tetrahedron& t : mesh.tetrahedra)
+    for (const auto& face : tetrahedron_faces) {
+      const Triangle corners{t[face[0]], t[face[1]], t[face[2]]};
+      all.push_back({corners, turned(corners)});
+      std::ranges::sort(all.back()[0]);
+    }
+  std::ranges::sort(all);
+  std::set<Triangle> outer;
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if ((n == 0 || all[n - 1][0] != all[n][0]) &&
+        (n + 1 == all.size() || all[n + 1][0] != all[n][0]))
+      outer.insert(outer.end(), all[n][1]);
+  return outer;
+}
+
+/// The first thing that is wrong, or "".
+inline std::string fault_of(const TetMesh& before, const TetCut& cut, double least_angle) {
+  const TetMesh& mesh = cut.mesh;
+  const auto at = [](const char* what, std::size_t n) { return what + (" " + std::to_string(n)); };
+  check_mesh(mesh);
+  if (cut.origin.size() != mesh.points.size() || cut.tetrahedron.size() != mesh.tetrahedra.size())
+    return "sizes of origins";
+  // Nodes stand where their origin says, tetrahedra have their parent's material, and shape.
+  for (std::size_t n = 0; n < mesh.points.size(); ++n) {
+    const auto& [a, b, share] = cut.origin[n];
+    if (a >= before.points.size() || b >= before.points.size() || !(share >= 0 && share <= 0.5))
+      return at("origin of node", n);
+    const Vec3 place = before.points[a] + (before.points[b] - before.points[a]) * share;
+    if (!(norm(mesh.points[n] - place) <= 1e-14 * (norm(place) + 1)))
+      return at("place of node", n);
+    if (n < before.points.size() && a != n)
+      return at("number of node", n);
+  }
+  std::vector<bool> changed(before.tetrahedra.size());
+  for (const std::uint32_t t : cut.changed)
+    changed[t] = true;
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const std::uint32_t parent = cut.tetrahedron[t];
+    if (parent >= before.tetrahedra.size() || (t < before.tetrahedra.size() && parent != t))
+      return at("parent of tetrahedron", t);
+    if (!before.material.empty() && mesh.material[t] != before.material[parent])
+      return at("material of tetrahedron", t);
+    if (!changed[parent] && (mesh.tetrahedra[t] != before.tetrahedra[parent] ||
+                             places_of(mesh, t) != places_of(before, parent)))
+      return at("tetrahedron told to be unchanged", t);
+    if (!(volume_at(mesh, t) > 0))
+      return at("inverted tetrahedron", t);
+    if (changed[parent] &&
+        !(least_margin(mesh, t) >= std::min(least_angle, least_margin(before, parent)) - 1e-9))
+      return at("angles of tetrahedron", t);
+    // Corners stand at corners of the parent, in its edges, or were such corners and have moved.
+    const Tetrahedron& own = before.tetrahedra[parent];
+    for (const std::uint32_t corner : mesh.tetrahedra[t]) {
+      const auto& [a, b, share] = cut.origin[corner];
+      const bool moved =
+          share > 0 && a < before.points.size() && mesh.points[a] == mesh.points[corner];
+      if (std::ranges::find(own, a) == own.end() ||
+          (!moved && std::ranges::find(own, b) == own.end()))
+        return at("corners of tetrahedron", t);
+    }
+  }
+  const std::map<std::int32_t, long double> old_volumes = volumes(before);
+  std::map<std::int32_t, long double> new_volumes = volumes(mesh);
+  for (const auto& [material, volume] : old_volumes)
+    if (!(std::fabs(static_cast<double>(new_volumes[material] - volume)) <=
+          1e-12 * static_cast<double>(volume)))
+      return at("volume of material", static_cast<std::size_t>(material));
+  const TetReport was = examine_tetrahedra(before), is = examine_tetrahedra(mesh);
+  if (!is.sound())
+    return "faces that are crowded or overlap";
+  if (was.manifold_boundary() && !is.manifold_boundary())
+    return at("boundary of edges", is.nonmanifold_edges.count) +
+           at(", of points", is.nonmanifold_points.count);
+  if (is.unused_points.count > was.unused_points.count)
+    return at("unused point", is.unused_points.first);
+  // Walls are on the boundary, on either side of the same place, and all that is new on it.
+  const std::set<Triangle> outer = outer_faces(mesh);
+  std::set<Triangle> walls;
+  for (std::size_t w = 0; w < cut.wall.size(); ++w) {
+    const WallTriangle& wall = cut.wall[w];
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (!outer.contains(turned(wall.corners[side])))
+        return at("wall inside the tissue", w);
+      if (!walls.insert(turned(wall.corners[side])).second)
+        return at("wall told twice", w);
+      const Tetrahedron& t = mesh.tetrahedra[wall.tetrahedron[side]];
+      for (const std::uint32_t corner : wall.corners[side])
+        if (std::ranges::find(t, corner) == t.end())
+          return at("tetrahedron of wall", w);
+    }
+    bool same = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (mesh.points[wall.corners[0][k]] != mesh.points[wall.corners[1][2 - k]])
+        return at("sides of wall", w);
+      same = same && wall.corners[0][k] == wall.corners[1][2 - k];
+    }
+    if (same)
+      return at("wall that is joined", w);
+  }
+  double old_area = 0, rest_area = 0;
+  for (const Triangle& face : outer_faces(before))
+    old_area += area(before, face);
+  for (const Triangle& face : outer)
+    rest_area += walls.contains(face) ? 0 : area(mesh, face);
+  if (!(std::fabs(rest_area - old_area) <= 1e-11 * old_area))
+    return "area of what was the boundary before";
+  return "";
+}
+
+/// A rectangle about `centre` spanned by two vectors, as a strip of `steps` quadrilaterals along u.
+inline TriangleMesh blade_strip(const Vec3& centre, const Vec3& u, const Vec3& v,
+                                std::uint32_t steps = 1) {
+  TriangleMesh blade;
+  for (std::uint32_t n = 0; n <= steps; ++n) {
+    const Vec3 at = centre + u * (2.0 * n / steps - 1);
+    blade.points.push_back(at - v);
+    blade.points.push_back(at + v);
+    if (n > 0) {
+      const std::uint32_t p = 2 * n - 2;
+      blade.triangles.push_back({p, p + 2, p + 1});
+      blade.triangles.push_back({p + 2, p + 3, p + 1});
+    }
+  }
+  return blade;
+}
+
+} // namespace gewebe::test
