@@ -86,6 +86,7 @@ Section constant_strain();
 Section manufactured();
 Section benchmarks();
 Section hertz();
+Section sliding();
 Section peers();
 Section silicone();
 Section swings();

@@ -19,10 +19,11 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 8> all{{{"patch", constant_strain},
+  const std::array<std::pair<std::string, Section (*)()>, 9> all{{{"patch", constant_strain},
                                                                   {"order", manufactured},
                                                                   {"benchmarks", benchmarks},
                                                                   {"contact", hertz},
+                                                                  {"sliding", sliding},
                                                                   {"peers", peers},
                                                                   {"beam", silicone},
                                                                   {"swing", swings},
