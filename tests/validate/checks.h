@@ -87,6 +87,7 @@ Section manufactured();
 Section benchmarks();
 Section hertz();
 Section sliding();
+Section passivity();
 Section peers();
 Section silicone();
 Section swings();

@@ -19,15 +19,16 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 9> all{{{"patch", constant_strain},
-                                                                  {"order", manufactured},
-                                                                  {"benchmarks", benchmarks},
-                                                                  {"contact", hertz},
-                                                                  {"sliding", sliding},
-                                                                  {"peers", peers},
-                                                                  {"beam", silicone},
-                                                                  {"swing", swings},
-                                                                  {"organs", organs}}};
+  const std::array<std::pair<std::string, Section (*)()>, 10> all{{{"patch", constant_strain},
+                                                                   {"order", manufactured},
+                                                                   {"benchmarks", benchmarks},
+                                                                   {"contact", hertz},
+                                                                   {"sliding", sliding},
+                                                                   {"passivity", passivity},
+                                                                   {"peers", peers},
+                                                                   {"beam", silicone},
+                                                                   {"swing", swings},
+                                                                   {"organs", organs}}};
   if (count < 2) {
     (void)std::fputs("usage: validate FOLDER [SECTION…]\n", stderr);
     return 2;
