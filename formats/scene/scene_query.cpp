@@ -79,7 +79,7 @@ std::string told_instruments(const Simulation& simulation) {
       continue;
     ++count;
     const InstrumentShape& shape = report.shape;
-    lines += report.name + (shape.blade ? " blade" : shape.axis == Vec3{} ? " sphere" : " capsule");
+    lines += report.name + ' ' + instrument_kind_name(kind_of(shape));
     append(lines, {shape.radius, shape.friction});
     append(lines, report.pose.place);
     append(lines, report.pose(shape.axis));

@@ -75,6 +75,23 @@ Pose PoseWay::at(double time) const {
   return between(from, to, time > start ? smooth_step((time - start) / (end - start)) : 0);
 }
 
+InstrumentKind kind_of(const InstrumentShape& shape) {
+  return shape.blade            ? InstrumentKind::blade
+         : shape.axis == Vec3{} ? InstrumentKind::sphere
+                                : InstrumentKind::capsule;
+}
+
+const char* instrument_kind_name(InstrumentKind kind) {
+  switch (kind) {
+  case InstrumentKind::sphere:
+    return "sphere";
+  case InstrumentKind::capsule:
+    return "capsule";
+  default:
+    return "blade";
+  }
+}
+
 PlacedInstrument::PlacedInstrument(const InstrumentShape& shape, const Pose& pose)
     : a(pose.place), ab(rotated(pose.turn, shape.axis)), radius(shape.radius),
       friction(shape.friction) {

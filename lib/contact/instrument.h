@@ -5,6 +5,8 @@
 
 #include "base/vec3.h"
 
+#include <cstdint>
+
 namespace gewebe {
 
 /// A rotation; need not be of unit length until made so.
@@ -52,6 +54,12 @@ struct InstrumentShape {
   double friction = 0; ///< Coulomb's coefficient
   bool blade = false;  ///< an edge along the axis, without radius: it cuts what it sweeps over
 };
+
+/// Numbers are those that results hold; 0 is none there.
+enum class InstrumentKind : std::uint8_t { sphere = 1, capsule = 2, blade = 3 };
+InstrumentKind kind_of(const InstrumentShape& shape);
+/// "sphere", "capsule", "blade".
+const char* instrument_kind_name(InstrumentKind kind);
 
 /// An instrument at one moment.
 struct PlacedInstrument {

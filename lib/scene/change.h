@@ -140,6 +140,14 @@ using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Rele
                             MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
                             SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
+/// What a log says of an instrument alone; what does not apply stays empty.
+struct InstrumentRow {
+  std::optional<Vec3> end;        ///< the second one of its axis
+  std::optional<Quaternion> turn; ///< from how it came
+  std::optional<Vec3> force, torque;
+  std::optional<std::uint64_t> nodes; ///< that it touches or grasps
+};
+
 /// What a log says of a change; what does not apply stays empty.
 struct ChangeRow {
   std::string what, object;
@@ -150,6 +158,7 @@ struct ChangeRow {
   std::string other{}; ///< object or instrument
   std::vector<std::uint32_t> others{};
   std::string text{};
+  InstrumentRow instrument{};
 };
 
 } // namespace gewebe

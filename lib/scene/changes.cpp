@@ -17,7 +17,7 @@ void log_names(const World& w, const Kind& c, ChangeRow& row) {
   if constexpr (requires { c.nodes; })
     row.nodes = c.nodes;
   if constexpr (requires { c.instrument; })
-    row.other = w.now.instruments.at(c.instrument).name;
+    (requires { c.object; } ? row.other : row.object) = w.now.instruments.at(c.instrument).name;
   if constexpr (requires { c.others; }) {
     row.other = w.now.objects.at(c.other).name();
     row.others = c.others;

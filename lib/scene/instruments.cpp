@@ -170,6 +170,9 @@ void Rule<SetInstrument>::log(const World&, const SetInstrument& c, ChangeRow& r
   row.what = "instrument";
   row.vector = c.pose.place;
   row.value = c.shape.radius;
+  row.text = instrument_kind_name(kind_of(c.shape));
+  row.instrument.end = c.pose(c.shape.axis);
+  row.instrument.turn = c.pose.turn;
 }
 
 void Rule<MoveInstrument>::check(World&, const MoveInstrument& c) {
@@ -186,10 +189,13 @@ void Rule<MoveInstrument>::apply(World& w, const MoveInstrument& c) {
   carry(w, i);
   note_poses(w);
 }
-void Rule<MoveInstrument>::log(const World&, const MoveInstrument& c, ChangeRow& row) {
+void Rule<MoveInstrument>::log(const World& w, const MoveInstrument& c, ChangeRow& row) {
+  const Instrument& i = w.now.instruments[c.instrument];
   row.what = "move";
   row.vector = c.place;
   row.duration = c.duration;
+  row.instrument.end = i.way.to(i.shape.axis);
+  row.instrument.turn = i.way.to.turn;
 }
 
 void Rule<Grasp>::check(World& w, const Grasp& c) {

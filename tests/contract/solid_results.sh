@@ -169,7 +169,7 @@ test_stress_of_a_hanging_body() {
   printf '%s\n' 'object bar bar.ela method=ffe' 'emit stress bar x<0.001' 'gravity 9810 0 0' 'step 1' 'emit stress bar' \
     'at 1.5 gravity 0 0 0' 'step 1' >hang.scene
   ffe-run hang.scene -o run.h5 --record again.scene --events events.csv >answers
-  grep -q '^1,emit,bar,[0-9 -]*,.*"stress"$' events.csv || fail 'no event' "$(<events.csv)"
+  grep -q '^1,emit,bar,[0-9 -]*,.*"stress",*$' events.csv || fail 'no event' "$(<events.csv)"
   ffe-run again.scene | cmp - answers
   # density g height = 1e-3 g/mm3 * 9810 mm/s2 * 10 mm = 98.1 Pa on the top nodes, and all others 0.
   awk '/^stress/ { ++n; next } /^(step|done)/ { next } n == 1 {

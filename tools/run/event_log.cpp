@@ -2,6 +2,8 @@
 
 #include "base/number_text.h"
 
+#include <initializer_list>
+
 namespace gewebe {
 
 namespace {
@@ -21,7 +23,22 @@ std::string csv(double time, const ChangeRow& row) {
   line += (row.value ? number_text(*row.value) : "") + ",";
   line += (row.duration > 0 ? number_text(row.duration) : "") + "," + row.other + "," +
           node_ranges(row.others, ' ') + ",";
-  return line + (row.text.empty() ? "" : quoted(row.text)) + "\n";
+  line += row.text.empty() ? "" : quoted(row.text);
+  const InstrumentRow& of = row.instrument;
+  const auto add = [&](bool there, std::initializer_list<double> values) {
+    for (const double value : values)
+      line += "," + (there ? number_text(value + 0.0) : ""); // -0 as 0
+  };
+  const auto add_vector = [&](const std::optional<Vec3>& v) {
+    const Vec3 value = v.value_or(Vec3{});
+    add(v.has_value(), {value.x, value.y, value.z});
+  };
+  add_vector(of.end);
+  const Quaternion turn = of.turn.value_or(Quaternion{});
+  add(of.turn.has_value(), {turn.w, turn.x, turn.y, turn.z});
+  add_vector(of.force);
+  add_vector(of.torque);
+  return line + "," + (of.nodes ? std::to_string(*of.nodes) : "") + "\n";
 }
 
 } // namespace
@@ -44,7 +61,9 @@ std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator)
 
 EventLog::EventLog(const std::string& path, const Output::Options& options)
     : output_(path, options) {
-  output_.write("time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text\n");
+  output_.write("time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text,end_x,end_y,"
+                "end_z,turn_w,turn_x,turn_y,turn_z,force_x,force_y,force_z,torque_x,torque_y,"
+                "torque_z,touched\n");
 }
 
 void EventLog::object(double time, const std::string& name, const std::string& model,
@@ -79,6 +98,22 @@ void EventLog::cutting(const Simulation& simulation, const Cutting& c) {
                                            ? std::to_string(c.springs) + " springs, " +
                                                  std::to_string(c.doubled) + " nodes doubled"
                                            : c.text}));
+}
+
+void EventLog::instruments(const Simulation& simulation) {
+  for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
+    const InstrumentReport report = simulation.instrument(k);
+    if (!report.present)
+      continue;
+    rows_.push_back(
+        csv(simulation.time(), {.what = "felt",
+                                .object = report.name,
+                                .vector = report.pose.place + Vec3{}, // -0 as 0
+                                .value = report.shape.radius,
+                                .text = instrument_kind_name(kind_of(report.shape)),
+                                .instrument = {report.pose(report.shape.axis), report.pose.turn,
+                                               report.force, report.torque, report.nodes}}));
+  }
 }
 
 void EventLog::message(double time, const char* what, std::string_view text) {

@@ -25,6 +25,8 @@ public:
   void change(double time, const ChangeRow& row);
   /// What cutting did to an object.
   void cutting(const Simulation& simulation, const Cutting& cutting);
+  /// Where each instrument that is there stands at the end of a step, and what it feels.
+  void instruments(const Simulation& simulation);
   /// `what` is "error" or "warning".
   void message(double time, const char* what, std::string_view text);
 

@@ -109,9 +109,11 @@ void SceneRun::State::answer() {
       options.reply(options.binary ? binary_answer(simulation, steps, stress.answers())
                                    : text_answer(simulation, steps, stress.answers()));
     });
-  if (options.events != nullptr)
+  if (options.events != nullptr) {
     for (const Cutting& c : simulation.news().cuttings)
       options.events->cutting(simulation, c);
+    options.events->instruments(simulation);
+  }
   if (options.latency != nullptr)
     deliver([&] { options.latency->answered(steps, simulation.time()); });
   if (result)
