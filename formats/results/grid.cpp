@@ -1,8 +1,10 @@
 #include "base/mesh.h"
+#include "contact/instrument_surface.h"
 #include "formats/results/grid_internal.h"
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace gewebe::grid {
 
@@ -36,6 +38,61 @@ Shape shape_of(const Model& model) {
   return shape;
 }
 
+void Shapes::add(const Model& model) {
+  all_.insert(all_.begin() + static_cast<std::ptrdiff_t>(objects_++), shape_of(model));
+}
+
+void Shapes::change(std::size_t object, const Model& model) {
+  all_.at(object) = shape_of(model);
+}
+
+void Shapes::set(std::span<const FrameObject> objects) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    Shape& shape = all_.at(i);
+    shape.displacement.assign(objects[i].displacement.begin(), objects[i].displacement.end());
+    shape.fields.reset();
+    if (objects[i].fields != nullptr)
+      shape.fields = *objects[i].fields;
+  }
+}
+
+bool Shapes::set(std::span<const FrameInstrument> instruments) {
+  constexpr std::size_t around = 32;
+  std::vector<Instrument> there;
+  for (std::size_t k = 0; k < instruments.size(); ++k)
+    if (instruments[k].present && shown_radius(instruments[k].shape) > 0)
+      there.push_back({k, instruments[k].shape, {}});
+  const bool other =
+      !std::ranges::equal(there, instruments_, [](const Instrument& a, const Instrument& b) {
+        return a.number == b.number && same_surface(a.shape, b.shape);
+      });
+  if (other) {
+    all_.resize(objects_);
+    for (Instrument& one : there) {
+      InstrumentSurface made = round_surface(shown_radius(one.shape), one.shape.axis, around);
+      one.own = std::move(made.points);
+      Shape& shape = all_.emplace_back();
+      shape.instrument = one.number;
+      for (const Vec3& r : one.own)
+        shape.points.push_back(instruments[one.number].pose(r));
+      for (const Triangle& t : made.triangles)
+        shape.nodes.insert(shape.nodes.end(), t.begin(), t.end());
+      shape.material.assign(made.triangles.size(), -1);
+    }
+    instruments_ = std::move(there);
+  }
+  for (std::size_t n = 0; n < instruments_.size(); ++n) {
+    const Instrument& one = instruments_[n];
+    Shape& shape = all_[objects_ + n];
+    shape.displacement.clear();
+    for (std::size_t i = 0; i < one.own.size(); ++i) {
+      const Vec3 u = instruments[one.number].pose(one.own[i]) - shape.points[i];
+      shape.displacement.insert(shape.displacement.end(), {u.x, u.y, u.z});
+    }
+  }
+  return other;
+}
+
 Joined join(const std::vector<Shape>& shapes) {
   Joined all;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
@@ -49,7 +106,10 @@ Joined join(const std::vector<Shape>& shapes) {
       all.ends.push_back((all.ends.empty() ? 0 : all.ends.back()) +
                          static_cast<std::int64_t>(shape.size()));
     all.types.insert(all.types.end(), shape.cells(), shape.type);
-    all.object.insert(all.object.end(), shape.cells(), static_cast<std::int32_t>(i));
+    const std::size_t number = shape.instrument.value_or(i);
+    all.object.insert(all.object.end(), shape.cells(),
+                      shape.instrument ? -1 - static_cast<std::int32_t>(number)
+                                       : static_cast<std::int32_t>(number));
     all.material.insert(all.material.end(), shape.material.begin(), shape.material.end());
   }
   return all;

@@ -1,7 +1,10 @@
 #pragma once
-// All objects of a frame as one unstructured grid of VTK's, which files of several kinds hold.
+// All objects and instruments of a frame as one unstructured grid of VTK's, which files of several
+// kinds hold.
 
 #include "base/vec3.h"
+#include "contact/instrument.h"
+#include "formats/results/results_writer.h"
 #include "model/model.h"
 #include "solid/stress.h"
 
@@ -9,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace gewebe::grid {
@@ -16,7 +20,7 @@ namespace gewebe::grid {
 /// Cells of VTK's types: triangles where there are no tetrahedra.
 enum CellType : std::uint8_t { triangle = 5, tetrahedron = 10, quadratic = 24 };
 
-/// An object as it is now.
+/// An object as it is now, or an instrument.
 struct Shape {
   std::vector<Vec3> points; ///< at rest
   CellType type = triangle;
@@ -24,6 +28,7 @@ struct Shape {
   std::vector<std::int32_t> material;
   std::vector<double> displacement;
   std::optional<SolidFields> fields;
+  std::optional<std::size_t> instrument; ///< of these
 
   std::size_t size() const { return type == triangle ? 3 : type == tetrahedron ? 4 : 10; }
   std::size_t cells() const { return nodes.size() / size(); }
@@ -32,12 +37,35 @@ struct Shape {
 /// At rest, without fields.
 Shape shape_of(const Model& model);
 
+/// Of objects, and behind them of instruments. An instrument stands at rest where it was when one
+/// of them last came, went or got another shape.
+class Shapes {
+public:
+  void add(const Model& model);
+  void change(std::size_t object, const Model& model);
+  void set(std::span<const FrameObject> objects);
+  /// Whether it is another set of shapes.
+  bool set(std::span<const FrameInstrument> instruments);
+  const std::vector<Shape>& all() const noexcept { return all_; }
+
+private:
+  struct Instrument {
+    std::size_t number = 0; ///< of all
+    InstrumentShape shape;
+    std::vector<Vec3> own; ///< points in its own coordinates
+  };
+  std::vector<Shape> all_;
+  std::size_t objects_ = 0;
+  std::vector<Instrument> instruments_; ///< that are there
+};
+
 /// What doesn't change from frame to frame unless a shape is cut.
 struct Joined {
   std::vector<double> points; ///< at rest
   std::vector<std::int64_t> nodes, ends;
   std::vector<std::uint8_t> types;
-  std::vector<std::int32_t> object, material; ///< of the cells
+  /// Of the cells: the object's number, or of instruments -1, -2, …; a material, -1 of these.
+  std::vector<std::int32_t> object, material;
 };
 
 Joined join(const std::vector<Shape>& shapes);

@@ -24,6 +24,7 @@ hdf5::File open_checked(const std::string& path) {
   return file;
 }
 
+/// Of objects, or instruments.
 std::vector<std::string> object_names(const hdf5::Group& objects) {
   std::vector<std::pair<std::uint32_t, std::string>> ordered;
   for (const std::string& name : objects.groups())
@@ -199,6 +200,53 @@ std::vector<double> read_von_mises(const std::string& path, const ShapeGroup& sh
   return {values.begin(), values.end()};
 }
 
+/// A row of `count` numbers. \throw Error if there is none, or one is not finite
+template <std::size_t count>
+std::array<double, count> read_row(const hdf5::Group& group, const char* name,
+                                   const hdf5::Shape& shape, std::uint64_t row) {
+  const hdf5::Dataset set = group.dataset(name, hdf5::Number::float64);
+  hdf5::Shape whole{set.rows()};
+  whole.insert(whole.end(), shape.begin(), shape.end());
+  set.require_shape(whole);
+  std::array<double, count> values{};
+  set.read_rows(row, std::span<double>(values));
+  for (const double value : values)
+    if (!std::isfinite(value))
+      set.fail("holds a number that is not finite");
+  return values;
+}
+
+/// Nothing where it is not there in this row, or of a kind that is not known.
+std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::uint64_t row) {
+  std::uint8_t kind = 0;
+  group.dataset("kind", hdf5::Number::uint8).read_rows(row, std::span<std::uint8_t>(&kind, 1));
+  if (kind == 0 || kind > static_cast<std::uint8_t>(InstrumentKind::blade))
+    return std::nullopt;
+  const auto vector = [&](const char* name) {
+    const auto [x, y, z] = read_row<3>(group, name, {3}, row);
+    return Vec3{x, y, z};
+  };
+  const auto ends = read_row<6>(group, "ends", {2, 3}, row);
+  const auto pose = read_row<12>(group, "pose", {3, 4}, row);
+  ResultInstrument read;
+  read.kind = static_cast<InstrumentKind>(kind);
+  read.radius = read_row<1>(group, "radius", {}, row)[0];
+  read.friction = read_row<1>(group, "friction", {}, row)[0];
+  if (!(read.radius >= 0))
+    group.fail("has a radius below 0");
+  read.ends = {Vec3{ends[0], ends[1], ends[2]}, Vec3{ends[3], ends[4], ends[5]}};
+  for (std::size_t a = 0; a < 3; ++a)
+    read.rotation[a] = {pose[4 * a], pose[4 * a + 1], pose[4 * a + 2]};
+  read.place = {pose[3], pose[7], pose[11]};
+  read.force = vector("force");
+  read.torque = vector("torque");
+  std::uint32_t touched = 0;
+  group.dataset("touched", hdf5::Number::uint32)
+      .read_rows(row, std::span<std::uint32_t>(&touched, 1));
+  read.touched = touched;
+  return read;
+}
+
 } // namespace
 
 ResultIndex read_result_index(const std::string& path) {
@@ -209,7 +257,32 @@ ResultIndex read_result_index(const std::string& path) {
   index.times.resize(time.rows());
   time.read_rows(0, std::span<double>(index.times));
   index.objects = object_names(file.root().group("objects"));
+  if (file.root().has("instruments"))
+    index.instruments = object_names(file.root().group("instruments"));
   return index;
+}
+
+std::vector<ResultInstrument> read_result_instruments(const std::string& path, std::size_t frame) {
+  const hdf5::File file = open_checked(path);
+  const std::uint64_t frames = file.root().dataset("time", hdf5::Number::float64).rows();
+  if (frame >= frames)
+    throw Error(path, "there is no frame " + std::to_string(frame) + ", expected 0 to " +
+                          std::to_string(frames - 1));
+  std::vector<ResultInstrument> found;
+  if (!file.root().has("instruments"))
+    return found;
+  const hdf5::Group all = file.root().group("instruments");
+  for (const std::string& name : object_names(all)) {
+    const hdf5::Group group = all.group(name);
+    const auto first = group.number<std::uint64_t>("first_frame");
+    if (frame < first)
+      continue;
+    if (std::optional<ResultInstrument> there = read_instrument(group, frame - first)) {
+      there->name = name;
+      found.push_back(std::move(*there));
+    }
+  }
+  return found;
 }
 
 ResultSurface read_result_surface(const std::string& path, const std::string& object,

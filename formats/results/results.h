@@ -4,8 +4,10 @@
 
 #include "base/mesh.h"
 #include "base/vec3.h"
+#include "contact/instrument.h"
 #include "tetrahedra/tet_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -14,8 +16,9 @@
 namespace gewebe {
 
 struct ResultIndex {
-  std::vector<std::string> objects; ///< in the order of the scene
-  std::vector<double> times;        ///< of the frames, s
+  std::vector<std::string> objects;     ///< in the order of the scene
+  std::vector<std::string> instruments; ///< likewise; those of older files are not known
+  std::vector<double> times;            ///< of the frames, s
 };
 
 /// \throw Error, place = path: missing, no HDF5, no result, truncated, of a newer version
@@ -44,6 +47,21 @@ struct ResultSolid {
 /// \throw Error as read_result_surface, and if the object has no tetrahedra
 ResultSolid read_result_solid(const std::string& path, const std::string& object,
                               std::size_t frame);
+
+/// An instrument in one frame. Its own point r stands at rotation r + place, row by row.
+struct ResultInstrument {
+  std::string name;
+  InstrumentKind kind = InstrumentKind::sphere;
+  double radius = 0, friction = 0;
+  std::array<Vec3, 2> ends; ///< of its axis
+  std::array<Vec3, 3> rotation;
+  Vec3 place;
+  Vec3 force, torque; ///< 1e-6 N, and 1e-9 N m about its place
+  std::uint64_t touched = 0;
+};
+/// Those that are there then, in the order of the scene, and of a kind that is known here.
+/// \throw Error, place = path; if there is no such frame, or a number is not finite
+std::vector<ResultInstrument> read_result_instruments(const std::string& path, std::size_t frame);
 
 /// The fields of a result: "displacement", its length in mm; "von-mises", the equivalent stress of
 /// the mean tensor at a node in Pa, where the scene emitted stress.

@@ -71,37 +71,35 @@ public:
   }
 
   void add_object(const std::string& /*name*/, const Model& model) override {
-    shapes_.push_back(grid::shape_of(model));
+    shapes_.add(model);
     changed_ = true;
   }
   void change_object(std::size_t object, const Model& model,
                      std::span<const std::uint32_t> /*origin*/) override {
-    shapes_.at(object) = grid::shape_of(model);
+    shapes_.change(object, model);
     changed_ = true;
+  }
+  void set_instruments(std::span<const FrameInstrument> instruments) override {
+    if (shapes_.set(instruments))
+      changed_ = true;
   }
 
   void add_frame(double time, std::span<const FrameObject> objects) override {
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-      grid::Shape& shape = shapes_.at(i);
-      shape.displacement.assign(objects[i].displacement.begin(), objects[i].displacement.end());
-      shape.fields.reset();
-      if (objects[i].fields != nullptr)
-        shape.fields = *objects[i].fields;
-    }
+    shapes_.set(objects);
     in_place([&] {
       if (std::exchange(changed_, false) || parts_.empty())
         begin_part();
-      if (fields_.empty() && grid::have_fields(shapes_))
+      if (fields_.empty() && grid::have_fields(shapes_.all()))
         begin_fields();
       times_.push_back(time);
       part_.push_back(static_cast<std::int64_t>(parts_.size()) - 1);
       displacement_->begin_frame(displacement_->rows());
-      displacement_->append(grid::displacements(shapes_));
+      displacement_->append(grid::displacements(shapes_.all()));
       material_->begin_frame(parts_.back().first_cell);
       object_->begin_frame(parts_.back().first_cell);
       for (auto& [field, track] : fields_) {
         track.begin_frame(track.rows());
-        track.append(grid::values_of(shapes_, field));
+        track.append(grid::values_of(shapes_.all(), field));
       }
     });
   }
@@ -169,7 +167,7 @@ private:
   }
 
   void begin_part() {
-    const grid::Joined all = grid::join(shapes_);
+    const grid::Joined all = grid::join(shapes_.all());
     parts_.push_back({static_cast<std::int64_t>(all.points.size() / 3),
                       static_cast<std::int64_t>(all.types.size()),
                       static_cast<std::int64_t>(all.nodes.size()), points_->rows(), types_->rows(),
@@ -209,7 +207,7 @@ private:
   std::optional<hdf5::Group> root_, of_points_, of_cells_;
   std::optional<Track> points_, nodes_, ends_, types_, displacement_, material_, object_;
   std::vector<std::pair<grid::Field, Track>> fields_;
-  std::vector<grid::Shape> shapes_;
+  grid::Shapes shapes_;
   bool changed_ = false; ///< since the last part
   std::vector<Part> parts_;
   std::vector<double> times_;

@@ -47,22 +47,17 @@ public:
       last_.emplace(path, options_);
   }
 
-  void add_object(const std::string& /*name*/, const Model& model) override {
-    shapes_.push_back(grid::shape_of(model));
-  }
+  void add_object(const std::string& /*name*/, const Model& model) override { shapes_.add(model); }
   void change_object(std::size_t object, const Model& model,
                      std::span<const std::uint32_t> /*origin*/) override {
-    shapes_.at(object) = grid::shape_of(model);
+    shapes_.change(object, model);
+  }
+  void set_instruments(std::span<const FrameInstrument> instruments) override {
+    (void)shapes_.set(instruments);
   }
   void add_frame(double time, std::span<const FrameObject> objects) override {
     time_ = time;
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-      grid::Shape& shape = shapes_.at(i);
-      shape.displacement.assign(objects[i].displacement.begin(), objects[i].displacement.end());
-      shape.fields.reset();
-      if (objects[i].fields != nullptr)
-        shape.fields = *objects[i].fields;
-    }
+    shapes_.set(objects);
     if (!series_)
       return;
     Output output(series_->name(frame_++), options_);
@@ -75,8 +70,8 @@ public:
 
 private:
   void write(Output& output) const {
-    const grid::Joined all = grid::join(shapes_);
-    const bool fields = grid::have_fields(shapes_);
+    const grid::Joined all = grid::join(shapes_.all());
+    const bool fields = grid::have_fields(shapes_.all());
     Arrays arrays;
     std::string text =
         "<?xml version=\"1.0\"?>\n<!-- gewebe_results, millimetres -->\n"
@@ -92,16 +87,16 @@ private:
     arrays.add(text, "offsets", 1, all.ends);
     arrays.add(text, "types", 1, all.types);
     text += "</Cells>\n<PointData Vectors=\"displacement\">\n";
-    arrays.add(text, "displacement", 3, grid::displacements(shapes_));
+    arrays.add(text, "displacement", 3, grid::displacements(shapes_.all()));
     if (fields)
       for (const grid::Field& field : grid::node_fields)
-        arrays.add(text, field.name, field.components(), grid::values_of(shapes_, field));
+        arrays.add(text, field.name, field.components(), grid::values_of(shapes_.all(), field));
     text += "</PointData>\n<CellData Scalars=\"material\">\n";
     arrays.add(text, "material", 1, all.material);
     arrays.add(text, "object", 1, all.object);
     if (fields)
       for (const grid::Field& field : grid::cell_fields)
-        arrays.add(text, field.name, field.components(), grid::values_of(shapes_, field));
+        arrays.add(text, field.name, field.components(), grid::values_of(shapes_.all(), field));
     text += "</CellData>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
     output.write(text);
     output.write(arrays.bytes());
@@ -112,7 +107,7 @@ private:
   Output::Options options_;
   std::optional<SeriesName> series_; ///< else
   std::optional<Output> last_;
-  std::vector<grid::Shape> shapes_;
+  grid::Shapes shapes_;
   double time_ = 0;
   std::uint64_t frame_ = 0;
 };

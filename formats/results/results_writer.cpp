@@ -2,9 +2,11 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "formats/results/instrument_sets_internal.h"
 #include "formats/results/results_mesh.h"
 #include "formats/results/results_vtkhdf.h"
 #include "formats/results/results_vtu.h"
+#include "formats/results/xdmf_internal.h"
 #include "formats/store/hdf5_internal.h"
 #include "solid/skin.h"
 
@@ -27,25 +29,6 @@ std::string xdmf_path(const std::string& path) {
 
 std::string base_name(const std::string& path) {
   return path.substr(path.find_last_of('/') + 1);
-}
-
-std::string xml_text(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    switch (c) {
-    case '&':
-      result += "&amp;";
-      break;
-    case '<':
-      result += "&lt;";
-      break;
-    case '>':
-      result += "&gt;";
-      break;
-    default:
-      result += c;
-    }
-  return result;
 }
 
 std::vector<float> in_single(std::span<const double> values, const char* what, const char* unit) {
@@ -112,7 +95,7 @@ private:
 class Hdf5Result final : public ResultWriter {
 public:
   Hdf5Result(const std::string& path, Output::Options options)
-      : output_(path, with_sync(options)), name_(base_name(path)) {
+      : output_(path, with_sync(options)), xdmf_text_(base_name(path)) {
     (void)output_.temporary(); // refuses what is no file, before anything is made beside it
     xdmf_.emplace(xdmf_path(path), text(options));
     in_place([&] {
@@ -158,6 +141,10 @@ public:
       object.shapes.push_back(
           shape_of(model, "/objects/" + object.name + "/cuts/" + number, frames_));
     });
+  }
+
+  void set_instruments(std::span<const FrameInstrument> instruments) override {
+    in_place([&] { instruments_.add_frame(file_->root(), frames_, instruments); });
   }
 
   void add_frame(double time, std::span<const FrameObject> objects) override {
@@ -342,37 +329,10 @@ private:
       for (const Object& object : objects_)
         if (object.shapes.front().first <= f)
           xdmf_->write(grid(object, f));
+      xdmf_->write(instruments_.grids(xdmf_text_, f, frames_));
       xdmf_->write("</Grid>\n");
     }
     xdmf_->write("</Grid>\n</Domain>\n</Xdmf>\n");
-  }
-
-  std::string array(const std::string& path, const std::string& dimensions, const char* type) {
-    return "<DataItem Format=\"HDF\" Dimensions=\"" + dimensions + "\" " + type + ">" +
-           xml_text(name_) + ":" + path + "</DataItem>\n";
-  }
-
-  /// One of the rows of an array, whose shape is `dimensions`, one or two numbers.
-  std::string rows(const char* name, const char* type, const char* center, const std::string& path,
-                   std::uint64_t row, std::uint64_t count, const std::string& dimensions) {
-    const bool two = dimensions.find(' ') != std::string::npos;
-    return std::string("<Attribute Name=\"") + name + "\" AttributeType=\"" + type +
-           "\" Center=\"" + center + "\">\n<DataItem ItemType=\"HyperSlab\" Dimensions=\"" +
-           dimensions + "\">\n<DataItem Format=\"XML\" Dimensions=\"3 " + (two ? "3" : "2") +
-           "\">" + std::to_string(row) + (two ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") + dimensions +
-           "</DataItem>\n" +
-           array(path, std::to_string(count) + " " + dimensions,
-                 R"(NumberType="Float" Precision="4")") +
-           "</DataItem>\n</Attribute>\n";
-  }
-
-  std::string topology(const char* type, const std::string& path, std::uint64_t count,
-                       std::uint64_t nodes) {
-    const std::string n = std::to_string(count);
-    return std::string("<Topology TopologyType=\"") + type + "\" NumberOfElements=\"" + n +
-           "\">\n" +
-           array(path, n + " " + std::to_string(nodes), R"(NumberType="UInt" Precision="4")") +
-           "</Topology>\n";
   }
 
   std::string grid(const Object& object, std::uint64_t frame) {
@@ -386,28 +346,31 @@ private:
     const std::string n = std::to_string(shape.nodes);
     std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
     if (shape.tetrahedra > 0) { // nodes are in VTK's order, which is that of its reader
-      text += topology(shape.quadratic ? "Tetrahedron_10" : "Tetrahedron", group + "/tetrahedra",
-                       shape.tetrahedra, shape.quadratic ? 10 : 4);
+      text +=
+          xdmf_text_.topology(shape.quadratic ? "Tetrahedron_10" : "Tetrahedron",
+                              group + "/tetrahedra", shape.tetrahedra, shape.quadratic ? 10 : 4);
       text += "<Attribute Name=\"material\" AttributeType=\"Scalar\" Center=\"Cell\">\n" +
-              array(group + "/tetrahedron_material", std::to_string(shape.tetrahedra),
-                    R"(NumberType="Int" Precision="4")") +
+              xdmf_text_.array(group + "/tetrahedron_material", std::to_string(shape.tetrahedra),
+                               R"(NumberType="Int" Precision="4")") +
               "</Attribute>\n";
     } else if (shape.triangles > 0) {
-      text += topology("Triangle", group + "/triangles", shape.triangles, 3);
+      text += xdmf_text_.topology("Triangle", group + "/triangles", shape.triangles, 3);
     } else {
       text += "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"" + n + "\"/>\n";
     }
     text += "<Geometry GeometryType=\"XYZ\">\n" +
-            array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
+            xdmf_text_.array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
             "</Geometry>\n" +
-            rows("displacement", "Vector", "Node", group + "/displacement", frame - shape.first,
-                 end - shape.first, n + " 3");
+            xdmf_text_.attribute("displacement", "Vector", "Node",
+                                 xdmf_text_.row(group + "/displacement", frame - shape.first,
+                                                end - shape.first, n + " 3"));
     if (object.fields && frame >= object.fields->first) {
       const auto field = [&](const char* name, const char* set, bool tensor, bool of_nodes) {
         const std::string count = of_nodes ? n : std::to_string(shape.tetrahedra);
-        text += rows(name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
-                     group + "/fields/" + set, frame - object.fields->first,
-                     end - object.fields->first, tensor ? count + " 6" : count);
+        text += xdmf_text_.attribute(
+            name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
+            xdmf_text_.row(group + "/fields/" + set, frame - object.fields->first,
+                           end - object.fields->first, tensor ? count + " 6" : count));
       };
       field("stress", "stress", true, true);
       field("strain", "strain", true, true);
@@ -422,11 +385,12 @@ private:
 
   Output output_;
   std::optional<Output> xdmf_;
-  std::string name_;
+  XdmfText xdmf_text_;
   std::optional<hdf5::File> file_;
   std::optional<hdf5::Dataset> time_;
   std::optional<hdf5::Group> groups_;
   std::vector<Object> objects_;
+  InstrumentSets instruments_;
   std::vector<double> times_;
   std::uint64_t frames_ = 0;
 };

@@ -2,6 +2,7 @@
 // What a run leaves: gewebe_results(5). HDF5 with an XDMF beside it, the last shape or every
 // shape as a mesh, or the contact forces as CSV.
 
+#include "contact/instrument.h"
 #include "contact/load.h"
 #include "formats/stream/kind.h"
 #include "formats/stream/stream.h"
@@ -13,6 +14,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gewebe {
@@ -23,6 +25,16 @@ struct FrameObject {
   std::span<const NodeVector> forces;   ///< at displaced nodes
   /// Of a solid, where they are asked for: from one frame on in all; such an object doesn't change.
   const SolidFields* fields = nullptr;
+};
+
+/// An instrument in one frame.
+struct FrameInstrument {
+  std::string_view name; ///< as those of objects; no two have the same
+  bool present = false;  ///< else what follows does not count
+  InstrumentShape shape;
+  Pose pose;
+  Vec3 force, torque;      ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
+  std::uint64_t nodes = 0; ///< that it touches or grasps
 };
 
 class ResultWriter {
@@ -44,6 +56,9 @@ public:
   /// first model that it is, or is a copy of; empty: all as they came
   virtual void change_object(std::size_t /*object*/, const Model& /*model*/,
                              std::span<const std::uint32_t> /*origin*/) {}
+  /// All instruments, in an order that stays, as they are in the next frame alone. Nothing to who
+  /// writes none.
+  virtual void set_instruments(std::span<const FrameInstrument> /*instruments*/) {}
   /// \pre as many objects as were added, in their order
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
   /// Nothing appears without it, but for the files of a series. \throw Error

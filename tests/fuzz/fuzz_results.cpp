@@ -53,6 +53,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         attempt([&] { check_mesh(gewebe::read_result_surface(path, object, frame).mesh); });
         attempt([&] { check_mesh(gewebe::read_result_solid(path, object, frame).mesh); });
       }
+    for (const std::size_t frame : {std::size_t{0}, index.times.size() / 2})
+      attempt([&] { (void)gewebe::read_result_instruments(path, frame); });
   });
   return 0;
 }

@@ -1,10 +1,13 @@
 #include "contact/instrument.h"
 
+#include "contact/instrument_surface.h"
 #include "contact/load.h"
 #include "contact/surface_facets.h"
 #include "sim_models.h"
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <gtest/gtest.h>
 #include <set>
 
@@ -145,6 +148,37 @@ TEST(SurfaceFacets, FindAllNodesInABox) {
     EXPECT_LT(asked, surface_count(model) * surface_count(model) / 7 / 2); // and not all
   }
   blocks.visit_near({{1e6, 0, 0}, {2e6, 1, 1}}, [](std::uint32_t) { FAIL(); });
+}
+
+TEST(Instrument, ItsSurfaceIsClosedRoundAndItsOwn) {
+  for (const Vec3& axis : {Vec3{}, Vec3{0, 0, 7}, Vec3{3, -4, 12}, Vec3{0, -1e-3, 0}})
+    for (const std::size_t along : {std::size_t{1}, std::size_t{5}})
+      for (const std::size_t around : {std::size_t{4}, std::size_t{32}, std::size_t{128}}) {
+        const double radius = 2.5, pi = std::acos(-1.0);
+        const InstrumentSurface made = round_surface(radius, axis, around, along);
+        const PlacedInstrument placed({.radius = radius, .axis = axis}, {});
+        ASSERT_EQ(made.points.size(), made.normals.size());
+        for (std::size_t i = 0; i < made.points.size(); ++i) {
+          EXPECT_LT(std::fabs(placed.distance(made.points[i])), 1e-14);
+          const Vec3 core = placed.nearest(made.points[i]);
+          EXPECT_LT(norm(core + radius * made.normals[i] - made.points[i]), 1e-14);
+        }
+        // Each edge once in each direction, and what is inside by the triangles' order.
+        std::set<std::array<std::uint32_t, 2>> edges;
+        for (const Triangle& t : made.triangles)
+          for (std::size_t c = 0; c < 3; ++c)
+            EXPECT_TRUE(edges.insert({t[c], t[(c + 1) % 3]}).second);
+        for (const auto& [a, b] : edges)
+          EXPECT_TRUE(edges.contains({b, a}));
+        TriangleMesh mesh;
+        mesh.points = made.points;
+        mesh.triangles = made.triangles;
+        const double volume = pi * radius * radius * (norm(axis) + 4 * radius / 3);
+        const double missing = 1 - signed_volume(mesh) / volume;
+        const auto n = static_cast<double>(around);
+        EXPECT_GT(missing, 0);
+        EXPECT_LT(missing, 20 / (n * n));
+      }
 }
 
 } // namespace

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -73,6 +74,103 @@ void write(Kind kind, const std::string& path, const Model& a, const Model& b) {
   result->add_frame(0.1, std::vector<FrameObject>{{ua, forces}, {ub, none}});
   result->add_frame(1, std::vector<FrameObject>{{ua, none}, {ub, forces}});
   result->commit();
+}
+
+/// A sphere that moves, goes and comes again as a capsule; another from the last frame on.
+void write_instruments(Kind kind, const std::string& path, const Model& model) {
+  const std::unique_ptr<ResultWriter> result =
+      open_result(kind, path, Output::Options{.binary = is_binary(kind)});
+  const std::vector<double> u(3 * model.nodes.size());
+  const Pose turned{{5, 0, 1}, turn_about({0, 0, 1}, 90)};
+  result->add_object("o", model);
+  result->add_frame(0, std::vector<FrameObject>{{u, {}}});
+  std::vector<FrameInstrument> all{{"probe",
+                                    true,
+                                    {.radius = 2, .axis = {}, .friction = 0.5},
+                                    {{1, 2, 3}, {}},
+                                    {0, 0, 9},
+                                    {1, 0, 0},
+                                    4}};
+  const auto add = [&](double time) {
+    result->set_instruments(all);
+    result->add_frame(time, std::vector<FrameObject>{{u, {}}});
+  };
+  add(1);
+  all[0].pose = {{1, 2, 2}, {}};
+  add(2);
+  all[0].present = false;
+  add(3);
+  all[0] = {"probe", true, {.radius = 1, .axis = {4, 0, 0}}, turned, {}, {}, 0};
+  all.push_back({"knife", true, {.radius = 0, .axis = {0, 0, 8}, .blade = true}, {}, {}, {}, 0});
+  add(4);
+  result->commit();
+}
+
+TEST(Results, InstrumentsAreReadAsTheyWereWritten) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  write_instruments(Kind::hdf5, path, test::organ(1));
+  EXPECT_EQ(read_result_index(path).instruments, (std::vector<std::string>{"probe", "knife"}));
+  EXPECT_TRUE(read_result_instruments(path, 0).empty());
+  EXPECT_TRUE(read_result_instruments(path, 3).empty());
+  const std::vector<ResultInstrument> second = read_result_instruments(path, 2);
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(second[0].name, "probe");
+  EXPECT_EQ(second[0].kind, InstrumentKind::sphere);
+  EXPECT_EQ(second[0].radius, 2);
+  EXPECT_EQ(second[0].friction, 0.5);
+  EXPECT_EQ(second[0].place, (Vec3{1, 2, 2}));
+  EXPECT_EQ(second[0].ends[1], second[0].place);
+  EXPECT_EQ(second[0].force, (Vec3{0, 0, 9}));
+  EXPECT_EQ(second[0].torque, (Vec3{1, 0, 0}));
+  EXPECT_EQ(second[0].touched, 4U);
+  const std::vector<ResultInstrument> last = read_result_instruments(path, 4);
+  ASSERT_EQ(last.size(), 2U);
+  EXPECT_EQ(last[0].kind, InstrumentKind::capsule);
+  EXPECT_LT(norm(last[0].ends[1] - Vec3{5, 4, 1}), 1e-15);
+  EXPECT_LT(norm(last[0].rotation[1] - Vec3{1, 0, 0}), 1e-15);
+  EXPECT_EQ(last[1].kind, InstrumentKind::blade);
+  EXPECT_THROW((void)read_result_instruments(path, 5), Error);
+  // Nothing of it where there are none, whose bytes are those of before.
+  write(Kind::hdf5, folder / "bare.h5", test::organ(1), test::two_masses());
+  EXPECT_TRUE(read_result_index(folder / "bare.h5").instruments.empty());
+  EXPECT_TRUE(read_result_instruments(folder / "bare.h5", 1).empty());
+  EXPECT_FALSE(hdf5::File::open(folder / "bare.h5").root().has("instruments"));
+}
+
+TEST(Results, InstrumentsThatAreDamagedAreErrors) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.h5";
+  const auto make = [&](double radius, std::uint64_t rows, std::uint8_t kind) {
+    hdf5::File file = hdf5::File::create(path);
+    hdf5::Group& root = file.root();
+    root.set("format", "gewebe_results");
+    root.set("version", std::uint32_t{1});
+    root.write("time", std::vector<double>{0, 1});
+    hdf5::Group probe = root.create_group("instruments").create_group("probe");
+    probe.set("order", std::uint32_t{0});
+    probe.set("first_frame", std::uint64_t{0});
+    probe.write("kind", std::vector<std::uint8_t>(2, kind));
+    probe.write("touched", std::vector<std::uint32_t>(2));
+    probe.write("radius", std::vector<double>(rows, radius));
+    probe.write("friction", std::vector<double>(2));
+    const std::vector<double> zeros(24);
+    probe.write("ends", std::span(zeros).first(12), {2, 2, 3});
+    probe.write("pose", std::span(zeros), {2, 3, 4});
+    probe.write("force", std::span(zeros).first(6), {2, 3});
+    probe.write("torque", std::span(zeros).first(6), {2, 3});
+    file.close();
+  };
+  make(1, 2, 1);
+  EXPECT_EQ(read_result_instruments(path, 1).size(), 1U);
+  make(1, 2, 200); // of a kind to come
+  EXPECT_TRUE(read_result_instruments(path, 1).empty());
+  make(-1, 2, 1);
+  EXPECT_THROW((void)read_result_instruments(path, 1), Error);
+  make(std::nan(""), 2, 1);
+  EXPECT_THROW((void)read_result_instruments(path, 1), Error);
+  make(1, 1, 1);
+  EXPECT_THROW((void)read_result_instruments(path, 1), Error);
 }
 
 TEST(Results, WhatIsWrittenIsRead) {

@@ -60,9 +60,20 @@ void SceneResult::first_frame(const Simulation& simulation, std::size_t objects)
   ++frames_;
 }
 
+void SceneResult::set_instruments(const Simulation& simulation) {
+  std::vector<InstrumentReport> reports;
+  for (std::size_t k = 0; k < simulation.instrument_count(); ++k)
+    reports.push_back(simulation.instrument(k));
+  std::vector<FrameInstrument> instruments;
+  for (const InstrumentReport& r : reports)
+    instruments.push_back({r.name, r.present, r.shape, r.pose, r.force, r.torque, r.nodes});
+  deliver([&] { writer_.set_instruments(instruments); });
+}
+
 void SceneResult::frame(const Simulation& simulation) {
   add_objects(simulation, simulation.object_count());
   change_objects(simulation);
+  set_instruments(simulation);
   std::vector<FrameObject> frame;
   for (std::size_t i = 0; i < simulation.object_count(); ++i)
     frame.push_back(

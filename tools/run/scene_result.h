@@ -28,6 +28,7 @@ public:
 private:
   void add_objects(const Simulation& simulation, std::size_t objects);
   void change_objects(const Simulation& simulation);
+  void set_instruments(const Simulation& simulation);
 
   ResultWriter& writer_;
   const SceneStress& stress_;
