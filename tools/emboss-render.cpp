@@ -4,6 +4,7 @@
 #include "formats/image/image_file.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_field.h"
+#include "tools/render/render_materials.h"
 #include "tools/render/render_pictures.h"
 #include "tools/render/render_volume.h"
 #include "tools/render/solid_surface.h"
@@ -69,6 +70,7 @@ void work(cli::Run& run, cli::RenderArguments a) {
   SurfaceReadOptions& reading = a.reading;
   reading.kind = input_kind(input.peek(4096), a.surface, run.format());
   check_kind(a, input, reading.kind);
+  cli::take_instruments(a, input);
   if (reading.kind == Kind::vdb) {
     const Image picture = cli::volume_picture(run, a, input);
     run.timed("write", [&] { write_image(*one, picture, to); });

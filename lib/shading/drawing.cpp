@@ -186,6 +186,10 @@ void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOpt
   group_of.reserve(drawing.triangles.size());
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
     const TriangleMesh& mesh = surfaces[s].mesh;
+    if (surfaces[s].instrument) {
+      group_of.insert(group_of.end(), mesh.triangles.size(), options.groups.size() + 1);
+      continue;
+    }
     const std::vector<std::int32_t>& numbers =
         options.group_by == GroupBy::part ? mesh.part : mesh.material;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -199,7 +203,7 @@ void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOpt
                              : static_cast<std::size_t>(found - options.groups.begin()) + 1);
     }
   }
-  std::vector<std::size_t> next(options.groups.size() + 2);
+  std::vector<std::size_t> next(options.groups.size() + (options.instruments ? 3 : 2));
   for (const std::size_t g : group_of)
     ++next[g + 1];
   for (std::size_t g = 1; g < next.size(); ++g)
@@ -281,7 +285,7 @@ const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const Drawi
     if (!sorted)
       append_triangles(drawing, parts_[n].vertices);
   }
-  if (!sorted && !options.groups.empty())
+  if (!sorted && (!options.groups.empty() || options.instruments))
     group(drawing, surfaces, options);
   drawing_ = std::move(drawing);
   return drawing_;
@@ -331,8 +335,9 @@ std::uint64_t triangle_count(std::span<const Surface> surfaces) {
 Box3 rest_box(std::span<const Surface> surfaces) {
   Box3 box;
   for (const Surface& surface : surfaces)
-    for (const Vec3& p : surface.rest.empty() ? surface.mesh.points : surface.rest)
-      box.add(p);
+    if (!surface.instrument)
+      for (const Vec3& p : surface.rest.empty() ? surface.mesh.points : surface.rest)
+        box.add(p);
   return box;
 }
 

@@ -67,6 +67,7 @@ struct Surface {
   TriangleMesh mesh;
   std::vector<Vec3> rest;             ///< where its points were at rest; empty: where they are
   std::vector<std::string> materials; ///< names of its materials, where they are known
+  bool instrument = false; ///< no tissue: of the group behind all others, without textures
 };
 
 /// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
@@ -94,6 +95,7 @@ struct DrawingOptions {
   Camera camera;   ///< that sees the sphere maps and has the second light
   GroupBy group_by = GroupBy::material;
   std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
+  bool instruments = false; ///< instruments have a group, the last one; else no surface is one
 };
 
 /// All surfaces in one, in order within each group. Per vertex (report eq. 3.2)
@@ -155,7 +157,7 @@ double drawing_bytes(std::span<const Surface> surfaces);
 
 std::uint64_t triangle_count(std::span<const Surface> surfaces);
 
-/// The box of the rest shapes of all surfaces.
+/// The box of the rest shapes of all surfaces but instruments.
 Box3 rest_box(std::span<const Surface> surfaces);
 
 } // namespace gewebe

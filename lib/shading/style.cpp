@@ -7,6 +7,7 @@ namespace gewebe {
 
 Surface faceted(const Surface& surface) {
   Surface out;
+  out.instrument = surface.instrument;
   out.mesh.texcoords = surface.mesh.texcoords;
   out.mesh.part = surface.mesh.part;
   out.mesh.material = surface.mesh.material;
@@ -35,6 +36,7 @@ Surface wireframe(const Surface& surface, const Camera& camera, double pixels,
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
 
   Surface out;
+  out.instrument = surface.instrument;
   const double half_pixel = camera.tan_y / height; // at distance 1
   const auto depth = [&](const Vec3& p) { return -dot(p - camera.eye, camera.back); };
   for (const auto& [a, b] : edges) {

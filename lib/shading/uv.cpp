@@ -155,6 +155,10 @@ std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& opt
   frame.edge = rest_mapping(frame.box, options.edge).edge;
   std::uint64_t mapped = 0;
   for (Surface& surface : surfaces) {
+    if (surface.instrument) { // which has no use for them, but a place
+      surface.mesh.texcoords.assign(surface.mesh.triangles.size(), {});
+      continue;
+    }
     if (surface.mesh.texcoords.size() == surface.mesh.triangles.size() && !options.mapping)
       continue;
     const std::vector<Vec3>& rest = surface.rest.empty() ? surface.mesh.points : surface.rest;

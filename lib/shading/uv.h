@@ -49,7 +49,7 @@ struct UvOptions {
 };
 
 /// Gives the surfaces coordinates by one common frame around all of them at rest, and tells how
-/// many it gave them to.
+/// many it gave them to; instruments get zeros and don't count.
 std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& options,
                             const Context& context);
 

@@ -205,3 +205,118 @@ P
   python3 in.py
   rm in.py log.csv answers told touch.scene ./*.ela ./*.vtu
 }
+
+
+# What each pixel must be: red where a ray meets an instrument at its radius, and as bright as the angle of its own normal
+# with the light has it. A ring of a pixel on both sides of the outline is free.
+test_pictures_show_instruments_where_they_are() {
+  python3 -c 'import numpy' 2>/dev/null || skip 'no numpy for python3'
+  exp2ela -q --primitive sphere:16x12 --size 20 --fix 'z<-8' -o ball.ela
+  cat >free.scene <<'S'
+object ball ball.ela
+instrument probe sphere 12 60 -10 50 friction 0.2
+instrument clip capsule 4 -40 0 30 -40 0 60
+move probe 90 -30 70 over 0.1
+at 0.055 move clip -30 0 40 turn 1 1 0 70 over 0.02
+run 0.1 every 0.05
+instrument knife blade 60 0 0 99 20 -30
+instrument probe capsule 3 60 -10 50 90 -10 50
+step 0.05
+withdraw clip
+step 0.05
+S
+  ffe-run --events log.csv free.scene -o run.h5 >answers
+  cat >in.py <<'P'
+import csv, sys
+import numpy as np
+felt = {}
+for row in csv.DictReader(open('log.csv')):
+    if row['what'] == 'felt':
+        felt.setdefault(row['time'], []).append(row)
+n, eye, target, fov = 400, np.array([160., -300, 170]), np.array([20., 0, 30]), 30
+light = np.array([-0.6, -0.64, 0.48])
+back = (eye - target) / np.linalg.norm(eye - target)
+right = np.cross([0, 0, 1], back); right /= np.linalg.norm(right)
+up = np.cross(back, right)
+half = np.tan(np.radians(fov / 2))
+s = ((np.arange(n) + 0.5) / n * 2 - 1) * half
+rays = right * s[None, :, None] - up * s[:, None, None] - back
+rays /= np.linalg.norm(rays, axis=2)[:, :, None]
+def core(ray, a, b):
+    """How near each ray comes to the axis, and to which point of it."""
+    across = lambda v: v - (v * ray).sum(axis=2)[:, :, None] * ray
+    m, w = across(b - a), across(a - eye)
+    t = np.clip(-(w * m).sum(axis=2) / np.maximum((m * m).sum(axis=2), 1e-300), 0, 1)[:, :, None]
+    return np.linalg.norm(w + t * m, axis=2), a + t * (b - a)
+seen = lit = 0
+for k, time in enumerate([None] + list(felt)):
+    data = open(sys.argv[1] % k, 'rb').read()
+    picture = np.frombuffer(data[-3 * n * n:], np.uint8).reshape(n, n, 3).astype(float) / 255
+    red = (picture[:, :, 0] > 0) & (picture[:, :, 1] == 0) & (picture[:, :, 2] == 0)
+    inside, near = np.zeros((n, n), bool), np.zeros((n, n), bool)
+    for row in felt[time] if k else []:
+        number = lambda names: np.array([float(row[c]) for c in names])
+        a, b, radius = number('xyz'), number(['end_x', 'end_y', 'end_z']), float(row['value'])
+        radius = radius or np.linalg.norm(b - a) / 100
+        d, p = core(rays, a, b)
+        pixel = np.linalg.norm(p - eye, axis=2) * half * 2 / n
+        mine = d < radius - pixel
+        inside |= mine
+        near |= abs(d - radius) <= pixel
+        if (a == b).all():  # and how bright a sphere is
+            sine, cosine = radius / np.linalg.norm(a - eye), (a - eye) @ -back / np.linalg.norm(a - eye)
+            scale = n / 2 / half  # the cone of rays that meet it, cut by the picture's plane
+            exact = np.pi * sine ** 2 * (1 - sine ** 2) ** 0.5 / (cosine ** 2 - sine ** 2) ** 1.5 * scale ** 2
+            area, ring = (red & (d < radius + pixel)).sum(), 2 * (np.pi * exact) ** 0.5
+            assert abs(area - exact) < 0.2 * ring, (k, area, exact, ring)
+            along = (rays * (a - eye)).sum(axis=2)
+            hit = eye + rays * (along - np.sqrt(np.maximum(radius ** 2 - d ** 2, 0)))[:, :, None]
+            shade = np.maximum(((hit - a) / radius) @ light, 0) * 0.9 + 0.1
+            inner = d < radius - 2 * pixel
+            assert abs(picture[:, :, 0] - shade)[inner].max() < 3 / 255, (k, abs(picture[:, :, 0] - shade)[inner].max())
+            lit += inner.sum()
+    assert red[inside].all(), (k, (~red & inside).sum())
+    assert not (red & ~inside & ~near).any(), (k, (red & ~inside & ~near).sum())
+    seen += inside.sum()
+assert seen > 6000 and lit > 2000, (seen, lit)
+P
+  local backend backends=(cpu)
+  local look=(--frames all --size 400 --eye '160,-300,170' --target '20,0,30' --supersample 1 --shade 0.9 --fill 0
+    --light-direction '-0.6,-0.64,0.48' --color '0,1,0' --background '0,0,1' --instrument-color '1,0,0')
+  cube >in.off
+  if emboss-render --plain --backend gl --size 8 in.off -o /dev/null 2>/dev/null; then
+    backends+=(gl)
+  else
+    left_out 'no OpenGL'
+  fi
+  for backend in "${backends[@]}"; do
+    emboss-render --backend "$backend" "${look[@]}" run.h5 -o "$backend-%d.ppm"
+    python3 in.py "$backend-%d.ppm" || fail "by $backend"
+  done
+  # They are no part of what places the camera.
+  emboss-render --backend cpu --frame 2 --stats=with.json --size 64 run.h5 -o with.png
+  emboss-render --backend cpu --frame 2 --no-instruments --stats=none.json --size 64 run.h5 -o none.png
+  place() { sed 's/.*\("eye":[^]]*\].*"light":[^]]*\]\).*/\1/' "$1"; }
+  [[ $(place with.json) == "$(place none.json)" ]] || fail 'the camera moved' "$(<with.json)" "$(<none.json)"
+  rm ./*.ppm run.h5
+  touched -o run.h5
+  # They are left out.
+  emboss-render --backend cpu --no-instruments --plain --size 64 run.h5 --to ppm -o without.ppm
+  emboss-render --backend cpu --object ball --frame 3 --stats=one.json --size 64 run.h5 --to ppm -o one.ppm
+  grep -q '"surfaces":1,' one.json || fail "$(<one.json)"
+  emboss-render --backend cpu --frame 3 --size 64 run.h5 -o with.png
+  emboss-render --backend cpu --frame 3 --no-instruments --size 64 run.h5 -o none.png
+  ! cmp -s with.png none.png || fail 'the instruments are not to be seen'
+  # A texture on the organ stays as it was, and one of theirs is none.
+  emboss-render --backend cpu --frame 3 --texture veins --uv-scale 30 --no-instruments --supersample 1 --size 128 run.h5 -o a.ppm
+  emboss-render --backend cpu --frame 3 --texture veins --uv-scale 30 --instrument-color 1,0,0 --supersample 1 --size 128 run.h5 -o b.ppm
+  python3 - <<'P'
+a, b = (open(f, 'rb').read()[-3 * 128 * 128:] for f in ('a.ppm', 'b.ppm'))
+other = [k for k in range(128 * 128) if a[3 * k:3 * k + 3] != b[3 * k:3 * k + 3]]
+assert 20 < len(other) < 1000 and all(b[3 * k] > 2 * b[3 * k + 1] == 2 * b[3 * k + 2] for k in other), len(other)
+P
+  emboss-render --backend cpu --frame 3 --field displacement --size 64 run.h5 -o field.png
+  expect_failure 2 emboss-render emboss-render --no-instruments --instrument-color 1,0,0 run.h5
+  expect_failure 2 emboss-render emboss-render --no-instruments in.off
+  rm -r in.py in.off log.csv answers told touch.scene free.scene ./*.ela ./*.h5 ./*.xdmf ./*.ppm ./*.png ./*.json
+}

@@ -160,6 +160,8 @@ void complete(RenderArguments& a) {
     refuse(norm(*a.light) == 0, "--light-direction: expected another vector than 0");
   }
   complete_field(a);
+  refuse(a.no_instruments && a.instrument_color,
+         "--instrument-color with --no-instruments, expected one of them");
   refuse(!a.frames.empty() && a.reading.frame.has_value(),
          "--frame and --frames, expected one of them");
   std::vector<std::string> inputs{a.surface};
@@ -241,6 +243,10 @@ void declare(Program& p, RenderArguments& a) {
            "of tetrahedra, solids: cut them open; what lies on that side of a point goes")
       .count(6);
   p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
+  p.flag("--no-instruments", a.no_instruments, "of a result: draw its objects alone");
+  p.option("--instrument-color", a.instrument_color, "R,G,B",
+           "of a result's instruments, 0 to 1 (default 0.75,0.77,0.8)")
+      .range(0, 1);
   p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
       .range(-1, 1e15);
   p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");

@@ -53,6 +53,8 @@ struct RenderArguments {
   SurfaceReadOptions reading;
   std::string frames;                           ///< of a result, "": one
   std::optional<std::int64_t> turn, turn_light; ///< pictures in one turn
+  bool no_instruments = false;                  ///< of a result
+  std::optional<Vec3> instrument_color;         ///< else that of steel
   CameraOptions camera;
   DrawingOptions drawing;
   UvOptions mapping;

@@ -1,5 +1,6 @@
 #include "tools/render/render_materials.h"
 
+#include "formats/results/results.h"
 #include "shading/tissue_color.h"
 #include "tools/render/render_layer.h"
 
@@ -61,6 +62,32 @@ void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
   common.others = std::move(others);
 }
 
+void take_instruments(RenderArguments& a, const Input& input) {
+  if (a.reading.kind != Kind::hdf5) {
+    if (a.no_instruments || a.instrument_color)
+      throw UsageError(input.name(),
+                       "--instrument-color or --no-instruments for no result of a run, "
+                       "expected neither");
+    return;
+  }
+  constexpr std::size_t smooth = 128, coarse = 32;
+  if (!a.no_instruments && a.reading.object.empty() && input.name() != "-" &&
+      !read_result_index(input.name()).instruments.empty())
+    a.reading.ring = a.style == "textured" ? smooth : coarse;
+}
+
+void add_instrument_material(SurfaceMaterial& common, const RenderArguments& a,
+                             DrawingOptions& drawing) {
+  if (a.reading.ring == 0)
+    return;
+  constexpr Vec3 steel{0.75, 0.77, 0.8};
+  SurfaceMaterial own;
+  own.color = a.instrument_color.value_or(a.style == "wireframe" ? a.common.color : steel);
+  own.background = common.background;
+  common.others.push_back(std::move(own));
+  drawing.instruments = true;
+}
+
 namespace {
 
 Vec3 color_of(const Surface& surface, std::size_t material) {
@@ -85,7 +112,7 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
     auto own = common.others.begin();
     for (const auto& [number, material] : a.materials) {
       const auto n = static_cast<std::size_t>(number);
-      const bool object = a.words.by == "object" && n < surfaces.size();
+      const bool object = a.words.by == "object" && n < surfaces.size() && !surfaces[n].instrument;
       if (!material.color && takes_tissue_color(*own))
         own->color = object                 ? color_of(surfaces[n], 0)
                      : a.words.by == "part" ? common.color
@@ -98,6 +125,8 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
     return;
   renumbers_ = true;
   for (const Surface& surface : surfaces) {
+    if (surface.instrument)
+      continue;
     std::vector<std::int32_t> numbers = surface.mesh.material;
     if (numbers.empty())
       numbers.push_back(0);
@@ -110,6 +139,8 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
         colors_.push_back(color);
     }
   }
+  if (colors_.empty())
+    return;
   common.color = colors_.front();
   drawing.group_by = GroupBy::material;
   for (std::size_t n = 1; n < colors_.size(); ++n) {
@@ -121,9 +152,11 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
 }
 
 void TissueColors::number_materials(std::vector<Surface>& surfaces) const {
-  if (!renumbers_ || colors_.size() == 1)
+  if (!renumbers_ || colors_.size() < 2)
     return;
   for (Surface& surface : surfaces) {
+    if (surface.instrument)
+      continue;
     surface.mesh.material.resize(surface.mesh.triangles.size());
     for (std::int32_t& number : surface.mesh.material) {
       const auto found =

@@ -24,6 +24,14 @@ std::vector<std::string> material_paths(const RenderArguments& arguments);
 void add_group_materials(SurfaceMaterial& common, const RenderArguments& arguments,
                          const Context& context);
 
+/// Reads, or not, the instruments that a result has. \throw UsageError if the input is no result
+/// and words about instruments were given; Error with place
+void take_instruments(RenderArguments& arguments, const Input& input);
+
+/// Adds the group of instruments behind all others, if they are read.
+void add_instrument_material(SurfaceMaterial& common, const RenderArguments& arguments,
+                             DrawingOptions& drawing);
+
 /// Colours for materials that were given neither colour nor image, see tissue_color().
 /// Where no number was given there is a group for each colour, whatever `--by` says: the triangles'
 /// materials are numbered anew.

@@ -68,6 +68,7 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
     drawing_.offset = {*a.offset_texels / material.structure->width(),
                        *a.offset_texels / material.structure->height()};
   tissue_.emplace(a, surfaces, material_, drawing_);
+  add_instrument_material(material_, a, drawing_);
   if (drawing_.rest)
     place_at_rest(material_, box_, a.mapping.edge);
   run_.timed("start", [&] {
@@ -204,7 +205,7 @@ void Pictures::tell_groups(const Drawing& drawing) {
   for (std::size_t g = 0; g < group_count(drawing); ++g)
     counts.push_back(triangles_of_group(drawing, g).size());
   run_.stats().set("triangles_by_look", counts);
-  for (std::size_t g = 1; g < counts.size(); ++g)
+  for (std::size_t g = 1; g <= drawing_.groups.size(); ++g)
     if (counts[g] == 0)
       run_.warn("no triangle is of " + arguments_.words.by + " " +
                 std::to_string(drawing_.groups[g - 1]));

@@ -1,11 +1,13 @@
 #include "tools/render/result_surfaces.h"
 
 #include "base/error.h"
+#include "contact/instrument_surface.h"
 #include "formats/results/results.h"
 #include "tetrahedra/order.h"
 #include "tools/render/solid_surface.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -75,6 +77,40 @@ Surface open_solid(const Frame& frame, const std::string& object, const SurfaceR
   });
 }
 
+/// The straight part in pieces of about the thickness, so that a near light falls off along it.
+std::size_t pieces_along(double length, double radius) {
+  constexpr double most = 32;
+  return static_cast<std::size_t>(std::clamp(std::ceil(length / (2 * radius)), 1.0, most));
+}
+
+Surface instrument_surface(const ResultInstrument& of, std::size_t ring) {
+  const Vec3 along = of.ends[1] - of.ends[0];
+  // Back into its own coordinates.
+  const auto& m = of.rotation;
+  const Vec3 axis = m[0] * along.x + m[1] * along.y + m[2] * along.z;
+  const bool sphere = of.kind == InstrumentKind::sphere, blade = of.kind == InstrumentKind::blade;
+  const double radius = shown_radius({of.radius, axis, of.friction, blade});
+  Surface surface;
+  surface.instrument = true;
+  if (!(radius > 0))
+    return surface;
+  InstrumentSurface own = sphere
+                              ? round_surface(radius, {}, ring)
+                              : round_surface(radius, axis, ring, pieces_along(norm(axis), radius));
+  const auto rotated = [&](const Vec3& r) {
+    return Vec3{dot(m[0], r), dot(m[1], r), dot(m[2], r)};
+  };
+  for (std::size_t i = 0; i < own.points.size(); ++i) {
+    surface.mesh.points.push_back(of.place + rotated(own.points[i]));
+    const Vec3 n = rotated(own.normals[i]);
+    surface.mesh.normals.push_back(
+        {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+  }
+  surface.mesh.triangles = std::move(own.triangles);
+  surface.rest = std::move(own.points);
+  return surface;
+}
+
 } // namespace
 
 std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
@@ -103,6 +139,9 @@ std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadO
   }
   if (options.clip && surfaces.empty())
     throw Error(frame.path, takes_all_away);
+  if (options.ring > 0)
+    for (const ResultInstrument& instrument : read_result_instruments(frame.path, frame.number))
+      surfaces.push_back(instrument_surface(instrument, options.ring));
   return surfaces;
 }
 

@@ -17,9 +17,11 @@ namespace gewebe {
 /// Objects in the order of the scene. With options.clip those that are cut as read_solid() does, at
 /// the displaced places of their nodes, quadratic elements as the eight of linear_parts(); the
 /// report sums them up. With options.field each corner has its value's place in ramp_texture():
-/// where an edge is cut it is interpolated linearly along it.
-/// \throw Error with place: a pipe, no such frame, object or field; with a plane also an object
-/// without tetrahedra, one that is not sound at rest, and a plane that takes all of all away
+/// where an edge is cut it is interpolated linearly along it. Behind the objects stand the
+/// instruments, if options.ring has them: whole, with their own normals, and with their shape
+/// around their own origin as the one at rest. \throw Error with place: a pipe, no such frame,
+/// object or field; with a plane also an object without tetrahedra, one that is not sound at rest,
+/// and a plane that takes all of all away
 std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadOptions& options,
                                           SolidReport& report);
 

@@ -8,6 +8,7 @@
 #include "tetrahedra/clip.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -21,7 +22,9 @@ struct SurfaceReadOptions {
   std::string object;                ///< of a result, by name; "": all
   std::optional<std::int64_t> frame; ///< of a result, from 0; -1 is the last one, and the default
   std::optional<ClipPlane> clip;     ///< of tetrahedra
-  std::string field;                 ///< of a result, of result_field_names(); "": none
+  std::size_t ring = 0; ///< of a result: corners of the rings of its instruments, as round_surface
+                        ///< has them; 0: they are left out
+  std::string field;    ///< of a result, of result_field_names(); "": none
   std::optional<std::array<double, 2>>
       field_range; ///< the values of the ramp's ends, if there is one
 };
