@@ -24,6 +24,9 @@ public:
   /// \throw Error as cut_tetrahedra, of the blade
   explicit Blade(const TriangleMesh& surface);
 
+  /// Of all of it; empty without triangles.
+  const Box3& box() const { return boxes_[1]; }
+
   /// May the surface come into the box? (By boxes of its triangles.)
   bool meets(const Box3& box) const;
 

@@ -54,8 +54,26 @@ public:
   }
 
 private:
+  /// Bits for the planes of the blade's box beyond which each node lies: tetrahedra whose nodes
+  /// share one are done with, which most are.
+  std::vector<std::uint8_t> beyond_box() const {
+    const Box3& box = blade_.box();
+    std::vector<std::uint8_t> beyond(places_.size());
+    for (std::size_t n = 0; n < beyond.size(); ++n) {
+      const Vec3& p = places_[n];
+      beyond[n] = static_cast<std::uint8_t>(
+          (p.x < box.min.x ? 1 : 0) | (p.x > box.max.x ? 2 : 0) | (p.y < box.min.y ? 4 : 0) |
+          (p.y > box.max.y ? 8 : 0) | (p.z < box.min.z ? 16 : 0) | (p.z > box.max.z ? 32 : 0));
+    }
+    return beyond;
+  }
+
   void find_candidates() {
+    const std::vector<std::uint8_t> beyond = beyond_box();
     for (std::uint32_t t = 0; t < mesh_.tetrahedra.size(); ++t) {
+      const auto& [a, b, c, d] = mesh_.tetrahedra[t];
+      if ((beyond[a] & beyond[b] & beyond[c] & beyond[d]) != 0)
+        continue;
       Box3 box;
       for (const std::uint32_t corner : mesh_.tetrahedra[t])
         box.add(places_[corner]);
@@ -137,21 +155,20 @@ private:
   }
 
   void gather() {
-    std::vector<bool> marked(mesh_.points.size());
-    bool any = false;
+    if (std::ranges::none_of(passed_, &Passed::used))
+      return;
+    std::vector<std::uint8_t> marked(mesh_.points.size());
     for (const Passed& edge : passed_)
       if (edge.used)
-        marked[edge.low] = marked[edge.high] = any = true;
-    if (!any)
-      return;
-    const auto is_marked = [&](std::uint32_t node) { return marked[node]; };
+        marked[edge.low] = marked[edge.high] = 1;
     std::size_t next = 0; // candidate
     for (std::uint32_t t = 0; t < mesh_.tetrahedra.size(); ++t) {
       const Tetrahedron& corners = mesh_.tetrahedra[t];
+      const auto& [a, b, c, d] = corners;
+      if ((marked[a] | marked[b] | marked[c] | marked[d]) == 0)
+        continue;
       while (next < candidates_.size() && candidates_[next].number < t)
         ++next;
-      if (std::ranges::none_of(corners, is_marked))
-        continue;
       RegionTet tet{t, corners, {}, {}, false};
       tet.crossing.fill(no_crossing);
       if (next < candidates_.size() && candidates_[next].number == t) {
@@ -165,8 +182,6 @@ private:
     std::ranges::sort(region_.nodes);
     const auto repeated = std::ranges::unique(region_.nodes);
     region_.nodes.erase(repeated.begin(), repeated.end());
-    for (const std::uint32_t node : region_.nodes)
-      region_.whole.push_back(marked[node]);
     take_used_edges();
     make_stars();
   }

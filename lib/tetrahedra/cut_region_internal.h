@@ -46,11 +46,10 @@ struct RegionTet {
 
 struct CutRegion {
   std::vector<CrossedEdge> edges;   ///< by the numbers of their ends in the mesh
-  std::vector<RegionTet> tets;      ///< ascending; all at the ends of crossed edges
+  std::vector<RegionTet> tets;      ///< ascending: all with an end of a crossed edge
   std::vector<std::uint32_t> nodes; ///< of each local node its number in the mesh, ascending
   std::vector<std::uint32_t> first; ///< star[first[n] … first[n+1]) of a local node:
-  std::vector<std::uint32_t> star;  ///< tetrahedra of the region, ascending
-  std::vector<bool> whole;          ///< is the star of a local node all of it?
+  std::vector<std::uint32_t> star;  ///< tetrahedra of the region at it, ascending
   std::uint64_t tested = 0, folded = 0;
 
   std::span<const std::uint32_t> star_of(std::uint32_t node) const {
