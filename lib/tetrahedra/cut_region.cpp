@@ -197,8 +197,13 @@ private:
       // From the nearer end, so that what is close to it keeps its digits.
       const Vec3 point = edge.share <= 0.5 ? low + (high - low) * edge.share
                                            : high + (low - high) * (1 - edge.share);
-      region_.edges.push_back(
-          {{local(edge.low), local(edge.high)}, edge.share, point, norm(high - low), 0});
+      region_.edges.push_back({{local(edge.low), local(edge.high)},
+                               edge.share,
+                               point,
+                               norm(high - low),
+                               0,
+                               no_crossing,
+                               0});
     }
     std::vector<std::uint32_t> order(region_.edges.size());
     std::iota(order.begin(), order.end(), 0U);
@@ -207,11 +212,18 @@ private:
     });
     for (std::size_t n = 0; n < order.size(); ++n)
       region_.edges[order[n]].rank = static_cast<std::uint32_t>(n);
-    for (RegionTet& tet : region_.tets) {
+    for (std::uint32_t r = 0; r < region_.tets.size(); ++r) {
+      RegionTet& tet = region_.tets[r];
       for (std::uint32_t& corner : tet.corners)
         corner = local(corner);
-      for (std::uint32_t& crossing : tet.crossing)
+      for (std::uint32_t k = 0; k < 6; ++k) {
+        std::uint32_t& crossing = tet.crossing[k];
         crossing = crossing == no_crossing ? no_crossing : place[crossing];
+        if (crossing == no_crossing || region_.edges[crossing].tet != no_crossing)
+          continue;
+        region_.edges[crossing].tet = r;
+        region_.edges[crossing].edge = k;
+      }
     }
   }
 

@@ -23,6 +23,8 @@ struct CrossedEdge {
   Vec3 point;       ///< at rest
   double length = 0;
   std::uint32_t rank = 0; ///< in the order in which edges are halved: long ones first
+  std::uint32_t tet = 0;  ///< of the region, at it, the first
+  std::uint32_t edge = 0; ///< of that (tetrahedron_edges)
 };
 
 /// A tetrahedron of the region.

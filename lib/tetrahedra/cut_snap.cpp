@@ -38,10 +38,9 @@ class Snapper {
 public:
   Snapper(const TetMesh& mesh, const CutRegion& region, const BladeCutOptions& options)
       : mesh_(mesh), region_(region), options_(options) {
-    for (const std::uint32_t node : region.nodes) {
+    for (const std::uint32_t node : region.nodes)
       result_.points.push_back(mesh.points[node]);
-      result_.origin.push_back({node, node, 0});
-    }
+    result_.along.assign(region.nodes.size(), no_crossing);
     result_.on.resize(region.nodes.size());
     held_.resize(region.nodes.size());
     for (const std::uint32_t node : options.held) {
@@ -183,7 +182,7 @@ private:
     if (way.share <= there_already)
       return;
     result_.points[node] = edge.point;
-    result_.origin[node] = {region_.nodes[node], region_.nodes[edge.ends[1 - way.end]], way.share};
+    result_.along[node] = way.edge;
     ++result_.moved;
   }
 

@@ -12,9 +12,9 @@ namespace gewebe {
 
 /// By local nodes.
 struct SnappedRegion {
-  std::vector<Vec3> points;          ///< at rest, some of them moved
-  std::vector<bool> on;              ///< does the wound pass through the node?
-  std::vector<TetNodeOrigin> origin; ///< nodes as numbered in the mesh
+  std::vector<Vec3> points;         ///< at rest, some of them moved
+  std::vector<bool> on;             ///< does the wound pass through the node?
+  std::vector<std::uint32_t> along; ///< the crossed edge along which it was moved, or no_crossing
   std::uint64_t moved = 0, kept = 0;
   double largest_miss = 0;
 };

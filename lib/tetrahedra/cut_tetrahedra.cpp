@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "tetrahedra/cut_blade_internal.h"
+#include "tetrahedra/cut_middles_internal.h"
 #include "tetrahedra/cut_region_internal.h"
 #include "tetrahedra/cut_snap_internal.h"
 #include "tetrahedra/cut_wall_internal.h"
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -16,8 +18,6 @@ namespace gewebe {
 namespace {
 
 void check(const TetMesh& mesh, const BladeCutOptions& options) {
-  if (!mesh.middles.empty())
-    throw Error("quadratic tetrahedra, expected linear ones to cut");
   if (!options.places.empty() && options.places.size() != mesh.points.size())
     throw Error(std::to_string(options.places.size()) +
                 " places, expected none or one for each of "
@@ -43,11 +43,11 @@ class Assembler {
 public:
   Assembler(const TetMesh& mesh, const CutRegion& region, const SnappedRegion& snapped,
             const PartedRegion& parted)
-      : region_(region), snapped_(snapped), parted_(parted) {
+      : before_(mesh), region_(region), snapped_(snapped), parted_(parted) {
     cut_.mesh = mesh;
     cut_.origin.resize(mesh.points.size());
     for (std::uint32_t n = 0; n < cut_.origin.size(); ++n)
-      cut_.origin[n] = {n, n, 0};
+      cut_.origin[n].node = n;
     cut_.tetrahedron.resize(mesh.tetrahedra.size());
     for (std::uint32_t t = 0; t < cut_.tetrahedron.size(); ++t)
       cut_.tetrahedron[t] = t;
@@ -65,6 +65,8 @@ public:
     add_copies();
     write_parts();
     write_wall();
+    if (!before_.middles.empty())
+      add_middles(before_, original_, cut_);
     return std::move(cut_);
   }
 
@@ -78,32 +80,48 @@ private:
     return static_cast<std::uint32_t>(cut_.mesh.points.size() - 1);
   }
 
+  /// In a tetrahedron at a crossed edge, on that edge.
+  TetNodeOrigin origin_on(std::uint32_t e) const {
+    const CrossedEdge& edge = region_.edges[e];
+    const RegionTet& tet = region_.tets[edge.tet];
+    TetNodeOrigin origin{TetNodeOrigin::none, tet.number, {}};
+    for (std::size_t k = 0; k < 4; ++k)
+      origin.weights[k] = tet.corners[k] == edge.ends[0]   ? 1 - edge.share
+                          : tet.corners[k] == edge.ends[1] ? edge.share
+                                                           : 0;
+    return origin;
+  }
+
   void move_nodes() {
     number_ = region_.nodes;
-    for (std::size_t n = 0; n < region_.nodes.size(); ++n) {
-      cut_.mesh.points[number_[n]] = snapped_.points[n];
-      cut_.origin[number_[n]] = snapped_.origin[n];
-    }
+    for (std::size_t n = 0; n < region_.nodes.size(); ++n)
+      if (snapped_.along[n] != no_crossing) {
+        cut_.mesh.points[number_[n]] = snapped_.points[n];
+        cut_.origin[number_[n]] = origin_on(snapped_.along[n]);
+      }
   }
 
   void add_crossings() {
-    for (const CrossedEdge& edge : region_.edges) {
+    for (std::uint32_t e = 0; e < region_.edges.size(); ++e) {
+      const CrossedEdge& edge = region_.edges[e];
       if (snapped_.on[edge.ends[0]] || snapped_.on[edge.ends[1]]) {
         number_.push_back(UINT32_MAX); // given up
         continue;
       }
-      std::uint32_t near = region_.nodes[edge.ends[0]], far = region_.nodes[edge.ends[1]];
-      double share = edge.share;
-      if (!(share <= 0.5)) {
-        std::swap(near, far);
-        share = 1 - share;
+      if (before_.middles.empty()) {
+        number_.push_back(add_node(edge.point, origin_on(e)));
+        continue;
       }
-      number_.push_back(add_node(edge.point, {near, far, share}));
+      number_.push_back(before_.middles[region_.tets[edge.tet].number][edge.edge]);
+      cut_.mesh.points[number_.back()] = edge.point;
+      cut_.origin[number_.back()] = origin_on(e);
     }
   }
 
   /// The largest piece keeps the number, the others get new ones in their order.
   void add_copies() {
+    original_.resize(cut_.mesh.points.size());
+    std::iota(original_.begin(), original_.end(), 0U);
     for (const PartedRegion::Piece& node : parted_.nodes) {
       first_copy_.push_back(static_cast<std::uint32_t>(cut_.mesh.points.size()));
       const std::uint32_t number = number_[node.node];
@@ -111,6 +129,7 @@ private:
         const Vec3 point = cut_.mesh.points[number];
         const TetNodeOrigin origin = cut_.origin[number];
         add_node(point, origin);
+        original_.push_back(number);
         ++cut_.report.doubled;
       }
     }
@@ -137,7 +156,7 @@ private:
         corners[k] = node_at(part, k);
         const std::uint32_t local = part.corners[k];
         changed = changed || corners[k] != cut_.mesh.tetrahedra[tet.number][k] ||
-                  (local < snapped_.origin.size() && snapped_.origin[local].share > 0);
+                  (local < snapped_.along.size() && snapped_.along[local] != no_crossing);
       }
       if (first) {
         number_of_part_.push_back(tet.number);
@@ -155,6 +174,8 @@ private:
       cut_.tetrahedron.push_back(tet.number);
       if (!cut_.mesh.material.empty())
         cut_.mesh.material.push_back(cut_.mesh.material[tet.number]);
+      if (!before_.middles.empty())
+        cut_.mesh.middles.emplace_back();
     }
   }
 
@@ -188,10 +209,12 @@ private:
     return part.side != 0 ? part.side > 0 : beyond.side < 0;
   }
 
+  const TetMesh& before_;
   const CutRegion& region_;
   const SnappedRegion& snapped_;
   const PartedRegion& parted_;
   std::vector<std::uint32_t> number_;         // of local nodes and crossings, in the cut mesh
+  std::vector<std::uint32_t> original_;       // of each corner: the node that it is, or a copy of
   std::vector<std::uint32_t> first_copy_;     // of parted_.nodes
   std::vector<std::uint32_t> number_of_part_; // in the cut mesh
   TetCut cut_;
@@ -204,6 +227,8 @@ TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
   check(mesh, options);
   const Blade swept(blade);
   const CutRegion region = cut_region(mesh, options.places, swept);
+  if (!mesh.middles.empty())
+    check_straight(mesh, region);
   const SnappedRegion snapped = snap_region(mesh, region, options);
   const PartedRegion parted = part_region(region, snapped);
   return Assembler(mesh, region, snapped, parted).assemble();

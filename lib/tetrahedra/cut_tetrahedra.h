@@ -37,11 +37,13 @@ struct BladeCutOptions {
   std::span<const std::uint32_t> held = {};
 };
 
-/// A node of the cut mesh stood at a + share (b - a) of nodes before; a kept one at itself, both
-/// being it. Displacements and velocities are the same mixture.
+/// Where a node of the cut mesh stood before.
 struct TetNodeOrigin {
-  std::uint32_t a = 0, b = 0;
-  double share = 0;
+  static constexpr std::uint32_t none = UINT32_MAX;
+
+  std::uint32_t node = none;        ///< at this node, or
+  std::uint32_t tetrahedron = none; ///< in this tetrahedron
+  std::array<double, 4> weights{};  ///< of its corners, sum 1; middles of edges can lie beside it
 
   bool operator==(const TetNodeOrigin&) const = default;
 };
@@ -52,6 +54,7 @@ struct TetNodeOrigin {
 /// Corner k of side 0 and corner 2 - k of side 1 stand at one place.
 struct WallTriangle {
   std::array<Triangle, 2> corners{};
+  std::array<Triangle, 2> middles{}; ///< of edges 01, 12, 20, where the mesh is quadratic
   std::array<std::uint32_t, 2> tetrahedron{};
 };
 
@@ -105,11 +108,16 @@ struct TetCut {
 /// blade); everything beyond that is in proportion to the tetrahedra at nodes of edges that the
 /// blade passes. On one thread.
 /// \pre check_mesh(mesh) passes
-/// \throw Error if the mesh is quadratic; if a tetrahedron near the blade has no positive volume;
-/// if a point of the blade or a place is not finite or too far away (2^40 mm); if the blade has an
-/// edge with three triangles, or two that run along it the same way; if an option is out of its
-/// range; if there are too many nodes or tetrahedra
+/// \throw Error if an edge near the blade is curved (curved_edge); if a tetrahedron near the blade
+/// has no positive volume; if a point of the blade or a place is not finite or too far away (2^40
+/// mm); if the blade has an edge with three triangles, or two that run along it the same way; if an
+/// option is out of its range; if there are too many nodes or tetrahedra
 TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options = {});
+
+/// What has a value at each node before, at those of the cut mesh: by the shape functions of the
+/// elements before. \pre `field` has one value per node before
+std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigin> origin,
+                             std::span<const Vec3> field);
 
 } // namespace gewebe

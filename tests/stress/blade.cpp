@@ -1,6 +1,6 @@
 // Strains cuts of solids by blades: random paths of a blade through a liver, a spleen and balls
 // (balls alone where there is no shared data), whole sweeps and sweeps in steps, ten one behind the
-// other in each solid, some tissue with a second material, some of it displaced. What holds of
+// other in each solid, some with a second material, displaced, or quadratic. What holds of
 // every cut is in tests/unit/tet_cut_checks.h. Tells times of the cuts, how far walls miss the
 // blade and what becomes of angles. Argument: number of cuts (default 1000).
 
@@ -9,6 +9,7 @@
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "tests/unit/tet_cut_checks.h"
+#include "tetrahedra/order.h"
 #include "voxelize/voxelize.h"
 
 #include <algorithm>
@@ -163,6 +164,8 @@ void strain(const Body& body, std::uint32_t seed, std::uint64_t cuts, Totals& to
   if (seed % 3 == 0)
     for (const Tetrahedron& t : mesh.tetrahedra)
       mesh.material.push_back(norm(mesh.points[t[0]] - mesh.points[0]) > 6 * edge ? 1 : 0);
+  if (seed % 4 == 3)
+    make_quadratic(mesh);
   for (int n = 0; n < cuts_of_solid && totals.cuts < cuts; ++n) {
     const TriangleMesh blade = sweep(mesh, chance);
     const std::string name = body.name + " " + std::to_string(seed) + ", cut " + std::to_string(n);

@@ -429,9 +429,12 @@ TEST(TetCut, RefusesByName) {
                            const BladeCutOptions& options = {}) {
     return complaint([&] { cut_tetrahedra(solid, surface, options); });
   };
-  TetMesh quadratic = mesh;
-  make_quadratic(quadratic);
-  EXPECT_EQ(refusal(quadratic, blade), "quadratic tetrahedra, expected linear ones to cut");
+  TetMesh curved = mesh;
+  make_quadratic(curved);
+  EXPECT_EQ(refusal(curved, blade), "");
+  for (std::size_t n = mesh.points.size(); n < curved.points.size(); ++n)
+    curved.points[n].z += 0.01;
+  EXPECT_NE(refusal(curved, blade).find("is curved"), std::string::npos);
   TetMesh turned = mesh;
   std::swap(turned.tetrahedra[9][0], turned.tetrahedra[9][1]);
   EXPECT_NE(refusal(turned, blade).find("no positive volume"), std::string::npos);
@@ -465,6 +468,86 @@ TEST(TetCut, RefusesByName) {
   options = {};
   options.places = lost;
   EXPECT_NE(refusal(mesh, blade, options), "");
+}
+
+// ---- Quadratic solids, and what nodes carry
+
+Vec3 polynomial(const Vec3& p, bool quadratic) {
+  const Vec3 linear{1 + p.x - 2 * p.y, p.z + 0.5 * p.x, 3 - p.y};
+  return quadratic ? linear + Vec3{p.x * p.y, p.z * p.z - p.x * p.z, p.y * p.y} : linear;
+}
+
+TEST(TetCut, QuadraticSolidsKeepTheirMiddles) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> reach(0.1, 0.5);
+  for (const bool distorted : {false, true}) {
+    TetMesh mesh = distorted ? test::distorted_box() : slabs(5, 2);
+    make_quadratic(mesh);
+    for (int n = 0; n < 12; ++n) {
+      const TetCut cut = cut_tetrahedra(mesh, random_flat(mesh, reach(random), random).surface);
+      ASSERT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "") << n;
+      ASSERT_EQ(cut.mesh.middles.size(), cut.mesh.tetrahedra.size());
+      mesh = cut.mesh;
+    }
+  }
+}
+
+TEST(TetCut, QuadraticSolidsAreCutAsLinearOnesAre) {
+  const TetMesh mesh = slabs(5, 2);
+  TetMesh quadratic = mesh;
+  make_quadratic(quadratic);
+  const TriangleMesh blade = blade_strip({0.4, 0.5, 0.54}, {0.5, 0, 0.1}, {0, 1, 0.05});
+  const TetCut a = cut_tetrahedra(mesh, blade), b = cut_tetrahedra(quadratic, blade);
+  ASSERT_EQ(a.mesh.tetrahedra.size(), b.mesh.tetrahedra.size());
+  for (std::size_t t = 0; t < a.mesh.tetrahedra.size(); ++t)
+    EXPECT_EQ(test::places_of(a.mesh, t), test::places_of(b.mesh, t));
+  EXPECT_EQ(a.wall.size(), b.wall.size());
+  EXPECT_EQ(a.changed, b.changed);
+  // All nodes stay in use, so that none is left over.
+  EXPECT_EQ(examine_tetrahedra(b.mesh).unused_points.count, 0U);
+  EXPECT_EQ(component_count(a.mesh), component_count(b.mesh));
+}
+
+TEST(TetCut, NodesCarryWhatTheElementsSay) {
+  std::mt19937 random(13);
+  for (const bool quadratic : {false, true}) {
+    TetMesh mesh = test::distorted_box();
+    if (quadratic)
+      make_quadratic(mesh);
+    const TetCut cut = cut_tetrahedra(mesh, random_flat(mesh, 0.6, random).surface);
+    ASSERT_GT(cut.report.moved, 0U);
+    std::vector<Vec3> field;
+    for (const Vec3& p : mesh.points)
+      field.push_back(polynomial(p, quadratic));
+    const std::vector<Vec3> carried = carry_over(mesh, cut.origin, field);
+    ASSERT_EQ(carried.size(), cut.mesh.points.size());
+    for (std::size_t n = 0; n < carried.size(); ++n)
+      EXPECT_LE(norm(carried[n] - polynomial(cut.mesh.points[n], quadratic)), 1e-12) << n;
+  }
+}
+
+/// A box with a notch between an upright plane and a slanted one, whose floor is an edge.
+TEST(TetCut, ANodeCanFallIntoThreePieces) {
+  TetMesh whole = box_tetrahedra(4, 2, 4), mesh;
+  mesh.points = whole.points;
+  for (const Tetrahedron& t : whole.tetrahedra) {
+    Vec3 c;
+    for (const std::uint32_t corner : t)
+      c += whole.points[corner] * 0.25;
+    if (!(c.z > 2 && c.x > 2 && c.x - 2 < c.z - 2))
+      mesh.tetrahedra.push_back(t);
+  }
+  drop_unused_points(mesh);
+  ASSERT_TRUE(examine_tetrahedra(mesh).manifold_boundary());
+  const TriangleMesh blade = blade_strip({2, 1, 2}, {3, 0, 0}, {0, 3, 0});
+  const TetCut cut = cut_tetrahedra(mesh, blade);
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_EQ(component_count(cut.mesh), 3U);
+  const auto at_floor = std::ranges::count_if(cut.mesh.points, [](const Vec3& p) {
+    return p == Vec3{2, 1, 2};
+  });
+  EXPECT_EQ(at_floor, 3);
+  EXPECT_NEAR(wall_area(cut), 8, 1e-12);
 }
 
 // ---- Parts of it
@@ -557,7 +640,14 @@ TEST(TetCut, ChecksSeePlantedFaults) {
   EXPECT_EQ(fault([&](TetCut& c) { c.mesh.material[added] = 10 - c.mesh.material[added]; }),
             "material of tetrahedron");
   EXPECT_EQ(fault([](TetCut& c) { c.mesh.points.back().z += 1e-6; }), "place of node");
-  EXPECT_EQ(fault([](TetCut& c) { c.origin.back().share = 0.7; }), "origin of node");
+  EXPECT_EQ(fault([](TetCut& c) { c.origin.back().tetrahedron = 1 << 30; }), "origin of node");
+  EXPECT_EQ(fault([](TetCut& c) {
+              for (TetNodeOrigin& from : c.origin)
+                if (from.node == TetNodeOrigin::none)
+                  from.weights = {0.25, 0.25, 0.25, 0.25};
+            }),
+            "place of node");
+  EXPECT_EQ(fault([](TetCut& c) { c.origin[1].node = 0; }), "number of node");
   EXPECT_EQ(fault([](TetCut& c) { c.changed.pop_back(); }), "tetrahedron told to be unchanged");
   EXPECT_EQ(fault([](TetCut& c) { c.wall.pop_back(); }), "area of what was the boundary before");
   EXPECT_EQ(fault([](TetCut& c) { std::swap(c.wall[0].corners[0][0], c.wall[0].corners[0][1]); }),

@@ -82,24 +82,70 @@ inline std::set<Triangle> outer_faces(const TetMesh& mesh) {
   return outer;
 }
 
+inline std::array<double, 3> key_of(const Vec3& p) {
+  return {p.x, p.y, p.z};
+}
+
+/// Does a place lie in a tetrahedron, to rounding?
+inline bool is_within(const TetMesh& mesh, std::size_t t, const Vec3& place) {
+  const std::array<Vec3, 4> p = places_of(mesh, t);
+  const double whole = tetrahedron_volume(p[0], p[1], p[2], p[3]);
+  for (std::size_t k = 0; k < 4; ++k) {
+    std::array<Vec3, 4> q = p;
+    q[k] = place;
+    if (!(tetrahedron_volume(q[0], q[1], q[2], q[3]) >= -1e-9 * whole))
+      return false;
+  }
+  return true;
+}
+
+/// Nodes in the middles of a triangle's edges 01, 12, 20.
+inline Triangle middles_of(const TetMesh& mesh, std::uint32_t t, const Triangle& corners) {
+  Triangle middles{};
+  for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::set<std::uint32_t> edge{mesh.tetrahedra[t][tetrahedron_edges[k][0]],
+                                         mesh.tetrahedra[t][tetrahedron_edges[k][1]]};
+      if (edge == std::set<std::uint32_t>{corners[c], corners[(c + 1) % 3]})
+        middles[c] = mesh.middles[t][k];
+    }
+  return middles;
+}
+
 /// The first thing that is wrong, or "".
 inline std::string fault_of(const TetMesh& before, const TetCut& cut, double least_angle) {
   const TetMesh& mesh = cut.mesh;
   const auto at = [](const char* what, std::size_t n) { return what + (" " + std::to_string(n)); };
   check_mesh(mesh);
+  const double size = norm(bounding_box(before).size());
   if (cut.origin.size() != mesh.points.size() || cut.tetrahedron.size() != mesh.tetrahedra.size())
     return "sizes of origins";
   // Nodes stand where their origin says, tetrahedra have their parent's material, and shape.
   for (std::size_t n = 0; n < mesh.points.size(); ++n) {
-    const auto& [a, b, share] = cut.origin[n];
-    if (a >= before.points.size() || b >= before.points.size() || !(share >= 0 && share <= 0.5))
+    const TetNodeOrigin& from = cut.origin[n];
+    const bool node = from.node < before.points.size();
+    if (node == (from.tetrahedron < before.tetrahedra.size()))
       return at("origin of node", n);
-    const Vec3 place = before.points[a] + (before.points[b] - before.points[a]) * share;
-    if (!(norm(mesh.points[n] - place) <= 1e-14 * (norm(place) + 1)))
-      return at("place of node", n);
-    if (n < before.points.size() && a != n)
+    if (n < before.points.size() && node && from.node != n)
       return at("number of node", n);
+    double sum = 0;
+    for (const double weight : from.weights) {
+      sum += weight;
+      if (!(weight >= -0.2 && weight <= 1.2))
+        return at("weights of node", n);
+    }
+    if (!node && !(std::fabs(sum - 1) <= 1e-12))
+      return at("weights of node", n);
   }
+  const std::vector<Vec3> carried = carry_over(before, cut.origin, before.points);
+  for (std::size_t n = 0; n < mesh.points.size(); ++n)
+    if (!(norm(mesh.points[n] - carried[n]) <= 1e-12 * (norm(carried[n]) + size)))
+      return at("place of node", n);
+  std::set<std::array<double, 3>> moved;
+  for (const std::uint32_t t : cut.changed)
+    for (const std::uint32_t corner : before.tetrahedra[t])
+      if (cut.origin[corner].node == TetNodeOrigin::none)
+        moved.insert(key_of(mesh.points[corner]));
   std::vector<bool> changed(before.tetrahedra.size());
   for (const std::uint32_t t : cut.changed)
     changed[t] = true;
@@ -109,22 +155,24 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
       return at("parent of tetrahedron", t);
     if (!before.material.empty() && mesh.material[t] != before.material[parent])
       return at("material of tetrahedron", t);
-    if (!changed[parent] && (mesh.tetrahedra[t] != before.tetrahedra[parent] ||
-                             places_of(mesh, t) != places_of(before, parent)))
+    if (!changed[parent] &&
+        (mesh.tetrahedra[t] != before.tetrahedra[parent] ||
+         places_of(mesh, t) != places_of(before, parent) ||
+         (!before.middles.empty() && mesh.middles[t] != before.middles[parent])))
       return at("tetrahedron told to be unchanged", t);
     if (!(volume_at(mesh, t) > 0))
       return at("inverted tetrahedron", t);
     if (changed[parent] &&
         !(least_margin(mesh, t) >= std::min(least_angle, least_margin(before, parent)) - 1e-9))
       return at("angles of tetrahedron", t);
-    // Corners stand at corners of the parent, in its edges, or were such corners and have moved.
+    // Corners that weren't one of the parent's stand in it, but for those that have moved.
     const Tetrahedron& own = before.tetrahedra[parent];
-    for (const std::uint32_t corner : mesh.tetrahedra[t]) {
-      const auto& [a, b, share] = cut.origin[corner];
-      const bool moved =
-          share > 0 && a < before.points.size() && mesh.points[a] == mesh.points[corner];
-      if (std::ranges::find(own, a) == own.end() ||
-          (!moved && std::ranges::find(own, b) == own.end()))
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::uint32_t corner = mesh.tetrahedra[t][k];
+      if (cut.origin[corner].node != TetNodeOrigin::none
+              ? std::ranges::find(own, cut.origin[corner].node) == own.end()
+              : !moved.contains(key_of(mesh.points[corner])) &&
+                    !is_within(before, parent, mesh.points[corner]))
         return at("corners of tetrahedron", t);
     }
   }
@@ -140,6 +188,8 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
   if (was.manifold_boundary() && !is.manifold_boundary())
     return at("boundary of edges", is.nonmanifold_edges.count) +
            at(", of points", is.nonmanifold_points.count);
+  if (is.curved_edges.count > was.curved_edges.count)
+    return at("curved edge", is.curved_edges.first);
   if (is.unused_points.count > was.unused_points.count)
     return at("unused point", is.unused_points.first);
   // Walls are on the boundary, on either side of the same place, and all that is new on it.
@@ -156,6 +206,9 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
       for (const std::uint32_t corner : wall.corners[side])
         if (std::ranges::find(t, corner) == t.end())
           return at("tetrahedron of wall", w);
+      if (!mesh.middles.empty() &&
+          wall.middles[side] != middles_of(mesh, wall.tetrahedron[side], wall.corners[side]))
+        return at("middles of wall", w);
     }
     bool same = true;
     for (std::size_t k = 0; k < 3; ++k) {
