@@ -94,7 +94,10 @@ std::vector<NodeVector> TwoStepYielding::held_forces(std::span<const NodeTouch> 
     return forces;
   VectorXd f = VectorXd::Zero(static_cast<Index>(rows_.size()));
   for (const NodeTouch& t : touches) {
-    const auto k = std::lower_bound(nodes_.begin(), nodes_.end(), t.node) - nodes_.begin();
+    const auto found = std::lower_bound(nodes_.begin(), nodes_.end(), t.node);
+    if (found == nodes_.end() || *found != t.node)
+      continue; // it gives no way
+    const auto k = found - nodes_.begin();
     for (int a = 0; a < 3; ++a)
       f[3 * k + a] += t.force[a];
   }
@@ -107,6 +110,17 @@ std::vector<NodeVector> TwoStepYielding::held_forces(std::span<const NodeTouch> 
         std::lower_bound(forces.begin(), forces.end(), node,
                          [](const NodeVector& v, std::uint32_t wanted) { return v.node < wanted; });
     at->value[static_cast<int>(held_[k] % 3)] = held[static_cast<Index>(k)];
+  }
+  // The support of a displaced node carries what touches it.
+  for (const NodeTouch& t : touches) {
+    const auto at =
+        std::lower_bound(forces.begin(), forces.end(), t.node,
+                         [](const NodeVector& v, std::uint32_t wanted) { return v.node < wanted; });
+    if (at == forces.end() || at->node != t.node)
+      continue;
+    for (int a = 0; a < 3; ++a)
+      if (!is_fixed(model_, t.node, a))
+        at->value[a] -= t.force[a];
   }
   return forces;
 }

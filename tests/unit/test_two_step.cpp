@@ -8,6 +8,7 @@
 
 #include "compliance/compliance_source.h"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
@@ -348,6 +349,53 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
           }
         }
       }
+}
+
+/// Its support carries what presses on it, beyond the threshold as below.
+TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
+  const Model model = organ(), stiff = stiffened(model, 2, 5);
+  const auto middle = [&](const Triangle& t) {
+    return (model.nodes[t[0]].position + model.nodes[t[1]].position + model.nodes[t[2]].position) /
+           3;
+  };
+  const Triangle top = *std::max_element(
+      model.triangles.begin(), model.triangles.end(),
+      [&](const Triangle& a, const Triangle& b) { return middle(a).z < middle(b).z; });
+  const Vec3 start = middle(top) + Vec3{0, 0, 2.1};
+  const auto press = [&](std::optional<TwoStepOptions> options, double friction) {
+    Simulation s(test::one_thread(),
+                 {.warn = [](const std::string& text) { ADD_FAILURE() << text; }});
+    s.add_object("o", model, Method::ffe);
+    if (options)
+      s.apply(SetTwoStep{0, *options, [&] { return compliance_of(stiff); }});
+    s.apply(SetDisplacement{0, {top[1]}, {0.02, 0, -0.03}});
+    s.apply(SetInstrument{0, {2, {}, friction}, {start, {}}});
+    s.apply(MoveInstrument{0, start - Vec3{0, 0, 0.4}, {}, 0.2});
+    for (int k = 0; k < 4; ++k)
+      s.step(0.05);
+    EXPECT_EQ(s.instrument(0).nodes, 3U); // the displaced one among them
+    return Pressed{{s.displacement(0).begin(), s.displacement(0).end()},
+                   s.contact_forces(0),
+                   s.instrument(0).force};
+  };
+  for (const bool series : {false, true})
+    for (const double friction : {0.0, 0.3}) {
+      const Pressed one = press({}, friction);
+      const TwoStepOptions options{norm(one.tool) / 3, series};
+      const Pressed two = press(options, friction);
+      EXPECT_GT(norm(two.tool - one.tool), 0.1 * norm(one.tool)); // it would show
+      Load load;
+      double largest = 0;
+      for (const NodeVector& f : two.forces) {
+        load.displacement[f.node] = at(two.u, f.node);
+        largest = test::larger(largest, norm(f.value));
+      }
+      Stages stages(model, stiff, options);
+      EXPECT_LT(difference(stages.shape(load), two.u), 1e-9);
+      ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
+      for (std::size_t k = 0; k < two.forces.size(); ++k)
+        EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value), 1e-9 * largest);
+    }
 }
 
 /// All that a scene shows of its objects and the instrument.
