@@ -26,8 +26,22 @@ void append(std::string& text, const Vec3& v, char end) {
   text += end;
 }
 
-/// The lines of `emit instruments`.
-std::string instrument_reply(const Simulation& simulation) {
+} // namespace
+
+void append_numbers(std::string& line, std::initializer_list<double> values) {
+  for (const double value : values) {
+    line += ' ';
+    append(line, value + 0.0); // -0 as 0
+  }
+}
+
+void append_numbers(std::string& line, const Vec3& v) {
+  append_numbers(line, {v.x, v.y, v.z});
+}
+
+std::string
+instrument_lines(const Simulation& simulation,
+                 const std::function<void(std::string&, const InstrumentReport&)>& tell) {
   std::size_t count = 0;
   std::string lines;
   for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
@@ -35,20 +49,12 @@ std::string instrument_reply(const Simulation& simulation) {
     if (!report.present)
       continue;
     ++count;
-    lines += simulation.instrument(k).name;
-    for (const Vec3& v : {report.pose.place, report.force, report.torque})
-      for (int a = 0; a < 3; ++a) {
-        std::array<char, 32> number{};
-        lines += ' ';
-        lines.append(number.data(),
-                     std::to_chars(number.data(), number.data() + number.size(), v[a] + 0.0).ptr);
-      }
+    lines += report.name;
+    tell(lines, report);
     lines += '\n';
   }
   return "instruments " + std::to_string(count) + "\n" + lines;
 }
-
-} // namespace
 
 std::string cutting_line(const Simulation& simulation, const Cutting& c) {
   const std::string& name = simulation.object(c.object).name;
@@ -131,7 +137,10 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
     }
   }
   if (simulation.settings().emits.instruments)
-    text += instrument_reply(simulation);
+    text += instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {
+      for (const Vec3& v : {report.pose.place, report.force, report.torque})
+        append_numbers(line, v);
+    });
   return text + "done\n";
 }
 

@@ -6,6 +6,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,6 +31,14 @@ struct StressAnswer {
 /// all objects are known where shapes are emitted
 std::string text_answer(const Simulation& simulation, std::uint64_t step,
                         std::span<const StressAnswer> stresses = {});
+
+/// "instruments n", then for each that is there a line: its name and what `tell` adds to it.
+std::string
+instrument_lines(const Simulation& simulation,
+                 const std::function<void(std::string&, const InstrumentReport&)>& tell);
+/// Adds a blank and the number, -0 as 0, for each; for x, y and z.
+void append_numbers(std::string& line, std::initializer_list<double> values);
+void append_numbers(std::string& line, const Vec3& v);
 
 /// "ok LINE": it is done.
 std::string text_ok(std::uint64_t line);

@@ -3,25 +3,16 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/vector_at.h"
+#include "formats/scene/scene_answer.h"
 
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <span>
 #include <vector>
 
 namespace gewebe {
 
 namespace {
-
-void append(std::string& line, std::initializer_list<double> values) {
-  for (const double value : values)
-    line += ' ' + number_text(value + 0.0); // -0 as 0
-}
-
-void append(std::string& line, const Vec3& v) {
-  append(line, {v.x, v.y, v.z});
-}
 
 std::string told_nodes(const Simulation& simulation, const QueryCommand& query) {
   const std::size_t object = find_object(simulation, query.object);
@@ -71,25 +62,18 @@ std::string told_objects(const Simulation& simulation) {
 }
 
 std::string told_instruments(const Simulation& simulation) {
-  std::size_t count = 0;
-  std::string lines;
-  for (std::size_t k = 0; k < simulation.instrument_count(); ++k) {
-    const InstrumentReport report = simulation.instrument(k);
-    if (!report.present)
-      continue;
-    ++count;
+  return instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {
     const InstrumentShape& shape = report.shape;
-    lines += report.name + ' ' + instrument_kind_name(kind_of(shape));
-    append(lines, {shape.radius, shape.friction});
-    append(lines, report.pose.place);
-    append(lines, report.pose(shape.axis));
+    (line += ' ') += instrument_kind_name(kind_of(shape));
     const Quaternion& turn = report.pose.turn;
-    append(lines, {turn.w, turn.x, turn.y, turn.z});
-    append(lines, report.force);
-    append(lines, report.torque);
-    lines += ' ' + std::to_string(report.nodes) + '\n';
-  }
-  return "instruments " + std::to_string(count) + "\n" + lines;
+    append_numbers(line, {shape.radius, shape.friction});
+    append_numbers(line, report.pose.place);
+    append_numbers(line, report.pose(shape.axis));
+    append_numbers(line, {turn.w, turn.x, turn.y, turn.z});
+    append_numbers(line, report.force);
+    append_numbers(line, report.torque);
+    line += ' ' + std::to_string(report.nodes);
+  });
 }
 
 } // namespace

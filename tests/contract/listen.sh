@@ -411,3 +411,41 @@ P
   [[ $(<stderr.txt) == "ffe-run: warning: user $name (65534) may not drive the scene, expected root (0)" ]] || fail "$(<stderr.txt)"
   rm -r ./*
 }
+
+test_a_client_without_a_descriptor_is_refused_by_name() {
+  prepare
+  listen
+  cat >drive.py <<'P'
+from client import *
+import resource
+server = int(sys.argv[1])
+limits = resource.prlimit(server, resource.RLIMIT_NOFILE)
+free = next(n for n in range(limits[0]) if not os.path.lexists('/proc/%d/fd/%d' % (server, n)))
+used = lambda: sum(int(x) for x in open('/proc/%d/stat' % server).read().rsplit(')')[1].split()[11:13]) / os.sysconf('SC_CLK_TCK')
+resource.prlimit(server, resource.RLIMIT_NOFILE, (free, limits[1]))
+before = used()
+for _ in range(3):
+    c = Client()
+    assert c.greeting == 'error 0: no file descriptor is left for a client, expected fewer open files or a higher limit: Too many open files\n', c.greeting
+    assert c.line() == '', 'it is not closed'
+    c.close()
+    time.sleep(0.3)
+assert used() - before < 0.3, 'it spins'
+resource.prlimit(server, resource.RLIMIT_NOFILE, limits)
+c = driven()
+c.ask('object o organ.ela', 'force o 6 0 0 3', 'step 0.01')
+# Another one is told what it always is.
+free = next(n for n in range(limits[0]) if not os.path.lexists('/proc/%d/fd/%d' % (server, n)))
+resource.prlimit(server, resource.RLIMIT_NOFILE, (free, limits[1]))
+for _ in range(3): assert 'busy' in Client().greeting
+assert c.ask('step 0.01').startswith('step 2 0.02')
+# A file that can't be opened is the fault of its line.
+assert 'Too many open files' in c.ask('object p organ.ela', 'nodes p')[1]
+resource.prlimit(server, resource.RLIMIT_NOFILE, limits)
+c.ask('nodes p', 'step 0.01', 'end')
+P
+  python3 drive.py "$server" || fail 'a client fails' "$(<stderr.txt)"
+  ended 1
+  [[ $(grep -c 'warning: no file descriptor is left' stderr.txt) == 3 ]] || fail "$(<stderr.txt)"
+  rm -r ./*
+}

@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
 #include <pwd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -54,6 +55,11 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
     fail(path, "nobody listens there, but it cannot be removed");
 }
 
+/// One that can be had at any time but must not be used for anything.
+Descriptor spare_descriptor() {
+  return Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+}
+
 std::string user_name(uid_t user) {
   std::array<char, 4096> memory{};
   passwd entry{};
@@ -65,7 +71,7 @@ std::string user_name(uid_t user) {
 
 } // namespace
 
-LocalListener::LocalListener(const std::string& path) : path_(path) {
+LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spare_descriptor()) {
   const sockaddr_un address = address_of(path);
   const Descriptor lock = lock_folder_of(path);
   remove_stale(path, address);
@@ -99,8 +105,28 @@ LocalListener::~LocalListener() {
     (void)::unlink(path_.c_str());
 }
 
-Descriptor LocalListener::accept() const {
-  return Descriptor(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+LocalListener::Arrival LocalListener::accept() {
+  if (!spare_)
+    spare_ = spare_descriptor();
+  const auto next = [&] {
+    return Descriptor(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  };
+  Arrival arrival{next()};
+  const int error = arrival.client ? 0 : errno;
+  if (error == ENOBUFS || error == ENOMEM)
+    fail(path_, "cannot let a client in");
+  if (error != EMFILE && error != ENFILE)
+    return arrival; // or there is none, or none that waits still
+  arrival.refusal = std::string("no file descriptor is left for a client, expected fewer open "
+                                "files or a higher limit: ") +
+                    std::strerror(error);
+  spare_ = Descriptor();
+  arrival.client = next();
+  if (!arrival.client && errno != EAGAIN)
+    fail(path_, "no file descriptor is left to turn a client away");
+  if (!arrival.client) // nobody waits, which is seen with a descriptor alone
+    spare_ = spare_descriptor();
+  return arrival;
 }
 
 std::optional<std::string> foreign_peer(const Descriptor& client) {
@@ -133,16 +159,15 @@ Transfer send_some(const Descriptor& to, std::string& bytes) {
   return result;
 }
 
-Transfer receive_some(const Descriptor& from, std::string& bytes, std::size_t most) {
-  const std::size_t before = bytes.size();
-  bytes.resize(before + most);
+Received receive_some(const Descriptor& from, std::span<char> buffer) {
   ssize_t count = 0;
   do
-    count = ::recv(from.get(), bytes.data() + before, most, 0);
+    count = ::recv(from.get(), buffer.data(), buffer.size(), 0);
   while (count < 0 && errno == EINTR);
-  const bool now = count >= 0 || (errno != EAGAIN && errno != EWOULDBLOCK);
-  bytes.resize(before + static_cast<std::size_t>(count > 0 ? count : 0));
-  return count > 0 ? Transfer::some : now ? Transfer::over : Transfer::none_now;
+  if (count > 0)
+    return {Transfer::some, {buffer.data(), static_cast<std::size_t>(count)}};
+  const bool later = count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK);
+  return {later ? Transfer::none_now : Transfer::over};
 }
 
 } // namespace gewebe

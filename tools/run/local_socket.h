@@ -3,10 +3,11 @@
 
 #include "formats/stream/descriptor.h"
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace gewebe {
 
@@ -22,12 +23,20 @@ public:
   LocalListener& operator=(const LocalListener&) = delete;
 
   int descriptor() const noexcept { return socket_.get(); }
-  /// The next one that waits to be let in, if any; it does not block.
-  Descriptor accept() const;
+  struct Arrival {
+    Descriptor client;
+    /// Why it can't stay: no descriptor was left for it. It has one that is kept for this and must
+    /// be closed before the next is accepted. "": it may stay
+    std::string refusal{};
+  };
+  /// The next one that waits, if any; it does not block. \throw Error (place = path) if there is
+  /// one that can't even be turned away
+  Arrival accept();
 
 private:
   std::string path_;
   Descriptor socket_;
+  Descriptor spare_;                    ///< makes room for who is turned away for want of one
   std::uint64_t device_ = 0, file_ = 0; ///< of the path
   int removal_ = -1;
 };
@@ -42,7 +51,11 @@ enum class Transfer { some, none_now, over };
 /// Sends what the other end takes now, and removes it from `bytes`: some, or over where there is no
 /// other end.
 Transfer send_some(const Descriptor& to, std::string& bytes);
-/// Appends what has come, up to `most` bytes. Over: no more will come.
-Transfer receive_some(const Descriptor& from, std::string& bytes, std::size_t most);
+/// What has come, up to the size of the buffer, which it is in. Over: no more will come.
+struct Received {
+  Transfer how = Transfer::none_now;
+  std::string_view bytes{};
+};
+Received receive_some(const Descriptor& from, std::span<char> buffer);
 
 } // namespace gewebe

@@ -25,7 +25,7 @@ bool wait_for(std::array<pollfd, 2>& who, double seconds) {
 } // namespace
 
 SceneClients::SceneClients(const std::string& path, SceneClientsOptions options)
-    : options_(std::move(options)), listener_(path) {}
+    : options_(std::move(options)), listener_(path), buffer_(block) {}
 
 void SceneClients::serve(SceneRun& run) {
   serving_ = true;
@@ -57,33 +57,26 @@ void SceneClients::wait() {
 }
 
 void SceneClients::take_lines(SceneRun& run) {
-  std::string bytes;
-  const Transfer came = receive_some(client_, bytes, block);
-  if (came == Transfer::some && run.latency() != nullptr)
+  const Received came = receive_some(client_, buffer_);
+  if (came.how == Transfer::some && run.latency() != nullptr)
     run.latency()->line_arrived();
-  for (const char c : bytes) {
+  for (const char c : came.bytes) {
     if (!client_ || run.ended())
       return;
     if (!lines_->take(c))
       return drop("sent a line of over 1 GiB");
   }
-  if (came != Transfer::over)
+  if (came.how != Transfer::over)
     return;
   lines_->drop(); // a line without its end may be half of one
   leaving_ = true;
 }
 
 void SceneClients::let_in(SceneRun& run) {
-  Descriptor next = listener_.accept();
-  if (!next)
+  LocalListener::Arrival next = listener_.accept();
+  if (!next.client || refused(next))
     return;
-  if (const std::optional<std::string> foreign = foreign_peer(next)) {
-    say(next, *foreign);
-    if (options_.warn)
-      options_.warn(*foreign);
-    return;
-  }
-  client_ = std::move(next);
+  client_ = std::move(next.client);
   lines_.emplace(run);
   unread_.clear();
   leaving_ = false;
@@ -102,8 +95,25 @@ pollfd SceneClients::others() const {
 void SceneClients::turn_away() {
   if (hung_up())
     return;
-  while (const Descriptor other = listener_.accept())
-    say(other, foreign_peer(other).value_or("busy, the scene has a client, expected none"));
+  while (true) {
+    const LocalListener::Arrival other = listener_.accept();
+    if (!other.client)
+      return;
+    say(other.client,
+        foreign_peer(other.client).value_or("busy, the scene has a client, expected none"));
+  }
+}
+
+/// Tells a client that may not drive the scene why. \return false: it may
+bool SceneClients::refused(const LocalListener::Arrival& next) const {
+  const std::string why =
+      next.refusal.empty() ? foreign_peer(next.client).value_or("") : next.refusal;
+  if (why.empty())
+    return false;
+  say(next.client, why);
+  if (options_.warn)
+    options_.warn(why);
+  return true;
 }
 
 /// One line that fits into any buffer, to somebody who is not let in.

@@ -12,6 +12,7 @@
 #include <poll.h>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace gewebe {
 
@@ -43,6 +44,7 @@ private:
   void take_lines(SceneRun& run);
   void let_in(SceneRun& run);
   void turn_away();
+  bool refused(const LocalListener::Arrival& next) const;
   void say(const Descriptor& to, const std::string& text) const;
   void drop(const std::string& why);
   void flush(std::size_t most);
@@ -52,6 +54,7 @@ private:
   SceneClientsOptions options_;
   LocalListener listener_;
   Descriptor client_;
+  std::vector<char> buffer_; ///< of what the client sends
   std::optional<SceneLines> lines_;
   std::string unread_;        ///< answers that wait
   std::uint64_t clients_ = 0; ///< that were let in
