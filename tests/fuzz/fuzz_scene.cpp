@@ -1,5 +1,6 @@
 // Any bytes as a scene over small models: an Error, or a run whose answers are well-formed. Served,
-// each line that is refused is answered and takes no time; in binary the frames follow one another.
+// each line ends with its acknowledgement or its error, one that is refused takes no time; in
+// binary the frames follow one another.
 
 #include "base/error.h"
 #include "formats/scene/frames_binary.h"
@@ -12,6 +13,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace {
 
@@ -61,19 +63,36 @@ bool are_frames(std::string_view bytes, FrameKind kind) {
   return last == static_cast<std::uint32_t>(kind);
 }
 
-bool is_answer(std::string_view text, bool binary, bool& refusal) {
-  if (binary) {
-    refusal = are_frames(text, FrameKind::error);
-    return refusal || are_frames(text, FrameKind::done);
-  }
-  refusal = text.starts_with("error ");
-  return refusal || text.starts_with("sync ")
-             ? text.find('\n') == text.size() - 1
-             : text.starts_with("step ") && text.ends_with("\ndone\n");
+enum class Reply { none, refusal, ok, step, told };
+
+Reply binary_reply(std::string_view frames) {
+  for (const auto& [kind, reply] : {std::pair{FrameKind::error, Reply::refusal},
+                                    {FrameKind::ok, Reply::ok},
+                                    {FrameKind::done, Reply::step},
+                                    {FrameKind::told, Reply::told}})
+    if (are_frames(frames, kind))
+      return reply;
+  return Reply::none;
+}
+
+Reply text_reply(std::string_view text) {
+  if (text.empty() || text.back() != '\n')
+    return Reply::none;
+  const bool single = text.find('\n') == text.size() - 1;
+  if (text.starts_with("step "))
+    return text.ends_with("\ndone\n") ? Reply::step : Reply::none;
+  for (const char* word : {"nodes ", "select ", "objects ", "instruments "})
+    if (text.starts_with(word))
+      return Reply::told;
+  return !single                      ? Reply::none
+         : text.starts_with("error ") ? Reply::refusal
+         : text.starts_with("ok ")    ? Reply::ok
+         : text.starts_with("sync ")  ? Reply::told
+                                      : Reply::none;
 }
 
 void play(std::string_view text, bool serving, bool binary) {
-  std::size_t answers = 0, objects = 0, refusals = 0;
+  std::size_t answers = 0, objects = 0, refusals = 0, ended = 0;
   SceneOptions options;
   options.files.model = [&](const std::string&) {
     if (++objects > 4)
@@ -84,15 +103,16 @@ void play(std::string_view text, bool serving, bool binary) {
     throw Error(name, "no store here");
   };
   options.files.node_list = [](const std::string&) { return std::string("1 3"); };
-  options.reply = [&](std::string_view reply) {
-    bool refusal = false;
-    if (!is_answer(reply, binary, refusal))
+  options.reply = [&](std::string_view bytes) {
+    const Reply reply = binary ? binary_reply(bytes) : text_reply(bytes);
+    if (reply == Reply::none || ended > 0) // nothing is said behind the end of a line
       std::abort();
-    refusals += refusal ? 1 : 0;
-    if (!refusal && ++answers > 20) // a long run is no fault
+    refusals += reply == Reply::refusal ? 1 : 0;
+    ended += reply == Reply::refusal || reply == Reply::ok ? 1 : 0;
+    if (reply == Reply::step && ++answers > 20) // a long run is no fault
       throw Stop{};
   };
-  options.serve = serving;
+  options.serve = options.acknowledge = serving;
   options.binary = binary;
   options.measure = true;
   options.measure_error = true;
@@ -106,14 +126,15 @@ void play(std::string_view text, bool serving, bool binary) {
   };
   SceneRun run("fuzz", context, options);
   try {
-    while (!text.empty()) {
+    while (!text.empty() && !run.ended()) {
       const std::size_t end = text.find('\n');
       const std::string_view line = text.substr(0, end);
       const double time = run.simulation().time();
       const std::size_t refused = refusals, answered = answers,
                         pending = run.simulation().pending();
+      ended = 0;
       run.line(line);
-      if (refusals > refused + 1 || (refusals > 0 && !serving))
+      if (refusals > refused + 1 || (refusals > 0 && !serving) || ended != (serving ? 1U : 0U))
         std::abort();
       if (refusals > refused && answers == answered &&
           (run.simulation().time() != time || run.simulation().pending() != pending))

@@ -1,7 +1,8 @@
 #pragma once
 // Random scenes on small models, and what must hold for any of them: served, none ends the session
-// or tells a number that is none; its record, run again with two threads, gives the same answers,
-// results and digest to the last byte.
+// or tells a number that is none, each line is acknowledged in its turn, and shared shapes are
+// those of the answers; its record, run again with two threads, gives the same answers, results and
+// digest to the last byte.
 
 #include "base/digest.h"
 #include "base/error.h"
@@ -12,6 +13,7 @@
 #include "solid/solid_model.h"
 #include "solve/condition.h"
 #include "tests/bench/memory_columns.h"
+#include "tests/unit/fuzzed_door.h"
 #include "tests/unit/scratch.h"
 #include "tests/unit/simulation_scenes.h"
 #include "tests/unit/tet_fixtures.h"
@@ -20,9 +22,9 @@
 #include "tools/run/scene_run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <ctime>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -92,6 +94,10 @@ public:
         command();
       go_on();
     }
+    if (one_in(20)) {
+      line("end");
+      line("step 0.001"); // which is not read
+    }
   }
   const std::vector<std::string>& lines() const { return lines_; }
 
@@ -134,12 +140,21 @@ private:
     std::vector<std::string> names;
     for (const auto& [name, model] : fuzzed_models())
       names.push_back(name);
+    const bool filled = one_in(12); // which goes with little else
+    if (filled && !one_in(6))
+      names = {"organ", "ball", "free"}; // closed nets
     const std::string model = of(names), name(1, static_cast<char>('a' + objects_.size()));
     std::string text = "object " + name + " " + model;
-    if (one_in(2))
-      text += " store=" + model;
-    text += one_in(3) ? " method=ffe" : one_in(3) ? " method=ela" : "";
-    text += one_in(4) ? " integration=implicit" : "";
+    if (filled) {
+      text += std::string(" integration=") + (one_in(2) ? "implicit" : "auto") +
+              " bulk=" + number_text(one_in(10) ? 1e12 : real(1, 3e6));
+    } else {
+      if (one_in(2))
+        text += " store=" + model;
+      text += one_in(3) ? " method=ffe" : one_in(3) ? " method=ela" : "";
+      text += one_in(6) ? " integration=implicit" : one_in(8) ? " integration=auto" : "";
+      text += one_in(50) ? " bulk=1e4" : "";
+    }
     if (!fuzzed_models().at(model).tetrahedra.empty() || one_in(20)) {
       text += one_in(3) ? " law=neo-hookean" : "";
       text += one_in(3) ? " damping=" + number_text(real(0, 1)) + "@30" : "";
@@ -198,21 +213,26 @@ private:
 
   std::string instrument() {
     static const std::vector<std::string> names{"p", "q", "k"};
-    return of(names);
+    return instruments_.empty() || one_in(6) ? of(names) : of(instruments_);
+  }
+  /// Each shape has its name.
+  std::string new_instrument(const std::string& name) {
+    instruments_.push_back(name);
+    return "instrument " + name;
   }
   std::string put_instrument() {
     const Known o = object();
     const double size = size_of(*o.model);
     const Vec3 at = place(*o.model) + vector(0.3 * size);
     if (one_in(3))
-      return "instrument k blade " + (one_in(20) ? triple(1e300) : numbers(at)) + " " +
+      return new_instrument("k") + " blade " + (one_in(20) ? triple(1e300) : numbers(at)) + " " +
              numbers(at + vector(size));
     const std::string friction = one_in(2) ? " friction " + number_text(real(0, 1.5)) : "";
     const std::string radius = one_in(30) ? number(1e3) : number_text(real(0.05, 0.4) * size);
     if (one_in(2))
-      return "instrument q capsule " + radius + " " + numbers(at) + " " +
+      return new_instrument("q") + " capsule " + radius + " " + numbers(at) + " " +
              numbers(at + vector(0.5 * size)) + friction;
-    return "instrument p sphere " + radius + " " + numbers(at) + friction;
+    return new_instrument("p") + " sphere " + radius + " " + numbers(at) + friction;
   }
   std::string move_instrument() {
     const Known o = object();
@@ -256,17 +276,33 @@ private:
     return "two-step " + o.name + " " + number_text(threshold) + (one_in(2) ? " series" : "") +
            (one_in(2) ? " stage=" + o.model->name + ".stiff" : "");
   }
+  std::string question() {
+    const Known o = object();
+    switch (below(6)) {
+    case 0:
+      return "objects";
+    case 1:
+      return "instruments";
+    case 2:
+      return "select " + o.name + " " + nodes(*o.model);
+    case 3:
+      return "sync";
+    default:
+      return "nodes " + o.name + (one_in(3) ? "" : one_in(3) ? " rest" : " positions");
+    }
+  }
   std::string change() {
     const Known o = object(), other = object();
-    switch (below(14)) {
+    switch (below(15)) {
     case 0:
     case 1:
       return put_instrument();
     case 2:
       return move_instrument();
     case 3:
-      return one_in(2) ? "withdraw " + instrument()
-                       : "grasp " + o.name + " " + nodes(*o.model) + " " + instrument();
+      return "withdraw " + instrument();
+    case 14:
+      return "grasp " + o.name + " " + nodes(*o.model) + " " + instrument();
     case 4:
     case 5:
       return cut();
@@ -284,10 +320,15 @@ private:
     }
   }
   void command() {
+    if (one_in(6))
+      line(question());
+    if (one_in(30))
+      line(next_client);
     if (one_in(80)) {
       line("emit stress " + object().name + (one_in(2) ? " all" : ""));
     } else if (one_in(40)) {
-      line("emit " + of(std::vector<std::string>{"shapes", "forces", "instruments", "all"}));
+      line("emit " +
+           of(std::vector<std::string>{"shapes", "surfaces", "forces", "instruments", "all"}));
     } else if (one_in(60)) {
       line("renew " + object().name);
       line("sync");
@@ -318,6 +359,7 @@ private:
 
   std::mt19937_64 random_;
   std::vector<Known> objects_;
+  std::vector<std::string> instruments_; ///< that were put somewhere
   std::vector<std::string> lines_;
   double now_ = 0;
 };
@@ -401,14 +443,15 @@ inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
 }
 
 struct FuzzedRun {
-  std::string replies, fault, digest, result;
+  std::string replies, answers, fault, digest, result;
   std::uint64_t errors = 0, steps = 0;
   bool slow = false; ///< it took too long and was ended
 };
 
-/// \param record written if it is not empty
+/// \param serve lines are acknowledged as well, and shapes shared \param record written if it is
+/// not empty
 inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
-                            const std::string& record, double seconds = 20) {
+                            const std::string& record, double seconds = 10) {
   FuzzedRun out;
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   CheckedResult result;
@@ -428,8 +471,16 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     return [file = base(name)] { return compliance_of_store(fuzzed_store(file, 4)); };
   };
   options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
-  options.reply = [&](std::string_view text) { out.replies += text; };
-  options.serve = serve;
+  const std::string shapes = serve ? ScratchFile(".shapes").path() : "";
+  DoorCheck door(shapes);
+  options.reply = [&](std::string_view text) {
+    out.replies += text;
+    if (serve)
+      door.reply(text);
+  };
+  options.serve = options.acknowledge = serve;
+  const auto shared = serve ? std::make_unique<SharedShapes>(shapes) : nullptr;
+  options.shared = shared.get();
   options.measure = true;
   options.result = &result;
   options.warn = [](const std::string&) {};
@@ -441,13 +492,23 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   options.events = &events;
   Context context;
   context.threads = threads;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  context.cancelled = [end] { return std::chrono::steady_clock::now() > end; };
+  // Of the processor, for others may be at work.
+  const auto end = std::clock() + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC);
+  context.cancelled = [end] { return std::clock() > end; };
   SceneRun run("fuzz", context, options);
   try {
-    for (const std::string& line : lines)
+    for (const std::string& line : lines) {
+      if (run.ended())
+        break;
+      if (line == next_client)
+        run.next_client();
+      door.line(line);
       run.line(line);
-    run.finish();
+      if (serve)
+        door.line_done();
+    }
+    if (run.simulation().object_count() > 0) // else each was refused
+      run.finish();
   } catch (const Cancelled&) {
     out.slow = true;
   } catch (const std::exception& error) {
@@ -456,7 +517,8 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   if (log)
     log->commit();
   if (out.fault.empty())
-    out.fault = result.fault;
+    out.fault = result.fault.empty() ? door.fault : result.fault;
+  out.answers = serve ? door.answers : out.replies;
   out.errors = run.counts().errors;
   out.steps = run.simulation().counts().steps;
   out.digest = run.counts().digest;
@@ -471,19 +533,15 @@ inline std::vector<std::string> lines_in(std::istream& text) {
   return lines;
 }
 
-/// Answers without those to wrong lines; `fault` gets what no line may say.
-inline std::string answers_of(const std::string& replies, std::string& fault) {
+/// What no line may say, if one says it.
+inline std::string said_in(const std::string& replies) {
   std::istringstream text(replies);
-  std::string answers;
-  for (const std::string& line : lines_in(text)) {
+  for (const std::string& line : lines_in(text))
     for (const char* word : {"nan", "inf ", "basic_ios", "max_size", "std::", "bad_alloc"})
       if ((" " + line + " ").find(std::string(line.starts_with("error ") ? "" : " ") + word) !=
           std::string::npos)
-        fault = "it says: " + line;
-    if (!line.starts_with("error "))
-      answers += line + "\n";
-  }
-  return answers;
+        return "it says: " + line;
+  return "";
 }
 
 /// The first line that differs.
@@ -515,19 +573,18 @@ inline std::string fault_of_scene(const std::vector<std::string>& lines, FuzzedC
     ++seen.slow;
     return "";
   }
-  std::string fault = live.fault;
-  const std::string answers = answers_of(live.replies, fault);
+  const std::string fault = live.fault.empty() ? said_in(live.replies) : live.fault;
   if (!fault.empty())
     return fault;
   std::ifstream file(record.path());
   const std::vector<std::string> again = lines_in(file);
   if (again.empty())
     return "";
-  const FuzzedRun replay = run_fuzzed(again, false, 2, "", 60);
+  const FuzzedRun replay = run_fuzzed(again, false, 2, "", 100);
   if (!replay.fault.empty() || replay.slow)
     return "the record does not run: " + replay.fault;
-  if (replay.replies != answers)
-    return "the record answers otherwise: " + first_difference(answers, replay.replies);
+  if (replay.answers != live.answers)
+    return "the record answers otherwise: " + first_difference(live.answers, replay.answers);
   if (replay.digest != live.digest || replay.result != live.result)
     return "the record gives another result";
   return "";
