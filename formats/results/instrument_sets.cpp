@@ -11,8 +11,8 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::size_t around = 32;       // corners of a ring
-constexpr std::uint64_t rows_kept = 256; // together
+constexpr std::size_t around = 32;      // corners of a ring
+constexpr std::uint64_t rows_kept = 64; // together
 
 hdf5::Dataset grow(hdf5::Group& group, const char* name, hdf5::Number type,
                    const hdf5::Shape& row) {

@@ -200,7 +200,7 @@ std::vector<double> read_von_mises(const std::string& path, const ShapeGroup& sh
   return {values.begin(), values.end()};
 }
 
-/// A row of `count` numbers. \throw Error if there is none, or one is not finite
+/// A row of `count` numbers. \throw Error if there is none, or one is larger than any scene has
 template <std::size_t count>
 std::array<double, count> read_row(const hdf5::Group& group, const char* name,
                                    const hdf5::Shape& shape, std::uint64_t row) {
@@ -211,9 +211,15 @@ std::array<double, count> read_row(const hdf5::Group& group, const char* name,
   std::array<double, count> values{};
   set.read_rows(row, std::span<double>(values));
   for (const double value : values)
-    if (!std::isfinite(value))
-      set.fail("holds a number that is not finite");
+    if (!(std::fabs(value) <= 1e100))
+      set.fail("holds a number that is beyond 1e100");
   return values;
+}
+
+bool is_rotation(const std::array<Vec3, 3>& rows) {
+  const Vec3 &x = rows[0], &y = rows[1], &z = rows[2];
+  return std::fabs(dot(x, x) - 1) < 1e-6 && std::fabs(dot(y, y) - 1) < 1e-6 &&
+         std::fabs(dot(z, z) - 1) < 1e-6 && norm(cross(x, y) - z) < 1e-6;
 }
 
 /// Nothing where it is not there in this row, or of a kind that is not known.
@@ -237,6 +243,8 @@ std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::u
   read.ends = {Vec3{ends[0], ends[1], ends[2]}, Vec3{ends[3], ends[4], ends[5]}};
   for (std::size_t a = 0; a < 3; ++a)
     read.rotation[a] = {pose[4 * a], pose[4 * a + 1], pose[4 * a + 2]};
+  if (!is_rotation(read.rotation))
+    group.fail("has a pose that is no rotation");
   read.place = {pose[3], pose[7], pose[11]};
   read.force = vector("force");
   read.torque = vector("torque");

@@ -60,7 +60,8 @@ struct ResultInstrument {
   std::uint64_t touched = 0;
 };
 /// Those that are there then, in the order of the scene, and of a kind that is known here.
-/// \throw Error, place = path; if there is no such frame, or a number is not finite
+/// \throw Error, place = path; if there is no such frame, a number is beyond 1e100 or a
+/// pose no rotation
 std::vector<ResultInstrument> read_result_instruments(const std::string& path, std::size_t frame);
 
 /// The fields of a result: "displacement", its length in mm; "von-mises", the equivalent stress of

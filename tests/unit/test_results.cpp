@@ -141,7 +141,7 @@ TEST(Results, InstrumentsAreReadAsTheyWereWritten) {
 TEST(Results, InstrumentsThatAreDamagedAreErrors) {
   const ScratchFolder folder;
   const std::string path = folder / "run.h5";
-  const auto make = [&](double radius, std::uint64_t rows, std::uint8_t kind) {
+  const auto make = [&](double radius, std::uint64_t rows, std::uint8_t kind, double turned = 0) {
     hdf5::File file = hdf5::File::create(path);
     hdf5::Group& root = file.root();
     root.set("format", "gewebe_results");
@@ -154,9 +154,12 @@ TEST(Results, InstrumentsThatAreDamagedAreErrors) {
     probe.write("touched", std::vector<std::uint32_t>(2));
     probe.write("radius", std::vector<double>(rows, radius));
     probe.write("friction", std::vector<double>(2));
-    const std::vector<double> zeros(24);
+    const std::vector<double> zeros(12);
+    std::vector<double> pose;
+    for (int k = 0; k < 2; ++k)
+      pose.insert(pose.end(), {1, turned, 0, 4, 0, 1, 0, 5, 0, 0, 1, 6});
     probe.write("ends", std::span(zeros).first(12), {2, 2, 3});
-    probe.write("pose", std::span(zeros), {2, 3, 4});
+    probe.write("pose", std::span<const double>(pose), {2, 3, 4});
     probe.write("force", std::span(zeros).first(6), {2, 3});
     probe.write("torque", std::span(zeros).first(6), {2, 3});
     file.close();
@@ -170,6 +173,10 @@ TEST(Results, InstrumentsThatAreDamagedAreErrors) {
   make(std::nan(""), 2, 1);
   EXPECT_THROW((void)read_result_instruments(path, 1), Error);
   make(1, 1, 1);
+  EXPECT_THROW((void)read_result_instruments(path, 1), Error);
+  make(1, 2, 1, 0.1); // which would draw it askew
+  EXPECT_THROW((void)read_result_instruments(path, 1), Error);
+  make(1, 2, 1, std::nan(""));
   EXPECT_THROW((void)read_result_instruments(path, 1), Error);
 }
 
