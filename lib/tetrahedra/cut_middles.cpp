@@ -62,7 +62,10 @@ public:
       begin = end;
     }
     for (WallTriangle& wall : cut_.wall)
-      add_to(wall);
+      for (std::size_t side = 0; side < 2; ++side)
+        wall.middles[side] = middles_of(wall.tetrahedron[side], wall.corners[side]);
+    for (CutFace& face : cut_.surface)
+      face.middles = middles_of(face.tetrahedron, face.corners);
   }
 
 private:
@@ -191,17 +194,15 @@ private:
     return weights;
   }
 
-  void add_to(WallTriangle& wall) const {
-    for (std::size_t side = 0; side < 2; ++side) {
-      const std::uint32_t t = wall.tetrahedron[side];
-      const Tetrahedron& corners = cut_.mesh.tetrahedra[t];
-      std::array<std::size_t, 3> at{};
-      for (std::size_t c = 0; c < 3; ++c)
-        at[c] = static_cast<std::size_t>(std::ranges::find(corners, wall.corners[side][c]) -
-                                         corners.begin());
-      for (std::size_t c = 0; c < 3; ++c)
-        wall.middles[side][c] = cut_.mesh.middles[t][edge_between(at[c], at[(c + 1) % 3])];
-    }
+  /// Of the edges 01, 12, 20 of a face of a tetrahedron.
+  Triangle middles_of(std::uint32_t t, const Triangle& face) const {
+    const Tetrahedron& corners = cut_.mesh.tetrahedra[t];
+    std::array<std::size_t, 3> at{};
+    for (std::size_t c = 0; c < 3; ++c)
+      at[c] = static_cast<std::size_t>(std::ranges::find(corners, face[c]) - corners.begin());
+    const EdgeMiddles& middles = cut_.mesh.middles[t];
+    return {middles[edge_between(at[0], at[1])], middles[edge_between(at[1], at[2])],
+            middles[edge_between(at[2], at[0])]};
   }
 
   const TetMesh& before_;

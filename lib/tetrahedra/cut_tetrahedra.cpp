@@ -5,6 +5,7 @@
 #include "tetrahedra/cut_middles_internal.h"
 #include "tetrahedra/cut_region_internal.h"
 #include "tetrahedra/cut_snap_internal.h"
+#include "tetrahedra/cut_surface_internal.h"
 #include "tetrahedra/cut_wall_internal.h"
 #include "tetrahedra/faces.h"
 
@@ -65,6 +66,7 @@ public:
     add_copies();
     write_parts();
     write_wall();
+    write_surface();
     if (!before_.middles.empty())
       add_middles(before_, original_, cut_);
     return std::move(cut_);
@@ -202,6 +204,53 @@ private:
         }
         cut_.wall.push_back(wall);
       }
+  }
+
+  /// Faces without an end of a crossed edge can have neighbours outside of the region; they stay as
+  /// they were.
+  void write_surface() {
+    std::vector<bool> known(region_.nodes.size());
+    for (const CrossedEdge& edge : region_.edges)
+      known[edge.ends[0]] = known[edge.ends[1]] = true;
+    const auto is_known = [&](std::uint32_t node) { return node >= known.size() || known[node]; };
+    for (std::uint32_t p = 0; p < parted_.parts.size(); ++p)
+      for (std::uint32_t k = 0; k < 4; ++k) {
+        const TetPart& part = parted_.parts[p];
+        const Triangle face = corners_of_face(part.corners, k);
+        if (part.neighbour[k] == no_neighbour && std::ranges::any_of(face, is_known))
+          cut_.surface.push_back(surface_face(part, k, number_of_part_[p]));
+      }
+  }
+
+  CutFace surface_face(const TetPart& part, std::uint32_t k, std::uint32_t tetrahedron) const {
+    const RegionTet& tet = region_.tets[part.parent];
+    std::array<TetSupport, 3> supports;
+    CutFace face;
+    face.tetrahedron = tetrahedron;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t corner = tetrahedron_faces[k][c];
+      face.corners[c] = node_at(part, corner);
+      supports[c] = support_of(part.corners[corner], tet);
+    }
+    const std::uint32_t before = face_of(supports);
+    face.face_before = 4 * tet.number + before;
+    const Triangle corners = corners_of_face(before_.tetrahedra[tet.number], before);
+    for (std::size_t c = 0; c < 3; ++c)
+      face.weights[c] = weights_in_face(
+          {before_.points[corners[0]], before_.points[corners[1]], before_.points[corners[2]]},
+          cut_.mesh.points[face.corners[c]]);
+    return face;
+  }
+
+  /// The corners of a tetrahedron of the region between which a node of a part of it stands.
+  TetSupport support_of(std::uint32_t node, const RegionTet& tet) const {
+    TetSupport support{};
+    const std::size_t nodes = region_.nodes.size();
+    for (std::size_t k = 0; k < 4; ++k)
+      support[k] = node < nodes
+                       ? tet.corners[k] == node
+                       : std::ranges::count(region_.edges[node - nodes].ends, tet.corners[k]) > 0;
+    return support;
   }
 
   /// At least one of both has a side.

@@ -58,6 +58,17 @@ struct WallTriangle {
   std::array<std::uint32_t, 2> tetrahedron{};
 };
 
+/// A face of the boundary, beside the wall, or a part of one.
+struct CutFace {
+  Triangle corners{};            ///< counter-clockwise seen from outside
+  Triangle middles{};            ///< of edges 01, 12, 20, where the mesh is quadratic
+  std::uint32_t tetrahedron = 0; ///< whose face it is now
+  std::uint32_t face_before = 0; ///< 4 tetrahedron + k of the face that it lay in
+  /// Of each corner: where it stood in the corners of that face (tetrahedron_faces), sum 1; beside
+  /// it, if the node has moved.
+  std::array<std::array<double, 3>, 3> weights{};
+};
+
 struct BladeCutReport {
   std::uint64_t tested = 0;    ///< edges compared with the blade
   std::uint64_t separated = 0; ///< tetrahedra that the blade passes through from side to side
@@ -78,6 +89,9 @@ struct TetCut {
   std::vector<TetNodeOrigin> origin;      ///< of each node
   std::vector<std::uint32_t> tetrahedron; ///< of each: that before which it is (a part of)
   std::vector<WallTriangle> wall;
+  /// The boundary at all nodes of edges that the blade passed: takes the place of the faces that it
+  /// names; other faces stay. By tetrahedron before.
+  std::vector<CutFace> surface;
   /// Tetrahedra before of which a corner has been moved or renamed, or which were split; ascending.
   std::vector<std::uint32_t> changed;
   BladeCutReport report;

@@ -526,6 +526,20 @@ TEST(TetCut, NodesCarryWhatTheElementsSay) {
   }
 }
 
+/// Moved from below a saddle to as far above it, a node would leave the boundary's area as it is,
+/// but not the volume.
+TEST(TetCut, ANodeOnASaddleStays) {
+  TetMesh mesh;
+  const double high = 0.3, off = 0.1;
+  mesh.points = {{0, 0, -off},  {0, 0, 1},     {1, 0, high},
+                 {0, 1, -high}, {-1, 0, high}, {0, -1, -high}};
+  mesh.tetrahedra = {{0, 2, 3, 1}, {0, 3, 4, 1}, {0, 4, 5, 1}, {0, 5, 2, 1}};
+  const TetCut cut = cut_tetrahedra(mesh, blade_strip({0, 0, off}, {3, 0, 0}, {0, 3, 0}));
+  EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "");
+  EXPECT_EQ(cut.mesh.points[0], mesh.points[0]);
+  EXPECT_GT(cut.wall.size(), 3U);
+}
+
 /// A box with a notch between an upright plane and a slanted one, whose floor is an edge.
 TEST(TetCut, ANodeCanFallIntoThreePieces) {
   TetMesh whole = box_tetrahedra(4, 2, 4), mesh;
@@ -649,7 +663,18 @@ TEST(TetCut, ChecksSeePlantedFaults) {
             "place of node");
   EXPECT_EQ(fault([](TetCut& c) { c.origin[1].node = 0; }), "number of node");
   EXPECT_EQ(fault([](TetCut& c) { c.changed.pop_back(); }), "tetrahedron told to be unchanged");
-  EXPECT_EQ(fault([](TetCut& c) { c.wall.pop_back(); }), "area of what was the boundary before");
+  EXPECT_EQ(fault([](TetCut& c) { c.wall.pop_back(); }), "surface that is left out");
+  EXPECT_EQ(fault([&](TetCut& c) {
+              c.surface.erase(std::ranges::find_if(
+                  c.surface, [&](const CutFace& f) { return f.tetrahedron >= added; }));
+            }),
+            "surface that is left out");
+  EXPECT_EQ(fault([](TetCut& c) { c.surface.push_back(c.surface[3]); }), "surface told twice");
+  EXPECT_EQ(fault([](TetCut& c) {
+              c.surface[4].weights[1] = {0.3, 0.3, 0.4};
+            }),
+            "weights of surface");
+  EXPECT_EQ(fault([](TetCut& c) { c.surface[4].face_before += 4; }), "tetrahedron of surface");
   EXPECT_EQ(fault([](TetCut& c) { std::swap(c.wall[0].corners[0][0], c.wall[0].corners[0][1]); }),
             "wall inside the tissue");
   EXPECT_EQ(fault([](TetCut& c) { c.wall.push_back(c.wall[0]); }), "wall told twice");

@@ -219,8 +219,42 @@ inline std::string fault_of(const TetMesh& before, const TetCut& cut, double lea
     if (same)
       return at("wall that is joined", w);
   }
+  // The surface: what is told, and the faces that it does not replace, are all that is beside
+  // walls.
+  std::set<Triangle> replaced, rest;
+  for (const CutFace& face : cut.surface) {
+    const auto n = static_cast<std::size_t>(&face - cut.surface.data());
+    if (face.face_before / 4 != cut.tetrahedron[face.tetrahedron])
+      return at("tetrahedron of surface", n);
+    const Tetrahedron& t = before.tetrahedra[face.face_before / 4];
+    const auto& old = tetrahedron_faces[face.face_before % 4];
+    replaced.insert(turned({t[old[0]], t[old[1]], t[old[2]]}));
+    if (!rest.insert(turned(face.corners)).second)
+      return at("surface told twice", n);
+    for (std::size_t c = 0; c < 3; ++c) {
+      Vec3 place;
+      for (std::size_t k = 0; k < 3; ++k)
+        place += before.points[t[old[k]]] * face.weights[c][k];
+      if (!(norm(place - mesh.points[face.corners[c]]) <= 1e-12 * size))
+        return at("weights of surface", n);
+    }
+    if (!mesh.middles.empty() && face.middles != middles_of(mesh, face.tetrahedron, face.corners))
+      return at("middles of surface", n);
+  }
+  const std::set<Triangle> old_outer = outer_faces(before);
+  for (const Triangle& face : replaced)
+    if (!old_outer.contains(face))
+      return "surface that was inside";
+  for (const Triangle& face : old_outer)
+    if (!replaced.contains(face) && !rest.insert(face).second)
+      return "surface told twice";
+  for (const Triangle& face : walls)
+    if (!rest.insert(face).second)
+      return "surface that is a wall";
+  if (rest != outer)
+    return "surface that is left out";
   double old_area = 0, rest_area = 0;
-  for (const Triangle& face : outer_faces(before))
+  for (const Triangle& face : old_outer)
     old_area += area(before, face);
   for (const Triangle& face : outer)
     rest_area += walls.contains(face) ? 0 : area(mesh, face);
