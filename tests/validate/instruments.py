@@ -7,14 +7,15 @@ Spheres and capsules from half an edge up, with and without friction, are presse
 both methods. From each answer (forces, shapes, instruments) this script finds for itself, by its own geometry,
 
   depth            how deep the surface is in the instrument, over its radius
-  pull, cone       how far the forces at nodes are from any sum of pushes within the cones of friction at the points
-                   where the surface touches the instrument, over all forces
-  complementarity  the share of forces at nodes of no triangle that touches
-  sum              whether the instrument feels the opposite of what it does
+  cone             how far the forces at nodes are from any sum of pushes within the cones of friction at the points where
+                   the surface touches the instrument, over all of them: a pull, or a drag too large
+  apart            the share of forces at nodes of no triangle that touches (complementarity)
+  sum              by how much the instrument feels other than the opposite of what it does
 
-and prints a table, and each case that breaks a bound with the scene that shows it, which stays in the folder. Cases that
-ffe-run itself calls inexact are counted apart. Programs are found by $PATH; real organs in FOLDER, else models are
-made. Ends with status 1 where a bound is broken.
+and prints the worst of each body, and each case that breaks a bound with the scene that shows it, which stays in the
+folder. Cases that ffe-run itself calls inexact, or held, are counted apart. Of what moves, depth and sum are judged at
+each step, the others in steps of one integration step, whose forces are not means. Programs are found by $PATH; real
+organs in FOLDER, else models are made. Ends with status 1 where a bound is broken, or over 5 % of all are inexact.
 """
 
 import argparse
@@ -26,9 +27,11 @@ import tempfile
 import numpy as np
 
 TOUCH = 1e-6  # of the radius: so near is touched, so deep is inside
+LONG = 60  # s that a scene may take
+MAY_COME = 1e-3  # of the radius: so near is what may be reached in one step of integration
 
 
-# --- Geometry: distances of triangles from a segment -------------------------------------------------------------------
+# --- Geometry: distances of triangles from a segment ------------------------------------------------------------------
 
 
 def dot(a, b):
@@ -38,8 +41,8 @@ def dot(a, b):
 def on_segment(p, a, b):
     """The share of the way from a to b that is nearest to p."""
     ab = b - a
-    length = dot(ab, ab)
-    return np.clip(np.divide(dot(p - a, ab), length, out=np.zeros(np.shape(length)), where=length > 0), 0, 1)
+    along, length = np.broadcast_arrays(dot(p - a, ab), dot(ab, ab))
+    return np.clip(np.divide(along, length, out=np.zeros(along.shape), where=length > 0), 0, 1)
 
 
 def on_triangles(p, t):
@@ -65,7 +68,7 @@ def on_triangles(p, t):
 
 
 def between_segments(a, b, c, d):
-    """Shares of the ways a-b and c-d at their nearest points in the lines, NaN where these are parallel or not between."""
+    """Shares of the ways a-b and c-d at the lines' nearest points, NaN where they are parallel or these not between."""
     u, v, r = b - a, d - c, a - c
     uu, uv, vv, ur, vr = dot(u, u), dot(u, v), dot(v, v), dot(u, r), dot(v, r)
     by = uu * vv - uv * uv
@@ -114,7 +117,7 @@ def near_points(corners, a, b):
     return np.concatenate(index), np.concatenate(weights), np.concatenate(cores)
 
 
-# --- Forces: the nearest sum of pushes within cones ------------------------------------------------------------------------
+# --- Forces: the nearest sum of pushes within cones -------------------------------------------------------------------
 
 
 def non_negative(a, f, start):
@@ -184,13 +187,13 @@ def beyond_cones(nodes, force, supports, weights, normals, friction):
         columns, x = columns[:, x > 0], x[x > 0]
         left = f - columns @ x
         now = np.linalg.norm(left)
-        if now < 1e-8 or (now > 0.98 * last and len(best) < 2):
+        if now < (1e-5 if friction else 1e-8) or (now > 0.98 * last and len(best) < 2):
             break
         last = now
     return np.linalg.norm(left)
 
 
-# --- Models and answers ---------------------------------------------------------------------------------------------------
+# --- Models and answers -----------------------------------------------------------------------------------------------
 
 
 class Model:
@@ -209,6 +212,8 @@ class Model:
         self.rest, self.fixed = np.array(rows), np.array(self.fixed)
         corners = self.rest[self.triangles]
         self.edge = np.mean(np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2))
+        self.surface = np.zeros(len(self.rest), dtype=bool)
+        self.surface[self.triangles] = True
         self.free = ~self.fixed[self.triangles].any(axis=1)
 
 
@@ -243,7 +248,7 @@ def turned(axis, degrees, v):
     return v * np.cos(angle) + np.cross(k, v) * np.sin(angle) + k * (k @ v) * (1 - np.cos(angle))
 
 
-# --- Cases -------------------------------------------------------------------------------------------------------------------
+# --- Cases ------------------------------------------------------------------------------------------------------------
 
 
 def numbers(*values):
@@ -254,6 +259,11 @@ class Case:
     """An instrument on its way: lines of a scene, and where it is at each of its steps."""
 
     def __init__(self, body, random):
+        while not self.drawn(body, random):
+            pass
+
+    def drawn(self, body, random):
+        """Whether it is away from what is held."""
         m = body.model
         corners = m.rest[m.triangles]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -276,6 +286,12 @@ class Case:
         while self.clearance(m, m.rest, start, self.axis) < 0:
             start = start + 0.2 * self.radius * out
         pressed = point - self.axis / 2 + out * (self.radius - depth)
+        held = m.rest[m.fixed & m.surface]
+        for place in (start, pressed, pressed + aside):
+            foot = on_segment(held, place, place + self.axis)
+            far = np.linalg.norm(place + foot[:, None] * self.axis - held, axis=1)
+            if far.min(initial=np.inf) < self.radius + 2 * m.edge:
+                return False
         shape = "capsule" if self.axis.any() else "sphere"
         ends = numbers(start, start + self.axis) if self.axis.any() else numbers(start)
         self.lines = [f"object organ {body.path} {body.words}".rstrip(), "emit forces", "emit shapes", "emit instruments",
@@ -291,11 +307,12 @@ class Case:
             self.lines += [f"move probe {numbers(place)}{turn}" + (f" over {body.step}" if body.over else ""),
                            f"step {body.step}"]
             self.axes.append(turned(self.turn[0], angle, self.axis))
-            self.strict.append(body.strict_steps)
-        for step in body.rest:
-            self.lines.append(f"step {step}")
-            self.axes.append(self.axes[-1])
-            self.strict.append(True)
+            self.strict.append(not body.moment)
+            if body.moment:  # one step of integration, whose forces are those of where it ends
+                self.lines.append(f"step {body.moment}")
+                self.axes.append(self.axes[-1])
+                self.strict.append(True)
+        return True
 
     def clearance(self, m, shape, place, axis):
         """Of triangles that can give way, and their pairs of nearest points with the distances."""
@@ -318,8 +335,8 @@ class Case:
         return least, far, close[index], weights, places, cores
 
 
-def judge(case, m, step, axis):
-    """What a step breaks."""
+def judge(case, m, step, axis, began=None):
+    """What a step breaks. Explicit steps push where they began, by that shape."""
     found = {"depth": 0.0, "cone": 0.0, "apart": 0.0, "sum": 0.0, "nodes": len(step["forces"])}
     near = case.near(m, step["shape"], step["place"], axis)
     if near:
@@ -332,10 +349,15 @@ def judge(case, m, step, axis):
     found["sum"] = np.linalg.norm(total + step["force"]) / size
     touched, points = set(), {}
     if near:
+        _, far, triangles = near[:3]
+        touched.update(m.triangles[triangles[far <= (1 + TOUCH) * case.radius]].ravel())
+    reach = TOUCH
+    if began is not None:
+        near, reach = case.near(m, began, step["place"], axis), MAY_COME
+    if near:
         _, far, triangles, weights, places, cores = near
-        for k in np.flatnonzero((far <= (1 + case.touch) * case.radius) & (far > 0)):
+        for k in np.flatnonzero((far <= (1 + reach) * case.radius) & (far > 0)):
             nodes = m.triangles[triangles[k]]
-            touched.update(nodes)
             normal = (places[k] - cores[k]) / far[k]
             support = tuple(sorted((int(n), round(float(w), 7)) for n, w in zip(nodes, weights[k]) if w > 1e-12))
             points.setdefault((support, tuple(np.round(normal, 7))), (nodes, weights[k], normal))
@@ -353,16 +375,16 @@ def judge(case, m, step, axis):
     return found
 
 
-# --- Bodies --------------------------------------------------------------------------------------------------------------------
+# --- Bodies -----------------------------------------------------------------------------------------------------------
 
 
 class Body:
     def __init__(self, name, share, make, words, **how):
         self.name, self.share, self.make, self.words = name, share, make, words
-        self.steps, self.step, self.over, self.rest = how.get("steps", 6), how.get("step", 0.02), how.get("over", False), how.get("rest", [])
-        self.strict_steps = how.get("strict", True)
-        self.touch = how.get("touch", TOUCH)  # of the radius, where forces act
-        self.cone = how.get("cone", 1e-5)
+        self.steps, self.step = how.get("steps", 6), how.get("step", 0.02)
+        self.over = how.get("over", False)  # whether moves take time
+        self.moment = how.get("moment")  # s: a step so short that it is one of integration
+        self.explicit = how.get("explicit", False)
         self.store = how.get("store", False)
 
 
@@ -373,17 +395,18 @@ def bodies(data):
     else:
         liver, coarse = "--primitive sphere:40x30 --size 30", "--primitive sphere:12x8 --size 30"
         spleen, colon = "--primitive sphere:60x40 --size 40", "--primitive tube:30x60 --size 15,200"
-    low = {"liver": "--fix z<{low}", "spleen": "--fix z<{low}"}["liver"]
+    low = "--fix z<{low}"
+    moving = {"over": True, "moment": 1e-5}
     return [
         Body("liver, net", 0.2, f"{liver} {low}", "method=ffe", store=True),
         Body("spleen, net", 0.15, f"{spleen} --bend {low}", "method=ffe", store=True),
         Body("colon, net", 0.1, f"{colon} --bend {low}", "method=ffe", store=True),
         Body("liver, solid", 0.15, f"{liver} --solid --order 1 {low}", "method=ffe", store=True),
         Body("liver, quadratic solid", 0.1, f"{liver} --solid --cell 6 {low}", "method=ffe", store=True),
-        Body("liver, net that moves", 0.12, f"{coarse} {low}", "method=ela", over=True, rest=[2, 2, 0.01], strict=False),
-        Body("spleen, net that moves", 0.08, f"{spleen} --bend {low}", "method=ela", over=True, rest=[0.5, 0.01], strict=False),
-        Body("liver, net that moves implicitly", 0.06, f"{coarse} {low}", "method=ela integration=implicit", over=True),
-        Body("liver, solid that moves", 0.04, f"{coarse} --solid --cell 12 --order 1 {low}", "method=ela", over=True, steps=4),
+        Body("liver, net that moves", 0.12, f"{coarse} {low}", "method=ela", explicit=True, **moving),
+        Body("spleen, net that moves", 0.08, f"{spleen} --bend {low}", "method=ela", explicit=True, **moving),
+        Body("liver, net that moves implicitly", 0.06, f"{coarse} {low}", "method=ela integration=implicit", **moving),
+        Body("liver, solid that moves", 0.04, f"{coarse} --solid --cell 12 --order 1 {low}", "method=ela", steps=4, **moving),
     ]
 
 
@@ -422,9 +445,9 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or pathlib.Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        broken = []
-        head = f"{'':34}{'cases':>6}{'steps':>7}{'touched':>8}{'inexact':>8}{'failed':>7}{'broken':>7}{'depth':>10}{'cone':>10}{'apart':>10}{'sum':>10}"
-        print(head)
+        broken, cases, told = [], 0, 0
+        print(f"{'':34}{'cases':>6}{'steps':>7}{'touched':>8}{'inexact':>8}{'failed':>7}{'broken':>7}"
+              f"{'depth':>10}{'cone':>10}{'apart':>10}{'sum':>10}")
         for number, body in enumerate(bodies(data)):
             if options.only not in body.name:
                 continue
@@ -434,28 +457,33 @@ def main():
             tally = dict.fromkeys(("steps", "touched", "inexact", "failed", "broken"), 0)
             for k in range(count) if options.case is None else [options.case]:
                 case = Case(body, np.random.default_rng([options.seed, number, k]))
-                case.touch = body.touch
                 scene = folder / f"{body.path.stem}-{k}.scene"
                 scene.write_text("\n".join(case.lines) + "\n")
-                ran = subprocess.run(["ffe-run", "-j", "1", str(scene)], capture_output=True, text=True)
+                try:
+                    ran = subprocess.run(["ffe-run", "-j", "1", str(scene)], capture_output=True, text=True, timeout=LONG)
+                except subprocess.TimeoutExpired:
+                    tally["failed"] += 1
+                    broken.append((scene, "failed", [f"not done in {LONG} s"]))
+                    continue
                 steps = answers(ran.stdout)
-                inexact = "not exact" in ran.stderr or "can't be moved" in ran.stderr
+                inexact = "not exact" in ran.stderr or "goes through it" in ran.stderr
                 tally["inexact"] += inexact
                 wrong = []
                 if ran.returncode != 0:
                     tally["failed"] += 1
-                    wrong.append(ran.stderr.splitlines()[-1])
+                    wrong.append((ran.stderr.splitlines() or [f"status {ran.returncode}"])[-1])
                 for s, step in enumerate(steps):
-                    found = judge(case, body.model, step, case.axes[s])
+                    began = steps[s - 1]["shape"] if body.explicit and s > 0 else None
+                    found = judge(case, body.model, step, case.axes[s], began)
                     tally["steps"] += 1
                     tally["touched"] += found["nodes"] > 0
                     if options.case is not None:
                         print(s, found, ran.stderr)
                     bounds = {"depth": TOUCH, "sum": 1e-9}
                     if case.strict[s]:
-                        bounds |= {"cone": body.cone, "apart": 1e-6}
+                        bounds |= {"cone": 1e-4 if case.friction else 1e-5, "apart": 1e-6}
                     for what, bound in bounds.items():
-                        if not inexact:
+                        if not inexact and what in found:
                             worst[what] = max(worst[what], found[what])
                         if not found[what] <= bound:
                             wrong.append(f"step {s + 1}: {what} {found[what]:.2g}")
@@ -465,11 +493,16 @@ def main():
                     broken.append((scene, "inexact" if inexact else "failed" if ran.returncode else "broken", wrong))
                 else:
                     scene.unlink()
-            print(f"{body.name:34}{count:6}" + "".join(f"{tally[t]:{w}}" for t, w in (("steps", 7), ("touched", 8), ("inexact", 8), ("failed", 7), ("broken", 7)))
+            cases, told = cases + count, told + tally["inexact"]
+            widths = {"steps": 7, "touched": 8, "inexact": 8, "failed": 7, "broken": 7}
+            print(f"{body.name:34}{count:6}" + "".join(f"{tally[t]:{w}}" for t, w in widths.items())
                   + "".join(f"{worst[w]:10.2g}" for w in worst), flush=True)
+        inexact_share = told / cases
         for scene, kind, wrong in broken:
             print(f"{kind}: {scene}: {'; '.join(wrong[:4])}")
-        return 1 if any(kind != "inexact" for _, kind, _ in broken) else 0
+        if inexact_share > 0.05:
+            print(f"{inexact_share:.0%} of all cases are inexact, expected at most 5 %")
+        return 1 if inexact_share > 0.05 or any(kind != "inexact" for _, kind, _ in broken) else 0
 
 
 if __name__ == "__main__":
