@@ -1,5 +1,7 @@
 #include "contact/contact_solver.h"
 
+#include "contact/contact_interior_internal.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -8,8 +10,7 @@
 #include <cmath>
 #include <optional>
 
-// Based on: J. Júdice, F. Pires, A block principal pivoting algorithm for large-scale strictly
-// monotone linear complementarity problems, 1994; P. Alart, A. Curnier, A mixed formulation for
+// Based on: P. Alart, A. Curnier, A mixed formulation for
 // frictional contact problems prone to Newton like solution methods, 1991.
 
 namespace gewebe {
@@ -26,7 +27,11 @@ constexpr double regular = 1e-12;
 // Of the same, in a Newton step alone: forces that contacts can share anyhow stay small.
 constexpr double regular_step = 1e-7;
 
-constexpr int max_vain = 5; ///< rounds that don't halve the residual
+constexpr int max_vain = 2;   ///< rounds that don't halve the residual
+constexpr int max_inner = 60; ///< steps along the centre
+constexpr int max_idle = 12;  ///< of them that don't halve it
+constexpr int max_newton = 12;
+constexpr int max_sweeps = 10;
 
 using Block = Eigen::Matrix3d;
 
@@ -247,79 +252,56 @@ void sweep(const Local& l, std::span<const Contact> contacts, VectorXd& f) {
   }
 }
 
-/// λ >= 0, g = b + A λ >= 0, λ g = 0. \param on in: a guess of where λ > 0
-std::optional<VectorXd> pivot(const MatrixXd& a, const VectorXd& b, std::vector<bool> on) {
-  const Index count = b.size();
-  const double slack = 1e-14 * b.cwiseAbs().maxCoeff();
-  VectorXd lambda = VectorXd::Zero(count);
-  Index best = count + 1;
-  int patience = 3;
-  for (Index round = 0; round < 10 * count + 100; ++round) {
-    std::vector<Index> set;
-    for (Index i = 0; i < count; ++i)
-      if (on[static_cast<std::size_t>(i)])
-        set.push_back(i);
-    lambda.setZero();
-    if (!set.empty()) {
-      const MatrixXd within = a(set, set);
-      const Eigen::LLT<MatrixXd> factor(within);
-      if (factor.info() != Eigen::Success)
-        return std::nullopt;
-      const VectorXd rhs = -b(set), part = factor.solve(rhs);
-      lambda(set) = part;
-    }
-    const VectorXd g = b + a * lambda;
-    Index wrong = 0, last = -1;
-    for (Index i = 0; i < count; ++i)
-      if (on[static_cast<std::size_t>(i)] ? lambda[i] < 0 : g[i] < -slack) {
-        ++wrong;
-        last = i;
-      }
-    if (wrong == 0)
-      return lambda;
-    if (!lambda.allFinite())
-      return std::nullopt;
-    // All that are wrong change sides while that helps, else the last one (which must end).
-    if (wrong < best) {
-      best = wrong;
-      patience = 3;
-    } else {
-      --patience;
-    }
-    for (Index i = 0; i < count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if ((patience > 0 || i == last) && (on[k] ? lambda[i] < 0 : g[i] < -slack))
-        on[k] = !on[k];
-    }
-  }
-  return std::nullopt;
-}
-
-/// The normal forces under given tangential ones. \return whether they were found
-bool push_out(const Local& l, VectorXd& f) {
+/// The normal forces under given tangential ones.
+void push_out(const Local& l, VectorXd& f) {
   const Index count = f.size() / 3;
   MatrixXd a(count, count);
-  VectorXd b(count);
-  VectorXd drag = f;
-  std::vector<bool> on;
-  for (Index i = 0; i < count; ++i)
+  VectorXd b(count), drag = f;
+  std::vector<double> start;
+  for (Index i = 0; i < count; ++i) {
+    start.push_back(f[3 * i]);
     drag[3 * i] = 0;
+  }
   const VectorXd r = l.q + l.w * drag;
   for (Index i = 0; i < count; ++i) {
     b[i] = r[3 * i];
-    on.push_back(f[3 * i] > 0);
     for (Index j = 0; j < count; ++j)
       a(i, j) = l.w(3 * i, 3 * j);
   }
-  if (std::none_of(on.begin(), on.end(), [](bool o) { return o; }))
-    for (Index i = 0; i < count; ++i)
-      on[static_cast<std::size_t>(i)] = b[i] < 0;
-  const std::optional<VectorXd> lambda = pivot(a, b, on);
-  if (!lambda)
-    return false;
+  const PushForces pushes = solve_pushes({a.data(), static_cast<std::size_t>(a.size())},
+                                         {b.data(), static_cast<std::size_t>(b.size())}, start);
   for (Index i = 0; i < count; ++i)
-    f[3 * i] = (*lambda)[i];
-  return true;
+    f[3 * i] = pushes.push[static_cast<std::size_t>(i)];
+}
+
+/// Along the centre, then by Newton's steps. \pre e is of f; so it is behind
+void go_inside(const Local& l, std::span<const Contact> contacts, VectorXd& f, Residual& e) {
+  std::vector<Index> rows;
+  std::vector<double> friction;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    friction.push_back(contacts[i].friction);
+    for (Index a = 0; a < (contacts[i].friction > 0 ? 3 : 1); ++a)
+      rows.push_back(3 * static_cast<Index>(i) + a);
+  }
+  const MatrixXd w = l.w(rows, rows);
+  const VectorXd q = l.q(rows);
+  double last = HUGE_VAL;
+  int idle = 0;
+  follow_contact_centre(w, q, friction, max_inner, [&](const VectorXd& some) {
+    VectorXd all = VectorXd::Zero(f.size());
+    all(rows) = some;
+    Residual there = equations(l, contacts, all);
+    idle = there.size < 0.5 * last ? 0 : idle + 1;
+    last = idle == 0 ? there.size : last;
+    if (there.size < e.size) {
+      f = std::move(all);
+      e = std::move(there);
+    }
+    return e.size <= 0.1 * contact_solver_tolerance || idle == max_idle;
+  });
+  for (int k = 0; k < max_newton && !(e.size <= contact_solver_tolerance); ++k)
+    if (!newton(l, contacts, f, e))
+      break;
 }
 
 } // namespace
@@ -344,27 +326,32 @@ ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
     }
     rough = rough || contacts[i].friction > 0;
   }
-  if (!push_out(l, f))
-    for (int k = 0; k < 200; ++k)
-      sweep(l, contacts, f);
+  push_out(l, f);
   Residual e = equations(l, contacts, f);
   double best = HUGE_VAL;
-  for (int round = 0, vain = 0; rough && vain < max_vain && !(e.size <= contact_solver_tolerance);
-       ++round) {
-    bool on = true;
-    for (int k = 0; on && k < 12 && !(e.size <= contact_solver_tolerance); ++k)
-      on = newton(l, contacts, f, e);
+  for (int vain = 0; rough && vain < max_vain && !(e.size <= contact_solver_tolerance);) {
+    for (int k = 0; k < max_newton && !(e.size <= contact_solver_tolerance); ++k)
+      if (!newton(l, contacts, f, e))
+        break;
     if (e.size <= contact_solver_tolerance)
       break;
-    for (int k = 0; k < (round < 4 ? 10 : 40); ++k) // more where Newton's steps don't help
+    for (int k = 0; k < max_sweeps; ++k)
       sweep(l, contacts, f);
     e = equations(l, contacts, f);
     vain = e.size < 0.5 * best ? 0 : vain + 1;
     best = e.size < best ? e.size : best;
   }
-  // Whatever friction does, nothing stays inside.
-  if (rough && !(e.size <= contact_solver_tolerance) && push_out(l, f))
-    e = equations(l, contacts, f);
+  if (rough && !(e.size <= contact_solver_tolerance))
+    go_inside(l, contacts, f, e);
+  if (rough &&
+      !(e.size <= contact_solver_tolerance)) { // rather nothing inside, than friction right
+    VectorXd out = f;
+    push_out(l, out);
+    if (Residual there = equations(l, contacts, out); there.size < e.size) {
+      f = std::move(out);
+      e = std::move(there);
+    }
+  }
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Eigen::Vector3d g = l.frame[i].transpose() * f.segment<3>(static_cast<Index>(3 * i));
     result.force.push_back({g[0], g[1], g[2]});

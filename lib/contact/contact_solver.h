@@ -8,11 +8,13 @@
 //   s = T (slip + W f),  |f_t| <= μ f_n,  |f_t| = μ f_n and s = -α f_t, α >= 0, where s != 0
 //                                                                     (Coulomb)
 //
-// T leaves out the part along n. Without friction this is a convex quadratic programme, solved
-// exactly by block principal pivoting; with friction by sweeps over single contacts, each solved
-// exactly, and Newton steps on Alart and Curnier's equations.
+// T leaves out the part along n. Without friction this is a convex quadratic programme
+// (contact_pushes.h). With friction it is solved by Newton steps on Alart and Curnier's equations
+// and sweeps over single contacts, each solved exactly; where these fail, by an interior-point
+// method (contact_interior_internal.h).
 
 #include "base/vec3.h"
+#include "contact/contact_pushes.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -34,8 +36,6 @@ struct ContactForces {
   double residual = 0;     ///< of all conditions as forces, over the largest force
   bool solved = false;     ///< residual is at most the tolerance
 };
-
-inline constexpr double contact_solver_tolerance = 1e-10;
 
 /// \param compliance W, (3 m)² numbers, columns one behind the other \param start a guess, by
 /// contact, or empty   \pre contacts' nodes < m

@@ -1,4 +1,5 @@
 #include "contact/contact_solver.h"
+#include "statics/bent_compliance_internal.h"
 #include "statics/contact_turns_internal.h"
 
 #include "base/vector_at.h"
@@ -25,12 +26,15 @@ constexpr double outside = 1e-9;    ///< of the radius: so deep is not inside
 constexpr double immovable = 1e-12; ///< of the largest compliance
 constexpr double nearly = 0.03;     ///< from where on each turn comes nearer
 constexpr double most_softer = 8;   ///< by which forces make their points give way more
-constexpr double short_way = 0.1;
-constexpr int max_turns = 60;
+constexpr double short_way = 0.1, most_way = 8;
+constexpr std::array looseness{1.0, 0.7, 0.4, 0.0}; ///< how much of what makes softer counts
+constexpr double overlook = 1e-11;                  ///< of the radius
+constexpr std::size_t few = 32;                     ///< pairs that join at once, at least
+constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
 constexpr int max_sweeps = 200;
 constexpr double least_square = 1e-6; ///< of weights of nodes that give way
-constexpr int max_idle = 20;          ///< turns on end that came no nearer
+constexpr int max_idle = 40;          ///< turns on end that came no nearer
 
 std::array<Vec3, 3> corners_of(const Facet& piece, std::span<const Vec3> at) {
   return {at[piece[0]], at[piece[1]], at[piece[2]]};
@@ -226,13 +230,25 @@ private:
   }
 
   /// ∂(Bᵀ f)/∂x of the last pushes f, by differences. \param loose how much of it that makes softer
-  MatrixXd bending(double loose) const {
-    MatrixXd h = MatrixXd::Zero(size_, size_);
+  BentCompliance bending(double loose) const {
+    std::vector<Index> rows;
+    for (const std::uint32_t i : active_)
+      if (pushes(i))
+        for (const std::uint32_t node : turns_.pairs[i].piece)
+          if (node < nodes_.moving)
+            for (Index a = 0; a < 3; ++a)
+              rows.push_back(3 * static_cast<Index>(node) + a);
+    std::ranges::sort(rows);
+    rows.erase(std::ranges::unique(rows).begin(), rows.end());
+    const auto count = static_cast<Index>(rows.size());
+    MatrixXd h = MatrixXd::Zero(count, count);
+    const auto row_of = [&](std::uint32_t node) {
+      return std::ranges::lower_bound(rows, 3 * static_cast<Index>(node)) - rows.begin();
+    };
     for (const std::uint32_t i : active_) {
-      const TouchPair& p = turns_.pairs[i];
-      const double push = dot(p.force, p.normal);
-      if (!(push > 0))
+      if (!pushes(i))
         continue;
+      const TouchPair& p = turns_.pairs[i];
       std::optional<Eigen::Matrix<double, 9, 9>> own = bending_of(p);
       if (!own)
         continue;
@@ -242,16 +258,17 @@ private:
             parts.eigenvalues().cwiseMin(0.0) + loose * parts.eigenvalues().cwiseMax(0.0);
         *own = parts.eigenvectors() * all.asDiagonal() * parts.eigenvectors().transpose();
       }
-      for (Index c = 0; c < 9; ++c)
-        for (Index r = 0; r < 9; ++r) {
-          const std::uint32_t from = p.piece[static_cast<std::size_t>(c / 3)],
-                              to = p.piece[static_cast<std::size_t>(r / 3)];
-          if (from < nodes_.moving && to < nodes_.moving)
-            h(3 * static_cast<Index>(to) + r % 3, 3 * static_cast<Index>(from) + c % 3) +=
-                push * (*own)(r, c);
-        }
+      *own *= dot(p.force, p.normal);
+      for (std::size_t from = 0; from < 3; ++from)
+        for (std::size_t to = 0; to < 3; ++to)
+          if (p.piece[from] < nodes_.moving && p.piece[to] < nodes_.moving)
+            h.block<3, 3>(row_of(p.piece[to]), row_of(p.piece[from])) +=
+                own->block<3, 3>(3 * static_cast<Index>(to), 3 * static_cast<Index>(from));
     }
-    return h;
+    return {w_, std::move(rows), std::move(h)};
+  }
+  bool pushes(std::uint32_t pair) const {
+    return dot(turns_.pairs[pair].force, turns_.pairs[pair].normal) > 0;
   }
 
   /// Second derivatives of a pair's distance by its corners' places, 0 for repeated ones.
@@ -303,7 +320,8 @@ private:
     return energy;
   }
 
-  /// Less of the last way where all of it leads up.
+  /// Less of the last way where all of it leads up; more while that leads down, as from a saddle,
+  /// where curvature was left out.
   double shorten() {
     double weight = 0;
     for (const TouchPair& p : turns_.pairs)
@@ -319,7 +337,14 @@ private:
       if (there < here)
         break;
     }
-    if (part < 1) {
+    for (double way = 2; level_ > 0 && part >= 1 && way <= most_way; way *= 2) {
+      const double there = merit(way, weight);
+      if (!(there < best))
+        break;
+      best = there;
+      part = way;
+    }
+    if (part != 1) {
       for (std::size_t k = 0; k < nodes_.moving; ++k)
         turns_.at[k] = at_[k] + part * (turns_.at[k] - at_[k]);
       next_forces_ = forces_ + part * (next_forces_ - forces_);
@@ -327,108 +352,98 @@ private:
     return part;
   }
 
-  /// W Bᵀ, 3 columns for each active pair.
-  MatrixXd spread() const {
-    MatrixXd all = MatrixXd::Zero(size_, 3 * static_cast<Index>(active_.size()));
-    for (std::size_t k = 0; k < active_.size(); ++k) {
-      const TouchPair& p = turns_.pairs[active_[k]];
-      for (std::size_t c = 0; c < 3; ++c)
-        if (p.point.weights[c] > 0 && p.piece[c] < nodes_.moving)
-          all.middleCols(3 * static_cast<Index>(k), 3) +=
-              p.point.weights[c] * w_.middleCols(3 * static_cast<Index>(p.piece[c]), 3);
-    }
-    return all;
-  }
-
-  /// The points of the active pairs.
-  Vec3 point_of(const TouchPair& p, std::span<const Vec3> at) const {
+  /// The pair's point.
+  static Vec3 point_of(const TouchPair& p, std::span<const Vec3> at) {
     return p.point.weights[0] * at[p.piece[0]] + p.point.weights[1] * at[p.piece[1]] +
            p.point.weights[2] * at[p.piece[2]];
   }
-  MatrixXd at_points(const MatrixXd& rows) const {
-    MatrixXd all = MatrixXd::Zero(3 * static_cast<Index>(active_.size()), rows.cols());
-    for (std::size_t k = 0; k < active_.size(); ++k) {
-      const TouchPair& p = turns_.pairs[active_[k]];
+
+  /// The pairs that a turn's linear problem looks at, each with a column of W Bᵀ for its push, or
+  /// three for its force where anything rubs.
+  struct Looked {
+    std::vector<std::uint32_t> pairs;
+    MatrixXd straight; ///< own compliance by rows of the points, before forces turn: diagonal
+    MatrixXd columns;  ///< with it
+    VectorXd forces;   ///< by column
+    VectorXd x;        ///< where the nodes are under them
+    bool exact = true;
+  };
+
+  Index width() const { return rough_ ? 3 : 1; }
+  /// Directions of a pair's forces, one or three of unit length.
+  Eigen::Matrix<double, 3, Eigen::Dynamic> directions(const TouchPair& p) const {
+    if (rough_)
+      return Eigen::Matrix3d::Identity();
+    return Eigen::Vector3d(p.normal.x, p.normal.y, p.normal.z);
+  }
+
+  /// Rows of the points of pairs, along their directions.
+  MatrixXd at_points(std::span<const std::uint32_t> pairs, const MatrixXd& rows) const {
+    MatrixXd all(width() * static_cast<Index>(pairs.size()), rows.cols());
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const TouchPair& p = turns_.pairs[pairs[k]];
+      MatrixXd own = MatrixXd::Zero(3, rows.cols());
       for (std::size_t c = 0; c < 3; ++c)
         if (p.point.weights[c] > 0 && p.piece[c] < nodes_.moving)
-          all.middleRows(3 * static_cast<Index>(k), 3) +=
-              p.point.weights[c] * rows.middleRows(3 * static_cast<Index>(p.piece[c]), 3);
+          own += p.point.weights[c] * rows.middleRows(3 * static_cast<Index>(p.piece[c]), 3);
+      all.middleRows(width() * static_cast<Index>(k), width()) = directions(p).transpose() * own;
     }
     return all;
   }
 
-  /// Compliance of the nodes and their places without forces of the active pairs, with these
-  /// forces' turning. \return whether it is stable: forces move their points out
-  bool bent(const MatrixXd& h, const MatrixXd& straight, MatrixXd& columns, VectorXd& base) const {
-    VectorXd x(size_);
-    for (Index r = 0; r < size_; ++r)
-      x[r] = at_[static_cast<std::size_t>(r / 3)][static_cast<int>(r % 3)];
-    const Eigen::PartialPivLU<MatrixXd> lu(MatrixXd::Identity(size_, size_) - w_ * h);
-    columns = lu.solve(straight);
-    base = lu.solve(base - w_ * (h * x)).eval();
-    if (!columns.allFinite() || !base.allFinite())
-      return false;
-    const MatrixXd p = at_points(columns), before = at_points(straight);
-    const auto count = static_cast<Index>(active_.size());
-    MatrixXd normal(count, count);
-    for (Index i = 0; i < count; ++i)
-      for (Index j = 0; j < count; ++j) {
-        const Vec3 a = normal_of(i), b = normal_of(j);
-        normal(i, j) = Eigen::Vector3d(a.x, a.y, a.z)
-                           .dot(p.block<3, 3>(3 * i, 3 * j) * Eigen::Vector3d(b.x, b.y, b.z));
-      }
-    normal = (0.5 * (normal + normal.transpose())).eval();
-    for (Index r = 0; r < p.rows(); ++r) // near its end nothing of it can be trusted
-      if (!(p(r, r) <= most_softer * before(r, r)))
+  /// Pairs join those that are looked at.
+  void look_at(std::span<const std::uint32_t> pairs, const BentCompliance& bent,
+               Looked& looked) const {
+    MatrixXd more = MatrixXd::Zero(size_, width() * static_cast<Index>(pairs.size()));
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const TouchPair& p = turns_.pairs[pairs[k]];
+      const auto along = directions(p);
+      for (std::size_t c = 0; c < 3; ++c)
+        if (p.point.weights[c] > 0 && p.piece[c] < nodes_.moving)
+          more.middleCols(width() * static_cast<Index>(k), width()) +=
+              p.point.weights[c] * w_.middleCols(3 * static_cast<Index>(p.piece[c]), 3) * along;
+    }
+    const Index before = looked.columns.cols();
+    const VectorXd own = at_points(pairs, more).diagonal();
+    bent.apply(more);
+    looked.straight.conservativeResize(before + more.cols(), 1);
+    looked.straight.bottomRows(more.cols()) = own;
+    looked.columns.conservativeResize(size_, before + more.cols());
+    looked.columns.rightCols(more.cols()) = more;
+    looked.pairs.insert(looked.pairs.end(), pairs.begin(), pairs.end());
+  }
+
+  /// Whether forces move their points out, and not too far.
+  bool stable(const Looked& looked, const MatrixXd& compliance) const {
+    for (Index r = 0; r < compliance.rows(); ++r) // near its end nothing of it can be trusted
+      if (!(compliance(r, r) <= most_softer * looked.straight(r, 0)))
         return false;
+    const auto count = static_cast<Index>(looked.pairs.size());
+    MatrixXd normal = compliance;
+    if (rough_) {
+      normal.resize(count, count);
+      for (Index i = 0; i < count; ++i)
+        for (Index j = 0; j < count; ++j)
+          normal(i, j) =
+              normal_of(looked, i).dot(compliance.block<3, 3>(3 * i, 3 * j) * normal_of(looked, j));
+    }
     normal.diagonal().array() += 1e-10 * normal.diagonal().cwiseAbs().maxCoeff();
     return Eigen::LLT<MatrixXd>(normal).info() == Eigen::Success;
   }
 
-  /// Forces of the active pairs, and where the nodes are under them.
-  bool solve(bool bend, bool safe) {
-    bend = bend && !active_.empty();
-    const MatrixXd straight = spread();
-    MatrixXd columns = straight;
-    VectorXd base(size_);
-    for (Index r = 0; r < size_; ++r)
-      base[r] = free_[static_cast<std::size_t>(r / 3)][static_cast<int>(r % 3)];
-    MatrixXd h = MatrixXd::Zero(size_, size_);
-    if (bend) {
-      const VectorXd free = base;
-      bool stable = false;
-      for (const double loose : {1.0, 0.7, 0.4, 0.0}) {
-        if (safe && loose > 0)
-          continue;
-        h = bending(loose);
-        columns = straight;
-        base = free;
-        stable = bent(h, straight, columns, base);
-        if (stable)
-          break;
-      }
-      if (!stable) {
-        h.setZero();
-        columns = straight;
-        base = free;
-      }
-    }
-    MatrixXd compliance = at_points(columns);
-    compliance = (0.5 * (compliance + compliance.transpose())).eval();
-    std::vector<Vec3> without(free_.begin(), free_.end());
-    for (std::size_t k = 0; k < nodes_.moving; ++k)
-      without[k] = {base[static_cast<Index>(3 * k)], base[static_cast<Index>(3 * k + 1)],
-                    base[static_cast<Index>(3 * k + 2)]};
+  /// The forces of these pairs, whatever the others say. \param base where the nodes are without
+  void solve_looked(const MatrixXd& compliance, const VectorXd& base, Looked& looked) {
+    const std::vector<Vec3> without = places_of(base);
     std::vector<Contact> contacts;
     std::vector<Vec3> guess;
-    std::vector<std::uint32_t> used;
-    for (std::uint32_t k = 0; k < active_.size(); ++k) {
-      TouchPair& p = turns_.pairs[active_[k]];
+    for (std::uint32_t k = 0; k < looked.pairs.size(); ++k) {
+      TouchPair& p = turns_.pairs[looked.pairs[k]];
       const PlacedInstrument& instrument = *placed_[p.instrument];
       const MovedInstrument& way = *moved_[p.instrument];
-      const Index row = 3 * static_cast<Index>(k);
-      const Eigen::Vector3d n(p.normal.x, p.normal.y, p.normal.z);
-      const double own = n.dot(compliance.block<3, 3>(row, row) * n);
+      const Index row = width() * static_cast<Index>(k);
+      const Eigen::Vector3d n = normal_of(looked, k);
+      const double own =
+          rough_ ? n.dot(compliance.block<3, 3>(row, row) * n) : compliance(row, row);
       if (!(own > immovable * largest_)) {
         turns_.stuck = p;
         p.force = {};
@@ -439,38 +454,148 @@ private:
                           here - carried(way.before, way.now, point_of(p, nodes_.was)),
                           instrument.friction});
       guess.push_back(p.force);
-      used.push_back(active_[k]);
     }
-    const ContactForces forces =
-        solve_contacts({compliance.data(), static_cast<std::size_t>(compliance.size())},
-                       active_.size(), contacts, guess);
-    VectorXd f = VectorXd::Zero(compliance.rows());
-    for (std::size_t i = 0; i < used.size(); ++i) {
-      turns_.pairs[used[i]].force = forces.force[i];
+    looked.forces = VectorXd::Zero(compliance.rows());
+    if (rough_) {
+      const ContactForces found =
+          solve_contacts({compliance.data(), static_cast<std::size_t>(compliance.size())},
+                         looked.pairs.size(), contacts, guess);
+      looked.exact = found.solved;
+      for (std::size_t i = 0; i < contacts.size(); ++i)
+        for (int a = 0; a < 3; ++a)
+          looked.forces[3 * static_cast<Index>(contacts[i].node) + a] = found.force[i][a];
+    } else {
+      std::vector<Index> rows;
+      std::vector<double> gap, start;
+      for (std::size_t i = 0; i < contacts.size(); ++i) {
+        rows.push_back(contacts[i].node);
+        gap.push_back(contacts[i].gap);
+        start.push_back(dot(guess[i], contacts[i].normal));
+      }
+      const MatrixXd some = compliance(rows, rows);
+      const PushForces found =
+          solve_pushes({some.data(), static_cast<std::size_t>(some.size())}, gap, start);
+      looked.exact = found.solved;
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        looked.forces[rows[i]] = found.push[i];
+    }
+    for (std::size_t k = 0; k < looked.pairs.size(); ++k) {
+      TouchPair& p = turns_.pairs[looked.pairs[k]];
+      const Eigen::Vector3d force =
+          directions(p) * looked.forces.segment(width() * static_cast<Index>(k), width());
+      p.force = {force[0], force[1], force[2]};
+    }
+    looked.x = base + looked.columns * looked.forces;
+  }
+
+  std::vector<Vec3> places_of(const VectorXd& x) const {
+    std::vector<Vec3> all(free_.begin(), free_.end());
+    for (std::size_t k = 0; k < nodes_.moving; ++k)
       for (int a = 0; a < 3; ++a)
-        f[3 * static_cast<Index>(contacts[i].node) + a] = forces.force[i][a];
+        all[k][a] = x[static_cast<Index>(3 * k) + a];
+    return all;
+  }
+  VectorXd rows_of(std::span<const Vec3> places) const {
+    VectorXd all(size_);
+    for (Index r = 0; r < size_; ++r)
+      all[r] = places[static_cast<std::size_t>(r / 3)][static_cast<int>(r % 3)];
+    return all;
+  }
+
+  /// The pairs that nobody looked at whose points are in their instruments, the deepest first.
+  std::vector<std::uint32_t> overlooked(const Looked& looked) const {
+    const std::vector<Vec3> at =
+        looked.x.size() > 0 ? places_of(looked.x) : std::vector<Vec3>(free_.begin(), free_.end());
+    std::vector<std::uint32_t> known(looked.pairs);
+    std::ranges::sort(known);
+    std::vector<std::pair<double, std::uint32_t>> found;
+    for (const std::uint32_t i : active_) {
+      if (std::ranges::binary_search(known, i))
+        continue;
+      const TouchPair& p = turns_.pairs[i];
+      const double radius = placed_[p.instrument]->radius;
+      const double gap = dot(p.normal, point_of(p, at) - p.point.core) - radius;
+      if (!(gap >= -overlook * radius))
+        found.emplace_back(gap / radius, i);
     }
-    const VectorXd x = base + columns * f;
+    std::ranges::sort(found);
+    found.resize(std::min(found.size(), std::max(few, known.size())));
+    std::vector<std::uint32_t> pairs;
+    for (const auto& [gap, i] : found)
+      pairs.push_back(i);
+    std::ranges::sort(pairs);
+    return pairs;
+  }
+
+  /// The linear problem of a turn, by more and more of the pairs. \return none where it isn't
+  /// stable
+  std::optional<Looked> solve_bent(const BentCompliance& bent, bool careful) {
+    MatrixXd base = rows_of(free_);
+    base -= w_ * bent.turning(rows_of(at_));
+    bent.apply(base);
+    Looked looked;
+    looked.columns.resize(size_, 0);
+    looked.x = base;
+    if (!looked.x.allFinite())
+      return std::nullopt;
+    std::vector<std::uint32_t> more;
+    for (const std::uint32_t i : active_)
+      if (turns_.pairs[i].force != Vec3{})
+        more.push_back(i);
+    if (more.empty())
+      more = overlooked(looked);
+    while (!more.empty()) {
+      look_at(more, bent, looked);
+      if (!looked.columns.allFinite())
+        return std::nullopt;
+      MatrixXd compliance = at_points(looked.pairs, looked.columns);
+      compliance = (0.5 * (compliance + compliance.transpose())).eval();
+      if (careful && !stable(looked, compliance))
+        return std::nullopt;
+      solve_looked(compliance, base, looked);
+      more = overlooked(looked);
+    }
+    return looked;
+  }
+
+  /// Forces of the active pairs, and where the nodes are under them.
+  bool solve(bool bend, bool safe) {
+    rough_ = std::ranges::any_of(active_, [&](std::uint32_t i) {
+      return placed_[turns_.pairs[i].instrument]->friction > 0;
+    });
+    std::vector<Vec3> guess;
+    for (const TouchPair& p : turns_.pairs)
+      guess.push_back(p.force);
+    std::optional<BentCompliance> bent;
+    std::optional<Looked> looked;
+    // What the turn before had to leave out, this one tries little of.
+    const std::size_t first = safe ? looseness.size() - 1 : 0;
+    for (std::size_t level = first; bend && !looked && level < looseness.size(); ++level) {
+      for (std::size_t i = 0; i < guess.size(); ++i)
+        turns_.pairs[i].force = guess[i];
+      bent.emplace(bending(looseness[level]));
+      looked = solve_bent(*bent, true);
+      level_ = level;
+    }
+    if (!looked) {
+      for (std::size_t i = 0; i < guess.size(); ++i)
+        turns_.pairs[i].force = guess[i];
+      bent.emplace(w_, std::vector<Index>{}, MatrixXd{});
+      looked = solve_bent(*bent, false);
+    }
+    if (!looked)
+      return false;
     // The forces on the nodes that these places mean.
-    next_forces_ = VectorXd::Zero(size_);
-    for (std::size_t i = 0; i < used.size(); ++i) {
-      const TouchPair& p = turns_.pairs[used[i]];
+    next_forces_ = bent->turning(looked->x - rows_of(at_));
+    for (const std::uint32_t i : looked->pairs) {
+      const TouchPair& p = turns_.pairs[i];
       for (std::size_t c = 0; c < 3; ++c)
         for (int a = 0; a < 3; ++a)
           if (p.piece[c] < nodes_.moving)
             next_forces_[3 * static_cast<Index>(p.piece[c]) + a] += p.point.weights[c] * p.force[a];
     }
-    if (bend) {
-      VectorXd way = x;
-      for (Index r = 0; r < size_; ++r)
-        way[r] -= at_[static_cast<std::size_t>(r / 3)][static_cast<int>(r % 3)];
-      next_forces_ += h * way;
-    }
-    turns_.at.assign(free_.begin(), free_.end());
-    for (std::size_t k = 0; k < nodes_.moving; ++k)
-      turns_.at[k] = {x[static_cast<Index>(3 * k)], x[static_cast<Index>(3 * k + 1)],
-                      x[static_cast<Index>(3 * k + 2)]};
-    return forces.solved;
+    turns_.at = places_of(looked->x);
+    return looked->exact;
   }
 
   /// How far the pairs' points and normals are from where the nodes now have them: of those that
@@ -494,8 +619,9 @@ private:
     return most;
   }
 
-  Vec3 normal_of(Index k) const {
-    return turns_.pairs[active_[static_cast<std::size_t>(k)]].normal;
+  Eigen::Vector3d normal_of(const Looked& looked, Index k) const {
+    const Vec3& n = turns_.pairs[looked.pairs[static_cast<std::size_t>(k)]].normal;
+    return {n.x, n.y, n.z};
   }
 
   const ContactNodes& nodes_;
@@ -506,6 +632,8 @@ private:
   Index size_;
   Eigen::Map<const MatrixXd> w_;
   double largest_ = 0;
+  bool rough_ = false;                ///< anything rubs
+  std::size_t level_ = 0;             ///< of looseness
   std::vector<Vec3> at_;              ///< before a turn
   VectorXd forces_, next_forces_;     ///< on the nodes, as the places mean before and behind a turn
   std::vector<std::uint32_t> active_; ///< pairs

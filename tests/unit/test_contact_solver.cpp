@@ -109,6 +109,70 @@ TEST(ContactSolver, OneNodeSticksOrSlips) {
   }
 }
 
+/// Several contacts at each node of a small organ, as where an instrument lies on all triangles
+/// around: their forces are not determined.
+Case crowded_case(double friction, unsigned seed, std::size_t at_each) {
+  const Model model = test::organ();
+  Case c;
+  const std::vector<std::uint32_t> nodes = test::free_nodes(model);
+  c.m = nodes.size();
+  c.w = compliance_of(model, nodes);
+  Random random;
+  random.engine.seed(seed);
+  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+    const Vec3 out = random.direction(), slip = 0.5 * random.direction();
+    const double gap = random(-1, 0.3);
+    for (std::size_t k = 0; k < at_each; ++k) {
+      Vec3 n = out + 0.3 * random.direction();
+      n = n / norm(n);
+      c.contacts.push_back({i, n, gap, slip, friction});
+    }
+  }
+  return c;
+}
+
+TEST(ContactSolver, ContactsShareWhatTheirNodesCanDo) {
+  for (const double friction : {0.0, 0.2, 0.4})
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      const Case c = crowded_case(friction, seed, 4);
+      const ContactForces f = solve_contacts(c.w, c.m, c.contacts);
+      EXPECT_TRUE(f.solved) << friction << " " << seed << " " << f.residual;
+      EXPECT_LT(contact_residual(c.w, c.m, c.contacts, f.force), 1e-9);
+    }
+}
+
+TEST(ContactSolver, PushesAreThoseOfTheWholeProblem) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Case c = crowded_case(0, seed, 4);
+    const std::size_t count = c.contacts.size();
+    std::vector<double> a(count * count), gap;
+    for (std::size_t i = 0; i < count; ++i)
+      gap.push_back(c.contacts[i].gap);
+    std::vector<Vec3> unit(count);
+    for (std::size_t j = 0; j < count; ++j) {
+      unit.assign(count, {});
+      unit[j] = c.contacts[j].normal;
+      for (std::size_t i = 0; i < count; ++i)
+        a[j * count + i] =
+            dot(c.contacts[i].normal, moved(c.w, c.m, c.contacts, unit, c.contacts[i].node));
+    }
+    const PushForces pushes = solve_pushes(a, gap);
+    EXPECT_TRUE(pushes.solved) << seed << " " << pushes.residual;
+    const ContactForces whole = solve_contacts(c.w, c.m, c.contacts);
+    // Pushes are not determined where contacts share them; what they do is.
+    std::vector<Vec3> force;
+    for (std::size_t i = 0; i < count; ++i)
+      force.push_back(pushes.push[i] * c.contacts[i].normal);
+    double largest = 0;
+    for (std::size_t node = 0; node < c.m; ++node)
+      largest = std::max(largest, norm(moved(c.w, c.m, c.contacts, force, node)));
+    for (std::size_t node = 0; node < c.m; ++node)
+      EXPECT_LT(norm(moved(c.w, c.m, c.contacts, force, node) -
+                     moved(c.w, c.m, c.contacts, whole.force, node)),
+                1e-8 * largest);
+  }
+}
+
 TEST(ContactSolver, AllConditionsHoldOnAnOrgan) {
   for (const double friction : {0.0, 0.05, 0.3, 1.0}) {
     std::size_t pressed = 0, open = 0, slipping = 0, sticking = 0;

@@ -1,0 +1,129 @@
+#include "contact/contact_pushes.h"
+
+#include "contact/contact_interior_internal.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+// Based on: J. Júdice, F. Pires, A block principal pivoting algorithm for large-scale strictly
+// monotone linear complementarity problems, 1994.
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int max_inner = 60; ///< steps along the centre
+
+/// λ >= 0, g = b + A λ >= 0, λ g = 0. \param on in: a guess of where λ > 0
+std::optional<VectorXd> pivot(const MatrixXd& a, const VectorXd& b, std::vector<bool> on) {
+  const Index count = b.size();
+  const double slack = 1e-14 * b.cwiseAbs().maxCoeff();
+  VectorXd lambda = VectorXd::Zero(count);
+  Index best = count + 1;
+  int patience = 3;
+  for (Index round = 0; round < 10 * count + 100; ++round) {
+    std::vector<Index> set;
+    for (Index i = 0; i < count; ++i)
+      if (on[static_cast<std::size_t>(i)])
+        set.push_back(i);
+    lambda.setZero();
+    if (!set.empty()) {
+      const MatrixXd within = a(set, set);
+      const Eigen::LLT<MatrixXd> factor(within);
+      if (factor.info() != Eigen::Success)
+        return std::nullopt;
+      const VectorXd rhs = -b(set), part = factor.solve(rhs);
+      lambda(set) = part;
+    }
+    const VectorXd g = b + a * lambda;
+    Index wrong = 0, last = -1;
+    for (Index i = 0; i < count; ++i)
+      if (on[static_cast<std::size_t>(i)] ? lambda[i] < 0 : g[i] < -slack) {
+        ++wrong;
+        last = i;
+      }
+    if (wrong == 0)
+      return lambda;
+    if (!lambda.allFinite())
+      return std::nullopt;
+    // All that are wrong change sides while that helps, else the last one (which must end).
+    if (wrong < best) {
+      best = wrong;
+      patience = 3;
+    } else {
+      --patience;
+    }
+    for (Index i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if ((patience > 0 || i == last) && (on[k] ? lambda[i] < 0 : g[i] < -slack))
+        on[k] = !on[k];
+    }
+  }
+  return std::nullopt;
+}
+
+double residual_of(const MatrixXd& a, const VectorXd& b, const VectorXd& lambda) {
+  const VectorXd g = b + a * lambda;
+  double scale = 0, miss = 0;
+  for (Index i = 0; i < b.size(); ++i) {
+    const double push = std::max(0.0, lambda[i] - g[i] / a(i, i));
+    const double here = std::abs(lambda[i] - push);
+    scale = std::max({scale, std::abs(lambda[i]), push});
+    miss = here <= miss ? miss : here;
+  }
+  return scale > 0 ? miss / scale : miss;
+}
+
+} // namespace
+
+PushForces solve_pushes(std::span<const double> compliance, std::span<const double> gap,
+                        std::span<const double> start) {
+  PushForces result;
+  const auto count = static_cast<Index>(gap.size());
+  if (count == 0) {
+    result.solved = true;
+    return result;
+  }
+  const MatrixXd a = Eigen::Map<const MatrixXd>(compliance.data(), count, count);
+  const VectorXd b = Eigen::Map<const VectorXd>(gap.data(), count);
+  std::vector<bool> on;
+  for (const double push : start)
+    on.push_back(push > 0);
+  if (std::ranges::none_of(on, [](bool o) { return o; })) {
+    on.clear();
+    for (Index i = 0; i < count; ++i)
+      on.push_back(b[i] < 0);
+  }
+  VectorXd lambda = VectorXd::Zero(count);
+  result.residual = HUGE_VAL;
+  const auto take = [&](VectorXd&& some) {
+    const double residual = residual_of(a, b, some);
+    if (!(residual < result.residual))
+      return;
+    lambda = std::move(some);
+    result.residual = residual;
+  };
+  if (std::optional<VectorXd> found = pivot(a, b, std::move(on)))
+    take(std::move(*found));
+  if (!(result.residual <= contact_solver_tolerance)) {
+    const std::vector<double> smooth(gap.size());
+    follow_contact_centre(a, b, smooth, max_inner, [&](const VectorXd& some) {
+      take(VectorXd(some));
+      return result.residual <= 0.1 * contact_solver_tolerance;
+    });
+  }
+  result.push.assign(lambda.begin(), lambda.end());
+  result.solved = result.residual <= contact_solver_tolerance;
+  return result;
+}
+
+} // namespace gewebe
