@@ -45,12 +45,15 @@ auto key_of(const TouchPair& p) {
 }
 
 /// Corners that a point depends on, ascending and last repeated: the same for pieces that share it.
+/// All of them where forces without bounds have left it no place.
 Facet support_of(const TouchPair& p) {
   Facet all{};
   std::size_t count = 0;
   for (std::size_t c = 0; c < 3; ++c)
     if (p.point.weights[c] > 0)
       all[count++] = p.piece[c];
+  if (count == 0)
+    return p.piece;
   std::sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t c = count; c < 3; ++c)
     all[c] = all[count - 1];

@@ -328,6 +328,13 @@ TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
         "-0 over 0.0015",
         "step 0.0025", "at 0.015 force a x>0 1e38 -14990 45240", "step 0.001", "step 0.005",
         "step 0.005", "step 0.001"}},
+      {"instruments between which a filled body has no place",
+       {"object b ball integration=auto bulk=87600", "emit instruments",
+        "instrument p sphere 10.364 117.85296580927726 -55.52993161855453 31.80596580927726 "
+        "friction 1.343",
+        "instrument q capsule 6.071999999999999 95.14006838144547 -34.906034190722735 "
+        "15.032034190722737 89.96206838144548 -33.33703419072273 16.821034190722738",
+        "step 0.0025"}},
       {"an instrument that comes while a factor can't be had",
        {"object a free store=free method=ffe", "emit instruments",
         "cut a plane 0 -11.08655439013544 4.592201188381077 -1.831 -1.183 -0.4173", "step 0.005",
