@@ -44,12 +44,12 @@ public:
       : mesh_(mesh), places_(places.empty() ? std::span<const Vec3>(mesh.points) : places),
         blade_(blade) {}
 
-  CutRegion find() {
+  CutRegion find(bool wide) {
     find_candidates();
     find_passed();
     for (Candidate& candidate : candidates_)
       separate(candidate);
-    gather();
+    gather(wide);
     return std::move(region_);
   }
 
@@ -154,13 +154,15 @@ private:
                                       region_.nodes.begin());
   }
 
-  void gather() {
+  void gather(bool wide) {
     if (std::ranges::none_of(passed_, &Passed::used))
       return;
     std::vector<std::uint8_t> marked(mesh_.points.size());
     for (const Passed& edge : passed_)
       if (edge.used)
         marked[edge.low] = marked[edge.high] = 1;
+    if (wide)
+      marked = with_neighbours(marked);
     std::size_t next = 0; // candidate
     for (std::uint32_t t = 0; t < mesh_.tetrahedra.size(); ++t) {
       const Tetrahedron& corners = mesh_.tetrahedra[t];
@@ -182,8 +184,18 @@ private:
     std::ranges::sort(region_.nodes);
     const auto repeated = std::ranges::unique(region_.nodes);
     region_.nodes.erase(repeated.begin(), repeated.end());
+    for (const std::uint32_t node : region_.nodes)
+      region_.whole.push_back(marked[node]);
     take_used_edges();
     make_stars();
+  }
+
+  std::vector<std::uint8_t> with_neighbours(const std::vector<std::uint8_t>& marked) const {
+    std::vector<std::uint8_t> wider = marked;
+    for (const auto& [a, b, c, d] : mesh_.tetrahedra)
+      if ((marked[a] | marked[b] | marked[c] | marked[d]) != 0)
+        wider[a] = wider[b] = wider[c] = wider[d] = 1;
+    return wider;
   }
 
   void take_used_edges() {
@@ -250,8 +262,9 @@ private:
 
 } // namespace
 
-CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade) {
-  return Finder(mesh, places, blade).find();
+CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade,
+                     bool wide) {
+  return Finder(mesh, places, blade).find(wide);
 }
 
 } // namespace gewebe

@@ -48,10 +48,11 @@ struct RegionTet {
 
 struct CutRegion {
   std::vector<CrossedEdge> edges;   ///< by the numbers of their ends in the mesh
-  std::vector<RegionTet> tets;      ///< ascending: all with an end of a crossed edge
+  std::vector<RegionTet> tets;      ///< ascending: all with an end of a crossed edge, or more
   std::vector<std::uint32_t> nodes; ///< of each local node its number in the mesh, ascending
   std::vector<std::uint32_t> first; ///< star[first[n] … first[n+1]) of a local node:
   std::vector<std::uint32_t> star;  ///< tetrahedra of the region at it, ascending
+  std::vector<std::uint8_t> whole;  ///< are all tetrahedra at a local node in the region?
   std::uint64_t tested = 0, folded = 0;
 
   std::span<const std::uint32_t> star_of(std::uint32_t node) const {
@@ -59,8 +60,10 @@ struct CutRegion {
   }
 };
 
+/// \param wide with the neighbours of what is at the ends of crossed edges
 /// \pre check_mesh(mesh) passes; places is empty or has one per point
 /// \throw Error as cut_tetrahedra
-CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade);
+CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade,
+                     bool wide);
 
 } // namespace gewebe

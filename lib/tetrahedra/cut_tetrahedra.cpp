@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -58,6 +59,7 @@ public:
     cut_.report.kept = snapped.kept;
     cut_.report.largest_miss = snapped.largest_miss;
     cut_.report.rejoined = parted.rejoined;
+    cut_.report.opened = parted.opened;
   }
 
   TetCut assemble() {
@@ -206,13 +208,13 @@ private:
       }
   }
 
-  /// Faces without an end of a crossed edge can have neighbours outside of the region; they stay as
-  /// they were.
+  /// Faces none of whose nodes has all its tetrahedra in the region can have neighbours outside of
+  /// the region; they stay as they were.
   void write_surface() {
-    std::vector<bool> known(region_.nodes.size());
-    for (const CrossedEdge& edge : region_.edges)
-      known[edge.ends[0]] = known[edge.ends[1]] = true;
-    const auto is_known = [&](std::uint32_t node) { return node >= known.size() || known[node]; };
+    const std::vector<std::uint8_t>& whole = region_.whole;
+    const auto is_known = [&](std::uint32_t node) {
+      return node >= whole.size() || whole[node] != 0;
+    };
     for (std::uint32_t p = 0; p < parted_.parts.size(); ++p)
       for (std::uint32_t k = 0; k < 4; ++k) {
         const TetPart& part = parted_.parts[p];
@@ -269,18 +271,28 @@ private:
   TetCut cut_;
 };
 
+/// Nothing if a wider neighbourhood of the blade is wanted.
+std::optional<TetCut> cut_near(const TetMesh& mesh, const Blade& blade,
+                               const BladeCutOptions& options, bool wide) {
+  const CutRegion region = cut_region(mesh, options.places, blade, wide);
+  if (!mesh.middles.empty())
+    check_straight(mesh, region);
+  const SnappedRegion snapped = snap_region(mesh, region, options);
+  const PartedRegion parted = part_region(region, snapped);
+  if (parted.needs_more && !wide)
+    return std::nullopt;
+  return Assembler(mesh, region, snapped, parted).assemble();
+}
+
 } // namespace
 
 TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options) {
   check(mesh, options);
   const Blade swept(blade);
-  const CutRegion region = cut_region(mesh, options.places, swept);
-  if (!mesh.middles.empty())
-    check_straight(mesh, region);
-  const SnappedRegion snapped = snap_region(mesh, region, options);
-  const PartedRegion parted = part_region(region, snapped);
-  return Assembler(mesh, region, snapped, parted).assemble();
+  std::optional<TetCut> cut = cut_near(mesh, swept, options, false);
+  // Seldom: faces beside the blade are to be opened whose neighbours are not known.
+  return cut ? std::move(*cut) : std::move(*cut_near(mesh, swept, options, true));
 }
 
 } // namespace gewebe

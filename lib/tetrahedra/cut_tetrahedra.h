@@ -51,7 +51,8 @@ struct TetNodeOrigin {
 /// Both sides of the wound at one place: triangles of the same shape, which look into the wound
 /// from either tissue. `corners[s]` are counter-clockwise seen from outside of `tetrahedron[s]`;
 /// side 0 lies above the blade (where its triangles appear counter-clockwise), side 1 below.
-/// Corner k of side 0 and corner 2 - k of side 1 stand at one place.
+/// Corner k of side 0 and corner 2 - k of side 1 stand at one place. (Of an opened face, which is
+/// off the blade, either side is 0.)
 struct WallTriangle {
   std::array<Triangle, 2> corners{};
   std::array<Triangle, 2> middles{}; ///< of edges 01, 12, 20, where the mesh is quadratic
@@ -78,6 +79,7 @@ struct BladeCutReport {
   double largest_miss = 0;     ///< of these, along an edge at rest, mm
   std::uint64_t doubled = 0;   ///< copies of nodes
   std::uint64_t folded = 0;    ///< edges that the blade passes more than once: at most one is seen
+  std::uint64_t opened = 0;    ///< faces between the wall and an earlier wound that touched it
   std::uint64_t rejoined = 0;  ///< faces that would have left tissue hanging by a node or an edge
 };
 
@@ -89,7 +91,7 @@ struct TetCut {
   std::vector<TetNodeOrigin> origin;      ///< of each node
   std::vector<std::uint32_t> tetrahedron; ///< of each: that before which it is (a part of)
   std::vector<WallTriangle> wall;
-  /// The boundary at all nodes of edges that the blade passed: takes the place of the faces that it
+  /// The boundary near the blade: takes the place of the faces that it
   /// names; other faces stay. By tetrahedron before.
   std::vector<CutFace> surface;
   /// Tetrahedra before of which a corner has been moved or renamed, or which were split; ascending.
@@ -114,9 +116,10 @@ struct TetCut {
 /// least angle, the wall passes through the nearest node instead, which may miss the blade by up to
 /// half an edge (`kept`, `largest_miss`); at worst the wound follows the faces of the mesh.
 ///
-/// Round each node the boundary is one fan of triangles afterwards if it was before: faces of the
-/// wall that would leave tissue hanging together by one node or one edge are joined again
-/// (`rejoined`).
+/// Round each node the boundary is one fan of triangles afterwards if it was before: where the
+/// front of an earlier wound touches the wall, faces in between are opened (`opened`; they are of
+/// the wall, though not on the blade); elsewhere faces of the wall that would leave tissue hanging
+/// together by one node or one edge are joined again (`rejoined`).
 ///
 /// Linear in the points and tetrahedra of the mesh with a small factor (boxes against those of the
 /// blade); everything beyond that is in proportion to the tetrahedra at nodes of edges that the

@@ -1,5 +1,6 @@
 #include "tetrahedra/cut_wall_internal.h"
 
+#include "tetrahedra/cut_link_internal.h"
 #include "tetrahedra/faces.h"
 
 #include <algorithm>
@@ -122,25 +123,32 @@ private:
 
   // ---- Pieces
 
+  /// Opening comes first, for so the wounds meet; joining again always ends.
   void fall_apart() {
-    gather_uses();
-    for (bool again = true; again;) {
+    constexpr int rounds_of_opening = 8;
+    for (int round = 0;; ++round) {
+      gather_uses();
       find_pieces();
       rejoin_whole_faces();
-      again = rejoin_pinches();
+      if (!mend_pinches(round < rounds_of_opening))
+        break;
     }
     // Who lost its last face of the wall is whole.
     std::erase_if(result_.nodes, [](const PartedRegion::Piece& n) { return n.pieces == 1; });
   }
 
   void gather_uses() {
+    uses_.clear();
+    result_.nodes.clear();
     std::vector<std::uint32_t> nodes;
-    for (const TetPart& part : result_.parts)
+    for (TetPart& part : result_.parts) {
+      part.piece.fill(0);
       for (std::uint32_t k = 0; k < 4; ++k)
         if (part.wall[k]) {
           const Triangle face = corners_of_face(part.corners, k);
           nodes.insert(nodes.end(), face.begin(), face.end());
         }
+    }
     std::ranges::sort(nodes);
     const auto repeated = std::ranges::unique(nodes);
     nodes.erase(repeated.begin(), repeated.end());
@@ -239,20 +247,46 @@ private:
     result_.parts[other / 4].wall[other % 4] = false;
   }
 
-  /// What the tetrahedra of a piece cut out of a small sphere about its node is a disc, or all of
-  /// the sphere: V - E + F is 1 or 2 there. Where it is less, the piece hangs together at another
-  /// edge or at the node alone; its faces of the wall are joined again. True if there were any.
-  bool rejoin_pinches() {
-    std::vector<std::uint32_t> faces;
+  void open(std::uint32_t number) {
+    const std::uint32_t other = result_.parts[number / 4].neighbour[number % 4];
+    result_.parts[number / 4].wall[number % 4] = true;
+    result_.parts[other / 4].wall[other % 4] = true;
+  }
+
+  /// Where the link of a piece is neither a disc nor a sphere, the piece hangs together at its node
+  /// alone, or at another edge. Where the front of an earlier wound touches the wall at the node,
+  /// so that there are two loops, faces between them are opened; else faces of the wall are joined
+  /// again. True if there were any.
+  bool mend_pinches(bool may_open) {
+    std::vector<std::uint32_t> faces, ways;
     for_each_node([&](std::size_t n, std::span<const Use> uses) {
-      for (std::uint32_t number = 0; number < result_.nodes[n].pieces; ++number)
-        if (euler_number(uses, number) < 1)
-          for (const Use& use : uses)
-            for (std::uint32_t k = 0; k < 4; ++k)
-              if (piece(use.corner) == number && k != use.corner % 4 &&
-                  result_.parts[use.corner / 4].wall[k])
-                faces.push_back(4 * (use.corner / 4) + k);
+      for (std::uint32_t number = 0; number < result_.nodes[n].pieces; ++number) {
+        const NodeLink link = link_of(uses, number);
+        if (link.euler_number() >= 1)
+          continue;
+        constexpr std::size_t farthest = 4;
+        const std::vector<std::uint32_t> way =
+            may_open ? link.ways_across(farthest) : std::vector<std::uint32_t>();
+        if (!way.empty() &&
+            std::ranges::all_of(way, [&](std::uint32_t f) { return is_known(f); })) {
+          ways.insert(ways.end(), way.begin(), way.end());
+          continue;
+        }
+        result_.needs_more = result_.needs_more || !way.empty();
+        for (const Use& use : uses)
+          for (std::uint32_t k = 0; k < 4; ++k)
+            if (piece(use.corner) == number && k != use.corner % 4 &&
+                result_.parts[use.corner / 4].wall[k])
+              faces.push_back(4 * (use.corner / 4) + k);
+      }
     });
+    for (const std::uint32_t face : ways)
+      if (!result_.parts[face / 4].wall[face % 4]) {
+        open(face);
+        ++result_.opened;
+      }
+    if (!ways.empty())
+      return true;
     for (const std::uint32_t face : faces)
       if (result_.parts[face / 4].wall[face % 4]) {
         rejoin(face);
@@ -261,25 +295,38 @@ private:
     return !faces.empty();
   }
 
-  int euler_number(std::span<const Use> uses, std::uint32_t number) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> edges; // other end, its piece
-    int tets = 0, open = 0;
+  /// Are all tetrahedra at the corners of a face in the region?
+  bool is_known(std::uint32_t number) const {
+    return std::ranges::all_of(corners_of_face(result_.parts[number / 4].corners, number % 4),
+                               [&](std::uint32_t node) {
+                                 return node >= region_.whole.size() || region_.whole[node] != 0;
+                               });
+  }
+
+  NodeLink link_of(std::span<const Use> uses, std::uint32_t number) {
+    NodeLink link;
     for (const Use& use : uses) {
       if (piece(use.corner) != number)
         continue;
-      ++tets;
-      const TetPart& part = result_.parts[use.corner / 4];
+      const std::uint32_t p = use.corner / 4;
+      const TetPart& part = result_.parts[p];
+      std::array<NodeLink::Face, 3> faces;
+      std::size_t count = 0;
       for (std::uint32_t k = 0; k < 4; ++k) {
         if (k == use.corner % 4)
           continue;
-        open += part.wall[k] || part.neighbour[k] == no_neighbour ? 1 : 0;
-        edges.emplace_back(part.corners[k], part.piece[k]);
+        NodeLink::Face& face = faces[count++];
+        std::size_t end = 0;
+        for (std::uint32_t c = 0; c < 4; ++c)
+          if (c != k && c != use.corner % 4)
+            face.ends[end++] = {part.corners[c], part.piece[c]};
+        face.number = 4 * p + k;
+        face.old = part.neighbour[k] == no_neighbour;
+        face.open = face.old || part.wall[k];
       }
+      link.add(faces);
     }
-    std::ranges::sort(edges);
-    const auto repeated = std::ranges::unique(edges);
-    const auto distinct = static_cast<int>(edges.size() - repeated.size());
-    return distinct - (3 * tets + open) / 2 + tets;
+    return link;
   }
 
   const CutRegion& region_;

@@ -31,7 +31,8 @@ struct PartedRegion {
     std::uint32_t largest = 0; ///< which of them has the most volume
   };
   std::vector<Piece> nodes;
-  std::uint64_t rejoined = 0;
+  std::uint64_t rejoined = 0, opened = 0;
+  bool needs_more = false; ///< a wider region would let more faces be opened
 };
 
 /// \throw Error if there are too many parts

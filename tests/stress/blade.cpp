@@ -18,6 +18,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <numeric>
 #include <random>
 #include <string>
 #include <string_view>
@@ -106,7 +107,7 @@ TriangleMesh sweep(const TetMesh& mesh, Chance& chance) {
 
 struct Totals {
   std::uint64_t cuts = 0, empty = 0, failed = 0, separated = 0, walls = 0, split = 0;
-  std::uint64_t moved = 0, kept = 0, folded = 0, rejoined = 0, doubled = 0;
+  std::uint64_t moved = 0, kept = 0, folded = 0, opened = 0, rejoined = 0, doubled = 0;
   double least_before = 180, least_after = 180; ///< degrees from 0 and 180
   double largest_miss = 0;                      ///< of the solid's mean edge
   std::vector<double> times;                    ///< ms, of cuts that touch something
@@ -151,6 +152,7 @@ void cut_once(TetMesh& mesh, const TriangleMesh& blade, const BladeCutOptions& o
   totals.moved += report.moved;
   totals.kept += report.kept;
   totals.folded += report.folded;
+  totals.opened += report.opened;
   totals.rejoined += report.rejoined;
   totals.doubled += report.doubled;
   totals.largest_miss = test::larger(totals.largest_miss, report.largest_miss / edge);
@@ -203,15 +205,16 @@ void tell(const Body& body, Totals& totals) {
   std::printf(
       "%s, %zu tetrahedra: %llu cuts (%llu beside it), %llu tetrahedra separated, %llu "
       "split, %llu triangles of wall, %llu nodes doubled, %llu moved, %llu kept (missed by "
-      "%.2f edges at most), %llu edges folded, %llu faces joined again; angles keep %.2f "
+      "%.2f edges at most), %llu edges folded, %llu faces opened, %llu joined again; angles keep "
+      "%.2f "
       "degrees from 0 and 180, %.2f before; %.2f ms median, %.2f ms p99 (%.4f ms a separated "
       "tetrahedron), %llu failed\n",
       body.name.c_str(), body.mesh.tetrahedra.size(), number(totals.cuts), number(totals.empty),
       number(totals.separated), number(totals.split), number(totals.walls), number(totals.doubled),
       number(totals.moved), number(totals.kept), totals.largest_miss, number(totals.folded),
-      number(totals.rejoined), totals.least_after, totals.least_before, share_of(totals.times, 0.5),
-      share_of(totals.times, 0.99),
-      share_of(totals.times, 0.5) * static_cast<double>(totals.times.size()) /
+      number(totals.opened), number(totals.rejoined), totals.least_after, totals.least_before,
+      share_of(totals.times, 0.5), share_of(totals.times, 0.99),
+      std::accumulate(totals.times.begin(), totals.times.end(), 0.0) /
           std::fmax(1, static_cast<double>(totals.separated)),
       number(totals.failed));
 }

@@ -221,7 +221,8 @@ TEST_P(CutSolid, HeldNodesStayAndNewOnesHaveAMaterial) {
   EXPECT_GT(corners, 0U);
   std::vector<std::int32_t> first(cut.model.nodes.size(), -1);
   const auto use = [&](std::uint32_t node, std::int32_t material) {
-    first[node] = first[node] < 0 ? material : first[node];
+    if (first[node] == -1)
+      first[node] = material;
   };
   for (std::size_t t = 0; t < cut.model.tetrahedra.size(); ++t) {
     for (const std::uint32_t n : cut.model.tetrahedra[t])

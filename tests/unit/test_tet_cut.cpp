@@ -1,6 +1,7 @@
 // Solids cut by blades: sound whatever the blade, exact where formulas or the clipping of solids by
 // planes (tetrahedra/clip.h, other code) say what comes out.
 
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
@@ -9,6 +10,7 @@
 #include "tetrahedra/clip.h"
 #include "tetrahedra/components.h"
 #include "tetrahedra/cut_blade_internal.h"
+#include "tetrahedra/cut_link_internal.h"
 #include "tetrahedra/cut_split_internal.h"
 #include "tetrahedra/order.h"
 
@@ -281,6 +283,42 @@ TEST(TetCut, HundredRandomCutsOneAfterTheOther) {
     mesh = cut.mesh;
   }
   EXPECT_GT(walls, 1000U);
+}
+
+/// No piece has tetrahedra on both sides of a plane, farther away than nodes that it missed.
+bool hangs_over(const TetCut& cut, const FlatBlade& blade) {
+  DisjointSets pieces(cut.mesh.points.size());
+  for (const Tetrahedron& t : cut.mesh.tetrahedra)
+    for (std::size_t k = 1; k < 4; ++k)
+      pieces.join(t[0], t[k]);
+  std::vector<std::array<bool, 2>> on(cut.mesh.points.size());
+  for (const Tetrahedron& t : cut.mesh.tetrahedra) {
+    Vec3 centre;
+    for (const std::uint32_t corner : t)
+      centre += cut.mesh.points[corner] * 0.25;
+    const double height = dot(centre - blade.centre, blade.normal);
+    if (std::fabs(height) > cut.report.largest_miss)
+      on[pieces.find(t[0])][height > 0 ? 0 : 1] = true;
+  }
+  return std::ranges::any_of(on, [](const auto& sides) { return sides[0] && sides[1]; });
+}
+
+/// Fronts of the earlier wounds end on the last wall, touch it, run along it.
+TEST(TetCut, AWoundedBodyFallsApartWhole) {
+  std::uint64_t opened = 0;
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    std::mt19937 random(seed);
+    TetMesh mesh = seed % 2 == 0 ? box_tetrahedra(7, 7, 7, 1.0 / 7) : ball();
+    for (int n = 0; n < 4; ++n)
+      mesh = cut_tetrahedra(mesh, random_flat(mesh, 0.3, random).surface).mesh;
+    const FlatBlade last = random_flat(mesh, 3, random);
+    const TetCut cut = cut_tetrahedra(mesh, last.surface);
+    EXPECT_EQ(fault_of(mesh, cut, blade_cut_least_angle), "") << seed;
+    EXPECT_EQ(cut.report.rejoined, 0U) << seed;
+    EXPECT_FALSE(hangs_over(cut, last)) << seed;
+    opened += cut.report.opened;
+  }
+  EXPECT_GT(opened, 10U);
 }
 
 // ---- Other shapes of blades
@@ -631,6 +669,31 @@ TEST(TetCut, EdgesPassABladeBetweenItsTrianglesOnce) {
     }
   EXPECT_EQ(blade.crossing({-2, 0, 0.5}, {2, 0, 0.5}).passes, 2U);
   EXPECT_EQ(blade.crossing({-2, 0, 0.5}, {2, 0, 0.5}).direction, 0);
+}
+
+TEST(TetCut, ARingOfTetrahedraFallsIntoTwoDiscs) {
+  // Eight triangles of a ring round a square hole, as a node sees them: inner vertices 0 … 3, outer
+  // ones 4 … 7; faces numbered by their ends.
+  const auto face = [](std::uint32_t a, std::uint32_t b, bool open) {
+    return NodeLink::Face{{{{a, 0}, {b, 0}}}, 10 * std::min(a, b) + std::max(a, b), open, open};
+  };
+  NodeLink ring;
+  for (std::uint32_t n = 0; n < 4; ++n) {
+    const std::uint32_t next = (n + 1) % 4;
+    ring.add({face(n, next, true), face(next, n + 4, false), face(n, n + 4, false)});
+    ring.add({face(n + 4, next + 4, true), face(next, n + 4, false), face(next, next + 4, false)});
+  }
+  EXPECT_EQ(ring.euler_number(), 0);
+  const std::vector<std::uint32_t> ways = ring.ways_across(4);
+  ASSERT_EQ(ways.size(), 2U);
+  std::array<std::uint32_t, 4> ends{ways[0] / 10, ways[0] % 10, ways[1] / 10, ways[1] % 10};
+  std::ranges::sort(ends);
+  EXPECT_EQ(std::ranges::adjacent_find(ends), ends.end());
+  EXPECT_TRUE(ring.ways_across(0).empty());
+  NodeLink disc;
+  disc.add({face(0, 1, true), face(1, 2, true), face(0, 2, true)});
+  EXPECT_EQ(disc.euler_number(), 1);
+  EXPECT_TRUE(disc.ways_across(4).empty());
 }
 
 /// The checks themselves: each catches the fault that it is for.
