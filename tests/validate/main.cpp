@@ -1,4 +1,5 @@
-// The finite elements of lib/solid against theory, benchmarks, another program and an experiment.
+// The finite elements of lib/solid, and contact with instruments, against theory, benchmarks,
+// another program and an experiment.
 //
 // Prints its checks, writes a page with curves into FOLDER, and ends with status 1 where a bound is
 // not kept. Usage: validate FOLDER [SECTION…], sections by the words below; all where there are
