@@ -20,6 +20,14 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
+/// How a turn takes the forces' turning: how much of what makes softer counts, and by how much
+/// (over a contact's own stiffness) what pushes is held to its place, which changes nothing where
+/// that is met and makes stable what is so only under its contacts.
+struct Bend {
+  double loose = 1, hold = 0;
+};
+constexpr std::array<Bend, 5> bends{{{1.0, 0}, {1.0, 4}, {0.7, 0}, {0.4, 0}, {0.0, 0}}};
+
 constexpr double same_place = 1e-9; ///< of the radius, and of a normal's length
 constexpr double fair_place = 1e-6; ///< that is not worth a warning
 constexpr double outside = 1e-9;    ///< of the radius: so deep is not inside
@@ -27,9 +35,8 @@ constexpr double immovable = 1e-12; ///< of the largest compliance
 constexpr double nearly = 0.03;     ///< from where on each turn comes nearer
 constexpr double most_softer = 8;   ///< by which forces make their points give way more
 constexpr double short_way = 0.1, most_way = 8;
-constexpr std::array looseness{1.0, 0.7, 0.4, 0.0}; ///< how much of what makes softer counts
-constexpr double overlook = 1e-11;                  ///< of the radius
-constexpr std::size_t few = 32;                     ///< pairs that join at once, at least
+constexpr double overlook = 1e-11; ///< of the radius
+constexpr std::size_t few = 32;    ///< pairs that join at once, at least
 constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
 constexpr int max_sweeps = 200;
@@ -99,9 +106,13 @@ public:
       turns_.solved = exact && !joined && change <= fair_place;
       since_best = joined || change < 0.8 * best ? 0 : since_best + 1;
       best = joined ? HUGE_VAL : std::min(best, change);
-      if ((!joined && change <= same_place) || vain == max_vain || since_best == max_idle)
+      const bool slow = change <= fair_place && change > 0.1 * before;
+      if ((!joined && (change <= same_place || (exact && slow))) || vain == max_vain ||
+          since_best == max_idle)
         break;
-      before = change;
+      if (level_ < bends.size() && bends[level_].hold > 0 && !(change < before))
+        can_hold_ = false;
+      before = last_change_ = change;
       at_ = turns_.at;
       forces_ = next_forces_;
     }
@@ -232,8 +243,10 @@ private:
     }
   }
 
-  /// ∂(Bᵀ f)/∂x of the last pushes f, by differences. \param loose how much of it that makes softer
-  BentCompliance bending(double loose) const {
+  /// ∂(Bᵀ f)/∂x of the last pushes f, by differences. \param held becomes the forces that hold what
+  /// pushes to its place, where the nodes were last
+  BentCompliance bending(const Bend& how, VectorXd& held) const {
+    held = VectorXd::Zero(size_);
     std::vector<Index> rows;
     for (const std::uint32_t i : active_)
       if (pushes(i))
@@ -255,13 +268,15 @@ private:
       std::optional<Eigen::Matrix<double, 9, 9>> own = bending_of(p);
       if (!own)
         continue;
-      if (loose < 1) {
+      if (how.loose < 1) {
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> parts(*own);
         const Eigen::Matrix<double, 9, 1> all =
-            parts.eigenvalues().cwiseMin(0.0) + loose * parts.eigenvalues().cwiseMax(0.0);
+            parts.eigenvalues().cwiseMin(0.0) + how.loose * parts.eigenvalues().cwiseMax(0.0);
         *own = parts.eigenvectors() * all.asDiagonal() * parts.eigenvectors().transpose();
       }
       *own *= dot(p.force, p.normal);
+      if (how.hold > 0)
+        hold(p, how.hold, *own, held);
       for (std::size_t from = 0; from < 3; ++from)
         for (std::size_t to = 0; to < 3; ++to)
           if (p.piece[from] < nodes_.moving && p.piece[to] < nodes_.moving)
@@ -269,6 +284,40 @@ private:
                 own->block<3, 3>(3 * static_cast<Index>(to), 3 * static_cast<Index>(from));
     }
     return {w_, std::move(rows), std::move(h)};
+  }
+  /// Springs that hold a pair's point where its contact wants it: along the normal, and where it
+  /// sticks along the surface.
+  void hold(const TouchPair& p, double by, Eigen::Matrix<double, 9, 9>& h, VectorXd& held) const {
+    const Vec3 n = p.normal;
+    Eigen::Matrix3d own = Eigen::Matrix3d::Zero(); // compliance of the point
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t d = 0; d < 3; ++d)
+        if (p.piece[c] < nodes_.moving && p.piece[d] < nodes_.moving)
+          own += p.point.weights[c] * p.point.weights[d] *
+                 w_.block<3, 3>(3 * static_cast<Index>(p.piece[c]),
+                                3 * static_cast<Index>(p.piece[d]));
+    const PlacedInstrument& instrument = *placed_[p.instrument];
+    const MovedInstrument& way = *moved_[p.instrument];
+    const Vec3 here = point_of(p, at_),
+               slip = here - carried(way.before, way.now, point_of(p, nodes_.was));
+    const double push = dot(p.force, n);
+    const bool sticks = norm(p.force - push * n) < (1 - 1e-6) * instrument.friction * push;
+    const Vec3 miss = (dot(n, here - p.point.core) - instrument.radius) * n +
+                      (sticks ? slip - dot(slip, n) * n : Vec3{});
+    const Eigen::Vector3d along(n.x, n.y, n.z);
+    const double stiffness = by / along.dot(own * along);
+    if (!(stiffness > 0) || !std::isfinite(stiffness))
+      return;
+    const Eigen::Matrix3d axes =
+        sticks ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : along * along.transpose();
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t d = 0; d < 3; ++d)
+        h.block<3, 3>(3 * static_cast<Index>(c), 3 * static_cast<Index>(d)) -=
+            stiffness * p.point.weights[c] * p.point.weights[d] * axes;
+      if (p.piece[c] < nodes_.moving)
+        for (int a = 0; a < 3; ++a)
+          held[3 * static_cast<Index>(p.piece[c]) + a] -= stiffness * p.point.weights[c] * miss[a];
+    }
   }
   bool pushes(std::uint32_t pair) const {
     return dot(turns_.pairs[pair].force, turns_.pairs[pair].normal) > 0;
@@ -340,7 +389,7 @@ private:
       if (there < here)
         break;
     }
-    for (double way = 2; level_ > 0 && part >= 1 && way <= most_way; way *= 2) {
+    for (double way = 2; level_ > 1 && part >= 1 && way <= most_way; way *= 2) {
       const double there = merit(way, weight);
       if (!(there < best))
         break;
@@ -532,9 +581,9 @@ private:
 
   /// The linear problem of a turn, by more and more of the pairs. \return none where it isn't
   /// stable
-  std::optional<Looked> solve_bent(const BentCompliance& bent, bool careful) {
+  std::optional<Looked> solve_bent(const BentCompliance& bent, const VectorXd& held, bool careful) {
     MatrixXd base = rows_of(free_);
-    base -= w_ * bent.turning(rows_of(at_));
+    base += w_ * (held - bent.turning(rows_of(at_)));
     bent.apply(base);
     Looked looked;
     looked.columns.resize(size_, 0);
@@ -571,25 +620,29 @@ private:
       guess.push_back(p.force);
     std::optional<BentCompliance> bent;
     std::optional<Looked> looked;
-    // What the turn before had to leave out, this one tries little of.
-    const std::size_t first = safe ? looseness.size() - 1 : 0;
-    for (std::size_t level = first; bend && !looked && level < looseness.size(); ++level) {
+    VectorXd held;
+    for (std::size_t level = safe ? bends.size() - 1 : 0; bend && !looked && level < bends.size();
+         ++level) {
+      if (bends[level].hold > 0 &&
+          (!can_hold_ || !(last_change_ < nearly))) // what pushes may not, and is held then
+        continue;
       for (std::size_t i = 0; i < guess.size(); ++i)
         turns_.pairs[i].force = guess[i];
-      bent.emplace(bending(looseness[level]));
-      looked = solve_bent(*bent, true);
+      bent.emplace(bending(bends[level], held));
+      looked = solve_bent(*bent, held, true);
       level_ = level;
     }
     if (!looked) {
       for (std::size_t i = 0; i < guess.size(); ++i)
         turns_.pairs[i].force = guess[i];
+      held = VectorXd::Zero(size_);
       bent.emplace(w_, std::vector<Index>{}, MatrixXd{});
-      looked = solve_bent(*bent, false);
+      looked = solve_bent(*bent, held, false);
     }
     if (!looked)
       return false;
     // The forces on the nodes that these places mean.
-    next_forces_ = bent->turning(looked->x - rows_of(at_));
+    next_forces_ = held + bent->turning(looked->x - rows_of(at_));
     for (const std::uint32_t i : looked->pairs) {
       const TouchPair& p = turns_.pairs[i];
       for (std::size_t c = 0; c < 3; ++c)
@@ -635,7 +688,9 @@ private:
   Index size_;
   Eigen::Map<const MatrixXd> w_;
   double largest_ = 0;
-  bool rough_ = false;                ///< anything rubs
+  bool rough_ = false; ///< anything rubs
+  double last_change_ = HUGE_VAL;
+  bool can_hold_ = true;              ///< nothing came of it that was worse
   std::size_t level_ = 0;             ///< of looseness
   std::vector<Vec3> at_;              ///< before a turn
   VectorXd forces_, next_forces_;     ///< on the nodes, as the places mean before and behind a turn

@@ -6,7 +6,8 @@
 // the planes that support the instrument there (contact_solver.h); where the forces put the nodes.
 // Forces turn and wander over the surface with the nodes they push: with H = ∂(Bᵀf)/∂x at the last
 // forces, B the weights of the points, x = (1 - W H)⁻¹ (x_free + W (Bᵀ f - H x_last)), which is
-// Newton's method on the conditions of the energy's minimum. It is left out where it isn't stable.
+// Newton's method on the conditions of the energy's minimum. Less of it is taken where it isn't
+// stable; near the end, where that is so only but for the contacts, these hold their points.
 
 #include "contact/surface_parts.h"
 #include "contact/surface_point.h"
