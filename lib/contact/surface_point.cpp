@@ -87,4 +87,15 @@ std::optional<SurfacePoint> nearest_points(const PlacedInstrument& instrument, C
   return found;
 }
 
+bool goes_through(const PlacedInstrument& instrument, const std::array<Vec3, 3>& corners) {
+  const auto& [a, b, c] = corners;
+  const Vec3 normal = cross(b - a, c - a);
+  const double first = dot(normal, instrument.a - a), along = dot(normal, instrument.ab);
+  if (!(first * (first + along) < 0))
+    return false;
+  const Vec3 at = instrument.a - first / along * instrument.ab;
+  return dot(normal, cross(b - a, at - a)) > 0 && dot(normal, cross(c - b, at - b)) > 0 &&
+         dot(normal, cross(a - c, at - c)) > 0;
+}
+
 } // namespace gewebe

@@ -48,4 +48,8 @@ struct SurfacePoint {
 std::optional<SurfacePoint> nearest_points(const PlacedInstrument& instrument, CorePart part,
                                            const std::array<Vec3, 3>& corners, int count);
 
+/// Whether the core goes through the middle of a whole piece, which no distance of a part tells:
+/// its ends may both be far.
+bool goes_through(const PlacedInstrument& instrument, const std::array<Vec3, 3>& corners);
+
 } // namespace gewebe

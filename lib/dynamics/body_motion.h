@@ -38,6 +38,7 @@ struct SolidStepCounts {
   std::uint64_t unfinished = 0; ///< steps whose rounds ran out
   std::uint64_t limited = 0;    ///< steps whose speeds were lowered, see SolidMotion::step
   double seconds = 0;           ///< by the clock
+  TouchCounts touches;
 };
 
 struct MotionEnergies {

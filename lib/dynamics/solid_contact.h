@@ -46,6 +46,8 @@ public:
   /// Takes the engine on by a step; one that clears, where something is in the way. \param touches
   /// forces of the last step, then of this one \throw as SolidMotion::step
   Result step(const Step& step, std::vector<NodeTouch>& touches, const Context& context);
+  /// Of contacts since the last call.
+  TouchCounts take_counts() { return contact_.take_counts(); }
   /// Forgets the columns of A⁻¹, which serve for some steps.
   void renew() {
     columns_.clear();

@@ -370,6 +370,7 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
         {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
          state_.load->displacement, moved, h, options_, clearing},
         state_.touched, context);
+    counts_.touches.add(contact_->take_counts());
     all.rounds += result.took.rounds;
     all.factorisations += result.took.factorisations;
     all.change = result.took.change;

@@ -257,6 +257,7 @@ void add_counts(SolidStepCounts& sum, const SolidStepCounts& more) {
   sum.unfinished += more.unfinished;
   sum.limited += more.limited;
   sum.seconds += more.seconds;
+  sum.touches.add(more.touches);
 }
 
 void drop_body(World& w, const Body* body) {

@@ -233,6 +233,7 @@ void follow_instruments(World& w, Object& object) {
       solved = solved && object.contact->solved();
     }
   }
+  w.now.counts.touches.add(object.contact->take_counts());
   object.shown.touches = object.contact->touches();
   if (const auto stuck = object.contact->stuck();
       stuck && !object.matter->told.stuck && w.options.warn) {

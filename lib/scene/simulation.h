@@ -82,6 +82,7 @@ struct SimulationCounts {
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
   SolidStepCounts solids;          ///< of all that move
+  TouchCounts touches;             ///< of elastostatic objects
   double largest_jump = 0;         ///< mm, see MethodJump
   std::uint64_t cuts = 0;          ///< that changed a model
   /// Of elastostatic objects: how their stiffness followed, see CutWay.

@@ -104,11 +104,10 @@ public:
       vain += exact ? 0 : 1;
       const bool joined = join(turns_.at, outside);
       turns_.solved = exact && !joined && change <= fair_place;
+      turns_.change = change;
       since_best = joined || change < 0.8 * best ? 0 : since_best + 1;
       best = joined ? HUGE_VAL : std::min(best, change);
-      const bool slow = change <= fair_place && change > 0.1 * before;
-      if ((!joined && (change <= same_place || (exact && slow))) || vain == max_vain ||
-          since_best == max_idle)
+      if ((!joined && change <= same_place) || vain == max_vain || since_best == max_idle)
         break;
       if (level_ < bends.size() && bends[level_].hold > 0 && !(change < before))
         can_hold_ = false;
@@ -116,11 +115,22 @@ public:
       at_ = turns_.at;
       forces_ = next_forces_;
     }
+    turns_.solved = turns_.solved && !pierced();
     if (!turns_.solved)
       move_out();
   }
 
 private:
+  /// Whether a core goes through a piece: no pair leads it out again.
+  bool pierced() const {
+    for (const std::optional<PlacedInstrument>& instrument : placed_)
+      for (const Facet& piece : nodes_.pieces)
+        if (instrument && corner_count(piece) == 3 &&
+            goes_through(*instrument, corners_of(piece, turns_.at)))
+          return true;
+    return false;
+  }
+
   /// Whatever the forces are, nothing stays inside: the nodes around move alike.
   void move_out() {
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
@@ -660,11 +670,14 @@ private:
     double most = 0;
     for (const std::uint32_t i : active_) {
       const TouchPair& p = turns_.pairs[i];
-      if (p.force == Vec3{})
-        continue;
       const PlacedInstrument& instrument = *placed_[p.instrument];
       const auto found =
           nearest_points(instrument, p.part, corners_of(p.piece, turns_.at), corner_count(p.piece));
+      if (p.force == Vec3{}) { // its plane may have been beside its place now
+        if (found && found->distance < (1 - outside) * instrument.radius)
+          most = std::max(most, 1 - found->distance / instrument.radius);
+        continue;
+      }
       if (!found)
         return 1;
       const double change =

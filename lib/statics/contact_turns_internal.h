@@ -47,6 +47,7 @@ struct ContactTurns {
   std::vector<Vec3> at;         ///< the nodes' places
   bool solved = true;
   int turns = 0;
+  double change = 0; ///< of what pushes, in the last turn: of normals, of points over the radius
   std::optional<TouchPair> stuck; ///< a piece that can't be moved out
 };
 

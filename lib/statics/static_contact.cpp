@@ -22,6 +22,8 @@ constexpr int max_rounds = 300; ///< until an object agrees
 /// Of a piece from an instrument's core, the least.
 double distance_of(const PlacedInstrument& instrument, const Facet& piece,
                    const std::array<Vec3, 3>& corners) {
+  if (corner_count(piece) == 3 && goes_through(instrument, corners))
+    return 0;
   double least = HUGE_VAL;
   for_parts(instrument,
             {0, piece[1] == piece[0] ? 0U : 1U,
@@ -39,6 +41,14 @@ double distance_of(const PlacedInstrument& instrument, const Facet& piece,
 }
 
 } // namespace
+
+void TouchCounts::add(const TouchCounts& more) {
+  problems += more.problems;
+  turns += more.turns;
+  most_turns = std::max(most_turns, more.most_turns);
+  unsolved += more.unsolved;
+  change = more.change <= change ? change : more.change;
+}
 
 std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches) {
   std::stable_sort(touches.begin(), touches.end(), [](const NodeTouch& a, const NodeTouch& b) {
@@ -184,6 +194,10 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
                                                                 : vector_at(before, node)));
       }
       take_turns(delassus, all, free, placed, moved, turns);
+      if (!turns.pairs.empty()) {
+        const auto taken = static_cast<std::uint64_t>(turns.turns);
+        counts_.add({1, taken, taken, turns.solved ? 0U : 1U, turns.solved ? turns.change : 0});
+      }
       solved_ = turns.solved;
       if (turns.stuck && !stuck_) {
         const auto& [weights, place, core, distance] = turns.stuck->point;

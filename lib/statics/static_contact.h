@@ -23,6 +23,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -55,6 +56,16 @@ struct MovedInstrument {
 /// The way in parts in which no instrument moves further than half its radius. \return how many, at
 /// most `max`
 std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size_t max);
+
+/// What contact took: problems with instruments that touch something, and their turns.
+struct TouchCounts {
+  std::uint64_t problems = 0, turns = 0, most_turns = 0;
+  std::uint64_t unsolved = 0;
+  double change =
+      0; ///< the largest that was left where solved: of normals, of points over a radius
+
+  void add(const TouchCounts& more);
+};
 
 struct ContactNodes;
 
@@ -107,6 +118,8 @@ public:
   std::optional<NodeTouch> stuck() const { return stuck_; }
   /// Whether the last forces meet the conditions, and their directions the surfaces.
   bool solved() const noexcept { return solved_; }
+  /// Since the last call.
+  TouchCounts take_counts() { return std::exchange(counts_, {}); }
 
 private:
   using Placed = std::vector<std::optional<PlacedInstrument>>;
@@ -128,6 +141,7 @@ private:
   std::vector<PointTouch> points_;
   std::optional<NodeTouch> stuck_;
   bool solved_ = true;
+  TouchCounts counts_;
 };
 
 } // namespace gewebe

@@ -165,7 +165,7 @@ TEST(ContactSolver, PushesAreThoseOfTheWholeProblem) {
       force.push_back(pushes.push[i] * c.contacts[i].normal);
     double largest = 0;
     for (std::size_t node = 0; node < c.m; ++node)
-      largest = std::max(largest, norm(moved(c.w, c.m, c.contacts, force, node)));
+      largest = test::larger(largest, norm(moved(c.w, c.m, c.contacts, force, node)));
     for (std::size_t node = 0; node < c.m; ++node)
       EXPECT_LT(norm(moved(c.w, c.m, c.contacts, force, node) -
                      moved(c.w, c.m, c.contacts, whole.force, node)),

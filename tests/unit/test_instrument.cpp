@@ -1,4 +1,5 @@
 #include "contact/instrument.h"
+#include "contact/surface_point.h"
 
 #include "contact/instrument_surface.h"
 #include "contact/load.h"
@@ -110,6 +111,22 @@ TEST(Instrument, ACarriedNodeFollowsTheTurn) {
   EXPECT_EQ(ramp.at(1), (Vec3{-2, 0, 2}));
   const Vec3 middle = rest + ramp.at(0.5);
   EXPECT_LT(norm(middle - Vec3{0, 1, 1}), 1e-15); // on the circle, not through its middle
+}
+
+TEST(Instrument, ACoreGoesThroughAPieceOrPastIt) {
+  const std::array<Vec3, 3> piece{Vec3{0, 0, 0}, Vec3{4, 0, 0}, Vec3{0, 4, 0}},
+      back{piece[0], piece[2], piece[1]};
+  const auto capsule = [](const Vec3& a, const Vec3& b) {
+    return PlacedInstrument({.radius = 0.1, .axis = b - a}, {a, {}});
+  };
+  for (const auto& corners : {piece, back}) {
+    EXPECT_TRUE(goes_through(capsule({1, 1, -5}, {1, 1, 5}), corners));
+    EXPECT_TRUE(goes_through(capsule({1, 1, 5}, {1.5, 1, -2}), corners));
+    EXPECT_FALSE(goes_through(capsule({1, 1, 0.5}, {1, 1, 5}), corners)); // ends before it
+    EXPECT_FALSE(goes_through(capsule({3, 3, -5}, {3, 3, 5}), corners));  // beside it
+    EXPECT_FALSE(goes_through(capsule({1, 1, 1}, {2, 1, 1}), corners));   // along it
+    EXPECT_FALSE(goes_through(capsule({1, 1, 0.01}, {1, 1, 0.01}), corners));
+  }
 }
 
 TEST(SurfaceFacets, FindAllNodesInABox) {

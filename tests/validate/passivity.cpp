@@ -4,6 +4,7 @@
 #include "scene/simulation.h"
 #include "statics/elastostatic.h"
 #include "tests/bench/timing.h"
+#include "tests/unit/larger.h"
 #include "tests/unit/sim_models.h"
 #include "tests/validate/checks.h"
 #include "tests/validate/node_contact.h"
@@ -74,9 +75,9 @@ Cycle lead(Method method, Integration integration, double friction, double step)
     last = to;
     const SimulationState state = s.state();
     cycle.kept = state.kinetic_energy + state.elastic_energy;
-    cycle.most = std::max(cycle.most, cycle.work);
+    cycle.most = test::larger(cycle.most, cycle.work);
     if (method != Method::ffe)
-      cycle.least = std::min(cycle.least, cycle.work - cycle.kept);
+      cycle.least = test::smaller(cycle.least, cycle.work - cycle.kept);
   }
   return cycle;
 }
@@ -95,7 +96,7 @@ Cycle lead_among_nodes(double step) {
     cycle.work -= dot(0.5 * (force + now), to - last);
     force = now;
     last = to;
-    cycle.most = std::max(cycle.most, cycle.work);
+    cycle.most = test::larger(cycle.most, cycle.work);
   }
   return cycle;
 }

@@ -123,7 +123,7 @@ struct Slide {
 };
 
 void worse(double& worst, double one) {
-  worst = one <= worst ? worst : one; // so that a NaN stays
+  worst = test::larger(worst, one);
 }
 
 /// What one step's points violate.
@@ -206,7 +206,7 @@ Curve among_nodes(const Body& body, double radius, double way) {
     if (body.model.nodes[i].fixed == fixed_none) {
       double least = HUGE_VAL;
       for (double at = -way / 2; at <= way / 2; at += 1)
-        least = std::min(least, norm(body.model.nodes[i].position - body.surface(at).first));
+        least = test::smaller(least, norm(body.model.nodes[i].position - body.surface(at).first));
       if (least < radius + 1.5 * body.edge)
         nodes.push_back(i);
     }

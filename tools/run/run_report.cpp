@@ -64,6 +64,15 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("solid_limited", solids.limited);
     stats.seconds("solid_motion", solids.seconds);
   }
+  TouchCounts touches = steps.touches;
+  touches.add(steps.solids.touches);
+  if (touches.problems > 0) {
+    stats.set("touch_problems", touches.problems);
+    stats.set("touch_turns", touches.turns);
+    stats.set("touch_turns_largest", touches.most_turns);
+    stats.set("touch_unsolved", touches.unsolved);
+    stats.set("touch_change", touches.change);
+  }
   stats.set("contact_error", statics.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);
   stats.set("largest_jump", steps.largest_jump);
