@@ -288,12 +288,19 @@ TEST(SceneServe, ALineWithoutEndIsRefusedAtOnce) {
 }
 
 TEST(SceneServe, AnyScenePlaysAgainToTheLastByte) {
+  // The time that a scene may take is the processor's: sanitizers take some ten times as much, so
+  // that more scenes are ended early there.
+#ifdef GEWEBE_SANITIZE
+  constexpr std::uint64_t scenes = 60, may_be_slow = 6;
+#else
+  constexpr std::uint64_t scenes = 200, may_be_slow = 2;
+#endif
   test::FuzzedCounts seen;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed)
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed)
     EXPECT_EQ(test::fault_of_scene(test::FuzzedScene(seed).lines(), seen), "")
         << "seed " << seed << " of stress_scenes";
-  EXPECT_GT(seen.steps, 200U); // or nothing was tried
-  EXPECT_LT(seen.slow, 3U);
+  EXPECT_GT(seen.steps, scenes); // or nothing was tried
+  EXPECT_LE(seen.slow, may_be_slow);
 }
 
 TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
