@@ -1,0 +1,140 @@
+// How forces of contact turn and wander with the nodes they push.
+
+#include "statics/contact_scene_internal.h"
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+class Bending {
+public:
+  Bending(const ContactScene& scene, std::span<const TouchPair> pairs,
+          std::span<const std::uint32_t> active, std::span<const Vec3> at)
+      : scene_(scene), pairs_(pairs), active_(active), at_(at) {}
+
+  BentCompliance all(const Bend& how, VectorXd& held) const {
+    held = VectorXd::Zero(scene_.rows());
+    std::vector<Index> rows;
+    for (const std::uint32_t i : active_)
+      if (pushes(i))
+        for (const std::uint32_t node : pairs_[i].piece)
+          if (node < scene_.nodes.moving)
+            for (Index a = 0; a < 3; ++a)
+              rows.push_back(3 * static_cast<Index>(node) + a);
+    std::ranges::sort(rows);
+    rows.erase(std::ranges::unique(rows).begin(), rows.end());
+    const auto count = static_cast<Index>(rows.size());
+    MatrixXd h = MatrixXd::Zero(count, count);
+    const auto row_of = [&](std::uint32_t node) {
+      return std::ranges::lower_bound(rows, 3 * static_cast<Index>(node)) - rows.begin();
+    };
+    for (const std::uint32_t i : active_) {
+      if (!pushes(i))
+        continue;
+      const TouchPair& p = pairs_[i];
+      std::optional<Eigen::Matrix<double, 9, 9>> own = bending_of(p);
+      if (!own)
+        continue;
+      if (how.loose < 1) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> parts(*own);
+        const Eigen::Matrix<double, 9, 1> all =
+            parts.eigenvalues().cwiseMin(0.0) + how.loose * parts.eigenvalues().cwiseMax(0.0);
+        *own = parts.eigenvectors() * all.asDiagonal() * parts.eigenvectors().transpose();
+      }
+      *own *= dot(p.force, p.normal);
+      if (how.hold > 0)
+        hold(p, how.hold, *own, held);
+      for (std::size_t from = 0; from < 3; ++from)
+        for (std::size_t to = 0; to < 3; ++to)
+          if (p.piece[from] < scene_.nodes.moving && p.piece[to] < scene_.nodes.moving)
+            h.block<3, 3>(row_of(p.piece[to]), row_of(p.piece[from])) +=
+                own->block<3, 3>(3 * static_cast<Index>(to), 3 * static_cast<Index>(from));
+    }
+    return {scene_.w, std::move(rows), std::move(h)};
+  }
+
+private:
+  /// Springs that hold a pair's point where its contact wants it: along the normal, and where it
+  /// sticks along the surface.
+  void hold(const TouchPair& p, double by, Eigen::Matrix<double, 9, 9>& h, VectorXd& held) const {
+    const Vec3 n = p.normal;
+    Eigen::Matrix3d own = Eigen::Matrix3d::Zero(); // compliance of the point
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t d = 0; d < 3; ++d)
+        if (p.piece[c] < scene_.nodes.moving && p.piece[d] < scene_.nodes.moving)
+          own += p.point.weights[c] * p.point.weights[d] *
+                 scene_.w.block<3, 3>(3 * static_cast<Index>(p.piece[c]),
+                                      3 * static_cast<Index>(p.piece[d]));
+    const PlacedInstrument& instrument = *scene_.placed[p.instrument];
+    const MovedInstrument& way = *scene_.moved[p.instrument];
+    const Vec3 here = point_of(p, at_),
+               slip = here - carried(way.before, way.now, point_of(p, scene_.nodes.was));
+    const double push = dot(p.force, n);
+    const bool sticks = norm(p.force - push * n) < (1 - 1e-6) * instrument.friction * push;
+    const Vec3 miss = (dot(n, here - p.point.core) - instrument.radius) * n +
+                      (sticks ? slip - dot(slip, n) * n : Vec3{});
+    const Eigen::Vector3d along(n.x, n.y, n.z);
+    const double stiffness = by / along.dot(own * along);
+    if (!(stiffness > 0) || !std::isfinite(stiffness))
+      return;
+    const Eigen::Matrix3d axes =
+        sticks ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : along * along.transpose();
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t d = 0; d < 3; ++d)
+        h.block<3, 3>(3 * static_cast<Index>(c), 3 * static_cast<Index>(d)) -=
+            stiffness * p.point.weights[c] * p.point.weights[d] * axes;
+      if (p.piece[c] < scene_.nodes.moving)
+        for (int a = 0; a < 3; ++a)
+          held[3 * static_cast<Index>(p.piece[c]) + a] -= stiffness * p.point.weights[c] * miss[a];
+    }
+  }
+  bool pushes(std::uint32_t pair) const { return dot(pairs_[pair].force, pairs_[pair].normal) > 0; }
+
+  /// Second derivatives of a pair's distance by its corners' places, 0 for repeated ones.
+  std::optional<Eigen::Matrix<double, 9, 9>> bending_of(const TouchPair& p) const {
+    const PlacedInstrument& instrument = *scene_.placed[p.instrument];
+    const int count = corner_count(p.piece);
+    const double by = 1e-6 * instrument.radius;
+    Eigen::Matrix<double, 9, 9> all = Eigen::Matrix<double, 9, 9>::Zero();
+    for (int c = 0; c < count; ++c)
+      for (int a = 0; a < 3; ++a)
+        for (const double side : {-by, by}) {
+          std::array<Vec3, 3> corners = corners_of(p.piece, at_);
+          corners[static_cast<std::size_t>(c)][a] += side;
+          const auto found = nearest_points(instrument, p.part, corners, count);
+          if (!found || !(found->distance > 1e-3 * instrument.radius))
+            return std::nullopt;
+          const Vec3 n = found->normal({});
+          for (int d = 0; d < count; ++d)
+            for (int b = 0; b < 3; ++b)
+              all(3 * d + b, 3 * c + a) +=
+                  found->weights[static_cast<std::size_t>(d)] * n[b] / (2 * side);
+        }
+    return 0.5 * (all + all.transpose());
+  }
+  const ContactScene& scene_;
+  std::span<const TouchPair> pairs_;
+  std::span<const std::uint32_t> active_;
+  std::span<const Vec3> at_;
+};
+
+} // namespace
+
+BentCompliance bending(const ContactScene& scene, std::span<const TouchPair> pairs,
+                       std::span<const std::uint32_t> active, std::span<const Vec3> at,
+                       const Bend& how, VectorXd& held) {
+  return Bending(scene, pairs, active, at).all(how, held);
+}
+
+} // namespace gewebe

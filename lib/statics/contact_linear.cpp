@@ -1,0 +1,235 @@
+// The linear problem of a turn: the forces of the pairs that push, or would be inside.
+
+#include "contact/contact_solver.h"
+#include "statics/contact_scene_internal.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+constexpr double immovable = 1e-12; ///< of the largest compliance
+constexpr double most_softer = 8;   ///< by which forces make their points give way more
+constexpr double overlook = 1e-11;  ///< of the radius
+constexpr std::size_t few = 32;     ///< pairs that join at once, at least
+
+class LinearContacts {
+public:
+  LinearContacts(const ContactScene& scene, std::span<TouchPair> pairs,
+                 std::span<const std::uint32_t> active, std::optional<TouchPair>& stuck)
+      : scene_(scene), pairs_(pairs), active_(active), stuck_(stuck),
+        largest_(scene.rows() > 0 ? scene.w.diagonal().maxCoeff() : 0),
+        rough_(std::ranges::any_of(active, [&](std::uint32_t i) {
+          return scene.placed[pairs[i].instrument]->friction > 0;
+        })) {}
+
+  std::optional<LookedContacts> solve(std::span<const Vec3> at, const BentCompliance& bent,
+                                      const VectorXd& held, bool careful) {
+    MatrixXd base = scene_.rows_of(scene_.free);
+    base += scene_.w * (held - bent.turning(scene_.rows_of(at)));
+    bent.apply(base);
+    LookedContacts looked;
+    looked.columns.resize(scene_.rows(), 0);
+    looked.x = base;
+    if (!looked.x.allFinite())
+      return std::nullopt;
+    std::vector<std::uint32_t> more;
+    for (const std::uint32_t i : active_)
+      if (pairs_[i].force != Vec3{})
+        more.push_back(i);
+    if (more.empty())
+      more = overlooked(looked);
+    while (!more.empty()) {
+      look_at(more, bent, looked);
+      if (!looked.columns.allFinite())
+        return std::nullopt;
+      MatrixXd compliance = at_points(looked.pairs, looked.columns);
+      compliance = (0.5 * (compliance + compliance.transpose())).eval();
+      if (careful && !stable(looked, compliance))
+        return std::nullopt;
+      solve_looked(compliance, base, looked);
+      more = overlooked(looked);
+    }
+    return looked;
+  }
+
+private:
+  Index width() const { return rough_ ? 3 : 1; }
+  /// Directions of a pair's forces, one or three of unit length.
+  Eigen::Matrix<double, 3, Eigen::Dynamic> directions(const TouchPair& p) const {
+    if (rough_)
+      return Eigen::Matrix3d::Identity();
+    return Eigen::Vector3d(p.normal.x, p.normal.y, p.normal.z);
+  }
+
+  /// Rows of the points of pairs, along their directions.
+  MatrixXd at_points(std::span<const std::uint32_t> pairs, const MatrixXd& rows) const {
+    MatrixXd all(width() * static_cast<Index>(pairs.size()), rows.cols());
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const TouchPair& p = pairs_[pairs[k]];
+      MatrixXd own = MatrixXd::Zero(3, rows.cols());
+      for (std::size_t c = 0; c < 3; ++c)
+        if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
+          own += p.point.weights[c] * rows.middleRows(3 * static_cast<Index>(p.piece[c]), 3);
+      all.middleRows(width() * static_cast<Index>(k), width()) = directions(p).transpose() * own;
+    }
+    return all;
+  }
+
+  /// Pairs join those that are looked at.
+  void look_at(std::span<const std::uint32_t> pairs, const BentCompliance& bent,
+               LookedContacts& looked) const {
+    MatrixXd more = MatrixXd::Zero(scene_.rows(), width() * static_cast<Index>(pairs.size()));
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const TouchPair& p = pairs_[pairs[k]];
+      const auto along = directions(p);
+      for (std::size_t c = 0; c < 3; ++c)
+        if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
+          more.middleCols(width() * static_cast<Index>(k), width()) +=
+              p.point.weights[c] * scene_.w.middleCols(3 * static_cast<Index>(p.piece[c]), 3) *
+              along;
+    }
+    const Index before = looked.columns.cols();
+    const VectorXd own = at_points(pairs, more).diagonal();
+    bent.apply(more);
+    looked.straight.conservativeResize(before + more.cols(), 1);
+    looked.straight.bottomRows(more.cols()) = own;
+    looked.columns.conservativeResize(scene_.rows(), before + more.cols());
+    looked.columns.rightCols(more.cols()) = more;
+    looked.pairs.insert(looked.pairs.end(), pairs.begin(), pairs.end());
+  }
+
+  /// Whether forces move their points out, and not too far.
+  bool stable(const LookedContacts& looked, const MatrixXd& compliance) const {
+    for (Index r = 0; r < compliance.rows(); ++r) // near its end nothing of it can be trusted
+      if (!(compliance(r, r) <= most_softer * looked.straight(r, 0)))
+        return false;
+    const auto count = static_cast<Index>(looked.pairs.size());
+    MatrixXd normal = compliance;
+    if (rough_) {
+      normal.resize(count, count);
+      for (Index i = 0; i < count; ++i)
+        for (Index j = 0; j < count; ++j)
+          normal(i, j) =
+              normal_of(looked, i).dot(compliance.block<3, 3>(3 * i, 3 * j) * normal_of(looked, j));
+    }
+    normal.diagonal().array() += 1e-10 * normal.diagonal().cwiseAbs().maxCoeff();
+    return Eigen::LLT<MatrixXd>(normal).info() == Eigen::Success;
+  }
+
+  /// The forces of these pairs, whatever the others say. \param base where the nodes are without
+  void solve_looked(const MatrixXd& compliance, const VectorXd& base, LookedContacts& looked) {
+    const std::vector<Vec3> without = scene_.places_of(base);
+    std::vector<Contact> contacts;
+    std::vector<Vec3> guess;
+    for (std::uint32_t k = 0; k < looked.pairs.size(); ++k) {
+      TouchPair& p = pairs_[looked.pairs[k]];
+      const PlacedInstrument& instrument = *scene_.placed[p.instrument];
+      const MovedInstrument& way = *scene_.moved[p.instrument];
+      const Index row = width() * static_cast<Index>(k);
+      const Eigen::Vector3d n = normal_of(looked, k);
+      const double own =
+          rough_ ? n.dot(compliance.block<3, 3>(row, row) * n) : compliance(row, row);
+      if (!(own > immovable * largest_)) {
+        stuck_ = p;
+        p.force = {};
+        continue;
+      }
+      const Vec3 here = point_of(p, without);
+      contacts.push_back({k, p.normal, dot(p.normal, here - p.point.core) - instrument.radius,
+                          here - carried(way.before, way.now, point_of(p, scene_.nodes.was)),
+                          instrument.friction});
+      guess.push_back(p.force);
+    }
+    looked.forces = VectorXd::Zero(compliance.rows());
+    if (rough_) {
+      const ContactForces found =
+          solve_contacts({compliance.data(), static_cast<std::size_t>(compliance.size())},
+                         looked.pairs.size(), contacts, guess);
+      looked.exact = found.solved;
+      for (std::size_t i = 0; i < contacts.size(); ++i)
+        for (int a = 0; a < 3; ++a)
+          looked.forces[3 * static_cast<Index>(contacts[i].node) + a] = found.force[i][a];
+    } else {
+      std::vector<Index> rows;
+      std::vector<double> gap, start;
+      for (std::size_t i = 0; i < contacts.size(); ++i) {
+        rows.push_back(contacts[i].node);
+        gap.push_back(contacts[i].gap);
+        start.push_back(dot(guess[i], contacts[i].normal));
+      }
+      const MatrixXd some = compliance(rows, rows);
+      const PushForces found =
+          solve_pushes({some.data(), static_cast<std::size_t>(some.size())}, gap, start);
+      looked.exact = found.solved;
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        looked.forces[rows[i]] = found.push[i];
+    }
+    for (std::size_t k = 0; k < looked.pairs.size(); ++k) {
+      TouchPair& p = pairs_[looked.pairs[k]];
+      const Eigen::Vector3d force =
+          directions(p) * looked.forces.segment(width() * static_cast<Index>(k), width());
+      p.force = {force[0], force[1], force[2]};
+    }
+    looked.x = base + looked.columns * looked.forces;
+  }
+  /// The pairs that nobody looked at whose points are in their instruments, the deepest first.
+  std::vector<std::uint32_t> overlooked(const LookedContacts& looked) const {
+    const std::vector<Vec3> at = looked.x.size() > 0
+                                     ? scene_.places_of(looked.x)
+                                     : std::vector<Vec3>(scene_.free.begin(), scene_.free.end());
+    std::vector<std::uint32_t> known(looked.pairs);
+    std::ranges::sort(known);
+    std::vector<std::pair<double, std::uint32_t>> found;
+    for (const std::uint32_t i : active_) {
+      if (std::ranges::binary_search(known, i))
+        continue;
+      const TouchPair& p = pairs_[i];
+      const double radius = scene_.placed[p.instrument]->radius;
+      const double gap = dot(p.normal, point_of(p, at) - p.point.core) - radius;
+      if (!(gap >= -overlook * radius))
+        found.emplace_back(gap / radius, i);
+    }
+    std::ranges::sort(found);
+    found.resize(std::min(found.size(), std::max(few, known.size())));
+    std::vector<std::uint32_t> pairs;
+    for (const auto& [gap, i] : found)
+      pairs.push_back(i);
+    std::ranges::sort(pairs);
+    return pairs;
+  }
+
+  Eigen::Vector3d normal_of(const LookedContacts& looked, Index k) const {
+    const Vec3& n = pairs_[looked.pairs[static_cast<std::size_t>(k)]].normal;
+    return {n.x, n.y, n.z};
+  }
+  const ContactScene& scene_;
+  std::span<TouchPair> pairs_;
+  std::span<const std::uint32_t> active_;
+  std::optional<TouchPair>& stuck_;
+  double largest_;
+  bool rough_; ///< anything rubs
+};
+
+} // namespace
+
+std::optional<LookedContacts> solve_bent(const ContactScene& scene, std::span<TouchPair> pairs,
+                                         std::span<const std::uint32_t> active,
+                                         std::span<const Vec3> at, const BentCompliance& bent,
+                                         const VectorXd& held, bool careful,
+                                         std::optional<TouchPair>& stuck) {
+  return LinearContacts(scene, pairs, active, stuck).solve(at, bent, held, careful);
+}
+
+} // namespace gewebe
