@@ -2,6 +2,7 @@
 
 #include "base/digest.h"
 #include "formats/image/image_file.h"
+#include "shading/occlusion.h"
 #include "tools/render/render_arguments.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_materials.h"
@@ -19,7 +20,8 @@
 using namespace gewebe;
 namespace {
 
-std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions& options) {
+std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions& options,
+                          bool occluded) {
   SolidReport solid;
   std::vector<Surface> surfaces = read_surfaces(input, options, run.context(), &solid);
   tell_solid(run, input.name(), options, solid);
@@ -27,8 +29,11 @@ std::vector<Surface> read(cli::Run& run, Input& input, const SurfaceReadOptions&
   run.stats().set("triangles", triangle_count(surfaces));
   if (triangle_count(surfaces) == 0)
     run.warn(input.name() + ": no triangle to draw");
-  at(input.name(),
-     [&] { require_memory(run.context(), drawing_bytes(surfaces), "drawing the triangles"); });
+  at(input.name(), [&] {
+    const double hidden =
+        occluded ? occlusion_bytes(static_cast<double>(triangle_count(surfaces))) : 0;
+    require_memory(run.context(), drawing_bytes(surfaces) + hidden, "drawing the triangles");
+  });
   return surfaces;
 }
 
@@ -98,7 +103,8 @@ void work(cli::Run& run, cli::RenderArguments a) {
     if (!a.frames.empty())
       reading.frame = frame;
     if (!a.frames.empty() || surfaces.empty())
-      surfaces = run.timed("read", [&] { return read(run, input, reading); });
+      surfaces =
+          run.timed("read", [&] { return read(run, input, reading, a.drawing.occlusion > 0); });
     picture = pictures.of(surfaces);
     digest.add(picture.values);
     run.timed("write", [&] {

@@ -55,7 +55,8 @@ std::string shader_kind(const SurfaceMaterial& material) {
   for (const auto* texture :
        {&material.base, &material.detail, &material.reflection, &material.structure})
     kind = 4 * kind + (*texture ? ((*texture)->options.sphere ? 3U : 1U) : 0U);
-  return std::to_string(kind) + (is_at_rest(material) ? rest_definitions(material) : "");
+  return std::to_string(kind) + (material.film.amount > 0 ? "wet" : "") +
+         (is_at_rest(material) ? rest_definitions(material) : "");
 }
 
 // At most so many passes blend into one group.
@@ -339,7 +340,7 @@ void GlRenderer::State::draw_one(const Context& context) {
 }
 
 void GlRenderer::State::draw_shader(const Context& context) {
-  shaders.at(shader_kind(*now->material)).use(light, *now->material);
+  shaders.at(shader_kind(*now->material)).use(light, *now->material, material.background);
   const auto bind = [&](GlUnit unit, GLuint texture) {
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     glBindTexture(GL_TEXTURE_2D, texture);
@@ -412,6 +413,9 @@ GlRenderer::GlRenderer(GlContext& gl, const SurfaceMaterial& material, std::uint
     if (is_at_rest(material_of_group(material, g)) && options.mode != GlMode::shader)
       throw Error("the fixed functions know neither three projections nor solid textures, expected "
                   "the shader");
+  for (std::size_t g = 0; g <= material.others.size(); ++g)
+    if (material_of_group(material, g).film.amount > 0 && options.mode != GlMode::shader)
+      throw Error("the fixed functions know no wet film, expected the shader");
   state_->load_textures();
   GLint max = 0;
   glGetIntegerv(GL_MAX_TEXTURE_UNITS, &max);
@@ -448,6 +452,8 @@ void GlRenderer::set_drawing(const Drawing& drawing) {
     group.count = triangles.size();
     if (group.count == 0)
       continue;
+    if (group.material->film.amount > 0 && !frames)
+      throw Error("a wet film on a drawing without frames, expected them at each vertex");
     if (is_at_rest(*group.material) && drawing.rests.empty())
       throw Error("textures on the shape at rest for a drawing without it, expected its places");
     if (s.options.mode == GlMode::shader)

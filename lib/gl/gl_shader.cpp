@@ -57,6 +57,25 @@ vec3 unit(vec3 v) {
   float l = length(v);
   return l > 0.0 ? v / l : vec3(0.0);
 }
+#ifdef FILM
+uniform vec3 film, mirrored_color; // amount, a², F0
+float mirrored_share(float cosine) {
+  return film.z + (1.0 - film.z) * pow(1.0 - min(cosine, 1.0), 5.0);
+}
+float smith(float x) {
+  return x + sqrt(film.y + (1.0 - film.y) * x * x);
+}
+vec3 wet(vec3 c, vec3 n, vec3 v, vec3 l, float twice_relief) {
+  n = dot(n, v) < 0.0 ? -n : n;
+  n = unit(n + (twice_relief - 1.0) * unit(l - n * dot(l, n)));
+  vec3 h = unit(v + l);
+  float nv = max(dot(n, v), 0.0), nl = max(dot(n, l), 0.0), nh = max(dot(n, h), 0.0);
+  float spread = nh * nh * (film.y - 1.0) + 1.0;
+  float light_mirrored =
+      film.y * mirrored_share(max(dot(v, h), 0.0)) * nl / (spread * spread * smith(nl) * smith(nv));
+  return min(c + film.x * (mirrored_share(nv) * (mirrored_color - c) + light_mirrored), 1.0);
+}
+#endif
 )";
 
 constexpr const char* fragment_source = R"(
@@ -111,12 +130,16 @@ void main() {
 #ifdef REST_REFLECTION
   c = min(c + rest_reflection(), 1.0);
 #endif
+  float relief = 0.5;
 #ifdef REST_STRUCTURE
-  c = min(2.0 * rest_relief() * c, 1.0);
+  relief = rest_relief();
 #endif
 #ifdef STRUCTURE
-  float relief = 0.5 + 0.5 * (texture2D(structure, STRUCTURE).r - texture2D(structure, STRUCTURE + shift).r);
+  relief = 0.5 + 0.5 * (texture2D(structure, STRUCTURE).r - texture2D(structure, STRUCTURE + shift).r);
+#endif
   c = min(2.0 * relief * c, 1.0);
+#ifdef FILM
+  c = wet(c, n, unit(eye - place), light.w > 0.0 ? unit(light.xyz - place) : light.xyz, 2.0 * relief);
 #endif
   gl_FragColor = vec4(c, 1.0);
 })";
@@ -161,7 +184,8 @@ GlShader::GlShader(const SurfaceMaterial& material, bool frames, bool rotated) {
   define(material.detail, "DETAIL");
   define(material.reflection, "REFLECTION");
   define(material.structure, "STRUCTURE");
-  head += std::string(sphere ? "#define SPHERE\n" : "") + (frames ? "#define FRAMES\n" : "");
+  head += std::string(sphere ? "#define SPHERE\n" : "") + (frames ? "#define FRAMES\n" : "") +
+          (material.film.amount > 0 ? "#define FILM\n" : "");
   const GLuint vertex = compiled(GL_VERTEX_SHADER, head + vertex_source);
   const GLuint fragment =
       compiled(GL_FRAGMENT_SHADER,
@@ -184,7 +208,8 @@ GlShader::~GlShader() {
   glDeleteProgram(program_);
 }
 
-void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material) const {
+void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material,
+                   const Vec3& surroundings) const {
   glUseProgram(program_);
   int unit = 0;
   for (const char* name : {"base", "detail", "reflection", "structure"})
@@ -198,6 +223,9 @@ void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material) cons
   set(program_, "right", drawing.camera.right);
   set(program_, "up", drawing.camera.up);
   set(program_, "back", drawing.camera.back);
+  const double alpha = material.film.roughness * material.film.roughness;
+  set(program_, "film", {material.film.amount, alpha * alpha, material.film.reflectance});
+  set(program_, "mirrored_color", surroundings);
   if (is_at_rest(material))
     set_rest(program_, material, drawing);
 }

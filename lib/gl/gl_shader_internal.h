@@ -22,8 +22,9 @@ public:
   ~GlShader();
   GlShader(const GlShader&) = delete;
   GlShader& operator=(const GlShader&) = delete;
+  /// \param surroundings what a film mirrors
   /// \pre `material` has textures as that which the program was made for, with values of its own
-  void use(const Drawing& drawing, const SurfaceMaterial& material) const;
+  void use(const Drawing& drawing, const SurfaceMaterial& material, const Vec3& surroundings) const;
 
 private:
   GLuint program_ = 0;

@@ -1,5 +1,6 @@
 #include "raster/raster_cpu.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "raster/raster_kernel_internal.h"
 #include "raster/raster_rest_internal.h"
@@ -339,8 +340,22 @@ std::uint32_t background_of(const SurfaceMaterial& material) {
 struct MaterialScene {
   MaterialScene(const Drawing& drawing, const Viewport& viewport, const SurfaceMaterial& material)
       : textures(material), scene(scene_of(drawing, viewport, material, textures, rest)) {}
+  /// What the film of its triangles mirrors.
+  void cover(const WetFilm& of, const Vec3& surroundings) {
+    if (!(of.amount > 0))
+      return;
+    if (scene.frames == nullptr)
+      throw Error("a wet film on a drawing without frames, expected them at each vertex");
+    const double alpha = of.roughness * of.roughness;
+    film.amount = static_cast<float>(of.amount);
+    film.alpha2 = static_cast<float>(alpha * alpha);
+    film.reflectance = static_cast<float>(of.reflectance);
+    set(film.mirrored, surroundings);
+    scene.film = &film;
+  }
   Textures textures;
   std::optional<RasterRest> rest;
+  KernelFilm film{};
   KernelScene scene;
 };
 
@@ -353,8 +368,11 @@ std::list<MaterialScene> scenes_of(const Drawing& drawing, const Viewport& viewp
     if (group.empty() && g > 0)
       continue;
     KernelScene* const last = scenes.empty() ? nullptr : &scenes.back().scene;
-    KernelScene& scene =
-        scenes.emplace_back(drawing, viewport, material_of_group(material, g)).scene;
+    const SurfaceMaterial& own = material_of_group(material, g);
+    MaterialScene& made = scenes.emplace_back(drawing, viewport, own);
+    if (!group.empty())
+      made.cover(own.film, material.background);
+    KernelScene& scene = made.scene;
     scene.first = static_cast<std::uint32_t>(group.data() - drawing.triangles.data());
     scene.count = static_cast<std::uint32_t>(group.size());
     scene.background = background_of(material);

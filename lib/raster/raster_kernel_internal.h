@@ -43,6 +43,12 @@ struct KernelRest {
   float shift; ///< of a solid structure towards the light, in the unit of places
 };
 
+/// A film of water, see wet_film.h.
+struct KernelFilm {
+  float amount, alpha2, reflectance; ///< w, a², F0
+  float mirrored[3];                 ///< b
+};
+
 /// What shading needs of the triangles from `first` on; others have another material. Vertices are
 /// 10 floats: position, s t, shifted s t, sphere s t, shade; frames 7: normal, tangent, side.
 struct KernelScene {
@@ -60,6 +66,7 @@ struct KernelScene {
   bool clamped;     ///< some texture neither repeats nor is mirrored: whole numbers count
   bool derivatives; ///< some texture shrinks by mipmaps
   float eye[3], right[3], up[3], back[3];
+  const KernelFilm* film;   ///< null: dry. Else there are frames
   const KernelRest* rest;   ///< null where no texture needs it; such ones are absent above
   std::uint32_t background; ///< red, green, blue from the lowest byte
 };

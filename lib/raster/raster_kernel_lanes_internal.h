@@ -662,7 +662,11 @@ inline Floats relief(const KernelScene& scene, const Slots& slots, std::size_t a
                                       sample(structure, slots, at, s2, t2).c[0]);
 }
 
-/// min(1, 2 r min(1, min(1, base + detail) + reflection)), 0 … 1.
+// In raster_kernel_film_lanes_internal.h.
+inline void wet(const KernelScene& scene, const Slots& slots, std::size_t at, Floats twice_relief,
+                Colors& color);
+
+/// min(1, 2 r min(1, min(1, base + detail) + reflection)), 0 … 1, and the film upon it.
 template <bool Rest>
 inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
   if (scene.frames != nullptr)
@@ -696,13 +700,16 @@ inline Colors shade(const KernelScene& scene, Slots& slots, std::size_t at) {
   add(scene.detail, &KernelRest::detail, rest.detail);
   add(scene.reflection, &KernelRest::reflection, rest.reflection);
   const bool rest_relief = Rest && rest_has(scene, &KernelRest::structure);
+  Floats twice_relief = one;
   if (scene.structure != nullptr || rest_relief) {
-    const Floats r = splat(2.0F) * (rest_relief ? rest.relief : relief(scene, slots, at));
+    twice_relief = splat(2.0F) * (rest_relief ? rest.relief : relief(scene, slots, at));
     for (Floats& c : color.c)
-      c = smaller(c * r, one);
+      c = smaller(c * twice_relief, one);
   }
   for (Floats& c : color.c)
     c = larger(c, splat(0.0F));
+  if (scene.film != nullptr)
+    wet(scene, slots, at, twice_relief, color);
   return color;
 }
 

@@ -2,7 +2,7 @@
 // A tile of the rasteriser: what is seen in each row, gathered and shaded. Included like
 // raster_kernel_lanes_internal.h, from which all that happens in its lanes comes.
 
-#include "raster/raster_kernel_lanes_internal.h"
+#include "raster/raster_kernel_film_lanes_internal.h"
 
 #include <cstring>
 

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "shading/occlusion.h"
 #include "shading/tangents.h"
 
 #include <algorithm>
@@ -72,7 +73,8 @@ void prepare(DrawingParts& kept, const Surface& surface, const DrawingOptions& o
   if (options.rest)
     prepare_rest(kept, surface, options, change);
   const TriangleMesh& mesh = surface.mesh;
-  if (options.structure || options.sphere || options.shade > 0)
+  if (options.structure || options.sphere || options.wet || options.shade > 0 ||
+      options.occlusion > 0)
     kept.normals = render_normals(mesh);
   counts.frames += options.structure ? 1U : 0U;
   if (change == DrawingChange::points) {
@@ -98,7 +100,7 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
     throw Error(std::to_string(base + vertices.point.size()) + " vertices, expected at most " +
                 std::to_string(UINT32_MAX));
   drawing.vertices.resize(base + vertices.point.size());
-  const bool frames = options.per_pixel && (options.structure || options.sphere);
+  const bool frames = options.per_pixel && (options.structure || options.sphere || options.wet);
   if (frames)
     drawing.frames.resize(drawing.vertices.size());
   parallel_blocks(context, vertices.point.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -135,8 +137,22 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
         out.shade =
             static_cast<float>(1 - options.shade + options.shade * std::min(lit / brightest, 1.0));
       }
+      if (!parts.openness.empty())
+        out.shade *= static_cast<float>(1 - options.occlusion *
+                                                (1 - double{parts.openness[vertices.point[v]]}));
     }
   });
+}
+
+/// How open all surfaces are, each hidden by the others too.
+void find_openness(std::vector<DrawingParts>& parts, std::span<const Surface> surfaces,
+                   const DrawingOptions& options, const Context& context) {
+  std::vector<Occluder> occluders;
+  for (std::size_t n = 0; n < surfaces.size(); ++n)
+    occluders.push_back({surfaces[n].mesh.points, parts[n].normals, surfaces[n].mesh.triangles});
+  std::vector<std::vector<float>> found = openness(occluders, options.occlusion_radius, context);
+  for (std::size_t n = 0; n < surfaces.size(); ++n)
+    parts[n].openness = std::move(found[n]);
 }
 
 /// Places and normals at rest of the vertices appended last.
@@ -274,8 +290,11 @@ const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const Drawi
   }
   parts_.resize(surfaces.size());
   const bool sorted = change != DrawingChange::all;
-  for (std::size_t n = 0; n < surfaces.size(); ++n) {
+  for (std::size_t n = 0; n < surfaces.size(); ++n)
     prepare(parts_[n], surfaces[n], options, change, counts_, context);
+  if (options.occlusion > 0 && change != DrawingChange::view)
+    find_openness(parts_, surfaces, options, context);
+  for (std::size_t n = 0; n < surfaces.size(); ++n) {
     append(drawing, surfaces[n], parts_[n], options, context);
     if (options.rest && change != DrawingChange::view) {
       append_rests(drawing, surfaces[n], parts_[n]);

@@ -83,6 +83,7 @@ struct DrawingOptions {
   bool texcoords = false;    ///< a base or a structure texture is there
   bool structure = false;    ///< a structure texture is there: offsets are computed
   bool sphere = false;       ///< a texture is sphere-mapped
+  bool wet = false;          ///< a film is there: normals for each pixel
   bool rest = false;         ///< places at rest: solid textures or three projections
   bool rest_normals = false; ///< normals at rest: three projections or a solid structure
   bool rest_light = false;   ///< turns: a structure at rest
@@ -91,8 +92,10 @@ struct DrawingOptions {
   bool directional = false;
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
-  double fill = 0; ///< strength of a second, far light, from the camera's right, 0 … 1
-  Camera camera;   ///< that sees the sphere maps and has the second light
+  double fill = 0;      ///< strength of a second, far light, from the camera's right, 0 … 1
+  double occlusion = 0; ///< share of the light that comes from all around, 0 … 1
+  double occlusion_radius = 0; ///< mm, of openness()
+  Camera camera;               ///< that sees the sphere maps and has the second light
   GroupBy group_by = GroupBy::material;
   std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
   bool instruments = false; ///< instruments have a group, the last one; else no surface is one
@@ -101,11 +104,12 @@ struct DrawingOptions {
 /// All surfaces in one, in order within each group. Per vertex (report eq. 3.2)
 ///   (ds, dt) = offset · (L·T, L·B),  L = (lP - vP) / |lP - vP|
 /// with the frame of tangents.h. shade = 1 - k + k (max(0, L·N) + f max(0, F·N)) / max(1, |L + f
-/// F|), F of fill_direction(), for shares k and f. L is 0 for a vertex at the light. Sphere maps
-/// are read as OpenGL's GL_SPHERE_MAP does: (x, y) / m + 1/2 for the view's mirror image (x, y, z)
-/// at the normal, in axes right, up, back, and m = 2 |(x, y, z + 1)|. Only what is asked for is
-/// computed. \pre check_mesh passes for every mesh; with `texcoords` all meshes have them \throw
-/// Error if a coordinate overflows or there are more than 2³² vertices; Cancelled
+/// F|), F of fill_direction(), for shares k and f; times 1 - o (1 - openness) for the share o of
+/// occlusion.h. L is 0 for a vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP
+/// does: (x, y) / m + 1/2 for the view's mirror image (x, y, z) at the normal, in axes right, up,
+/// back, and m = 2 |(x, y, z + 1)|. Only what is asked for is computed. \pre check_mesh passes for
+/// every mesh; with `texcoords` all meshes have them \throw Error if a coordinate overflows or
+/// there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
                      const Context& context);
 
@@ -127,6 +131,7 @@ struct DrawingParts {
   TexturedVertices vertices;
   std::vector<Vec3> normals;
   std::vector<Vec3> rest_normals; ///< where places at rest are asked for
+  std::vector<float> openness;    ///< of its points, where occlusion is asked for
   bool moved = false;             ///< whether its points are not at rest
 };
 

@@ -5,6 +5,7 @@
 #include "shading/rest.h"
 #include "shading/solid_texture.h"
 #include "shading/texture.h"
+#include "shading/wet_film.h"
 
 #include <algorithm>
 #include <array>
@@ -25,6 +26,7 @@ struct SurfaceMaterial {
   std::optional<Texture> structure;  ///< the height f, one channel
   std::optional<SolidTexture> solid_base, solid_detail, solid_structure; ///< instead of images
   RestMapping rest;         ///< of textures on the shape at rest
+  WetFilm film;             ///< upon it all
   Vec3 color{1, 1, 1};      ///< factor of the base, 0 … 1
   Vec3 background{1, 1, 1}; ///< 0 … 1
   std::vector<SurfaceMaterial>

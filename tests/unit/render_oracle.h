@@ -8,12 +8,14 @@
 #include "rest_oracle.h"
 #include "shading/camera.h"
 #include "shading/image.h"
+#include "shading/wet_film.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <tuple>
 #include <vector>
@@ -28,6 +30,8 @@ struct OracleScene {
   std::optional<Image> reflection;      ///< sphere-mapped
   std::optional<SolidTexture> solid_base, solid_detail, solid_structure;
   RestMapping rest; ///< triplanar: of all but the reflection
+  WetFilm film;
+  Vec3 background; ///< what it mirrors, of the first scene
   Vec3 color{1, 1, 1}, light;
   double offset = 0, shade = 0;
   bool directional = false; ///< `light` is a vector to it
@@ -336,8 +340,39 @@ private:
                     value(material.structure, change, s + ds, t + dt, c));
       nearest.value[c] =
           scene_.clamp_early ? std::min(1.0, 2 * r) * base : std::min(1.0, 2 * r * base);
+      if (own.film.amount > 0)
+        nearest.value[c] = wet(own.film, nearest.value[c], scene_.background[static_cast<int>(c)],
+                               place, unit(normal), r);
     }
     return true;
+  }
+
+  /// Cook and Torrance's product of distribution, shadowing and reflectance, as wet_film.h has it.
+  double wet(const WetFilm& film, double color, double around, const Vec3& place, Vec3 n,
+             double r) const {
+    const Vec3 v = unit(camera_.eye - place), l = to_light(place), h = unit(v + l);
+    n = n * std::copysign(1.0, dot(n, v));
+    n = unit(n + unit(l - n * dot(l, n)) * (2 * r - 1));
+    const double pi = std::numbers::pi, a = film.roughness * film.roughness;
+    const auto fresnel = [&](double x) {
+      return film.reflectance + (1 - film.reflectance) * std::pow(1 - std::max(x, 0.0), 5);
+    };
+    const auto shadowing = [&](double x) {
+      return 2 / (1 + std::sqrt(1 + a * a * (1 / (x * x) - 1)));
+    };
+    const double nl = dot(n, l), nv = dot(n, v);
+    double mirrored = 0;
+    if (nl > 0 && nv > 0) {
+      const double tilt = std::pow(dot(n, h), 2);
+      const double density = a * a / (pi * std::pow(tilt * (a * a - 1) + 1, 2));
+      mirrored =
+          pi * density * fresnel(dot(v, h)) * shadowing(nl) * shadowing(nv) / (4 * nl * nv) * nl;
+    } else if (nl > 0) { // its limit at the rim
+      const double tilt = std::pow(dot(n, h), 2);
+      const double density = a * a / (pi * std::pow(tilt * (a * a - 1) + 1, 2));
+      mirrored = pi * density * fresnel(dot(v, h)) * shadowing(nl) / (2 * a);
+    }
+    return test::smaller(color + film.amount * (fresnel(nv) * (around - color) + mirrored), 1.0);
   }
 
   /// What textures at rest see of a point; for surfaces that rest.

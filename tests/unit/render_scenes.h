@@ -60,7 +60,7 @@ inline TriangleMesh torus(std::uint32_t around, std::uint32_t across, bool mirro
   return m;
 }
 
-/// The material that an oracle's scene has, before black.
+/// The material that an oracle's scene has, before black unless it has another background.
 inline SurfaceMaterial material_of(const OracleScene& scene) {
   SurfaceMaterial material;
   TextureOptions filter;
@@ -81,7 +81,8 @@ inline SurfaceMaterial material_of(const OracleScene& scene) {
   material.solid_structure = scene.solid_structure;
   material.rest = scene.rest;
   material.color = scene.color;
-  material.background = {0, 0, 0};
+  material.film = scene.film;
+  material.background = scene.background;
   for (OracleScene other : scene.others) {
     other.rest = scene.rest;
     other.mipmap = scene.mipmap;

@@ -103,6 +103,7 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
     options.structure = options.structure || other.structure;
     options.sphere = options.sphere || other.reflection;
   }
+  options.wet = c.scene.film.amount > 0;
   options.per_pixel = mode.per_pixel;
   options.light = light;
   options.directional = c.scene.directional;
@@ -334,6 +335,70 @@ TEST_P(RenderOracle, ShallowHeightsAreSmoothIn16BitsAndStepsIn8) {
   const OracleComparison stepped = compare(image, c.scene, camera);
   RecordProperty("stepped.rms", std::to_string(stepped.rms_rounded));
   EXPECT_GT(stepped.rms_rounded, 0.35);
+}
+
+Case wet_torus() {
+  Case c = textured(torus(60, 30, false), "iso");
+  c.scene.shade = 0.6;
+  c.scene.color = {0.7, 0.4, 0.3};
+  c.scene.film = {0.8, 0.4, water_reflectance};
+  c.scene.background = {0.2, 0.3, 0.6};
+  return c;
+}
+
+TEST_P(RenderOracle, WetFilm) {
+  Case c = wet_torus();
+  if (!GetParam().per_pixel) {
+    EXPECT_THROW(held_against_oracle(c, GetParam()), Error);
+    return;
+  }
+  expect_equal(c, "wet");
+  c.scene.directional = true;
+  c.scene.light = {3, 1, 2};
+  expect_equal(c, "light far away");
+  c.scene.structure.reset();
+  c.scene.film.reflectance = steel_reflectance;
+  expect_equal(c, "smooth steel");
+  // That it can fail: another film, relief the other way around.
+  for (const double roughness : {0.4, 0.5}) {
+    Case other = wet_torus();
+    other.scene.film.roughness = roughness;
+    Camera camera;
+    const Image image = draw(other, GetParam(), camera, c.scene.light, roughness > 0.4 ? 1 : -1);
+    other.scene.film.roughness = 0.4;
+    other.scene.light = c.scene.light;
+    other.scene.per_pixel = true;
+    EXPECT_GT(compare(image, other.scene, camera).rms, 1) << roughness;
+  }
+}
+
+// Light and eye along the normal: H = F0 / (4 a²), and b is seen by F0 of it.
+TEST_P(RenderOracle, WetFilmSeenFromTheLight) {
+  if (!GetParam().per_pixel)
+    return; // none without frames for each pixel, as above
+  Case c;
+  c.scene.mesh = quad(100, 100, 1, 1);
+  c.camera.view = "top";
+  c.width = c.height = 101;
+  c.scene.directional = true;
+  c.scene.light = {0, 0, 1};
+  c.scene.color = {0.5, 0.25, 0.125};
+  c.scene.background = {0, 1, 0.5};
+  for (const double roughness : {0.1, 0.35, 1.0}) {
+    c.scene.film = {0.7, roughness, water_reflectance};
+    Camera camera;
+    Vec3 light;
+    const Image image = draw(c, GetParam(), camera, light);
+    const double h = water_reflectance / (4 * std::pow(roughness, 4));
+    for (int n = 0; n < 3; ++n) {
+      const double own = c.scene.color[n];
+      EXPECT_NEAR(
+          image.values[3 * (101 * 50 + 50) + static_cast<std::size_t>(n)],
+          255 * std::min(1.0, own + 0.7 * (water_reflectance * (c.scene.background[n] - own) + h)),
+          0.51)
+          << roughness << n;
+    }
+  }
 }
 
 // What the comparison must see.

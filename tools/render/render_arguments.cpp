@@ -4,6 +4,7 @@
 #include "tools/render/render_camera.h"
 #include "tools/render/render_field.h"
 #include "tools/render/render_layer.h"
+#include "tools/render/render_lighting.h"
 #include "tools/render/render_materials.h"
 #include "tools/render/render_volume.h"
 
@@ -87,6 +88,7 @@ void complete_modes(RenderArguments& a) {
   a.picture.samples = static_cast<int>(a.words.msaa);
   refuse(a.words.msaa != 1 && a.words.msaa != 4,
          "--msaa: expected 1 or 4, not " + std::to_string(a.words.msaa));
+  complete_lighting(a);
   if (a.words.tbn != "auto")
     a.picture.per_pixel = a.words.tbn == "pixel";
   refuse(a.words.tbn == "vertex" && a.drawing.rest_light,
@@ -94,10 +96,11 @@ void complete_modes(RenderArguments& a) {
   refuse(a.words.tbn == "pixel" && a.picture.gl.mode != GlMode::shader,
          "--tbn pixel for fixed functions, expected --passes shader");
   constexpr const char* fixed =
-      " for --uv triplanar or a solid texture, expected shader or cpu (--passes shader, --backend "
-      "cpu)";
-  refuse(a.drawing.rest && a.picture.backend == Backend::gl &&
-             a.picture.gl.mode != GlMode::shader && a.words.compare.empty(),
+      " for --uv triplanar, a solid texture or --wet, expected shader or cpu (--passes shader, "
+      "--backend cpu)";
+  const bool shaded = a.drawing.rest || a.drawing.wet;
+  refuse(shaded && a.picture.backend == Backend::gl && a.picture.gl.mode != GlMode::shader &&
+             a.words.compare.empty(),
          "--passes " + a.words.passes + fixed);
   if (a.words.compare.empty())
     return;
@@ -106,7 +109,7 @@ void complete_modes(RenderArguments& a) {
     refuse(mode != "cpu" && std::ranges::find(gl_mode_names(), mode) == gl_mode_names().end(),
            "--compare: '" + mode + "' is no mode, expected 3, 2, 1, shader or cpu");
   for (const std::string& mode : a.compare)
-    refuse(a.drawing.rest && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
+    refuse(shaded && mode != "cpu" && mode != "shader", "--compare: " + mode + fixed);
 }
 
 /// What was not said: a picture to show, or the formula alone.
@@ -225,6 +228,7 @@ void declare_textures(Program& p, RenderArguments& a) {
 
 void declare(Program& p, RenderArguments& a) {
   declare_textures(p, a);
+  declare_lighting(p, a);
   p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
       .one_of({"textured", "flat", "wireframe"});
   declare_camera(p, a);

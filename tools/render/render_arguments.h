@@ -30,6 +30,7 @@ struct RenderLayer {
 struct RenderMaterial {
   RenderLayer base, detail, reflection, structure;
   std::optional<Vec3> color;
+  std::optional<double> wet, wet_roughness;
 };
 
 /// What a volume alone is asked for, as words and as what they mean.
@@ -46,6 +47,8 @@ struct RenderArguments {
   SurfaceMaterial common;     ///< colours; its textures are read later
   bool tissue_colors = false; ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
+  std::optional<double> wet, wet_roughness; ///< the film on all
+  std::optional<double> occlusion_radius;   ///< mm
   double offset = 0.02;
   std::optional<double> offset_texels; ///< of the structure instead
   std::string style = "textured";

@@ -3,6 +3,7 @@
 #include "formats/results/results.h"
 #include "shading/tissue_color.h"
 #include "tools/render/render_layer.h"
+#include "tools/render/render_lighting.h"
 
 #include <algorithm>
 #include <array>
@@ -58,6 +59,7 @@ void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
                   {&material.base, &material.detail, &material.reflection, &material.structure},
                   context);
     own.color = material.color.value_or(common.color);
+    own.film = film_of(a, &material);
   }
   common.others = std::move(others);
 }
@@ -84,6 +86,8 @@ void add_instrument_material(SurfaceMaterial& common, const RenderArguments& a,
   SurfaceMaterial own;
   own.color = a.instrument_color.value_or(a.style == "wireframe" ? a.common.color : steel);
   own.background = common.background;
+  own.film = film_of(a, nullptr);
+  own.film.reflectance = steel_reflectance;
   common.others.push_back(std::move(own));
   drawing.instruments = true;
 }

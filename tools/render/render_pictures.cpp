@@ -3,6 +3,7 @@
 #include "shading/angles.h"
 #include "shading/style.h"
 #include "tools/render/render_layer.h"
+#include "tools/render/render_lighting.h"
 #include "tools/render/render_materials.h"
 
 #include <algorithm>
@@ -15,6 +16,7 @@ namespace {
 /// The material with its textures; one that was not asked for is not read.
 SurfaceMaterial material_of(const RenderArguments& a, const Context& context) {
   SurfaceMaterial material = a.common;
+  material.film = film_of(a, nullptr);
   take_textures(material, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
   add_group_materials(material, a, context);
   return material;
@@ -57,6 +59,7 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   camera_ = camera_of(0);
   drawing_.light = a.light.value_or(default_light(*camera_));
   first_light_ = drawing_.light;
+  drawing_.occlusion_radius = a.occlusion_radius.value_or(box_.longest_side() / 4);
   drawing_.offset = {a.offset, a.offset};
   const auto structured =
       std::ranges::find_if(material_.others, [](const SurfaceMaterial& material) {

@@ -112,6 +112,7 @@ public:
   /// N each; `value_of(N)` is where that value goes.
   OptionRef& numbered(std::function<std::string&(std::int32_t)> value_of);
   OptionRef& numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of);
+  OptionRef& numbered(std::function<std::optional<double>&(std::int32_t)> value_of);
 
 private:
   friend class Program;

@@ -272,10 +272,20 @@ OptionRef& OptionRef::numbered(std::function<std::string&(std::int32_t)> value_o
   return *this;
 }
 
-OptionRef& OptionRef::numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of) {
-  Spec& spec = spec_of(spec_);
+namespace {
+template <class Value>
+void read_numbered(Spec& spec, std::function<std::optional<Value>&(std::int32_t)> value_of) {
   spec.set_numbered = [&spec, value_of = std::move(value_of)](
                           std::int32_t n, std::string_view word) { spec.read(word, value_of(n)); };
+}
+} // namespace
+
+OptionRef& OptionRef::numbered(std::function<std::optional<Vec3>&(std::int32_t)> value_of) {
+  read_numbered(spec_of(spec_), std::move(value_of));
+  return *this;
+}
+OptionRef& OptionRef::numbered(std::function<std::optional<double>&(std::int32_t)> value_of) {
+  read_numbered(spec_of(spec_), std::move(value_of));
   return *this;
 }
 

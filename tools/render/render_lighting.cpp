@@ -1,0 +1,65 @@
+#include "tools/render/render_lighting.h"
+
+#include <algorithm>
+
+namespace gewebe::cli {
+namespace {
+
+void refuse(bool wrong, const std::string& what) {
+  if (wrong)
+    throw UsageError(what);
+}
+
+bool is_wet(const RenderArguments& a) {
+  return a.wet.value_or(0) > 0 || std::ranges::any_of(a.materials, [](const auto& material) {
+           return material.second.wet.value_or(0) > 0;
+         });
+}
+
+} // namespace
+
+void declare_lighting(Program& p, RenderArguments& a) {
+  p.option("--wet", a.wet, "[N=]W", "a film of water that mirrors light and background, 0 to 1")
+      .range(0, 1)
+      .numbered([&a](std::int32_t n) -> std::optional<double>& { return a.materials[n].wet; });
+  p.option("--wet-roughness", a.wet_roughness, "[N=]R",
+           "of that film: 0.1, as a mirror, to 1 (default 0.3)")
+      .range(0.1, 1)
+      .numbered(
+          [&a](std::int32_t n) -> std::optional<double>& { return a.materials[n].wet_roughness; });
+  p.option("--occlusion", a.drawing.occlusion, "O", "darken what near surfaces hide, 0 to 1")
+      .range(0, 1);
+  p.option("--occlusion-radius", a.occlusion_radius, "MM",
+           "how near, else a quarter of the longest side")
+      .positive();
+}
+
+void complete_lighting(RenderArguments& a) {
+  a.drawing.wet = is_wet(a);
+  const bool rough = a.wet_roughness || std::ranges::any_of(a.materials, [](const auto& material) {
+                       return material.second.wet_roughness.has_value();
+                     });
+  refuse(rough && !a.drawing.wet, "--wet-roughness without a film, expected --wet above 0");
+  refuse(a.drawing.wet && (a.words.plain || a.style == "wireframe"),
+         "--wet with --plain or --style wireframe, which have no light on them, expected one of "
+         "them");
+  refuse(a.occlusion_radius && !(a.drawing.occlusion > 0),
+         "--occlusion-radius without --occlusion, expected both");
+  refuse(a.drawing.occlusion > 0 && a.style == "wireframe",
+         "--occlusion with --style wireframe, which has no surfaces, expected one of them");
+  refuse(a.drawing.wet && a.words.tbn == "vertex",
+         "--tbn vertex for --wet, expected pixel or auto");
+}
+
+WetFilm film_of(const RenderArguments& a, const RenderMaterial* own) {
+  WetFilm film;
+  film.amount = a.wet.value_or(0);
+  film.roughness = a.wet_roughness.value_or(film.roughness);
+  if (own != nullptr) {
+    film.amount = own->wet.value_or(film.amount);
+    film.roughness = own->wet_roughness.value_or(film.roughness);
+  }
+  return film;
+}
+
+} // namespace gewebe::cli

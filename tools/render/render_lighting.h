@@ -1,0 +1,18 @@
+#pragma once
+// How light falls on what emboss-render draws: films of water, what near surfaces hide.
+
+#include "shading/drawing.h"
+#include "shading/surface_material.h"
+#include "tools/render/render_arguments.h"
+#include "tools/shared/cli.h"
+
+namespace gewebe::cli {
+
+void declare_lighting(Program& program, RenderArguments& arguments);
+/// \throw UsageError
+void complete_lighting(RenderArguments& arguments);
+
+/// The film of a material that was given one of its own, or that of all.
+WetFilm film_of(const RenderArguments& arguments, const RenderMaterial* own);
+
+} // namespace gewebe::cli
