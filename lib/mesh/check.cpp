@@ -1,98 +1,23 @@
 #include "mesh/check.h"
 
-#include "base/disjoint_sets.h"
+#include "base/joint_sets.h"
+#include "base/parallel.h"
 #include "mesh/edges.h"
-#include "mesh/repeated_faces.h"
+#include "mesh/face_figures.h"
+#include "mesh/fans.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
 namespace {
 
-/// Examines all edges, joins the corners of faces that meet at an edge (corner 3 f + n).
-void examine_edges(const TriangleMesh& mesh, DisjointSets& corners, MeshReport& report) {
-  report.edge_min = HUGE_VAL;
-  double length_sum = 0;
-  const EdgeSides sides(mesh.points.size(), mesh.triangles);
-  sides.for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
-    ++report.edges;
-    const double length = norm(mesh.points[edge[0].high()] - mesh.points[low]);
-    length_sum += length;
-    report.edge_min = std::fmin(report.edge_min, length);
-    report.edge_max = std::fmax(report.edge_max, length);
-    report.boundary_edges += edge.size() == 1 ? 1 : 0;
-    report.nonmanifold_edges += edge.size() > 2 ? 1 : 0;
-    report.misoriented_edges += edge.size() == 2 && surplus(edge) != 0 ? 1 : 0;
-    for (const EdgeSide& other : edge.subspan(1)) {
-      corners.join(edge[0].low_corner(), other.low_corner());
-      corners.join(edge[0].high_corner(), other.high_corner());
-    }
-  });
-  report.edge_mean = report.edges > 0 ? length_sum / static_cast<double>(report.edges) : 0;
-  if (report.edges == 0)
-    report.edge_min = 0;
-}
-
-/// Points whose corners fall into more than one set, and points in no face.
-void examine_points(const TriangleMesh& mesh, DisjointSets& corners, MeshReport& report) {
-  constexpr std::uint32_t unseen = UINT32_MAX, split = UINT32_MAX - 1;
-  std::vector<std::uint32_t> fan(mesh.points.size(), unseen);
-  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    const Triangle& t = mesh.triangles[f];
-    if (has_equal_corners(t))
-      continue;
-    for (std::uint32_t n = 0; n < 3; ++n) {
-      std::uint32_t& seen = fan[t[n]];
-      const std::uint32_t root = corners.find(3 * f + n);
-      if (seen == unseen) {
-        seen = root;
-      } else if (seen != split && seen != root) {
-        seen = split;
-        ++report.nonmanifold_points;
-      }
-    }
-  }
-  report.unused_points = static_cast<std::uint64_t>(std::ranges::count(fan, unseen));
-}
-
-void count_duplicates(const TriangleMesh& mesh, MeshReport& report) {
-  const std::vector<bool> repeated =
-      repeated_faces(mesh.points.size(), mesh.triangles, SameFace::corners);
-  for (std::size_t f = 0; f < repeated.size(); ++f)
-    report.duplicate_faces += repeated[f] && !has_equal_corners(mesh.triangles[f]) ? 1 : 0;
-}
-
-void examine_shapes(const TriangleMesh& mesh, MeshReport& report) {
-  double largest_cosine = -1; // of the smallest angle
-  for (const Triangle& t : mesh.triangles) {
-    if (has_equal_corners(t)) {
-      ++report.degenerate_faces;
-      continue;
-    }
-    const Vec3& a = mesh.points[t[0]];
-    const Vec3 u = mesh.points[t[1]] - a, v = mesh.points[t[2]] - a, w = v - u;
-    const double uu = dot(u, u), vv = dot(v, v), ww = dot(w, w);
-    const double twice_area = norm(cross(u, v));
-    report.area += twice_area / 2;
-    if (!(twice_area > 2e-12 * std::fmax(uu, std::fmax(vv, ww)))) {
-      ++report.zero_area_faces;
-      largest_cosine = 1;
-      continue;
-    }
-    // The smallest angle lies between the two longer sides.
-    const double shortest = std::fmin(uu, std::fmin(vv, ww));
-    const double cosine = shortest == ww   ? dot(u, v) / std::sqrt(uu * vv)
-                          : shortest == uu ? dot(v, w) / std::sqrt(vv * ww)
-                                           : -dot(u, w) / std::sqrt(uu * ww);
-    largest_cosine = std::fmax(largest_cosine, std::fmin(cosine, 1));
-  }
-  report.smallest_angle = std::acos(largest_cosine) * 57.295779513082320877;
-}
+constexpr std::size_t grain = 1 << 15;
 
 struct Component {
   double volume = 0;
@@ -126,62 +51,99 @@ bool ray_meets(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   return normal.z != 0 && dot(normal, a - p) / normal.z > 0;
 }
 
-void find_wrapped(const TriangleMesh& mesh, DisjointSets& connected,
-                  std::vector<Component>& components) {
+void find_wrapped(const TriangleMesh& mesh, const std::vector<std::uint32_t>& component_of,
+                  std::vector<Component>& components, const Context& context) {
   if (components.size() < 2)
     return;
   std::vector<std::size_t> by_x(components.size());
   std::iota(by_x.begin(), by_x.end(), std::size_t{0});
-  std::ranges::sort(by_x, {}, [&](std::size_t n) { return components[n].probe.x; });
-  for (const Triangle& t : mesh.triangles) {
-    if (has_equal_corners(t))
-      continue;
-    const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
-    const double low = std::fmin(a.x, std::fmin(b.x, c.x)),
-                 high = std::fmax(a.x, std::fmax(b.x, c.x));
-    const auto probe_x = [&](std::size_t n) { return components[n].probe.x; };
-    const std::uint32_t root = connected.find(t[0]);
-    for (auto n = std::ranges::lower_bound(by_x, low, {}, probe_x);
-         n != by_x.end() && probe_x(*n) <= high; ++n) {
-      Component& component = components[*n];
-      if (component.root != root && ray_meets(a, b, c, component.probe))
-        component.wrapped = !component.wrapped;
+  const auto probe_x = [&](std::size_t n) { return components[n].probe.x; };
+  std::ranges::sort(by_x, {}, probe_x);
+  const auto between = [&](double low, double high) { // probes
+    const auto first = std::ranges::lower_bound(by_x, low, {}, probe_x);
+    auto stop = first;
+    while (stop != by_x.end() && probe_x(*stop) <= high)
+      ++stop;
+    return std::span<const std::size_t>(first, stop);
+  };
+  constexpr std::size_t few = 64; // faces that may lie beside all probes
+  std::vector<std::vector<std::size_t>> met((mesh.triangles.size() + grain - 1) / grain);
+  parallel_blocks(context, mesh.triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t first = begin; first < end; first += few) {
+      const std::size_t stop = std::min(end, first + few);
+      double low = HUGE_VAL, high = -HUGE_VAL;
+      for (std::size_t f = first; f < stop; ++f)
+        for (const std::uint32_t p : mesh.triangles[f]) {
+          low = std::min(low, mesh.points[p].x);
+          high = std::max(high, mesh.points[p].x);
+        }
+      if (between(low, high).empty())
+        continue;
+      for (std::size_t f = first; f < stop; ++f) {
+        const Triangle& t = mesh.triangles[f];
+        if (has_equal_corners(t))
+          continue;
+        const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+        for (const std::size_t n :
+             between(std::min(a.x, std::min(b.x, c.x)), std::max(a.x, std::max(b.x, c.x))))
+          if (components[n].root != component_of[t[0]] && ray_meets(a, b, c, components[n].probe))
+            met[begin / grain].push_back(n);
+      }
     }
-  }
+  });
+  for (const std::vector<std::size_t>& some : met)
+    for (const std::size_t n : some)
+      components[n].wrapped = !components[n].wrapped;
 }
 
-void examine_components(const TriangleMesh& mesh, MeshReport& report) {
-  DisjointSets connected(mesh.points.size());
-  for (const Triangle& t : mesh.triangles)
-    if (!has_equal_corners(t)) {
-      connected.join(t[0], t[1]);
-      connected.join(t[1], t[2]);
+/// For each point the first of the points that faces connect it to.
+std::vector<std::uint32_t> connected(const TriangleMesh& mesh, std::vector<std::uint32_t> joined_to,
+                                     const Context& context) {
+  JointSets sets(std::move(joined_to));
+  sets.flatten(context); // now most faces join nothing
+  parallel_blocks(context, mesh.triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) {
+      const Triangle& t = mesh.triangles[f];
+      if (has_equal_corners(t))
+        continue;
+      sets.join(t[0], t[1]);
+      sets.join(t[1], t[2]);
     }
-  std::vector<std::size_t> number(mesh.points.size(), SIZE_MAX); // by root
+  });
+  return std::move(sets).smallest(context);
+}
+
+void examine_components(const TriangleMesh& mesh, const FaceFigures& faces,
+                        const std::vector<std::uint32_t>& component_of, const Context& context,
+                        MeshReport& report) {
+  constexpr std::uint32_t none = UINT32_MAX;
+  std::vector<std::uint32_t> number(mesh.points.size(), none); // by root
   std::vector<Component> components;
-  for (const Triangle& t : mesh.triangles) {
-    if (has_equal_corners(t))
-      continue;
-    const std::uint32_t root = connected.find(t[0]);
-    if (number[root] == SIZE_MAX) {
-      number[root] = components.size();
+  std::vector<std::uint32_t> largest; // face of each
+  for (const FaceFigures::Run& one : faces.runs) {
+    if (number[one.component] == none) {
+      number[one.component] = static_cast<std::uint32_t>(components.size());
       components.push_back({});
-      components.back().root = root;
+      components.back().root = one.component;
+      largest.push_back(one.largest);
     }
-    Component& component = components[number[root]];
-    const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
-    const Vec3 normal = cross(b - a, c - a);
-    if (dot(normal, normal) > component.largest) {
-      component.largest = dot(normal, normal);
-      // The step keeps apart shells that touch there: normal / sqrt|normal| has the face's size.
-      component.probe = (a + b + c) / 3;
-      if (component.largest > 0)
-        component.probe -= normal * (1e-6 / std::sqrt(std::sqrt(component.largest)));
+    const std::uint32_t n = number[one.component];
+    components[n].volume += one.six_volumes / 6;
+    if (one.square > components[n].largest) {
+      components[n].largest = one.square;
+      largest[n] = one.largest;
     }
-    const Vec3& origin = mesh.points[root];
-    component.volume += dot(a - origin, cross(b - origin, c - origin)) / 6;
   }
-  find_wrapped(mesh, connected, components);
+  for (std::size_t n = 0; n < components.size(); ++n) {
+    const Triangle& t = mesh.triangles[largest[n]];
+    const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+    // The step keeps apart shells that touch there: normal / sqrt|normal| has the face's size.
+    components[n].probe = (a + b + c) / 3;
+    if (components[n].largest > 0)
+      components[n].probe -=
+          cross(b - a, c - a) * (1e-6 / std::sqrt(std::sqrt(components[n].largest)));
+  }
+  find_wrapped(mesh, component_of, components, context);
   report.components = components.size();
   for (const Component& component : components) {
     report.volume += component.volume;
@@ -192,19 +154,35 @@ void examine_components(const TriangleMesh& mesh, MeshReport& report) {
 
 } // namespace
 
-MeshReport examine_mesh(const TriangleMesh& mesh) {
+MeshReport examine_mesh(const TriangleMesh& mesh, const Context& context, MeshQuality* quality) {
+  Context quiet = context;
+  quiet.progress = nullptr; // that of parts means nothing
   MeshReport report;
   report.points = mesh.points.size();
   report.triangles = mesh.triangles.size();
-  DisjointSets corners(3 * mesh.triangles.size());
-  examine_edges(mesh, corners, report);
-  examine_points(mesh, corners, report);
-  count_duplicates(mesh, report);
-  examine_shapes(mesh, report);
-  examine_components(mesh, report);
+  FanFigures fans = examine_fans(mesh, quiet);
+  report.unused_points = fans.unused_points;
+  report.nonmanifold_points = fans.nonmanifold_points;
+  report.duplicate_faces = fans.duplicate_faces;
+  report.edges = fans.edges;
+  report.boundary_edges = fans.boundary_edges;
+  report.nonmanifold_edges = fans.nonmanifold_edges;
+  report.misoriented_edges = fans.misoriented_edges;
+  report.edge_min = fans.edge_min;
+  report.edge_mean = fans.edges > 0 ? fans.length_sum / static_cast<double>(fans.edges) : 0;
+  report.edge_max = fans.edge_max;
+  const std::vector<std::uint32_t> component_of = connected(mesh, std::move(fans.joined_to), quiet);
+  const FaceFigures faces = examine_faces(mesh, component_of, quiet);
+  report.degenerate_faces = faces.degenerate;
+  report.zero_area_faces = faces.zero_area;
+  report.area = faces.area;
+  report.smallest_angle = faces.smallest_angle;
+  examine_components(mesh, faces, component_of, quiet, report);
   report.euler = static_cast<std::int64_t>(report.points - report.unused_points) -
                  static_cast<std::int64_t>(report.edges) +
                  static_cast<std::int64_t>(report.triangles - report.degenerate_faces);
+  if (quality != nullptr)
+    *quality = quality_of(faces, fans, quiet);
   return report;
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 // What can be said about a triangle mesh: is it closed, manifold, oriented, and how well shaped.
 
+#include "base/context.h"
 #include "base/mesh.h"
+#include "mesh/quality.h"
 
 #include <cstdint>
 
@@ -41,10 +43,14 @@ struct MeshReport {
   bool outward() const { return closed() && oriented() && inverted_components == 0; }
 };
 
-/// Examines a mesh. Time and memory grow with points and faces (sorting inside each point's list).
+/// Examines a mesh, and its quality where that is asked for, in two passes over what is in cache:
+/// round the points, and over the faces. Time and memory grow with points and faces (sorting inside
+/// a point's list). The same figures for any number of threads.
 /// Whether a component lies in another is decided by the parity of the crossings along +z from its
 /// largest face; of shells that touch each other there the answer may be either.
 /// \pre check_mesh(mesh) passes: indices in range, coordinates finite
-MeshReport examine_mesh(const TriangleMesh& mesh);
+/// \throw Error if there are more than 2^32 / 3 triangles; Cancelled
+MeshReport examine_mesh(const TriangleMesh& mesh, const Context& context = {},
+                        MeshQuality* quality = nullptr);
 
 } // namespace gewebe

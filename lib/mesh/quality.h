@@ -2,19 +2,12 @@
 // How well a mesh is shaped for computing on it: angles, lengths, areas, and the time step that its
 // springs allow.
 
+#include "base/context.h"
 #include "base/mesh.h"
-
-#include <cstdint>
-#include <vector>
+#include "mesh/face_figures.h"
+#include "mesh/fans.h"
 
 namespace gewebe {
-
-/// Counts of values in equal bins over [0, top]; a value at a border counts above it, one at the
-/// top in the last bin.
-struct Histogram {
-  double top = 0;
-  std::vector<std::uint64_t> counts;
-};
 
 struct MeshQuality {
   Histogram smallest_angles; ///< of each face, degrees: 12 bins of 5
@@ -33,7 +26,10 @@ struct MeshQuality {
   double explicit_step = 0;
 };
 
-/// \pre check_mesh(mesh) passes. Faces with equal corners are left out.
-MeshQuality mesh_quality(const TriangleMesh& mesh);
+/// Of what was found of the faces and round the points. \throw Cancelled
+MeshQuality quality_of(const FaceFigures& faces, const FanFigures& fans, const Context& context);
+
+/// What examine_mesh (mesh/check.h) finds, faces with equal corners left out. \pre, \throw as there
+MeshQuality mesh_quality(const TriangleMesh& mesh, const Context& context = {});
 
 } // namespace gewebe

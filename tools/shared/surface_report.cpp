@@ -39,7 +39,8 @@ void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
 
 void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections) {
   Stats& stats = run.stats();
-  const MeshReport report = examine_mesh(mesh);
+  MeshQuality quality;
+  const MeshReport report = examine_mesh(mesh, run.context(), &quality);
   stats.set("closed", report.closed());
   stats.set("manifold", report.manifold());
   stats.set("oriented", report.oriented());
@@ -50,7 +51,6 @@ void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections)
   stats.set("area", report.area);
   stats.set("zero_area_faces", report.zero_area_faces);
   stats.set("smallest_angle", report.smallest_angle);
-  const MeshQuality quality = mesh_quality(mesh);
   stats.set("angle_1_percent", quality.angle_1_percent);
   stats.set("angle_5_percent", quality.angle_5_percent);
   stats.set("angle_median", quality.angle_median);
