@@ -471,6 +471,7 @@ void GlRenderer::set_light(const Drawing& drawing) {
   Drawing& light = state_->light;
   light.light = drawing.light;
   light.directional = drawing.directional;
+  light.full_distance = drawing.full_distance;
   light.offset = drawing.offset;
   light.camera = drawing.camera;
 }

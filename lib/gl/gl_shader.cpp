@@ -58,21 +58,22 @@ vec3 unit(vec3 v) {
   return l > 0.0 ? v / l : vec3(0.0);
 }
 #ifdef FILM
-uniform vec3 film, mirrored_color; // amount, a², F0
+uniform vec4 film; // amount, a², F0, where the light is full
+uniform vec3 mirrored_color;
 float mirrored_share(float cosine) {
   return film.z + (1.0 - film.z) * pow(1.0 - min(cosine, 1.0), 5.0);
 }
 float smith(float x) {
   return x + sqrt(film.y + (1.0 - film.y) * x * x);
 }
-vec3 wet(vec3 c, vec3 n, vec3 v, vec3 l, float twice_relief) {
+vec3 wet(vec3 c, vec3 n, vec3 v, vec3 l, float twice_relief, float left) {
   n = dot(n, v) < 0.0 ? -n : n;
   n = unit(n + (twice_relief - 1.0) * unit(l - n * dot(l, n)));
   vec3 h = unit(v + l);
   float nv = max(dot(n, v), 0.0), nl = max(dot(n, l), 0.0), nh = max(dot(n, h), 0.0);
   float spread = nh * nh * (film.y - 1.0) + 1.0;
   float light_mirrored =
-      film.y * mirrored_share(max(dot(v, h), 0.0)) * nl / (spread * spread * smith(nl) * smith(nv));
+      film.y * mirrored_share(max(dot(v, h), 0.0)) * nl * left / (spread * spread * smith(nl) * smith(nv));
   return min(c + film.x * (mirrored_share(nv) * (mirrored_color - c) + light_mirrored), 1.0);
 }
 #endif
@@ -139,7 +140,8 @@ void main() {
 #endif
   c = min(2.0 * relief * c, 1.0);
 #ifdef FILM
-  c = wet(c, n, unit(eye - place), light.w > 0.0 ? unit(light.xyz - place) : light.xyz, 2.0 * relief);
+  c = wet(c, n, unit(eye - place), light.w > 0.0 ? unit(light.xyz - place) : light.xyz, 2.0 * relief,
+          film.w > 0.0 ? min(film.w / length(light.xyz - place), 1.0) : 1.0);
 #endif
   gl_FragColor = vec4(c, 1.0);
 })";
@@ -224,7 +226,9 @@ void GlShader::use(const Drawing& drawing, const SurfaceMaterial& material,
   set(program_, "up", drawing.camera.up);
   set(program_, "back", drawing.camera.back);
   const double alpha = material.film.roughness * material.film.roughness;
-  set(program_, "film", {material.film.amount, alpha * alpha, material.film.reflectance});
+  glUniform4f(glGetUniformLocation(program_, "film"), static_cast<float>(material.film.amount),
+              static_cast<float>(alpha * alpha), static_cast<float>(material.film.reflectance),
+              static_cast<float>(drawing.full_distance));
   set(program_, "mirrored_color", surroundings);
   if (is_at_rest(material))
     set_rest(program_, material, drawing);

@@ -341,7 +341,7 @@ struct MaterialScene {
   MaterialScene(const Drawing& drawing, const Viewport& viewport, const SurfaceMaterial& material)
       : textures(material), scene(scene_of(drawing, viewport, material, textures, rest)) {}
   /// What the film of its triangles mirrors.
-  void cover(const WetFilm& of, const Vec3& surroundings) {
+  void cover(const WetFilm& of, const Vec3& surroundings, double full_distance) {
     if (!(of.amount > 0))
       return;
     if (scene.frames == nullptr)
@@ -351,6 +351,7 @@ struct MaterialScene {
     film.alpha2 = static_cast<float>(alpha * alpha);
     film.reflectance = static_cast<float>(of.reflectance);
     set(film.mirrored, surroundings);
+    film.full_distance = static_cast<float>(full_distance);
     scene.film = &film;
   }
   Textures textures;
@@ -371,7 +372,7 @@ std::list<MaterialScene> scenes_of(const Drawing& drawing, const Viewport& viewp
     const SurfaceMaterial& own = material_of_group(material, g);
     MaterialScene& made = scenes.emplace_back(drawing, viewport, own);
     if (!group.empty())
-      made.cover(own.film, material.background);
+      made.cover(own.film, material.background, drawing.full_distance);
     KernelScene& scene = made.scene;
     scene.first = static_cast<std::uint32_t>(group.data() - drawing.triangles.data());
     scene.count = static_cast<std::uint32_t>(group.size());

@@ -30,8 +30,12 @@ inline void wet(const KernelScene& scene, const Slots& slots, std::size_t at, Fl
   const Floats a2 = splat(film.alpha2), f0 = splat(film.reflectance);
   const auto smith = [&](Floats x) { return x + root(a2 + (one - a2) * x * x); };
   const Floats spread = nh * nh * (a2 - one) + one;
-  const Floats light_mirrored =
+  Floats light_mirrored =
       a2 * mirrored_share(f0, vh) * nl / (spread * spread * smith(nl) * smith(nv));
+  if (film.full_distance > 0) {
+    const Vector to = minus(splat(scene.light), place);
+    light_mirrored *= smaller(splat(film.full_distance) * inverse_or_zero(root(dot(to, to))), one);
+  }
   const Floats share = mirrored_share(f0, nv), amount = splat(film.amount);
   for (int n = 0; n < 3; ++n)
     color.c[n] = smaller(

@@ -47,6 +47,7 @@ struct KernelRest {
 struct KernelFilm {
   float amount, alpha2, reflectance; ///< w, a², F0
   float mirrored[3];                 ///< b
+  float full_distance;               ///< of the light, see light_left(); 0: it doesn't fall off
 };
 
 /// What shading needs of the triangles from `first` on; others have another material. Vertices are

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "shading/endoscope.h"
 #include "shading/occlusion.h"
 #include "shading/tangents.h"
 
@@ -137,6 +138,8 @@ void append(Drawing& drawing, const Surface& surface, const DrawingParts& parts,
         out.shade =
             static_cast<float>(1 - options.shade + options.shade * std::min(lit / brightest, 1.0));
       }
+      if (options.full_distance > 0)
+        out.shade *= static_cast<float>(light_left(options.full_distance, norm(options.light - p)));
       if (!parts.openness.empty())
         out.shade *= static_cast<float>(1 - options.occlusion *
                                                 (1 - double{parts.openness[vertices.point[v]]}));
@@ -202,8 +205,10 @@ void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOpt
   group_of.reserve(drawing.triangles.size());
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
     const TriangleMesh& mesh = surfaces[s].mesh;
-    if (surfaces[s].instrument) {
-      group_of.insert(group_of.end(), mesh.triangles.size(), options.groups.size() + 1);
+    if (surfaces[s].instrument || surfaces[s].inside) {
+      const bool behind = surfaces[s].instrument && options.insides;
+      group_of.insert(group_of.end(), mesh.triangles.size(),
+                      options.groups.size() + (behind ? 2 : 1));
       continue;
     }
     const std::vector<std::int32_t>& numbers =
@@ -219,7 +224,8 @@ void group(Drawing& drawing, std::span<const Surface> surfaces, const DrawingOpt
                              : static_cast<std::size_t>(found - options.groups.begin()) + 1);
     }
   }
-  std::vector<std::size_t> next(options.groups.size() + (options.instruments ? 3 : 2));
+  std::vector<std::size_t> next(options.groups.size() + 2 + (options.insides ? 1 : 0) +
+                                (options.instruments ? 1 : 0));
   for (const std::size_t g : group_of)
     ++next[g + 1];
   for (std::size_t g = 1; g < next.size(); ++g)
@@ -235,6 +241,7 @@ void set_view(Drawing& drawing, const DrawingOptions& options) {
   drawing.directional = options.directional;
   drawing.light = options.directional ? direction_to(options.light, {})
                                       : (options.light - drawing.origin) / drawing.scale;
+  drawing.full_distance = options.full_distance / drawing.scale;
   drawing.offset = options.offset;
   drawing.camera = options.camera;
   drawing.camera.eye = (options.camera.eye - drawing.origin) / drawing.scale;
@@ -252,7 +259,8 @@ Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& op
 const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const DrawingOptions& options,
                                   DrawingChange change, const Context& context) {
   ++counts_.drawings;
-  if (change == DrawingChange::view && options.per_pixel && !(options.shade > 0)) {
+  if (change == DrawingChange::view && options.per_pixel && !(options.shade > 0) &&
+      !(options.full_distance > 0)) {
     set_view(drawing_, options); // nothing of it stands at vertices
     return drawing_;
   }
@@ -304,7 +312,7 @@ const Drawing& DrawingMaker::make(std::span<const Surface> surfaces, const Drawi
     if (!sorted)
       append_triangles(drawing, parts_[n].vertices);
   }
-  if (!sorted && (!options.groups.empty() || options.instruments))
+  if (!sorted && (!options.groups.empty() || options.insides || options.instruments))
     group(drawing, surfaces, options);
   drawing_ = std::move(drawing);
   return drawing_;

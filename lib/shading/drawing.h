@@ -53,6 +53,7 @@ struct Drawing {
   // What frames are used with, in coordinates of positions.
   Vec3 light; ///< place, or unit vector to it
   bool directional = false;
+  double full_distance = 0;       ///< of the light, 0: it doesn't fall off
   std::array<double, 2> offset{}; ///< of the structure
   Camera camera;                  ///< eye and axes
 };
@@ -68,6 +69,7 @@ struct Surface {
   std::vector<Vec3> rest;             ///< where its points were at rest; empty: where they are
   std::vector<std::string> materials; ///< names of its materials, where they are known
   bool instrument = false; ///< no tissue: of the group behind all others, without textures
+  bool inside = false;     ///< the other side of a surface: of the group behind those of tissue
 };
 
 /// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
@@ -92,12 +94,14 @@ struct DrawingOptions {
   bool directional = false;
   std::array<double, 2> offset{0.02, 0.02}; ///< length of the offset along s and t
   double shade = 0;                         ///< share of Lambert's law in the base colour, 0 … 1
-  double fill = 0;      ///< strength of a second, far light, from the camera's right, 0 … 1
-  double occlusion = 0; ///< share of the light that comes from all around, 0 … 1
+  double fill = 0;          ///< strength of a second, far light, from the camera's right, 0 … 1
+  double full_distance = 0; ///< of the light, mm, as light_left() has it; 0: it doesn't fall off
+  double occlusion = 0;     ///< share of the light that comes from all around, 0 … 1
   double occlusion_radius = 0; ///< mm, of openness()
   Camera camera;               ///< that sees the sphere maps and has the second light
   GroupBy group_by = GroupBy::material;
   std::vector<std::int32_t> groups; ///< numbers of the materials, … that are groups 1, 2, …
+  bool insides = false;     ///< insides have a group, after `groups`; else no surface is one
   bool instruments = false; ///< instruments have a group, the last one; else no surface is one
 };
 

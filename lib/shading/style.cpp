@@ -1,6 +1,10 @@
 #include "shading/style.h"
 
+#include "shading/tangents.h"
+
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
 namespace gewebe {
@@ -23,6 +27,63 @@ Surface faceted(const Surface& surface) {
     }
   }
   return out;
+}
+
+namespace {
+
+/// Takes the triangles of `front` that face away from the eye.
+Surface taken_inside(Surface& front, const Vec3& eye) {
+  Surface inside;
+  inside.inside = true;
+  TriangleMesh& mesh = front.mesh;
+  const std::vector<Vec3> normals = render_normals(mesh);
+  mesh.normals.clear();
+  for (const Vec3& n : normals) {
+    mesh.normals.push_back(
+        {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+    inside.mesh.normals.push_back(
+        {static_cast<float>(-n.x), static_cast<float>(-n.y), static_cast<float>(-n.z)});
+  }
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto [a, b, c] = mesh.triangles[t];
+    const Vec3& p = mesh.points[a];
+    if (dot(cross(mesh.points[b] - p, mesh.points[c] - p), eye - p) < 0) {
+      inside.mesh.triangles.push_back({a, c, b});
+      continue;
+    }
+    mesh.triangles[kept] = mesh.triangles[t];
+    if (!mesh.texcoords.empty())
+      mesh.texcoords[kept] = mesh.texcoords[t];
+    if (!mesh.part.empty())
+      mesh.part[kept] = mesh.part[t];
+    if (!mesh.material.empty())
+      mesh.material[kept] = mesh.material[t];
+    ++kept;
+  }
+  const auto shorten = [kept](auto& values) { values.resize(std::min(values.size(), kept)); };
+  shorten(mesh.triangles);
+  shorten(mesh.texcoords);
+  shorten(mesh.part);
+  shorten(mesh.material);
+  inside.mesh.points = mesh.points;
+  inside.rest = front.rest;
+  return inside;
+}
+
+} // namespace
+
+std::vector<Surface> two_sided(std::vector<Surface> surfaces, const Vec3& eye) {
+  std::vector<Surface> insides;
+  for (Surface& surface : surfaces) {
+    if (surface.instrument)
+      continue;
+    Surface inside = taken_inside(surface, eye);
+    if (!inside.mesh.triangles.empty())
+      insides.push_back(std::move(inside));
+  }
+  std::ranges::move(insides, std::back_inserter(surfaces));
+  return surfaces;
 }
 
 Surface wireframe(const Surface& surface, const Camera& camera, double pixels,

@@ -34,6 +34,7 @@ struct OracleScene {
   Vec3 background; ///< what it mirrors, of the first scene
   Vec3 color{1, 1, 1}, light;
   double offset = 0, shade = 0;
+  double full_distance = 0; ///< of the light; 0: it doesn't fall off
   bool directional = false; ///< `light` is a vector to it
   bool per_pixel = false;   ///< frames for each pixel, not offsets for each vertex
   bool mipmap = false;
@@ -168,11 +169,18 @@ private:
       frame.sphere = sphere_map(scene_.mesh.points[p], n);
       frame.ds = scene_.offset * dot(l, tangent);
       frame.dt = scene_.offset * dot(l, bitangent);
-      frame.shade = 1 - scene_.shade + scene_.shade * std::max(0.0, dot(l, n));
+      frame.shade = (1 - scene_.shade + scene_.shade * std::max(0.0, dot(l, n))) *
+                    left(scene_.mesh.points[p]);
     }
   }
 
   static Vec3 unit(const Vec3& v) { return norm(v) > 0 ? v / norm(v) : Vec3{}; }
+  double left(const Vec3& p) const {
+    const double distance = norm(scene_.light - p);
+    return scene_.full_distance == 0 || distance < scene_.full_distance
+               ? 1
+               : scene_.full_distance / distance;
+  }
   Vec3 to_light(const Vec3& p) const {
     return unit(scene_.directional ? scene_.light : scene_.light - p);
   }
@@ -372,6 +380,7 @@ private:
       const double density = a * a / (pi * std::pow(tilt * (a * a - 1) + 1, 2));
       mirrored = pi * density * fresnel(dot(v, h)) * shadowing(nl) / (2 * a);
     }
+    mirrored *= left(place);
     return test::smaller(color + film.amount * (fresnel(nv) * (around - color) + mirrored), 1.0);
   }
 

@@ -109,6 +109,7 @@ Image draw(const Case& c, const Mode& mode, Camera& camera, Vec3& light, double 
   options.directional = c.scene.directional;
   options.offset = {sign * c.scene.offset, sign * c.scene.offset};
   options.shade = c.scene.shade;
+  options.full_distance = c.scene.full_distance;
   options.camera = camera;
   PictureOptions picture;
   picture.backend = mode.backend;
@@ -353,6 +354,9 @@ TEST_P(RenderOracle, WetFilm) {
     return;
   }
   expect_equal(c, "wet");
+  c.scene.full_distance = 70;
+  expect_equal(c, "light that falls off");
+  c.scene.full_distance = 0;
   c.scene.directional = true;
   c.scene.light = {3, 1, 2};
   expect_equal(c, "light far away");

@@ -116,11 +116,14 @@ void complete_modes(RenderArguments& a) {
 void complete_light(RenderArguments& a) {
   const bool lines = a.style == "wireframe", plain = a.words.plain;
   a.drawing.shade = a.words.shade.value_or(plain || lines ? 0 : 0.75);
-  a.drawing.fill = a.words.fill.value_or(plain ? 0 : 0.35);
+  a.drawing.fill = a.words.fill.value_or(plain || a.endoscope ? 0 : 0.35);
   a.tissue_colors = !a.words.color && !plain && !lines;
   const double gray = lines && !plain ? 0.1 : 1;
   a.common.color = a.words.color.value_or(Vec3{gray, gray, gray});
-  a.common.background = a.words.background.value_or(plain ? Vec3{1, 1, 1} : Vec3{0.8, 0.8, 0.8});
+  constexpr Vec3 cavity{0.15, 0.05, 0.04};
+  a.common.background = a.words.background.value_or(plain         ? Vec3{1, 1, 1}
+                                                    : a.endoscope ? cavity
+                                                                  : Vec3{0.8, 0.8, 0.8});
   const bool smooth = plain || a.words.msaa != 1; // by other means, or not at all
   a.picture.supersample = static_cast<std::uint32_t>(a.words.supersample.value_or(smooth ? 1 : 2));
 }

@@ -49,6 +49,9 @@ struct RenderArguments {
   std::optional<Vec3> light;
   std::optional<double> wet, wet_roughness; ///< the film on all
   std::optional<double> occlusion_radius;   ///< mm
+  std::optional<Vec3> inside;               ///< colour of what is seen of surfaces from within
+  bool endoscope = false;                   ///< the light goes with the camera, the field is round
+  std::optional<double> reach;              ///< where its light is full, mm
   double offset = 0.02;
   std::optional<double> offset_texels; ///< of the structure instead
   std::string style = "textured";
@@ -72,7 +75,7 @@ struct RenderArguments {
     std::vector<double> orbit{0, 0};
     std::int64_t msaa = 1, rgb_scale = 2;
     std::optional<Vec3> light_direction, color, background;
-    std::optional<double> shade, fill;
+    std::optional<double> shade, fill, fov;
     std::vector<double> clip;                ///< point and normal
     std::optional<std::int64_t> supersample; ///< nothing: what is fit for a surface
     bool plain = false;

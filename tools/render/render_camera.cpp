@@ -1,5 +1,7 @@
 #include "tools/render/render_camera.h"
 
+#include "shading/endoscope.h"
+
 #include <cmath>
 #include <tuple>
 
@@ -24,7 +26,9 @@ void declare_camera(Program& p, RenderArguments& a) {
   p.option("--eye", a.camera.eye, "X,Y,Z", "place of the camera in mm");
   p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
   p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
-  p.option("--fov", a.camera.fov, "DEG", "angle across the shorter side").range(1, 170);
+  p.option("--fov", a.words.fov, "DEG",
+           "angle across the shorter side (default 30, --endoscope: 70)")
+      .range(1, 170);
   p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
   p.option("--supersample", a.words.supersample, "N",
            "a pixel is the mean of N x N samples (default 2; volumes, --msaa: 1)")
@@ -37,6 +41,7 @@ void complete_camera(RenderArguments& a) {
          "--eye with --view or --distance, expected one way to place the camera");
   if (!a.words.view.empty())
     a.camera.view = a.words.view;
+  a.camera.fov = a.words.fov.value_or(a.endoscope ? endoscope_fov : a.camera.fov);
   a.camera.azimuth = a.words.orbit[0];
   a.camera.elevation = a.words.orbit[1];
   refuse(!(std::abs(a.camera.azimuth) <= 3600 && std::abs(a.camera.elevation) <= 90),

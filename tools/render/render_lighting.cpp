@@ -1,6 +1,7 @@
 #include "tools/render/render_lighting.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace gewebe::cli {
 namespace {
@@ -32,6 +33,13 @@ void declare_lighting(Program& p, RenderArguments& a) {
   p.option("--occlusion-radius", a.occlusion_radius, "MM",
            "how near, else a quarter of the longest side")
       .positive();
+  p.option("--inside", a.inside, "R,G,B", "colour of surfaces seen from within, else that outside")
+      .range(0, 1);
+  p.flag("--endoscope", a.endoscope,
+         "light at the camera that falls off, a round field, wide angle");
+  p.option("--reach", a.reach, "MM",
+           "where an endoscope's light is full, else the target's distance")
+      .positive();
 }
 
 void complete_lighting(RenderArguments& a) {
@@ -47,8 +55,27 @@ void complete_lighting(RenderArguments& a) {
          "--occlusion-radius without --occlusion, expected both");
   refuse(a.drawing.occlusion > 0 && a.style == "wireframe",
          "--occlusion with --style wireframe, which has no surfaces, expected one of them");
+  refuse(a.inside && a.style == "wireframe",
+         "--inside with --style wireframe, which has no surfaces, expected one of them");
+  a.drawing.insides = a.inside.has_value();
+  refuse(a.reach && !a.endoscope, "--reach without --endoscope, expected both");
+  refuse(a.endoscope && (a.light || a.words.light_direction || a.turn_light),
+         "--endoscope with another light, expected no --light, --light-direction or --turn-light");
+  refuse(a.endoscope && (a.words.plain || a.style == "wireframe"),
+         "--endoscope with --plain or --style wireframe, which have no light on them, expected one "
+         "of them");
   refuse(a.drawing.wet && a.words.tbn == "vertex",
          "--tbn vertex for --wet, expected pixel or auto");
+}
+
+void add_inside_material(SurfaceMaterial& common, const RenderArguments& a) {
+  if (!a.inside)
+    return;
+  SurfaceMaterial own;
+  own.color = *a.inside;
+  own.background = common.background;
+  own.film = film_of(a, nullptr);
+  common.others.push_back(std::move(own));
 }
 
 WetFilm film_of(const RenderArguments& a, const RenderMaterial* own) {

@@ -1,5 +1,6 @@
 #pragma once
-// How light falls on what emboss-render draws: films of water, what near surfaces hide.
+// How light falls on what emboss-render draws: films of water, what near surfaces hide, an
+// endoscope.
 
 #include "shading/drawing.h"
 #include "shading/surface_material.h"
@@ -11,6 +12,9 @@ namespace gewebe::cli {
 void declare_lighting(Program& program, RenderArguments& arguments);
 /// \throw UsageError
 void complete_lighting(RenderArguments& arguments);
+
+/// Adds the group of what is seen from within behind those of tissue, if it has a colour.
+void add_inside_material(SurfaceMaterial& common, const RenderArguments& arguments);
 
 /// The film of a material that was given one of its own, or that of all.
 WetFilm film_of(const RenderArguments& arguments, const RenderMaterial* own);

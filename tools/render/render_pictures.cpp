@@ -1,6 +1,7 @@
 #include "tools/render/render_pictures.h"
 
 #include "shading/angles.h"
+#include "shading/endoscope.h"
 #include "shading/style.h"
 #include "tools/render/render_layer.h"
 #include "tools/render/render_lighting.h"
@@ -58,6 +59,8 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
   box_ = rest_box(surfaces);
   camera_ = camera_of(0);
   drawing_.light = a.light.value_or(default_light(*camera_));
+  if (a.endoscope)
+    drawing_.full_distance = a.reach.value_or(norm(camera_->eye - camera_->target));
   first_light_ = drawing_.light;
   drawing_.occlusion_radius = a.occlusion_radius.value_or(box_.longest_side() / 4);
   drawing_.offset = {a.offset, a.offset};
@@ -71,6 +74,7 @@ void Pictures::start(const std::vector<Surface>& surfaces) {
     drawing_.offset = {*a.offset_texels / material.structure->width(),
                        *a.offset_texels / material.structure->height()};
   tissue_.emplace(a, surfaces, material_, drawing_);
+  add_inside_material(material_, a);
   add_instrument_material(material_, a, drawing_);
   if (drawing_.rest)
     place_at_rest(material_, box_, a.mapping.edge);
@@ -94,6 +98,8 @@ bool Pictures::place(std::uint64_t number) {
   const Vec3 eye = drawing_.camera.eye, light = drawing_.light;
   camera_ = camera_of(number);
   drawing_.camera = *camera_;
+  if (a.endoscope)
+    drawing_.light = endoscope_light(*camera_);
   if (a.turn_light) {
     const double part = static_cast<double>(number) / static_cast<double>(*a.turn_light);
     drawing_.light = rotated_light(first_light_, *camera_, part, drawing_.directional);
@@ -108,6 +114,8 @@ std::vector<Surface> Pictures::styled(std::vector<Surface> surfaces) const {
     if (arguments_.style == "wireframe")
       surface = wireframe(surface, *camera_, 1.25, arguments_.picture.height);
   }
+  if (arguments_.inside)
+    surfaces = two_sided(std::move(surfaces), camera_->eye);
   return surfaces;
 }
 
@@ -129,7 +137,8 @@ std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool 
     return pictures_ > 1 && surfaces_.size() == surfaces.size() &&
            std::equal(surfaces_.begin(), surfaces_.end(), surfaces.begin(), same);
   };
-  if (arguments_.style != "textured") { // made of the points, and of the camera
+  if (arguments_.style != "textured" ||
+      arguments_.inside) { // made of the points, and of the camera
     const bool same =
         pictures_ > 1 && plain_.size() == surfaces.size() &&
         std::equal(surfaces.begin(), surfaces.end(), plain_.begin(),
@@ -191,6 +200,8 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
     }
     images.push_back(
         run_.timed("draw", [&] { return mode.painter->paint(*drawing, *camera_, &mode.report); }));
+    if (arguments_.endoscope)
+      look_through_endoscope(images.back(), *camera_);
     if (pictures_ == 1 && !mode.report.gl_failure.empty())
       run_.warn(mode.report.gl_failure + "; drawn without OpenGL (--backend cpu)");
   }

@@ -98,8 +98,9 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
          input, "--style, --compare, --backend gl or --msaa for a volume, expected none of them");
   refuse(a.light || a.words.shade || a.words.fill || a.words.plain, input,
          "a light, --shade, --fill or --plain for a volume, expected none");
-  refuse(a.drawing.wet || a.drawing.occlusion > 0, input,
-         "--wet or --occlusion for a volume, which has no surface, expected neither");
+  refuse(a.drawing.wet || a.drawing.occlusion > 0 || a.inside || a.endoscope, input,
+         "--wet, --occlusion, --inside or --endoscope for a volume, which has no surface, expected "
+         "none of them");
   refuse(a.reading.clip.has_value(), input,
          "--clip for a volume, expected a tetrahedral mesh (mc-opt --tets makes one)");
   refuse(!a.reading.unit.empty() || !a.reading.object.empty() || a.reading.frame ||
