@@ -140,6 +140,8 @@ public:
       object.displacement = add_shape(cut, model);
       object.shapes.push_back(
           shape_of(model, "/objects/" + object.name + "/cuts/" + number, frames_));
+      object.fields.reset();
+      object.shape_group = std::move(cut);
     });
   }
 
@@ -156,9 +158,12 @@ public:
         const std::vector<float> u = in_single(objects[i].displacement, "a displacement", " mm");
         to.displacement.append(std::span<const float>(u));
         if (const SolidFields* const fields = objects[i].fields) {
-          if (!to.fields)
-            to.fields.emplace(to.group.create_group("fields"), fields->node_stress.size(),
+          if (!to.fields) {
+            hdf5::Group& group = to.shape_group ? *to.shape_group : to.group;
+            to.fields.emplace(group.create_group("fields"), fields->node_stress.size(),
                               fields->element_stress.size(), frames_);
+            to.shapes.back().fields = frames_;
+          }
           to.fields->append(*fields);
         }
         const std::span<const NodeVector> forces = objects[i].forces;
@@ -193,6 +198,7 @@ private:
     std::uint64_t first = 0; ///< frame
     std::uint64_t nodes = 0, triangles = 0, tetrahedra = 0;
     bool quadratic = false;
+    std::optional<std::uint64_t> fields = std::nullopt; ///< the first frame with some
   };
   static Shape shape_of(const Model& model, const std::string& path, std::uint64_t first) {
     return {path,
@@ -207,7 +213,7 @@ private:
     hdf5::Group group;
     hdf5::Dataset displacement, frame, node, force;
     std::vector<Shape> shapes;
-    std::optional<hdf5::Group> cuts;
+    std::optional<hdf5::Group> cuts, shape_group; ///< and, of one that was cut, of its last shape
     std::optional<FieldSets> fields;
   };
 
@@ -231,6 +237,7 @@ private:
                         std::move(node),
                         std::move(force),
                         {shape_of(model, "/objects/" + name, first)},
+                        std::nullopt,
                         std::nullopt,
                         std::nullopt});
     return objects_.back();
@@ -364,13 +371,13 @@ private:
             xdmf_text_.attribute("displacement", "Vector", "Node",
                                  xdmf_text_.row(group + "/displacement", frame - shape.first,
                                                 end - shape.first, n + " 3"));
-    if (object.fields && frame >= object.fields->first) {
+    if (shape.fields && frame >= *shape.fields) {
       const auto field = [&](const char* name, const char* set, bool tensor, bool of_nodes) {
         const std::string count = of_nodes ? n : std::to_string(shape.tetrahedra);
         text += xdmf_text_.attribute(
             name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
-            xdmf_text_.row(group + "/fields/" + set, frame - object.fields->first,
-                           end - object.fields->first, tensor ? count + " 6" : count));
+            xdmf_text_.row(group + "/fields/" + set, frame - *shape.fields, end - *shape.fields,
+                           tensor ? count + " 6" : count));
       };
       field("stress", "stress", true, true);
       field("strain", "strain", true, true);

@@ -23,7 +23,7 @@ namespace gewebe {
 struct FrameObject {
   std::span<const double> displacement; ///< 3 n numbers
   std::span<const NodeVector> forces;   ///< at displaced nodes
-  /// Of a solid, where they are asked for: from one frame on in all; such an object doesn't change.
+  /// Of a solid, where they are asked for: from one frame on in all.
   const SolidFields* fields = nullptr;
 };
 

@@ -257,8 +257,11 @@ What parse_cut(Words& in) {
     const double size = norm(what.plane.normal);
     if (!(size > 0 && std::isfinite(size)))
       in.fail("a normal without direction");
-    if (!in.done())
+    what.along_faces = in.take("along=faces");
+    if (!what.along_faces && !in.done()) {
       c.nodes = in.nodes();
+      what.along_faces = in.take("along=faces");
+    }
     c.change = CutObject{0, what};
   } else if (kind == "springs") {
     c.nodes = in.nodes();
@@ -317,8 +320,9 @@ const std::array<Verb, 27>& verbs() {
        parse_move},
       {"grasp", "grasp NAME NODES INSTRUMENT", true, parse_grasp},
       {"withdraw", "withdraw NAME", true, parse_withdraw},
-      {"cut", "cut NAME springs NODES [NODES] or cut NAME plane px py pz nx ny nz [NODES]", true,
-       parse_cut},
+      {"cut",
+       "cut NAME springs NODES [NODES] or cut NAME plane px py pz nx ny nz [NODES] [along=faces]",
+       true, parse_cut},
       {"tear", "tear NAME STRAIN, 0 or more", true, parse_tear},
       {"restore", "restore NAME", true, parse_restore},
       {"gravity", "gravity gx gy gz", true, parse_gravity},

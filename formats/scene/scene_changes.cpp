@@ -43,7 +43,8 @@ struct Names {
     c.object = find_object(simulation, said.object);
     if (auto* const plane = std::get_if<PlaneToCut>(&c.what)) {
       if (said.nodes)
-        plane->nodes = nodes(c.object, *said.nodes);
+        plane->nodes = // those inside a solid too
+            select_nodes(simulation.model(c.object), *said.nodes, lists, SelectorScope::body);
       return;
     }
     auto& springs = std::get<SpringsToCut>(c.what);

@@ -16,6 +16,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -46,14 +47,27 @@ struct CutModel {
   /// In `place`: a node that is no longer in the model.
   static constexpr std::uint32_t gone = std::numeric_limits<std::uint32_t>::max();
 
+  /// A node of a cut solid that stands where none did: what nodes before had is its to these
+  /// shares.
+  struct Between {
+    std::uint32_t node = 0;
+    std::vector<std::pair<std::uint32_t, double>> of; ///< nodes before, sum 1
+
+    bool operator==(const Between&) const = default;
+  };
+
   Model model;
-  std::vector<std::uint32_t> origin; ///< by node: the node before that it is, or is a copy of
-  std::vector<std::uint32_t> place;  ///< by node before: its number now, or gone
-  std::vector<double> share;         ///< by node: its part of what the node before had, sums 1
-  Cut left;                ///< edges asked for that did not come apart yet, of the new model
-  std::size_t doubled = 0; ///< copies
-  std::size_t removed = 0; ///< springs of which nothing is left
-  std::size_t split = 0;   ///< springs that have become several
+  /// By node: the node before that it is, or is a copy of; of a node between others the one with
+  /// the largest share.
+  std::vector<std::uint32_t> origin;
+  std::vector<std::uint32_t> place; ///< by node before: its number now, or gone
+  /// By node: its part of what the node before had, sums 1; 0 of one that was put between others.
+  std::vector<double> share;
+  std::vector<Between> between; ///< ascending: new ones, and those that have been moved
+  Cut left;                     ///< edges asked for that did not come apart yet, of the new model
+  std::size_t doubled = 0;      ///< copies
+  std::size_t removed = 0;      ///< springs of which nothing is left
+  std::size_t split = 0;        ///< springs that have become several
 
   bool changed() const { return doubled > 0 || removed > 0; }
 };
@@ -86,10 +100,11 @@ struct FreeParts {
   std::vector<ModelPart> parts;  ///< by smallest node
 };
 
-/// Parts of a cut model, connected by springs and triangles, that hung together with more before
-/// and now have no node that the model holds along any axis. Where there is none that is held, the
-/// part with the most nodes stays (ties: the one with the smallest node). Central nodes that no
-/// spring holds any more and that can move, or to which no node belongs, are left out.
+/// Parts of a cut model, connected by springs, triangles and tetrahedra, that hung together with
+/// more before and now have no node that the model holds along any axis. Where there is none that
+/// is held, the part with the most nodes stays (ties: the one with the smallest node). Central
+/// nodes that no spring holds any more and that can move, or to which no node belongs, are left
+/// out. \pre neither has a skin
 FreeParts free_parts(const Model& before, const CutModel& cut);
 
 /// The cut model without the parts that came off, as one step from the model before.

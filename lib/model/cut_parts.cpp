@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t none = CutModel::gone;
 
-/// The set of each node, connected by springs and triangles; returns how many.
+/// The set of each node, connected by springs, triangles and tetrahedra; returns how many.
 std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
   DisjointSets sets(model.nodes.size());
   for (const Spring& s : model.springs)
@@ -22,14 +22,20 @@ std::uint32_t connected(const Model& model, std::vector<std::uint32_t>& set) {
     sets.join(t[0], t[1]);
     sets.join(t[0], t[2]);
   }
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (std::size_t k = 1; k < 4; ++k)
+      sets.join(t[0], t[k]);
+  for (std::size_t t = 0; t < model.middles.size(); ++t)
+    for (const std::uint32_t middle : model.middles[t])
+      sets.join(model.tetrahedra[t][0], middle);
   return sets.number(set);
 }
 
 /// The nodes with that mark. A central node to which none of them belongs is left out.
 ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, std::uint32_t value) {
-  const std::size_t surface = surface_count(model);
+  const std::size_t body = body_count(model);
   std::vector<bool> named(model.nodes.size());
-  for (std::size_t i = 0; i < surface; ++i)
+  for (std::size_t i = 0; i < body; ++i)
     if (mark[i] == value && model.nodes[i].central >= 0)
       named[static_cast<std::size_t>(model.nodes[i].central)] = true;
   std::vector<std::uint32_t> place(model.nodes.size(), none);
@@ -38,7 +44,7 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
   m.name = model.name;
   m.materials = model.materials;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (mark[i] == value && (i < surface || named[i])) {
+    if (mark[i] == value && (i < body || named[i])) {
       place[i] = static_cast<std::uint32_t>(part.origin.size());
       part.origin.push_back(i);
     }
@@ -65,6 +71,19 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
     if (!model.texcoords.empty())
       m.texcoords.push_back(model.texcoords[k]);
   }
+  const auto placed = [&](auto nodes) {
+    for (std::uint32_t& node : nodes)
+      node = place[node];
+    return nodes;
+  };
+  for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
+    if (place[model.tetrahedra[t][0]] == none)
+      continue;
+    m.tetrahedra.push_back(placed(model.tetrahedra[t]));
+    m.tetrahedron_material.push_back(model.tetrahedron_material[t]);
+    if (!model.middles.empty())
+      m.middles.push_back(placed(model.middles[t]));
+  }
   return part;
 }
 
@@ -72,21 +91,21 @@ ModelPart part_of(const Model& model, const std::vector<std::uint32_t>& mark, st
 
 FreeParts free_parts(const Model& before, const CutModel& cut) {
   const Model& model = cut.model;
-  const std::size_t surface = surface_count(model);
+  const std::size_t body = body_count(model);
   std::vector<std::uint32_t> old_set, set;
   const std::uint32_t count = connected(model, set);
   if (count == 1)
     return {};
   const std::uint32_t olds = connected(before, old_set);
   struct Group {
-    std::uint32_t old = none, nodes = 0; // of the surface
+    std::uint32_t old = none, nodes = 0; // no central ones
     bool held = false, stays = false;
   };
   std::vector<Group> groups(count);
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     Group& g = groups[set[i]];
     g.held = g.held || model.nodes[i].fixed != fixed_none;
-    if (i >= surface)
+    if (i >= body)
       continue;
     g.old = old_set[cut.origin[i]];
     ++g.nodes;
@@ -140,6 +159,11 @@ CutModel without_parts(CutModel cut, std::optional<ModelPart> rest) {
     origin.push_back(cut.origin[i]);
     share.push_back(cut.share[i]);
   }
+  std::vector<CutModel::Between> between;
+  for (CutModel::Between& b : cut.between)
+    if (place[b.node] != none)
+      between.push_back({place[b.node], std::move(b.of)});
+  cut.between = std::move(between);
   // Edges that wait to come apart keep their triangles' numbers only if none is gone.
   Cut left;
   for (const auto& [i, j] : cut.left.edges)

@@ -122,6 +122,7 @@ struct SpringsToCut {
 struct PlaneToCut {
   CutPlane plane;
   std::optional<std::vector<std::uint32_t>> nodes;
+  bool along_faces = false; ///< of a solid: no tetrahedron is cut through
 };
 struct CutObject {
   std::size_t object = 0;

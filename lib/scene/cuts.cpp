@@ -3,12 +3,15 @@
 #include "base/vector_at.h"
 #include "cutting/cut_stiffness.h"
 #include "scene/rules_internal.h"
+#include "solid/solid_model.h"
+#include "solid/solid_place.h"
 #include "solve/condition.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -20,22 +23,12 @@ namespace {
 
 constexpr double largest_turn = 0.1; ///< between two edges of a swept area, about its angle
 
-/// An Error of a cut, with the object's name.
-template <class Work>
-auto of_object(const std::string& name, Work&& work) {
-  try {
-    return work();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error("object " + name + ": " + error.what());
-  }
-}
-
 /// The stiffness of an elastostatic object, to follow its cuts; nothing: no solution was asked of
 /// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
 /// back.
 CutStiffness* stiffness_of(World& w, Object& object) {
+  if (is_solid(object))
+    return nullptr;
   if (object.statics->stiffness || (!object.statics->solver && !has_moved(w, object)))
     return object.statics->stiffness.get();
   object.statics->ahead = true;
@@ -70,12 +63,6 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
   }
 }
 
-/// Whether it is known and its second stage can follow; who says otherwise is warned once.
-bool may_cut(World& w, Object& object) {
-  const bool feels_it = feels(w, object, Feature::blade);
-  return object.matter->known && feels_it;
-}
-
 /// Where all nodes of a cut object go.
 Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const FreeParts& free) {
   Moves moves;
@@ -86,7 +73,13 @@ Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const Fre
   ways.reserve(cut.origin.size());
   const auto add = [&](std::size_t object, std::uint32_t i, std::uint32_t c) {
     const std::uint32_t o = cut.origin[c];
-    ways.push_back({o, {object, i, cut.share[c], cut.place[o] == c}});
+    const auto at = std::ranges::lower_bound(cut.between, c, {}, &CutModel::Between::node);
+    const bool between = at != cut.between.end() && at->node == c,
+               fresh = between && cut.share[c] == 0;
+    if (between)
+      moves.between.push_back({object, i, fresh, at->of});
+    if (!fresh)
+      ways.push_back({o, {object, i, cut.share[c], cut.place[o] == c}});
   };
   const std::size_t stay = free.rest ? free.rest->origin.size() : cut.origin.size();
   for (std::uint32_t i = 0; i < stay; ++i)
@@ -129,6 +122,14 @@ void defer_shape(const Object& old, const Moves& moves, Object& next) {
   next.shown.shaped = false;
 }
 
+} // namespace
+
+/// Whether it is known and can be cut; who says otherwise is warned once.
+bool may_cut(World& w, Object& object, Feature feature) {
+  const bool feels_it = feels(w, object, feature);
+  return object.matter->known && feels_it;
+}
+
 /// \param cut of the object's model
 void carry_out(World& w, std::size_t index, CutModel cut) {
   Object& old = w.now.objects[index];
@@ -136,9 +137,10 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   FreeParts free = free_parts(old.model(), cut);
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
-                        w.now.instruments.empty() && old.matter->known && !old.stages.options;
+                        w.now.instruments.empty() && old.matter->known && !old.stages.options &&
+                        !old.warp;
   if (ffe && !deferred)
-    shape_in_step(w, old);
+    (void)whole_shape_in_step(w, old);
   const Moves moves = moves_of(w, index, cut, free);
   std::vector<Vec3> velocity = old.came.velocity;
   if (!free.parts.empty()) // before the stiffness follows the cut
@@ -173,6 +175,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   follow_cut(w, old, rest.origin, next);
   next.cut = cut_again(old, rest.origin, moves);
   next.cut.scored = std::move(rest.left);
+  next.cut.trails = old.cut.trails;
   if (deferred)
     defer_shape(old, moves, next);
   if (loose && !velocity.empty()) {
@@ -181,6 +184,12 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
       for (const Moves::To& to : moves.of(i))
         if (to.object == index)
           next.came.velocity[to.node] = velocity[i];
+    for (const Moves::Between& b : moves.between)
+      if (b.object == index) {
+        Vec3& at = next.came.velocity[b.node] = {};
+        for (const auto& [node, share] : b.of)
+          at += share * velocity[node];
+      }
   }
   told.nodes = now->nodes.size();
   w.now.news.cuttings.push_back(told);
@@ -189,6 +198,8 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
         renumbered(old, std::make_shared<const Model>(std::move(free.parts[k].model))));
     part.method = Method::ela;
     part.stages = {};
+    part.warp = false;
+    part.cut.trails = old.cut.trails;
     part.matter->source = {};
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::part,
                                    .object = index,
@@ -200,8 +211,6 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   ++w.now.counts.cuts;
   move_all(w, index, moves, std::move(pieces), velocity);
 }
-
-} // namespace
 
 /// That the object will be cut, so that its first cut costs no more than others.
 void announce_cut(World& w, std::size_t index) {
@@ -228,19 +237,8 @@ void find_deferred_shape(World& w, Object& object) {
   solver.update(deferred.load);
   const std::span<const double> first = solver.displacement();
   std::vector<double> shape(first.begin(), first.end());
-  for (const auto& moves : deferred.moves) {
-    std::size_t nodes = 0;
-    for (const Moves::To& to : moves->all)
-      if (to.object == moves->objects[0])
-        nodes = std::max<std::size_t>(nodes, to.node + std::size_t{1});
-    std::vector<double> moved(3 * nodes, 0.0);
-    for (std::uint32_t i = 0; i < shape.size() / 3; ++i)
-      for (const Moves::To& to : moves->of(i))
-        if (to.object == moves->objects[0])
-          std::copy_n(shape.begin() + 3 * static_cast<std::ptrdiff_t>(i), 3,
-                      moved.begin() + 3 * static_cast<std::ptrdiff_t>(to.node));
-    shape = std::move(moved);
-  }
+  for (const auto& moves : deferred.moves)
+    shape = moved_field(*moves, moves->objects[0], shape);
   require_bounded(object, shape);
   object.shown.displacement = std::move(shape);
   object.shown.deferred.reset();
@@ -252,9 +250,10 @@ void find_deferred_shape(World& w, Object& object) {
 namespace {
 
 /// What blades passed since the last step, in pieces that are nearly flat.
-std::vector<SweptQuad> swept_areas(World& w) {
-  std::vector<SweptQuad> areas;
-  for (Instrument& i : w.now.instruments) {
+std::vector<BladeArea> swept_areas(World& w) {
+  std::vector<BladeArea> areas;
+  for (std::size_t n = 0; n < w.now.instruments.size(); ++n) {
+    Instrument& i = w.now.instruments[n];
     if (!i.present || !i.shape.blade)
       continue;
     for (std::size_t k = 1; k < i.path.size(); ++k) {
@@ -266,7 +265,7 @@ std::vector<SweptQuad> swept_areas(World& w) {
       Pose last = from;
       for (std::size_t p = 1; p <= parts; ++p) {
         const Pose next = between(from, to, static_cast<double>(p) / static_cast<double>(parts));
-        areas.push_back({last.place, last(i.shape.axis), next(i.shape.axis), next.place});
+        areas.push_back({n, {last.place, last(i.shape.axis), next(i.shape.axis), next.place}});
         last = next;
       }
     }
@@ -279,14 +278,21 @@ std::vector<SweptQuad> swept_areas(World& w) {
 } // namespace
 
 void sweep_blades(World& w) {
-  const std::vector<SweptQuad> areas = swept_areas(w);
+  const std::vector<BladeArea> areas = swept_areas(w);
   if (areas.empty())
     return;
+  std::vector<SweptQuad> quads;
+  for (const BladeArea& area : areas)
+    quads.push_back(area.corners);
   const std::uint64_t cuts = w.now.counts.cuts;
   const std::size_t count = w.now.objects.size();
   for (std::size_t index = 0; index < count; ++index) {
     Object& object = w.now.objects[index];
     need_model(object);
+    if (is_solid(object)) {
+      sweep_solid(w, index, areas);
+      continue;
+    }
     if (object.method == Method::ffe)
       shape_in_step(w, object);
     std::vector<double> moved;
@@ -296,8 +302,8 @@ void sweep_blades(World& w) {
         moved.insert(moved.end(), {m.displacement.x, m.displacement.y, m.displacement.z});
       shape = moved;
     }
-    const Cut swept = swept_cut(object.model(), shape, areas);
-    if ((swept.empty() && swept.sides.empty()) || !may_cut(w, object))
+    const Cut swept = swept_cut(object.model(), shape, quads);
+    if ((swept.empty() && swept.sides.empty()) || !may_cut(w, object, Feature::blade))
       continue;
     of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
       CutModel cut = cut_model(object.model(), merged(swept, object.cut.scored));
@@ -318,7 +324,7 @@ void tear(World& w) {
   const std::size_t count = w.now.objects.size();
   for (std::size_t index = 0; index < count; ++index) {
     Object& object = w.now.objects[index];
-    if (!(object.cut.tear > 0) || !may_cut(w, object))
+    if (!(object.cut.tear > 0) || !may_cut(w, object, Feature::tear))
       continue;
     shape_in_step(w, object);
     const Cut torn = torn_cut(object.model(), *object.shown.displacement, object.cut.tear);
@@ -338,11 +344,14 @@ void tear(World& w) {
 /// elastodynamic.
 void find_free_motion(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
-  if (!object.cut.first || object.method != Method::ffe || object.statics->solver ||
+  if (!object.cut.first || object.method != Method::ffe || object.statics->made() ||
       (object.load->empty() && !instruments_there(w)))
     return;
   try {
-    (void)solver_of(w, object);
+    if (object.warp)
+      (void)warped_of(w, object);
+    else
+      (void)solver_of(w, object);
     return;
   } catch (const SingularStiffness& error) {
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::loose,
@@ -379,11 +388,19 @@ void Rule<CutObject>::apply(World& w, const CutObject& c) {
   need_model(object);
   require_support(w, object, Feature::cut);
   CutModel cut = of_object(object.name(), [&] {
+    if (is_solid(object)) {
+      const auto* const plane = std::get_if<PlaneToCut>(&c.what);
+      if (plane == nullptr)
+        throw Error("it has tetrahedra and no springs, expected a plane to cut it, or a blade");
+      return plane_through(w, c.object, *plane);
+    }
     Cut what;
     if (const auto* const springs = std::get_if<SpringsToCut>(&c.what)) {
       what = springs_between(object.model(), springs->from, springs->to);
     } else {
       const auto& plane = std::get<PlaneToCut>(c.what);
+      if (plane.along_faces)
+        throw Error("it has no tetrahedra, expected a solid for along=faces");
       what = plane_cut(object.model(), plane.plane,
                        plane.nodes ? std::span<const std::uint32_t>(*plane.nodes)
                                    : std::span<const std::uint32_t>());
@@ -409,7 +426,8 @@ void Rule<CutObject>::log(const World&, const CutObject& c, ChangeRow& row) {
   row.nodes = plane.nodes.value_or(std::vector<std::uint32_t>{});
   row.vector = plane.plane.point;
   const Vec3& n = plane.plane.normal;
-  row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z);
+  row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z) +
+             (plane.along_faces ? " along=faces" : "");
 }
 
 void Rule<SetTear>::apply(World& w, const SetTear& c) {
@@ -420,11 +438,40 @@ void Rule<SetTear>::log(const World&, const SetTear& c, ChangeRow& row) {
   row.value = c.strain;
 }
 
+namespace {
+
+/// Where nodes of a solid as it came stand that have been moved since, in what is left of it.
+std::vector<Moves::Between> back_between(const Object& old, std::size_t index) {
+  constexpr double there = 1e-9; // of an element's size: what of it is still there
+  const Model &first = *old.cut.first, &now = old.model();
+  std::vector<Moves::Between> between;
+  std::optional<TetMesh> mesh;
+  for (std::uint32_t f = 0; f < first.nodes.size(); ++f) {
+    const std::uint32_t i = (*old.cut.places)[f];
+    const Vec3& place = first.nodes[f].position;
+    if (i == CutModel::gone || now.nodes[i].position == place)
+      continue;
+    if (!mesh)
+      mesh = element_mesh(now);
+    const SolidPlace found = find_place(*mesh, place);
+    if (!(found.outside <= there * norm(now.nodes[i].position - place)))
+      continue;
+    Moves::Between b{index, f, false, {}};
+    for (std::size_t k = 0; k < found.count; ++k)
+      if (found.weight[k] != 0)
+        b.of.emplace_back(found.node[k], found.weight[k]);
+    between.push_back(std::move(b));
+  }
+  return between;
+}
+
+} // namespace
+
 void Rule<Restore>::apply(World& w, const Restore& c) {
   Object& old = w.now.objects.at(c.object);
   require_support(w, old, Feature::restore);
   if (old.method == Method::ffe)
-    shape_in_step(w, old);
+    (void)whole_shape_in_step(w, old);
   Moves moves;
   moves.objects = {c.object};
   std::vector<std::pair<std::uint32_t, Moves::To>> ways;
@@ -434,6 +481,8 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
     ways.push_back({i, {c.object, to, 1, (*old.cut.places)[to] == i}});
   }
   moves.add(ways, old.model().nodes.size());
+  if (is_solid(old))
+    moves.between = back_between(old, c.object);
   std::deque<Object> pieces;
   pieces.push_back(renumbered(old, old.cut.first));
   make_whole(w, pieces[0]);

@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
+#include <span>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -36,8 +39,12 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.matter = std::make_shared<Matter>(*old.matter);
   next.matter->model = std::move(model);
   next.matter->known = true;
-  next.matter->size = 0; // but the shortest edge stays: a cut makes none shorter
+  next.matter->size = 0;
+  next.matter->surface = 0;
+  if (is_solid(old))
+    next.matter->shortest_edge = 0; // else it stays: a cut of a net makes none shorter
   next.statics = std::make_shared<Statics>();
+  next.warped = nullptr;
   next.load = gravity_of(*old.load);
   next.body = nullptr;
   next.offset = 0;
@@ -51,6 +58,31 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.impulses.clear();
   next.cut = {.tear = old.cut.tear};
   return next;
+}
+
+std::vector<double> moved_field(const Moves& moves, std::size_t object,
+                                std::span<const double> field) {
+  std::size_t nodes = 0;
+  const auto count = [&](const auto& one) {
+    if (one.object == object)
+      nodes = std::max(nodes, one.node + std::size_t{1});
+  };
+  std::ranges::for_each(moves.all, count);
+  std::ranges::for_each(moves.between, count);
+  std::vector<double> moved(3 * nodes, 0.0);
+  for (std::uint32_t i = 0; i < field.size() / 3; ++i)
+    for (const Moves::To& to : moves.of(i))
+      if (to.object == object)
+        for (int a = 0; a < 3; ++a)
+          moved[axis_of(to.node, a)] = field[axis_of(i, a)];
+  for (const Moves::Between& b : moves.between)
+    if (b.object == object)
+      for (int a = 0; a < 3; ++a) {
+        double& at = moved[axis_of(b.node, a)] = 0;
+        for (const auto& [node, share] : b.of)
+          at += share * field[axis_of(node, a)];
+      }
+  return moved;
 }
 
 namespace {
@@ -95,9 +127,72 @@ public:
     follow(from.pressure, [&](Object& o) -> auto& { return load_of(o).pressure; });
     follow(from.displacement, [&](Object& o) -> auto& { return load_of(o).displacement; });
     follow(from.ramp, [&](Object& o) -> auto& { return load_of(o).ramp; });
+    for (const Moves::Between& b : moves_.between)
+      join_load(from, b, load_of((*this)({.object = b.object, .node = b.node})));
   }
 
 private:
+  /// What all nodes have between which one stands.
+  template <class Value>
+  static std::optional<std::vector<std::pair<Value, double>>>
+  shared(const std::map<std::uint32_t, Value>& from, const Moves::Between& b) {
+    std::vector<std::pair<Value, double>> all;
+    for (const auto& [node, share] : b.of) {
+      const auto at = from.find(node);
+      if (at == from.end())
+        return std::nullopt;
+      all.emplace_back(at->second, share);
+    }
+    return all;
+  }
+
+  /// A node among displaced ones is displaced if they go together, one among pressed ones is
+  /// pressed.
+  static void join_load(const Load& from, const Moves::Between& b, Load& load) {
+    if (const auto pressures = shared(from.pressure, b)) {
+      NodePressure sum{0, (*pressures)[0].first.period};
+      bool alike = true;
+      for (const auto& [pressure, share] : *pressures) {
+        sum.pressure += share * pressure.pressure;
+        alike = alike && pressure.period == sum.period;
+      }
+      if (alike)
+        load.pressure[b.node] = sum;
+    }
+    const auto displacements = shared(from.displacement, b);
+    if (!displacements)
+      return;
+    const bool on_their_way =
+        std::ranges::any_of(b.of, [&](const auto& one) { return from.ramp.contains(one.first); });
+    if (on_their_way) {
+      const auto ramps = shared(from.ramp, b);
+      if (!ramps)
+        return;
+      Ramp sum = (*ramps)[0].first;
+      const auto way_of = [](const Ramp& ramp) {
+        return ramp.by ? std::optional<PoseWay>(ramp.by->way) : std::nullopt;
+      };
+      for (const auto& [ramp, share] : *ramps)
+        if (ramp.start != sum.start || ramp.end != sum.end || !(way_of(ramp) == way_of(sum)))
+          return;
+      sum.from = sum.to = {};
+      if (sum.by)
+        sum.by->point = sum.by->rest = {};
+      for (const auto& [ramp, share] : *ramps) {
+        sum.from += share * ramp.from;
+        sum.to += share * ramp.to;
+        if (sum.by) {
+          sum.by->point += share * ramp.by->point;
+          sum.by->rest += share * ramp.by->rest;
+        }
+      }
+      load.ramp[b.node] = sum;
+    }
+    Vec3& at = load.displacement[b.node] = {};
+    for (const auto& [displacement, share] : *displacements)
+      at += share * displacement;
+  }
+
   const Moves& moves_;
   std::deque<Object>& all_;
 };
@@ -124,8 +219,9 @@ void move_shown(const Object& old, const Moves& moves, std::deque<Object>& piece
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).impulses.push_back({to.node, t.instrument, t.force});
+  const std::span<const double> shape = known_shape(old);
   for (std::uint32_t i = 0; old.shown.shaped && i < old.model().nodes.size(); ++i) {
-    const Vec3 u = vector_at(*old.shown.displacement, i);
+    const Vec3 u = vector_at(shape, i);
     for (const Moves::To& to : moves.of(i)) {
       if (!to.main && moves.objects.size() == 1 && moves.of(i).size() == 1)
         continue;
@@ -133,6 +229,16 @@ void move_shown(const Object& old, const Moves& moves, std::deque<Object>& piece
       for (int a = 0; a < 3; ++a)
         moved[axis_of(to.node, a)] = u[a];
     }
+  }
+  for (const Moves::Between& b : moves.between) {
+    if (!old.shown.shaped)
+      break;
+    Vec3 u;
+    for (const auto& [node, share] : b.of)
+      u += share * vector_at(shape, node);
+    std::vector<double>& moved = piece({.object = b.object}).shown.displacement.write();
+    for (int a = 0; a < 3; ++a)
+      moved[axis_of(b.node, a)] = u[a];
   }
 }
 
@@ -149,6 +255,25 @@ void move_grips(World& w, std::size_t index, const Moves& moves) {
               return g.object == to.object && g.node == to.node;
             }))
           grips.push_back({to.object, to.node, grip.point});
+    }
+    for (const Moves::Between& b : moves.between) { // what stands among grasped nodes
+      Vec3 point;
+      std::size_t found = 0;
+      for (const auto& [node, share] : b.of)
+        for (const Instrument::Grip& grip : i.grips)
+          if (grip.object == index && grip.node == node) {
+            point += share * grip.point;
+            ++found;
+          }
+      if (found != b.of.size())
+        continue;
+      const auto own = std::ranges::find_if(grips, [&](const Instrument::Grip& g) {
+        return g.object == b.object && g.node == b.node;
+      });
+      if (own != grips.end())
+        own->point = point;
+      else
+        grips.push_back({b.object, b.node, point});
     }
     i.grips = std::move(grips);
   }
@@ -182,6 +307,11 @@ Nodes nodes_in(const Moves& moves, std::size_t object, const Nodes& nodes, bool 
     for (const Moves::To& to : moves.of(node))
       if (to.object == object && (copies || to.main))
         now.push_back(to.node);
+  const std::set<std::uint32_t> named(nodes.begin(), nodes.end());
+  for (const Moves::Between& b : moves.between)
+    if (copies && b.fresh && b.object == object &&
+        std::ranges::all_of(b.of, [&](const auto& one) { return named.contains(one.first); }))
+      now.push_back(b.node);
   std::sort(now.begin(), now.end());
   now.erase(std::unique(now.begin(), now.end()), now.end());
   return now;
@@ -265,8 +395,7 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
     }
   } else if (old.method == Method::ffe && moves.objects.size() > 1) {
     for (std::size_t i = 0; i < old.model().nodes.size(); ++i)
-      motion.push_back(
-          {vector_at(*old.shown.displacement, i), velocity.empty() ? Vec3{} : velocity[i]});
+      motion.push_back({vector_at(known_shape(old), i), velocity.empty() ? Vec3{} : velocity[i]});
   }
   if (motion.empty())
     return motions;
@@ -289,6 +418,21 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
         if (const auto at = motions.find(to.object);
             at != motions.end() && to.main == main && (main || moves.of(i).size() > 1))
           at->second[to.node] = motion[i];
+  for (const Moves::Between& b : moves.between) {
+    const auto at = motions.find(b.object);
+    if (at == motions.end())
+      continue;
+    NodeMotion sum;
+    for (const auto& [node, share] : b.of) {
+      sum.displacement += share * motion[node].displacement;
+      sum.velocity += share * motion[node].velocity;
+    }
+    const auto piece = std::ranges::find(moves.objects, b.object) - moves.objects.begin();
+    for (int a = 0; a < 3; ++a)
+      if (is_fixed(pieces[static_cast<std::size_t>(piece)].model(), b.node, a))
+        sum.displacement[a] = sum.velocity[a] = 0;
+    at->second[b.node] = sum;
+  }
   return motions;
 }
 

@@ -36,9 +36,17 @@ struct Moves {
     double share = 1; // of what the node had
     bool main = true; // of several: which one goes on as that node
   };
+  /// A node that stands where none did: it has shares of what others had.
+  struct Between {
+    std::size_t object = 0;
+    std::uint32_t node = 0;
+    bool fresh = true; // or one of `all` that has been moved
+    std::vector<std::pair<std::uint32_t, double>> of;
+  };
   std::vector<std::size_t> objects; // itself, new ones
   std::vector<std::size_t> first;   // by node, and the end
   std::vector<To> all;
+  std::vector<Between> between;
 
   std::span<const To> of(std::uint32_t node) const {
     return {all.data() + first[node], all.data() + first[node + std::size_t{1}]};
@@ -152,6 +160,13 @@ struct RangeWatch {
   int not_looked = 0;
 };
 
+/// What a blade has passed of a solid, back to where the wound may still end.
+struct BladeTrail {
+  std::size_t instrument = 0;
+  std::vector<std::array<Vec3, 2>> edges; // where they were in the solid, at rest
+  std::array<Vec3, 2> last{};             // the last one where it stands
+};
+
 /// What cuts have done to an object.
 struct CutState {
   std::shared_ptr<const Model> first{};                  // the model as it came, of a cut one
@@ -159,6 +174,7 @@ struct CutState {
   CopyOnWrite<std::vector<std::uint32_t>> places{};
   Cut scored{}; // edges that wait to come apart
   double tear = 0;
+  std::vector<BladeTrail> trails{}; // of blades in a solid
 };
 
 /// An object. A cut makes another one that takes its place.

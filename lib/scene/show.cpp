@@ -179,6 +179,18 @@ std::span<const double> whole_shape(World& w, Object& object) {
   return *shown.whole;
 }
 
+std::span<const double> whole_shape_in_step(World& w, Object& object) {
+  shape_in_step(w, object);
+  if (object.shown.displacement->size() != 3 * object.model().nodes.size())
+    object.statics->ahead = true;
+  return whole_shape(w, object);
+}
+
+std::span<const double> known_shape(const Object& object) {
+  const Shown& shown = object.shown;
+  return shown.whole->empty() ? *shown.displacement : *shown.whole;
+}
+
 void show(World& w, Object& object) {
   if (object.body != nullptr || !object.load->empty())
     need_model(object);

@@ -234,7 +234,7 @@ std::size_t Simulation::surface_nodes(std::size_t object) const {
     return now.nodes.size();
   std::size_t& surface = world_->now.objects[object].matter->surface;
   if (surface == 0)
-    surface = surface_count(now); // solids are not cut
+    surface = surface_count(now);
   return surface;
 }
 

@@ -18,14 +18,17 @@ enum class Way : std::uint8_t {
   whole,
   cut,
   solid,        ///< of tetrahedra, or with some
+  sprung,       ///< a solid with springs or central nodes beside its tetrahedra
+  skinned,      ///< a solid whose surface is not that of its tetrahedra
   net,          ///< of none
   solid_motion, ///< a solid that moves
   warped,       ///< with large rotations
   filled        ///< a net that keeps the volume it encloses
 };
 inline constexpr std::array all_ways{
-    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic, Way::two_step,
-    Way::two_step_stored, Way::whole,           Way::cut,      Way::solid,        Way::net,
+    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
+    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
+    Way::solid,           Way::sprung,          Way::skinned,  Way::net,
     Way::solid_motion,    Way::warped,          Way::filled};
 
 /// What may act on an object, or be done to it.
@@ -36,7 +39,8 @@ enum class Feature : std::uint8_t {
   grasp,
   touch, ///< by an instrument that pushes
   cut,   ///< by the command
-  blade, ///< or tearing
+  blade,
+  tear, ///< by strain
   restore,
   attach,
   method, ///< another one
@@ -45,9 +49,9 @@ enum class Feature : std::uint8_t {
   warp, ///< large rotations
 };
 inline constexpr std::array all_features{
-    Feature::force,    Feature::pressure, Feature::displace, Feature::grasp,  Feature::touch,
-    Feature::cut,      Feature::blade,    Feature::restore,  Feature::attach, Feature::method,
-    Feature::two_step, Feature::renew,    Feature::warp};
+    Feature::force,  Feature::pressure, Feature::displace, Feature::grasp,   Feature::touch,
+    Feature::cut,    Feature::blade,    Feature::tear,     Feature::restore, Feature::attach,
+    Feature::method, Feature::two_step, Feature::renew,    Feature::warp};
 
 /// A pair that does not go together.
 struct Gap {
@@ -62,12 +66,20 @@ inline constexpr std::array gaps{
         "has a second stage of its store, expected two-step with the model of that, stage=FILE"},
     Gap{Way::two_step_stored, Feature::blade, false,
         "has a second stage of its store and not its model: it is not cut"},
-    Gap{Way::solid, Feature::cut, true,
-        "holds tetrahedra, expected springs and triangles alone to cut"},
-    Gap{Way::solid, Feature::blade, false, "holds tetrahedra: it is not cut"},
+    Gap{Way::two_step_stored, Feature::tear, false,
+        "has a second stage of its store and not its model: it does not tear"},
+    Gap{Way::sprung, Feature::cut, true,
+        "has springs beside its tetrahedra, expected tetrahedra alone to cut"},
+    Gap{Way::sprung, Feature::blade, false, "has springs beside its tetrahedra: it is not cut"},
+    Gap{Way::skinned, Feature::cut, true,
+        "has a skin, expected a solid with the surface of its tetrahedra to cut"},
+    Gap{Way::skinned, Feature::blade, false, "has a skin: it is not cut"},
+    Gap{Way::solid, Feature::tear, false, "holds tetrahedra: it does not tear"},
     Gap{Way::filled, Feature::cut, true,
         "keeps the volume it encloses (bulk=), expected none to cut"},
     Gap{Way::filled, Feature::blade, false, "keeps the volume it encloses (bulk=): it is not cut"},
+    Gap{Way::filled, Feature::tear, false,
+        "keeps the volume it encloses (bulk=): it does not tear"},
     Gap{Way::filled, Feature::attach, true,
         "keeps the volume it encloses (bulk=), expected none to attach"},
     Gap{Way::filled, Feature::method, true,

@@ -54,7 +54,23 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   for (const NodeTouch& t : object.shown.touches)
     now.displacement[t.node] = vector_at(*object.shown.displacement, t.node);
   std::vector<Vec3> velocity;
+  const auto between = [&](std::span<const double> before, std::span<const double> after) {
+    for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
+      velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.duration);
+  };
   try {
+    if (object.warp) {
+      std::optional<WarpedStatics> own;
+      if (afresh)
+        own.emplace(object.model(), nullptr, w.context);
+      WarpedStatics& warped = afresh ? *own : warped_of(w, object);
+      warped.update(load);
+      const std::span<const double> shape = warped.displacement();
+      const std::vector<double> before(shape.begin(), shape.end());
+      warped.update(now);
+      between(before, warped.displacement());
+      return velocity;
+    }
     std::optional<Elastostatic> own;
     std::optional<TwoStep> own_stages;
     if (afresh)
@@ -73,9 +89,7 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
     };
     const std::span<const double> shape = shape_under(load);
     const std::vector<double> before(shape.begin(), shape.end());
-    const std::span<const double> after = shape_under(now);
-    for (std::size_t i = 0; i < object.model().nodes.size(); ++i)
-      velocity.push_back((vector_at(after, i) - vector_at(before, i)) / object.came.duration);
+    between(before, shape_under(now));
   } catch (const SingularStiffness&) {
     // It hangs loosely, and nobody has asked for a shape since.
   }

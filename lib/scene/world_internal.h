@@ -134,6 +134,9 @@ void shape(World& w, Object& object);
 void shape_in_step(World& w, Object& object);
 /// Of all nodes, those inside a solid too.
 std::span<const double> whole_shape(World& w, Object& object);
+std::span<const double> whole_shape_in_step(World& w, Object& object);
+/// That which is known: as it is shown, of all nodes if it was asked for. \pre shaped
+std::span<const double> known_shape(const Object& object);
 double displacement_limit(Object& object);
 void require_bounded(Object& object, std::span<const double> displacement);
 
@@ -166,9 +169,34 @@ void find_deferred_shape(World& w, Object& object);
 void sweep_blades(World& w);
 void tear(World& w);
 void find_free_motion(World& w, std::size_t index);
+void carry_out(World& w, std::size_t index, CutModel cut);
+bool may_cut(World& w, Object& object, Feature feature);
+/// An Error of a cut, with the object's name.
+template <class Work>
+auto of_object(const std::string& name, Work&& work) {
+  try {
+    return work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("object " + name + ": " + error.what());
+  }
+}
+
+// solid_cuts.cpp: blades and planes through tetrahedra
+/// What a blade passed since the last step, nearly flat.
+struct BladeArea {
+  std::size_t instrument = 0;
+  SweptQuad corners{};
+};
+CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane);
+void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 
 // moves.cpp: all that names nodes follows them
 Object renumbered(const Object& old, std::shared_ptr<const Model> model);
+/// What all nodes had, at those of one of the objects: three numbers each.
+std::vector<double> moved_field(const Moves& moves, std::size_t object,
+                                std::span<const double> field);
 void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object> pieces,
               std::span<const Vec3> velocity = {});
 void renew_bodies(World& w, const Motions& motions);

@@ -7,10 +7,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <compare>
 #include <cstddef>
+#include <numeric>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace gewebe {
@@ -350,6 +353,90 @@ SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCut
   TetMesh mesh = element_mesh(model);
   TetCut cut = cut_tetrahedra(mesh, blade, own);
   return Cutter(model, std::move(cut), std::move(mesh)).carry_out();
+}
+
+namespace {
+
+bool before_by_place(const TetNodeOrigin& a, const TetNodeOrigin& b) {
+  return std::tie(a.tetrahedron, a.weights) < std::tie(b.tetrahedron, b.weights);
+}
+
+/// The one that has most; of several the first.
+std::uint32_t main_of(const std::vector<std::pair<std::uint32_t, double>>& shares) {
+  return std::ranges::max_element(shares, {}, [](const auto& share) { return share.second; })
+      ->first;
+}
+
+} // namespace
+
+CutModel as_cut_model(const Model& before, SolidCut cut) {
+  const auto n = static_cast<std::uint32_t>(before.nodes.size());
+  const TetMesh mesh = element_mesh(before);
+  CutModel result;
+  std::vector<std::uint32_t> moved; // nodes before
+  for (std::uint32_t i = 0; i < n; ++i)
+    if (cut.origin[i].node == TetNodeOrigin::none)
+      moved.push_back(i);
+  std::ranges::sort(moved, [&](std::uint32_t a, std::uint32_t b) {
+    return before_by_place(cut.origin[a], cut.origin[b]);
+  });
+  std::vector<bool> fresh(cut.origin.size());
+  for (std::uint32_t i = 0; i < cut.origin.size(); ++i) {
+    const TetNodeOrigin& from = cut.origin[i];
+    if (from.node != TetNodeOrigin::none) {
+      result.origin.push_back(from.node);
+      continue;
+    }
+    CutModel::Between between{i, shares_of(mesh, from)};
+    std::uint32_t origin = i;
+    if (i >= n) { // a copy of one that has been moved, or new
+      const auto at = std::ranges::lower_bound(
+          moved, from, before_by_place,
+          [&](std::uint32_t m) -> const TetNodeOrigin& { return cut.origin[m]; });
+      fresh[i] = at == moved.end() || !(cut.origin[*at] == from);
+      origin = fresh[i] ? main_of(between.of) : *at;
+    }
+    result.origin.push_back(origin);
+    result.between.push_back(std::move(between));
+  }
+  std::vector<double> mass(n, 0.0);
+  std::vector<std::uint32_t> copies(n, 0);
+  for (std::uint32_t i = 0; i < result.origin.size(); ++i)
+    if (!fresh[i]) {
+      mass[result.origin[i]] += cut.model.nodes[i].mass;
+      ++copies[result.origin[i]];
+    }
+  for (std::uint32_t i = 0; i < result.origin.size(); ++i) {
+    const std::uint32_t o = result.origin[i];
+    result.share.push_back(fresh[i] ? 0 : copies[o] == 1 ? 1 : cut.model.nodes[i].mass / mass[o]);
+  }
+  result.place.resize(n);
+  std::iota(result.place.begin(), result.place.end(), 0U);
+  result.doubled = cut.report.doubled;
+  result.model = std::move(cut.model);
+  return result;
+}
+
+TriangleMesh plane_blade(const Model& model, const CutPlane& plane) {
+  Box3 box;
+  for (const Node& node : model.nodes)
+    box.add(node.position);
+  const Vec3 normal = plane.normal / norm(plane.normal), middle = (box.min + box.max) * 0.5;
+  const Vec3 foot = middle - dot(normal, middle - plane.point) * normal;
+  int least = 0;
+  for (int a = 1; a < 3; ++a)
+    if (std::abs(normal[a]) < std::abs(normal[least]))
+      least = a;
+  Vec3 axis;
+  axis[least] = 1;
+  const double reach = 2 * norm(box.max - box.min) + 1;
+  Vec3 u = cross(normal, axis);
+  u = u * (reach / norm(u));
+  const Vec3 v = cross(normal, u);
+  TriangleMesh blade;
+  blade.points = {foot - u - v, foot + u - v, foot + u + v, foot - u + v};
+  blade.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return blade;
 }
 
 } // namespace gewebe

@@ -1,6 +1,8 @@
 #pragma once
 // A model of finite elements cut by a blade: elements, masses, supports and surface follow.
 
+#include "model/cut.h"
+#include "model/cut_select.h"
 #include "model/model.h"
 #include "tetrahedra/cut_tetrahedra.h"
 
@@ -43,5 +45,12 @@ struct SolidCut {
 /// skin; if a face of its boundary at the blade is not among its triangles
 SolidCut cut_solid(const Model& model, const TriangleMesh& blade,
                    const BladeCutOptions& options = {});
+
+/// The cut as one of any model (model/cut.h): copies share what their node had by their masses.
+/// \pre `cut` is of this model
+CutModel as_cut_model(const Model& before, SolidCut cut);
+
+/// Two triangles of the plane that reach beyond the model at rest. \pre the model has nodes
+TriangleMesh plane_blade(const Model& model, const CutPlane& plane);
 
 } // namespace gewebe

@@ -18,7 +18,9 @@ bool same_but_stiffness(const Model& first, const Model& second) {
                     [](const Spring& a, const Spring& b) {
                       return a.i == b.i && a.j == b.j && a.kind == b.kind;
                     }) &&
-         first.triangles == second.triangles;
+         first.triangles == second.triangles && first.tetrahedra == second.tetrahedra &&
+         first.middles == second.middles &&
+         first.tetrahedron_material == second.tetrahedron_material;
 }
 
 Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, const Model& first,
@@ -34,6 +36,8 @@ Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, 
     two += second.springs[k].stiffness;
   }
   Model stiff = cut;
+  if (!cut.tetrahedra.empty())
+    stiff.materials = second.materials;
   for (Spring& s : stiff.springs) {
     const auto& [one, two] = sums.at(key(s, origin[s.i], origin[s.j]));
     s.stiffness *= two / one;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <compare>
 #include <cstddef>
 #include <string>
@@ -234,6 +235,28 @@ void add_middles(const TetMesh& before, std::span<const std::uint32_t> original,
   Adder(before, original, cut).add();
 }
 
+std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
+                                                        const TetNodeOrigin& origin) {
+  if (origin.node != TetNodeOrigin::none)
+    return {{origin.node, 1}};
+  std::vector<std::pair<std::uint32_t, double>> shares;
+  const auto add = [&](std::uint32_t node, double share) {
+    if (share != 0)
+      shares.emplace_back(node, share);
+  };
+  constexpr double rounding = 1e-13; // of volumes: on a face a place has no share of what is off it
+  std::array<double, 4> w = origin.weights;
+  for (double& weight : w)
+    weight = std::fabs(weight) < rounding ? 0 : weight;
+  const bool quadratic = !before.middles.empty();
+  for (std::size_t k = 0; k < 4; ++k)
+    add(before.tetrahedra[origin.tetrahedron][k], quadratic ? w[k] * (2 * w[k] - 1) : w[k]);
+  for (std::size_t k = 0; quadratic && k < 6; ++k)
+    add(before.middles[origin.tetrahedron][k],
+        4 * w[tetrahedron_edges[k][0]] * w[tetrahedron_edges[k][1]]);
+  return shares;
+}
+
 std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigin> origin,
                              std::span<const Vec3> field) {
   std::vector<Vec3> carried;
@@ -243,15 +266,9 @@ std::vector<Vec3> carry_over(const TetMesh& before, std::span<const TetNodeOrigi
       carried.push_back(field[from.node]);
       continue;
     }
-    const std::array<double, 4>& w = from.weights;
-    const bool quadratic = !before.middles.empty();
     Vec3 sum;
-    for (std::size_t k = 0; k < 4; ++k)
-      sum += field[before.tetrahedra[from.tetrahedron][k]] *
-             (quadratic ? w[k] * (2 * w[k] - 1) : w[k]);
-    for (std::size_t k = 0; quadratic && k < 6; ++k)
-      sum += field[before.middles[from.tetrahedron][k]] *
-             (4 * w[tetrahedron_edges[k][0]] * w[tetrahedron_edges[k][1]]);
+    for (const auto& [node, share] : shares_of(before, from))
+      sum += field[node] * share;
     carried.push_back(sum);
   }
   return carried;

@@ -40,9 +40,10 @@ struct Candidate {
 
 class Finder {
 public:
-  Finder(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade)
-      : mesh_(mesh), places_(places.empty() ? std::span<const Vec3>(mesh.points) : places),
-        blade_(blade) {}
+  Finder(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade)
+      : mesh_(mesh),
+        places_(options.places.empty() ? std::span<const Vec3>(mesh.points) : options.places),
+        among_(options.among), blade_(blade) {}
 
   CutRegion find(bool wide) {
     find_candidates();
@@ -110,6 +111,8 @@ private:
   }
 
   std::uint32_t pass(std::uint32_t low, std::uint32_t high) {
+    if (!among_.empty() && (among_[low] & among_[high]) == 0)
+      return no_crossing;
     ++region_.tested;
     const BladeCrossing found = blade_.crossing(places_[low], places_[high]);
     region_.folded += found.passes > 1 ? 1 : 0;
@@ -254,6 +257,7 @@ private:
 
   const TetMesh& mesh_;
   std::span<const Vec3> places_;
+  std::span<const std::uint8_t> among_;
   const Blade& blade_;
   std::vector<Candidate> candidates_;
   std::vector<Passed> passed_; // by low, then high
@@ -262,9 +266,9 @@ private:
 
 } // namespace
 
-CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade,
+CutRegion cut_region(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade,
                      bool wide) {
-  return Finder(mesh, places, blade).find(wide);
+  return Finder(mesh, options, blade).find(wide);
 }
 
 } // namespace gewebe

@@ -61,9 +61,9 @@ struct CutRegion {
 };
 
 /// \param wide with the neighbours of what is at the ends of crossed edges
-/// \pre check_mesh(mesh) passes; places is empty or has one per point
+/// \pre check_mesh(mesh) passes; options as cut_tetrahedra wants them
 /// \throw Error as cut_tetrahedra
-CutRegion cut_region(const TetMesh& mesh, std::span<const Vec3> places, const Blade& blade,
+CutRegion cut_region(const TetMesh& mesh, const BladeCutOptions& options, const Blade& blade,
                      bool wide);
 
 } // namespace gewebe

@@ -150,7 +150,7 @@ private:
         if (!waiting[r])
           continue;
         waiting[r] = false;
-        while (!(worst_part(r) <= limit_[r])) {
+        while (options_.along_faces ? is_split(r) : !(worst_part(r) <= limit_[r])) {
           const std::uint32_t node = give_up_one(r);
           for (const std::uint32_t other : region_.star_of(node))
             if (region_.tets[other].has_crossing() && other != r)
@@ -158,6 +158,12 @@ private:
         }
       }
     }
+  }
+
+  bool is_split(std::uint32_t r) const {
+    return std::ranges::any_of(region_.tets[r].crossing, [&](std::uint32_t e) {
+      return e != no_crossing && active(region_.edges[e]);
+    });
   }
 
   double worst_part(std::uint32_t r) const {
@@ -210,7 +216,8 @@ private:
   bool can_move(const Approach& way) {
     const CrossedEdge& edge = region_.edges[way.edge];
     const std::uint32_t node = edge.ends[way.end];
-    if (held_[node] || !within_planes(node, edge.point - result_.points[node]))
+    if (options_.along_faces || held_[node] ||
+        !within_planes(node, edge.point - result_.points[node]))
       return false;
     const Vec3 before = result_.points[node];
     result_.points[node] = edge.point;

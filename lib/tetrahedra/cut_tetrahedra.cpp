@@ -28,6 +28,11 @@ void check(const TetMesh& mesh, const BladeCutOptions& options) {
   for (std::size_t n = 0; n < options.places.size(); ++n)
     if (!is_finite(options.places[n]))
       throw Error("the place of node " + std::to_string(n) + " is not finite");
+  if (!options.among.empty() && options.among.size() != mesh.points.size())
+    throw Error(std::to_string(options.among.size()) +
+                " marks of nodes, expected none or one for "
+                "each of the " +
+                std::to_string(mesh.points.size()));
   if (!(options.snap >= 0 && options.snap <= 0.5))
     throw Error("a share of " + std::to_string(options.snap) +
                 " of an edge to move nodes within, expected 0 to 0.5");
@@ -274,7 +279,7 @@ private:
 /// Nothing if a wider neighbourhood of the blade is wanted.
 std::optional<TetCut> cut_near(const TetMesh& mesh, const Blade& blade,
                                const BladeCutOptions& options, bool wide) {
-  const CutRegion region = cut_region(mesh, options.places, blade, wide);
+  const CutRegion region = cut_region(mesh, options, blade, wide);
   if (!mesh.middles.empty())
     check_straight(mesh, region);
   const SnappedRegion snapped = snap_region(mesh, region, options);

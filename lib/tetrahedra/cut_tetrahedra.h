@@ -15,6 +15,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -35,6 +36,11 @@ struct BladeCutOptions {
   std::span<const Vec3> places = {};
   /// Nodes that must not be moved (they are doubled like others), in any order.
   std::span<const std::uint32_t> held = {};
+  /// By node, of quadratic meshes by corner at least: whether the blade passes edges between such
+  /// ones alone; empty: all.
+  std::span<const std::uint8_t> among = {};
+  /// The wound follows the faces of the mesh: no node is moved, none is put into an edge.
+  bool along_faces = false;
 };
 
 /// Where a node of the cut mesh stood before.
@@ -131,6 +137,11 @@ struct TetCut {
 /// option is out of its range; if there are too many nodes or tetrahedra
 TetCut cut_tetrahedra(const TetMesh& mesh, const TriangleMesh& blade,
                       const BladeCutOptions& options = {});
+
+/// The nodes before whose values make the value there, by the shape functions of the element, with
+/// their shares, sum 1. None of them has a share of 0.
+std::vector<std::pair<std::uint32_t, double>> shares_of(const TetMesh& before,
+                                                        const TetNodeOrigin& origin);
 
 /// What has a value at each node before, at those of the cut mesh: by the shape functions of the
 /// elements before. \pre `field` has one value per node before

@@ -265,11 +265,11 @@ private:
       return "restore " + o.name;
     if (one_in(4))
       return "tear " + o.name + " " + number_text(real(0, 0.3));
-    if (one_in(3))
+    if (one_in(o.model->tetrahedra.empty() ? 3 : 20))
       return "cut " + o.name + " springs " + nodes(*o.model) +
              (one_in(2) ? " " + nodes(*o.model) : "");
     return "cut " + o.name + " plane " + numbers(place(*o.model)) + " " + numbers(vector(2)) +
-           (one_in(3) ? " " + nodes(*o.model) : "");
+           (one_in(3) ? " " + nodes(*o.model) : "") + (one_in(8) ? " along=faces" : "");
   }
   std::string two_step(const Known& o) {
     const double threshold = one_in(2) ? real(1, 1e4) : real(1e3, 1e6);

@@ -8,6 +8,7 @@
 #include "simulation_scenes.h"
 #include "solid/assembly.h"
 #include "solid/model_stiffness.h"
+#include "solid/skin.h"
 #include "solid/solid_model.h"
 #include "solve/stiffness.h"
 
@@ -23,7 +24,8 @@ namespace gewebe {
 namespace {
 
 bool is_solid(Way way) {
-  return way == Way::solid || way == Way::warped || way == Way::solid_motion;
+  return way == Way::solid || way == Way::warped || way == Way::solid_motion ||
+         way == Way::sprung || way == Way::skinned;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
@@ -41,6 +43,10 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole};
   case Way::solid:
     return {Way::elastostatic, Way::whole};
+  case Way::sprung:
+    return {Way::elastostatic, Way::whole, Way::sprung};
+  case Way::skinned:
+    return {Way::elastostatic, Way::whole, Way::skinned};
   case Way::warped:
     return {Way::elastostatic, Way::whole, Way::warped};
   case Way::net:
@@ -94,10 +100,21 @@ Model solid(Model model) {
   return model;
 }
 
+Model model_of(Way way) {
+  Model model = is_solid(way) ? solid(test::organ(3)) : test::organ(3);
+  if (way == Way::sprung) {
+    const auto [i, j] = std::minmax(model.triangles[0][0], model.triangles[0][1]);
+    model.springs = {{i, j, SpringKind::edge, 1, 0, 1}};
+  }
+  if (way == Way::skinned)
+    (void)add_skin(model, surface_mesh(model), {}, {});
+  return model;
+}
+
 class Pair {
 public:
   Pair(Way way, std::vector<std::string>& warnings)
-      : model_(is_solid(way) ? solid(test::organ(3)) : test::organ(3)), way_(way),
+      : model_(model_of(way)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
     const bool moves = way == Way::explicit_motion || way == Way::implicit_motion ||
                        way == Way::attached || way == Way::solid_motion || way == Way::filled;
@@ -154,10 +171,18 @@ public:
         scene_.step(0.001);
       return scene_.instrument(0).nodes > 0 && norm(scene_.instrument(0).force) > 0;
     case Feature::cut:
-      scene_.apply(CutObject{0, way_ == Way::cut ? lower_incision() : test::incision(model_)});
+      scene_.apply(CutObject{0, is_solid(way_)     ? through()
+                                : way_ == Way::cut ? lower_incision()
+                                                   : test::incision(model_)});
       return test::count(scene_, Cutting::Kind::cut) == 1;
     case Feature::blade:
       return sweep();
+    case Feature::tear:
+      scene_.apply(SetTear{0, 0.05});
+      scene_.apply(SetDisplacement{0, {top()}, {0, 0, 6}});
+      for (int k = 0; k < 4; ++k)
+        scene_.step(0.001);
+      return test::count(scene_, Cutting::Kind::cut) > 0;
     case Feature::restore:
       scene_.apply(Restore{0});
       return test::count(scene_, Cutting::Kind::restored) == 1;
@@ -197,6 +222,7 @@ private:
                   [model] { return Factor(stiffness_matrix(model), Context{}); });
             }};
   }
+  static PlaneToCut through() { return {{{100.2, -50, 30}, {1, 0.1, 0}}, {}}; }
   PlaneToCut lower_incision() const {
     PlaneToCut cut{{{100.2, -50, 30}, {0.1, 1, 0}}, std::vector<std::uint32_t>{}};
     const Model& now = scene_.model(0);
@@ -217,10 +243,11 @@ private:
     InstrumentShape edge;
     edge.radius = 0;
     edge.blade = true;
-    edge.axis = {0, 0, -8};
-    scene_.apply(SetInstrument{0, edge, {{88, -50.3, 53}, {}}, "blade"});
+    edge.axis = {0, 0, is_solid(way_) ? -80.0 : -8.0}; // solids are cut through
+    const double away = is_solid(way_) ? 40 : 12;
+    scene_.apply(SetInstrument{0, edge, {{100 - away, -50.3, 53}, {}}, "blade"});
     scene_.step(0);
-    scene_.apply(MoveInstrument{0, {112, -50.3, 53}, {}, 0.01});
+    scene_.apply(MoveInstrument{0, {100 + away, -50.3, 53}, {}, 0.01});
     for (int k = 0; k < 10; ++k)
       scene_.step(0.001);
     std::set<std::size_t> cut;

@@ -3,7 +3,9 @@
 #include "base/error.h"
 #include "solid/solid_model.h"
 
+#include <algorithm>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace gewebe {
@@ -27,12 +29,20 @@ const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
     solid.nodes.resize(model.nodes.size());
     std::iota(solid.nodes.begin(), solid.nodes.end(), 0U);
   }
+  const std::span<const std::uint32_t> first = simulation.object(object).first_nodes;
+  for (const std::uint32_t node : solid.nodes)
+    solid.first.push_back(first.empty() ? node : first[node]);
+  std::ranges::sort(solid.first);
+  take_elements(solid, model);
+  return (solids_[object] = std::move(solid)).nodes;
+}
+
+void SceneStress::take_elements(Solid& solid, const Model& model) {
   solid.mesh = element_mesh(model);
   solid.materials = element_materials(model);
   solid.elements = solid_elements(solid.mesh, solid.materials);
   solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
                               std::vector<double>(3 * model.nodes.size()));
-  return (solids_[object] = std::move(solid)).nodes;
 }
 
 namespace {
@@ -46,10 +56,19 @@ StrainFrames frames_of(const ObjectFacts& object) {
 } // namespace
 
 void SceneStress::find(const Simulation& simulation, const Vec3& gravity) {
-  for (auto& [object, solid] : solids_)
+  for (auto& [object, solid] : solids_) {
+    if (topology_changed(simulation, object)) {
+      take_elements(solid, simulation.model(object));
+      const std::span<const std::uint32_t> first = simulation.object(object).first_nodes;
+      solid.nodes.clear();
+      for (std::uint32_t i = 0; i < simulation.model(object).nodes.size(); ++i)
+        if (std::ranges::binary_search(solid.first, first.empty() ? i : first[i]))
+          solid.nodes.push_back(i);
+    }
     solid.fields = solid_fields(solid.mesh, solid.materials, solid.elements,
                                 simulation.local_displacement(object), gravity,
                                 frames_of(simulation.object(object)));
+  }
 }
 
 const SolidFields* SceneStress::fields(std::size_t object) const {

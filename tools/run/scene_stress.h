@@ -25,7 +25,9 @@ public:
   ask(const Simulation& simulation, const EmitStressCommand& command, const LoadNodeList& lists);
   bool asked(std::size_t object) const { return solids_.contains(object); }
 
-  /// Behind a step: finds the fields of its shapes under the present gravity (mm/s²).
+  /// Behind a step, whose news were not taken yet: finds the fields of its shapes under the present
+  /// gravity (mm/s²). Of a solid that was cut answers tell of the copies of its nodes too, and of
+  /// what was put nearest to one.
   /// \throw Error as Simulation::displacement
   void find(const Simulation& simulation, const Vec3& gravity);
   /// Of the last find(), 0 before it; nothing where it was not asked for.
@@ -37,9 +39,11 @@ private:
     TetMesh mesh;
     std::vector<SolidMaterial> materials;
     std::vector<SolidElement> elements;
+    std::vector<std::uint32_t> first; ///< of answers' nodes: what they were in the model as it came
     std::vector<std::uint32_t> nodes; ///< that answers tell of
     SolidFields fields;
   };
+  static void take_elements(Solid& solid, const Model& model);
   std::map<std::size_t, Solid> solids_; ///< by object
 };
 

@@ -1,0 +1,482 @@
+// Scenes in which solids are cut: shapes are those of what is left, motion is carried on, what acts
+// on nodes follows them.
+
+#include "base/error.h"
+#include "larger.h"
+#include "mesh/check.h"
+#include "simulation_scenes.h"
+#include "solid/solid_model.h"
+#include "tet_fixtures.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::count, test::one_thread, test::shape;
+
+/// A bar of 20 x 10 x 10 mm of two materials, held at x = 0 if it is.
+Model bar(bool quadratic, bool held = true) {
+  TetMesh mesh = test::box_tetrahedra(8, 4, 4, 2.5);
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    double x = 0;
+    for (const std::uint32_t corner : t)
+      x += mesh.points[corner].x / 4;
+    mesh.material.push_back(x < 10 ? 0 : 1);
+  }
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.4},
+                                {"stone", 2e-3, 60000, 1, 0.2, 0.2}};
+  options.material.of_part = {0, 1};
+  options.quadratic = quadratic;
+  options.drag_rate = 0;
+  Model model = solid_model(std::move(mesh), options, {});
+  for (Node& node : model.nodes)
+    node.fixed = held && node.position.x == 0 ? fixed_all : fixed_none;
+  model.name = "bar";
+  return model;
+}
+
+std::vector<std::uint32_t> nodes_where(const Model& model, auto&& holds) {
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    if (holds(model.nodes[i].position))
+      nodes.push_back(i);
+  return nodes;
+}
+
+/// Across the bar, over its upper part alone.
+CutObject notch(const Model& model, double x) {
+  return {0, PlaneToCut{{{x, 0, 0}, {1, 0.1, 0.05}},
+                        nodes_where(model, [](const Vec3& p) { return p.z > 4; })}};
+}
+
+CutObject off(double x) {
+  return {0, PlaneToCut{{{x, 5, 5}, {1, 0.1, 0.2}}, {}}};
+}
+
+void expect_sound(const Model& model, double volume, double mass) {
+  check_model(model);
+  const TriangleMesh surface = surface_mesh(model);
+  EXPECT_NEAR(signed_volume(surface), volume, 1e-12 * volume);
+  EXPECT_NEAR(total_mass(model), mass, 1e-12 * mass);
+  const MeshReport report = examine_mesh(surface);
+  EXPECT_TRUE(report.closed() && report.oriented() && report.manifold());
+}
+
+/// Against a factor of its own of the same model under the same load.
+double error_of_shape(const Simulation& s, const Load& load) {
+  const Model model = s.model(0);
+  Elastostatic fresh(model, {}, one_thread());
+  fresh.update(load);
+  const std::span<const double> want = fresh.displacement();
+  const std::vector<double> is = shape(s, 0);
+  EXPECT_EQ(is.size(), want.size());
+  double largest = 0, worst = 0;
+  for (std::size_t i = 0; i < std::min(want.size(), is.size()); ++i) {
+    largest = test::larger(largest, std::abs(want[i]));
+    worst = test::larger(worst, std::abs(want[i] - is[i]));
+  }
+  EXPECT_GT(largest, 0);
+  return worst / largest;
+}
+
+class SolidCuts : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Orders, SolidCuts, testing::Bool());
+
+TEST_P(SolidCuts, AnElastostaticShapeIsThatOfTheCutModel) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(GetParam()), Method::ffe);
+  const double mass = total_mass(s.model(0));
+  Load load;
+  load.gravity = {0, 0, -9810};
+  s.apply(SetGravity{load.gravity});
+  s.step(0.1);
+  const std::vector<double> whole = shape(s, 0);
+  double lower = 0;
+  for (const double x : {5.3, 12.6, 8.9}) {
+    s.apply(notch(s.model(0), x));
+    ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
+    EXPECT_GT(s.news().cuttings[0].doubled, 3U);
+    s.take_news();
+    s.step(0.1);
+    expect_sound(s.model(0), 2000, mass);
+    EXPECT_LT(error_of_shape(s, load), 1e-10);
+    const std::vector<double> now = shape(s, 0);
+    double lowest = 0, before = 0;
+    for (std::size_t i = 2; i < now.size(); i += 3)
+      lowest = std::min(lowest, now[i]);
+    for (std::size_t i = 2; i < whole.size(); i += 3)
+      before = std::min(before, whole[i]);
+    EXPECT_LT(lowest, 1.03 * before); // it hangs lower each time
+    EXPECT_LT(lowest, lower);
+    lower = lowest;
+  }
+  EXPECT_EQ(s.object_count(), 1U);
+}
+
+TEST_P(SolidCuts, APieceComesOffAndFalls) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", bar(GetParam()), method);
+    const double mass = total_mass(s.model(0));
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.step(0.02);
+    const double hung = shape(s, 0)[3 * nodes_where(s.model(0),
+                                                    [](const Vec3& p) {
+                                                      return p == Vec3{20, 10, 10};
+                                                    })[0] +
+                                    2];
+    s.schedule(0.03, off(9.7));
+    s.step(0.02);
+    ASSERT_EQ(s.object_count(), 2U);
+    EXPECT_EQ(s.object(1).name, "bar.1");
+    EXPECT_EQ(s.object(1).method, Method::ela);
+    EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
+    EXPECT_NEAR(total_mass(s.model(0)) + total_mass(s.model(1)), mass, 1e-12 * mass);
+    expect_sound(s.model(1), signed_volume(surface_mesh(s.model(1))), total_mass(s.model(1)));
+    EXPECT_NEAR(signed_volume(surface_mesh(s.model(0))) + signed_volume(surface_mesh(s.model(1))),
+                2000, 1e-9);
+    const auto height = [&] {
+      const std::vector<double> u = shape(s, 1);
+      double sum = 0, all = 0;
+      for (std::size_t i = 0; i < u.size() / 3; ++i) {
+        sum += s.model(1).nodes[i].mass * u[3 * i + 2];
+        all += s.model(1).nodes[i].mass;
+      }
+      return sum / all;
+    };
+    const double start = height();
+    EXPECT_LT(start, 0.2 * hung); // it has its shape still
+    s.step(0.1);
+    const double fall = height() - start;
+    EXPECT_LT(fall, -0.95 * 9810 * 0.1 * 0.1 / 2) << method_name(method);
+    EXPECT_GT(fall, -1.9 * 9810 * 0.11 * 0.11 / 2) << method_name(method);
+  }
+}
+
+TEST_P(SolidCuts, APartGoesOnWithItsMomentum) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(GetParam(), false), Method::ela);
+  s.apply(SetGravity{{100, 0, 0}});
+  s.step(0.5);
+  s.apply(SetGravity{{}});
+  s.apply(off(9.7));
+  ASSERT_EQ(s.object_count(), 2U);
+  const auto middle = [&](std::size_t object) {
+    Vec3 sum;
+    double mass = 0;
+    const std::vector<double> u = shape(s, object);
+    for (std::size_t i = 0; i < u.size() / 3; ++i) {
+      const double m = s.model(object).nodes[i].mass;
+      sum += m * Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+      mass += m;
+    }
+    return sum / mass;
+  };
+  s.step(0);
+  const Vec3 first = middle(0), part = middle(1);
+  s.step(0.2);
+  EXPECT_NEAR((middle(0) - first).x, 10, 1e-6); // 50 mm/s each
+  EXPECT_NEAR((middle(1) - part).x, 10, 1e-6);
+}
+
+TEST_P(SolidCuts, ANodeThatIsPutBetweenOthersStandsWhereTheyDo) {
+  // A linear field, which elements of both kinds have exactly, held or let go.
+  const auto field = [](const Vec3& p) {
+    return Vec3{0.01 * p.y - 0.02 * p.z, 0.03 * p.x, -0.01 * p.x + 0.02 * p.y};
+  };
+  for (const bool held : {true, false}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", bar(GetParam(), false), Method::ela);
+    const std::vector<std::uint32_t> all =
+        nodes_where(s.model(0), [](const Vec3&) { return true; });
+    for (const std::uint32_t i : all)
+      s.apply(SetDisplacement{0, {i}, field(s.model(0).nodes[i].position)});
+    s.step(0.01);
+    if (!held)
+      s.apply(Release{0, all});
+    s.apply(off(9.7));
+    s.step(0);
+    for (const std::size_t object : {0U, 1U}) {
+      const Model& model = s.model(object);
+      const std::vector<double> u = shape(s, object);
+      for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+        const Vec3 want = field(model.nodes[i].position);
+        for (int a = 0; a < 3; ++a)
+          EXPECT_NEAR(u[3 * i + static_cast<std::size_t>(a)], want[a], 1e-12) << held;
+      }
+      EXPECT_EQ(s.contact_forces(object).size(), held ? model.nodes.size() : 0);
+    }
+  }
+}
+
+TEST_P(SolidCuts, LoadsGripsAndEventsFollow) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(GetParam()), Method::ela);
+  const auto end = nodes_where(s.model(0), [](const Vec3& p) { return p.x == 20; });
+  const auto top = nodes_where(s.model(0), [](const Vec3& p) { return p.z == 10; });
+  s.apply(SetInstrument{0, {1, {}, 0}, {{20, 5, 20}, {}}, "tongs"});
+  s.apply(Grasp{0, end, 0});
+  s.apply(SetPressure{0, top, {50, 0}});
+  s.apply(SetForce{0, {top[0]}, {0, 0, 5}});
+  s.schedule(0.05, Release{0, end});
+  s.step(0.01);
+  s.apply(CutObject{0, PlaneToCut{{{0, 0, 5.2}, {0.05, 0.02, 1}}, {}}}); // along the bar
+  s.step(0.01);
+  ASSERT_EQ(s.object_count(), 1U);
+  const auto ends = nodes_where(s.model(0), [](const Vec3& p) { return p.x == 20; });
+  EXPECT_GT(ends.size(), end.size());
+  EXPECT_EQ(s.instrument(0).nodes, ends.size());
+  s.apply(MoveInstrument{0, {20, 5, 21}, {}, 0});
+  s.step(0.01);
+  for (const std::uint32_t node : ends)
+    EXPECT_NEAR(shape(s, 0)[3 * node + 2], 1, 1e-12);
+  s.step(0.05);
+  EXPECT_EQ(s.contact_forces(0).size(), 0U);
+  EXPECT_EQ(s.instrument(0).nodes, 0U);
+}
+
+TEST_P(SolidCuts, ABladeCutsInOneStepAndInMany) {
+  for (const Method method : {Method::ffe, Method::ela})
+    for (const int steps : {1, 7, 40}) {
+      SCOPED_TRACE(std::string(method_name(method)) + " " + std::to_string(steps));
+      Simulation s(one_thread(), {});
+      s.add_object("bar", bar(GetParam()), method);
+      const double mass = total_mass(s.model(0));
+      InstrumentShape edge;
+      edge.radius = 0;
+      edge.blade = true;
+      edge.axis = {0, 0, 8};
+      s.apply(SetInstrument{0, edge, {{9.6, -2, 4}, {}}, "knife"});
+      s.step(0);
+      s.apply(MoveInstrument{0, {9.9, 12, 4}, {}, 0.1});
+      for (int k = 0; k < steps; ++k)
+        s.step(0.1 / steps);
+      EXPECT_EQ(s.object_count(), 1U);
+      expect_sound(s.model(0), 2000, mass);
+      // From side to side, down to where it reaches.
+      double area = 0, lowest = 10;
+      const Model& model = s.model(0);
+      for (const Triangle& t : model.triangles) {
+        const Vec3 &a = model.nodes[t[0]].position, &b = model.nodes[t[1]].position,
+                   &c = model.nodes[t[2]].position;
+        const auto inside = [](const Vec3& p) { return p.x > 7 && p.x < 12; };
+        const Vec3 n = cross(b - a, c - a);
+        if (!inside(a) || !inside(b) || !inside(c) || std::abs(n.x) < 0.5 * norm(n))
+          continue;
+        area += norm(n) / 4; // of either side
+        lowest = std::min({lowest, a.z, b.z, c.z});
+      }
+      EXPECT_GT(area, 0.5 * 10 * 6);
+      EXPECT_LT(area, 1.3 * 10 * 6);
+      EXPECT_NEAR(lowest, 4, 2.6);
+    }
+}
+
+TEST(SolidCutScenes, ABladeCutsWhereTheSolidIs) {
+  // The bar flies at 400 mm/s, the blade beside it: in the bar it moves straight down at x = 11,
+  // though in space each step's area leans by 2 mm.
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(false, false), Method::ela);
+  s.apply(SetGravity{{800, 0, 0}});
+  s.step(0.5);
+  s.apply(SetGravity{{}});
+  s.step(0);
+  const double away = shape(s, 0)[0];
+  EXPECT_GT(away, 90);
+  InstrumentShape edge;
+  edge.radius = 0;
+  edge.blade = true;
+  edge.axis = {0, 30, 0};
+  const double speed = 400, step = 0.005;
+  const auto place = [&](int k) { return Vec3{away + 11 + speed * step * k, -10, 12 - 1.4 * k}; };
+  s.apply(SetInstrument{0, edge, {place(0), {}}, "knife"});
+  for (int k = 1; k <= 10; ++k) {
+    s.apply(MoveInstrument{0, place(k), {}, 0});
+    s.step(step);
+  }
+  ASSERT_EQ(s.object_count(), 2U);
+  for (const std::size_t object : {0U, 1U}) {
+    Box3 box;
+    for (const Node& node : s.model(object).nodes)
+      box.add(node.position);
+    EXPECT_NEAR(box.min.x == 0 ? box.max.x : box.min.x, 11, 0.7);
+  }
+}
+
+TEST_P(SolidCuts, RestoreMakesItWholeAgain) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {}), never(one_thread(), {});
+    for (Simulation* one : {&s, &never}) {
+      one->add_object("bar", bar(GetParam()), method);
+      one->apply(SetForce{0, {1}, {0, 0, 500}});
+      one->step(0.05);
+    }
+    s.apply(notch(s.model(0), 8.1));
+    s.apply(Restore{0});
+    EXPECT_EQ(s.model(0), never.model(0));
+    s.step(0);
+    const std::vector<double> a = shape(s, 0), b = shape(never, 0);
+    double largest = 0;
+    for (const double value : b)
+      largest = test::larger(largest, std::abs(value));
+    // A node that was moved comes back through another element, so elements' bends are lost.
+    for (std::size_t i = 0; i < a.size(); ++i)
+      ASSERT_NEAR(a[i], b[i], (method == Method::ffe ? 1e-10 : 0.02) * largest) << i;
+    EXPECT_THROW(s.apply(Restore{0}), Error);
+    s.apply(off(9.7)); // and what has come off stays
+    s.step(0.01);
+    s.apply(Restore{0});
+    EXPECT_EQ(s.model(0), never.model(0));
+    EXPECT_EQ(s.object_count(), 2U);
+    s.step(0.01);
+    for (const double u : shape(s, 0))
+      EXPECT_TRUE(std::isfinite(u));
+  }
+}
+
+TEST(SolidCutScenes, BadCutsAreRefusedAndChangeNothing) {
+  SimulationOptions how;
+  how.guard = true;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), how);
+    s.add_object("bar", bar(false), method);
+    s.apply(SetForce{0, {5}, {0, 1, 5}});
+    s.step(0.01);
+    const Model before = s.model(0);
+    const std::vector<double> u = shape(s, 0);
+    const std::pair<CutObject, const char*> bad[]{
+        {{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}, "parts no tetrahedra, expected"},
+        {{0, PlaneToCut{{{0, 0, 5}, {0, 0, 1}}, std::vector<std::uint32_t>{3}}},
+         "parts no tetrahedra of these nodes, expected"},
+        {{0, PlaneToCut{{{1e200, 0, 5}, {1, 0, 1}}, {}}}, "expected"},
+        {{0, SpringsToCut{{0}, {1}}}, "no springs, expected a plane"},
+    };
+    for (const auto& [cut, words] : bad) {
+      try {
+        s.apply(cut);
+        ADD_FAILURE() << "no error";
+      } catch (const Error& error) {
+        EXPECT_TRUE(std::string(error.what()).starts_with("object bar: ")) << error.what();
+      }
+      EXPECT_EQ(s.model(0), before);
+    }
+    EXPECT_TRUE(s.news().cuttings.empty());
+    EXPECT_EQ(shape(s, 0), u);
+  }
+}
+
+TEST(SolidCutScenes, AStepThatFailsTakesACutBack) {
+  SimulationOptions how;
+  how.guard = true;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), how), calm(one_thread(), how);
+    for (Simulation* one : {&s, &calm}) {
+      one->add_object("bar", bar(false), method);
+      one->apply(SetGravity{{0, 0, -1000}});
+      one->step(0.01);
+    }
+    s.schedule(0.015, off(9.7));
+    s.schedule(0.018, CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
+    EXPECT_THROW(s.step(0.01), Error);
+    EXPECT_EQ(s.object_count(), 1U);
+    EXPECT_EQ(s.model(0), calm.model(0));
+    EXPECT_EQ(shape(s, 0), shape(calm, 0));
+    s.step_to(0.014);
+    if (method == Method::ffe)
+      calm.apply(Renew{0});
+    calm.step_to(0.014);
+    EXPECT_EQ(shape(s, 0), shape(calm, 0));
+  }
+}
+
+TEST(SolidCutScenes, TheSameForAnyNumberOfThreads) {
+  std::vector<double> first;
+  for (const int threads : {1, 2}) {
+    Context context;
+    context.threads = threads;
+    Simulation s(context, {});
+    s.add_object("bar", bar(true), Method::ffe);
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.step(0.01);
+    s.apply(notch(s.model(0), 5.3));
+    s.step(0.01);
+    s.apply(off(9.7));
+    s.step(0.05);
+    std::vector<double> all = shape(s, 0);
+    const std::vector<double> part = shape(s, 1);
+    all.insert(all.end(), part.begin(), part.end());
+    if (threads == 1)
+      first = all;
+    else
+      EXPECT_EQ(all, first);
+  }
+}
+
+TEST(SolidCutScenes, AlongFacesNoTetrahedronIsCutThrough) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(false), Method::ela);
+  const Model before = s.model(0);
+  PlaneToCut plane{{{9.1, 5, 5}, {1, 0.3, 0.2}}, {}};
+  plane.along_faces = true;
+  s.apply(CutObject{0, plane});
+  ASSERT_EQ(s.object_count(), 2U);
+  EXPECT_EQ(s.model(0).tetrahedra.size() + s.model(1).tetrahedra.size(), before.tetrahedra.size());
+  for (const std::size_t object : {0U, 1U})
+    for (const Node& node : s.model(object).nodes)
+      EXPECT_TRUE(std::ranges::any_of(
+          before.nodes, [&](const Node& was) { return was.position == node.position; }));
+}
+
+TEST(SolidCutScenes, LargeRotationsAndTwoStepsFollow) {
+  for (const bool warp : {true, false}) {
+    Simulation s(one_thread(), {}), after(one_thread(), {});
+    s.add_object("bar", bar(false), Method::ffe);
+    Model stiff = bar(false);
+    stiff.materials[0].young *= 4;
+    stiff.materials[1].young *= 3;
+    if (warp)
+      s.apply(SetWarp{0});
+    else
+      s.apply(SetTwoStep{0, {.threshold = 1e4}, {}, std::make_shared<const Model>(stiff)});
+    s.apply(SetGravity{{0, 0, -20000}});
+    s.step(0.1);
+    s.apply(notch(s.model(0), 7.7));
+    s.step(0.1);
+    const std::vector<double> is = shape(s, 0);
+    // The same of the cut model, as it comes.
+    after.add_object("bar", s.model(0), Method::ffe);
+    if (warp) {
+      after.apply(SetWarp{0});
+    } else {
+      Model both = s.model(0);
+      both.materials = stiff.materials;
+      after.apply(SetTwoStep{0, {.threshold = 1e4}, {}, std::make_shared<const Model>(both)});
+    }
+    after.apply(SetGravity{{0, 0, -20000}});
+    after.step(0.1);
+    const std::vector<double> want = shape(after, 0);
+    ASSERT_EQ(is.size(), want.size());
+    double largest = 0, worst = 0;
+    for (std::size_t i = 0; i < want.size(); ++i) {
+      largest = test::larger(largest, std::abs(want[i]));
+      worst = test::larger(worst, std::abs(want[i] - is[i]));
+    }
+    EXPECT_LT(worst, (warp ? 1e-5 : 1e-10) * largest);
+    s.apply(off(9.7)); // with the velocity of such an object
+    s.step(0.01);
+    EXPECT_EQ(s.object_count(), 2U);
+  }
+}
+
+} // namespace
+} // namespace gewebe
