@@ -35,21 +35,24 @@ ColorRamp color_ramp_from_image(const Image& image) {
   return ramp;
 }
 
+std::array<double, 3> ramp_color(const ColorRamp& ramp, double share) {
+  const std::size_t last = ramp.colors.size() - 1;
+  const double place = std::clamp(share, 0.0, 1.0) * static_cast<double>(last);
+  const std::size_t n = std::min(static_cast<std::size_t>(place), last);
+  const auto &a = ramp.colors[n], &b = ramp.colors[std::min(n + 1, last)];
+  std::array<double, 3> color{};
+  for (std::size_t k = 0; k < 3; ++k)
+    color[k] = a[k] + (b[k] - a[k]) * (place - static_cast<double>(n));
+  return color;
+}
+
 Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height, double min,
               double max, const ColorRamp& ramp) {
   Image image{width, height, 3, {}};
   image.values.reserve(values.size() * 3);
-  const std::size_t last = ramp.colors.size() - 1;
-  for (const float value : values) {
-    const double share = std::clamp((static_cast<double>(value) - min) / (max - min), 0.0, 1.0);
-    const double place = share * static_cast<double>(last);
-    const std::size_t n = std::min(static_cast<std::size_t>(place), last);
-    const auto &a = ramp.colors[n], &b = ramp.colors[std::min(n + 1, last)];
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double mixed = a[c] + (b[c] - a[c]) * (place - static_cast<double>(n));
+  for (const float value : values)
+    for (const double mixed : ramp_color(ramp, (static_cast<double>(value) - min) / (max - min)))
       image.values.push_back(static_cast<std::uint8_t>(std::floor(mixed + 0.5)));
-    }
-  }
   return image;
 }
 

@@ -25,6 +25,9 @@ ColorRamp color_ramp_from_name(std::string_view name);
 /// The pixels of the middle row, from left to right. \throw Error if the image has none
 ColorRamp color_ramp_from_image(const Image& image);
 
+/// At a share of its length, 0 … 1 (beyond it that of its ends), 0 … 255.
+std::array<double, 3> ramp_color(const ColorRamp& ramp, double share);
+
 /// The colour of each value: the ramp's first one up to `min`, its last one from `max` on.
 /// \pre min < max, values.size() == width · height
 Image colored(std::span<const float> values, std::uint32_t width, std::uint32_t height, double min,

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -95,6 +96,70 @@ TEST(RenderVolume, SlicesOfABallAreDiscsOfKnownRadius) {
     options.camera.distance = 26;
     EXPECT_NEAR(disc_radius(view_volume(grid, options, {})), 6, 0.02);
   }
+}
+
+// A block of 16 voxels between clear ones: an optical depth of σ times its 16 voxels, as its ramps
+// count by half.
+TEST(RenderVolume, TranslucentBlockHasItsAnalyticDepth) {
+  for (const double size : {0.5, 2.0}) {
+    const Grid grid = grid_of([](const Vec3&) { return 3.0; }, 8, uniform_transform(size));
+    for (const double k : {0.001, 0.05, 3.0}) {
+      VolumeViewOptions options = options_of(VolumeMode::translucent, VolumeAxis::y, 5);
+      options.transfer.ramp.colors = {{51, 102, 204}};
+      options.transfer.range = {0, 6};
+      options.transfer.extinction = k;
+      const VolumeView view = view_volume(grid, options, {});
+      const double left = std::exp(-k / 2 * 16 * size);
+      const std::array<double, 3> color{0.2, 0.4, 0.8};
+      EXPECT_NEAR(static_cast<double>(view.values[12]), left, k > 1 ? 1.0 / 4096 : 1e-6) << k;
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(static_cast<double>(view.colors[36 + c]), (1 - left) * color[c],
+                    k > 1 ? 1.0 / 4096 : 1e-6);
+      options.transfer.range = {3, 6}; // from the value itself on nothing is seen
+      EXPECT_EQ(view_volume(grid, options, {}).values[12], 1.0F);
+    }
+  }
+}
+
+TEST(RenderVolume, TranslucentFieldsAreIntegratedAlongTheRay) {
+  const auto f = [](const Vec3& p) { // not symmetric: what is in front counts
+    return std::exp(-norm(p - Vec3{2, 1, 0}) / 3) + 0.7 * std::exp(-norm(p + Vec3{3, 2, 2}) / 2);
+  };
+  const Grid grid = grid_of(f, 16, rotated(0.7));
+  VolumeViewOptions options = options_of(VolumeMode::translucent, VolumeAxis::view, 12);
+  options.camera.view = "iso";
+  options.transfer.ramp = color_ramp_from_name("rainbow");
+  options.transfer.range = {0.05, 0.9};
+  options.transfer.extinction = 0.4;
+  const VolumeView view = view_volume(grid, options, {});
+  double worst = 0, turned = 0, least = 1;
+  for (std::size_t y = 0; y < 12; ++y)
+    for (std::size_t x = 0; x < 12; ++x) {
+      Field field(grid);
+      constexpr double reach = 40, step = 0.004;
+      for (const double way : {-1.0, 1.0}) { // from the eye, and the wrong way around
+        double depth = 0;
+        std::array<double, 3> color{};
+        for (double t = -reach; t < reach; t += step) {
+          const Vec3 p = place(view, x, y) + view.camera.back * (way * (t + step / 2));
+          const double u =
+              std::clamp((field.value(grid.info().transform.to_index(p)) - 0.05) / 0.85, 0.0, 1.0);
+          const auto c = ramp_color(options.transfer.ramp, u);
+          for (std::size_t k = 0; k < 3; ++k)
+            color[k] += c[k] / 255 * 0.4 * u * step * std::exp(-depth);
+          depth += 0.4 * u * step;
+        }
+        double error = std::abs(static_cast<double>(view.values[y * 12 + x]) - std::exp(-depth));
+        for (std::size_t k = 0; k < 3; ++k)
+          error = test::larger(
+              error, std::abs(static_cast<double>(view.colors[3 * (y * 12 + x) + k]) - color[k]));
+        (way < 0 ? worst : turned) = test::larger(way < 0 ? worst : turned, error);
+        least = test::smaller(least, std::exp(-depth));
+      }
+    }
+  EXPECT_LT(worst, 0.002);
+  EXPECT_GT(turned, 0.05);
+  EXPECT_LT(least, 0.4);
 }
 
 TEST(RenderVolume, SlicesAreTheFieldAtThePixels) {
@@ -185,10 +250,12 @@ TEST(RenderVolume, PicturesAreTheSameForAnyNumberOfThreads) {
   Context one, many;
   one.threads = 1;
   many.threads = 3;
-  for (const VolumeMode mode : {VolumeMode::slice, VolumeMode::maximum}) {
+  for (const VolumeMode mode : {VolumeMode::slice, VolumeMode::maximum, VolumeMode::translucent}) {
     VolumeViewOptions options = options_of(mode, VolumeAxis::view, 70);
+    options.transfer.ramp = color_ramp_from_name("heat");
     options.camera.view = "iso";
     EXPECT_EQ(view_volume(grid, options, one).values, view_volume(grid, options, many).values);
+    EXPECT_EQ(view_volume(grid, options, one).colors, view_volume(grid, options, many).colors);
   }
 }
 

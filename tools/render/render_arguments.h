@@ -35,7 +35,7 @@ struct RenderMaterial {
 
 /// What a volume alone is asked for, as words and as what they mean.
 struct RenderVolume {
-  std::string slice, maximum, ramp;
+  std::string slice, maximum, translucent, ramp;
   std::vector<double> range;
   VolumeViewOptions view; ///< its mode, axis and place
 };

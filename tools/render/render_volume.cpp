@@ -4,6 +4,7 @@
 #include "formats/volume/volume_plugin.h"
 #include "raster/raster_cpu.h"
 #include "shading/color_ramp.h"
+#include "shading/surface_material.h"
 
 #include <algorithm>
 #include <charconv>
@@ -54,6 +55,11 @@ void declare_volume(Program& p, RenderArguments& a) {
            "of a volume: across x, y, z or view, at a place or in the middle");
   p.option("--maximum", a.volume.maximum, "AXIS",
            "of a volume: the greatest values along x, y, z, or view (the default)");
+  p.option("--translucent", a.volume.translucent, "AXIS",
+           "of a volume: its light, and what it hides, along x, y, z or view");
+  p.option("--extinction", a.volume.view.transfer.extinction, "K",
+           "of translucent volumes, 1/mm at the last colour, else 8 over its longest side")
+      .positive();
   p.option("--ramp", a.volume.ramp, "RAMP",
            "colours of its values or a field's: gray, heat, rainbow, or an image");
   p.option("--range", a.volume.range, "A,B", "values with the first and last colour, else all")
@@ -64,6 +70,10 @@ void complete_volume(RenderArguments& a) {
   RenderVolume& v = a.volume;
   if (!v.slice.empty() && !v.maximum.empty())
     throw UsageError("--slice and --maximum, expected one of them");
+  if (!v.translucent.empty() && !(v.slice.empty() && v.maximum.empty()))
+    throw UsageError("--translucent with --slice or --maximum, expected one of them");
+  if (v.view.transfer.extinction && v.translucent.empty())
+    throw UsageError("--extinction without --translucent, expected both");
   if (!v.slice.empty()) {
     v.view.mode = VolumeMode::slice;
     const std::size_t mid = v.slice.find('=');
@@ -72,6 +82,9 @@ void complete_volume(RenderArguments& a) {
       v.view.place = place_of(v.slice.substr(mid + 1));
   } else if (!v.maximum.empty()) {
     v.view.axis = axis_of("--maximum", v.maximum);
+  } else if (!v.translucent.empty()) {
+    v.view.mode = VolumeMode::translucent;
+    v.view.axis = axis_of("--translucent", v.translucent);
   }
   if (!v.range.empty() && !(v.range[0] < v.range[1]))
     throw UsageError("--range: expected two values, the smaller one first");
@@ -84,11 +97,12 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
   const RenderVolume& v = a.volume;
   const bool field = !a.reading.field.empty();
   if (kind != Kind::vdb)
-    return refuse(!v.slice.empty() || !v.maximum.empty() ||
+    return refuse(!v.slice.empty() || !v.maximum.empty() || !v.translucent.empty() ||
                       (!field && (!v.ramp.empty() || !v.range.empty())),
                   input,
-                  field ? "--slice or --maximum for no volume, expected neither"
-                        : "--slice, --maximum, --ramp or --range for no volume, expected none of "
+                  field ? "--slice, --maximum or --translucent for no volume, expected none of them"
+                        : "--slice, --maximum, --translucent, --ramp or --range for no volume, "
+                          "expected none of "
                           "them (--ramp and --range with --field too)");
   refuse(field, input, "--field for a volume, expected --ramp alone");
   refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
@@ -108,6 +122,22 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
          input, "--unit, --object or --frame for a volume, expected none of them");
 }
 
+namespace {
+
+/// The colours of a translucent volume before a background.
+Image composed(const VolumeView& view, const Vec3& background) {
+  Image image{view.width, view.height, 3, {}};
+  image.values.reserve(view.colors.size());
+  for (std::size_t n = 0; n < view.values.size(); ++n)
+    for (std::size_t c = 0; c < 3; ++c)
+      image.values.push_back(
+          stored(static_cast<double>(view.colors[3 * n + c]) +
+                 static_cast<double>(view.values[n]) * background[static_cast<int>(c)]));
+  return image;
+}
+
+} // namespace
+
 Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
   const Context& context = run.context();
   const ColorRamp ramp = ramp_of(a.volume.ramp.empty() ? "gray" : a.volume.ramp, context);
@@ -119,6 +149,12 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
   if (std::max(options.width, options.height) > max_picture_side)
     throw UsageError("--size times --supersample: expected sides up to " +
                      std::to_string(max_picture_side));
+  const bool translucent = options.mode == VolumeMode::translucent;
+  if (translucent) {
+    options.transfer.ramp = ramp;
+    if (!a.volume.range.empty())
+      options.transfer.range = {a.volume.range[0], a.volume.range[1]};
+  }
   std::string bytes = run.timed("read", [&] { return input.read_all(context.max_memory); });
   const VolumeView view = run.timed(
       "draw", [&] { return view_volume_bytes(std::move(bytes), input.name(), options, context); });
@@ -130,11 +166,16 @@ Image volume_picture(Run& run, const RenderArguments& a, Input& input) {
     run.warn(input.name() + ": all values are equal");
     max = min + 1;
   }
-  Image image = shrunk(colored(view.values, view.width, view.height, min, max, ramp), finer);
+  Image image = shrunk(translucent ? composed(view, a.words.background.value_or(Vec3{}))
+                                   : colored(view.values, view.width, view.height, min, max, ramp),
+                       finer);
   const auto [low, high] = std::ranges::minmax_element(view.values);
   Stats& stats = run.stats();
   stats.set("range", std::vector<double>{min, max});
-  stats.set("seen", std::vector<double>{static_cast<double>(*low), static_cast<double>(*high)});
+  if (translucent)
+    stats.set("extinction", view.extinction);
+  stats.set(translucent ? "left" : "seen",
+            std::vector<double>{static_cast<double>(*low), static_cast<double>(*high)});
   stats.set("looks_at", view.camera.target);
   stats.set("looks_along", view.camera.back * -1.0);
   stats.set("width_mm", 2 * view.half_width);
