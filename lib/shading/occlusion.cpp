@@ -39,9 +39,9 @@ public:
     facets_ = std::move(sorted);
   }
 
-  /// The distance to the first facet between `least` and `most`, `most` if there is none.
+  /// The distance to the first facet, `most` if there is none nearer.
   /// \pre `along` is a unit vector
-  double first_hit(const Vec3& from, const Vec3& along, double least, double most) const {
+  double first_hit(const Vec3& from, const Vec3& along, double most) const {
     if (nodes_.empty())
       return most;
     const Vec3 inverse{1 / along.x, 1 / along.y, 1 / along.z}; // infinite along an axis
@@ -55,7 +55,7 @@ public:
       const Node& node = nodes_[at];
       if (node.count > 0) {
         for (std::uint32_t n = node.first; n < node.first + node.count; ++n)
-          nearest = std::min(nearest, hit(facets_[n], from, along, least, nearest));
+          nearest = std::min(nearest, hit(facets_[n], from, along, nearest));
       } else {
         std::uint32_t near = at + 1, far = node.first;
         double t_near = entry(nodes_[near], from, inverse),
@@ -135,8 +135,7 @@ private:
   }
 
   /// Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, 1997; both sides.
-  static double hit(const Facet& f, const Vec3& from, const Vec3& along, double least,
-                    double most) {
+  static double hit(const Facet& f, const Vec3& from, const Vec3& along, double most) {
     const Vec3 p = cross(along, f.edge2);
     const double det = dot(f.edge1, p);
     if (det == 0)
@@ -148,7 +147,7 @@ private:
       return most;
     const Vec3 q = cross(to, f.edge1);
     const double v = dot(along, q) / det, t = dot(f.edge2, q) / det;
-    return v >= -slack && u + v <= 1 + slack && t > least && t < most ? t : most;
+    return v >= -slack && u + v <= 1 + slack && t > 0 && t < most ? t : most;
   }
 
   std::vector<Facet> facets_;
@@ -207,10 +206,11 @@ std::vector<std::vector<float>> openness(std::span<const Occluder> surfaces, dou
         if (!used[p] || n == Vec3{})
           continue;
         const auto [x, y] = across(n);
+        const Vec3 from = surface.points[p] + n * (occlusion_lift * radius);
         double hidden = 0;
         for (const Vec3& ray : rays) {
           const Vec3 along = x * ray.x + y * ray.y + n * ray.z;
-          hidden += 1 - tree.first_hit(surface.points[p], along, 1e-4 * radius, radius) / radius;
+          hidden += 1 - tree.first_hit(from, along, radius) / radius;
         }
         result[s][p] = static_cast<float>(1 - hidden / occlusion_rays);
       }

@@ -30,21 +30,46 @@ TEST(Occlusion, NothingHidesAConvexBody) {
     EXPECT_EQ(open, 1.0F);
 }
 
-// From the inside of a sphere a ray at the angle a runs 2 r cos a; the mean of cos a, weighted by
-// itself, is 2/3.
+// From e above the inside of a sphere a ray at the angle a from the normal, cos a = c, runs
+// (r - e) c + √(r² - (r - e)² (1 - c²)); with e = 0 and a large radius the openness were 4 r / 3 R.
+double inside_a_sphere(double r, double radius) {
+  const double below = r - occlusion_lift * radius;
+  constexpr int steps = 20000;
+  double open = 0;
+  for (int n = 0; n < steps; ++n) {
+    const double square = (n + 0.5) / steps; // of c, which has the weight 2 c
+    const double chord =
+        below * std::sqrt(square) + std::sqrt(r * r - below * below * (1 - square));
+    open += test::smaller(chord / radius, 1.0) / steps;
+  }
+  return open;
+}
+
 TEST(Occlusion, InsideASphere) {
   const double r = 30;
   const TriangleMesh ball = test::sphere_mesh(4, r, {5, 6, 7});
   std::vector<Vec3> inwards = render_normals(ball);
   for (Vec3& n : inwards)
     n = n * -1.0;
-  for (const double radius : {2 * r, 5 * r})
+  EXPECT_NEAR(inside_a_sphere(r, 3 * r), 4.0 / 9, 0.02);
+  for (const double radius : {r, 2 * r, 5 * r})
     for (const float open : openness_of(ball, inwards, radius))
-      EXPECT_NEAR(static_cast<double>(open), 4 * r / (3 * radius), 0.002);
-  // Where the radius is smaller, chords up to it count: cos a < c = R / 2 r.
-  const double c = 0.5, expected = 1 - (c * c - 2 * c * c * c / (3 * c));
-  for (const float open : openness_of(ball, inwards, 2 * r * c))
-    EXPECT_NEAR(static_cast<double>(open), expected, 0.02);
+      EXPECT_NEAR(static_cast<double>(open), inside_a_sphere(r, radius), 0.003);
+}
+
+// A sliver that is folded over beside a point hides nothing.
+TEST(Occlusion, AFoldHidesNothing) {
+  TriangleMesh m;
+  m.points = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}, {-10, -10, 0}, {5, 0.1, 0.05}};
+  m.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 4}};
+  std::vector<Vec3> up(m.points.size(), Vec3{0, 0, 1});
+  EXPECT_EQ(openness_of(m, up, 20)[0], 1.0F);
+  for (const Vec3& p : {Vec3{2, -5, 0}, {2, 5, 0}, {2, 0, 6}}) { // a wall
+    m.points.push_back(p);
+    up.push_back({0, 0, 1});
+  }
+  m.triangles.push_back({5, 6, 7});
+  EXPECT_LT(openness_of(m, up, 20)[0], 0.97F);
 }
 
 // A wall without end beside a floor hides what looks towards it.
@@ -89,7 +114,7 @@ TriangleMesh scattered(std::size_t count, std::vector<Vec3>& normals) {
 double counted(const TriangleMesh& m, std::size_t p, const Vec3& n, double radius) {
   std::mt19937 random(static_cast<std::mt19937::result_type>(p));
   const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
-  const Vec3 from = m.points[p];
+  const Vec3 from = m.points[p] + n * (0.01 * radius);
   double hidden = 0;
   constexpr int rays = 3000;
   for (int k = 0; k < rays; ++k) {
@@ -107,7 +132,7 @@ double counted(const TriangleMesh& m, std::size_t p, const Vec3& n, double radiu
       if (!((u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0)) || sum == 0)
         continue;
       const double t = dot(a, cross(b, c)) / sum;
-      if (t > 1e-4 * radius)
+      if (t > 0)
         nearest = test::smaller(nearest, t);
     }
     hidden += 1 - nearest / radius;
