@@ -9,6 +9,10 @@ BINDIR ?= $(PREFIX)/bin
 LIBDIR ?= $(PREFIX)/lib
 INCLUDEDIR ?= $(PREFIX)/include
 MANDIR ?= $(PREFIX)/share/man
+# Where shells look for completions; Debian's packages have zsh/vendor-completions.
+BASHDIR ?= $(PREFIX)/share/bash-completion/completions
+ZSHDIR ?= $(PREFIX)/share/zsh/site-functions
+FISHDIR ?= $(PREFIX)/share/fish/vendor_completions.d
 INSTALL ?= install
 
 # --- How to compile ---------------------------------------------------------------------------------
@@ -85,6 +89,8 @@ PLUGIN := $(BUILD)/gewebe-volume.so
 PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 
 obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
+# The commit that programs tell; its own unit, so that another one compiles nothing else and links programs alone.
+COMMIT := $(BUILD)/obj/commit.o
 OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(VALIDATE_SRC) tests/fuzz/replay.cpp)
 
 # --- Packages ---------------------------------------------------------------------------------------
@@ -172,7 +178,15 @@ $(ARCHIVE) $(SHARED):
 	@mkdir -p $(@D) && rm -f $@
 	$(AR) rcsD $@ $^
 
-$(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(SHARED) $(ARCHIVE)
+$(BUILD)/commit.cpp: FORCE
+	@mkdir -p $(@D)
+	@printf 'extern "C" const char gewebe_commit[] = "%s";\n' "$$(scripts/commit)" | cmp -s - $@ || \
+	  printf 'extern "C" const char gewebe_commit[] = "%s";\n' "$$(scripts/commit)" > $@
+$(COMMIT): $(BUILD)/commit.cpp | $(FIRST)
+	@mkdir -p $(@D)
+	$(CXX) -fPIC -c $< -o $@
+
+$(TOOLS): $(BUILD)/%: $(BUILD)/obj/tools/%.o $(COMMIT) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 
 $(PLUGIN): $(ARCHIVE)
@@ -199,6 +213,17 @@ else
 $(FUZZ): $(BUILD)/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/obj/tests/fuzz/replay.o $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)
 endif
+
+# What shells complete command lines by, from what the programs declare.
+COMPLETIONS := $(BUILD)/completions/gewebe $(BUILD)/completions/_gewebe $(TOOLS:$(BUILD)/%=$(BUILD)/completions/%.fish)
+completed = @mkdir -p $(@D) && scripts/completions $(1) $(BUILD) $(2) > $@
+$(COMPLETIONS): $(TOOLS) scripts/completions
+$(BUILD)/completions/gewebe:
+	$(call completed,bash,$(notdir $(TOOLS)))
+$(BUILD)/completions/_gewebe:
+	$(call completed,zsh,$(notdir $(TOOLS)))
+$(BUILD)/completions/%.fish: $(TOOLS) scripts/completions
+	$(call completed,fish,$*)
 
 -include $(OBJECTS:.o=.d)
 
@@ -281,7 +306,7 @@ $(TIDY_STAMPS): $(LINT)/%.tidy: % .clang-tidy tests/.clang-tidy scripts/tidy | $
 
 to = $(DESTDIR)$(1)
 PC := $(call to,$(LIBDIR))/pkgconfig/gewebe.pc
-install: all
+install: all $(COMPLETIONS)
 	@test '$(config)' != fuzz || { echo 'install: config=fuzz has no programs' >&2; exit 1; }
 	$(INSTALL) -d '$(call to,$(BINDIR))' '$(call to,$(LIBDIR))/pkgconfig'
 	$(if $(TOOLS),$(INSTALL) $(TOOLS) '$(call to,$(BINDIR))')
@@ -289,6 +314,11 @@ install: all
 	$(INSTALL) -m 644 $(ARCHIVE) '$(call to,$(LIBDIR))'
 	$(foreach h,$(PUBLIC),$(INSTALL) -D -m 644 $(firstword $(wildcard lib/$h $h) $h) '$(call to,$(INCLUDEDIR))/gewebe/$h' &&) true
 	$(foreach m,$(MAN),$(INSTALL) -D -m 644 $m '$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)' &&) true
+	$(INSTALL) -D -m 644 $(BUILD)/completions/gewebe '$(call to,$(BASHDIR))/gewebe'
+	$(foreach t,$(filter-out gewebe,$(notdir $(TOOLS))),ln -sf gewebe '$(call to,$(BASHDIR))/$t' &&) true
+	$(INSTALL) -D -m 644 $(BUILD)/completions/_gewebe '$(call to,$(ZSHDIR))/_gewebe'
+	$(INSTALL) -d '$(call to,$(FISHDIR))'
+	$(INSTALL) -m 644 $(filter %.fish,$(COMPLETIONS)) '$(call to,$(FISHDIR))'
 	sed -e 's|@VERSION@|$(VERSION)|' -e 's|@LIBS@|$(LIBS)|' -e 's|@PREFIX@|$(PREFIX)|' \
 	  -e 's|@LIBDIR@|$(LIBDIR:$(PREFIX)/%=$${prefix}/%)|' -e 's|@INCLUDEDIR@|$(INCLUDEDIR:$(PREFIX)/%=$${prefix}/%)|' \
 	  gewebe.pc.in > '$(PC)'
@@ -302,12 +332,13 @@ uninstall:
 	rm -f '$(call to,$(PLUGINDIR))/$(notdir $(PLUGIN))'
 	rm -f $(foreach h,$(PUBLIC),'$(call to,$(INCLUDEDIR))/gewebe/$h')
 	rm -f $(foreach m,$(MAN),'$(call to,$(MANDIR))/man$(subst .,,$(suffix $m))/$(notdir $m)')
+	rm -f $(foreach t,$(notdir $(TOOLS)),'$(call to,$(BASHDIR))/$t' '$(call to,$(FISHDIR))/$t.fish') '$(call to,$(ZSHDIR))/_gewebe'
 	@for folder in $(foreach d,$(ours),'$(call to,$(INCLUDEDIR))/gewebe/$d') \
 	  '$(call to,$(INCLUDEDIR))/gewebe/formats' '$(call to,$(INCLUDEDIR))/gewebe' \
 	  '$(call to,$(PLUGINDIR))' '$(call to,$(LIBDIR))/pkgconfig' $(foreach s,1 5 7,'$(call to,$(MANDIR))/man$s'); do \
 	  rmdir "$$folder" 2>/dev/null || true; done
 ifeq ($(system_dir),)
-	@for folder in '$(BINDIR)' '$(LIBDIR)' '$(INCLUDEDIR)' '$(MANDIR)'; do \
+	@for folder in '$(BINDIR)' '$(LIBDIR)' '$(INCLUDEDIR)' '$(MANDIR)' '$(BASHDIR)' '$(ZSHDIR)' '$(FISHDIR)'; do \
 	  while test "$$folder" != / && test "$$folder" != . && rmdir '$(DESTDIR)'"$$folder" 2>/dev/null; do \
 	    folder=$$(dirname "$$folder"); done; done
 endif
@@ -327,7 +358,7 @@ help:
 	@echo '  bench          measure time against error'
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
 	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
-	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, library, headers, gewebe.pc'
+	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, completions, library, headers, gewebe.pc'
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo

@@ -56,7 +56,8 @@ int main(int argc, char** argv) {
   Arguments a;
   p.flag("--resample", a.options.resample, "bring the others to the first volume's lattice");
   p.output_kinds({Kind::vdb});
-  p.operand("OPERATION", a.word, "add, subtract, union, intersect, difference, xor", true);
+  p.operand("OPERATION", a.word, "add, subtract, union, intersect, difference, xor", true,
+            csg_operation_names());
   p.operands("VOLUME", a.volumes, "the volumes, - for standard input", 2);
   p.check([&] { complete(a); });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });

@@ -29,8 +29,10 @@ int main(int argc, char** argv) {
       .option("--bbox", arguments.box, "X0,Y0,Z0,X1,Y1,Z1",
               "only what lies in this box of the world, closed by its faces")
       .count(6);
-  program.option("--components", arguments.components, "WHICH",
-                 "keep only the largest components: largest, a number N, or min-volume:V mm3");
+  program
+      .option("--components", arguments.components, "WHICH",
+              "keep only the largest components: largest, a number N, or min-volume:V mm3")
+      .such_as({"largest", "1", "min-volume:"});
   program
       .option("--regularize", arguments.rounds, "N",
               "improve the triangles by N rounds of flips and sliding along the surface")

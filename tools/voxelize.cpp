@@ -129,11 +129,13 @@ int main(int argc, char** argv) {
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
   p.option("--label", a.labels, "L[-M][,L...]",
            "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels together; list: "
-           "which there are");
+           "which there are")
+      .such_as({"list"});
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.antialias, "FILTER",
-           "grey values: jones (for surfaces), exact (for volumes), sramek, lines:N, box:N, none");
+           "grey values: jones (for surfaces), exact (for volumes), sramek, lines:N, box:N, none")
+      .such_as({"jones", "exact", "sramek", "lines:", "box:", "none"});
   p.option("--on-open", a.on_open, "WHAT",
            "an open mesh: error, warn (odd rays stay empty), fill (close the holes)")
       .one_of({"error", "warn", "fill"});

@@ -59,6 +59,7 @@ test_uninstall_leaves_nothing() {
   mv away.so stage/opt/gewebe/lib/gewebe/gewebe-volume.so
   grep -q 'share/man/man1/' laid || fail 'no man page was installed'
   grep -q 'lib/pkgconfig/gewebe.pc' laid || fail 'no gewebe.pc was installed'
+  grep -q bash-completion/completions/gewebe laid || fail 'no completions were installed'
   ! grep -q _internal laid || fail 'an internal header was installed'
   staged_make uninstall /opt/gewebe
   [[ ! -d stage ]] || left=$(find stage -mindepth 1)
@@ -84,8 +85,9 @@ loads() { # TOOL LIBRARY; no pipe into grep -q, which would end ldd early
 test_programs_load_only_what_they_use() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   local tool library uses
-  for tool in $(programs); do
+  for tool in $(programs) gewebe; do
     case $tool in
+      gewebe) uses=' ' ;;
       metaball2vol | csg) uses=' openvdb ' ;;
       voxelize | mc-opt) uses=' openvdb assimp ' ;;
       exp2ela) uses=' assimp cholmod ' ;; # --fit solves

@@ -23,9 +23,9 @@ has() { command -v "$1" >/dev/null || { left_out "no $1"; return 1; }; }
 has_module() { python3 -c "import $1" 2>/dev/null || { left_out "no $1 for python3"; return 1; }; }
 has_strace() { has strace && { strace -o /dev/null true 2>/dev/null || { left_out 'strace may not trace here'; return 1; }; }; }
 
-# The names of our programs.
+# The names of our programs; gewebe, which starts the others, is none of them.
 programs() {
-  basename -s .cpp "$GEWEBE_ROOT"/tools/*.cpp
+  basename -s .cpp "$GEWEBE_ROOT"/tools/*.cpp | grep -vx gewebe
 }
 
 # Those whose result is a stream; the others write files by name (ffe-run's standard output is its replies).

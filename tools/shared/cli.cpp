@@ -7,6 +7,7 @@
 #include "tools/shared/messages.h"
 #include "tools/shared/options_internal.h"
 #include "tools/shared/progress_bar.h"
+#include "tools/shared/version.h"
 
 #include <algorithm>
 #include <array>
@@ -132,7 +133,7 @@ Program::Program(std::string name, std::string description) : state_(std::make_u
   state_->line.tool = std::move(name);
   state_->description = std::move(description);
   flag("-h,--help", state_->help, "this text");
-  flag("--version", state_->version, "the version");
+  flag("--version", state_->version, "version, commit, libraries, kernels");
 }
 Program::~Program() = default;
 
@@ -181,13 +182,19 @@ void Program::flag(const std::string& names, bool& value, const std::string& hel
 }
 
 void Program::operand(const std::string& name, std::string& value, const std::string& help,
-                      bool required) {
-  state_->line.operands.push_back({name, help, &value, nullptr, required ? 1U : 0U});
+                      bool required, std::vector<std::string> words) {
+  state_->line.operands.push_back({.name = name,
+                                   .help = help,
+                                   .words = std::move(words),
+                                   .value = &value,
+                                   .values = nullptr,
+                                   .min_count = required ? 1U : 0U});
 }
 
 void Program::operands(const std::string& name, std::vector<std::string>& values,
                        const std::string& help, std::size_t min_count) {
-  state_->line.operands.push_back({name, help, nullptr, &values, min_count});
+  state_->line.operands.push_back(
+      {.name = name, .help = help, .words = {}, .values = &values, .min_count = min_count});
 }
 
 namespace {
@@ -232,14 +239,18 @@ void Program::declare_common() {
   flag("--keep-unchanged", s.keep_unchanged, "leave FILE alone if its bytes would be equal");
 }
 
-/// Whether there is work to do: --help and --version are done here.
+/// Whether there is work to do: --help, --version and --describe, which is for scripts/completions
+/// and therefore in no help, are done here.
 bool Program::parse(const std::vector<std::string>& words) {
   State& s = *state_;
   declare_common();
+  if (words.size() == 1 && words[0] == "--describe") {
+    write_text("-", s.line.describe(s.description));
+    return false;
+  }
   s.line.take(words);
   if (s.help || s.version) {
-    write_text("-", s.version ? s.line.tool + " (Gewebe) " GEWEBE_VERSION "\n"
-                              : s.line.help(s.description));
+    write_text("-", s.version ? version_text(s.line.tool) : s.line.help(s.description));
     return false;
   }
   s.line.check_complete();

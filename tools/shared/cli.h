@@ -107,7 +107,8 @@ public:
   OptionRef& positive(); ///< > 0
   OptionRef& range(double min, double max);
   OptionRef& one_of(std::vector<std::string> words);
-  OptionRef& count(std::size_t n); ///< a list must have exactly n numbers
+  OptionRef& such_as(std::vector<std::string> words); ///< what a shell proposes; others will do
+  OptionRef& count(std::size_t n);                    ///< a list must have exactly n numbers
   /// The option may be given several times: plainly once, and as N=VALUE with another whole number
   /// N each; `value_of(N)` is where that value goes.
   OptionRef& numbered(std::function<std::string&(std::int32_t)> value_of);
@@ -136,9 +137,10 @@ public:
                    const std::string& help);
   void flag(const std::string& names, bool& value, const std::string& help);
 
-  // Operands, in order. An optional one keeps its default when absent.
+  // Operands, in order. An optional one keeps its default when absent. A shell proposes `words` for
+  // it, or else files.
   void operand(const std::string& name, std::string& value, const std::string& help,
-               bool required = false);
+               bool required = false, std::vector<std::string> words = {});
   /// All remaining operands, at least `at_least`.
   void operands(const std::string& name, std::vector<std::string>& values, const std::string& help,
                 std::size_t min_count);

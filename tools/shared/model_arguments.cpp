@@ -25,6 +25,13 @@ void refuse(bool wrong, const char* what) {
     throw UsageError(what);
 }
 
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  for (const Material& material : material_presets())
+    names.push_back(material.name);
+  return names;
+}
+
 /// The text of a table that parses.
 std::string checked_table(const std::string& file) {
   Input input(file, false);
@@ -48,7 +55,8 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.flag("--bend", b.bend, "add bending springs across edges");
   p.option("--bend-stiffness", b.bend_factor, "F", "their stiffness over that of the edge")
       .range(0, 1e9);
-  p.option("--material", a.material, "NAME", "of --list-materials; PART=NAME for a part");
+  p.option("--material", a.material, "NAME", "of --list-materials; PART=NAME for a part")
+      .such_as(preset_names());
   p.option("--materials", a.materials, "FILE", "a table of materials, beside the presets");
   p.flag("--list-materials", a.list_materials, "write the table of materials instead of a model");
   p.option("--density", a.values.density, "D", "g/mm3, instead of the material's").positive();
@@ -75,14 +83,16 @@ void declare(cli::Program& p, ModelArguments& a) {
   p.option("--fit", a.fit, "FILE",
            "of tetrahedra: find Young's moduli from measured displacements");
   p.option("--primitive", a.primitive, "KIND",
-           "plane:MxN, tube:MxN or sphere:MxN instead of a mesh");
+           "plane:MxN, tube:MxN or sphere:MxN instead of a mesh")
+      .such_as({"plane:", "tube:", "sphere:"});
   p.option("--size", a.size, "A,B", "its sides, radius and length or radius in mm");
   p.option("--name", a.name, "NAME", "name of the model, else that of its first material");
   p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
   p.option("--weld", a.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
   p.option("--repair", a.repair, "LIST",
-           "weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all");
+           "weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all")
+      .such_as({"weld", "duplicates", "orientation", "degenerate", "holes", "all"});
 }
 
 void complete(ModelArguments& a) {

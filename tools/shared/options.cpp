@@ -240,6 +240,24 @@ std::string CommandLine::help(const std::string& description) const {
   return text + "\n";
 }
 
+std::string CommandLine::describe(const std::string& description) const {
+  std::string text = "program\t" + tool + "\t\t\t" + description + "\n";
+  const auto add = [&](const char* what, const std::string& names, const std::string& metavar,
+                       const std::vector<std::string>& words, const std::string& help) {
+    std::string list;
+    for (const std::string& word : words)
+      list += (list.empty() ? "" : " ") + word;
+    text += std::string(what) + "\t" + names + "\t" + metavar + "\t" + list + "\t" + help + "\n";
+  };
+  for (const auto& spec : specs)
+    add(spec->set ? "option" : "flag", spec->names, spec->metavar,
+        spec->choices.empty() ? spec->proposals : spec->choices, spec->help);
+  for (const Operand& operand : operands)
+    add(operand.values != nullptr ? "operands" : "operand", operand.name, operand.name,
+        operand.words, operand.help);
+  return text;
+}
+
 // ---- OptionRef
 
 namespace {
@@ -259,6 +277,10 @@ OptionRef& OptionRef::range(double min, double max) {
 }
 OptionRef& OptionRef::one_of(std::vector<std::string> words) {
   spec_of(spec_).choices = std::move(words);
+  return *this;
+}
+OptionRef& OptionRef::such_as(std::vector<std::string> words) {
+  spec_of(spec_).proposals = std::move(words);
   return *this;
 }
 OptionRef& OptionRef::count(std::size_t n) {

@@ -23,8 +23,9 @@ struct Spec {
   bool must_be_positive = false;
   std::optional<double> min, max;
   std::vector<std::string> choices;
-  std::size_t list_count = 0;     ///< 0: any
-  std::vector<std::string> words; ///< as typed
+  std::vector<std::string> proposals; ///< beside `choices`: examples
+  std::size_t list_count = 0;         ///< 0: any
+  std::vector<std::string> words;     ///< as typed
 
   std::string long_name() const { return names.substr(names.find("--")); }
   bool is_named(std::string_view name) const;
@@ -48,6 +49,7 @@ private:
 
 struct Operand {
   std::string name, help;
+  std::vector<std::string> words;             ///< what a shell proposes, or nothing: files
   std::string* value = nullptr;               ///< one, or
   std::vector<std::string>* values = nullptr; ///< all that remain
   std::size_t min_count = 0;
@@ -69,6 +71,10 @@ struct CommandLine {
   void check_complete() const;
   /// The text of --help.
   std::string help(const std::string& description) const;
+  /// The same for programs: a line for the tool, each option and each operand, of words between
+  /// tabs: what it is (`program`, `flag`, `option`, `operand`, `operands`), its names, its value's
+  /// name, what that may be (words between blanks, or nothing), the help.
+  std::string describe(const std::string& description) const;
 
 private:
   using NextWord = std::function<std::optional<std::string>()>;

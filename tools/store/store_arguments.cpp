@@ -53,7 +53,8 @@ void check_method(const StoreArguments& a) {
 } // namespace
 
 void declare(cli::Program& p, StoreArguments& a) {
-  p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none");
+  p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none")
+      .such_as({"all", "none"});
   p.option("--rows", a.rows, "NODES",
            "whose displacements columns hold: surface, all; of solids surface by default")
       .one_of({"surface", "all"});

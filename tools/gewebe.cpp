@@ -1,0 +1,156 @@
+// gewebe: starts the programs beside it, gewebe(1).
+
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "formats/stream/stream.h"
+#include "tools/shared/messages.h"
+#include "tools/shared/version.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unistd.h>
+#include <vector>
+
+using namespace gewebe;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Tool {
+  std::string_view name, what; ///< as its page has them
+};
+constexpr std::array tools{
+    Tool{"metaball2vol", "turn particles into a volume of their density"},
+    Tool{"voxelize", "turn a closed triangle mesh or labels into a volume"},
+    Tool{"csg", "combine volumes"},
+    Tool{"mc-opt",
+         "turn a volume into a closed triangle mesh of its isosurface, or into tetrahedra"},
+    Tool{"exp2ela", "turn a mesh into a deformable model of springs or of finite elements"},
+    Tool{"ffe-precompute", "factorise the stiffness of a model and store it"},
+    Tool{"ffe-run", "simulate deformable objects, command by command"},
+    Tool{"emboss-render",
+         "draw a mesh, tetrahedra, a model or a result with embossed textures, or a volume"},
+};
+
+constexpr std::string_view usage = R"(Starts the programs of Gewebe.
+Usage: gewebe PROGRAM [ARGUMENT...]
+       gewebe help [PAGE]
+       gewebe --list | --help | --version
+
+Options:
+  --list      the programs, and what they do
+  -h,--help   this text
+  --version   version, commit, libraries, kernels
+
+)";
+
+/// Becomes that program. \throw Error if it can't be run
+[[noreturn]] void become(const std::string& path, std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words)
+    arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  (void)(path.find('/') == std::string::npos ? ::execvp(path.c_str(), arguments.data())
+                                             : ::execv(path.c_str(), arguments.data()));
+  throw Error(path + ": cannot run it: " + std::strerror(errno));
+}
+
+/// Where this program is: the others are there too.
+fs::path here() {
+  return fs::read_symlink("/proc/self/exe").parent_path();
+}
+
+[[noreturn]] void start(const std::string& tool, std::vector<std::string> words) {
+  words[0] = tool;
+  become((here() / tool).string(), std::move(words));
+}
+
+/// The file of a manual page: NAME, gewebe-NAME or gewebe_NAME.
+std::optional<std::string> page_file(const std::string& name) {
+  std::error_code failure;
+  for (const std::string& whole : {name, "gewebe-" + name, "gewebe_" + name})
+    for (const char* section : {"1", "5", "7"})
+      for (const char* packed : {"", ".gz"}) {
+        const fs::path path = here() / "../share/man" / (std::string("man") + section) /
+                              (whole + "." + section + packed);
+        if (fs::exists(path, failure))
+          return path.lexically_normal().string();
+      }
+  return std::nullopt;
+}
+
+bool is_tool(std::string_view name) {
+  return std::ranges::find(tools, name, &Tool::name) != tools.end();
+}
+
+void write_text(const std::string& text) {
+  Output output("-", {.binary = false});
+  output.write(text);
+  output.commit();
+}
+
+/// The page, where there are one and a `man`, or else what the program says itself.
+void show_help(const std::string& page) {
+  const std::optional<std::string> file = page_file(page);
+  try {
+    if (file)
+      become("man", {"man", "-l", *file});
+  } catch (const Error&) {
+    if (!is_tool(page))
+      throw;
+  }
+  if (!is_tool(page))
+    throw Error("no page '" + page + "', expected a program or a page that gewebe(7) names");
+  start(page, {"", "--help"});
+}
+
+std::string list() {
+  std::string text;
+  for (const Tool& tool : tools)
+    (((text += tool.name) += std::string(16 - tool.name.size(), ' ')) += tool.what) += "\n";
+  return text;
+}
+
+void work(const std::vector<std::string>& words) {
+  const std::string word = words.size() > 1 ? words[1] : "";
+  if (is_tool(word))
+    start(word, {words.begin() + 1, words.end()});
+  if (word.empty())
+    throw UsageError("expected a program, see gewebe --list");
+  if (word == "help" && words.size() == 3)
+    return show_help(words[2]);
+  if (words.size() > 2)
+    throw UsageError("unexpected '" + words[2] + "' after " + word + ", see gewebe --help");
+  if (word == "-h" || word == "--help" || word == "help")
+    return write_text(std::string(usage) + list());
+  if (word == "--list")
+    return write_text(list());
+  if (word == "--version")
+    return write_text(cli::version_text("gewebe"));
+  std::vector<std::string> known{"help", "--help", "--list", "--version"};
+  for (const Tool& tool : tools)
+    known.emplace_back(tool.name);
+  throw UsageError("no program '" + word + "'" + suggestion(word, known) + ", see gewebe --list");
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  try {
+    work({argv, argv + argc});
+    return 0;
+  } catch (const UsageError& error) {
+    cli::print_message("gewebe", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    cli::print_message("gewebe", error.what());
+  }
+  return 1;
+}
