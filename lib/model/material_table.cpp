@@ -34,6 +34,36 @@ gallbladder  0.00106 250000   3  0.2  0.49
 # 30 to 90 kPa in compression at 0.1 to 100 Hz: Kiss et al., Phys Med Biol 51, 2006. The myometrium
 # is one to two centimetres thick. Density as of the liver.
 uterus       0.00106  30000  15  0.2  0.49
+# Densities below that name no other source: ICRU Report 46, 1992.
+# Cortex 5.0, standard deviation 2.9 kPa, by shear waves in 127 healthy people: Arda et al., AJR 197,
+# 2011.
+kidney       0.00105   5000  10  0.2  0.49
+# 18.1, standard deviation 3.1 kPa, by shear waves in 100 healthy people: Giuffre et al., Ann Hepatol
+# 18, 2019. (Arda et al. found 2.9 kPa by another device.)
+spleen       0.00106  18000  10  0.2  0.49
+# Inflated. Shear stiffness 1.1 kPa at residual volume and 1.8 kPa at total capacity, by magnetic
+# resonance in 10 healthy people: Mariappan et al., J Magn Reson Imaging 33, 2011; 1.4 kPa is taken.
+# Poisson's ratio of dogs' lobes: Lai-Fook et al., J Appl Physiol 40, 1976.
+lung         0.00026   4000  10  0.2  0.43
+# An artery's wall. Shear modulus of the hepatic artery 210 kPa, density 1.05 g/cm3: Mancia et al.,
+# Phys Med Biol 64, 2019, from measurements of others. A wall of 1 mm is a choice.
+vessel       0.00105 630000   1  0.2  0.49
+# The wall, stretched: 1 to 4.1 MPa in tension to failure: Martins et al., Int Urogynecol J 22, 2011.
+# One that is half full yields far more easily. Density as of muscle.
+bladder      0.00105 1900000  3  0.2  0.49
+# At rest, gastrocnemius: 11.1, standard deviation 4.1 kPa, by shear waves: Arda et al., as above.
+muscle       0.00105  11000  10  0.2  0.49
+# 3.25, standard deviation 0.9 kPa, of the breast: Samani et al., Phys Med Biol 52, 2007.
+fat          0.00095   3200  10  0.2  0.49
+# 56, standard deviation 16 kPa, over the breast by suction in vivo: Briot et al., Clin Biomech 99,
+# 2022. Torsion finds 0.4 MPa and more: Agache et al., Arch Dermatol Res 269, 1980.
+skin         0.00109  56000   2  0.2  0.49
+# An invasive ductal carcinoma of high grade: 42, standard deviation 12 kPa: Samani et al., as above.
+# Density as of the liver.
+tumour       0.00106  42000  10  0.2  0.49
+# Of phantoms: Dragon Skin 10, 264 kPa from the droop of a beam, with 1.07 g/cm3: Dubied et al., IEEE
+# Robot Autom Lett 7, 2022.
+silicone     0.00107 264000   5  0.05  0.49
 )";
 
 constexpr const char* form = ", expected name density young thickness damping_ratio [poisson]";

@@ -136,3 +136,23 @@ test_readme_names_every_example() {
     grep -qF "(examples/$folder)" "$GEWEBE_ROOT/README.md" || fail "README.md does not name examples/$folder"
   done
 }
+
+# Each preset stands in the table of gewebe-values(7), with its Young's modulus in kPa at the beginning of its row, or within the row's range.
+untold_presets() { # FILE, presets on standard input
+  local name density young
+  while read -r name density young _; do
+    grep -q "^\.It .* Ta Cm $name\$" "$1" || { echo "$name"; continue; }
+    awk -v young="$young" -v name="$name" '
+      $0 ~ " Ta Cm " name "$" { split($0, cell, " Ta "); n = split(cell[2], word, /[^0-9.]+/); low = high = word[1]; if (cell[2] ~ /^[0-9.]+ to /) high = word[2] }
+      END { exit !(young >= 990 * low && young <= 1010 * high) }' "$1" || echo "$name ($density $young)"
+  done
+}
+test_values_tell_the_presets() {
+  local untold
+  exp2ela --list-materials | sed 's/#.*//; /^ *$/d; /^generic/d' >presets
+  [[ $(wc -l <presets) -gt 10 ]] || fail 'hardly any presets' "$(<presets)"
+  untold=$(untold_presets "$GEWEBE_ROOT/man/gewebe-values.7" <presets)
+  [[ -z $untold ]] || fail 'gewebe-values(7) lacks' "$untold"
+  [[ $(echo 'bone 0.002 2e10 1 0' | untold_presets "$GEWEBE_ROOT/man/gewebe-values.7") == bone ]] || fail 'a preset that it lacks passes'
+  [[ $(echo 'liver 0.001 7000 1 0' | untold_presets "$GEWEBE_ROOT/man/gewebe-values.7") == 'liver (0.001 7000)' ]] || fail 'another modulus passes'
+}

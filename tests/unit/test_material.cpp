@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gewebe {
@@ -16,6 +17,23 @@ TEST(ModelMaterials, TheTableOfPresetsSaysWhatTheyAre) {
   EXPECT_EQ(material_named("liver", material_presets()),
             (Material{"liver", 1.06e-3, 5500, 10, 0.2, 0.49}));
   EXPECT_EQ(BuildOptions{}.material.materials[0].name, "generic");
+}
+
+// A magnitude that is mistyped is seen: tissue is about as heavy as water, inflated lungs float,
+// and its stiffness is between that of fat and of a stretched wall. Each says where its numbers
+// come from in the lines before it.
+TEST(ModelMaterials, PresetsAreTissue) {
+  for (const Material& m : material_presets()) {
+    const bool lung = m.name == "lung";
+    EXPECT_TRUE(m.density > (lung ? 0.2e-3 : 0.9e-3) && m.density < (lung ? 0.4e-3 : 1.1e-3))
+        << m.name;
+    EXPECT_TRUE(m.young >= 3000 && m.young <= 2e6) << m.name;
+    EXPECT_TRUE(m.poisson && *m.poisson > 0.4 && *m.poisson < 0.5) << m.name;
+    const std::string_view table = preset_table();
+    const std::size_t at = table.find("\n" + m.name + " ");
+    ASSERT_NE(at, std::string_view::npos) << m.name;
+    EXPECT_EQ(table[table.rfind('\n', at - 1) + 1], '#') << m.name;
+  }
 }
 
 TEST(ModelMaterials, ATableReplacesAndAddsWhateverItsLineEnds) {
