@@ -13,7 +13,7 @@ namespace gewebe {
 /// The model that `text` holds; all invariants of model.h hold for it.
 /// \throw Error, place "NAME:LINE", for anything that the grammar or an invariant forbids. Takes no
 /// more memory than a small multiple of the text's size, whatever counts it claims.
-Model parse_ela(std::string_view text, const std::string& name);
+Model parse_ela(std::string_view text, const std::string& name, const Context& context = {});
 
 /// Reads all of the input. \throw as parse_ela, what Input throws, and where text and model exceed
 /// context.max_memory

@@ -5,9 +5,11 @@
 #include "base/parallel.h"
 #include "mesh/edges.h"
 #include "mesh/repeated_faces.h"
+#include "model/check.h"
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -36,8 +38,30 @@ struct Surface {
   EdgeTable edges;
 };
 
+/// Do two faces have the same corners? Then they have them at each of their edges.
+bool any_twice(const Surface& s, const Context& context) {
+  std::atomic<bool> found = false;
+  parallel_blocks(context, s.edges.size(), 1 << 15, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> opposite;
+    for (std::size_t e = begin; e < end; ++e) {
+      const std::span<const std::uint32_t> around = s.edges.around(e);
+      if (around.size() < 2)
+        continue;
+      opposite.clear();
+      for (const std::uint32_t corner : around)
+        opposite.push_back(s.triangles[corner / 3][corner % 3]);
+      std::ranges::sort(opposite);
+      if (std::ranges::adjacent_find(opposite) != opposite.end())
+        found = true;
+    }
+  });
+  return found;
+}
+
 Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Context& context) {
   Surface s;
+  s.triangles.reserve(mesh.triangles.size());
+  s.face_of_triangle.reserve(mesh.triangles.size());
   std::vector<std::uint32_t> node_of_point(mesh.points.size(), unused);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
     const Triangle& t = mesh.triangles[f];
@@ -63,10 +87,11 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
   for (Triangle& t : s.triangles)
     for (std::uint32_t& corner : t)
       corner = node_of_point[corner];
-  const std::vector<bool> twice =
-      repeated_faces(s.point_of_node.size(), s.triangles, SameFace::corners);
-  report.duplicate_faces = static_cast<std::size_t>(std::count(twice.begin(), twice.end(), true));
-  if (report.duplicate_faces != 0) {
+  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
+  if (any_twice(s, context)) {
+    const std::vector<bool> twice =
+        repeated_faces(s.point_of_node.size(), s.triangles, SameFace::corners);
+    report.duplicate_faces = static_cast<std::size_t>(std::count(twice.begin(), twice.end(), true));
     std::size_t kept = 0;
     for (std::size_t t = 0; t < s.triangles.size(); ++t) {
       if (twice[t])
@@ -76,8 +101,8 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
     }
     s.triangles.resize(kept);
     s.face_of_triangle.resize(kept);
+    s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
   }
-  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
   for (std::size_t e = 0; e < s.edges.size(); ++e) {
     const std::size_t faces = s.edges.around(e).size();
     report.boundary_edges += faces == 1 ? 1 : 0;
@@ -104,19 +129,16 @@ public:
     areas_and_materials();
     surface_nodes();
     edge_springs();
-    std::vector<Spring> bending;
     if (options_.bend)
-      bending = bending_springs();
-    std::vector<Spring> central;
+      bending_springs();
+    surface_.edges = {};
     if (options_.centrals > 0)
-      central = central_nodes();
+      central_nodes();
     if (options_.normals)
       normals();
-    model_.springs.insert(model_.springs.end(), bending.begin(), bending.end());
-    model_.springs.insert(model_.springs.end(), central.begin(), central.end());
     texture_coordinates();
     model_.triangles = std::move(surface_.triangles);
-    check_model(model_);
+    check_model(model_, context_);
     return {std::move(model_), report_};
   }
 
@@ -212,7 +234,10 @@ private:
 
   void edge_springs() {
     const EdgeTable& edges = surface_.edges;
-    std::vector<Spring> springs(edges.size());
+    std::vector<Spring>& springs = model_.springs;
+    springs.reserve((options_.bend ? 2 : 1) * edges.size() +
+                    (options_.centrals > 0 ? model_.nodes.size() : 0));
+    springs.resize(edges.size());
     parallel_blocks(context_, edges.size(), 8192, [&](std::size_t begin, std::size_t end) {
       for (std::size_t e = begin; e < end; ++e) {
         const auto [i, j] = edges.ends[e];
@@ -227,10 +252,9 @@ private:
     springs.erase(kept, springs.end());
     for (const Spring& s : springs)
       report_.slack_springs += s.stiffness == 0 ? 1 : 0;
-    model_.springs = std::move(springs);
   }
 
-  std::vector<Spring> bending_springs() const {
+  void bending_springs() {
     const EdgeTable& edges = surface_.edges;
     using Across = std::array<std::uint32_t, 3>; // node, node, edge between
     std::vector<Across> across;
@@ -243,7 +267,6 @@ private:
       across.push_back({std::min(a, b), std::max(a, b), e});
     }
     std::sort(across.begin(), across.end());
-    std::vector<Spring> springs;
     std::size_t next = 0; // edge, for the merge
     for (std::size_t n = 0; n < across.size(); ++n) {
       const auto [i, j, edge] = across[n];
@@ -258,14 +281,13 @@ private:
                  crossed = point(edges.ends[edge][1]) - point(edges.ends[edge][0]);
       if (!(dot(d, d) > 0 && dot(crossed, crossed) > 0))
         continue;
-      springs.push_back(
+      model_.springs.push_back(
           spring(i, j, SpringKind::bend, options_.bend_factor * edge_stiffness(edge)));
     }
-    return springs;
   }
 
-  /// Appends the central nodes; returns the springs to them.
-  std::vector<Spring> central_nodes() {
+  /// Appends the central nodes and the springs to them.
+  void central_nodes() {
     const std::size_t surface_nodes = model_.nodes.size();
     const Components parts = components(model_);
     std::vector<std::size_t> first(parts.count + std::size_t{1});
@@ -313,7 +335,7 @@ private:
       samples[c] = {};
       add_cluster_nodes(nearest_clusters(points, places.centers, context_), points, nodes, reach);
     }
-    return central_springs(stiffness, reach);
+    central_springs(stiffness, reach);
   }
 
   struct Samples {
@@ -372,18 +394,22 @@ private:
       model_.nodes[c].drag = options_.drag_rate * model_.nodes[c].mass;
   }
 
-  std::vector<Spring> central_springs(const std::vector<double>& stiffness,
-                                      const std::vector<double>& reach) const {
-    std::vector<Spring> springs;
-    springs.reserve(reach.size());
-    for (std::uint32_t i = 0; i < reach.size(); ++i) {
-      const auto center = static_cast<std::uint32_t>(model_.nodes[i].central);
-      const Vec3 d = model_.nodes[center].position - model_.nodes[i].position;
-      if (!(dot(d, d) > same_place * same_place * reach[i]))
-        continue;
-      springs.push_back(spring(i, center, SpringKind::central, stiffness[i]));
-    }
-    return springs;
+  void central_springs(const std::vector<double>& stiffness, const std::vector<double>& reach) {
+    const std::size_t before = model_.springs.size();
+    model_.springs.resize(before + reach.size());
+    parallel_blocks(context_, reach.size(), 8192, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto center = static_cast<std::uint32_t>(model_.nodes[i].central);
+        const Vec3 d = model_.nodes[center].position - model_.nodes[i].position;
+        if (dot(d, d) > same_place * same_place * reach[i])
+          model_.springs[before + i] =
+              spring(static_cast<std::uint32_t>(i), center, SpringKind::central, stiffness[i]);
+      }
+    });
+    const auto kept =
+        std::remove_if(model_.springs.begin() + static_cast<std::ptrdiff_t>(before),
+                       model_.springs.end(), [](const Spring& s) { return s.i == s.j; });
+    model_.springs.erase(kept, model_.springs.end());
   }
 
   void normals() {

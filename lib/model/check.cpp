@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -110,7 +111,23 @@ void ModelChecker::normal(std::size_t i) const {
     require_finite(model_.normals[i][a], "normal");
 }
 
-void ModelChecker::spring(std::size_t i) {
+void ModelChecker::springs(std::size_t begin, std::size_t end) const {
+  std::size_t merge = 0;
+  if (begin < end && model_.springs[begin].kind == SpringKind::bend) {
+    const Spring& first = model_.springs[begin];
+    const auto at = std::lower_bound(
+        model_.springs.begin(), model_.springs.begin() + static_cast<std::ptrdiff_t>(begin), first,
+        [](const Spring& a, const Spring& b) {
+          return a.kind == SpringKind::edge && std::tie(a.i, a.j) < std::tie(b.i, b.j);
+        });
+    merge = static_cast<std::size_t>(at - model_.springs.begin());
+  }
+  for (std::size_t i = begin; i < end; ++i)
+    spring(i, merge);
+}
+
+/// `merge` is the first edge spring that is not below the last bending spring.
+void ModelChecker::spring(std::size_t i, std::size_t& merge) const {
   const Spring& s = model_.springs[i];
   const std::vector<Node>& nodes = model_.nodes;
   if (s.j >= nodes.size() || s.i >= nodes.size())
@@ -149,11 +166,11 @@ void ModelChecker::spring(std::size_t i) {
   if (s.kind == SpringKind::bend) {
     const auto below = [&](const Spring& e) { return std::tie(e.i, e.j) < std::tie(s.i, s.j); };
     const auto is_edge = [&] {
-      return merge_ < i && model_.springs[merge_].kind == SpringKind::edge;
+      return merge < i && model_.springs[merge].kind == SpringKind::edge;
     };
-    while (is_edge() && below(model_.springs[merge_]))
-      ++merge_;
-    if (is_edge() && model_.springs[merge_].i == s.i && model_.springs[merge_].j == s.j)
+    while (is_edge() && below(model_.springs[merge]))
+      ++merge;
+    if (is_edge() && model_.springs[merge].i == s.i && model_.springs[merge].j == s.j)
       throw Error("spring " + pair(s) + " is of kind e and of kind b, expected one");
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 // The invariants of model.h, checked element by element while a model is being filled.
 
+#include "base/context.h"
 #include "model/model.h"
 
 #include <cstddef>
@@ -13,6 +14,9 @@ namespace gewebe {
 
 /// \throw Error if a model or a material can't have this name
 void check_name(const std::string& name);
+
+/// check_model (model.h) on several threads. \throw too Cancelled
+void check_model(const Model& model, const Context& context);
 
 /// Sections must be given in the order of ELA_EXPL. Each call checks element `i` of that section,
 /// which must already be in the model, against everything before it. Every call throws Error
@@ -29,7 +33,9 @@ public:
   /// After the last node.
   void all_nodes() const;
   void normal(std::size_t i) const;
-  void spring(std::size_t i);
+  void spring(std::size_t i) { spring(i, merge_); }
+  /// spring(i) for some, which may be checked side by side with others. All of them must be there.
+  void springs(std::size_t begin, std::size_t end) const;
   void triangle(std::size_t i) const;
   void texcoord(std::size_t i) const;
   void tetrahedron(std::size_t i) const;
@@ -39,6 +45,7 @@ public:
   void skin_texcoord(std::size_t i) const;
 
 private:
+  void spring(std::size_t i, std::size_t& merge) const;
   void corners(std::span<const std::uint32_t> index) const;
   void require_material(std::int32_t material) const;
 
@@ -46,7 +53,7 @@ private:
   std::size_t node_count_ = 0;
   std::size_t first_central_ = 0; ///< node_count_ while there is none
   std::vector<bool> named_;       ///< per node: some node's central
-  std::size_t merge_ = 0;         ///< first edge spring not below the last bending spring
+  std::size_t merge_ = 0;         ///< see spring()
 };
 
 } // namespace gewebe

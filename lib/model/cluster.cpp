@@ -102,9 +102,17 @@ void move_centers(const std::vector<Vec3>& points, Clusters& clusters,
                   std::span<const double> weights) {
   std::vector<Vec3> sum(clusters.centers.size());
   std::vector<double> size(clusters.centers.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    sum[clusters.of_point[i]] += weight(weights, i) * points[i];
-    size[clusters.of_point[i]] += weight(weights, i);
+  for (std::size_t i = 0; i < points.size();) {
+    // Neighbours often have one center: their sum stays where it is quick to add to.
+    const std::uint32_t c = clusters.of_point[i];
+    Vec3 sum_here = sum[c];
+    double size_here = size[c];
+    for (; i < points.size() && clusters.of_point[i] == c; ++i) {
+      sum_here += weight(weights, i) * points[i];
+      size_here += weight(weights, i);
+    }
+    sum[c] = sum_here;
+    size[c] = size_here;
   }
   std::vector<std::uint32_t> renumbered(size.size());
   std::uint32_t kept = 0;

@@ -4,6 +4,7 @@
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/parallel.h"
 #include "model/check.h"
 
 #include <algorithm>
@@ -45,7 +46,10 @@ std::optional<std::uint8_t> fixed_axes_from_name(std::string_view name) {
   return static_cast<std::uint8_t>(found - axes_names.begin());
 }
 
-void check_model(const Model& model) {
+namespace {
+
+template <class CheckSprings>
+void check_model(const Model& model, const CheckSprings& check_springs) {
   ModelChecker checker(model);
   checker.name();
   check_each("material", model.materials.size(), [&](std::size_t i) { checker.material(i); });
@@ -54,7 +58,7 @@ void check_model(const Model& model) {
   checker.all_nodes();
   require_size("normals", model.normals.size(), model.nodes.size());
   check_each("normal", model.normals.size(), [&](std::size_t i) { checker.normal(i); });
-  check_each("spring", model.springs.size(), [&](std::size_t i) { checker.spring(i); });
+  check_springs(checker);
   check_each("triangle", model.triangles.size(), [&](std::size_t i) { checker.triangle(i); });
   require_size("texcoords", model.texcoords.size(), model.triangles.size());
   check_each("texcoord", model.texcoords.size(), [&](std::size_t i) { checker.texcoord(i); });
@@ -79,6 +83,28 @@ void check_model(const Model& model) {
   require_size("skin_texcoords", skin.texcoords.size(), skin.triangles.size());
   check_each("skin_texcoord", skin.texcoords.size(),
              [&](std::size_t i) { checker.skin_texcoord(i); });
+}
+
+} // namespace
+
+void check_model(const Model& model) {
+  check_model(model, [&](ModelChecker& checker) {
+    check_each("spring", model.springs.size(), [&](std::size_t i) { checker.spring(i); });
+  });
+}
+
+void check_model(const Model& model, const Context& context) {
+  try {
+    check_model(model, [&](ModelChecker& checker) {
+      parallel_blocks(context, model.springs.size(), 1 << 14,
+                      [&](std::size_t begin, std::size_t end) { checker.springs(begin, end); });
+    });
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) {
+    check_model(model); // names the first of them
+    throw;
+  }
 }
 
 std::size_t body_count(const Model& model) {

@@ -1,0 +1,11 @@
+#pragma once
+// What reader and writer of ELA_EXPL share.
+
+#include <string_view>
+
+namespace gewebe {
+
+/// Of each kind of spring.
+constexpr std::string_view kind_letters = "ebc";
+
+} // namespace gewebe
