@@ -43,8 +43,8 @@ struct Line {
     c.set_numbered = [&](std::int32_t n, std::string_view word) {
       colors.push_back(std::to_string(n) + ":" + std::string(word));
     };
-    line.operands.push_back({"FIRST", "", &first, nullptr, 1, 0});
-    line.operands.push_back({"REST", "", nullptr, &rest, 0, 0});
+    line.operands.push_back({"FIRST", "", {}, &first, nullptr, 1, 0});
+    line.operands.push_back({"REST", "", {}, nullptr, &rest, 0, 0});
   }
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
