@@ -6,6 +6,7 @@
 #include "cutting/corrected_columns.h"
 #include "model/cut.h"
 #include "solid/model_stiffness.h"
+#include "solid/node_stiffness.h"
 #include "solve/condition.h"
 #include "solve/factor.h"
 #include "solve/stiffness.h"
@@ -155,12 +156,32 @@ void CutStiffness::factorise(const std::function<void()>& work) {
 void CutStiffness::prepare() {
   if (factor_ != nullptr)
     return;
-  norm_ = stiffness_bound(*now_);
-  factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
+  if (is_solid()) {
+    matrix_ = node_stiffness(*now_);
+    norm_ = one_norm(matrix_);
+    factorise([&] { factor_ = std::make_shared<FrontalFactor>(matrix_, context_); });
+  } else {
+    norm_ = stiffness_bound(*now_);
+    factorise([&] { factor_ = std::make_shared<FrontalFactor>(*now_, context_); });
+  }
   factored_ = now_;
   woodbury_.reset();
   origin_ = place_ = identity(now_->nodes.size());
   fresh_operations_ = factor_->work().all_operations;
+}
+
+/// The matrix of now, from that of factored_. \return the rows that are others
+std::vector<std::uint32_t> CutStiffness::follow_matrix() {
+  std::vector<std::uint32_t> rows = changed_rows(*factored_, *now_, place_);
+  bool stay = true;
+  for (std::uint32_t i = 0; i < place_.size(); ++i)
+    stay = stay && place_[i] == i;
+  if (stay)
+    update_node_stiffness(matrix_, *now_, rows);
+  else
+    matrix_ = node_stiffness(*now_);
+  norm_ = one_norm(matrix_);
+  return rows;
 }
 
 bool CutStiffness::woodbury_pays(std::size_t rank) const {
@@ -182,7 +203,7 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     const bool some_gone = std::find(place_.begin(), place_.end(), CutModel::gone) != place_.end();
     work.rank = 3 * copies(origin_, place_);
     std::optional<StiffnessChange> change;
-    if (!some_gone && (way ? way == CutWay::woodbury : woodbury_pays(work.rank))) {
+    if (!some_gone && !is_solid() && (way ? way == CutWay::woodbury : woodbury_pays(work.rank))) {
       change = stiffness_change(*factored_, *now_, origin_, place_);
       work.rank = change->rank();
     }
@@ -207,7 +228,14 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
     woodbury_.reset();
     if (!costs::order_is_worn_out(factor_->work().all_operations, fresh_operations_)) {
       ++*generation_;
-      factorise([&] { work.factor = factor_->refactor(*now_, origin_, place_, context_); });
+      factorise([&] {
+        if (is_solid()) {
+          const std::vector<std::uint32_t> rows = follow_matrix();
+          work.factor = factor_->refactor(matrix_, origin_, place_, rows, context_);
+        } else {
+          work.factor = factor_->refactor(*now_, origin_, place_, context_);
+        }
+      });
       work.way = CutWay::refactor;
       reached_ = work.factor.operations;
       factored_ = now_;
@@ -250,7 +278,7 @@ std::shared_ptr<ComplianceSource> CutStiffness::compliance() const {
   else
     entries += woodbury_->change().rank() * factor_->axes();
   std::unique_ptr<CorrectedColumns> columns;
-  if (source_ != nullptr && source_->columns() != nullptr)
+  if (!is_solid() && source_ != nullptr && source_->columns() != nullptr)
     columns = std::make_unique<CorrectedColumns>(
         std::shared_ptr<const ColumnSource>(source_, source_->columns()),
         stiffness_change(*first_, *now_, first_origin_, first_place_), solve, context_, AxesSolve{},

@@ -1,6 +1,7 @@
 #pragma once
 // The stiffness of an object that is cut again and again: whatever is cheapest keeps its solutions
-// exact, and columns of the model as it came go on to serve.
+// exact, and columns of a net as it came go on to serve. A solid's factor is refactored in part,
+// after K was assembled anew for the nodes of the elements that the cut has changed.
 
 #include "base/context.h"
 #include "compliance/compliance_source.h"
@@ -52,6 +53,8 @@ public:
   std::shared_ptr<ComplianceSource> compliance() const;
 
 private:
+  bool is_solid() const { return !now_->tetrahedra.empty(); }
+  std::vector<std::uint32_t> follow_matrix();
   bool woodbury_pays(std::size_t rank) const;
   std::function<void()> still_valid() const;
   AxesSolve solver() const;
@@ -62,6 +65,7 @@ private:
   Context context_;
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
   std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_
+  NodeMatrix matrix_;                                     ///< of a solid: that of factor_
   std::shared_ptr<FrontalFactor> factor_;
   std::shared_ptr<const WoodburySolver> woodbury_;
   std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_

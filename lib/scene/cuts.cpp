@@ -27,9 +27,7 @@ constexpr double largest_turn = 0.1; ///< between two edges of a swept area, abo
 /// it so far, or lately. It goes over to the next object, and is made anew where a cut is taken
 /// back.
 CutStiffness* stiffness_of(World& w, Object& object) {
-  if (is_solid(object))
-    return nullptr;
-  if (object.statics->stiffness || (!object.statics->solver && !has_moved(w, object)))
+  if (object.statics->stiffness || (!object.statics->made() && !has_moved(w, object)))
     return object.statics->stiffness.get();
   object.statics->ahead = true;
   const std::shared_ptr<const Model> first =
@@ -157,7 +155,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   std::shared_ptr<ComplianceSource> prepared;
   bool loose = !old.came.velocity.empty();
   if (ffe) {
-    if (old.statics->solver || old.statics->stiffness)
+    if (old.statics->made() || old.statics->stiffness)
       old.statics->ahead = true;
     try {
       prepared = cut_source(w, old, now, rest);

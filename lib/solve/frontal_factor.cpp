@@ -41,8 +41,24 @@ constexpr std::array<FreeAxes, 8> all_free_axes = [] {
   return all;
 }();
 
-const FreeAxes& free_axes(const Model& model, std::uint32_t node) {
-  return all_free_axes[model.nodes[node].fixed & 7U];
+/// What K is made of: springs of a model, or a matrix.
+struct Source {
+  const Model* model = nullptr;
+  const NodeMatrix* matrix = nullptr;
+
+  std::size_t nodes() const { return model != nullptr ? model->nodes.size() : matrix->nodes(); }
+  std::uint8_t fixed(std::size_t node) const {
+    return model != nullptr ? model->nodes[node].fixed : matrix->fixed[node];
+  }
+  SpringGraph graph() const {
+    if (model != nullptr)
+      return spring_graph(*model);
+    return {matrix->start, matrix->node, matrix->at, matrix->axes};
+  }
+};
+
+const FreeAxes& free_axes(const Source& k, std::uint32_t node) {
+  return all_free_axes[k.fixed(node) & 7U];
 }
 
 /// 0, 1, 2 …: nothing has moved.
@@ -78,17 +94,61 @@ struct FrontalFactor::State {
   double weakest = 1;
   std::size_t weakest_row = 0;
 
-  /// Springs of the nodes that a front eliminates; each spring between two of them comes once.
-  void assemble(const Model& model, const FrontAssembly& to) const {
+  /// The rows of the nodes that a front eliminates.
+  void assemble(const Source& k, const FrontAssembly& to) const {
     const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
     std::vector<SymmetricBlock> diagonals(last - first);
+    if (k.model != nullptr)
+      add_springs(k, to, diagonals);
+    else
+      add_blocks(k, to, diagonals);
+    to.min_pivot.clear();
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
+      const FreeAxes& free = free_axes(k, node);
+      const SymmetricBlock& diagonal = diagonals[at - first];
+      for (std::size_t a = 0; a < free.count; ++a) {
+        for (std::size_t b = a; b < free.count; ++b)
+          to.at(to.row[node] + b, to.row[node] + a) += diagonal[entry[free.axis[a]][free.axis[b]]];
+        to.min_pivot.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
+      }
+    }
+  }
+
+  /// Each block between two nodes of the front comes once.
+  void add_blocks(const Source& k, const FrontAssembly& to,
+                  std::vector<SymmetricBlock>& diagonals) const {
+    const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
+    for (std::uint32_t at = first; at < last; ++at) {
+      const std::uint32_t node = tree.sequence[at];
+      const FreeAxes& free = free_axes(k, node);
+      diagonals[at - first] = k.matrix->diagonal[node];
+      for (std::size_t arm = graph.start[node]; arm < graph.start[node + std::size_t{1}]; ++arm) {
+        const std::uint32_t end = graph.node[arm], there = tree.position[end];
+        if (there == none || there < at)
+          continue;
+        const std::array<double, 9>& block = k.matrix->block[graph.spring[arm]];
+        const FreeAxes& other = free_axes(k, end);
+        for (std::size_t a = 0; a < free.count; ++a)
+          for (std::size_t b = 0; b < other.count; ++b)
+            to.at(to.row[end] + b, to.row[node] + a) +=
+                block[3 * std::size_t{free.axis[a]} + other.axis[b]];
+      }
+    }
+  }
+
+  /// Springs of the nodes that a front eliminates; each spring between two of them comes once.
+  void add_springs(const Source& k, const FrontAssembly& to,
+                   std::vector<SymmetricBlock>& diagonals) const {
+    const Model& model = *k.model;
+    const std::uint32_t first = tree.first[to.front], last = tree.first[to.front + 1];
     const auto add_diagonal = [&](std::uint32_t place, const SymmetricBlock& block) {
-      for (std::size_t k = 0; k < 6; ++k)
-        diagonals[place - first][k] += block[k];
+      for (std::size_t n = 0; n < 6; ++n)
+        diagonals[place - first][n] += block[n];
     };
     for (std::uint32_t at = first; at < last; ++at) {
       const std::uint32_t node = tree.sequence[at];
-      const FreeAxes& free = free_axes(model, node);
+      const FreeAxes& free = free_axes(k, node);
       for (std::size_t arm = graph.start[node]; arm < graph.start[node + std::size_t{1}]; ++arm) {
         const std::uint32_t end = graph.node[arm], there = tree.position[end];
         if (there != none && first <= there && there < at)
@@ -99,36 +159,25 @@ struct FrontalFactor::State {
           continue;
         if (there < last)
           add_diagonal(there, block);
-        const FreeAxes& other = free_axes(model, end);
+        const FreeAxes& other = free_axes(k, end);
         for (std::size_t a = 0; a < free.count; ++a)
           for (std::size_t b = 0; b < other.count; ++b)
             to.at(to.row[end] + b, to.row[node] + a) -= block[entry[free.axis[a]][other.axis[b]]];
       }
     }
-    to.min_pivot.clear();
-    for (std::uint32_t at = first; at < last; ++at) {
-      const std::uint32_t node = tree.sequence[at];
-      const FreeAxes& free = free_axes(model, node);
-      const SymmetricBlock& diagonal = diagonals[at - first];
-      for (std::size_t a = 0; a < free.count; ++a) {
-        for (std::size_t b = a; b < free.count; ++b)
-          to.at(to.row[node] + b, to.row[node] + a) += diagonal[entry[free.axis[a]][free.axis[b]]];
-        to.min_pivot.push_back(diagonal[entry[free.axis[a]][free.axis[a]]] / max_condition);
-      }
-    }
   }
 
-  std::size_t axis_at(const Model& model, std::size_t f, std::size_t row) const {
+  std::size_t axis_at(const Source& k, std::size_t f, std::size_t row) const {
     for (const std::uint32_t node : tree.eliminated(f)) {
       if (row < graph.axes[node])
-        return 3 * std::size_t{node} + free_axes(model, node).axis[row];
+        return 3 * std::size_t{node} + free_axes(k, node).axis[row];
       row -= graph.axes[node];
     }
     return 0;
   }
 
   /// Computes the fronts that are wanted (all, where that is empty).
-  void factorise(const Model& model, std::span<const char> wanted, const Context& context) {
+  void factorise(const Source& k, std::span<const char> wanted, const Context& context) {
     const std::size_t size = measure_fronts(tree, graph.axes, fronts);
     require_memory(context,
                    8 * static_cast<double>(size) +
@@ -141,15 +190,15 @@ struct FrontalFactor::State {
       work = gewebe::factorise({.tree = tree,
                                 .axes = graph.axes,
                                 .fronts = fronts,
-                                .assemble = [&](const FrontAssembly& to) { assemble(model, to); },
+                                .assemble = [&](const FrontAssembly& to) { assemble(k, to); },
                                 .keep_updates = true},
                                wanted, context);
     } catch (const PivotTooSmall& pivot) {
-      throw NotPositiveDefinite(axis_at(model, pivot.front, pivot.column));
+      throw NotPositiveDefinite(axis_at(k, pivot.front, pivot.column));
     }
   }
 
-  void lay_out(const Model& model) {
+  void lay_out(const Source& k) {
     const std::size_t count = tree.fronts();
     values.clear();
     axis_of_row.clear();
@@ -157,7 +206,7 @@ struct FrontalFactor::State {
     row_of_node.assign(graph.axes.size(), none);
     for (const std::uint32_t node : tree.sequence) {
       row_of_node[node] = static_cast<std::uint32_t>(axis_of_row.size());
-      const FreeAxes& free = free_axes(model, node);
+      const FreeAxes& free = free_axes(k, node);
       for (std::size_t a = 0; a < free.count; ++a)
         axis_of_row.push_back(3 * node + free.axis[a]);
     }
@@ -206,37 +255,43 @@ struct FrontalFactor::State {
       }
   }
 
-  void remember(const Model& model) {
-    springs = model.springs;
-    position.resize(model.nodes.size());
-    fixed.resize(model.nodes.size());
-    for (std::size_t i = 0; i < model.nodes.size(); ++i) {
-      position[i] = model.nodes[i].position;
-      fixed[i] = model.nodes[i].fixed;
-    }
+  void remember(const Source& k) {
+    fixed.resize(k.nodes());
+    for (std::size_t i = 0; i < fixed.size(); ++i)
+      fixed[i] = k.fixed(i);
+    if (k.model == nullptr)
+      return;
+    springs = k.model->springs;
+    position.resize(fixed.size());
+    for (std::size_t i = 0; i < fixed.size(); ++i)
+      position[i] = k.model->nodes[i].position;
   }
 
   /// All anew, in an order of its own finding.
-  void begin(const Model& model, const Context& context) {
+  void begin(const Source& k, const Context& context) {
     cpu = context.cpu;
-    graph = spring_graph(model);
+    graph = k.graph();
     const std::vector<std::uint32_t> order = elimination_order(graph.view());
     if (order.empty())
       throw Error("every node is fixed along every axis, expected a node that can move");
     tree = front_tree(graph.view(), order);
     fronts = std::vector<Front>(tree.fronts());
-    factorise(model, {}, context);
-    lay_out(model);
-    remember(model);
+    factorise(k, {}, context);
+    lay_out(k);
+    remember(k);
   }
 
   // ---- changes
 
   /// Whether each node is held along the axes along which it was.
-  bool held_alike(const Model& model, std::span<const std::uint32_t> origin) const {
-    for (std::size_t i = 0; i < model.nodes.size(); ++i)
-      if (model.nodes[i].fixed != fixed[origin.empty() ? i : origin[i]])
+  bool held_alike(const Source& k, std::span<const std::uint32_t> origin,
+                  std::span<const std::uint32_t> place) const {
+    for (std::size_t i = 0; i < k.nodes(); ++i) {
+      const std::uint32_t old = origin.empty() ? static_cast<std::uint32_t>(i) : origin[i];
+      const bool put = k.matrix != nullptr && !place.empty() && place[old] != i;
+      if (!put && k.fixed(i) != fixed[old])
         return false;
+    }
     return true;
   }
 
@@ -332,16 +387,22 @@ struct FrontalFactor::State {
     return order;
   }
 
-  void refactor(const Model& model, std::span<const std::uint32_t> origin,
-                std::span<const std::uint32_t> place, const Context& context) {
-    if (!held_alike(model, origin)) // rows come and go within fronts
-      return begin(model, context);
+  /// \param rows that are others, of a matrix
+  void refactor(const Source& k, std::span<const std::uint32_t> origin,
+                std::span<const std::uint32_t> place, std::span<const std::uint32_t> rows,
+                const Context& context) {
+    if (!held_alike(k, origin, place)) // rows come and go within fronts
+      return begin(k, context);
     cpu = context.cpu;
-    SpringGraph now = spring_graph(model);
-    const std::size_t n = model.nodes.size();
+    SpringGraph now = k.graph();
+    const std::size_t n = k.nodes();
     if (n == graph.axes.size() && ascend_by_one(origin) && ascend_by_one(place))
       origin = place = {};
-    const std::vector<char> changed = changed_rows(model, origin, place);
+    std::vector<char> changed(n, 0);
+    if (k.model != nullptr)
+      changed = changed_rows(*k.model, origin, place);
+    for (const std::uint32_t row : rows)
+      changed[row] = 1;
     std::vector<char> wanted;
     if (still_fits(now, place)) {
       graph = std::move(now);
@@ -352,16 +413,16 @@ struct FrontalFactor::State {
         if (wanted[f] && tree.parent[f] != none)
           wanted[tree.parent[f]] = 1;
       }
-      factorise(model, wanted, context);
+      factorise(k, wanted, context);
       find_weakest();
     } else {
       const std::vector<std::uint32_t> order = order_for(now, origin, place);
       graph = std::move(now);
       wanted = grow(order, changed, place);
-      factorise(model, wanted, context);
-      lay_out(model);
+      factorise(k, wanted, context);
+      lay_out(k);
     }
-    remember(model);
+    remember(k);
   }
 
   /// The tree of this order, with the fronts that are as they were. \return which are not
@@ -412,7 +473,12 @@ struct FrontalFactor::State {
 
 FrontalFactor::FrontalFactor(const Model& model, const Context& context)
     : state_(std::make_unique<State>()) {
-  state_->begin(model, context);
+  state_->begin({.model = &model}, context);
+}
+
+FrontalFactor::FrontalFactor(const NodeMatrix& matrix, const Context& context)
+    : state_(std::make_unique<State>()) {
+  state_->begin({.matrix = &matrix}, context);
 }
 
 FrontalFactor::~FrontalFactor() = default;
@@ -421,7 +487,14 @@ FrontalFactor& FrontalFactor::operator=(FrontalFactor&&) noexcept = default;
 
 FrontalWork FrontalFactor::refactor(const Model& model, std::span<const std::uint32_t> origin,
                                     std::span<const std::uint32_t> place, const Context& context) {
-  state_->refactor(model, origin, place, context);
+  state_->refactor({.model = &model}, origin, place, {}, context);
+  return state_->work;
+}
+
+FrontalWork FrontalFactor::refactor(const NodeMatrix& matrix, std::span<const std::uint32_t> origin,
+                                    std::span<const std::uint32_t> place,
+                                    std::span<const std::uint32_t> rows, const Context& context) {
+  state_->refactor({.matrix = &matrix}, origin, place, rows, context);
   return state_->work;
 }
 

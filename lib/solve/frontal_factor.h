@@ -10,6 +10,7 @@
 #include "base/context.h"
 #include "model/model.h"
 #include "solve/multifrontal.h"
+#include "solve/node_matrix.h"
 
 #include <array>
 #include <cstddef>
@@ -29,6 +30,8 @@ public:
   /// than its diagonal entry over max_condition, so that K's condition exceeds that; Error if no
   /// axis is free or memory exceeds the context's; Cancelled
   FrontalFactor(const Model& model, const Context& context);
+  /// The same of a matrix, such as a solid's. \throw as above
+  FrontalFactor(const NodeMatrix& matrix, const Context& context);
   ~FrontalFactor();
   FrontalFactor(FrontalFactor&&) noexcept;
   FrontalFactor& operator=(FrontalFactor&&) noexcept;
@@ -40,6 +43,13 @@ public:
   /// \throw as the constructor; then the factor is of no use
   FrontalWork refactor(const Model& model, std::span<const std::uint32_t> origin,
                        std::span<const std::uint32_t> place, const Context& context);
+
+  /// The same of a matrix. A node that is new counts as a copy of its origin, right behind which it
+  /// is eliminated. \param rows ascending: nodes whose rows are others, new ones among them
+  /// \pre it is the factor of a matrix
+  FrontalWork refactor(const NodeMatrix& matrix, std::span<const std::uint32_t> origin,
+                       std::span<const std::uint32_t> place, std::span<const std::uint32_t> rows,
+                       const Context& context);
 
   std::size_t axes() const noexcept;    ///< 3 n
   std::size_t entries() const noexcept; ///< doubles in L

@@ -75,6 +75,8 @@ private:
       const auto& [a, b, c, d] = mesh_.tetrahedra[t];
       if ((beyond[a] & beyond[b] & beyond[c] & beyond[d]) != 0)
         continue;
+      if (!among_.empty() && among_[a] + among_[b] + among_[c] + among_[d] < 2)
+        continue; // none of its edges is passed
       Box3 box;
       for (const std::uint32_t corner : mesh_.tetrahedra[t])
         box.add(places_[corner]);

@@ -36,7 +36,7 @@ struct BladeCutOptions {
   std::span<const Vec3> places = {};
   /// Nodes that must not be moved (they are doubled like others), in any order.
   std::span<const std::uint32_t> held = {};
-  /// By node, of quadratic meshes by corner at least: whether the blade passes edges between such
+  /// By node 0 or 1, of quadratic meshes by corner at least: the blade passes edges between such
   /// ones alone; empty: all.
   std::span<const std::uint8_t> among = {};
   /// The wound follows the faces of the mesh: no node is moved, none is put into an edge.

@@ -11,6 +11,7 @@
 
 #include "formats/model/ela.h"
 #include "model/build.h"
+#include "tests/bench/served.h"
 #include "tests/bench/timing.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/random_cuts.h"
@@ -39,83 +40,8 @@ constexpr int max_cuts = 200, max_runs = 12;
 constexpr double picture = 1000.0 / 60; // ms
 
 [[noreturn]] void fail(const std::string& why) {
-  (void)std::fprintf(stderr, "cut_frame: %s\n", why.c_str());
-  std::exit(EXIT_FAILURE);
+  Served::fail(why);
 }
-
-long number_behind(const std::string& text, const std::string& word) {
-  const std::size_t at = text.find(word);
-  return at == std::string::npos ? 0 : std::strtol(text.c_str() + at + word.size(), nullptr, 10);
-}
-
-/// ffe-run --serve at the other ends of two pipes.
-class Served {
-public:
-  Served(const std::string& tools, const std::string& folder) {
-    std::array<int, 2> to{}, from{};
-    if (pipe(to.data()) != 0 || pipe(from.data()) != 0)
-      fail("no pipe");
-    posix_spawn_file_actions_t actions{};
-    (void)posix_spawn_file_actions_init(&actions);
-    (void)posix_spawn_file_actions_adddup2(&actions, to[0], STDIN_FILENO);
-    (void)posix_spawn_file_actions_adddup2(&actions, from[1], STDOUT_FILENO);
-    for (const int end : {to[0], to[1], from[0], from[1]})
-      (void)posix_spawn_file_actions_addclose(&actions, end);
-    const std::string program = tools + "/ffe-run";
-    std::vector<std::string> words{program, "--serve", "-q", "-j1", "--rate", "60"};
-    std::vector<char*> arguments;
-    for (std::string& word : words)
-      arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    std::filesystem::current_path(folder);
-    if (posix_spawn(&child_, program.c_str(), &actions, nullptr, arguments.data(), environ) != 0)
-      fail(program + " can't be started");
-    (void)posix_spawn_file_actions_destroy(&actions);
-    (void)close(to[0]);
-    (void)close(from[1]);
-    to_ = to[1];
-    from_ = fdopen(from[0], "r");
-  }
-  ~Served() {
-    (void)close(to_);
-    (void)std::fclose(from_);
-    (void)waitpid(child_, nullptr, 0);
-  }
-  Served(const Served&) = delete;
-  Served& operator=(const Served&) = delete;
-
-  void say(const std::string& text) const {
-    if (write(to_, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
-      fail("ffe-run does not listen");
-  }
-
-  struct Answer {
-    long gone = 0, doubled = 0;
-    bool refused = false, free = false;
-  };
-  /// Up to the end of the step.
-  Answer hear() const {
-    Answer answer;
-    std::array<char, 4096> line{};
-    while (std::fgets(line.data(), line.size(), from_) != nullptr) {
-      const std::string text = line.data();
-      if (text.starts_with("cut")) {
-        answer.gone = number_behind(text, " springs ");
-        answer.doubled = number_behind(text, " doubled ");
-      }
-      answer.refused = answer.refused || text.starts_with("error");
-      answer.free = answer.free || text.starts_with("loose") || text.starts_with("part");
-      if (text == "done\n")
-        return answer;
-    }
-    fail("ffe-run has ended");
-  }
-
-private:
-  pid_t child_ = 0;
-  int to_ = -1;
-  FILE* from_ = nullptr;
-};
 
 std::string numbers(std::initializer_list<double> values) {
   std::string text;

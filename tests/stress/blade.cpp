@@ -6,11 +6,10 @@
 
 #include "stuffing/stuffing.h"
 #include "tests/unit/larger.h"
-#include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/surface_scenes.h"
 #include "tests/unit/tet_cut_checks.h"
+#include "tests/unit/tet_organs.h"
 #include "tetrahedra/order.h"
-#include "voxelize/voxelize.h"
 
 #include <algorithm>
 #include <charconv>
@@ -35,25 +34,11 @@ struct Body {
   TetMesh mesh;
 };
 
-TetMesh organ(const std::string& file, double cells) {
-  const TriangleMesh surface = test::load_test_mesh(file);
-  if (surface.triangles.empty())
-    return {};
-  const double cell = bounding_box(surface).longest_side() / cells;
-  VoxelizeOptions exact;
-  exact.samples = 3;
-  exact.rule = VoxelRule::winding;
-  const Grid grid = voxelize({}, surface, uniform_transform(cell / 2), exact);
-  StuffingOptions options;
-  options.cell = cell;
-  return stuff({}, grid, options);
-}
-
 std::vector<Body> bodies() {
   std::vector<Body> all;
   all.push_back({"balls", stuff({}, scenes::metaballs(24, 7, 2.3), {})});
-  all.push_back({"liver", organ("sofa_liver_smooth.obj", 20)});
-  all.push_back({"spleen", organ("hubmap_F_spleen_uv.obj", 28)});
+  all.push_back({"liver", test::organ_tetrahedra("sofa_liver_smooth.obj", 20)});
+  all.push_back({"spleen", test::organ_tetrahedra("hubmap_F_spleen_uv.obj", 28)});
   std::erase_if(all, [](const Body& body) { return body.mesh.tetrahedra.empty(); });
   return all;
 }

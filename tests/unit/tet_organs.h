@@ -1,0 +1,27 @@
+#pragma once
+// Organs of the shared data as tetrahedra.
+
+#include "mesh_fixtures.h"
+#include "stuffing/stuffing.h"
+#include "voxelize/voxelize.h"
+
+#include <string>
+
+namespace gewebe::test {
+
+/// Its longest side is so many cells; empty where there is no such file.
+inline TetMesh organ_tetrahedra(const std::string& file, double cells) {
+  const TriangleMesh surface = load_test_mesh(file);
+  if (surface.triangles.empty())
+    return {};
+  const double cell = bounding_box(surface).longest_side() / cells;
+  VoxelizeOptions exact;
+  exact.samples = 3;
+  exact.rule = VoxelRule::winding;
+  const Grid grid = voxelize({}, surface, uniform_transform(cell / 2), exact);
+  StuffingOptions options;
+  options.cell = cell;
+  return stuff({}, grid, options);
+}
+
+} // namespace gewebe::test
