@@ -27,7 +27,7 @@ void declare_camera(Program& p, RenderArguments& a) {
   p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
   p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
   p.option("--fov", a.words.fov, "DEG",
-           "angle across the shorter side (default 30, --endoscope: 70)")
+           "angle across the shorter side, with --endoscope 70 (default 30)")
       .range(1, 170);
   p.option("--size", a.words.size, "WxH", "pixels of the picture, N for a square");
   p.option("--supersample", a.words.supersample, "N",
