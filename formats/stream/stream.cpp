@@ -350,6 +350,8 @@ Output::Output(const std::string& path, const Options& options)
     if (options.binary && ::isatty(1) != 0)
       throw UsageError("standard output is a terminal, expected -o FILE or a pipe");
     state.fd = 1;
+    // Where it is a pipe, so that neither end waits for the other at each 64 KiB; no harm if not.
+    (void)::fcntl(1, F_SETPIPE_SZ, static_cast<int>(buffer_bytes));
     state.use = FileUse("-", 1);
     return;
   }
