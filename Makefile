@@ -260,6 +260,11 @@ validate: $(VALIDATE) | $(FIRST)
 demo: $(TOOLS) | $(FIRST)
 	@PATH='$(abspath $(BUILD))':"$$PATH" $(MAKE) --no-print-directory -C examples/myoma
 
+# The manual as linked pages.
+html:
+	@scripts/html '$(BUILD)/html' && scripts/html --check '$(BUILD)/html'
+	@echo 'The manual is $(abspath $(BUILD))/html/index.html'
+
 # --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
 
 LINT := build/lint
@@ -357,6 +362,7 @@ help:
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
+	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
 	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, completions, library, headers, gewebe.pc'
 	@echo '  uninstall      the reverse'
@@ -368,4 +374,4 @@ help:
 FORCE:
 
 .DELETE_ON_ERROR:
-.PHONY: all deps check golden-update stress bench validate demo lint install uninstall clean help FORCE
+.PHONY: all deps check golden-update stress bench validate demo html lint install uninstall clean help FORCE

@@ -156,3 +156,20 @@ test_values_tell_the_presets() {
   [[ $(echo 'bone 0.002 2e10 1 0' | untold_presets "$GEWEBE_ROOT/man/gewebe-values.7") == bone ]] || fail 'a preset that it lacks passes'
   [[ $(echo 'liver 0.001 7000 1 0' | untold_presets "$GEWEBE_ROOT/man/gewebe-values.7") == 'liver (0.001 7000)' ]] || fail 'another modulus passes'
 }
+
+# The manual as web pages: one for each page and an index, whose links all lead somewhere.
+test_html_pages_are_linked() {
+  local page
+  "$GEWEBE_ROOT/scripts/html" pages
+  for page in "$GEWEBE_ROOT"/man/*.[1-9]; do
+    [[ -s pages/${page##*/}.html ]] || fail "no page for ${page##*/}"
+    grep -qF "href=\"${page##*/}.html\"" pages/index.html || fail "the index lacks ${page##*/}"
+  done
+  "$GEWEBE_ROOT/scripts/html" --check pages >said || fail "$(<said)"
+  # Links to a page and to a place that there are not are seen.
+  echo '<a href="nowhere.1.html">' >>pages/csg.1.html
+  ! "$GEWEBE_ROOT/scripts/html" --check pages >said || fail 'a link to nowhere passes'
+  "$GEWEBE_ROOT/scripts/html" pages
+  echo '<a href="#nowhere">' >>pages/csg.1.html
+  ! "$GEWEBE_ROOT/scripts/html" --check pages >said || fail 'a link to no place passes'
+}
