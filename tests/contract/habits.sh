@@ -91,3 +91,10 @@ test_gewebe_starts_every_program() {
   [[ $(gewebe mcopt 2>&1 || true) == *'did you mean mc-opt?'* ]] || fail 'no suggestion'
   [[ ! -c /dev/full ]] || expect_failure 1 gewebe gewebe --list >/dev/full
 }
+
+# Who cites Gewebe is told the version that the programs tell.
+test_citation_is_of_this_version() {
+  local version
+  version=$(sed -n 's/^version: //p' "$GEWEBE_ROOT/CITATION.cff")
+  [[ $version && $(csg --version) == "csg (Gewebe) $version"[,$'\n']* ]] || fail "CITATION.cff is of version '$version'" "$(csg --version)"
+}
