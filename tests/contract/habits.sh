@@ -28,8 +28,10 @@ check_version() { # TOOL
 test_version_tells_commit_libraries_and_kernels() {
   local tool commit version
   commit=$("$GEWEBE_ROOT/scripts/commit")
-  # The programs were linked with an earlier commit where somebody has made one since.
-  [[ ! $commit || $(csg --version) == *"commit $commit"* ]] || { left_out "programs of another commit than $commit"; commit=; }
+  # Those that were linked before the last commit tell an earlier one.
+  for tool in $(programs) gewebe; do
+    [[ ! $commit || $("$tool" --version) == *"commit $commit"* ]] || { left_out "$tool of another commit than $commit"; commit=; }
+  done
   for tool in $(programs) gewebe; do
     check_version "$tool"
   done

@@ -31,9 +31,10 @@ namespace openvdb::OPENVDB_VERSION_NAME {
 void initialize() __attribute__((weak));
 }
 namespace gewebe { // CGAL is headers alone: it is there with what uses them
+// NOLINTNEXTLINE(readability-redundant-declaration): it makes the reference weak
 RepairReport repair_mesh(TriangleMesh& mesh, const RepairOptions& options, const Context& context)
     __attribute__((weak));
-}
+} // namespace gewebe
 
 namespace gewebe::cli {
 namespace {
