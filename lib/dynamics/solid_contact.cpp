@@ -15,6 +15,10 @@ namespace {
 constexpr double same_place = 1e-4; ///< of the smallest radius
 constexpr double sure = 3e-4;       ///< tolerance of a step that instruments touch
 constexpr int max_pushes = 40;
+constexpr int max_idle = 8;    ///< pushes on end that came no nearer
+constexpr double nearer = 0.9; ///< than the best one
+/// Pushes in all whose rounds ran out: of what comes of such nothing is learned.
+constexpr int max_unfinished = 2;
 
 } // namespace
 
@@ -51,6 +55,8 @@ public:
               (entry(nodes, r, c) + entry(nodes, c, r)) / 2;
     }
     delassus.compliance = all_.learned_;
+    if (nodes_ != delassus.nodes)
+      start_pushes();
     nodes_ = delassus.nodes;
     note();
     for (const std::uint32_t node : nodes) {
@@ -80,12 +86,13 @@ public:
     }
     learn();
     const bool agreed = miss <= tolerance_ && (miss == 0 || put(at));
-    if (agreed || ++pushes_ == max_pushes) {
-      exact_ = exact_ && agreed;
-      pushes_ = 0;
-      return true;
-    }
-    return false;
+    idle_ = miss < nearer * best_ ? 0 : idle_ + 1;
+    best_ = std::min(best_, miss);
+    if (!agreed && ++pushes_ < max_pushes && idle_ < max_idle && unfinished_ < max_unfinished)
+      return false;
+    exact_ = exact_ && agreed;
+    start_pushes();
+    return true;
   }
 
   std::span<const double> shape() override {
@@ -108,6 +115,10 @@ public:
   const SolidStep& took() const { return took_; }
 
 private:
+  void start_pushes() {
+    pushes_ = idle_ = 0;
+    best_ = HUGE_VAL;
+  }
   /// The forces on the touched nodes, and where these stand: 3 for each.
   std::vector<double> forces_now() const {
     std::vector<double> all(3 * nodes_.size());
@@ -224,10 +235,12 @@ private:
     if (!step_.target.empty())
       engine.move_held(step_.target);
     const bool pushed = !force_.empty() || ran_;
-    engine.set_tolerance(pushed ? std::min(sure, step_.options.tolerance) : step_.options.tolerance,
-                         step_.options.max_rounds);
+    const double tolerance =
+        pushed ? std::min(sure, step_.options.tolerance) : step_.options.tolerance;
+    engine.set_tolerance(tolerance, step_.options.max_rounds);
     const SolidStep took = engine.step(step_.h, context_);
     ran_ = true;
+    unfinished_ += took.left <= tolerance ? 0 : 1;
     took_.rounds += took.rounds;
     took_.factorisations += took.factorisations;
     took_.change = took.change;
@@ -245,7 +258,8 @@ private:
   std::vector<double> shape_;                     ///< the last one
   std::vector<std::uint32_t> nodes_;
   double tolerance_ = 0;
-  int pushes_ = 0;
+  int pushes_ = 0, idle_ = 0, unfinished_ = 0;
+  double best_ = HUGE_VAL; ///< miss of a push
   std::vector<double> noted_force_, noted_place_;
   bool ran_ = false, exact_ = true;
   SolidStep took_;

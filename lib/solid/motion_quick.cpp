@@ -42,16 +42,14 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   for (std::size_t i = 0; i < body.nodes(); ++i)
     still_[i] = body.in_elements[i] == 0 || held[3 * i] != 0 || held[3 * i + 1] != 0 ||
                 held[3 * i + 2] != 0;
+  all_still_ = std::ranges::all_of(still_, [](std::uint8_t still) { return still != 0; });
   return 1;
 }
 
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
-  rotations_.resize(3 * held_.size());
-  if (std::ranges::all_of(still_, [](std::uint8_t still) { return still != 0; })) {
-    for (std::size_t at = 0; at < rotations_.size(); ++at)
-      rotations_[at] = at % 9 % 4 == 0 ? 1 : 0;
+  if (all_still_)
     return;
-  }
+  rotations_.resize(3 * held_.size());
   energy.node_rotations(rotations_, context);
   for (std::size_t i = 0; i < still_.size(); ++i)
     if (still_[i] != 0)
@@ -65,6 +63,8 @@ void MotionQuick::forget() {
 }
 
 void MotionQuick::into_frames(Numbers& v, const Context& context) const {
+  if (all_still_)
+    return;
   parallel_blocks(context, v.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; at += 3) {
       const double* const r = rotations_.data() + 3 * at;
@@ -76,6 +76,8 @@ void MotionQuick::into_frames(Numbers& v, const Context& context) const {
 }
 
 void MotionQuick::out_of_frames(Numbers& v, const Context& context) const {
+  if (all_still_)
+    return;
   parallel_blocks(context, v.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; at += 3) {
       const double* const r = rotations_.data() + 3 * at;

@@ -52,6 +52,7 @@ public:
 private:
   double step_ = 0;
   std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
+  bool all_still_ = false;
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;

@@ -18,6 +18,8 @@ constexpr std::size_t max_new = 256; ///< pieces that join at once, the deepest
 constexpr double outside = 1e-9;     ///< of the radius: so deep is not inside
 constexpr double deep = 1e-6;
 constexpr int max_rounds = 300; ///< until an object agrees
+/// Rounds whose forces were not found, in all: what comes of such is not exact anyway.
+constexpr std::size_t max_vain_pairs = 256;
 
 /// Of a piece from an instrument's core, the least.
 double distance_of(const PlacedInstrument& instrument, const Facet& piece,
@@ -176,7 +178,8 @@ void StaticContact::restart(std::span<const double> shape, std::vector<NodeTouch
 bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
                               const std::map<std::uint32_t, Vec3>& displaced, const Placed& placed,
                               std::span<const std::optional<MovedInstrument>> moved,
-                              std::span<const double> before, std::vector<Vec3>& at) {
+                              std::span<const double> before, std::size_t& vain_pairs,
+                              std::vector<Vec3>& at) {
   const ContactNodes all = around(nodes, displaced, before);
   ContactTurns turns;
   for (int round = 0; round < max_rounds; ++round) {
@@ -224,6 +227,9 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
     }
     if (object.push(touches_, at))
       return true;
+    vain_pairs += solved_ ? 0 : turns.pairs.size();
+    if (vain_pairs > max_vain_pairs)
+      return false;
   }
   return false;
 }
@@ -248,9 +254,11 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     return;
   const std::vector<double> before = shape;
   solved_ = true;
+  std::size_t vain_pairs = 0;
   for (;;) {
     std::vector<Vec3> at;
-    const bool agreed = solve_all(object, nodes, displaced, placed, instruments, before, at);
+    const bool agreed =
+        solve_all(object, nodes, displaced, placed, instruments, before, vain_pairs, at);
     solved_ = solved_ && agreed;
     const std::span<const double> u = object.shape();
     shape.assign(u.begin(), u.end());

@@ -131,7 +131,7 @@ private:
   bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
                  const std::map<std::uint32_t, Vec3>& displaced, const Placed& placed,
                  std::span<const std::optional<MovedInstrument>> moved,
-                 std::span<const double> before, std::vector<Vec3>& at);
+                 std::span<const double> before, std::size_t& vain_pairs, std::vector<Vec3>& at);
   Vec3 rest(std::uint32_t node) const { return model_.nodes[node].position; }
 
   const Model& model_;
