@@ -51,6 +51,15 @@ void warn_inexact(World& w, Object& object) {
                  " s: the forces of instruments are not exact, expected a slower way");
 }
 
+/// Whether the instrument touched it in the last step.
+bool touched_by(const World& w, const Body& body, std::size_t instrument) {
+  return body.touched && std::ranges::any_of(body.parts, [&](std::size_t part) {
+           return std::ranges::any_of(w.now.objects[part].shown.touches, [&](const NodeTouch& t) {
+             return t.instrument == instrument;
+           });
+         });
+}
+
 } // namespace
 
 // ---- elastodynamic objects
@@ -76,12 +85,13 @@ void guide(World& w, Body& body, double to) {
                              body.moving->motion()[object.offset + k].displacement);
       }
     }
-    for (Instrument& i : w.now.instruments) {
+    for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
+      const Instrument& i = w.now.instruments[k];
       const Pose now = i.way.at(to);
       if (!i.changed && (i.before == now || i.shape.blade))
         continue;
-      if (body.touched || (i.present && !i.shape.blade &&
-                           near(box_between(i.shape, i.before, now), *body.rest_box)))
+      if (touched_by(w, body, k) || (i.present && !i.shape.blade &&
+                                     near(box_between(i.shape, i.before, now), *body.rest_box)))
         body.moving->wake();
     }
   }
