@@ -53,6 +53,7 @@ InstrumentSets::Series InstrumentSets::begin(const std::string& name, std::uint6
                 friction = grow(group, "friction", Number::float64, {}),
                 ends = grow(group, "ends", Number::float64, {2, 3}),
                 pose = grow(group, "pose", Number::float64, {3, 4}),
+                hand = grow(group, "hand", Number::float64, {3}),
                 force = grow(group, "force", Number::float64, {3}),
                 torque = grow(group, "torque", Number::float64, {3}),
                 touched = grow(group, "touched", Number::uint32, {});
@@ -65,6 +66,7 @@ InstrumentSets::Series InstrumentSets::begin(const std::string& name, std::uint6
           std::move(friction),
           std::move(ends),
           std::move(pose),
+          std::move(hand),
           std::move(force),
           std::move(torque),
           std::move(touched),
@@ -78,7 +80,7 @@ void InstrumentSets::append(Series& to, const FrameInstrument& of) {
   to.touched.append(std::span<const std::uint32_t>(&touched, 1));
   if (!of.present) { // rows of zeros
     for (hdf5::Dataset* const set :
-         {&to.radius, &to.friction, &to.ends, &to.pose, &to.force, &to.torque})
+         {&to.radius, &to.friction, &to.ends, &to.pose, &to.hand, &to.force, &to.torque})
       put(*set, std::vector<double>(set->row_size()));
     return;
   }
@@ -88,6 +90,7 @@ void InstrumentSets::append(Series& to, const FrameInstrument& of) {
   put(to.ends,
       std::vector<double>{a.x + 0.0, a.y + 0.0, a.z + 0.0, b.x + 0.0, b.y + 0.0, b.z + 0.0});
   put(to.pose, matrix_of(of.pose));
+  put(to.hand, of.hand);
   put(to.force, of.force);
   put(to.torque, of.torque);
 }

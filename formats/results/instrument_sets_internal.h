@@ -37,7 +37,7 @@ private:
     std::string name;
     std::uint64_t first = 0; ///< frame
     hdf5::Group group, surface_group;
-    hdf5::Dataset kind, radius, friction, ends, pose, force, torque, touched;
+    hdf5::Dataset kind, radius, friction, ends, pose, hand, force, torque, touched;
     std::vector<Surface> surfaces;
   };
   Series begin(const std::string& name, std::uint64_t frame);

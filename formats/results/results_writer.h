@@ -33,6 +33,7 @@ struct FrameInstrument {
   bool present = false;  ///< else what follows does not count
   InstrumentShape shape;
   Pose pose;
+  Vec3 hand;               ///< that leads it: its own place where it is not coupled
   Vec3 force, torque;      ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
   std::uint64_t nodes = 0; ///< that it touches or grasps
 };

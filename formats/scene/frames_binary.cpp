@@ -120,9 +120,11 @@ std::string binary_answer(const Simulation& simulation, std::uint64_t step,
     const InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;
-    append_head(bytes, {FrameKind::instrument, k, step, 9});
+    append_head(bytes, {FrameKind::instrument, k, step, report.hand ? 12U : 9U});
     for (const Vec3& v : {report.pose.place, report.force, report.torque})
       append_single(bytes, v);
+    if (report.hand)
+      append_single(bytes, *report.hand);
   }
   return bytes + binary_sync(simulation, step);
 }

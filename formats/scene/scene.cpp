@@ -197,6 +197,25 @@ What parse_move(Words& in) {
   return c;
 }
 
+What parse_couple(Words& in) {
+  ChangeCommand c;
+  c.instrument = in.name();
+  SetCoupling set;
+  if (!in.take("off")) {
+    Coupling coupling;
+    coupling.stiffness = in.number("stiffness");
+    if (!(coupling.stiffness > 0))
+      in.fail("a stiffness that is not positive");
+    if (!in.done())
+      coupling.damping = in.number("damping");
+    if (!(coupling.damping >= 0))
+      in.fail("a negative damping");
+    set.coupling = coupling;
+  }
+  c.change = set;
+  return c;
+}
+
 What parse_grasp(Words& in) {
   ChangeCommand c = parse_about(in, Grasp{});
   c.instrument = in.name();
@@ -300,8 +319,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 27>& verbs() {
-  static const std::array<Verb, 27> all{{
+const std::array<Verb, 28>& verbs() {
+  static const std::array<Verb, 28> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -318,6 +337,8 @@ const std::array<Verb, 27>& verbs() {
        true, parse_instrument},
       {"move", "move NAME x y z [turn ax ay az DEGREES|quaternion w x y z] [over T]", true,
        parse_move},
+      {"couple", "couple NAME K [D], K positive, D 0 or more, or couple NAME off", true,
+       parse_couple},
       {"grasp", "grasp NAME NODES INSTRUMENT", true, parse_grasp},
       {"withdraw", "withdraw NAME", true, parse_withdraw},
       {"cut",

@@ -140,6 +140,8 @@ std::string text_answer(const Simulation& simulation, std::uint64_t step,
     text += instrument_lines(simulation, [](std::string& line, const InstrumentReport& report) {
       for (const Vec3& v : {report.pose.place, report.force, report.torque})
         append_numbers(line, v);
+      if (report.hand)
+        append_numbers(line, *report.hand);
     });
   return text + "done\n";
 }

@@ -73,6 +73,10 @@ std::string told_instruments(const Simulation& simulation) {
     append_numbers(line, report.force);
     append_numbers(line, report.torque);
     line += ' ' + std::to_string(report.nodes);
+    if (report.hand) {
+      append_numbers(line, *report.hand);
+      append_numbers(line, {report.coupling.stiffness, report.coupling.damping});
+    }
   });
 }
 

@@ -72,7 +72,8 @@ Pose between(const Pose& a, const Pose& b, double x) {
 Pose PoseWay::at(double time) const {
   if (!(time < end))
     return to;
-  return between(from, to, time > start ? smooth_step((time - start) / (end - start)) : 0);
+  const double x = time > start ? (time - start) / (end - start) : 0;
+  return between(from, to, even ? x : smooth_step(x));
 }
 
 InstrumentKind kind_of(const InstrumentShape& shape) {

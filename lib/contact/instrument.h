@@ -38,10 +38,11 @@ struct Pose {
 /// On the straight way from a to b, by the shorter rotation; exact at 0 and 1. \pre 0 <= x <= 1
 Pose between(const Pose& a, const Pose& b, double x);
 
-/// From one pose to another, smoothly, from `start` to `end` s.
+/// From one pose to another, from `start` to `end` s: smoothly, or evenly.
 struct PoseWay {
   Pose from, to;
   double start = 0, end = 0;
+  bool even = false;
 
   Pose at(double time) const;
   bool operator==(const PoseWay&) const = default;

@@ -86,6 +86,8 @@ public:
 
   /// Instruments during the advances to come, by number; none of them: no cost. Wakes nobody.
   virtual void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) = 0;
+  /// One that is led, behind the last advance.
+  virtual std::optional<LedInstrument> led(std::size_t instrument) const = 0;
   /// That it rests for `duration` s more, in place of an advance. \pre resting()
   virtual void rest_on(double duration) = 0;
   /// Impulses (forces times s) of the instruments since the last call, by ascending node and

@@ -2,6 +2,9 @@
 
 #include "contact/surface_parts.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -132,18 +135,25 @@ bool move_out(MassPoints& points, std::span<const MovingCore> cores, double dept
   return false;
 }
 
-void exchange_impulses(MassPoints& points, std::span<const MovingCore> cores,
-                       std::span<PieceTouch> touches, double exact, int sweeps) {
+namespace {
+
+constexpr int max_rounds = 30;
+
+/// \param gave what each instrument's velocity is beside its way's
+void sweep_impulses(MassPoints& points, std::span<const MovingCore> cores,
+                    std::span<const Vec3> gave, std::span<PieceTouch> touches, double exact,
+                    int sweeps) {
   std::vector<Vec3> own;       // velocity of the instrument there
   std::vector<double> allowed; // by which a point that was outside may come in
   for (const PieceTouch& t : touches) {
     const MovingCore& core = cores[t.instrument];
-    own.push_back(core.step > 0
-                      ? (t.point.place - carried(core.to, core.from, t.point.place)) / core.step
-                      : Vec3{});
+    // Its way as it was foreseen is what the gap is told by.
+    const Vec3 way = core.step > 0
+                         ? (t.point.place - carried(core.to, core.from, t.point.place)) / core.step
+                         : Vec3{};
     const double gap = t.point.distance - core.placed.radius; // of where the step begins
-    allowed.push_back(core.step > 0 ? std::max(0.0, gap / core.step + dot(own.back(), t.normal))
-                                    : 0);
+    own.push_back(way + gave[t.instrument]);
+    allowed.push_back(core.step > 0 ? std::max(0.0, gap / core.step + dot(way, t.normal)) : 0);
   }
   for (const PieceTouch& t : touches)
     for (std::size_t c = 0; c < 3; ++c)
@@ -188,6 +198,51 @@ void exchange_impulses(MassPoints& points, std::span<const MovingCore> cores,
     }
     if (!(change > exact * largest))
       return;
+  }
+}
+
+} // namespace
+
+void exchange_impulses(MassPoints& points, std::span<const MovingCore> cores,
+                       std::span<PieceTouch> touches, double exact, int sweeps) {
+  std::vector<Vec3> gave(cores.size());
+  const bool gives = std::ranges::any_of(cores, [](const auto& c) { return c.gives > 0; });
+  const std::vector<Vec3> velocity = gives ? points.velocity : std::vector<Vec3>{};
+  for (int round = 0;; ++round) {
+    sweep_impulses(points, cores, gave, touches, exact, sweeps);
+    if (!gives || round == max_rounds)
+      return;
+    bool met = true;
+    for (std::uint32_t k = 0; k < cores.size(); ++k) {
+      if (!(cores[k].gives > 0))
+        continue;
+      Vec3 felt;
+      double largest = 0;
+      // What it would feel more if it were quicker, of all that it touches.
+      Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
+      for (const PieceTouch& t : touches) {
+        if (t.instrument != k || t.impulse == Vec3{})
+          continue;
+        felt -= t.impulse;
+        largest = std::max(largest, norm(t.impulse));
+        const Eigen::Vector3d n(t.normal.x, t.normal.y, t.normal.z);
+        const double own = dot(t.normal, scaled(t.normal, answer_of(points, t.piece, t.point)));
+        stiffness += (cores[k].placed.friction > 0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
+                                                   : n * n.transpose()) /
+                     own;
+      }
+      const Vec3 miss = cores[k].gives * (felt - cores[k].expected) - gave[k];
+      if (norm(miss) <= exact * cores[k].gives * largest)
+        continue;
+      met = false;
+      const Eigen::Vector3d by = (Eigen::Matrix3d::Identity() + cores[k].gives * stiffness)
+                                     .ldlt()
+                                     .solve(Eigen::Vector3d(miss.x, miss.y, miss.z));
+      gave[k] += {by[0], by[1], by[2]};
+    }
+    if (met)
+      return;
+    points.velocity = velocity;
   }
 }
 

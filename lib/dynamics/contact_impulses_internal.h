@@ -25,6 +25,9 @@ struct MovingCore {
   PlacedInstrument placed;
   Pose from, to;
   double step = 0; ///< 0: it stands
+  /// Of one that gives way: velocity per impulse on it beyond the one that it goes `to` there with.
+  double gives = 0;
+  Vec3 expected{};
 };
 
 /// Where an instrument is nearer to a piece than its radius.
@@ -50,7 +53,8 @@ bool move_out(MassPoints& points, std::span<const MovingCore> cores, double dept
 
 /// Velocities behind the contact: no point leads into an instrument, against its own surface, but
 /// for what was left to it when the step began, and friction (Coulomb) brakes what slides along it.
-/// To `exact` of the largest impulse, or for `sweeps`.
+/// To `exact` of the largest impulse, or for `sweeps`. Instruments that give way have the velocity
+/// that goes with what they feel, by Newton's method.
 void exchange_impulses(MassPoints& points, std::span<const MovingCore> cores,
                        std::span<PieceTouch> touches, double exact, int sweeps);
 

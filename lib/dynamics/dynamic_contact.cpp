@@ -118,13 +118,16 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
     const MovingInstrument& i = *state_.instruments[k];
     ContactMoment::There& t = m.there.emplace_back();
     t.instrument = k;
-    t.from = i.way.at(time);
-    t.to = i.way.at(time + h);
+    t.from = i.at(time);
+    t.to = i.guess(time + h, h);
+    t.hand = i.way.at(time + h).place;
     t.placed = PlacedInstrument(i.shape, t.to);
     t.box = t.placed.box();
     t.speed = i.way.end > time
                   ? 2 * path_length(i.shape, i.way.from, i.way.to) / (i.way.end - i.way.start)
                   : 0;
+    if (i.led)
+      t.speed += 4 * norm(t.to.place - t.from.place) / h;
     const auto go = [&](const Pose& from, const Pose& to) {
       const MovedInstrument way{i.shape, from, to};
       const std::size_t parts = parts_of_way({&way, 1}, max_parts);
@@ -138,7 +141,7 @@ ContactMoment DynamicContact::moment(std::uint64_t step, std::uint64_t steps, do
         t.box.add(box.max);
       }
     };
-    if (step == 0 && i.before != t.from)
+    if (step == 0 && !i.led && i.before != t.from)
       go(i.before, t.from);
     go(t.from, t.to);
   }
@@ -151,9 +154,12 @@ Vec3 DynamicContact::place(std::span<const NodeRow> rows, std::uint32_t row) con
 
 bool DynamicContact::due(const ContactMoment& moment) const {
   return !moment.there.empty() &&
-         (moment.last || std::ranges::any_of(state_.next_look, [&](std::uint64_t step) {
-            return moment.step >= step;
-          }));
+         (moment.last ||
+          std::ranges::any_of(
+              moment.there,
+              [&](const auto& t) { return state_.instruments[t.instrument]->led.has_value(); }) ||
+          std::ranges::any_of(state_.next_look,
+                              [&](std::uint64_t step) { return moment.step >= step; }));
 }
 
 /// The pieces of blocks that may be in an instrument now, and when to look again at the others.
@@ -259,6 +265,7 @@ void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeT
   look(moment, next, numbers);
   if (numbers.empty()) {
     state_.guesses.clear();
+    lead(moment, {});
     return;
   }
   Near near = near_pieces(numbers, traits, next);
@@ -269,8 +276,13 @@ void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeT
   for (const std::uint32_t row : near.rows)
     from.push_back(place(now, row));
   std::vector<MovingCore> cores;
-  for (const ContactMoment::There& t : moment.there)
-    cores.push_back({t.placed, t.from, t.to, moment.h});
+  for (const ContactMoment::There& t : moment.there) {
+    MovingCore& core = cores.emplace_back(MovingCore{t.placed, t.from, t.to, moment.h});
+    if (const auto& led = state_.instruments[t.instrument]->led) {
+      core.gives = CouplingStep(led->coupling, led->lag, moment.h).compliance / moment.h / moment.h;
+      core.expected = moment.h * led->force;
+    }
+  }
   if (std::ranges::any_of(moment.there, [](const auto& t) { return !t.on_its_way.empty(); })) {
     const std::vector<Vec3> begin = from;
     points.place.swap(from);
@@ -299,6 +311,15 @@ void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeT
             std::tuple(moment.there[t.instrument].instrument, t.part, rows_of(t.piece)))
       t.impulse = moment.h * turned(known->force, t.normal, cores[t.instrument].placed.friction);
   exchange_impulses(points, cores, touches, exact_impulse, many_sweeps);
+  std::vector<Vec3> felt(cores.size());
+  for (const PieceTouch& t : touches)
+    felt[t.instrument] -= t.impulse;
+  lead(moment, felt);
+  for (std::size_t k = 0; k < cores.size(); ++k)
+    if (const auto& led = state_.instruments[moment.there[k].instrument]->led) {
+      cores[k].placed.a += led->place - cores[k].to.place;
+      cores[k].to.place = led->place;
+    }
   state_.guesses.clear();
   for (const PieceTouch& t : touches)
     if (t.impulse != Vec3{})
@@ -336,11 +357,21 @@ void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeT
   state_.impulses = sums_of_touches(std::move(state_.impulses));
 }
 
-bool DynamicContact::still(double start) const {
+bool DynamicContact::still(double start, double h) const {
   for (const auto& i : state_.instruments)
-    if (i && ((start < i->way.end && i->way.from != i->way.to) || i->before != i->way.at(start)))
+    if (i && ((start < i->way.end && i->way.from != i->way.to) ||
+              (!i->led && i->before != i->way.at(start)) || i->moves(start + h, h)))
       return false;
   return true;
+}
+
+/// Behind a step: where instruments that are led have gone, by what they felt. \param impulses on
+/// those that are there; none: nothing
+void DynamicContact::lead(const ContactMoment& moment, std::span<const Vec3> impulses) {
+  for (std::size_t k = 0; k < moment.there.size(); ++k)
+    if (auto& led = state_.instruments[moment.there[k].instrument]->led)
+      led->settle(moment.there[k].hand, moment.h,
+                  impulses.empty() ? Vec3{} : impulses[k] / moment.h);
 }
 
 std::vector<std::uint32_t> DynamicContact::pieces_near(const Box3& box,
@@ -361,7 +392,7 @@ bool DynamicContact::inside(std::span<const NodeTraits> traits,
   for (const auto& i : state_.instruments) {
     if (!i)
       continue;
-    const PlacedInstrument placed(i->shape, i->way.to);
+    const PlacedInstrument placed(i->shape, i->at(HUGE_VAL));
     const Near near = near_pieces(pieces_near(placed.box(), rows), traits, rows);
     if (!touches_of(near.points, std::array{MovingCore{placed, {}, {}, 0}}, -2 * on_surface)
              .empty())
@@ -378,7 +409,7 @@ void DynamicContact::balance(std::span<const NodeTraits> traits, std::span<const
     if (!state_.instruments[k])
       continue;
     const MovingInstrument& i = *state_.instruments[k];
-    cores.push_back({PlacedInstrument(i.shape, i.way.to), {}, {}, 0});
+    cores.push_back({PlacedInstrument(i.shape, i.at(HUGE_VAL)), {}, {}, 0});
     instrument.push_back(k);
     const double more = 2 * at_surface * i.shape.radius;
     Box3 box = cores.back().placed.box();

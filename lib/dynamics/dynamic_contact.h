@@ -11,6 +11,7 @@
 // every few steps only; behind the last step of an advance all that may be near are, so that no
 // shape is shown with an instrument in it.
 
+#include "contact/coupling.h"
 #include "contact/instrument.h"
 #include "contact/surface_point.h"
 #include "dynamics/spring_force.h"
@@ -31,6 +32,26 @@ struct MovingInstrument {
   InstrumentShape shape;
   Pose before;
   PoseWay way;
+  std::optional<LedInstrument> led{}; ///< the way is a hand's; it gives way to what it touches
+
+  /// Now, at `time`.
+  Pose at(double time) const {
+    Pose pose = way.at(time);
+    if (led)
+      pose.place = led->place;
+    return pose;
+  }
+  /// Behind a step of h to `time`, as far as is known before it.
+  Pose guess(double time, double h) const {
+    Pose pose = way.at(time);
+    if (led)
+      pose.place = led->guess(pose.place, h);
+    return pose;
+  }
+  /// Whether it moves in the step that ends at `time`.
+  bool moves(double time, double h) const {
+    return led && !(norm(guess(time, h).place - led->place) <= led_to_rest * shape.radius);
+  }
 };
 
 /// The instruments in one integration step.
@@ -39,6 +60,7 @@ struct ContactMoment {
     std::uint32_t instrument = 0;
     PlacedInstrument placed;                  ///< at the end
     Pose from, to;                            ///< of the step, a jump left out
+    Vec3 hand;                                ///< that leads it, at the end
     std::vector<PlacedInstrument> on_its_way; ///< where it was before, if it is fast
     Box3 box;                                 ///< of all these
     double speed = 0;                         ///< mm/s at most, a jump left out
@@ -88,8 +110,14 @@ public:
   void keep_out(const ContactMoment& moment, std::span<const NodeTraits> traits,
                 std::span<const NodeRow> now, std::span<NodeRow> next);
 
-  /// Whether no instrument moves from `start` on.
-  bool still(double start) const;
+  /// Whether no instrument moves from `start` on, in steps of h.
+  bool still(double start, double h) const;
+  /// An instrument that is led, as it is now.
+  std::optional<LedInstrument> led(std::size_t instrument) const {
+    return instrument < state_.instruments.size() && state_.instruments[instrument]
+               ? state_.instruments[instrument]->led
+               : std::nullopt;
+  }
   /// Whether a piece is inside one, as they stand in the end.
   bool inside(std::span<const NodeTraits> traits, std::span<const NodeRow> rows) const;
   /// What is left of accelerations of nodes at rest by the instruments that they touch, whose
@@ -114,6 +142,7 @@ private:
   Vec3 place(std::span<const NodeRow> rows, std::uint32_t row) const;
   void look(const ContactMoment& moment, std::span<const NodeRow> next,
             std::vector<std::uint32_t>& numbers);
+  void lead(const ContactMoment& moment, std::span<const Vec3> impulses);
   void take_part_pinched(Near& near, const ContactMoment& moment) const;
 
   const SpringLayout& layout_;

@@ -219,7 +219,7 @@ Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
 }
 
 bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const {
-  if (load_->changes_until() > time || (touch_ && !touch_->still(time)))
+  if (load_->changes_until() > time || (touch_ && !touch_->still(time, h)))
     return false;
   const double speed = rest_tolerance * size_ / h, acceleration = speed / h;
   for (const NodeRow& row : *rows_)
@@ -360,6 +360,10 @@ void Elastodynamic::set_instruments(std::vector<std::optional<MovingInstrument>>
     touch_ = std::make_unique<DynamicContact>(model_, layout_);
   if (touch_)
     touch_->begin(std::move(instruments));
+}
+
+std::optional<LedInstrument> Elastodynamic::led(std::size_t instrument) const {
+  return touch_ ? touch_->led(instrument) : std::nullopt;
 }
 
 void Elastodynamic::rest_on(double duration) {

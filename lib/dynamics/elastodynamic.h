@@ -71,6 +71,7 @@ public:
   std::vector<NodeVector> contact_forces() const override;
 
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
+  std::optional<LedInstrument> led(std::size_t instrument) const override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
   bool touches_exact() const override { return true; } // each step's are

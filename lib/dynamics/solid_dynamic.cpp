@@ -306,6 +306,7 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
       }
     moving.restore(target, velocity, context);
     moving.find_reactions(context);
+    lead_instruments(to, h);
   } else {
     const SolidStep took = push(forces, target, h, from, to, first, context);
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
@@ -333,6 +334,8 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
 
 bool SolidDynamic::instruments_move(bool first, double from, double to) const {
   return std::ranges::any_of(state_.instruments, [&](const auto& i) {
+    if (i && i->led)
+      return i->way.end > to || i->moves(to, to - from);
     return i && (i->way.end > to || (first && i->before != i->way.at(from)));
   });
 }
@@ -360,11 +363,15 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
         continue;
       }
       const auto at = [&](double of_jump, double of_way) {
-        const Pose start = i->way.at(from);
+        const Pose start = i->at(from);
         return of_jump < 1 ? between(i->before, start, of_jump)
-                           : between(start, i->way.at(to), of_way);
+                           : between(start, i->guess(to, h), of_way);
       };
       moved.emplace_back(MovedInstrument{i->shape, at(jump, way), at(jump_to, way_to)});
+      if (i->led && !clearing) {
+        moved.back()->compliance = CouplingStep(i->led->coupling, i->led->lag, h).compliance;
+        moved.back()->pushed = i->led->force;
+      }
     }
     const SolidContact::Result result = contact_->step(
         {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
@@ -382,9 +389,9 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     std::vector<MovedInstrument> ways;
     for (const auto& i : instruments)
       if (i && jump)
-        ways.push_back({i->shape, i->before, i->way.at(from)});
+        ways.push_back({i->shape, i->before, i->at(from)});
       else if (i)
-        ways.push_back({i->shape, i->way.at(from), i->way.at(to)});
+        ways.push_back({i->shape, i->at(from), i->guess(to, h)});
     const bool moves = std::ranges::any_of(ways, [](const auto& w) { return w.before != w.now; });
     return moves ? parts_of_way(ways, max_parts) : 0;
   };
@@ -396,12 +403,24 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
   for (std::size_t p = 0; p < ways; ++p)
     go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
+  lead_instruments(to, h);
   for (NodeTouch t : state_.touched) {
     t.force *= h;
     state_.impulses.push_back(t);
   }
   state_.exact = state_.exact && exact;
   return all;
+}
+
+/// Where those that are led have gone in a step, by what they felt.
+void SolidDynamic::lead_instruments(double to, double h) {
+  for (std::uint32_t k = 0; k < state_.instruments.size(); ++k)
+    if (auto& i = state_.instruments[k]; i && i->led) {
+      Vec3 felt;
+      for (const NodeTouch& t : state_.touched)
+        felt -= t.instrument == k ? t.force : Vec3{};
+      i->led->settle(i->way.at(to).place, h, felt);
+    }
 }
 
 /// The engine's state, to be kept.
@@ -430,6 +449,12 @@ std::vector<NodeVector> SolidDynamic::contact_forces() const {
 
 void SolidDynamic::set_instruments(std::vector<std::optional<MovingInstrument>> instruments) {
   state_.instruments = std::move(instruments);
+}
+
+std::optional<LedInstrument> SolidDynamic::led(std::size_t instrument) const {
+  return instrument < state_.instruments.size() && state_.instruments[instrument]
+             ? state_.instruments[instrument]->led
+             : std::nullopt;
 }
 
 void SolidDynamic::rest_on(double duration) {

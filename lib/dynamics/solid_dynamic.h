@@ -55,6 +55,7 @@ public:
   std::vector<NodeVector> contact_forces() const override;
 
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
+  std::optional<LedInstrument> led(std::size_t instrument) const override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
   bool touches_exact() const override { return state_.exact; }
@@ -84,6 +85,7 @@ private:
   void read_load();
   void apply_load(double time);
   void take_over();
+  void lead_instruments(double to, double h);
   SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;

@@ -275,6 +275,7 @@ void move_bodies(World& w, double to) {
       load_body(w, *body);
   if (!(duration > 0))
     return;
+  lead_on(w, to);
   std::vector<Body*> awake;
   std::vector<double> step;
   for (const auto& body : w.now.bodies) {

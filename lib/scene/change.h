@@ -2,6 +2,7 @@
 // What can be done to a scene: objects and instruments by number, nodes by number.
 
 #include "compliance/compliance_source.h"
+#include "contact/coupling.h"
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "model/cut_select.h"
@@ -77,6 +78,11 @@ struct Grasp {
   std::vector<std::uint32_t> nodes;
   std::size_t instrument = 0;
 };
+/// A hand leads the instrument through a spring and a damper from now on, or again at once.
+struct SetCoupling {
+  std::size_t instrument = 0;
+  std::optional<Coupling> coupling;
+};
 /// Takes an instrument away; what it grasped is released.
 struct Withdraw {
   std::size_t instrument = 0;
@@ -137,9 +143,10 @@ struct SetTear {
 struct Restore {
   std::size_t object = 0;
 };
-using Change = std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
-                            MoveInstrument, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
-                            SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
+using Change =
+    std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
+                 MoveInstrument, SetCoupling, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
+                 SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
 /// What a log says of an instrument alone; what does not apply stays empty.
 struct InstrumentRow {
@@ -147,6 +154,7 @@ struct InstrumentRow {
   std::optional<Quaternion> turn; ///< from how it came
   std::optional<Vec3> force, torque;
   std::optional<std::uint64_t> nodes; ///< that it touches or grasps
+  std::optional<Vec3> hand;           ///< that leads it, of a coupled one
 };
 
 /// What a log says of a change; what does not apply stays empty.

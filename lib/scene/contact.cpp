@@ -69,10 +69,18 @@ void guide(World& w, Body& body, double to) {
   if (!instruments_there(w))
     return;
   std::vector<std::optional<MovingInstrument>> all;
+  const auto met_by = [&](const Instrument& i) {
+    MovingInstrument met{i.shape, i.before, i.way};
+    if (!i.coupled)
+      return met;
+    if (gives_way_to(w, i, w.now.objects[body.parts[0]]))
+      met.led = i.coupled->led;
+    else
+      met.way = {i.pose(w.now.clock.time), i.coupled->end, w.now.clock.time, to, true};
+    return met;
+  };
   for (const Instrument& i : w.now.instruments)
-    all.push_back(i.present && !i.shape.blade
-                      ? std::optional(MovingInstrument{i.shape, i.before, i.way})
-                      : std::nullopt);
+    all.push_back(i.present && !i.shape.blade ? std::optional(met_by(i)) : std::nullopt);
   if (!body.moving->resting()) {
     body.rest_box.reset();
   } else {
@@ -87,7 +95,7 @@ void guide(World& w, Body& body, double to) {
     }
     for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
       const Instrument& i = w.now.instruments[k];
-      const Pose now = i.way.at(to);
+      const Pose now = i.present && i.coupled ? i.coupled->end : i.way.at(to);
       if (!i.changed && (i.before == now || i.shape.blade))
         continue;
       if (touched_by(w, body, k) || (i.present && !i.shape.blade &&
@@ -100,8 +108,9 @@ void guide(World& w, Body& body, double to) {
 }
 
 void end_guiding(World& w, double to) {
+  follow_hands(w, to);
   for (Instrument& i : w.now.instruments) {
-    i.before = i.way.at(to);
+    i.before = i.pose(to);
     i.changed = false;
   }
 }
@@ -214,6 +223,7 @@ void follow_instruments(World& w, Object& object) {
       const auto at = [&](std::size_t n) {
         return static_cast<double>(n) / static_cast<double>(parts);
       };
+      const bool whole = p + 1 == w.now.poses.size() && part == parts;
       std::vector<std::optional<MovedInstrument>> here(count);
       std::size_t next = 0;
       for (std::size_t k = 0; k < count; ++k)
@@ -221,8 +231,10 @@ void follow_instruments(World& w, Object& object) {
           const MovedInstrument& way = moved[next++];
           here[k] = MovedInstrument{way.shape, between(way.before, way.now, at(part - 1)),
                                     between(way.before, way.now, at(part))};
+          if (whole && gives_way_to(w, w.now.instruments[k], object))
+            here[k] = led_here(w, w.now.instruments[k], *here[k]);
         }
-      const bool last = changed && p + 1 == w.now.poses.size() && part == parts;
+      const bool last = changed && whole;
       const Load& load = *object.shown.load;
       if (object.warp) {
         WarpedYielding turning(
@@ -245,6 +257,9 @@ void follow_instruments(World& w, Object& object) {
   }
   w.now.counts.touches.add(object.contact->take_counts());
   object.shown.touches = object.contact->touches();
+  for (std::size_t k = 0; k < count; ++k)
+    if (pose_at(w, w.now.poses.size() - 1, k) && gives_way_to(w, w.now.instruments[k], object))
+      settle(w, k, object);
   if (const auto stuck = object.contact->stuck();
       stuck && !object.matter->told.stuck && w.options.warn) {
     object.matter->told.stuck = true;

@@ -75,11 +75,15 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
   InstrumentReport report{.name = i.name,
                           .present = i.present,
                           .shape = i.shape,
-                          .pose = i.way.at(w.now.clock.time),
+                          .pose = i.pose(w.now.clock.time),
                           .force = {},
                           .torque = {}};
   if (!i.present)
     return report;
+  if (i.coupled) {
+    report.hand = i.way.at(w.now.clock.time).place;
+    report.coupling = i.coupled->led.coupling;
+  }
   const auto add = [&](const Vec3& at, const Vec3& force) {
     report.force -= force;
     report.torque -= cross(at - report.pose.place, force);
@@ -116,7 +120,7 @@ void note_poses(World& w) {
     return;
   std::vector<std::optional<Pose>> now; // of those that push
   for (Instrument& i : w.now.instruments) {
-    now.push_back(i.present && !i.shape.blade ? std::optional(i.way.at(w.now.clock.time))
+    now.push_back(i.present && !i.shape.blade ? std::optional(i.pose(w.now.clock.time))
                                               : std::nullopt);
     if (!i.present || !i.shape.blade)
       continue;
@@ -155,6 +159,7 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   i.present = false;
   note_poses(w); // it takes no way from where it was
   i.present = true;
+  i.coupled.reset();
   i.path.clear();
   i.shape = c.shape;
   i.way = {c.pose, c.pose, w.now.clock.time, w.now.clock.time};
@@ -198,6 +203,38 @@ void Rule<MoveInstrument>::log(const World& w, const MoveInstrument& c, ChangeRo
   row.instrument.turn = i.way.to.turn;
 }
 
+void Rule<SetCoupling>::require(World& w, const SetCoupling& c) {
+  const Instrument& i = present_instrument(w, c.instrument);
+  if (i.shape.blade)
+    throw Error("the instrument " + i.name + " is a blade, expected one that pushes");
+  if (c.coupling && !i.grips.empty())
+    throw Error("the instrument " + i.name +
+                " holds nodes, expected one that holds none to be coupled");
+}
+void Rule<SetCoupling>::apply(World& w, const SetCoupling& c) {
+  Instrument& i = w.now.instruments[c.instrument];
+  const Pose hand = i.way.at(w.now.clock.time);
+  if (!c.coupling) { // at once to where the hand is
+    i.coupled.reset();
+  } else if (i.coupled) {
+    i.coupled->led.coupling = i.coupled->shown.coupling = *c.coupling;
+  } else {
+    Instrument::Coupled& led = i.coupled.emplace();
+    led.led = {.coupling = *c.coupling, .place = hand.place, .lag = {}, .force = {}, .others = {}};
+    led.shown = led.led;
+  }
+  note_poses(w);
+}
+void Rule<SetCoupling>::log(const World&, const SetCoupling& c, ChangeRow& row) {
+  row.what = "couple";
+  if (c.coupling) {
+    row.value = c.coupling->stiffness;
+    row.text = "damping " + number_text(c.coupling->damping);
+  } else {
+    row.text = "off";
+  }
+}
+
 void Rule<Grasp>::check(World& w, const Grasp& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
@@ -207,8 +244,14 @@ void Rule<Grasp>::check(World& w, const Grasp& c) {
                   " is fixed, expected nodes that can follow an instrument");
 }
 void Rule<Grasp>::require(World& w, const Grasp& c) {
-  if (const Instrument& i = present_instrument(w, c.instrument); i.shape.blade)
+  const Instrument& i = present_instrument(w, c.instrument);
+  if (i.shape.blade)
     throw Error("the instrument " + i.name + " is a blade, expected one that can hold nodes");
+  if (i.coupled)
+    throw Error("the instrument " + i.name +
+                " is led through a coupling, expected one that holds nodes where it is led: "
+                "couple " +
+                i.name + " off");
 }
 void Rule<Grasp>::apply(World& w, const Grasp& c) {
   Instrument& i = w.now.instruments[c.instrument];

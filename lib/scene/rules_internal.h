@@ -127,6 +127,12 @@ struct Rule<MoveInstrument> : Plain<MoveInstrument> {
   static void log(const World& w, const MoveInstrument& c, ChangeRow& row);
 };
 template <>
+struct Rule<SetCoupling> : Plain<SetCoupling> {
+  static void require(World& w, const SetCoupling& c);
+  static void apply(World& w, const SetCoupling& c);
+  static void log(const World& w, const SetCoupling& c, ChangeRow& row);
+};
+template <>
 struct Rule<Grasp> : Plain<Grasp> {
   static void check(World& w, const Grasp& c);
   static void require(World& w, const Grasp& c);

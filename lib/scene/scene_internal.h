@@ -219,6 +219,21 @@ struct Instrument {
   std::vector<Pose> path; // of a blade: what it has passed in this step
   Pose before;            // where elastodynamic objects last met it
   bool changed = false;   // since then put or withdrawn
+  /// Led by a hand, whose way it is then, see coupled.cpp.
+  struct Coupled {
+    LedInstrument led;                // as it goes on from its objects' last steps
+    LedInstrument shown;              // behind the last step of the scene
+    Pose end;                         // of the way that bodies meet it on
+    std::optional<std::size_t> giver; // the object that it gives way to in a step's course
+  };
+  std::optional<Coupled> coupled;
+
+  Pose pose(double time) const {
+    Pose pose = way.at(time);
+    if (coupled)
+      pose.place = coupled->led.place;
+    return pose;
+  }
 };
 
 struct Event {

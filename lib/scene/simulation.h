@@ -119,6 +119,8 @@ struct InstrumentReport {
   bool present = false;
   InstrumentShape shape;
   Pose pose;
+  std::optional<Vec3> hand{}; ///< that leads it through a coupling
+  Coupling coupling{};
   Vec3 force, torque;    ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
   std::size_t nodes = 0; ///< that it touches or grasps
 };

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 namespace gewebe::simulation {
 
@@ -59,8 +61,21 @@ void require_bounded_instruments(const World& w) {
   }
 }
 
+/// Those first that instruments give way to: the others meet them where they have gone.
+std::vector<std::size_t> order_of_showing(const World& w) {
+  std::vector<std::size_t> order(w.now.objects.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_partition(order, [&](std::size_t k) {
+    return std::ranges::any_of(w.now.instruments, [&](const Instrument& i) {
+      return gives_way_to(w, i, w.now.objects[k]);
+    });
+  });
+  return order;
+}
+
 void show_all(World& w) {
-  for (Object& object : w.now.objects) {
+  for (const std::size_t number : order_of_showing(w)) {
+    Object& object = w.now.objects[number];
     if (w.now.settings.emits.any_shapes())
       need_model(object);
     if (!object.shown.valid ||
@@ -96,6 +111,7 @@ void advance(World& w, double to) {
   for (std::size_t i = 0; i < w.now.objects.size(); ++i)
     at_object(w, w.now.objects[i], [&] { find_free_motion(w, i); });
   show_all(w);
+  end_leading(w);
   if (w.now.poses.size() > 1)
     w.now.poses.erase(w.now.poses.begin(), w.now.poses.end() - 1);
   clock.shown = clock.time;

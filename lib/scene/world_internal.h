@@ -154,6 +154,14 @@ void note_poses(World& w);
 bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
+// coupled.cpp: instruments that hands lead through a spring
+void lead_on(World& w, double to);
+void follow_hands(World& w, double to);
+bool gives_way_to(const World& w, const Instrument& instrument, const Object& object);
+MovedInstrument led_here(const World& w, const Instrument& instrument, const MovedInstrument& way);
+void settle(World& w, std::size_t instrument, const Object& object);
+void end_leading(World& w);
+
 // contact.cpp: whom they touch
 void guide(World& w, Body& body, double to);
 void end_guiding(World& w, double to);

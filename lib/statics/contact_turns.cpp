@@ -107,10 +107,11 @@ public:
 private:
   /// Whether a core goes through a piece: no pair leads it out again.
   bool pierced() const {
-    for (const std::optional<PlacedInstrument>& instrument : scene_.placed)
-      for (const Facet& piece : scene_.nodes.pieces)
-        if (instrument && corner_count(piece) == 3 &&
-            goes_through(*instrument, corners_of(piece, turns_.at)))
+    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
+      for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p)
+        if (const Facet& piece = scene_.nodes.pieces[p];
+            scene_.nodes.meet(k, p) && corner_count(piece) == 3 &&
+            goes_through(*scene_.placed[k], corners_of(piece, turns_.at)))
           return true;
     return false;
   }
@@ -155,7 +156,10 @@ private:
       if (!scene_.placed[k])
         continue;
       const PlacedInstrument& instrument = *scene_.placed[k];
-      for (const Facet& whole : scene_.nodes.pieces) {
+      for (std::size_t number = 0; number < scene_.nodes.pieces.size(); ++number) {
+        const Facet& whole = scene_.nodes.pieces[number];
+        if (!scene_.nodes.meet(k, number))
+          continue;
         // A piece can't be moved out while a corner that is held is in.
         const std::optional<Facet> piece = part_of(whole, [&](std::uint32_t i) {
           return i < scene_.nodes.moving ||

@@ -40,6 +40,12 @@ struct ContactNodes {
   std::vector<Vec3> was;    ///< where the instruments' ways began
   std::vector<Vec3> inward; ///< directions to move out by where nothing else says
   std::vector<Facet> pieces;
+  /// Instruments meet those pieces alone that are seen by the same; empty: all meet all.
+  std::vector<std::uint32_t> piece_seen_by{}, seen_by{}; ///< by piece, by instrument
+
+  bool meet(std::uint32_t instrument, std::size_t piece) const {
+    return seen_by.empty() || seen_by[instrument] == piece_seen_by[piece];
+  }
 };
 
 struct ContactTurns {

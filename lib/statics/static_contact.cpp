@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "statics/contact_turns_internal.h"
+#include "statics/giving_contact_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -181,6 +182,10 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
                               std::span<const double> before, std::size_t& vain_pairs,
                               std::vector<Vec3>& at) {
   const ContactNodes all = around(nodes, displaced, before);
+  std::optional<GivingContact> giving;
+  if (!gave_.empty())
+    giving.emplace(all, moved, gave_);
+  const auto node_of = [&](std::uint32_t i) { return all.node[giving ? giving->node(i) : i]; };
   ContactTurns turns;
   for (int round = 0; round < max_rounds; ++round) {
     touches_.clear();
@@ -196,7 +201,11 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
                                      : given != displaced.end() ? given->second
                                                                 : vector_at(before, node)));
       }
-      take_turns(delassus, all, free, placed, moved, turns);
+      if (giving)
+        take_turns(giving->delassus(delassus), giving->nodes(), giving->free(free), placed, moved,
+                   turns);
+      else
+        take_turns(delassus, all, free, placed, moved, turns);
       if (!turns.pairs.empty()) {
         const auto taken = static_cast<std::uint64_t>(turns.turns);
         counts_.add({1, taken, taken, turns.solved ? 0U : 1U, turns.solved ? turns.change : 0});
@@ -205,7 +214,7 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
       if (turns.stuck && !stuck_) {
         const auto& [weights, place, core, distance] = turns.stuck->point;
         const auto most = std::ranges::max_element(weights) - weights.begin();
-        stuck_ = NodeTouch{all.node[turns.stuck->piece[static_cast<std::size_t>(most)]],
+        stuck_ = NodeTouch{node_of(turns.stuck->piece[static_cast<std::size_t>(most)]),
                            turns.stuck->instrument,
                            {}};
       }
@@ -213,17 +222,22 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
         if (pair.force == Vec3{})
           continue;
         const Facet& f = pair.piece;
-        points_.push_back({{all.node[f[0]], all.node[f[1]], all.node[f[2]]},
+        points_.push_back({{node_of(f[0]), node_of(f[1]), node_of(f[2])},
                            pair.point.weights,
                            pair.instrument,
                            pair.force});
         for (std::size_t c = 0; c < 3; ++c)
           if (pair.point.weights[c] > 0)
             touches_.push_back(
-                {all.node[f[c]], pair.instrument, pair.point.weights[c] * pair.force});
+                {node_of(f[c]), pair.instrument, pair.point.weights[c] * pair.force});
       }
       touches_ = sums_of_touches(std::move(touches_));
-      at.assign(turns.at.begin(), turns.at.begin() + static_cast<std::ptrdiff_t>(all.moving));
+      if (giving) {
+        gave_ = giving->gave(turns.pairs);
+        at = giving->places(turns.at, gave_, delassus, free, turns.pairs);
+      } else {
+        at.assign(turns.at.begin(), turns.at.begin() + static_cast<std::ptrdiff_t>(all.moving));
+      }
     }
     if (object.push(touches_, at))
       return true;
@@ -240,6 +254,7 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
   Placed placed;
   for (const auto& i : instruments)
     placed.push_back(i ? std::optional(PlacedInstrument(i->shape, i->now)) : std::nullopt);
+  gave_.assign(any_gives(instruments) ? instruments.size() : 0, Vec3{});
   std::erase_if(touches_, [&](const NodeTouch& t) {
     return t.instrument >= placed.size() || !placed[t.instrument] || displaced.contains(t.node) ||
            model_.nodes[t.node].fixed == fixed_all;
@@ -250,8 +265,10 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
       nodes.push_back(t.node);
   stuck_.reset();
   find(placed, displaced, shape, 0, nodes);
-  if (nodes.empty() && !last)
+  if (nodes.empty() && !last && gave_.empty())
     return;
+  for (std::size_t k = 0; nodes.empty() && k < gave_.size(); ++k) // nothing pushes it
+    gave_[k] = instruments[k] ? -instruments[k]->compliance * instruments[k]->pushed : Vec3{};
   const std::vector<double> before = shape;
   solved_ = true;
   std::size_t vain_pairs = 0;
@@ -268,7 +285,11 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
         shape[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
     facets_.set_shape(model_, shape);
     const std::size_t known = nodes.size();
-    find(placed, displaced, shape, outside, nodes);
+    Placed there = placed;
+    for (std::size_t k = 0; k < gave_.size(); ++k)
+      if (there[k])
+        there[k]->a += gave_[k];
+    find(there, displaced, shape, outside, nodes);
     if (nodes.size() == known)
       return;
   }

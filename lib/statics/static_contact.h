@@ -51,6 +51,10 @@ std::vector<NodeTouch> sums_of_touches(std::vector<NodeTouch> touches);
 struct MovedInstrument {
   InstrumentShape shape;
   Pose before, now;
+  /// Of one that gives way (contact/coupling.h): mm per force, and the force on it with which it
+  /// would be where it is `now`.
+  double compliance = 0;
+  Vec3 pushed{};
 };
 
 /// The way in parts in which no instrument moves further than half its radius. \return how many, at
@@ -113,6 +117,10 @@ public:
   const std::vector<NodeTouch>& touches() const noexcept { return touches_; }
   /// The points that these are of; none behind a restart.
   const std::vector<PointTouch>& points() const noexcept { return points_; }
+  /// How far an instrument has given way in the last update, from where it is now.
+  Vec3 gave(std::size_t instrument) const {
+    return instrument < gave_.size() ? gave_[instrument] : Vec3{};
+  }
   /// A node inside an instrument, by more than 1e-6 of its radius, that can't be moved out: it is
   /// held.
   std::optional<NodeTouch> stuck() const { return stuck_; }
@@ -139,6 +147,7 @@ private:
   std::vector<Vec3> inward_; ///< at rest, by node
   std::vector<NodeTouch> touches_;
   std::vector<PointTouch> points_;
+  std::vector<Vec3> gave_; ///< by instrument; empty: none gives way
   std::optional<NodeTouch> stuck_;
   bool solved_ = true;
   TouchCounts counts_;

@@ -301,7 +301,10 @@ private:
     case 2:
       return move_instrument();
     case 3:
-      return "withdraw " + instrument();
+      return one_in(2)   ? "withdraw " + instrument()
+             : one_in(5) ? "couple " + instrument() + " off"
+                         : "couple " + instrument() + " " + number_text(real(1, 1e6)) +
+                               (one_in(2) ? " " + number_text(real(0, 1e4)) : "");
     case 14:
       return "grasp " + o.name + " " + nodes(*o.model) + " " + instrument();
     case 4:

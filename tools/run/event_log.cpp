@@ -38,7 +38,9 @@ std::string csv(double time, const ChangeRow& row) {
   add(of.turn.has_value(), {turn.w, turn.x, turn.y, turn.z});
   add_vector(of.force);
   add_vector(of.torque);
-  return line + "," + (of.nodes ? std::to_string(*of.nodes) : "") + "\n";
+  line += "," + (of.nodes ? std::to_string(*of.nodes) : "");
+  add_vector(of.hand);
+  return line + "\n";
 }
 
 } // namespace
@@ -63,7 +65,7 @@ EventLog::EventLog(const std::string& path, const Output::Options& options)
     : output_(path, options) {
   output_.write("time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text,end_x,end_y,"
                 "end_z,turn_w,turn_x,turn_y,turn_z,force_x,force_y,force_z,torque_x,torque_y,"
-                "torque_z,touched\n");
+                "torque_z,touched,hand_x,hand_y,hand_z\n");
 }
 
 void EventLog::object(double time, const std::string& name, const std::string& model,
@@ -105,14 +107,14 @@ void EventLog::instruments(const Simulation& simulation) {
     const InstrumentReport report = simulation.instrument(k);
     if (!report.present)
       continue;
-    rows_.push_back(
-        csv(simulation.time(), {.what = "felt",
-                                .object = report.name,
-                                .vector = report.pose.place + Vec3{}, // -0 as 0
-                                .value = report.shape.radius,
-                                .text = instrument_kind_name(kind_of(report.shape)),
-                                .instrument = {report.pose(report.shape.axis), report.pose.turn,
-                                               report.force, report.torque, report.nodes}}));
+    rows_.push_back(csv(simulation.time(),
+                        {.what = "felt",
+                         .object = report.name,
+                         .vector = report.pose.place + Vec3{}, // -0 as 0
+                         .value = report.shape.radius,
+                         .text = instrument_kind_name(kind_of(report.shape)),
+                         .instrument = {report.pose(report.shape.axis), report.pose.turn,
+                                        report.force, report.torque, report.nodes, report.hand}}));
   }
 }
 

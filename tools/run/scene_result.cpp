@@ -66,7 +66,8 @@ void SceneResult::set_instruments(const Simulation& simulation) {
     reports.push_back(simulation.instrument(k));
   std::vector<FrameInstrument> instruments;
   for (const InstrumentReport& r : reports)
-    instruments.push_back({r.name, r.present, r.shape, r.pose, r.force, r.torque, r.nodes});
+    instruments.push_back({r.name, r.present, r.shape, r.pose, r.hand.value_or(r.pose.place),
+                           r.force, r.torque, r.nodes});
   deliver([&] { writer_.set_instruments(instruments); });
 }
 

@@ -1,0 +1,64 @@
+#pragma once
+// Virtual coupling: a hand leads an instrument through a spring and a damper, so that what the hand
+// feels is never stiffer than the spring, whatever is touched (J. Colgate, M. Stanley, J. Brown,
+// Issues in the haptic display of tool use, 1995). The instrument has no mass: at each end of a
+// step the coupling's force and those of what it touches are in balance,
+//
+//   K e + D (e - e_before)/h + F = 0, e = hand - instrument,
+//
+// (backward Euler, which takes from the hand what damper and spring lose and never gives more).
+// Its place gives way to F, its turn is the hand's.
+
+#include "base/vec3.h"
+
+#include <cmath>
+
+namespace gewebe {
+
+struct Coupling {
+  double stiffness = 1; ///< K, g/s² (1e-6 N/mm), > 0
+  double damping = 0;   ///< D, g/s, >= 0
+
+  bool operator==(const Coupling&) const = default;
+};
+
+/// A step of it.
+struct CouplingStep {
+  double compliance = 0; ///< mm per force at the step's end
+  Vec3 free;             ///< e there without a force
+
+  /// \param lag e before \param h its length, s, >= 0: in no time a damper does not give way
+  CouplingStep(const Coupling& coupling, const Vec3& lag, double h) {
+    const double damper = coupling.damping > 0 ? coupling.damping / h : 0;
+    const double all = coupling.stiffness + damper;
+    compliance = 1 / all; // 0 where h is 0
+    free = std::isfinite(all) ? damper / all * lag : coupling.damping > 0 ? lag : Vec3{};
+  }
+  /// e under the force F on the instrument (1e-6 N).
+  Vec3 lag(const Vec3& force) const { return free - compliance * force; }
+};
+
+/// An instrument that a hand leads so, while something moves.
+struct LedInstrument {
+  Coupling coupling;
+  Vec3 place;  ///< of the instrument now
+  Vec3 lag;    ///< e behind the last step
+  Vec3 force;  ///< on it in the last step, of what moves
+  Vec3 others; ///< of all else, which stays
+
+  /// Where it is behind a step, with the hand at `hand`, if it feels what it felt.
+  Vec3 guess(const Vec3& hand, double h) const {
+    return hand - CouplingStep(coupling, lag, h).lag(force + others);
+  }
+  /// It felt this force instead.
+  void settle(const Vec3& hand, double h, const Vec3& felt) {
+    force = felt;
+    lag = CouplingStep(coupling, lag, h).lag(force + others);
+    place = hand - lag;
+  }
+};
+
+/// Of the radius: an instrument that is led no further in a step has come to rest.
+inline constexpr double led_to_rest = 1e-9;
+
+} // namespace gewebe
