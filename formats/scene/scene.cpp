@@ -128,6 +128,19 @@ What parse_attach(Words& in) {
   return c;
 }
 
+What parse_contact(Words& in) {
+  ChangeCommand c;
+  c.object = in.name();
+  c.other = in.name();
+  SetContact set;
+  if (in.take("friction"))
+    set.friction = in.number("coefficient");
+  if (!(set.friction >= 0))
+    in.fail("a negative coefficient of friction");
+  c.change = set;
+  return c;
+}
+
 What parse_displace(Words& in) {
   ChangeCommand c = parse_about(in, {});
   SetDisplacement set;
@@ -319,8 +332,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 28>& verbs() {
-  static const std::array<Verb, 28> all{{
+const std::array<Verb, 29>& verbs() {
+  static const std::array<Verb, 29> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -330,6 +343,8 @@ const std::array<Verb, 28>& verbs() {
       {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},
       {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
+      {"contact", "contact A B [friction MU] or contact A self [friction MU], MU 0 or more", true,
+       parse_contact},
       {"release", "release NAME NODES", true, parse_release},
       {"instrument",
        "instrument NAME sphere R x y z [friction MU], instrument NAME capsule R x y z x y z "

@@ -38,6 +38,13 @@ struct Names {
       if (said.total)
         c.force = c.force / static_cast<double>(c.nodes.size());
   }
+  void find(SetContact& c) const {
+    c.object = find_object(simulation, said.object);
+    c.other = said.other == "self" ? c.object : find_object(simulation, said.other);
+    if (c.other == c.object && said.other != "self")
+      throw Error("object " + said.object + " with itself, expected contact " + said.object +
+                  " self");
+  }
   void find(SetInstrument& c) const { c.instrument = instrument_place(simulation, c.name); }
   void find(CutObject& c) const {
     c.object = find_object(simulation, said.object);

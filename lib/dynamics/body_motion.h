@@ -5,6 +5,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "contact/load.h"
+#include "contact/surface_pairs.h"
 #include "dynamics/dynamic_contact.h"
 #include "dynamics/spring_force.h"
 #include "statics/static_contact.h"
@@ -88,6 +89,9 @@ public:
   virtual void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) = 0;
   /// One that is led, behind the last advance.
   virtual std::optional<LedInstrument> led(std::size_t instrument) const = 0;
+  /// Parts whose surfaces may touch each other, or themselves, from now on. Wakes nobody.
+  /// \pre it moves by the steps of solids, or there are none
+  virtual void set_meetings(std::vector<SurfaceMeeting> meetings) = 0;
   /// That it rests for `duration` s more, in place of an advance. \pre resting()
   virtual void rest_on(double duration) = 0;
   /// Impulses (forces times s) of the instruments since the last call, by ascending node and

@@ -366,6 +366,11 @@ std::optional<LedInstrument> Elastodynamic::led(std::size_t instrument) const {
   return touch_ ? touch_->led(instrument) : std::nullopt;
 }
 
+void Elastodynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
+  if (!meetings.empty())
+    throw Error("moves by explicit steps, expected integration=implicit or auto for contact");
+}
+
 void Elastodynamic::rest_on(double duration) {
   if (touch_)
     touch_->stay(duration);

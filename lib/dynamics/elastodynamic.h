@@ -72,6 +72,7 @@ public:
 
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
   std::optional<LedInstrument> led(std::size_t instrument) const override;
+  void set_meetings(std::vector<SurfaceMeeting> meetings) override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
   bool touches_exact() const override { return true; } // each step's are

@@ -37,6 +37,8 @@ public:
       if (i)
         radius = std::min(radius, i->shape.radius);
     tolerance_ = same_place * radius;
+    if (step.meets)
+      tolerance_ = std::min(tolerance_, surface_depth * all.pairs_->edge());
   }
 
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
@@ -85,7 +87,7 @@ public:
       miss = error <= miss ? miss : error;
     }
     learn();
-    const bool agreed = miss <= tolerance_ && (miss == 0 || put(at));
+    const bool agreed = miss <= tolerance_ && (miss == 0 || put_touched(at));
     idle_ = miss < nearer * best_ ? 0 : idle_ + 1;
     best_ = std::min(best_, miss);
     if (!agreed && ++pushes_ < max_pushes && idle_ < max_idle && unfinished_ < max_unfinished)
@@ -112,6 +114,7 @@ public:
           context_);
   }
   bool exact() const { return exact_; }
+  void distrust(bool inexact) { exact_ = exact_ && !inexact; }
   const SolidStep& took() const { return took_; }
 
 private:
@@ -161,20 +164,36 @@ private:
     return all_.columns_.at(
         nodes[c / 3])[(c % 3) * places_.size() + 3 * std::size_t{nodes[r / 3]} + r % 3];
   }
+  /// Those that instruments may touch; with surfaces that touch each other, those that are touched:
+  /// what these do keeps its momentum.
+  bool put_touched(std::span<const Vec3> at) {
+    if (!step_.meets)
+      return put(nodes_, at);
+    std::vector<std::uint32_t> nodes;
+    std::vector<Vec3> there;
+    for (std::size_t k = 0; k < nodes_.size(); ++k)
+      if (std::ranges::any_of(force_, [&](const NodeTouch& t) {
+            return t.node == nodes_[k] && t.instrument != other_surface;
+          })) {
+        nodes.push_back(nodes_[k]);
+        there.push_back(at[k]);
+      }
+    return nodes.empty() || put(nodes, there);
+  }
   /// The touched nodes stand where the contacts have them, to rounding; what is missing to there is
   /// as small as what a step leaves, and takes what is around along as forces there would.
   /// \return whether it can be done
-  bool put(std::span<const Vec3> at) {
-    need_columns(nodes_);
-    const auto size = static_cast<Eigen::Index>(3 * nodes_.size());
+  bool put(std::span<const std::uint32_t> nodes, std::span<const Vec3> at) {
+    need_columns(nodes);
+    const auto size = static_cast<Eigen::Index>(3 * nodes.size());
     Eigen::MatrixXd w(size, size);
     Eigen::VectorXd missing(size);
-    const std::vector<double> now = places_now();
     for (Eigen::Index c = 0; c < size; ++c) {
       const auto k = static_cast<std::size_t>(c);
-      missing[c] = at[k / 3][static_cast<int>(k % 3)] - now[k];
+      const int a = static_cast<int>(k % 3);
+      missing[c] = at[k / 3][a] - step_.engine.places()[axis_of(nodes[k / 3], a)];
       for (Eigen::Index r = 0; r < size; ++r)
-        w(r, c) = entry(nodes_, static_cast<std::size_t>(r), k);
+        w(r, c) = entry(nodes, static_cast<std::size_t>(r), k);
     }
     for (Eigen::Index k = 0; k < size; ++k)
       if (!(w(k, k) > 0)) { // held
@@ -183,11 +202,11 @@ private:
       }
     const Eigen::VectorXd force = w.partialPivLu().solve(missing);
     std::vector<double> by(places_.size());
-    for (std::size_t k = 0; k < nodes_.size(); ++k)
+    for (std::size_t k = 0; k < nodes.size(); ++k)
       for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t axis = 0; axis < by.size(); ++axis)
           by[axis] += force[static_cast<Eigen::Index>(3 * k + a)] *
-                      all_.columns_.at(nodes_[k])[a * by.size() + axis];
+                      all_.columns_.at(nodes[k])[a * by.size() + axis];
     if (!std::ranges::all_of(by, [](double b) { return std::isfinite(b); }))
       return false;
     step_.engine.nudge(by, context_);
@@ -265,14 +284,26 @@ private:
   SolidStep took_;
 };
 
-SolidContact::SolidContact(const Model& model)
-    : model_(model), contact_(model, std::vector<double>(3 * model.nodes.size())) {}
+SolidContact::SolidContact(const Model& model, std::vector<SurfaceMeeting> meetings)
+    : model_(model), contact_(model, std::vector<double>(3 * model.nodes.size())) {
+  if (!meetings.empty())
+    pairs_.emplace(model, std::move(meetings));
+}
 
 SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>& touches,
                                         const Context& context) {
+  std::vector<NodeTouch> by_instruments;
+  std::vector<std::uint32_t> met;
+  for (const NodeTouch& t : touches)
+    if (t.instrument == other_surface)
+      met.push_back(t.node);
+    else if (t.instrument < step.instruments.size() && step.instruments[t.instrument] &&
+             !step.displaced.contains(t.node))
+      by_instruments.push_back(t);
   std::erase_if(touches, [&](const NodeTouch& t) {
-    return t.instrument >= step.instruments.size() || !step.instruments[t.instrument] ||
-           step.displaced.contains(t.node);
+    return t.instrument == other_surface
+               ? !step.meets
+               : std::ranges::find(by_instruments, t) == by_instruments.end();
   });
   std::erase_if(columns_, [&](const auto& of) {
     return std::ranges::none_of(touches, [&](const NodeTouch& t) { return t.node == of.first; });
@@ -281,12 +312,27 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
       shape.push_back(step.engine.places()[axis_of(i, a)] - model_.nodes[i].position[a]);
-  contact_.restart(shape, touches);
+  contact_.restart(shape, std::move(by_instruments));
   Object object(*this, step, touches, context);
-  contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
+  if (!step.meets) {
+    contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
+    touches = contact_.touches();
+  } else {
+    MeetingYielding both(
+        object, *pairs_,
+        [&](std::uint32_t node) {
+          return model_.nodes[node].fixed == fixed_all || step.displaced.contains(node);
+        },
+        shape, std::move(met));
+    contact_.update(both, step.displaced, step.instruments, shape, !step.clearing);
+    met_.add(both.counts());
+    touches = both.touches();
+    touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
+    touches = sums_of_touches(std::move(touches));
+    object.distrust(!both.solved());
+  }
   object.end();
   step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);
-  touches = contact_.touches();
   return {object.took(), object.exact() && contact_.solved()};
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Instruments in a step of a solid that moves (solid/solid_motion.h).
+// Instruments in a step of a solid that moves (solid/solid_motion.h), and surfaces that touch.
 //
 // In turn the step under the last forces λ of the instruments;
 // W = H A⁻¹ Hᵀ of the touched nodes, with the constant matrix A of the step, in frames that turn
@@ -7,27 +7,35 @@
 // its nodes stand where W put them, within 1e-4 of the smallest radius. A is not the tangent,
 // where tissue is pressed in deeply by far, so W is corrected by what each round's forces have
 // moved (the update of BFGS: Nocedal, Wright, Numerical optimization, 2006, 6.1), and each round
-// starts from the last one's end. Nothing of a step's velocity into an instrument is left at its
-// end, and friction acts against the slip over the step.
+// starts from the last one's end. Surfaces of parts that may touch push each other in it
+// (statics/meeting_yielding.h), to 1e-4 of an edge. Nothing of a step's velocity into an instrument
+// is left at its end, and friction acts against the slip over the step.
 
 #include "base/context.h"
 #include "dynamics/dynamic_contact.h"
 #include "model/model.h"
 #include "solid/solid_motion.h"
+#include "statics/meeting_yielding.h"
 #include "statics/static_contact.h"
 
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
 
 class SolidContact {
 public:
-  /// Keeps a reference to the model.
-  explicit SolidContact(const Model& model);
+  /// Keeps a reference to the model. \param meetings parts whose surfaces may touch
+  explicit SolidContact(const Model& model, std::vector<SurfaceMeeting> meetings = {});
+
+  /// Whether surfaces may touch each other within a step of h from these places.
+  bool may_meet(std::span<const double> places, std::span<const double> velocity, double h) const {
+    return pairs_ && pairs_->may_touch(places, velocity, h);
+  }
 
   struct Step {
     SolidMotion& engine;                            ///< where the step begins
@@ -38,6 +46,7 @@ public:
     double h = 0;
     SolidMotionOptions options; ///< of the engine
     bool clearing = false;      ///< only what is in the way moves, from rest, and keeps its speed
+    bool meets = false;         ///< surfaces may touch: see may_meet
   };
   struct Result {
     SolidStep took; ///< of all rounds
@@ -47,7 +56,11 @@ public:
   /// forces of the last step, then of this one \throw as SolidMotion::step
   Result step(const Step& step, std::vector<NodeTouch>& touches, const Context& context);
   /// Of contacts since the last call.
-  TouchCounts take_counts() { return contact_.take_counts(); }
+  TouchCounts take_counts() {
+    TouchCounts all = contact_.take_counts();
+    all.add(std::exchange(met_, {}));
+    return all;
+  }
   /// Forgets the columns of A⁻¹, which serve for some steps.
   void renew() {
     columns_.clear();
@@ -59,6 +72,8 @@ private:
 
   const Model& model_;
   StaticContact contact_;
+  std::optional<SurfacePairs> pairs_;
+  TouchCounts met_; ///< of surfaces
   /// By node three columns of A⁻¹, 3 n numbers each.
   std::map<std::uint32_t, std::vector<double>> columns_;
   std::vector<std::uint32_t> learned_of_; ///< nodes

@@ -345,14 +345,17 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
                              double h, double from, double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
   const auto& instruments = state_.instruments;
-  if (std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
+  if (!contact_ && !meetings_.empty())
+    contact_ = std::make_unique<SolidContact>(model_, meetings_);
+  const bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
+  if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
     state_.touched.clear();
     if (!target.empty())
       moving.move_held(target);
     return moving.step(h, context);
   }
   if (!contact_)
-    contact_ = std::make_unique<SolidContact>(model_);
+    contact_ = std::make_unique<SolidContact>(model_, meetings_);
   SolidStep all;
   bool exact = true;
   const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
@@ -375,7 +378,7 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     }
     const SolidContact::Result result = contact_->step(
         {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
-         state_.load->displacement, moved, h, options_, clearing},
+         state_.load->displacement, moved, h, options_, clearing, meets},
         state_.touched, context);
     counts_.touches.add(contact_->take_counts());
     all.rounds += result.took.rounds;
@@ -455,6 +458,13 @@ std::optional<LedInstrument> SolidDynamic::led(std::size_t instrument) const {
   return instrument < state_.instruments.size() && state_.instruments[instrument]
              ? state_.instruments[instrument]->led
              : std::nullopt;
+}
+
+void SolidDynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
+  if (meetings == meetings_)
+    return;
+  meetings_ = std::move(meetings);
+  contact_.reset();
 }
 
 void SolidDynamic::rest_on(double duration) {

@@ -56,6 +56,7 @@ public:
 
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
   std::optional<LedInstrument> led(std::size_t instrument) const override;
+  void set_meetings(std::vector<SurfaceMeeting> meetings) override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
   bool touches_exact() const override { return state_.exact; }
@@ -109,9 +110,11 @@ private:
   std::vector<double> weight_, steady_;
   std::vector<PressedCorner> pressed_;
 
+  std::vector<SurfaceMeeting> meetings_;
+
   std::optional<SolidMotion> engine_;
   double last_step_ = 0;                  ///< of the engine
-  std::unique_ptr<SolidContact> contact_; ///< of the engine, while there are instruments
+  std::unique_ptr<SolidContact> contact_; ///< of the engine, while anything may touch
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false;

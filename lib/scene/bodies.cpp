@@ -1,4 +1,4 @@
-// Bodies: what is tied together and moves as one.
+// Bodies: what moves as one.
 
 #include "base/parallel.h"
 #include "scene/rules_internal.h"
@@ -199,6 +199,7 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   const Object& first = w.now.objects[parts[0]];
   body->moving = motion_for(w, parts, *body->model);
   body->moving->set_motion(motion);
+  body->moving->set_meetings(meetings_of(w, parts, offset));
   body->safe = moves_implicitly(first) ? HUGE_VAL : safe_step(*body->model);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     w.now.objects[parts[k]].body = body;
@@ -270,6 +271,7 @@ void move_bodies(World& w, double to) {
     if (w.now.objects[i].method == Method::ela &&
         (!w.now.objects[i].load->empty() || instruments_there(w)))
       need_body(w, i);
+  meet(w, to);
   for (const auto& body : w.now.bodies)
     if (body->changed)
       load_body(w, *body);
@@ -328,14 +330,12 @@ void move_bodies(World& w, double to) {
 
 // ---- attachments
 
-namespace {
-
-/// Solids that move as one have elements of one order and are moved alike.
-void require_like_solids(const World& w, const Object& a, const Object& b) {
+void require_like_solids(const World& w, std::span<const std::size_t> objects) {
   const Object* first = nullptr;
-  const auto look = [&](const Object& object) {
-    if (!is_solid(object))
-      return;
+  for (const std::size_t index : objects) {
+    const Object& object = w.now.objects[index];
+    if (!object.matter->known || !is_solid(object))
+      continue;
     if (first == nullptr)
       first = &object;
     const std::string both = "of " + first->name() + " and " + object.name();
@@ -343,16 +343,8 @@ void require_like_solids(const World& w, const Object& a, const Object& b) {
       throw Error("one " + both + " is linear and the other quadratic, expected both alike");
     if (!(first->matter->solid == object.matter->solid))
       throw Error("law=, damping= and tolerance= " + both + " differ, expected both alike");
-  };
-  for (const Object* const object : {&a, &b}) {
-    look(*object);
-    if (object->body != nullptr)
-      for (const std::size_t part : object->body->parts)
-        look(w.now.objects[part]);
   }
 }
-
-} // namespace
 
 void Rule<Attach>::check(World& w, const Attach& c) {
   Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
@@ -366,7 +358,10 @@ void Rule<Attach>::check(World& w, const Attach& c) {
   if (moves_implicitly(a) != moves_implicitly(b))
     throw Error("one of " + a.name() + " and " + b.name() +
                 " is implicit and the other is not, expected both alike");
-  require_like_solids(w, a, b);
+  std::vector<std::size_t> all = together(w, c.object);
+  const std::vector<std::size_t> others = together(w, c.other);
+  all.insert(all.end(), others.begin(), others.end());
+  require_like_solids(w, all);
 }
 
 void Rule<Attach>::apply(World& w, const Attach& c) {

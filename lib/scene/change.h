@@ -87,6 +87,11 @@ struct SetCoupling {
 struct Withdraw {
   std::size_t instrument = 0;
 };
+/// Surfaces of two objects, or of one with itself, may touch from now on but not pass.
+struct SetContact {
+  std::size_t object = 0, other = 0; ///< the same: with itself
+  double friction = 0;               ///< Coulomb's coefficient, >= 0
+};
 struct SetGravity {
   Vec3 gravity;
 };
@@ -145,8 +150,8 @@ struct Restore {
 };
 using Change =
     std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
-                 MoveInstrument, SetCoupling, Grasp, Withdraw, SetGravity, SetTimestep, SetTwoStep,
-                 SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
+                 MoveInstrument, SetCoupling, Grasp, Withdraw, SetContact, SetGravity, SetTimestep,
+                 SetTwoStep, SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
 
 /// What a log says of an instrument alone; what does not apply stays empty.
 struct InstrumentRow {

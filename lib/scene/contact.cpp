@@ -48,7 +48,8 @@ void warn_inexact(World& w, Object& object) {
     return;
   object.matter->told.unsolved = true;
   w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
-                 " s: the forces of instruments are not exact, expected a slower way");
+                 " s: the forces of " + (w.now.instruments.empty() ? "contact" : "instruments") +
+                 " are not exact, expected a slower way");
 }
 
 /// Whether the instrument touched it in the last step.
@@ -130,7 +131,7 @@ void gather_impulses(World& w, Body& body) {
 
 /// Behind a step: forces of instruments on elastodynamic objects, means over its time.
 void take_touches(World& w, double duration) {
-  if (w.now.instruments.empty() || !(duration > 0))
+  if ((w.now.instruments.empty() && w.now.meetings.empty()) || !(duration > 0))
     return;
   for (const auto& body : w.now.bodies) {
     // As they are at rest, exactly, where it rested all the time.
@@ -152,7 +153,9 @@ void take_touches(World& w, double duration) {
         touches = means_of(std::move(object.impulses), duration);
       }
       object.impulses.clear();
-      body->touched = body->touched || !touches.empty();
+      body->touched = body->touched || std::ranges::any_of(touches, [](const NodeTouch& t) {
+                        return t.instrument != other_surface;
+                      });
       if (held && touches == object.shown.touches)
         continue;
       object.shown.valid = object.shown.valid && object.shown.touches.empty() && touches.empty();

@@ -438,12 +438,16 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
 
 } // namespace
 
-/// Bodies anew for these objects and those tied to them, with the motions given.
+/// Bodies anew for these objects and those tied to them, or near to them if they may touch, with
+/// the motions given.
 /// \pre objects that are in a body have a motion
 void renew_bodies(World& w, const Motions& motions) {
   DisjointSets sets(w.now.objects.size());
   for (const Tie& tie : w.now.ties)
     sets.join(static_cast<std::uint32_t>(tie.object), static_cast<std::uint32_t>(tie.other));
+  for (const Meeting& m : w.now.meetings)
+    if (m.near)
+      sets.join(static_cast<std::uint32_t>(m.object), static_cast<std::uint32_t>(m.other));
   std::map<std::uint32_t, std::vector<std::size_t>> groups;
   for (const auto& [object, motion] : motions)
     groups[sets.find(static_cast<std::uint32_t>(object))].push_back(object);
@@ -477,6 +481,7 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   }
   move_grips(w, index, moves);
   move_ties(w, index, moves);
+  move_meetings(w, index, moves);
   move_events(w, index, moves);
   renew_bodies(w, motions);
 }

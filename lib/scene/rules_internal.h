@@ -147,6 +147,15 @@ struct Rule<Withdraw> : Plain<Withdraw> {
   static void log(const World&, const Withdraw&, ChangeRow& row) { row.what = "withdraw"; }
 };
 
+// meetings.cpp
+template <>
+struct Rule<SetContact> : Plain<SetContact> {
+  static void check(World& w, const SetContact& c);
+  static void enter(World& w, const SetContact& c);
+  static void apply(World& w, const SetContact& c);
+  static void log(const World& w, const SetContact& c, ChangeRow& row);
+};
+
 // cuts.cpp
 template <>
 struct Rule<CutObject> : Plain<CutObject> {

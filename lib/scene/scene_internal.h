@@ -185,6 +185,7 @@ struct Object {
   CopyOnWrite<Load> load{};
   Stages stages;
   bool warp = false;                          // large rotations
+  bool meets = false;                         // one of the scene's meetings is of it
   std::shared_ptr<const WarpedAnswer> warped; // the last one, that the next one starts from
   std::shared_ptr<Body> body;                 // of an elastodynamic object
   std::size_t offset = 0;                     // of its nodes in the body
@@ -203,6 +204,13 @@ struct Tie {
   std::size_t object = 0, other = 0;
   std::uint32_t node = 0, other_node = 0;
   double stiffness = 0, rest = 0;
+};
+
+/// Objects that may touch each other, or one that may touch itself.
+struct Meeting {
+  std::size_t object = 0, other = 0;
+  double friction = 0;
+  bool near = false; // they move as one body
 };
 
 struct Instrument {
@@ -253,6 +261,7 @@ struct Scene {
   std::deque<Object> objects; // references last while others come
   std::vector<std::shared_ptr<Body>> bodies;
   std::vector<Tie> ties;
+  std::vector<Meeting> meetings;
   std::vector<Instrument> instruments;
   /// In this step: where the instruments stood, one after the other.
   std::vector<std::vector<std::optional<Pose>>> poses;

@@ -23,13 +23,16 @@ enum class Way : std::uint8_t {
   net,          ///< of none
   solid_motion, ///< a solid that moves
   warped,       ///< with large rotations
-  filled        ///< a net that keeps the volume it encloses
+  filled,       ///< a net that keeps the volume it encloses
+  explicit_net, ///< that moves
+  meeting       ///< its surface may touch another, or itself
 };
 inline constexpr std::array all_ways{
     Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
     Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
     Way::solid,           Way::sprung,          Way::skinned,  Way::net,
-    Way::solid_motion,    Way::warped,          Way::filled};
+    Way::solid_motion,    Way::warped,          Way::filled,   Way::explicit_net,
+    Way::meeting};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -46,12 +49,15 @@ enum class Feature : std::uint8_t {
   method, ///< another one
   two_step,
   renew,
-  warp, ///< large rotations
+  warp,         ///< large rotations
+  contact,      ///< with another object's surface
+  self_contact, ///< of its surface with itself
 };
 inline constexpr std::array all_features{
-    Feature::force,  Feature::pressure, Feature::displace, Feature::grasp,   Feature::touch,
-    Feature::cut,    Feature::blade,    Feature::tear,     Feature::restore, Feature::attach,
-    Feature::method, Feature::two_step, Feature::renew,    Feature::warp};
+    Feature::force,   Feature::pressure, Feature::displace, Feature::grasp,
+    Feature::touch,   Feature::cut,      Feature::blade,    Feature::tear,
+    Feature::restore, Feature::attach,   Feature::method,   Feature::two_step,
+    Feature::renew,   Feature::warp,     Feature::contact,  Feature::self_contact};
 
 /// A pair that does not go together.
 struct Gap {
@@ -102,6 +108,18 @@ inline constexpr std::array gaps{
     Gap{Way::cut, Feature::two_step, true,
         "is cut and its second stage is not, expected one that is whole"},
     Gap{Way::whole, Feature::restore, true, "is as it came, expected one that was cut"},
+    Gap{Way::explicit_net, Feature::contact, true,
+        "moves by explicit steps, expected integration=implicit or auto for contact"},
+    Gap{Way::explicit_net, Feature::self_contact, true,
+        "moves by explicit steps, expected integration=implicit or auto for contact"},
+    Gap{Way::elastostatic, Feature::contact, true,
+        "is elastostatic (ffe), expected ela objects for contact"},
+    Gap{Way::elastostatic, Feature::self_contact, true,
+        "is elastostatic (ffe), expected ela objects for contact"},
+    Gap{Way::filled, Feature::contact, true,
+        "keeps the volume it encloses (bulk=), expected none to touch another object"},
+    Gap{Way::meeting, Feature::method, true,
+        "may touch other surfaces (contact) as long as it moves, expected none for method"},
     Gap{Way::attached, Feature::method, true,
         "is attached to * and moves with it, expected one that is attached to none"},
 };

@@ -109,12 +109,14 @@ std::span<const double> static_shape(Object& object);
 std::span<const double> static_surface(Object& object);
 std::vector<NodeVector> static_forces(const Object& object);
 
-// bodies.cpp: what is tied together and moves as one
+// bodies.cpp: what is tied together, or near and may touch, and moves as one
 using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
 void need_body(World& w, std::size_t object);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
 void drop_body(World& w, const Body* body);
+/// Solids that move as one have elements of one order and are moved alike. \throw Error
+void require_like_solids(const World& w, std::span<const std::size_t> objects);
 void move_bodies(World& w, double to);
 /// Of tetrahedra, or with some. \pre its model is known
 inline bool is_solid(const Object& object) {
@@ -126,6 +128,14 @@ inline bool moves_implicitly(const Object& object) {
 }
 /// How an object's nodes move. \pre it has a body
 std::span<const NodeMotion> motion_of(const Object& object);
+
+// meetings.cpp: whose surfaces touch
+void meet(World& w, double to);
+std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::size_t> parts,
+                                        std::span<const std::size_t> offset);
+void move_meetings(World& w, std::size_t index, const Moves& moves);
+/// Objects that may come to move as one with this one, by ties and meetings, itself among them.
+std::vector<std::size_t> together(const World& w, std::size_t object);
 
 // time.cpp: steps through events; show.cpp: the picture at their end
 void advance(World& w, double to);

@@ -82,7 +82,7 @@ inline const std::map<std::string, Model>& fuzzed_models() {
 /// The lines of a random scene; the same for the same seed.
 class FuzzedScene {
 public:
-  explicit FuzzedScene(std::uint64_t seed) : random_(seed) {
+  explicit FuzzedScene(std::uint64_t seed) : random_(seed), contacts_(seed) {
     const std::size_t count = 1 + below(3);
     for (std::size_t k = 0; k < count; ++k)
       add_object();
@@ -323,7 +323,18 @@ private:
       return load();
     }
   }
+  /// By numbers of its own: the rest of a scene is as it was without.
+  std::string contact() {
+    const auto name = [&] { return objects_[contacts_() % objects_.size()].name; };
+    const std::string one = name(), other = contacts_() % 3 == 0 ? "self" : name();
+    return "contact " + one + " " + other +
+           (contacts_() % 2 == 0
+                ? " friction " + number_text(static_cast<double>(contacts_() % 100) / 50)
+                : "");
+  }
   void command() {
+    if (contacts_() % 8 == 0)
+      line(contact());
     if (one_in(6))
       line(question());
     if (one_in(30))
@@ -361,7 +372,7 @@ private:
     }
   }
 
-  std::mt19937_64 random_;
+  std::mt19937_64 random_, contacts_;
   std::vector<Known> objects_;
   std::vector<std::string> instruments_; ///< that were put somewhere
   std::vector<std::string> lines_;

@@ -32,7 +32,12 @@ bool is_solid(Way way) {
 std::vector<Way> ways_of(Way way) {
   switch (way) {
   case Way::attached:
-    return {Way::explicit_motion, Way::whole, Way::attached};
+    return {Way::explicit_motion, Way::explicit_net, Way::whole, Way::attached};
+  case Way::explicit_motion:
+  case Way::explicit_net:
+    return {Way::explicit_motion, Way::explicit_net, Way::whole};
+  case Way::meeting:
+    return {Way::implicit_motion, Way::whole, Way::meeting};
   case Way::two_step:
     return {Way::elastostatic, Way::whole, Way::two_step};
   case Way::two_step_stored:
@@ -117,10 +122,12 @@ public:
       : model_(model_of(way)), way_(way),
         scene_(test::one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }}) {
     const bool moves = way == Way::explicit_motion || way == Way::implicit_motion ||
-                       way == Way::attached || way == Way::solid_motion || way == Way::filled;
-    const Integration integration = way == Way::implicit_motion || way == Way::filled
-                                        ? Integration::implicit
-                                        : Integration::semi_implicit;
+                       way == Way::attached || way == Way::solid_motion || way == Way::filled ||
+                       way == Way::explicit_net || way == Way::meeting;
+    const Integration integration =
+        way == Way::implicit_motion || way == Way::filled || way == Way::meeting
+            ? Integration::implicit
+            : Integration::semi_implicit;
     SolidChoice choice;
     if (way == Way::filled)
       choice.bulk = 1000;
@@ -132,6 +139,8 @@ public:
                       way == Way::solid_motion ? Integration::implicit : integration);
     if (way == Way::attached)
       scene_.apply(tie());
+    if (way == Way::meeting)
+      scene_.apply(SetContact{0, 1, 0.5});
     if (way == Way::warped)
       scene_.apply(SetWarp{0});
     if (way == Way::two_step || way == Way::two_step_stored)
@@ -201,6 +210,16 @@ public:
       return bends();
     case Feature::warp:
       scene_.apply(SetWarp{0});
+      scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
+      return bends();
+    case Feature::contact: // a node of the other one is brought into it from above
+      scene_.apply(SetContact{0, 1, 0});
+      scene_.apply(SetDisplacement{1, {top()}, {-100, 0, 1}});
+      scene_.step(0.005);
+      scene_.apply(SetDisplacement{1, {top()}, {-100, 0, -1}, 0.01});
+      return bends() && !scene_.contact_forces(0).empty();
+    case Feature::self_contact:
+      scene_.apply(SetContact{0, 0, 0});
       scene_.apply(SetForce{0, {top()}, {0, 0, 2000}});
       return bends();
     case Feature::renew:

@@ -1,0 +1,211 @@
+// Meetings: objects whose surfaces may touch each other or themselves. Those that are near move as
+// one body, which knows of them (statics/meeting_yielding.h); others cost no more than a look at
+// their boxes.
+
+#include "scene/rules_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double near_part = 0.05; ///< of the smaller one's size: so near they move as one
+constexpr double far_parts = 3;    ///< of what is near: so far they are two again
+
+/// Where an object's surface is, and how fast.
+struct Extent {
+  Box3 box;
+  double speed = 0;
+};
+
+Extent extent_of(const Object& object) {
+  Extent all;
+  const Model& model = object.model();
+  if (object.body == nullptr) {
+    for (const Node& node : model.nodes)
+      all.box.add(node.position);
+    return all;
+  }
+  const std::span<const NodeMotion> motion = motion_of(object);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    all.box.add(model.nodes[i].position + motion[i].displacement);
+    all.speed = std::max(all.speed, dot(motion[i].velocity, motion[i].velocity));
+  }
+  all.speed = std::sqrt(all.speed);
+  return all;
+}
+
+bool awake(const Object& object) {
+  return object.body != nullptr && (object.body->changed || !object.body->moving->resting());
+}
+
+/// Whether they may come to touch within a time; of such as were near already, with more room.
+bool are_near(const World& w, const Meeting& m, double duration,
+              std::map<std::size_t, Extent>& extents) {
+  const auto extent = [&](std::size_t object) -> const Extent& {
+    const auto known = extents.find(object);
+    return known != extents.end()
+               ? known->second
+               : extents.emplace(object, extent_of(w.now.objects[object])).first->second;
+  };
+  const Extent &a = extent(m.object), &b = extent(m.other);
+  const double margin = near_part * std::min(a.box.longest_side(), b.box.longest_side()) +
+                        2 * duration * (a.speed + b.speed) +
+                        duration * duration * norm(w.now.gravity);
+  return near(a.box, b.box, m.near ? far_parts * margin : margin);
+}
+
+/// The bodies of these objects anew, by who is near now.
+void regroup(World& w, const std::set<std::size_t>& objects) {
+  std::set<std::size_t> all = objects;
+  for (const std::size_t index : objects) {
+    need_body(w, index);
+    const std::vector<std::size_t>& parts = w.now.objects[index].body->parts;
+    all.insert(parts.begin(), parts.end());
+  }
+  Motions motions;
+  std::set<std::shared_ptr<Body>> bodies;
+  for (const std::size_t index : all) {
+    const Object& object = w.now.objects[index];
+    const std::span<const NodeMotion> motion = motion_of(object);
+    motions[index].assign(motion.begin(), motion.end());
+    bodies.insert(object.body);
+  }
+  for (const auto& body : bodies) {
+    gather_impulses(w, *body);
+    drop_body(w, body.get());
+  }
+  for (const std::size_t index : all)
+    w.now.objects[index].body = nullptr;
+  renew_bodies(w, motions);
+}
+
+} // namespace
+
+std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::size_t> parts,
+                                        std::span<const std::size_t> offset) {
+  std::vector<SurfaceMeeting> all;
+  const auto range_of = [&](std::size_t object) -> std::optional<NodeRange> {
+    const auto at = std::ranges::find(parts, object);
+    if (at == parts.end())
+      return std::nullopt;
+    const auto first =
+        static_cast<std::uint32_t>(offset[static_cast<std::size_t>(at - parts.begin())]);
+    return NodeRange{
+        first, first + static_cast<std::uint32_t>(w.now.objects[object].model().nodes.size())};
+  };
+  for (const Meeting& m : w.now.meetings)
+    if (const auto one = range_of(m.object), other = range_of(m.other); one && other)
+      all.push_back({*one, *other, m.friction});
+  return all;
+}
+
+/// Before objects move: those that may touch by then become one body, others come apart.
+void meet(World& w, double to) {
+  std::map<std::size_t, Extent> extents;
+  std::set<std::size_t> changed;
+  for (Meeting& m : w.now.meetings) {
+    const Object &a = w.now.objects[m.object], &b = w.now.objects[m.other];
+    if (m.object == m.other || (!awake(a) && !awake(b)))
+      continue;
+    const bool now = are_near(w, m, to - w.now.clock.time, extents);
+    if (now == m.near)
+      continue;
+    m.near = now;
+    changed.insert({m.object, m.other});
+  }
+  if (!changed.empty())
+    regroup(w, changed);
+}
+
+std::vector<std::size_t> together(const World& w, std::size_t object) {
+  std::vector<std::size_t> all{object};
+  const auto add = [&](std::size_t from, std::size_t a, std::size_t b) {
+    for (const auto& [one, other] : {std::pair(a, b), std::pair(b, a)})
+      if (one == from && std::ranges::find(all, other) == all.end())
+        all.push_back(other);
+  };
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const std::size_t from = all[k];
+    for (const Tie& tie : w.now.ties)
+      add(from, tie.object, tie.other);
+    for (const Meeting& m : w.now.meetings)
+      add(from, m.object, m.other);
+  }
+  return all;
+}
+
+/// Parts that came off an object touch whom it touched, and each other if it touched itself.
+void move_meetings(World& w, std::size_t index, const Moves& moves) {
+  std::vector<Meeting> all;
+  const auto pieces_of = [&](std::size_t object) {
+    return object == index ? moves.objects : std::vector<std::size_t>{object};
+  };
+  for (const Meeting& m : w.now.meetings)
+    for (const std::size_t one : pieces_of(m.object))
+      for (const std::size_t other : pieces_of(m.other))
+        if (m.object != m.other || one <= other)
+          all.push_back({one, other, m.friction, m.near || (m.object == m.other && one != other)});
+  w.now.meetings = std::move(all);
+}
+
+// ---- changes
+
+void Rule<SetContact>::check(World& w, const SetContact& c) {
+  const bool itself = c.object == c.other;
+  for (const std::size_t index : {c.object, c.other}) {
+    Object& object = w.now.objects.at(index);
+    need_model(object);
+    require_support(w, object, itself ? Feature::self_contact : Feature::contact);
+    if (object.model().triangles.empty())
+      throw Error("object " + object.name() + " has no triangles, expected a surface for contact");
+  }
+  std::vector<std::size_t> all = together(w, c.object);
+  const std::vector<std::size_t> others = together(w, c.other);
+  all.insert(all.end(), others.begin(), others.end());
+  require_like_solids(w, all);
+}
+
+/// Who is free to choose moves implicitly.
+void Rule<SetContact>::enter(World& w, const SetContact& c) {
+  for (const std::size_t index : {c.object, c.other})
+    if (Integration& way = w.now.objects.at(index).matter->integration;
+        way == Integration::automatic)
+      way = Integration::implicit;
+}
+
+void Rule<SetContact>::apply(World& w, const SetContact& c) {
+  const auto known = std::ranges::find_if(w.now.meetings, [&](const Meeting& m) {
+    return std::minmax(m.object, m.other) == std::minmax(c.object, c.other);
+  });
+  if (known != w.now.meetings.end())
+    known->friction = c.friction;
+  else
+    w.now.meetings.push_back({c.object, c.other, c.friction, false});
+  for (const std::size_t index : {c.object, c.other}) {
+    Object& object = w.now.objects[index];
+    object.meets = true;
+    if (object.body == nullptr)
+      continue;
+    Body& body = *object.body;
+    std::vector<std::size_t> offset;
+    for (const std::size_t part : body.parts)
+      offset.push_back(w.now.objects[part].offset);
+    body.ahead = true;
+    body.moving->set_meetings(meetings_of(w, body.parts, offset));
+    body.moving->wake();
+  }
+}
+
+void Rule<SetContact>::log(const World& w, const SetContact& c, ChangeRow& row) {
+  row.what = "contact";
+  row.other = w.now.objects.at(c.other).name();
+  row.value = c.friction;
+}
+
+} // namespace gewebe::simulation

@@ -1,0 +1,427 @@
+#include "statics/meeting_yielding.h"
+
+#include "base/vector_at.h"
+#include "contact/contact_solver.h"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+// Of an edge.
+constexpr double come_apart = 0.05; ///< of what overlaps, a step
+constexpr double keep_near = 0.1;   ///< of what was touched
+constexpr double same_gap = 1e-6, fair_gap = surface_depth;
+constexpr double same_place = 1e-8;
+
+constexpr double immovable = 1e-12; ///< of the largest compliance
+constexpr int max_turns = 40, turns_at_once = 8;
+constexpr int turns_of_step = 400;   ///< behind which its forces are told not to be exact
+constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
+constexpr int max_asked = 8;         ///< times that triangles beyond the operator's nodes are met
+constexpr int max_waits = 40;        ///< for instruments
+
+auto key_of(const SurfacePair& p) {
+  return std::tuple(p.meeting, !p.first_side, p.node);
+}
+
+Eigen::Vector3d eigen(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+Vec3 vec(const Eigen::Vector3d& v) {
+  return {v[0], v[1], v[2]};
+}
+
+} // namespace
+
+MeetingYielding::MeetingYielding(Yielding& object, SurfacePairs& pairs,
+                                 std::function<bool(std::uint32_t)> held,
+                                 std::span<const double> was, std::vector<std::uint32_t> touched)
+    : object_(object), pairs_(pairs), held_(std::move(held)), was_(was.begin(), was.end()),
+      was_at_(pairs.places_of(was)), touched_(std::move(touched)) {
+  std::erase_if(touched_, held_);
+}
+
+/// The step under the last forces, and who touches whom in it.
+void MeetingYielding::begin() {
+  begun_ = true;
+  nodes_ = own_;
+  nodes_.insert(nodes_.end(), touched_.begin(), touched_.end());
+  std::ranges::sort(nodes_);
+  nodes_.erase(std::ranges::unique(nodes_).begin(), nodes_.end());
+  delassus_ = object_.delassus_operator(nodes_);
+  fresh_ = true;
+  take_shape();
+  std::vector<SurfacePair> found = pairs_.find(object_.shape(), was_, keep_near * pairs_.edge());
+  if (std::ranges::any_of(
+          found, [&](const SurfacePair& p) { return p.gap < -come_apart * pairs_.edge(); }))
+    for (const SurfacePair& p : pairs_.find(was_, was_, 0))
+      overlaps_[key_of(p)] = p.gap;
+  join(std::move(found), true);
+}
+
+void MeetingYielding::take_shape() {
+  at_ = pairs_.places_of(object_.shape());
+}
+
+/// \param first some of these were touched already \return whether any is new
+bool MeetingYielding::join(std::vector<SurfacePair> found, bool first) {
+  const auto touched = [&](std::uint32_t node) {
+    return std::ranges::binary_search(touched_, node);
+  };
+  bool joined = false;
+  if (found.size() > max_new) {
+    std::ranges::stable_sort(found, {}, &SurfacePair::gap);
+    if (!first)
+      found.resize(max_new);
+  }
+  for (const SurfacePair& p : found) {
+    if (held_(p.node) && std::ranges::all_of(p.piece, held_))
+      continue;
+    const bool near = first && (touched(p.node) || std::ranges::any_of(p.piece, touched));
+    if (!near && !(p.gap < target_of(p) - surface_depth * pairs_.edge()))
+      continue;
+    const auto there = std::ranges::lower_bound(
+        all_, key_of(p), {}, [](const SurfacePush& push) { return key_of(push.pair); });
+    if (there != all_.end() && key_of(there->pair) == key_of(p))
+      continue;
+    all_.insert(there, {p, {}});
+    joined = true;
+  }
+  return joined;
+}
+
+/// \return whether it has more nodes than before
+bool MeetingYielding::gather_nodes() {
+  std::vector<std::uint32_t> nodes = own_;
+  nodes.insert(nodes.end(), more_.begin(), more_.end());
+  for (const SurfacePush& p : all_) {
+    nodes.push_back(p.pair.node);
+    nodes.insert(nodes.end(), p.pair.piece.begin(), p.pair.piece.end());
+  }
+  std::erase_if(nodes, held_);
+  std::ranges::sort(nodes);
+  nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+  const bool same = nodes == nodes_;
+  nodes_ = std::move(nodes);
+  return !same;
+}
+
+void MeetingYielding::ask() {
+  if (!gather_nodes() && fresh_)
+    return;
+  delassus_ = object_.delassus_operator(nodes_);
+  fresh_ = true;
+  take_shape();
+}
+
+/// Where the operator's nodes are without the pairs' forces.
+VectorXd MeetingYielding::without_pairs() const {
+  const std::span<const Vec3> rest = pairs_.rest();
+  const auto size = static_cast<Index>(3 * nodes_.size());
+  VectorXd x(size);
+  for (std::size_t k = 0; k < nodes_.size(); ++k)
+    for (int a = 0; a < 3; ++a)
+      x[static_cast<Index>(3 * k) + a] = rest[nodes_[k]][a] + vector_at(delassus_.free, k)[a];
+  const Eigen::Map<const MatrixXd> w(delassus_.compliance.data(), size, size);
+  for (const NodeTouch& t : pushed_) {
+    const auto at = std::ranges::lower_bound(nodes_, t.node);
+    if (at != nodes_.end() && *at == t.node)
+      x += w.middleCols<3>(3 * (at - nodes_.begin())) * eigen(t.force);
+  }
+  return x;
+}
+
+/// From the triangle's point to the node.
+Vec3 MeetingYielding::between(const SurfacePair& pair, std::span<const Vec3> at) const {
+  return at[pair.node] - pair.weights[0] * at[pair.piece[0]] - pair.weights[1] * at[pair.piece[1]] -
+         pair.weights[2] * at[pair.piece[2]];
+}
+
+/// The least gap that a pair may have.
+double MeetingYielding::target_of(const SurfacePair& pair) const {
+  const auto known = overlaps_.find(key_of(pair));
+  return known == overlaps_.end() ? 0 : std::min(0.0, known->second + come_apart * pairs_.edge());
+}
+
+/// Calls visit(row of the operator's nodes, weight) for those of a pair that give way.
+template <class Visit>
+void for_weights(const SurfacePair& p, std::span<const std::uint32_t> nodes, Visit&& visit) {
+  const auto one = [&](std::uint32_t node, double weight) {
+    const auto at = std::ranges::lower_bound(nodes, node);
+    if (weight != 0 && at != nodes.end() && *at == node)
+      visit(3 * (at - nodes.begin()), weight);
+  };
+  one(p.node, 1);
+  for (std::size_t c = 0; c < 3; ++c)
+    one(p.piece[c], -p.weights[c]);
+}
+
+MeetingYielding::Columns MeetingYielding::columns_of(std::span<const SurfacePush> pairs) const {
+  const auto size = static_cast<Index>(3 * nodes_.size());
+  const auto count = static_cast<Index>(3 * pairs.size());
+  const Eigen::Map<const MatrixXd> w(delassus_.compliance.data(), size, size);
+  Columns c{MatrixXd::Zero(size, count), MatrixXd::Zero(count, count)};
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    for_weights(pairs[k].pair, nodes_, [&](Index row, double weight) {
+      c.moved.middleCols<3>(static_cast<Index>(3 * k)) += weight * w.middleCols<3>(row);
+    });
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    for_weights(pairs[k].pair, nodes_, [&](Index row, double weight) {
+      c.compliance.middleRows<3>(static_cast<Index>(3 * k)) += weight * c.moved.middleRows<3>(row);
+    });
+  c.compliance = (0.5 * (c.compliance + c.compliance.transpose())).eval();
+  return c;
+}
+
+/// One of those that say the same: a node on a corner, and that corner on the node.
+std::vector<std::size_t> MeetingYielding::counting(std::span<const SurfacePush> pairs) const {
+  std::vector<std::size_t> all;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> met;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const SurfacePair& p = pairs[k].pair;
+    const auto corner = std::ranges::find(p.weights, 1.0);
+    if (corner != p.weights.end()) {
+      const std::uint32_t other = p.piece[static_cast<std::size_t>(corner - p.weights.begin())];
+      if (!met.try_emplace(std::minmax(p.node, other), k).second)
+        continue;
+    }
+    all.push_back(k);
+  }
+  return all;
+}
+
+/// Forces of pairs, whose points and normals stay.
+void MeetingYielding::solve_linear(std::vector<SurfacePush>& pairs, const VectorXd& base,
+                                   VectorXd& x) {
+  std::vector<Vec3> without(at_);
+  for (std::size_t k = 0; k < nodes_.size(); ++k)
+    without[nodes_[k]] = vec(base.segment<3>(static_cast<Index>(3 * k)));
+  const std::vector<std::size_t> some = counting(pairs);
+  std::vector<SurfacePush> looked;
+  for (const std::size_t k : some)
+    looked.push_back(pairs[k]);
+  const Columns columns = columns_of(looked);
+  const double largest = looked.empty() ? 0 : columns.compliance.diagonal().cwiseAbs().maxCoeff();
+  std::vector<Contact> contacts;
+  std::vector<Vec3> guess;
+  bool rough = false;
+  for (std::uint32_t k = 0; k < looked.size(); ++k) {
+    const SurfacePair& p = looked[k].pair;
+    const auto row = static_cast<Index>(3 * k);
+    const double own =
+        eigen(p.normal).dot(columns.compliance.block<3, 3>(row, row) * eigen(p.normal));
+    if (!(own > immovable * largest))
+      continue;
+    const Vec3 here = between(p, without);
+    const double friction = pairs_.meetings()[p.meeting].friction;
+    rough = rough || friction > 0;
+    contacts.push_back(
+        {k, p.normal, dot(p.normal, here) - target_of(p), here - between(p, was_at_), friction});
+    guess.push_back(looked[k].force);
+  }
+  for (SurfacePush& p : pairs)
+    p.force = {};
+  if (rough) {
+    const ContactForces found = solve_contacts(
+        {columns.compliance.data(), static_cast<std::size_t>(columns.compliance.size())},
+        looked.size(), contacts, guess);
+    solved_ = solved_ && found.solved;
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      pairs[some[contacts[i].node]].force = found.force[i];
+  } else {
+    const auto count = static_cast<Index>(contacts.size());
+    MatrixXd along(count, count);
+    std::vector<double> gap, start;
+    for (Index i = 0; i < count; ++i) {
+      const Contact& a = contacts[static_cast<std::size_t>(i)];
+      for (Index j = 0; j < count; ++j) {
+        const Contact& b = contacts[static_cast<std::size_t>(j)];
+        along(i, j) =
+            eigen(a.normal).dot(columns.compliance.block<3, 3>(3 * static_cast<Index>(a.node),
+                                                               3 * static_cast<Index>(b.node)) *
+                                eigen(b.normal));
+      }
+      gap.push_back(a.gap);
+      start.push_back(dot(guess[static_cast<std::size_t>(i)], a.normal));
+    }
+    const PushForces found =
+        solve_pushes({along.data(), static_cast<std::size_t>(along.size())}, gap, start);
+    solved_ = solved_ && found.solved;
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      pairs[some[contacts[i].node]].force = found.push[i] * contacts[i].normal;
+  }
+  x = base;
+  for (std::size_t k = 0; k < some.size(); ++k)
+    x += columns.moved.middleCols<3>(static_cast<Index>(3 * k)) * eigen(pairs[some[k]].force);
+}
+
+/// How far gaps are from what the forces say, over an edge.
+double MeetingYielding::miss_of(std::span<const SurfacePush> pairs) const {
+  double most = 0;
+  for (const SurfacePush& p : pairs) {
+    const double off = p.pair.gap - target_of(p.pair);
+    const double miss = p.force == Vec3{} ? std::max(0.0, -off) : std::abs(off);
+    most = miss <= most ? most : miss;
+  }
+  return most / pairs_.edge();
+}
+
+/// Forces of all pairs, and where they put the operator's nodes.
+void MeetingYielding::solve() {
+  for (int asked = 0; asked < max_asked; ++asked) {
+    ask();
+    const VectorXd base = without_pairs();
+    double part = 1;
+    for (int turn = 0;; ++turn) {
+      for (SurfacePush& p : all_)
+        pairs_.follow(p.pair, at_);
+      solved_ = true;
+      solve_linear(all_, base, x_);
+      ++turns_;
+      std::vector<Vec3> there(at_);
+      for (std::size_t k = 0; k < nodes_.size(); ++k)
+        there[nodes_[k]] = vec(x_.segment<3>(static_cast<Index>(3 * k)));
+      std::vector<SurfacePush> then(all_);
+      for (SurfacePush& p : then)
+        pairs_.follow(p.pair, there);
+      left_ = miss_of(then);
+      if (!(left_ > same_gap) || turn == max_turns || turns_ >= turns_of_step || !solved_)
+        break;
+      part = turn < turns_at_once ? 1 : 0.5;
+      for (const std::uint32_t node : nodes_)
+        at_[node] += part * (there[node] - at_[node]);
+    }
+    solved_ = solved_ && left_ <= fair_gap;
+    // Triangles that nodes have come to, whose corners must give way too.
+    bool beyond = false;
+    for (const SurfacePush& p : all_)
+      for (std::size_t c = 0; c < 3; ++c)
+        if (p.pair.weights[c] > 0 && !held_(p.pair.piece[c]) &&
+            !std::ranges::binary_search(nodes_, p.pair.piece[c]))
+          beyond = true;
+    if (!beyond || turns_ >= turns_of_step)
+      return;
+    more_ = nodes_; // none leaves again
+  }
+}
+
+DelassusOperator MeetingYielding::delassus_operator(std::span<const std::uint32_t> nodes) {
+  own_.assign(nodes.begin(), nodes.end());
+  if (!begun_)
+    begin();
+  std::erase_if(pushed_,
+                [&](const NodeTouch& t) { return !std::ranges::binary_search(own_, t.node); });
+  solve();
+  // What the pairs that push hold together: along the normal, and where they stick.
+  std::vector<SurfacePush> on;
+  for (const std::size_t k : counting(all_))
+    if (all_[k].force != Vec3{})
+      on.push_back(all_[k]);
+  const Columns columns = columns_of(on);
+  MatrixXd ways = MatrixXd::Zero(static_cast<Index>(3 * on.size()), 0);
+  for (std::size_t k = 0; k < on.size(); ++k) {
+    const SurfacePush& p = on[k];
+    const double friction = pairs_.meetings()[p.pair.meeting].friction;
+    const Vec3 &n = p.pair.normal, drag = p.force - dot(p.force, n) * n;
+    const bool sticks = friction > 0 && norm(drag) < (1 - 1e-6) * friction * dot(p.force, n);
+    const Index from = ways.cols(), more = sticks ? 3 : 1;
+    ways.conservativeResize(ways.rows(), from + more);
+    ways.rightCols(more).setZero();
+    if (sticks)
+      ways.block<3, 3>(static_cast<Index>(3 * k), from).setIdentity();
+    else
+      ways.block<3, 1>(static_cast<Index>(3 * k), from) = eigen(n);
+  }
+  const auto size = static_cast<Index>(3 * nodes_.size());
+  const auto count = static_cast<Index>(3 * own_.size());
+  std::vector<Index> rows;
+  for (const std::uint32_t node : own_)
+    for (Index a = 0; a < 3; ++a)
+      rows.push_back(3 * (std::ranges::lower_bound(nodes_, node) - nodes_.begin()) + a);
+  const Eigen::Map<const MatrixXd> w(delassus_.compliance.data(), size, size);
+  MatrixXd own = w(rows, rows);
+  if (ways.cols() > 0) {
+    const MatrixXd moved = (columns.moved * ways)(rows, Eigen::all);
+    MatrixXd held = ways.transpose() * columns.compliance * ways;
+    held.diagonal().array() += 1e-9 * held.diagonal().maxCoeff();
+    const MatrixXd less = moved * held.llt().solve(moved.transpose());
+    if (less.allFinite())
+      own -= 0.5 * (less + less.transpose());
+  }
+  DelassusOperator result;
+  result.nodes = own_;
+  result.compliance.assign(own.data(), own.data() + own.size());
+  VectorXd free(count);
+  const std::span<const Vec3> rest = pairs_.rest();
+  for (Index k = 0; k < count; ++k)
+    free[k] = x_[rows[static_cast<std::size_t>(k)]] -
+              rest[own_[static_cast<std::size_t>(k / 3)]][static_cast<int>(k % 3)];
+  for (const NodeTouch& t : pushed_)
+    free -= own.middleCols<3>(3 * (std::ranges::lower_bound(own_, t.node) - own_.begin())) *
+            eigen(t.force);
+  result.free.assign(free.data(), free.data() + free.size());
+  return result;
+}
+
+bool MeetingYielding::push(std::span<const NodeTouch> touches, std::span<const Vec3> at) {
+  pushed_.assign(touches.begin(), touches.end());
+  if (at.empty())
+    own_.clear();
+  const bool begins = !begun_;
+  if (begins)
+    begin();
+  if (begins && touched_.empty() && all_.empty() && touches.empty()) // it ran as it is
+    return true;
+  solve();
+  double miss = 0;
+  for (std::size_t k = 0; k < own_.size(); ++k) {
+    const Index row = 3 * (std::ranges::lower_bound(nodes_, own_[k]) - nodes_.begin());
+    miss = std::max(miss, norm(vec(x_.segment<3>(row)) - at[k]));
+  }
+  if (miss > same_place * pairs_.edge() && waits_++ < max_waits)
+    return false;
+  waits_ = 0;
+  std::vector<NodeTouch> all = this->touches();
+  all.insert(all.begin(), touches.begin(), touches.end());
+  std::vector<Vec3> there;
+  for (std::size_t k = 0; k < nodes_.size(); ++k)
+    there.push_back(vec(x_.segment<3>(static_cast<Index>(3 * k))));
+  const bool agreed = object_.push(all, there);
+  fresh_ = false;
+  take_shape();
+  if (turns_ >= turns_of_step) {
+    solved_ = solved_ && agreed;
+    return true;
+  }
+  return agreed && !join(pairs_.find(object_.shape(), was_, 0), false);
+}
+
+std::vector<NodeTouch> MeetingYielding::touches() const {
+  std::vector<NodeTouch> all;
+  for (const SurfacePush& p : all_) {
+    if (p.force == Vec3{})
+      continue;
+    all.push_back({p.pair.node, other_surface, p.force});
+    for (std::size_t c = 0; c < 3; ++c)
+      if (p.pair.weights[c] > 0)
+        all.push_back({p.pair.piece[c], other_surface, -p.pair.weights[c] * p.force});
+  }
+  return sums_of_touches(std::move(all));
+}
+
+TouchCounts MeetingYielding::counts() const {
+  if (all_.empty())
+    return {};
+  const auto turns = static_cast<std::uint64_t>(turns_);
+  return {1, turns, turns, solved_ ? 0U : 1U, solved_ ? left_ : 0};
+}
+
+} // namespace gewebe

@@ -1,0 +1,385 @@
+// Surfaces that touch each other or themselves, in scenes: nobody is pulled, nothing passes,
+// action is reaction.
+
+#include "base/context.h"
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "contact/surface_pairs.h"
+#include "scene/simulation.h"
+#include "sim_models.h"
+#include "simulation_scenes.h"
+#include "solid/solid_model.h"
+#include "tet_fixtures.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::one_thread;
+
+constexpr double edge = 4; ///< mm, of the elements
+
+/// A block of so many elements, its lowest corner there.
+Model block(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Vec3& corner,
+            bool held = false) {
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
+  options.quadratic = false;
+  Model model = solid_model(test::box_tetrahedra(nx, ny, nz, edge), options, {});
+  for (Node& node : model.nodes) {
+    if (held && node.position.z == 0)
+      node.fixed = fixed_all;
+    node.position += corner;
+  }
+  return model;
+}
+
+void add(Simulation& s, const std::string& name, const Model& model) {
+  s.add_object(name, model, Method::ela, {}, Integration::implicit);
+}
+
+Vec3 sum_of_forces(const Simulation& s, std::size_t object) {
+  Vec3 sum;
+  for (const NodeVector& f : s.contact_forces(object))
+    sum += f.value;
+  return sum;
+}
+
+/// The least gap of any pair of two objects' surfaces, or of one with itself, over the length of an
+/// edge.
+double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
+  Model all = s.model(a);
+  std::vector<double> u = test::shape(s, a);
+  const auto first = static_cast<std::uint32_t>(all.nodes.size());
+  NodeRange other{0, first};
+  if (a != b) {
+    const Model& more = s.model(b);
+    all.nodes.insert(all.nodes.end(), more.nodes.begin(), more.nodes.end());
+    for (Triangle t : more.triangles) {
+      for (std::uint32_t& corner : t)
+        corner += first;
+      all.triangles.push_back(t);
+    }
+    const std::vector<double> shape = test::shape(s, b);
+    u.insert(u.end(), shape.begin(), shape.end());
+    other = {first, static_cast<std::uint32_t>(all.nodes.size())};
+  }
+  SurfacePairs pairs(all, {{{0, first}, other, 0}});
+  const std::vector<double> rest(u.size());
+  double least = HUGE_VAL;
+  for (const SurfacePair& p : pairs.find(u, a == b ? rest : u, HUGE_VAL))
+    least = std::min(least, p.gap);
+  return least / pairs.edge();
+}
+
+double weight_of(const Simulation& s, std::size_t object) {
+  double mass = 0;
+  for (const Node& n : s.model(object).nodes)
+    mass += n.mass;
+  return 9810 * mass;
+}
+
+std::vector<std::uint32_t> nodes_of(const Model& model) {
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    all.push_back(i);
+  return all;
+}
+
+TEST(SimulationMeetings, ABlockRestsOnAnother) {
+  for (const double friction : {0.0, 0.3}) {
+    Simulation s(one_thread(), {});
+    add(s, "below", block(5, 5, 2, {}, true));
+    add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.3}));
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(SetTimestep{1.0 / 600});
+    s.apply(SetContact{0, 1, friction});
+    for (int k = 0; k < 16; ++k) {
+      s.step(1.0 / 60);
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      const Vec3 up = sum_of_forces(s, 1), sum = up + sum_of_forces(s, 0);
+      EXPECT_GE(up.z, 0);
+      EXPECT_LE(norm(sum), 1e-12 * norm(up));
+      EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z); // it isn't quite even
+    }
+    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-5 * weight_of(s, 1));
+    EXPECT_NEAR(least_gap(s, 0, 1), 0, 1e-6);
+    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+    EXPECT_EQ(s.state().kinetic_energy<1e-9, friction> 0) << "it slides where nothing rubs";
+  }
+}
+
+/// Of its step, in g mm/s.
+Vec3 momentum(Simulation& s, double h) {
+  std::vector<std::vector<double>> before;
+  for (std::size_t i = 0; i < s.object_count(); ++i)
+    before.push_back(test::shape(s, i));
+  s.step(h);
+  Vec3 sum;
+  for (std::size_t i = 0; i < s.object_count(); ++i) {
+    const std::vector<double> now = test::shape(s, i);
+    for (std::size_t k = 0; k < s.model(i).nodes.size(); ++k)
+      sum += s.model(i).nodes[k].mass / h * (vector_at(now, k) - vector_at(before[i], k));
+  }
+  return sum;
+}
+
+TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
+  Simulation s(one_thread(), {});
+  Model fast = block(2, 2, 2, {}), slow = block(3, 2, 2, {14, 1.5, 2.5});
+  for (Model* const m : {&fast, &slow})
+    for (Node& n : m->nodes)
+      n.drag = 0;
+  add(s, "fast", fast);
+  add(s, "slow", slow);
+  const double h = 1e-3;
+  s.apply(SetTimestep{h});
+  s.apply(SetContact{0, 1, 0.2});
+  s.apply(SetForce{0, nodes_of(fast), {500, 20, 0}});
+  for (int k = 0; k < 20; ++k)
+    s.step(h);
+  s.apply(Release{0, nodes_of(fast)});
+  s.step(h);
+  const Vec3 before = momentum(s, h);
+  double pushed = 0, least = 0;
+  for (int k = 0; k < 100; ++k) {
+    const Vec3 now = momentum(s, h);
+    EXPECT_LE(norm(now - before), 1e-9 * norm(before)) << k;
+    pushed = std::max(pushed, sum_of_forces(s, 1).x);
+    EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)), 1e-12 * pushed);
+    least = std::min(least, least_gap(s, 0, 1));
+  }
+  EXPECT_GT(pushed, 0);
+  EXPECT_GE(least, -1e-3);
+  EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+}
+
+/// A ball of 10 mm radius on tetrahedra that meet in its middle.
+Model solid_ball(const Vec3& center) {
+  const TriangleMesh surface = test::ball(2, 10, center);
+  TetMesh mesh;
+  mesh.points = surface.points;
+  mesh.points.push_back(center);
+  const auto middle = static_cast<std::uint32_t>(surface.points.size());
+  for (const Triangle& t : surface.triangles)
+    mesh.tetrahedra.push_back({t[1], t[0], t[2], middle});
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
+  options.quadratic = false;
+  return solid_model(mesh, options, {});
+}
+
+TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
+  Simulation s(one_thread(), {});
+  add(s, "plate", block(6, 6, 1, {}, true));
+  add(s, "ball", solid_ball({11.3, 12.1, 15}));
+  s.apply(SetGravity{{0, 0, -9810}});
+  s.apply(SetContact{1, 0, 0.5});
+  double least = 0, hardest = 0, mean = 0;
+  for (int k = 0; k < 30; ++k) {
+    s.step(1.0 / 60);
+    least = std::min(least, least_gap(s, 0, 1));
+    const Vec3 up = sum_of_forces(s, 1);
+    hardest = std::max(hardest, up.z);
+    mean += k < 15 ? 0 : up.z / 15;
+    EXPECT_GE(up.z, 0);
+  }
+  EXPECT_GE(least, -1e-3);
+  EXPECT_GT(hardest, 2 * weight_of(s, 1)) << "it falls";
+  EXPECT_NEAR(mean, weight_of(s, 1), 1e-2 * weight_of(s, 1));
+  EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+}
+
+/// Two arms along x, one element apart, held at their lower side.
+Model clamp() {
+  TetMesh mesh = test::box_tetrahedra(8, 2, 5, edge);
+  std::vector<Tetrahedron> kept;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    Vec3 middle;
+    for (const std::uint32_t i : t)
+      middle += 0.25 * mesh.points[i];
+    if (middle.x < 2 * edge || middle.z < 2 * edge || middle.z > 3 * edge)
+      kept.push_back(t);
+  }
+  std::vector<std::uint32_t> number(mesh.points.size(), 0);
+  for (const Tetrahedron& t : kept)
+    for (const std::uint32_t i : t)
+      number[i] = 1;
+  TetMesh some;
+  for (std::size_t i = 0; i < number.size(); ++i)
+    if (number[i] != 0) {
+      number[i] = static_cast<std::uint32_t>(some.points.size());
+      some.points.push_back(mesh.points[i]);
+    }
+  for (Tetrahedron t : kept) {
+    for (std::uint32_t& i : t)
+      i = number[i];
+    some.tetrahedra.push_back(t);
+  }
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
+  options.quadratic = false;
+  Model model = solid_model(some, options, {});
+  for (Node& node : model.nodes)
+    if (node.position.z == 0)
+      node.fixed = fixed_all;
+  return model;
+}
+
+std::vector<std::uint32_t> tip_of(const Model& model) {
+  std::vector<std::uint32_t> tip;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].position.x == 8 * edge && model.nodes[i].position.z == 5 * edge)
+      tip.push_back(i);
+  return tip;
+}
+
+TEST(SimulationMeetings, TheArmsOfAClampTouch) {
+  for (const bool meets : {true, false}) {
+    Simulation s(one_thread(), {});
+    const Model model = clamp();
+    add(s, "clamp", model);
+    if (meets)
+      s.apply(SetContact{0, 0, 0.3});
+    s.apply(SetForce{0, tip_of(model), {0, 0, -4e3}});
+    double least = HUGE_VAL;
+    for (int k = 0; k < 20; ++k) {
+      s.step(1.0 / 60);
+      least = std::min(least, least_gap(s, 0, 0));
+    }
+    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+    EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-9) << "what it does to itself, of some 1e4";
+    if (meets) {
+      EXPECT_GE(least, -1e-3);
+      EXPECT_NEAR(least_gap(s, 0, 0), 0, 1e-3);
+      EXPECT_GE(s.contact_forces(0).size(), 4U);
+    } else {
+      EXPECT_LE(least, -0.1) << "they pass each other where nobody says otherwise";
+    }
+  }
+}
+
+TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
+  for (const double friction : {0.0, 0.4}) {
+    Simulation s(one_thread(), {});
+    add(s, "below", block(4, 4, 1, {}, true));
+    add(s, "above", block(2, 2, 1, {3.7, 4.1, 4.1}));
+    s.apply(SetTimestep{1.0 / 600});
+    s.apply(SetContact{0, 1, 0.3});
+    s.apply(SetInstrument{0, {6, {}, friction}, {{7.7, 8.1, 14.3}, {}}, "probe"});
+    s.apply(MoveInstrument{0, {7.7, 8.1, 13.1}, {}, 0.1});
+    for (int k = 0; k < 12; ++k) {
+      s.step(1.0 / 60);
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      double depth = 0;
+      const PlacedInstrument probe(s.instrument(0).shape, s.instrument(0).pose);
+      const std::vector<double> u = test::shape(s, 1);
+      for (std::size_t i = 0; i < s.model(1).nodes.size(); ++i)
+        depth = std::max(depth, -probe.distance(s.model(1).nodes[i].position + vector_at(u, i)));
+      EXPECT_LE(depth, 1e-6 * 6);
+    }
+    // What the probe presses with goes through to the lower block.
+    const Vec3 probe = s.instrument(0).force, below = sum_of_forces(s, 0);
+    EXPECT_GT(probe.z, 1e4);
+    EXPECT_LE(norm(probe + below), 1e-4 * norm(probe));
+    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+  }
+}
+
+TEST(SimulationMeetings, WhatIsFarApartMovesAlone) {
+  const auto rounds = [](bool meets, double away) {
+    Simulation s(one_thread(), {});
+    add(s, "below", block(5, 5, 2, {}, true));
+    add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.3 + away}));
+    s.apply(SetGravity{{0, 0, -9810}});
+    if (meets)
+      s.apply(SetContact{0, 1, 0.2});
+    for (int k = 0; k < 5; ++k)
+      s.step(1.0 / 60);
+    EXPECT_EQ(s.counts().solids.touches.problems > 0, meets && away == 0);
+    return std::pair(s.counts().solids.rounds, s.counts().integration);
+  };
+  EXPECT_EQ(rounds(true, 500), rounds(false, 500));
+  EXPECT_NE(rounds(true, 0), rounds(false, 0));
+}
+
+/// A step that fails leaves all as it was, though bodies were joined in it.
+TEST(SimulationMeetings, AStepThatFailsIsTakenBack) {
+  const auto run = [](bool fail) {
+    Simulation s(one_thread(), {.guard = true});
+    add(s, "below", block(4, 4, 1, {}, true));
+    add(s, "above", block(2, 2, 1, {3.7, 4.1, 12}));
+    add(s, "apart", block(1, 1, 1, {300, 0, 0}, true));
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(SetContact{0, 1, 0.2});
+    for (int k = 0; k < 6; ++k) {
+      if (fail) {
+        s.apply(SetForce{2, {7}, {1e45, 0, 0}});
+        EXPECT_THROW(s.step(1.0 / 60), Error);
+        s.apply(Release{2, {7}});
+      }
+      s.step(1.0 / 60);
+    }
+    EXPECT_GT(s.counts().solids.touches.problems, 0U);
+    return test::shape(s, 1);
+  };
+  const std::vector<double> once = run(false), again = run(true);
+  double most = 0;
+  for (std::size_t k = 0; k < once.size(); ++k)
+    most = std::max(most, std::abs(once[k] - again[k]));
+  EXPECT_LE(most, 1e-3 * edge); // within what a step leaves: what was learned is forgotten
+}
+
+TEST(SimulationMeetings, WhatIsCutOffTouchesStill) {
+  Simulation s(one_thread(), {});
+  Model organ = test::soft_organ();
+  for (Node& n : organ.nodes)
+    n.drag = n.mass;
+  add(s, "organ", organ);
+  add(s, "plate", block(3, 3, 1, {94, -56, 50.1}));
+  s.apply(SetContact{0, 1, 0});
+  s.apply(SetContact{0, 0, 0});
+  s.apply(SetGravity{{0, 0, -9810}});
+  s.step(1.0 / 60);
+  s.apply(test::lobe_off());
+  ASSERT_EQ(s.object_count(), 3U);
+  for (int k = 0; k < 2; ++k)
+    s.step(1.0 / 120);
+  const Vec3 plate = sum_of_forces(s, 1);
+  EXPECT_GT(plate.z, 0) << "it lies on what came off";
+  EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+  EXPECT_LE(norm(plate + sum_of_forces(s, 0) + sum_of_forces(s, 2)), 1e-10 * norm(plate));
+}
+
+TEST(SimulationMeetings, WhatCannotBeServedIsRefused) {
+  const auto message = [](const SetContact& contact, Method method, Integration integration) {
+    Simulation s(one_thread(), {});
+    s.add_object("o", test::organ(2), method, {}, integration);
+    add(s, "p", test::organ(2));
+    try {
+      s.apply(contact);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const char* const steps = "object o moves by explicit steps, expected integration=implicit or "
+                            "auto for contact";
+  EXPECT_EQ(message({1, 0, 0}, Method::ela, Integration::semi_implicit), steps);
+  EXPECT_EQ(message({0, 0, 0}, Method::ela, Integration::semi_implicit), steps);
+  EXPECT_EQ(message({0, 1, 0}, Method::ffe, Integration::implicit),
+            "object o is elastostatic (ffe), expected ela objects for contact");
+  EXPECT_EQ(message({0, 1, 0}, Method::ela, Integration::implicit), "");
+}
+
+} // namespace
+} // namespace gewebe
