@@ -4,9 +4,12 @@
 #include "contact/contact_solver.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 #include <utility>
 
 namespace gewebe {
@@ -41,16 +44,71 @@ Vec3 vec(const Eigen::Vector3d& v) {
 
 } // namespace
 
-MeetingYielding::MeetingYielding(Yielding& object, SurfacePairs& pairs,
-                                 std::function<bool(std::uint32_t)> held,
-                                 std::span<const double> was, std::vector<std::uint32_t> touched)
+class MeetingYielding::Work {
+public:
+  Work(Yielding& object, SurfacePairs& pairs, std::function<bool(std::uint32_t)> held,
+       std::span<const double> was, std::vector<std::uint32_t> touched);
+
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes);
+  bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at);
+  std::span<const double> shape() { return object_.shape(); }
+
+  std::vector<NodeTouch> touches() const;
+  bool solved() const noexcept { return solved_; }
+  TouchCounts counts() const;
+
+private:
+  using Key = std::tuple<std::uint32_t, bool, std::uint32_t>;
+  struct Columns {
+    Eigen::MatrixXd moved;      ///< by pairs' forces, three columns each: nodes of the operator
+    Eigen::MatrixXd compliance; ///< of the pairs
+  };
+
+  void begin();
+  bool join(std::vector<SurfacePair> found, bool first);
+  void ask();
+  void take_shape();
+  void solve();
+  bool gather_nodes();
+  Eigen::VectorXd without_pairs() const;
+  Columns columns_of(std::span<const SurfacePush> pairs) const;
+  Vec3 between(const SurfacePair& pair, std::span<const Vec3> at) const;
+  double target_of(const SurfacePair& pair) const;
+  double miss_of(std::span<const SurfacePush> pairs) const;
+  void solve_linear(std::vector<SurfacePush>& pairs, const Eigen::VectorXd& base,
+                    Eigen::VectorXd& x);
+  std::vector<std::size_t> counting(std::span<const SurfacePush> pairs) const;
+
+  Yielding& object_;
+  SurfacePairs& pairs_;
+  std::function<bool(std::uint32_t)> held_;
+  std::vector<double> was_;
+  std::vector<Vec3> was_at_;
+  std::vector<std::uint32_t> touched_;
+  std::map<Key, double> overlaps_; ///< gaps when the step began
+
+  std::vector<std::uint32_t> own_; ///< nodes that instruments may touch
+  std::vector<SurfacePush> all_;   ///< by Key
+  std::vector<std::uint32_t> nodes_, more_;
+  DelassusOperator delassus_;     ///< of nodes_: own_, those of pairs, and more_
+  std::vector<NodeTouch> pushed_; ///< by instruments, last
+  std::vector<Vec3> at_;          ///< places of all nodes
+  Eigen::VectorXd x_;             ///< of nodes_ under all forces
+  bool begun_ = false, fresh_ = false, solved_ = true;
+  int waits_ = 0, turns_ = 0;
+  double left_ = 0; ///< of gaps, over an edge
+};
+
+MeetingYielding::Work::Work(Yielding& object, SurfacePairs& pairs,
+                            std::function<bool(std::uint32_t)> held, std::span<const double> was,
+                            std::vector<std::uint32_t> touched)
     : object_(object), pairs_(pairs), held_(std::move(held)), was_(was.begin(), was.end()),
       was_at_(pairs.places_of(was)), touched_(std::move(touched)) {
   std::erase_if(touched_, held_);
 }
 
 /// The step under the last forces, and who touches whom in it.
-void MeetingYielding::begin() {
+void MeetingYielding::Work::begin() {
   begun_ = true;
   nodes_ = own_;
   nodes_.insert(nodes_.end(), touched_.begin(), touched_.end());
@@ -67,12 +125,12 @@ void MeetingYielding::begin() {
   join(std::move(found), true);
 }
 
-void MeetingYielding::take_shape() {
+void MeetingYielding::Work::take_shape() {
   at_ = pairs_.places_of(object_.shape());
 }
 
 /// \param first some of these were touched already \return whether any is new
-bool MeetingYielding::join(std::vector<SurfacePair> found, bool first) {
+bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool first) {
   const auto touched = [&](std::uint32_t node) {
     return std::ranges::binary_search(touched_, node);
   };
@@ -99,7 +157,7 @@ bool MeetingYielding::join(std::vector<SurfacePair> found, bool first) {
 }
 
 /// \return whether it has more nodes than before
-bool MeetingYielding::gather_nodes() {
+bool MeetingYielding::Work::gather_nodes() {
   std::vector<std::uint32_t> nodes = own_;
   nodes.insert(nodes.end(), more_.begin(), more_.end());
   for (const SurfacePush& p : all_) {
@@ -114,7 +172,7 @@ bool MeetingYielding::gather_nodes() {
   return !same;
 }
 
-void MeetingYielding::ask() {
+void MeetingYielding::Work::ask() {
   if (!gather_nodes() && fresh_)
     return;
   delassus_ = object_.delassus_operator(nodes_);
@@ -123,7 +181,7 @@ void MeetingYielding::ask() {
 }
 
 /// Where the operator's nodes are without the pairs' forces.
-VectorXd MeetingYielding::without_pairs() const {
+VectorXd MeetingYielding::Work::without_pairs() const {
   const std::span<const Vec3> rest = pairs_.rest();
   const auto size = static_cast<Index>(3 * nodes_.size());
   VectorXd x(size);
@@ -140,13 +198,13 @@ VectorXd MeetingYielding::without_pairs() const {
 }
 
 /// From the triangle's point to the node.
-Vec3 MeetingYielding::between(const SurfacePair& pair, std::span<const Vec3> at) const {
+Vec3 MeetingYielding::Work::between(const SurfacePair& pair, std::span<const Vec3> at) const {
   return at[pair.node] - pair.weights[0] * at[pair.piece[0]] - pair.weights[1] * at[pair.piece[1]] -
          pair.weights[2] * at[pair.piece[2]];
 }
 
 /// The least gap that a pair may have.
-double MeetingYielding::target_of(const SurfacePair& pair) const {
+double MeetingYielding::Work::target_of(const SurfacePair& pair) const {
   const auto known = overlaps_.find(key_of(pair));
   return known == overlaps_.end() ? 0 : std::min(0.0, known->second + come_apart * pairs_.edge());
 }
@@ -164,7 +222,8 @@ void for_weights(const SurfacePair& p, std::span<const std::uint32_t> nodes, Vis
     one(p.piece[c], -p.weights[c]);
 }
 
-MeetingYielding::Columns MeetingYielding::columns_of(std::span<const SurfacePush> pairs) const {
+MeetingYielding::Work::Columns
+MeetingYielding::Work::columns_of(std::span<const SurfacePush> pairs) const {
   const auto size = static_cast<Index>(3 * nodes_.size());
   const auto count = static_cast<Index>(3 * pairs.size());
   const Eigen::Map<const MatrixXd> w(delassus_.compliance.data(), size, size);
@@ -182,7 +241,7 @@ MeetingYielding::Columns MeetingYielding::columns_of(std::span<const SurfacePush
 }
 
 /// One of those that say the same: a node on a corner, and that corner on the node.
-std::vector<std::size_t> MeetingYielding::counting(std::span<const SurfacePush> pairs) const {
+std::vector<std::size_t> MeetingYielding::Work::counting(std::span<const SurfacePush> pairs) const {
   std::vector<std::size_t> all;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> met;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -199,8 +258,8 @@ std::vector<std::size_t> MeetingYielding::counting(std::span<const SurfacePush> 
 }
 
 /// Forces of pairs, whose points and normals stay.
-void MeetingYielding::solve_linear(std::vector<SurfacePush>& pairs, const VectorXd& base,
-                                   VectorXd& x) {
+void MeetingYielding::Work::solve_linear(std::vector<SurfacePush>& pairs, const VectorXd& base,
+                                         VectorXd& x) {
   std::vector<Vec3> without(at_);
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     without[nodes_[k]] = vec(base.segment<3>(static_cast<Index>(3 * k)));
@@ -264,7 +323,7 @@ void MeetingYielding::solve_linear(std::vector<SurfacePush>& pairs, const Vector
 }
 
 /// How far gaps are from what the forces say, over an edge.
-double MeetingYielding::miss_of(std::span<const SurfacePush> pairs) const {
+double MeetingYielding::Work::miss_of(std::span<const SurfacePush> pairs) const {
   double most = 0;
   for (const SurfacePush& p : pairs) {
     const double off = p.pair.gap - target_of(p.pair);
@@ -275,7 +334,7 @@ double MeetingYielding::miss_of(std::span<const SurfacePush> pairs) const {
 }
 
 /// Forces of all pairs, and where they put the operator's nodes.
-void MeetingYielding::solve() {
+void MeetingYielding::Work::solve() {
   for (int asked = 0; asked < max_asked; ++asked) {
     ask();
     const VectorXd base = without_pairs();
@@ -313,7 +372,7 @@ void MeetingYielding::solve() {
   }
 }
 
-DelassusOperator MeetingYielding::delassus_operator(std::span<const std::uint32_t> nodes) {
+DelassusOperator MeetingYielding::Work::delassus_operator(std::span<const std::uint32_t> nodes) {
   own_.assign(nodes.begin(), nodes.end());
   if (!begun_)
     begin();
@@ -371,7 +430,7 @@ DelassusOperator MeetingYielding::delassus_operator(std::span<const std::uint32_
   return result;
 }
 
-bool MeetingYielding::push(std::span<const NodeTouch> touches, std::span<const Vec3> at) {
+bool MeetingYielding::Work::push(std::span<const NodeTouch> touches, std::span<const Vec3> at) {
   pushed_.assign(touches.begin(), touches.end());
   if (at.empty())
     own_.clear();
@@ -404,7 +463,7 @@ bool MeetingYielding::push(std::span<const NodeTouch> touches, std::span<const V
   return agreed && !join(pairs_.find(object_.shape(), was_, 0), false);
 }
 
-std::vector<NodeTouch> MeetingYielding::touches() const {
+std::vector<NodeTouch> MeetingYielding::Work::touches() const {
   std::vector<NodeTouch> all;
   for (const SurfacePush& p : all_) {
     if (p.force == Vec3{})
@@ -417,11 +476,37 @@ std::vector<NodeTouch> MeetingYielding::touches() const {
   return sums_of_touches(std::move(all));
 }
 
-TouchCounts MeetingYielding::counts() const {
+TouchCounts MeetingYielding::Work::counts() const {
   if (all_.empty())
     return {};
   const auto turns = static_cast<std::uint64_t>(turns_);
   return {1, turns, turns, solved_ ? 0U : 1U, solved_ ? left_ : 0};
+}
+
+MeetingYielding::MeetingYielding(Yielding& object, SurfacePairs& pairs,
+                                 std::function<bool(std::uint32_t)> held,
+                                 std::span<const double> was, std::vector<std::uint32_t> touched)
+    : work_(std::make_unique<Work>(object, pairs, std::move(held), was, std::move(touched))) {}
+
+MeetingYielding::~MeetingYielding() = default;
+
+DelassusOperator MeetingYielding::delassus_operator(std::span<const std::uint32_t> nodes) {
+  return work_->delassus_operator(nodes);
+}
+bool MeetingYielding::push(std::span<const NodeTouch> touches, std::span<const Vec3> at) {
+  return work_->push(touches, at);
+}
+std::span<const double> MeetingYielding::shape() {
+  return work_->shape();
+}
+std::vector<NodeTouch> MeetingYielding::touches() const {
+  return work_->touches();
+}
+bool MeetingYielding::solved() const noexcept {
+  return work_->solved();
+}
+TouchCounts MeetingYielding::counts() const {
+  return work_->counts();
 }
 
 } // namespace gewebe

@@ -108,7 +108,7 @@ TEST(Coupled, NeverGivesWhatItWasNotGiven) {
         given -= dot(method == Method::ffe ? 0.5 * (force + before) : force, to - last);
         before = force;
         last = to;
-        least = std::min(least, given);
+        least = test::smaller(least, given);
         most = larger(most, given);
         EXPECT_LE(depth(*s), 1e-6);
       }
@@ -135,7 +135,7 @@ std::pair<double, double> held_by_hand(const std::optional<Coupling>& coupling, 
     s->apply(MoveInstrument{0, above(z), {}, 0});
     s->step(h);
     late = std::exchange(felt, s->instrument(0).force.z);
-    low = std::min(low, z);
+    low = test::smaller(low, z);
     high = larger(high, z);
     if (std::abs(z) > 2) // it is thrown about
       return {first, high - low};

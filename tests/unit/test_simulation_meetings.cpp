@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/vector_at.h"
 #include "contact/surface_pairs.h"
+#include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "simulation_scenes.h"
@@ -77,7 +78,7 @@ double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
   const std::vector<double> rest(u.size());
   double least = HUGE_VAL;
   for (const SurfacePair& p : pairs.find(u, a == b ? rest : u, HUGE_VAL))
-    least = std::min(least, p.gap);
+    least = test::smaller(least, p.gap);
   return least / pairs.edge();
 }
 
@@ -154,9 +155,9 @@ TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
   for (int k = 0; k < 100; ++k) {
     const Vec3 now = momentum(s, h);
     EXPECT_LE(norm(now - before), 1e-9 * norm(before)) << k;
-    pushed = std::max(pushed, sum_of_forces(s, 1).x);
+    pushed = test::larger(pushed, sum_of_forces(s, 1).x);
     EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)), 1e-12 * pushed);
-    least = std::min(least, least_gap(s, 0, 1));
+    least = test::smaller(least, least_gap(s, 0, 1));
   }
   EXPECT_GT(pushed, 0);
   EXPECT_GE(least, -1e-3);
@@ -187,9 +188,9 @@ TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
   double least = 0, hardest = 0, mean = 0;
   for (int k = 0; k < 30; ++k) {
     s.step(1.0 / 60);
-    least = std::min(least, least_gap(s, 0, 1));
+    least = test::smaller(least, least_gap(s, 0, 1));
     const Vec3 up = sum_of_forces(s, 1);
-    hardest = std::max(hardest, up.z);
+    hardest = test::larger(hardest, up.z);
     mean += k < 15 ? 0 : up.z / 15;
     EXPECT_GE(up.z, 0);
   }
@@ -254,7 +255,7 @@ TEST(SimulationMeetings, TheArmsOfAClampTouch) {
     double least = HUGE_VAL;
     for (int k = 0; k < 20; ++k) {
       s.step(1.0 / 60);
-      least = std::min(least, least_gap(s, 0, 0));
+      least = test::smaller(least, least_gap(s, 0, 0));
     }
     EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
     EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-9) << "what it does to itself, of some 1e4";
@@ -284,7 +285,8 @@ TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
       const PlacedInstrument probe(s.instrument(0).shape, s.instrument(0).pose);
       const std::vector<double> u = test::shape(s, 1);
       for (std::size_t i = 0; i < s.model(1).nodes.size(); ++i)
-        depth = std::max(depth, -probe.distance(s.model(1).nodes[i].position + vector_at(u, i)));
+        depth =
+            test::larger(depth, -probe.distance(s.model(1).nodes[i].position + vector_at(u, i)));
       EXPECT_LE(depth, 1e-6 * 6);
     }
     // What the probe presses with goes through to the lower block.
@@ -335,7 +337,7 @@ TEST(SimulationMeetings, AStepThatFailsIsTakenBack) {
   const std::vector<double> once = run(false), again = run(true);
   double most = 0;
   for (std::size_t k = 0; k < once.size(); ++k)
-    most = std::max(most, std::abs(once[k] - again[k]));
+    most = test::larger(most, std::abs(once[k] - again[k]));
   EXPECT_LE(most, 1e-3 * edge); // within what a step leaves: what was learned is forgotten
 }
 
