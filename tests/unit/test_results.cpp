@@ -88,6 +88,7 @@ void write_instruments(Kind kind, const std::string& path, const Model& model) {
                                     true,
                                     {.radius = 2, .axis = {}, .friction = 0.5},
                                     {{1, 2, 3}, {}},
+                                    {1, 2, 5},
                                     {0, 0, 9},
                                     {1, 0, 0},
                                     4}};
@@ -100,8 +101,9 @@ void write_instruments(Kind kind, const std::string& path, const Model& model) {
   add(2);
   all[0].present = false;
   add(3);
-  all[0] = {"probe", true, {.radius = 1, .axis = {4, 0, 0}}, turned, {}, {}, 0};
-  all.push_back({"knife", true, {.radius = 0, .axis = {0, 0, 8}, .blade = true}, {}, {}, {}, 0});
+  all[0] = {"probe", true, {.radius = 1, .axis = {4, 0, 0}}, turned, {}, {}, {}, 0};
+  all.push_back(
+      {"knife", true, {.radius = 0, .axis = {0, 0, 8}, .blade = true}, {}, {}, {}, {}, 0});
   add(4);
   result->commit();
 }

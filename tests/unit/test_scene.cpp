@@ -147,7 +147,7 @@ TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known =
       "expected one of object, force, pressure, displace, attach, contact, release, "
-      "instrument, move, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
+      "instrument, move, couple, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
       "two-step, emit, step, run, renew, sync, end, nodes, select, objects, instruments, at";
   for (const char* word : {"slice", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;

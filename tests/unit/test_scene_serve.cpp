@@ -382,7 +382,7 @@ TEST(SceneServe, EventsSayWhoTouchedWhatWhen) {
         "", table.path());
   const std::vector<std::string> rows = lines_of(content(table.path()));
   ASSERT_EQ(rows.size(), 6U);
-  const std::string none(14, ','); // of the columns of instruments
+  const std::string none(17, ','); // of the columns of instruments
   EXPECT_EQ(rows[1], "0,object,a,,,,,,,,,\"m ela\"" + none);
   EXPECT_EQ(rows[2], "0,force,a,4 6-7,1,2,3,,0.5,,," + none);
   EXPECT_TRUE(rows[3].starts_with("0,error,,,,,,,,,,\"4: 'wrong,' is no command"));
