@@ -93,7 +93,9 @@ DelassusOperator GivingContact::delassus(const DelassusOperator& of_all) const {
       for (std::size_t b = 0; b < 3; ++b)
         for (std::size_t a = 0; a < 3; ++a)
           own.compliance[(3 * c + b) * size + 3 * r + a] =
-              (both ? of_all.compliance[(3 * of_[c] + b) * from + 3 * of_[r] + a] : 0) +
+              (both ? of_all.compliance[(std::size_t{3} * of_[c] + b) * from +
+                                        std::size_t{3} * of_[r] + a]
+                    : 0) +
               (a == b ? give : 0);
     }
   return own;
@@ -141,7 +143,7 @@ std::vector<Vec3> GivingContact::places(std::span<const Vec3> at, std::span<cons
           for (std::size_t a = 0; a < 3; ++a)
             for (std::size_t b = 0; b < 3; ++b)
               all[i][static_cast<int>(a)] +=
-                  of_all.compliance[(3 * j + b) * 3 * all_.moving + 3 * i + a] *
+                  of_all.compliance[(std::size_t{3} * j + b) * 3 * all_.moving + 3 * i + a] *
                   p.point.weights[c] * p.force[static_cast<int>(b)];
   }
   return all;
