@@ -28,7 +28,7 @@ struct Tool {
 };
 constexpr std::array tools{
     Tool{"metaball2vol", "turn particles into a volume of their density"},
-    Tool{"voxelize", "turn a closed triangle mesh or labels into a volume"},
+    Tool{"voxelize", "turn a closed triangle mesh, labels or a scan into a volume"},
     Tool{"csg", "combine volumes"},
     Tool{"mc-opt",
          "turn a volume into a closed triangle mesh of its isosurface, or into tetrahedra"},

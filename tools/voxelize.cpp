@@ -1,4 +1,4 @@
-// voxelize: closed mesh or labels -> volume.
+// voxelize: closed mesh, labels or scan -> volume.
 
 #include "voxelize/voxelize.h"
 #include "formats/mesh/mesh_file.h"
@@ -10,6 +10,7 @@
 #include "tools/shared/mesh_size.h"
 #include "tools/shared/report.h"
 #include "tools/shared/voxelize_labels.h"
+#include "tools/shared/voxelize_scan.h"
 #include "volume/lattice.h"
 
 #include <cmath>
@@ -24,7 +25,7 @@ struct Arguments {
   std::optional<double> voxel;
   std::optional<std::int64_t> dim;
   AntialiasChoice choice;
-  std::string labels;
+  std::string labels, threshold;
   VoxelizeOptions options;
 };
 
@@ -35,15 +36,11 @@ VoxelRule rule_from_text(const std::string& text) {
 }
 
 void complete(Arguments& a) {
-  if (!a.labels.empty()) {
-    if (a.labels != "list")
-      (void)labels_from_text(a.labels);
-    else if (a.voxel)
-      throw UsageError("--label list makes no volume, expected no --voxel");
-    if (a.dim || !a.like.empty())
-      throw UsageError("--label: the labels give the lattice, expected --voxel or nothing");
-    return;
-  }
+  const bool own_lattice = a.dim || !a.like.empty();
+  if (!a.threshold.empty())
+    return check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
+  if (!a.labels.empty())
+    return check_labels(a.labels, a.voxel.has_value(), own_lattice);
   if (int{a.voxel.has_value()} + int{a.dim.has_value()} + int{!a.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
@@ -95,7 +92,8 @@ void work(cli::Run& run, const Arguments& a) {
   Output output(run.output(), run.output_options(true));
   Input input(a.mesh);
   if (is_label_volume(input.peek(4096)))
-    throw Error(input.name(), "is a label volume, expected a mesh or --label L");
+    throw Error(input.name(), "is a label volume or a scan, expected a mesh, --label L or "
+                              "--threshold LOW");
   MeshReadOptions read;
   read.kind = input_kind(input.peek(4096), a.mesh, run.format());
   read.unit = a.unit;
@@ -121,16 +119,19 @@ void work(cli::Run& run, const Arguments& a) {
 } // namespace
 
 int main(int argc, char** argv) {
-  cli::Program p("voxelize", "Turns a closed mesh, exactly, or labels into a volume.");
+  cli::Program p("voxelize", "Turns a closed mesh, exactly, labels or a scan into a volume.");
   Arguments a;
   p.option("--voxel", a.voxel, "S", "edge of a voxel in mm, centres at multiples of S").positive();
   p.option("--dim", a.dim, "N", "voxels along the longest side of the mesh's box")
       .range(1, 1 << 30);
   p.option("--like", a.like, "VDB", "take the lattice of this volume");
-  p.option("--label", a.labels, "L[-M][,L...]",
-           "the operand is a label volume (NIfTI, NRRD, MetaImage): these labels together; list: "
-           "which there are")
+  p.option(
+       "--label", a.labels, "L[-M][,L...]",
+       "the operand is a label volume (NIfTI, NRRD, MetaImage, INR): these labels together; list: "
+       "which there are")
       .such_as({"list"});
+  p.option("--threshold", a.threshold, "LOW[,HIGH]",
+           "the operand is a scan (the same formats): its grey values above LOW and below HIGH");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.antialias, "FILTER",
@@ -147,7 +148,9 @@ int main(int argc, char** argv) {
   p.operand("MESH", a.mesh, "the mesh");
   p.check([&] { complete(a); });
   return p.run(argc, argv, [&](cli::Run& run) {
-    if (a.labels.empty())
+    if (!a.threshold.empty())
+      voxelize_scan(run, a.mesh, thresholds_from_text(a.threshold), a.voxel);
+    else if (a.labels.empty())
       work(run, a);
     else if (a.labels == "list")
       list_labels(run, a.mesh);

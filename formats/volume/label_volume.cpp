@@ -95,18 +95,15 @@ std::string value_text(T stored, const VoxelLayout& layout) {
   return text.data();
 }
 
-/// What becomes of a row of labels.
-using TakeRow = std::function<void(std::span<const std::int64_t> row)>;
-
-/// Rows of voxels of type T to labels.
-template <class T>
-void convert(ByteSource& data, const std::string& name, const VoxelLayout& layout,
-             const Context& context, const TakeRow& take) {
+/// Rows of voxels of type T as they are stored; take(row, j, k).
+template <class T, class Take>
+void read_rows(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+               const Context& context, const Take& take) {
   const std::size_t length = static_cast<std::size_t>(layout.size[0]);
   const std::size_t rows =
       static_cast<std::size_t>(layout.size[1]) * static_cast<std::size_t>(layout.size[2]);
+  const bool swap = layout.big_endian != (std::endian::native == std::endian::big);
   std::vector<T> row(length);
-  std::vector<std::int64_t> labels(length);
   for (std::size_t r = 0; r < rows; ++r) {
     if (r % 1024 == 0 && context.cancelled && context.cancelled())
       throw Cancelled();
@@ -115,24 +112,19 @@ void convert(ByteSource& data, const std::string& name, const VoxelLayout& layou
       throw Error(name, "ends after " + std::to_string(r * length * sizeof(T) + got) + " of " +
                             std::to_string(rows * length * sizeof(T)) + " bytes of voxels (" +
                             size_text(layout.size) + ")");
-    for (std::size_t i = 0; i < length; ++i) {
-      const T stored =
-          layout.big_endian != (std::endian::native == std::endian::big) ? swapped(row[i]) : row[i];
-      const std::optional<std::int64_t> label = label_of(stored, layout);
-      if (!label)
-        throw Error(name, "voxel (" + std::to_string(i) + ", " +
-                              std::to_string(r % static_cast<std::size_t>(layout.size[1])) + ", " +
-                              std::to_string(r / static_cast<std::size_t>(layout.size[1])) +
-                              ") is " + value_text(stored, layout) + ", expected whole numbers");
-      labels[i] = *label;
-    }
-    at(name, [&] { take(labels); });
+    if (swap)
+      for (T& stored : row)
+        stored = swapped(stored);
+    take(std::span<const T>(row), r % static_cast<std::size_t>(layout.size[1]),
+         r / static_cast<std::size_t>(layout.size[1]));
   }
 }
 
-void convert_any(ByteSource& data, const std::string& name, const VoxelLayout& layout,
-                 const Context& context, const TakeRow& take) {
-  const auto as = [&]<class T>(T) { convert<T>(data, name, layout, context, take); };
+/// The same for a type that is known as the program runs: take is called with a span of it.
+template <class Take>
+void read_any_rows(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                   const Context& context, const Take& take) {
+  const auto as = [&]<class T>(T) { read_rows<T>(data, name, layout, context, take); };
   switch (layout.type) {
   case ScalarType::i8:
     return as(std::int8_t{});
@@ -155,6 +147,34 @@ void convert_any(ByteSource& data, const std::string& name, const VoxelLayout& l
   case ScalarType::f64:
     return as(double{});
   }
+}
+
+/// What becomes of a row of labels.
+using TakeRow = std::function<void(std::span<const std::int64_t> row)>;
+
+void read_label_rows(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                     const Context& context, const TakeRow& take) {
+  std::vector<std::int64_t> labels(static_cast<std::size_t>(layout.size[0]));
+  read_any_rows(data, name, layout, context, [&](auto row, std::size_t j, std::size_t k) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::optional<std::int64_t> label = label_of(row[i], layout);
+      if (!label)
+        throw Error(name, "voxel (" + std::to_string(i) + ", " + std::to_string(j) + ", " +
+                              std::to_string(k) + ") is " + value_text(row[i], layout) +
+                              ", expected whole numbers");
+      labels[i] = *label;
+    }
+    at(name, [&] { take(labels); });
+  });
+}
+
+void read_grey_rows(ByteSource& data, const std::string& name, const VoxelLayout& layout,
+                    const Context& context, std::vector<float>& values) {
+  read_any_rows(data, name, layout, context, [&](auto row, std::size_t, std::size_t) {
+    for (const auto stored : row)
+      values.push_back(
+          static_cast<float>(layout.slope * static_cast<double>(stored) + layout.intercept));
+  });
 }
 
 // Both grow as the bytes come, so that a header's claim alone takes no memory.
@@ -209,7 +229,21 @@ std::string list_of(const std::vector<std::pair<std::int64_t, std::uint64_t>>& l
   return text;
 }
 
-LabelVolume read_any(ByteSource& source, const std::string& name, const LabelRequest& request) {
+AllLabels all_of(ByteSource& source, const std::string& name, const std::vector<LabelRange>& labels,
+                 const Context& context, bool side_files) {
+  AllLabels result;
+  const LabelCheck no_check;
+  LabelVolume volume = read_radiology(
+      source, name, {labels, context, no_check, side_files, &result.voxels, nullptr});
+  result.format = std::move(volume.format);
+  result.warnings = std::move(volume.warnings);
+  return result;
+}
+
+} // namespace
+
+LabelVolume read_radiology(ByteSource& source, const std::string& name,
+                           const LabelRequest& request) {
   BufferedBytes raw(source, name);
   std::optional<InflatedBytes> inflated;
   std::optional<BufferedBytes> unpacked;
@@ -226,8 +260,11 @@ LabelVolume read_any(ByteSource& source, const std::string& name, const LabelReq
     volume = read_nrrd(*bytes, request);
   else if (is_meta_image(first))
     volume = read_meta_image(*bytes, request);
+  else if (is_inr(first))
+    volume = read_inr(*bytes, request);
   else
-    throw Error(name, "is no label volume, expected NIfTI, NRRD or MetaImage");
+    throw Error(name, std::string(request.grey != nullptr ? "is no volume" : "is no label volume") +
+                          ", expected NIfTI, NRRD, MetaImage or INR");
   for (const LabelRange& range : request.labels)
     if (std::none_of(volume.labels.begin(), volume.labels.end(), [&](const auto& label) {
           return label.first >= range.first && label.first <= range.last;
@@ -237,18 +274,6 @@ LabelVolume read_any(ByteSource& source, const std::string& name, const LabelReq
                             ", expected some of " + list_of(volume.labels));
   return volume;
 }
-
-AllLabels all_of(ByteSource& source, const std::string& name, const std::vector<LabelRange>& labels,
-                 const Context& context, bool side_files) {
-  AllLabels result;
-  LabelVolume volume =
-      read_any(source, name, {labels, context, LabelCheck(), side_files, &result.voxels});
-  result.format = std::move(volume.format);
-  result.warnings = std::move(volume.warnings);
-  return result;
-}
-
-} // namespace
 
 // ---- what the formats share
 
@@ -284,20 +309,29 @@ LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLa
     // counts as well: it may be a small file that grows without end when it is unpacked.
     const double bytes = static_cast<double>(bytes_of(layout.type)) * layout.size[0] *
                          static_cast<double>(layout.size[1]) * layout.size[2];
-    require_memory(request.context, std::max(16 * words + 16.0 * layout.size[0] + 1e6, bytes),
-                   ("the label volume of " + size_text(layout.size) + " voxels").c_str());
+    const double grey = 8.0 * bytes / static_cast<double>(bytes_of(layout.type));
+    const double kept = request.grey != nullptr ? grey : 16 * words + 16.0 * layout.size[0] + 1e6;
+    require_memory(request.context, std::max(kept, bytes),
+                   (std::string(request.grey != nullptr ? "the volume" : "the label volume") +
+                    " of " + size_text(layout.size) + " voxels")
+                       .c_str());
     if (request.check)
       request.check(volume.mask);
   });
   Counter counter(request.labels);
-  if (request.all != nullptr)
+  if (request.grey != nullptr) {
+    *request.grey = {layout.size, layout.transform, {}};
+    read_grey_rows(data, name, layout, request.context, request.grey->values);
+  } else if (request.all != nullptr) {
     *request.all = {layout.size, layout.transform, {}, {0}};
-  convert_any(data, name, layout, request.context, [&](std::span<const std::int64_t> row) {
-    if (request.all != nullptr)
+    read_label_rows(data, name, layout, request.context, [&](std::span<const std::int64_t> row) {
       append_runs(request, row, counter, *request.all);
-    else
+    });
+  } else {
+    read_label_rows(data, name, layout, request.context, [&](std::span<const std::int64_t> row) {
       volume.voxels += append_bits(row, counter, volume.mask);
-  });
+    });
+  }
   char more = 0;
   if (data.read(&more, 1) != 0)
     throw Error(name, "goes on after its " + size_text(layout.size) + " voxels, expected its end");
@@ -419,7 +453,8 @@ LabelVolume read_label_volume(Input& input, const std::vector<LabelRange>& label
                               const Context& context, const LabelCheck& check) {
   (void)input.peek(1); // says that it is empty
   StreamBytes source(input.stream(), input.name());
-  return read_any(source, input.name(), {labels, context, check, input.name() != "-", nullptr});
+  return read_radiology(source, input.name(),
+                        {labels, context, check, input.name() != "-", nullptr, nullptr});
 }
 
 AllLabels read_all_labels(Input& input, const std::vector<LabelRange>& labels,
@@ -433,7 +468,7 @@ LabelVolume label_volume_from_bytes(std::string_view bytes, const std::string& n
                                     const std::vector<LabelRange>& labels, const Context& context,
                                     const LabelCheck& check) {
   MemoryBytes source(bytes);
-  return read_any(source, name, {labels, context, check, false, nullptr});
+  return read_radiology(source, name, {labels, context, check, false, nullptr, nullptr});
 }
 
 AllLabels all_labels_from_bytes(std::string_view bytes, const std::string& name,
@@ -458,7 +493,8 @@ bool is_label_volume(std::string_view first_bytes) {
     unpacked.resize(size);
     first_bytes = unpacked;
   }
-  return is_nifti(first_bytes) || is_nrrd(first_bytes) || is_meta_image(first_bytes);
+  return is_nifti(first_bytes) || is_nrrd(first_bytes) || is_meta_image(first_bytes) ||
+         is_inr(first_bytes);
 }
 
 } // namespace gewebe

@@ -1,8 +1,8 @@
 #pragma once
 // Label volumes of radiology: NIfTI-1 and -2 (.nii, .nii.gz, pairs .hdr/.img), NRRD (.nrrd, .nhdr;
-// raw and gzip) and MetaImage (.mha, .mhd; raw and zlib). What is read is which voxels have one of
-// the wanted labels, one bit a voxel, or the labels of all voxels as runs, and where they lie in
-// the world: mm, RAS.
+// raw and gzip), MetaImage (.mha, .mhd; raw and zlib) and INRIMAGE-4 (.inr, .inr.gz). What is read
+// is which voxels have one of the wanted labels, one bit a voxel, or the labels of all voxels as
+// runs, and where they lie in the world: mm, RAS.
 //
 // A reader of our own on zlib. Debian 12 has three libraries. nifticlib 3 (1.8 MB) opens files by
 // name alone, so no pipe; it warns on standard error and reads a file that is cut off as zeros, and
@@ -15,7 +15,8 @@
 // Frames: NIfTI is RAS; its affine is chosen as by nibabel (sform where sform_code > 0, else qform
 // where qform_code > 0, else the voxel sizes about the middle with x from right to left, and a
 // warning), its unit (m, mm, µm) applied. NRRD spaces RAS, LAS and LPS are converted by negating
-// axes; one without anatomical meaning is taken as RAS with a warning. MetaImage is LPS.
+// axes; one without anatomical meaning is taken as RAS with a warning. MetaImage is LPS. INR has
+// voxel sizes alone, from the first voxel on, which are taken as RAS with a warning.
 
 #include "base/context.h"
 #include "formats/stream/stream.h"
@@ -39,7 +40,7 @@ struct LabelRange {
 struct LabelVolume {
   LabelMask mask;           ///< of the wanted labels
   std::uint64_t voxels = 0; ///< that are set in it
-  std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage"
+  std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage", "INR"
   std::vector<std::pair<std::int64_t, std::uint64_t>>
       labels; ///< all values that the file holds, ascending, and how often
   std::vector<std::string> warnings;
@@ -51,7 +52,7 @@ using LabelCheck = std::function<void(const LabelMask& without_bits)>;
 
 /// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
 /// Compression is told by its bytes. Values must be whole numbers, in whatever type they are kept.
-/// \throw Error with the place if it is none of the three, is cut off or goes on beyond its end, if
+/// \throw Error with the place if it is none of these, is cut off or goes on beyond its end, if
 /// a value is no whole number, if the affine is singular, if none of a range of `labels` occurs
 /// (the message names those that do), if the mask or the voxels unpacked would need more than
 /// context.max_memory, or what `check` throws

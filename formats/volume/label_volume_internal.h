@@ -2,6 +2,7 @@
 // What the readers of label volumes share: bytes that come forwards, numbers out of them, voxels.
 
 #include "formats/volume/label_volume.h"
+#include "labels/grey_volume.h"
 
 #include <cstddef>
 #include <functional>
@@ -102,8 +103,14 @@ struct LabelRequest {
   const Context& context;
   const LabelCheck& check;
   bool side_files; ///< whether the name is that of a file, beside which others may be opened
-  LabelRuns* all;  ///< receives all labels in place of the mask's bits; nullptr: bits are wanted
+  // One of these may receive what is wanted in place of the mask's bits.
+  LabelRuns* all;
+  GreyVolume* grey;
 };
+
+/// Reads a volume of any of the formats for what is asked.
+LabelVolume read_radiology(ByteSource& source, const std::string& name,
+                           const LabelRequest& request);
 
 /// Reads the voxels to the end of `data`, which is called `name`. Fills all but format and
 /// warnings.
@@ -155,10 +162,12 @@ LabelVolume read_side_file(const std::string& header, const HeaderField& file,
 LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request);
 LabelVolume read_nrrd(BufferedBytes& bytes, const LabelRequest& request);
 LabelVolume read_meta_image(BufferedBytes& bytes, const LabelRequest& request);
+LabelVolume read_inr(BufferedBytes& bytes, const LabelRequest& request);
 
 /// By the first bytes, uncompressed.
 bool is_nifti(std::string_view bytes);
 bool is_nrrd(std::string_view bytes);
 bool is_meta_image(std::string_view bytes);
+bool is_inr(std::string_view bytes);
 
 } // namespace gewebe

@@ -1,8 +1,10 @@
-// Any bytes as a label volume: an Error, or a mask and runs, never a crash, and no memory beyond
-// the limit; small ones become a density too.
+// Any bytes as a label volume and as a scan: an Error, or a mask, runs and values, never a crash,
+// and no memory beyond the limit; small ones become a density too.
 
 #include "base/error.h"
+#include "formats/volume/grey_volume.h"
 #include "formats/volume/label_volume.h"
+#include "labels/grey_density.h"
 #include "labels/label_density.h"
 
 #include <cstddef>
@@ -32,6 +34,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             static_cast<std::size_t>(all.size[1]) * static_cast<std::size_t>(all.size[2]) + 1 ||
         all.rows.back() != all.runs.size() || all.runs.back().end != all.size[0])
       std::abort();
+  } catch (const Error&) {
+  }
+  try {
+    const GreyVolume scan = grey_volume_from_bytes(bytes, "fuzz", context).volume;
+    if (scan.values.size() != scan.row(0, scan.size[2]))
+      std::abort();
+    if (scan.values.size() < 4096) {
+      GreyDensityOptions options;
+      options.low = 2;
+      (void)grey_density(context, scan, options).digest();
+    }
   } catch (const Error&) {
   }
   return 0;

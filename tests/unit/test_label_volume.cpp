@@ -1,6 +1,7 @@
-// Readers of label volumes: the three formats say the same, damage is refused.
+// Readers of label volumes and scans: the formats say the same, damage is refused.
 
 #include "base/error.h"
+#include "formats/volume/grey_volume.h"
 #include "formats/volume/label_volume.h"
 #include "tests/unit/scratch.h"
 
@@ -166,6 +167,10 @@ void expect_sample(const std::string& bytes) {
             << i << " " << j << " " << k;
   for (const Int3& beyond : {Int3{5, 3, 2}, Int3{-1, 0, 0}, Int3{0, 4, 0}, Int3{0, 0, -1}})
     EXPECT_EQ(all.voxels.at(beyond), 0);
+  const GreyScan scan = grey_volume_from_bytes(bytes, "test", {});
+  EXPECT_EQ(scan.format, volume.format);
+  EXPECT_EQ(scan.volume.transform, volume.mask.transform);
+  EXPECT_EQ(scan.volume.values, voxels<float>());
 }
 
 std::string nifti_of_bytes() {
@@ -195,6 +200,75 @@ TEST(LabelVolume, AllFormatsAndTypesSayTheSame) {
   expect_sample(nrrd(lps + "type: uchar\nencoding: gzip\n", gzipped(raw(voxels<std::uint8_t>()))));
   expect_sample(meta("CompressedData = True\nElementType = MET_UCHAR\n",
                      deflated(raw(voxels<std::uint8_t>()), 15)));
+}
+
+namespace {
+
+/// Voxels as `type` of INR, the header filled up to 256 bytes.
+std::string inr(const std::string& fields, const std::string& data) {
+  std::string header = "#INRIMAGE-4#{\nXDIM=5\nYDIM=4\nZDIM=3\nVDIM=1\nVX=1\nVY=2\nVZ=4\n"
+                       "SCALE=2**0\n" +
+                       fields;
+  header.resize(252, '\n');
+  return header + "##}\n" + data;
+}
+
+} // namespace
+
+TEST(LabelVolume, InrHasVoxelSizesAlone) {
+  const std::string u8 = "TYPE=unsigned fixed\nPIXSIZE=8 bits\nCPU=decm\n";
+  const LabelVolume volume = read(inr(u8, raw(voxels<std::uint8_t>())));
+  EXPECT_EQ(volume.format, "INR");
+  EXPECT_EQ(volume.warnings.size(), 1U);
+  EXPECT_EQ(volume.mask.transform.m, (std::array<double, 12>{1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0}));
+  EXPECT_TRUE(volume.mask.inside({4, 3, 2}));
+  EXPECT_EQ(read(gzipped(inr(u8, raw(voxels<std::uint8_t>())))).voxels, 2U);
+  for (const bool big : {false, true}) {
+    const std::string cpu = big ? "CPU=sun\n" : "CPU=alpha\n";
+    EXPECT_EQ(grey_volume_from_bytes(
+                  inr("TYPE=float\nPIXSIZE=32 bits\n" + cpu, raw(voxels<float>(), big)), "test", {})
+                  .volume.values,
+              voxels<float>());
+    EXPECT_EQ(read(inr("TYPE=signed fixed\nPIXSIZE=16 bits\n#GEOMETRY=CARTESIAN\n" + cpu,
+                       raw(voxels<std::int16_t>(), big)))
+                  .voxels,
+              2U);
+  }
+  const LabelVolume moved = read(inr("TX=7\nTZ=-2.5\n" + u8, raw(voxels<std::uint8_t>())));
+  EXPECT_EQ(moved.mask.transform.m[3], 7);
+  EXPECT_EQ(moved.mask.transform.m[11], -2.5);
+  for (const auto& [fields, says] :
+       {std::pair("RX=0.1\n" + u8, "test:10: a rotation RX, expected none"),
+        std::pair(std::string("TYPE=unsigned fixed\nPIXSIZE=24 bits\nCPU=decm\n"),
+                  "test:10: TYPE 'unsigned fixed' with PIXSIZE '24 bits', expected unsigned fixed, "
+                  "signed fixed or float of 8 to 64 bits"),
+        std::pair(std::string("TYPE=float\nPIXSIZE=32 bits\nCPU=vax\n"),
+                  "test:12: CPU 'vax', expected decm, alpha, pc, sun or sgi"),
+        std::pair(std::string("TYPE=float\nPIXSIZE=32 bits\n"),
+                  "test: the INR header has no field 'CPU', expected one"),
+        std::pair("VZ=1\n" + u8, "test:10: a second 'VZ', expected one"),
+        std::pair("XDIM\n" + u8, "test:10: 'XDIM', expected KEY=value")})
+    EXPECT_EQ(message(inr(fields, raw(voxels<std::uint8_t>()))), says);
+  EXPECT_EQ(message("#INRIMAGE-4#{\nXDIM=5\n"),
+            "test: the header ends without ##}, expected that last line");
+}
+
+TEST(LabelVolume, GreyValuesNeedNotBeWhole) {
+  std::vector<float> values = voxels<float>();
+  values[7] = 0.25F;
+  values[8] = NAN;
+  const std::string bytes =
+      nifti_1({.datatype = 16, .bitpix = 32, .slope = 2, .intercept = -1024}, raw(values));
+  const GreyVolume scan = grey_volume_from_bytes(bytes, "test", {}).volume;
+  EXPECT_EQ(scan.size, size);
+  EXPECT_EQ(scan.values.at(0), -624);
+  EXPECT_EQ(scan.values.at(7), -1023.5F);
+  EXPECT_NE(scan.values.at(8), scan.values.at(8));
+  EXPECT_EQ(scan.values.at(scan.row(2, 1) + 1), -1006);
+  Context little;
+  little.max_memory = 300;
+  EXPECT_THROW((void)grey_volume_from_bytes(bytes, "test", little), Error);
+  EXPECT_THROW((void)grey_volume_from_bytes(bytes.substr(0, 500), "test", {}), Error);
 }
 
 TEST(LabelVolume, ScaledLabelsAreThoseThatAreMeant) {

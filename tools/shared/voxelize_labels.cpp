@@ -33,6 +33,15 @@ std::vector<LabelRange> labels_from_text(const std::string& text, const char* ex
   return labels;
 }
 
+void check_labels(const std::string& text, bool voxel, bool own_lattice) {
+  if (text != "list")
+    (void)labels_from_text(text);
+  else if (voxel)
+    throw UsageError("--label list makes no volume, expected no --voxel");
+  if (own_lattice)
+    throw UsageError("--label: the labels give the lattice, expected --voxel or nothing");
+}
+
 void list_labels(cli::Run& run, const std::string& path) {
   if (!run.to().empty())
     throw UsageError("--to for a list of labels, which is text, expected none");

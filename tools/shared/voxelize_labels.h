@@ -15,6 +15,9 @@ namespace gewebe {
 std::vector<LabelRange> labels_from_text(const std::string& text,
                                          const char* expected = "whole numbers, or list");
 
+/// What the command line says about labels. \throw UsageError if it does not fit together
+void check_labels(const std::string& text, bool voxel, bool own_lattice);
+
 /// Writes what labels the volume `path` holds: a line each, the label, its voxels, its volume in
 /// mm³.
 void list_labels(cli::Run& run, const std::string& path);
