@@ -24,7 +24,8 @@ std::vector<std::uint32_t> loose_nodes(const Model& model) {
     for (const std::uint32_t corner : t)
       taken[corner] = 1;
   std::vector<std::uint32_t> loose;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  const std::size_t surface = surface_count(model);
+  for (std::uint32_t i = 0; i < surface; ++i)
     if (taken[i] == 0)
       loose.push_back(i);
   return loose;
@@ -88,6 +89,15 @@ SurfaceFacets::SurfaceFacets(const Model& model) {
   for (const std::uint32_t k : order)
     sorted.push_back(facets_[k]);
   facets_ = std::move(sorted);
+  for (std::size_t b = 0; b < boxes_.size(); ++b) {
+    first_node_.push_back(nodes_.size());
+    std::vector<std::uint32_t> some;
+    for (std::size_t k = first_[b]; k < first_[b + 1]; ++k)
+      some.insert(some.end(), facets_[k].begin(), facets_[k].end());
+    std::ranges::sort(some);
+    nodes_.insert(nodes_.end(), some.begin(), std::ranges::unique(some).begin());
+  }
+  first_node_.push_back(nodes_.size());
 
   first_of_node_.assign(model.nodes.size() + 1, 0);
   const auto for_corners = [&](auto&& visit) {
@@ -107,14 +117,21 @@ SurfaceFacets::SurfaceFacets(const Model& model) {
 void SurfaceFacets::set_shape(const Model& model, std::span<const double> displacement) {
   box_ = {};
   for (std::size_t b = 0; b < boxes_.size(); ++b) {
-    Box3 box;
-    for (std::size_t k = first_[b]; k < first_[b + 1]; ++k)
-      for (const std::uint32_t i : facets_[k])
-        box.add(model.nodes[i].position +
-                (displacement.empty() ? Vec3{} : vector_at(displacement, i)));
-    boxes_[b] = box;
-    box_.add(box.min);
-    box_.add(box.max);
+    // As Box3::add, which passes over a NaN too, but without a call for each number.
+    Vec3 min = Box3{}.min, max = Box3{}.max;
+    for (std::size_t k = first_node_[b]; k < first_node_[b + 1]; ++k) {
+      const std::uint32_t i = nodes_[k];
+      const Vec3 at =
+          model.nodes[i].position + (displacement.empty() ? Vec3{} : vector_at(displacement, i));
+      for (int a = 0; a < 3; ++a) {
+        min[a] = at[a] < min[a] ? at[a] : min[a];
+        max[a] = at[a] > max[a] ? at[a] : max[a];
+      }
+    }
+    boxes_[b].min = min;
+    boxes_[b].max = max;
+    box_.add(min);
+    box_.add(max);
   }
 }
 

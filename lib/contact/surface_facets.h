@@ -50,6 +50,8 @@ private:
   std::vector<Facet> facets_;
   std::vector<std::size_t> first_; ///< piece of each block, and the end
   std::vector<Box3> boxes_;
+  std::vector<std::uint32_t> nodes_;    ///< of the blocks' pieces, ascending in each
+  std::vector<std::size_t> first_node_; ///< of each block, and the end
   Box3 box_;
   std::vector<std::uint32_t> of_node_;
   std::vector<std::size_t> first_of_node_;

@@ -89,7 +89,8 @@ void guide(World& w, Body& body, double to) {
       body.rest_box.emplace();
       for (const std::size_t part : body.parts) {
         const Object& object = w.now.objects[part];
-        for (std::size_t k = 0; k < surface_count(object.model()); ++k)
+        const std::size_t surface = surface_count(object.model());
+        for (std::size_t k = 0; k < surface; ++k)
           body.rest_box->add(object.model().nodes[k].position +
                              body.moving->motion()[object.offset + k].displacement);
       }

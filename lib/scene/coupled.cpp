@@ -16,7 +16,8 @@ namespace {
 Box3 box_of(const Object& object) {
   Box3 box;
   const bool moves = object.body != nullptr;
-  for (std::size_t k = 0; k < surface_count(object.model()); ++k)
+  const std::size_t surface = surface_count(object.model());
+  for (std::size_t k = 0; k < surface; ++k)
     box.add(object.model().nodes[k].position +
             (moves ? motion_of(object)[k].displacement
                    : vector_at(*object.shown.displacement, static_cast<std::uint32_t>(k))));

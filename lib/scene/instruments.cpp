@@ -114,8 +114,9 @@ void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& 
       });
 }
 
-/// Remembers where the instruments are.
-void note_poses(World& w) {
+/// Remembers where the instruments are. Where one jumps behind others that jumped just now, they
+/// go together: their ways are one.
+void note_poses(World& w, std::optional<std::size_t> jumps) {
   if (w.now.instruments.empty())
     return;
   std::vector<std::optional<Pose>> now; // of those that push
@@ -127,8 +128,18 @@ void note_poses(World& w) {
     if (const Pose pose = i.way.at(w.now.clock.time); i.path.empty() || i.path.back() != pose)
       i.path.push_back(pose);
   }
-  if (w.now.poses.empty() || w.now.poses.back() != now)
-    w.now.poses.push_back(std::move(now));
+  std::vector<std::vector<std::optional<Pose>>>& poses = w.now.poses;
+  if (!poses.empty() && poses.back() == now)
+    return;
+  const std::size_t size = poses.size();
+  const auto stood_still = [&](std::size_t k) {
+    return k < poses[size - 2].size() && poses[size - 2][k] == poses[size - 1][k];
+  };
+  if (jumps && w.now.jumped == w.now.clock.time && size > 1 && stood_still(*jumps))
+    poses.back() = std::move(now);
+  else
+    poses.push_back(std::move(now));
+  w.now.jumped = jumps ? std::optional(w.now.clock.time) : std::nullopt;
 }
 
 /// Whether there are some that push, or have just been.
@@ -192,7 +203,7 @@ void Rule<MoveInstrument>::apply(World& w, const MoveInstrument& c) {
   const Pose from = i.way.at(now);
   i.way = {from, {c.place, c.turn.value_or(from.turn)}, now, now + c.duration};
   carry(w, i);
-  note_poses(w);
+  note_poses(w, c.duration > 0 ? std::nullopt : std::optional(c.instrument));
 }
 void Rule<MoveInstrument>::log(const World& w, const MoveInstrument& c, ChangeRow& row) {
   const Instrument& i = w.now.instruments[c.instrument];

@@ -265,6 +265,7 @@ struct Scene {
   std::vector<Instrument> instruments;
   /// In this step: where the instruments stood, one after the other.
   std::vector<std::vector<std::optional<Pose>>> poses;
+  std::optional<double> jumped{}; // when, if the last of these is of instruments moved at once
   CopyOnWrite<std::multimap<double, Event>> events;
   Vec3 gravity;
   Clock clock;

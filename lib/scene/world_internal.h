@@ -160,7 +160,7 @@ std::size_t instrument_place(const World& w, const std::string& name) noexcept;
 std::size_t add_instrument(World& w, const std::string& name);
 InstrumentReport report_of(const World& w, std::size_t instrument);
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
-void note_poses(World& w);
+void note_poses(World& w, std::optional<std::size_t> jumps = {});
 bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 

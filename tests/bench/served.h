@@ -67,6 +67,7 @@ public:
 
   struct Answer {
     long gone = 0, doubled = 0;
+    long forces = 0; ///< nodes with one
     bool refused = false, free = false;
   };
   /// Up to the end of the step.
@@ -79,6 +80,8 @@ public:
         answer.gone = number_behind(text, " springs ");
         answer.doubled = number_behind(text, " doubled ");
       }
+      if (text.starts_with("forces "))
+        answer.forces += std::strtol(text.c_str() + text.rfind(' '), nullptr, 10);
       answer.refused = answer.refused || text.starts_with("error");
       answer.free = answer.free || text.starts_with("loose") || text.starts_with("part");
       if (text == "done\n")
@@ -93,6 +96,14 @@ public:
     double nanoseconds = 0;
     file >> nanoseconds;
     return 1e-6 * nanoseconds;
+  }
+
+  /// MB that it has in memory.
+  double resident() const {
+    std::ifstream file("/proc/" + std::to_string(child_) + "/statm");
+    double pages = 0, resident = 0;
+    file >> pages >> resident;
+    return 1e-6 * static_cast<double>(sysconf(_SC_PAGESIZE)) * resident;
   }
 
 private:

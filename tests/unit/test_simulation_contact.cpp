@@ -617,5 +617,28 @@ TEST(SimulationContact, TwoInstrumentsAtOneNode) {
     }
 }
 
+// As a driver does that leads several hands: their order says nothing, and one problem is solved.
+TEST(SimulationContact, InstrumentsMovedAtOnceGoTogether) {
+  const auto led = [](bool other_first) {
+    Simulation s(test::one_thread(), {});
+    s.add_object("organ", organ(3), Method::ffe);
+    const Vec3 left = middle + Vec3{-3, 0, 24.5}, right = middle + Vec3{4, 1, 24.5};
+    s.apply(SetInstrument{0, {5, {}, 0.4}, {left, {}}, "left"});
+    s.apply(SetInstrument{1, {5, {}, 0.4}, {right, {}}, "right"});
+    s.step(0.001);
+    const std::uint64_t before = s.counts().touches.problems;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::size_t i = other_first ? 1 - k : k;
+      s.apply(MoveInstrument{i, (i == 0 ? left : right) - Vec3{0.3, 0, 0.5}, {}, 0});
+    }
+    s.step(0.001);
+    EXPECT_EQ(s.counts().touches.problems - before, 1);
+    return std::pair(s.instrument(0).force, s.instrument(1).force);
+  };
+  const auto one = led(false);
+  EXPECT_GT(norm(one.first), 0);
+  EXPECT_EQ(one, led(true));
+}
+
 } // namespace
 } // namespace gewebe

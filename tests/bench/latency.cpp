@@ -1,0 +1,243 @@
+// Whether ffe-run --serve answers a thousand times a second: a patient's colon (a ball where there
+// is no shared data) of 10,000 nodes by the method ffe, along which several spheres slide, each
+// wholly anew in every step of 1 ms, so that what is touched changes all the time. Forces and
+// instruments are answered through a pipe; who asks does so by the clock, once a millisecond.
+//
+//   bench_latency [SECONDS] [spheres=N] [depth=EDGES] [fifo] [shapes] [to=FOLDER]
+//
+// fifo: both programs have real-time priority, where that is permitted. shapes: also the shape, ten
+// times a second. Where FOLDER is named, latency.csv there becomes the histogram and latency.svg
+// its picture.
+//
+// Writes CSV to standard output: stage, program, nodes, contacts (nodes with a force, in the mean),
+// answers, what half, 99 % and 99.9 % of all did not exceed and the largest, a figure and its unit.
+// "latency" counts from writing the lines until the answer is there; "work" is the processor's time
+// of ffe-run between two answers, which other programs disturb less.
+
+#include "formats/model/ela.h"
+#include "model/build.h"
+#include "tests/bench/histogram.h"
+#include "tests/bench/served.h"
+#include "tests/unit/mesh_fixtures.h"
+#include "tests/unit/random_cuts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <sched.h>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+using namespace gewebe;
+using namespace gewebe::timing;
+
+namespace {
+
+constexpr double tick = 1e-3;         // s
+constexpr double ball = 60;           // mm
+constexpr double speed = 40;          // mm/s
+constexpr double radius_in_edges = 2; // of an instrument
+
+struct Wanted {
+  double seconds = 10, depth = 0.5;
+  std::size_t spheres = 5;
+  bool fifo = false, shapes = false;
+  std::string folder;
+};
+
+Wanted wanted(int argc, char** argv) {
+  Wanted w;
+  for (int k = 1; k < argc; ++k) {
+    const std::string word = argv[k];
+    const auto behind = [&](std::string_view name) { return word.substr(name.size()); };
+    if (word.starts_with("spheres="))
+      w.spheres = std::strtoul(behind("spheres=").c_str(), nullptr, 10);
+    else if (word.starts_with("depth="))
+      w.depth = std::strtod(behind("depth=").c_str(), nullptr);
+    else if (word.starts_with("to="))
+      w.folder = std::filesystem::absolute(behind("to=")).string();
+    else if (word == "fifo" || word == "shapes")
+      (word == "fifo" ? w.fifo : w.shapes) = true;
+    else
+      w.seconds = std::strtod(word.c_str(), nullptr);
+  }
+  if (!(w.seconds > 0) || w.spheres == 0 || !(w.depth > 0))
+    Served::fail(
+        "latency: expected [SECONDS] [spheres=N] [depth=EDGES] [fifo] [shapes] [to=FOLDER]");
+  return w;
+}
+
+/// Over the ball: around an axis of its own, at a distance from its pole.
+class Path {
+public:
+  explicit Path(std::mt19937& random) {
+    std::normal_distribution<double> normal;
+    pole_ = Vec3{normal(random), normal(random), normal(random)};
+    pole_ = pole_ / norm(pole_);
+    aside_ = cross(pole_, std::abs(pole_.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});
+    aside_ = aside_ / norm(aside_);
+  }
+  /// Where the surface is, out of it, `way` mm from the beginning.
+  Vec3 out(double way) const {
+    constexpr double tilt = 0.35; // of the circle against the great one
+    const double angle = way / (ball * std::cos(tilt));
+    const Vec3 round = std::cos(angle) * aside_ + std::sin(angle) * cross(pole_, aside_);
+    return std::cos(tilt) * round + std::sin(tilt) * pole_;
+  }
+
+private:
+  Vec3 pole_, aside_;
+};
+
+double seconds_of(const timespec& t) {
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double now() {
+  timespec t{};
+  (void)clock_gettime(CLOCK_MONOTONIC, &t);
+  return seconds_of(t);
+}
+
+void wait_until(double when) {
+  const timespec t{static_cast<time_t>(when), static_cast<long>(1e9 * (when - std::floor(when)))};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) != 0) {
+  }
+}
+
+std::string text(const Vec3& v) {
+  std::array<char, 96> one{};
+  (void)std::snprintf(one.data(), one.size(), "%.9g %.9g %.9g", v.x, v.y, v.z);
+  return one.data();
+}
+
+double load_average() {
+  std::ifstream file("/proc/loadavg");
+  double load = 0;
+  file >> load;
+  return load;
+}
+
+struct Run {
+  std::vector<double> latency, work; // ms
+  double contacts = 0;
+  double memory_before = 0, memory_after = 0; // MB, behind the first tenth and in the end
+  std::size_t late = 0;                       // answers beyond their tick
+  double load = 0;
+};
+
+Run drive(const Served& served, const Wanted& w, double edge) {
+  std::mt19937 random(3);
+  std::vector<Path> paths;
+  for (std::size_t k = 0; k < w.spheres; ++k)
+    paths.emplace_back(random);
+  const double radius = radius_in_edges * edge;
+  const auto place = [&](std::size_t k, double time) {
+    const double depth = w.depth * edge * std::min(1.0, 4 * time) *
+                         (1 + 0.3 * std::sin(7 * time + static_cast<double>(k)));
+    return (ball + radius - depth) * paths[k].out(speed * time);
+  };
+  served.say("object organ organ.ela method=ffe\nemit forces\nemit instruments\n");
+  for (std::size_t k = 0; k < w.spheres; ++k)
+    served.say("instrument tool" + std::to_string(k) + " sphere " + std::to_string(radius) + " " +
+               text(place(k, 0)) + "\n");
+  served.say("step 0\n");
+  (void)served.hear();
+  Run run;
+  const auto count = static_cast<std::size_t>(w.seconds / tick);
+  run.latency.reserve(count);
+  run.work.reserve(count);
+  const double begin = now() + tick;
+  double worked = served.worked();
+  for (std::size_t step = 1; step <= count; ++step) {
+    const double time = static_cast<double>(step) * tick, due = begin + time;
+    std::string lines;
+    for (std::size_t k = 0; k < w.spheres; ++k)
+      lines += "move tool" + std::to_string(k) + " " + text(place(k, time)) + "\n";
+    lines += "step 0.001\n";
+    wait_until(due);
+    const double asked = now();
+    served.say(lines);
+    const Served::Answer answer = served.hear();
+    const double end = now();
+    run.latency.push_back(1e3 * (end - asked));
+    run.late += end > due + tick ? 1 : 0;
+    run.contacts += static_cast<double>(answer.forces);
+    const double work = served.worked();
+    run.work.push_back(work - worked);
+    worked = work;
+    if (step == std::max<std::size_t>(1, count / 10))
+      run.memory_before = served.resident();
+  }
+  run.contacts /= static_cast<double>(count);
+  run.memory_after = served.resident();
+  run.load = load_average();
+  return run;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  (void)std::signal(SIGPIPE, SIG_IGN);
+  const Wanted w = wanted(argc, argv);
+  const std::string tools = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
+  std::string folder = (std::filesystem::temp_directory_path() / "gewebe-bench-XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr)
+    Served::fail("no folder in " + std::filesystem::temp_directory_path().string());
+  const Model model = build_model(test::sphere_mesh(5, ball, {}), {}, Context{}).model;
+  {
+    Output output(folder + "/organ.ela", {});
+    write_ela(output, model, Context{});
+    output.commit();
+  }
+  std::string program = std::to_string(w.spheres) + " spheres";
+  if (w.fifo) {
+    sched_param priority{};
+    priority.sched_priority = 50;
+    if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0)
+      Served::fail("latency: real-time priority is not permitted");
+    program += " real-time";
+  }
+  Run run;
+  {
+    const Served served(tools, folder);
+    run = drive(served, w, test::mean_edge(model));
+  }
+  std::puts("stage,program,nodes,contacts,answers,p50_ms,p99_ms,p999_ms,largest_ms,figure,unit");
+  for (const bool latency : {true, false}) {
+    std::vector<double> times = latency ? run.latency : run.work;
+    std::ranges::sort(times);
+    std::printf("%s,%s,%zu,%.1f,%zu,%.4f,%.4f,%.4f,%.4f,%.4g,%s\n", latency ? "latency" : "work",
+                program.c_str(), model.nodes.size(), run.contacts, times.size(),
+                quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back(),
+                latency ? static_cast<double>(run.late) : run.memory_after - run.memory_before,
+                latency ? "answers too late" : "MB that memory grew in the last nine tenths");
+    if (latency && !w.folder.empty()) {
+      std::filesystem::create_directories(w.folder);
+      std::ofstream csv(w.folder + "/latency.csv"), picture(w.folder + "/latency.svg");
+      const std::vector<Bin> bins = histogram(times);
+      write_csv(csv, bins);
+      const std::array<std::pair<std::string, double>, 4> marks{{{"half", quantile(times, 0.5)},
+                                                                 {"99 %", quantile(times, 0.99)},
+                                                                 {"99.9 %", quantile(times, 0.999)},
+                                                                 {"largest", times.back()}}};
+      draw(picture, bins, "Answers of ffe-run at 1 kHz, " + program, marks);
+    }
+  }
+  (void)std::fprintf(stderr, "latency: load average %.2f, %.1f MB resident\n", run.load,
+                     run.memory_after);
+  std::filesystem::current_path("/");
+  std::filesystem::remove_all(folder);
+  return EXIT_SUCCESS;
+}
