@@ -49,8 +49,7 @@ ifneq ($(CCACHE),)
 export CCACHE_SLOPPINESS ?= pch_defines,time_macros
 endif
 # Programs take from these only what they use (--as-needed; tests/contract/install.sh looks with ldd).
-LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash -lgmp
-CHECK_LIBS := -lmpfr
+LIBS := -lopenvdb -ltbb -lImath -lassimp -lcholmod -lhdf5_serial -lepoxy -lpng -lz -lxxhash -lgmp -lmpfr
 BENCH_LIBS := -lembree3 -lblas
 LINK = $(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ $(filter %.o %.a,$^) -Wl,--as-needed
 
@@ -194,13 +193,13 @@ $(PLUGIN): $(ARCHIVE)
 
 $(BUILD)/unit: $(call obj,$(UNIT_SRC)) $(SHARED) $(ARCHIVE) | $(PLUGIN)
 	$(CXX) $(flags_$(config)) $(LDFLAGS) -o $@ -Wl,--whole-archive $(ARCHIVE) -Wl,--no-whole-archive $(filter %.o,$^) $(SHARED) \
-	  -Wl,--as-needed $(LIBS) -lgtest_main -lgtest $(CHECK_LIBS)
+	  -Wl,--as-needed $(LIBS) -lgtest_main -lgtest
 
 $(STRESS): $(BUILD)/stress_%: $(BUILD)/obj/tests/stress/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
-	$(LINK) $(LIBS) $(CHECK_LIBS)
+	$(LINK) $(LIBS)
 
 $(BENCH): $(BUILD)/bench_%: $(BUILD)/obj/tests/bench/%.o $(call obj,tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
-	$(LINK) $(LIBS) $(CHECK_LIBS) $(BENCH_LIBS)
+	$(LINK) $(LIBS) $(BENCH_LIBS)
 
 $(BUILD)/validate: $(call obj,$(VALIDATE_SRC) tests/unit/mesh_fixtures.cpp) $(SHARED) $(ARCHIVE)
 	$(LINK) $(LIBS)

@@ -104,7 +104,7 @@ struct FreeParts {
 /// more before and now have no node that the model holds along any axis. Where there is none that
 /// is held, the part with the most nodes stays (ties: the one with the smallest node). Central
 /// nodes that no spring holds any more and that can move, or to which no node belongs, are left
-/// out. \pre neither has a skin
+/// out. Parts have no skin (solid/skin_parts.h gives them theirs).
 FreeParts free_parts(const Model& before, const CutModel& cut);
 
 /// The cut model without the parts that came off, as one step from the model before.

@@ -3,6 +3,7 @@
 #include "base/vector_at.h"
 #include "cutting/cut_stiffness.h"
 #include "scene/rules_internal.h"
+#include "solid/skin_parts.h"
 #include "solid/solid_model.h"
 #include "solid/solid_place.h"
 #include "solve/condition.h"
@@ -133,6 +134,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   Object& old = w.now.objects[index];
   const bool ffe = old.method == Method::ffe;
   FreeParts free = free_parts(old.model(), cut);
+  (void)part_skin(cut.model, free);
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&

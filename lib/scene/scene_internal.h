@@ -165,6 +165,8 @@ struct BladeTrail {
   std::size_t instrument = 0;
   std::vector<std::array<Vec3, 2>> edges; // where they were in the solid, at rest
   std::array<Vec3, 2> last{};             // the last one where it stands
+  /// Of a solid with a skin: points of edges, at rest, since that was cut last.
+  std::vector<std::vector<Vec3>> rows{};
 };
 
 /// What cuts have done to an object.

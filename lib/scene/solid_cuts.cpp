@@ -21,6 +21,7 @@ namespace {
 constexpr double trail_length = 2; // of the longest edge: a wound ends an element before a blade
 constexpr double trail_step = 1.0 / 32; // of it, at least, between edges that are kept
 constexpr std::size_t most_edges = 256;
+constexpr double row_step = 0.25; // of a sheet's cell, at least, between rows that are kept
 
 /// What would no longer be where it is if it were moved: displaced, grasped, tied.
 std::vector<std::uint32_t> held_nodes(const World& w, std::size_t index) {
@@ -134,16 +135,63 @@ TriangleMesh strip_of(const std::vector<Edge>& edges) {
   return strip;
 }
 
+struct CutByBlade {
+  CutModel cut;
+  std::vector<Vec3> skin_end; ///< SkinCut::end
+};
+
 /// Nothing where it comes nowhere apart.
-std::optional<CutModel> cut_by(const World& w, std::size_t index, const TriangleMesh& blade,
-                               BladeCutOptions options) {
+std::optional<CutByBlade> cut_by(const World& w, std::size_t index, const TriangleMesh& blade,
+                                 BladeCutOptions options, const SkinSheet& sheet) {
   const Model& model = w.now.objects[index].model();
   const std::vector<std::uint32_t> held = held_nodes(w, index);
   options.held = held;
-  SolidCut cut = cut_solid(model, blade, options);
+  SolidCut cut = cut_solid(model, blade, options, &sheet);
   if (cut.report.doubled == 0)
     return std::nullopt;
-  return as_cut_model(model, std::move(cut));
+  std::vector<Vec3> end = std::move(cut.skin_end);
+  return CutByBlade{as_cut_model(model, std::move(cut)), std::move(end)};
+}
+
+// ---- Where blades pass a skin: rows of points at rest
+
+using Row = std::vector<Vec3>;
+
+Row row_of(const Model& model, const Edge& edge, double cell, Carried& carried) {
+  if (model.skin.points.empty())
+    return {};
+  const double length = norm(edge[1] - edge[0]);
+  const auto count = static_cast<std::size_t>(
+      std::clamp(std::ceil(length / cell), 1.0, static_cast<double>(most_edges)));
+  Row row;
+  for (std::size_t k = 0; k <= count; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(count);
+    row.push_back(carried.rest_of((1 - share) * edge[0] + share * edge[1]));
+  }
+  return row;
+}
+
+void add_row(std::vector<Row>& rows, Row row, double cell) {
+  if (row.empty() || !std::ranges::all_of(row, [](const Vec3& p) { return is_finite(p); }))
+    return;
+  if (rows.size() > 1) {
+    const Row& before = rows[rows.size() - 2];
+    if (way({before.front(), before.back()}, {rows.back().front(), rows.back().back()}) <
+        row_step * cell)
+      rows.pop_back();
+  }
+  rows.push_back(std::move(row));
+  if (rows.size() > most_edges)
+    rows.erase(rows.begin());
+}
+
+/// Those since the skin was cut last by a blade that goes on from where it ended.
+std::vector<Row> rows_before(const Object& object, const BladeArea& area) {
+  const Edge start{area.corners[0], area.corners[1]};
+  for (const BladeTrail& trail : object.cut.trails)
+    if (trail.instrument == area.instrument && trail.last == start)
+      return trail.rows;
+  return {};
 }
 
 /// The trail of a blade that goes on from where it ended: of the solid, for that may have moved
@@ -164,8 +212,8 @@ std::vector<Edge> trail_before(const Object& object, const BladeArea& area, Carr
 
 /// Of a trail what may be wanted again, at rest. \pre the blade has left none
 void leave_trail(Object& object, std::size_t instrument, const std::vector<Edge>& edges,
-                 Carried& carried) {
-  BladeTrail trail{instrument, {}, edges.back()};
+                 std::vector<Row> rows, Carried& carried) {
+  BladeTrail trail{instrument, {}, edges.back(), std::move(rows)};
   const double longest = longest_edge(object.model());
   double length = 0;
   std::vector<Edge> kept{edges.back()};
@@ -211,7 +259,10 @@ CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plan
       among[node] = 1;
     options.among = among;
   }
-  std::optional<CutModel> cut = cut_by(w, index, plane_blade(model, plane.plane), options);
+  SkinSheet sheet;
+  if (!model.skin.points.empty())
+    sheet = plane_sheet(model.skin, plane.plane, sheet_cell(model));
+  std::optional<CutByBlade> cut = cut_by(w, index, plane_blade(model, plane.plane), options, sheet);
   if (!cut)
     throw Error("the plane through " + number_text(plane.plane.point.x) + " " +
                 number_text(plane.plane.point.y) + " " + number_text(plane.plane.point.z) +
@@ -219,7 +270,7 @@ CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plan
                 number_text(plane.plane.normal.y) + " " + number_text(plane.plane.normal.z) +
                 " parts no tetrahedra" + (plane.nodes ? " of these nodes" : "") +
                 ", expected one that is not cut yet");
-  return std::move(*cut);
+  return std::move(cut->cut);
 }
 
 /// Runs of a blade's way that don't turn back are cut with one after the other.
@@ -235,7 +286,12 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
     if (!carried)
       carried.emplace(w, w.now.objects[index]);
     const std::size_t instrument = areas[n].instrument;
+    const Model& model = w.now.objects[index].model();
+    const double cell = model.skin.points.empty() ? 0 : sheet_cell(model);
     std::vector<Edge> edges = trail_before(w.now.objects[index], areas[n], *carried);
+    std::vector<Row> rows = rows_before(w.now.objects[index], areas[n]);
+    if (rows.empty())
+      add_row(rows, row_of(model, edges.back(), cell, *carried), cell);
     Vec3 normal = edges.size() < 2 ? Vec3{} : normal_of(edges[edges.size() - 2], edges.back());
     bool meets = false, comes_near = false;
     std::size_t first = n;
@@ -248,9 +304,12 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
         if (n > first)
           break; // the rest is another run
         edges = {edges.back()};
+        if (!rows.empty())
+          rows = {rows.back()};
       }
       normal = here;
       edges.push_back(next);
+      add_row(rows, row_of(model, next, cell, *carried), cell);
       meets = meets || near(carried->box(), areas[n]);
       comes_near = comes_near || near(wider(carried->box()), areas[n]);
     }
@@ -259,14 +318,21 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
                   [&](const BladeTrail& trail) { return trail.instrument == instrument; });
     if (!comes_near || (meets && !may_cut(w, object, Feature::blade)))
       continue;
-    leave_trail(object, instrument, meets ? edges : std::vector<Edge>{edges.back()}, *carried);
+    if (!meets && !rows.empty())
+      rows = {rows.back()};
+    leave_trail(object, instrument, meets ? edges : std::vector<Edge>{edges.back()}, rows,
+                *carried);
     if (!meets)
       continue;
     at_object(w, object, [&] {
       BladeCutOptions options;
       options.places = carried->places();
-      if (std::optional<CutModel> cut = cut_by(w, index, strip_of(edges), options)) {
-        carry_out(w, index, std::move(*cut));
+      if (std::optional<CutByBlade> cut =
+              cut_by(w, index, strip_of(edges), options, strip_sheet(rows))) {
+        for (BladeTrail& trail : object.cut.trails)
+          if (trail.instrument == instrument && !rows.empty())
+            trail.rows = {std::move(cut->skin_end)};
+        carry_out(w, index, std::move(cut->cut));
         carried.reset();
       }
     });

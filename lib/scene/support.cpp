@@ -36,8 +36,6 @@ bool goes(const Object& object, Way way) {
     return object.matter->known && is_solid(object) &&
            (!object.model().springs.empty() ||
             body_count(object.model()) != object.model().nodes.size());
-  case Way::skinned:
-    return object.matter->known && !object.model().skin.points.empty();
   case Way::net:
     return object.matter->known && object.model().tetrahedra.empty();
   case Way::solid_motion:

@@ -19,7 +19,6 @@ enum class Way : std::uint8_t {
   cut,
   solid,        ///< of tetrahedra, or with some
   sprung,       ///< a solid with springs or central nodes beside its tetrahedra
-  skinned,      ///< a solid whose surface is not that of its tetrahedra
   net,          ///< of none
   solid_motion, ///< a solid that moves
   warped,       ///< with large rotations
@@ -28,11 +27,10 @@ enum class Way : std::uint8_t {
   meeting       ///< its surface may touch another, or itself
 };
 inline constexpr std::array all_ways{
-    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
-    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
-    Way::solid,           Way::sprung,          Way::skinned,  Way::net,
-    Way::solid_motion,    Way::warped,          Way::filled,   Way::explicit_net,
-    Way::meeting};
+    Way::explicit_motion, Way::implicit_motion, Way::attached,     Way::elastostatic,
+    Way::two_step,        Way::two_step_stored, Way::whole,        Way::cut,
+    Way::solid,           Way::sprung,          Way::net,          Way::solid_motion,
+    Way::warped,          Way::filled,          Way::explicit_net, Way::meeting};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -77,9 +75,6 @@ inline constexpr std::array gaps{
     Gap{Way::sprung, Feature::cut, true,
         "has springs beside its tetrahedra, expected tetrahedra alone to cut"},
     Gap{Way::sprung, Feature::blade, false, "has springs beside its tetrahedra: it is not cut"},
-    Gap{Way::skinned, Feature::cut, true,
-        "has a skin, expected a solid with the surface of its tetrahedra to cut"},
-    Gap{Way::skinned, Feature::blade, false, "has a skin: it is not cut"},
     Gap{Way::solid, Feature::tear, false, "holds tetrahedra: it does not tear"},
     Gap{Way::filled, Feature::cut, true,
         "keeps the volume it encloses (bulk=), expected none to cut"},

@@ -1,9 +1,13 @@
 #include "shading/style.h"
 
+#include "base/disjoint_sets.h"
+#include "shading/angles.h"
 #include "shading/tangents.h"
 
 #include <algorithm>
+#include <compare>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <utility>
 
@@ -25,6 +29,66 @@ Surface faceted(const Surface& surface) {
       if (!surface.rest.empty())
         out.rest.push_back(surface.rest[corner]);
     }
+  }
+  return out;
+}
+
+Surface creased(const Surface& surface, double degrees) {
+  const TriangleMesh& mesh = surface.mesh;
+  const std::vector<Vec3>& at = surface.rest.empty() ? mesh.points : surface.rest;
+  std::vector<Vec3> normal;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 n = cross(at[b] - at[a], at[c] - at[a]);
+    const double length = norm(n);
+    normal.push_back(length > 0 ? n / length : Vec3{});
+  }
+  struct Side {
+    std::uint32_t low = 0, high = 0, corner = 0; // that the edge leaves
+    auto operator<=>(const Side&) const = default;
+  };
+  std::vector<Side> sides;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+      sides.push_back({low, high, 3 * t + k});
+    }
+  std::ranges::sort(sides);
+  const double least = cos_sin(degrees)[0];
+  const auto next = [](std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; };
+  const auto point = [&](std::uint32_t corner) { return mesh.triangles[corner / 3][corner % 3]; };
+  DisjointSets corners(3 * mesh.triangles.size());
+  for (std::size_t n = 1; n < sides.size(); ++n) {
+    const Side &a = sides[n - 1], &b = sides[n];
+    if (a.low != b.low || a.high != b.high)
+      continue;
+    const Vec3 &one = normal[a.corner / 3], &other = normal[b.corner / 3];
+    if (dot(one, other) < least && dot(one, one) > 0 && dot(other, other) > 0)
+      continue;
+    const bool along = point(a.corner) == point(b.corner);
+    corners.join(a.corner, along ? b.corner : next(b.corner));
+    corners.join(next(a.corner), along ? next(b.corner) : b.corner);
+  }
+  Surface out = surface;
+  std::vector<bool> taken(mesh.points.size());
+  std::vector<std::uint32_t> number(3 * mesh.triangles.size(), UINT32_MAX);
+  for (std::uint32_t corner = 0; corner < number.size(); ++corner) {
+    const std::uint32_t was = point(corner);
+    std::uint32_t& is = number[corners.find(corner)];
+    if (is == UINT32_MAX) {
+      is = was;
+      if (taken[was]) {
+        is = static_cast<std::uint32_t>(out.mesh.points.size());
+        out.mesh.points.push_back(mesh.points[was]);
+        if (!surface.rest.empty())
+          out.rest.push_back(surface.rest[was]);
+        if (!mesh.normals.empty()) {
+          out.mesh.normals.emplace_back();
+          out.mesh.normals[was] = {};
+        }
+      }
+      taken[was] = true;
+    }
+    out.mesh.triangles[corner / 3][corner % 3] = is;
   }
   return out;
 }

@@ -13,6 +13,12 @@ namespace gewebe {
 /// has its face's normal.
 Surface faceted(const Surface& surface);
 
+/// The surface with points of their own on either side of each edge at which normals of two faces
+/// turn by more than that, at rest where it has that, so that it is sharp there. Points that it
+/// gives copies have no normals of their own. An edge of one face, or of more than two, parts
+/// nothing by itself. \param degrees 0 … 180
+Surface creased(const Surface& surface, double degrees);
+
 /// The surfaces as an eye sees them: triangles that face away from it are those of further
 /// surfaces, behind all others, turned around and marked as seen from inside. Normals are those of
 /// the whole; instruments stay whole. Numbers of surfaces stay what they are.

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "solid/assembly.h"
+#include "solid/skin_binding.h"
 #include "solid/solid_model.h"
 #include "tetrahedra/faces.h"
 
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <compare>
 #include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -29,8 +31,6 @@ void check(const Model& model) {
                 " springs, expected elements alone to cut with a blade");
   if (body_count(model) != model.nodes.size())
     throw Error("the model has central nodes, expected elements alone to cut with a blade");
-  if (!model.skin.points.empty())
-    throw Error("the model has a skin, expected none on a solid to cut with a blade");
 }
 
 /// A face of an element as triangles of a model's surface: itself, or four about its middles.
@@ -87,8 +87,10 @@ struct NamedTriangle {
 
 class Cutter {
 public:
-  Cutter(const Model& model, TetCut cut, TetMesh before)
-      : before_(model), mesh_(std::move(before)), cut_(std::move(cut)) {
+  /// \param sheet of the skin, if there is one  \param narrow no wider than the wall
+  Cutter(const Model& model, TetCut cut, TetMesh before, const SkinSheet* sheet, bool narrow)
+      : before_(model), mesh_(std::move(before)), cut_(std::move(cut)), sheet_(sheet),
+        narrow_(narrow) {
     result_.model = model;
     result_.report = cut_.report;
   }
@@ -99,6 +101,7 @@ public:
       write_nodes();
       write_surface();
       write_normals();
+      write_skin();
     } else {
       for (std::uint32_t t = 0; t < before_.triangles.size(); ++t)
         result_.triangle.push_back(t);
@@ -333,16 +336,52 @@ private:
         model.normals[n] = model.normals[n] / length;
   }
 
+  void write_skin() {
+    if (before_.skin.points.empty())
+      return;
+    constexpr double reach = 3; // of the longest edge
+    constexpr int steps = 6;
+    double longest = 0;
+    for (const std::uint32_t t : cut_.changed)
+      for (const auto& [a, b] : tetrahedron_edges)
+        longest = std::max(longest, norm(mesh_.points[mesh_.tetrahedra[t][b]] -
+                                         mesh_.points[mesh_.tetrahedra[t][a]]));
+    SkinSheet narrow;
+    if (narrow_)
+      narrow = sheet_beside(result_.model, cut_.wall, *sheet_);
+    SkinCut cut = cut_skin(before_.skin,
+                           cut_.wall.empty() ? SkinSheet{}
+                           : narrow_         ? narrow
+                                             : *sheet_,
+                           sheet_cell(before_), reach * longest);
+    result_.model.skin = std::move(cut.skin);
+    const std::vector<std::int8_t> sides =
+        sides_of_elements(result_.model, cut_.wall, reach * longest, steps);
+    bind_skin(result_.model, cut, sides, cut_.changed);
+    result_.skin_end = std::move(cut.end);
+  }
+
   const Model& before_;
   TetMesh mesh_; // the elements before
   TetCut cut_;
+  const SkinSheet* sheet_;
+  bool narrow_;
   std::vector<NamedTriangle> named_; // triangles before near the blade
   SolidCut result_;
 };
 
 } // namespace
 
-SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCutOptions& options) {
+double sheet_cell(const Model& model) {
+  double sum = 0;
+  for (const Tetrahedron& t : model.tetrahedra)
+    for (const auto& [a, b] : tetrahedron_edges)
+      sum += norm(model.nodes[t[b]].position - model.nodes[t[a]].position);
+  return sum / (6 * static_cast<double>(model.tetrahedra.size()));
+}
+
+SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCutOptions& options,
+                   const SkinSheet* sheet) {
   check(model);
   BladeCutOptions own = options;
   std::vector<std::uint32_t> held(options.held.begin(), options.held.end());
@@ -352,7 +391,12 @@ SolidCut cut_solid(const Model& model, const TriangleMesh& blade, const BladeCut
   own.held = held;
   TetMesh mesh = element_mesh(model);
   TetCut cut = cut_tetrahedra(mesh, blade, own);
-  return Cutter(model, std::move(cut), std::move(mesh)).carry_out();
+  SkinSheet of_blade;
+  if (sheet == nullptr && !model.skin.points.empty()) {
+    of_blade.surface = blade;
+    sheet = &of_blade;
+  }
+  return Cutter(model, std::move(cut), std::move(mesh), sheet, !options.among.empty()).carry_out();
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include "model/cut.h"
 #include "model/cut_select.h"
 #include "model/model.h"
+#include "solid/cut_skin.h"
 #include "tetrahedra/cut_tetrahedra.h"
 
 #include <cstdint>
@@ -20,6 +21,7 @@ struct SolidCut {
   std::vector<std::uint32_t> tetrahedron; ///< of each: that before which it is (a part of)
   std::vector<std::uint32_t> triangle;    ///< of each: that before in which it lies, or wall
   std::vector<std::uint32_t> changed;     ///< tetrahedra before, as in TetCut
+  std::vector<Vec3> skin_end;             ///< SkinCut::end
   BladeCutReport report;
 
   bool cut() const { return !changed.empty(); }
@@ -38,17 +40,29 @@ struct SolidCut {
 /// those of the triangle before, at their places; those of the wall are 0 (solid textures go by
 /// places). Normals, where there are any, are area-weighted where triangles have changed.
 ///
+/// A skin is cut by the sheet, exactly where that passes (cut_skin), while the elements' wall is
+/// off it where no way to cut them is sound (BladeCutReport); points of either wall follow the
+/// nearest element on their side of the wound, so that they may lie outside of it, as points of
+/// skins do. Its walls have the materials of the elements there, their texture coordinates are 0.
+/// A sheet that reaches farther than the elements come apart leaves both of its walls together
+/// there. With `options.among` it goes no farther than elements beside their wall.
+///
 /// Pieces that come off stay in the model. Nodes of the wall stand behind all others, so that
 /// surface_count() rises to the number of nodes.
 /// \pre check_model(model) passes
-/// \throw Error as cut_tetrahedra; if the model has no tetrahedra, has springs, central nodes or a
-/// skin; if a face of its boundary at the blade is not among its triangles
+/// \param sheet what cuts the skin, at rest: where nothing is given the blade itself. Not looked at
+/// without a skin
+/// \throw Error as cut_tetrahedra and cut_skin; if the model has no tetrahedra, has springs or
+/// central nodes; if a face of its boundary at the blade is not among its triangles
 SolidCut cut_solid(const Model& model, const TriangleMesh& blade,
-                   const BladeCutOptions& options = {});
+                   const BladeCutOptions& options = {}, const SkinSheet* sheet = nullptr);
 
 /// The cut as one of any model (model/cut.h): copies share what their node had by their masses.
 /// \pre `cut` is of this model
 CutModel as_cut_model(const Model& before, SolidCut cut);
+
+/// How large the triangles of a sheet should be: mean length of the edges of elements, mm.
+double sheet_cell(const Model& model);
 
 /// Two triangles of the plane that reach beyond the model at rest. \pre the model has nodes
 TriangleMesh plane_blade(const Model& model, const CutPlane& plane);

@@ -285,9 +285,6 @@ TEST_P(CutSolid, RefusesByName) {
   other.nodes.emplace_back();
   EXPECT_NE(refusal(other).find("central"), std::string::npos);
   other = model;
-  other.skin.points.emplace_back();
-  EXPECT_NE(refusal(other).find("skin"), std::string::npos);
-  other = model;
   std::erase_if(other.triangles, [&](const Triangle& t) {
     return std::ranges::all_of(t, [&](std::uint32_t n) { return model.nodes[n].position.z == 2; });
   });

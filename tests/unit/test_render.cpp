@@ -478,6 +478,29 @@ TEST(RenderStyle, FacetsHaveTheirOwnPointsAndEdgesAreDrawnOnce) {
   }
 }
 
+TEST(RenderStyle, CreasesPartNormalsAndNothingElse) {
+  Surface surface;
+  surface.mesh = test::box_mesh({0, 0, 0}, {1, 2, 3});
+  const Surface sharp = creased(surface, 60);
+  EXPECT_EQ(sharp.mesh.points.size(), 24U); // three at each corner
+  EXPECT_EQ(signed_volume(sharp.mesh), 6);
+  for (std::size_t t = 0; t < sharp.mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(sharp.mesh.points[sharp.mesh.triangles[t][k]],
+                surface.mesh.points[surface.mesh.triangles[t][k]]);
+  std::size_t along = 0;
+  for (const Vec3& n : render_normals(sharp.mesh))
+    along += std::abs(n.x) + std::abs(n.y) + std::abs(n.z) == 1 ? 1 : 0;
+  EXPECT_EQ(along, 24U);
+  EXPECT_EQ(creased(surface, 91).mesh.points.size(), 8U);
+  // By what it was at rest: it may fold as it likes.
+  surface.rest = surface.mesh.points;
+  for (Vec3& p : surface.mesh.points)
+    p.z = 0;
+  EXPECT_EQ(creased(surface, 60).mesh.points.size(), 24U);
+  EXPECT_EQ(creased(surface, 60).rest.size(), 24U);
+}
+
 TEST(RenderCamera, OrbitsAroundItsTarget) {
   const Box3 box{{-1, -1, -1}, {1, 1, 1}};
   CameraOptions options;

@@ -2,6 +2,7 @@
 // on nodes follows them.
 
 #include "base/error.h"
+#include "cut_bars.h"
 #include "larger.h"
 #include "mesh/check.h"
 #include "simulation_scenes.h"
@@ -21,73 +22,8 @@
 namespace gewebe {
 namespace {
 
-using test::count, test::one_thread, test::shape;
-
-/// A bar of 20 x 10 x 10 mm of two materials, held at x = 0 if it is.
-Model bar(bool quadratic, bool held = true) {
-  TetMesh mesh = test::box_tetrahedra(8, 4, 4, 2.5);
-  for (const Tetrahedron& t : mesh.tetrahedra) {
-    double x = 0;
-    for (const std::uint32_t corner : t)
-      x += mesh.points[corner].x / 4;
-    mesh.material.push_back(x < 10 ? 0 : 1);
-  }
-  SolidModelOptions options;
-  options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.4},
-                                {"stone", 2e-3, 60000, 1, 0.2, 0.2}};
-  options.material.of_part = {0, 1};
-  options.quadratic = quadratic;
-  options.drag_rate = 0;
-  Model model = solid_model(std::move(mesh), options, {});
-  for (Node& node : model.nodes)
-    node.fixed = held && node.position.x == 0 ? fixed_all : fixed_none;
-  model.name = "bar";
-  return model;
-}
-
-std::vector<std::uint32_t> nodes_where(const Model& model, auto&& holds) {
-  std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
-    if (holds(model.nodes[i].position))
-      nodes.push_back(i);
-  return nodes;
-}
-
-/// Across the bar, over its upper part alone.
-CutObject notch(const Model& model, double x) {
-  return {0, PlaneToCut{{{x, 0, 0}, {1, 0.1, 0.05}},
-                        nodes_where(model, [](const Vec3& p) { return p.z > 4; })}};
-}
-
-CutObject off(double x) {
-  return {0, PlaneToCut{{{x, 5, 5}, {1, 0.1, 0.2}}, {}}};
-}
-
-void expect_sound(const Model& model, double volume, double mass) {
-  check_model(model);
-  const TriangleMesh surface = surface_mesh(model);
-  EXPECT_NEAR(signed_volume(surface), volume, 1e-12 * volume);
-  EXPECT_NEAR(total_mass(model), mass, 1e-12 * mass);
-  const MeshReport report = examine_mesh(surface);
-  EXPECT_TRUE(report.closed() && report.oriented() && report.manifold());
-}
-
-/// Against a factor of its own of the same model under the same load.
-double error_of_shape(const Simulation& s, const Load& load) {
-  const Model model = s.model(0);
-  Elastostatic fresh(model, {}, one_thread());
-  fresh.update(load);
-  const std::span<const double> want = fresh.displacement();
-  const std::vector<double> is = shape(s, 0);
-  EXPECT_EQ(is.size(), want.size());
-  double largest = 0, worst = 0;
-  for (std::size_t i = 0; i < std::min(want.size(), is.size()); ++i) {
-    largest = test::larger(largest, std::abs(want[i]));
-    worst = test::larger(worst, std::abs(want[i] - is[i]));
-  }
-  EXPECT_GT(largest, 0);
-  return worst / largest;
-}
+using test::bar, test::count, test::error_of_shape, test::expect_sound, test::nodes_where,
+    test::notch, test::off, test::one_thread, test::shape;
 
 class SolidCuts : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Orders, SolidCuts, testing::Bool());

@@ -8,7 +8,6 @@
 #include "simulation_scenes.h"
 #include "solid/assembly.h"
 #include "solid/model_stiffness.h"
-#include "solid/skin.h"
 #include "solid/solid_model.h"
 #include "solve/stiffness.h"
 
@@ -25,7 +24,7 @@ namespace {
 
 bool is_solid(Way way) {
   return way == Way::solid || way == Way::warped || way == Way::solid_motion ||
-         way == Way::sprung || way == Way::skinned;
+         way == Way::sprung;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
@@ -50,8 +49,6 @@ std::vector<Way> ways_of(Way way) {
     return {Way::elastostatic, Way::whole};
   case Way::sprung:
     return {Way::elastostatic, Way::whole, Way::sprung};
-  case Way::skinned:
-    return {Way::elastostatic, Way::whole, Way::skinned};
   case Way::warped:
     return {Way::elastostatic, Way::whole, Way::warped};
   case Way::net:
@@ -111,8 +108,6 @@ Model model_of(Way way) {
     const auto [i, j] = std::minmax(model.triangles[0][0], model.triangles[0][1]);
     model.springs = {{i, j, SpringKind::edge, 1, 0, 1}};
   }
-  if (way == Way::skinned)
-    (void)add_skin(model, surface_mesh(model), {}, {});
   return model;
 }
 

@@ -234,6 +234,8 @@ void declare(Program& p, RenderArguments& a) {
   declare_lighting(p, a);
   p.option("--style", a.style, "STYLE", "textured, flat (facets), wireframe")
       .one_of({"textured", "flat", "wireframe"});
+  p.option("--crease", a.crease, "DEG", "edges that turn by more than this are sharp")
+      .range(0, 180);
   declare_camera(p, a);
   p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
       .one_of(backend_names());

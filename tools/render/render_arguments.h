@@ -55,6 +55,7 @@ struct RenderArguments {
   double offset = 0.02;
   std::optional<double> offset_texels; ///< of the structure instead
   std::string style = "textured";
+  std::optional<double> crease;     ///< degrees
   std::vector<std::string> compare; ///< modes side by side
   SurfaceReadOptions reading;
   std::string frames;                           ///< of a result, "": one

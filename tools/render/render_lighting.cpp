@@ -55,6 +55,9 @@ void complete_lighting(RenderArguments& a) {
          "--occlusion-radius without --occlusion, expected both");
   refuse(a.drawing.occlusion > 0 && a.style == "wireframe",
          "--occlusion with --style wireframe, which has no surfaces, expected one of them");
+  refuse(
+      a.crease && a.style != "textured",
+      "--crease with --style flat or wireframe, which have no round edges, expected one of them");
   refuse(a.inside && a.style == "wireframe",
          "--inside with --style wireframe, which has no surfaces, expected one of them");
   a.drawing.insides = a.inside.has_value();

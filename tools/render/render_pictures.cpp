@@ -174,6 +174,9 @@ std::optional<DrawingChange> Pictures::take(std::vector<Surface> surfaces, bool 
 }
 
 const Image& Pictures::of(std::vector<Surface> surfaces) {
+  for (Surface& surface : surfaces)
+    if (arguments_.crease && !surface.instrument)
+      surface = creased(surface, *arguments_.crease);
   if (modes_.empty())
     start(surfaces);
   tissue_->number_materials(surfaces);

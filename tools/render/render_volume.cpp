@@ -119,6 +119,7 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
   refuse(a.drawing.wet || a.drawing.occlusion > 0 || a.inside || a.endoscope, input,
          "--wet, --occlusion, --inside or --endoscope for a volume, which has no surface, expected "
          "none of them");
+  refuse(a.crease.has_value(), input, "--crease for a volume, which has no edges, expected none");
   refuse(a.reading.clip.has_value(), input,
          "--clip for a volume, expected a tetrahedral mesh (mc-opt --tets makes one)");
   refuse(!a.reading.unit.empty() || !a.reading.object.empty() || a.reading.frame ||

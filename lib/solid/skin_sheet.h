@@ -1,0 +1,30 @@
+#pragma once
+// Sheets that blades sweep, to cut skins with.
+
+#include "base/mesh.h"
+#include "model/cut_select.h"
+#include "model/model.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// What a blade has swept, at rest. Above it is where its triangles appear counter-clockwise.
+struct SkinSheet {
+  TriangleMesh surface;
+  /// Of its border, in its direction: points from the first to the last one where the blade stands
+  /// now, and may go on. Two at least, or none.
+  std::vector<std::uint32_t> end;
+};
+
+/// A grid in the plane, as wide as the skin is there. Above it is where the normal points.
+SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell);
+
+/// Between rows of points, one after the other, which need not have as many: what lies between two
+/// is as far along one as along the other. Above it is where a row of points to the right that
+/// moves upwards is counter-clockwise: the first, its next, the following row.
+SkinSheet strip_sheet(std::span<const std::vector<Vec3>> rows);
+
+} // namespace gewebe
