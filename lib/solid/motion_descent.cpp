@@ -23,12 +23,17 @@ struct Way {
   std::function<void(Numbers&)> solve;
   std::function<void(Numbers&)> into, out; ///< of the frames that solve() and secants are in
   Secants& secants;
-  double& rate; ///< of changes, that of a second round over the first one's
+  double& rate;     ///< of changes, that of a second round over the first one's
+  double still = 0; ///< a step of less, mm, counts as one of this much
 };
 
 // What a round's change is expected to leave is its part of this many, or of as many as rounds
 // before left: never less than `least`, which a lucky round is no reason for.
 constexpr double least_first = 0.2, least_later = 0.3, doubt = 1.25;
+
+/// Of a held body's whole displacement: what moves by less in a step is all but at rest, and no
+/// rounds are spent on the digits of so little. What they leave is before the next steps.
+constexpr double still_part = 1e-5;
 
 double distance(const Numbers& a, const Numbers& b, const Context& context) {
   const auto sum = sums_of_axes<1>(
@@ -126,7 +131,7 @@ void descend(const MotionObjective& o, MotionPoint& now, const Way& way, MotionS
       continue;
     }
     fresh = false;
-    step.change = s * length / distance(next.at, o.state().place, context);
+    step.change = s * length / std::max(way.still, distance(next.at, o.state().place, context));
     if (s < 1)
       way.secants.forget_earlier();
     learn(now, next, way, scratch, context);
@@ -158,7 +163,10 @@ void descend_quickly(const MotionObjective& objective, MotionPoint& now, MotionQ
                 [&](Numbers& v) { quick.into_frames(v, context); },
                 [&](Numbers& v) { quick.out_of_frames(v, context); },
                 quick.secants(),
-                rate};
+                rate,
+                objective.state().any_held()
+                    ? still_part * distance(now.at, objective.body().rest, context)
+                    : 0};
   descend(objective, now, way, quick.scratch(), step, context);
   quick.set_rate(rate);
 }

@@ -7,6 +7,36 @@
 
 namespace gewebe {
 
+namespace {
+
+/// Whether every node is held along all its axes or none.
+bool held_by_nodes(const std::vector<std::uint8_t>& held) {
+  for (std::size_t axis = 0; axis < held.size(); axis += 3)
+    if (held[axis] != held[axis + 1] || held[axis] != held[axis + 2])
+      return false;
+  return true;
+}
+
+/// Zeros on the diagonal of the free nodes' first axes.
+StiffnessMatrix no_stiffness(const std::vector<std::uint8_t>& held) {
+  StiffnessMatrix matrix;
+  matrix.row_of_axis.assign(held.size(), -1);
+  matrix.column_start.push_back(0);
+  for (std::size_t axis = 0; axis < held.size(); axis += 3) {
+    if (held[axis] != 0)
+      continue;
+    const auto row = static_cast<std::int64_t>(matrix.order());
+    matrix.row_of_axis[axis] = row;
+    matrix.axis_of_row.push_back(static_cast<std::int64_t>(axis));
+    matrix.row.push_back(row);
+    matrix.column_start.push_back(row + 1);
+  }
+  matrix.value.resize(matrix.order());
+  return matrix;
+}
+
+} // namespace
+
 void add_masses(const MotionBody& body, double h, StiffnessMatrix& matrix) {
   for (std::size_t c = 0; c < matrix.order(); ++c) {
     const std::size_t node = static_cast<std::size_t>(matrix.axis_of_row[c]) / 3;
@@ -22,8 +52,12 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
     return 0;
   const double scale = 1 + options.damping / h;
   const bool same_pattern = factor_ && held_ == held;
-  if (!same_pattern)
-    stiffness_ = solid_stiffness(body.mesh, body.elements, held, context);
+  if (!same_pattern) {
+    // Springs are bounded along every axis alike: of a net alone one matrix serves all three.
+    alike_ = body.mesh.tetrahedra.empty() && held_by_nodes(held);
+    stiffness_ =
+        alike_ ? no_stiffness(held) : solid_stiffness(body.mesh, body.elements, held, context);
+  }
   StiffnessMatrix a = stiffness_;
   for (double& value : a.value)
     value *= scale;
@@ -103,21 +137,23 @@ void MotionQuick::solve(Numbers& v, const Context& context) {
 }
 
 void MotionQuick::solve_constant(Numbers& v, const Context& context) {
-  const std::size_t order = stiffness_.order();
-  rows_.resize(order);
   double scale = 0; // whatever the numbers are, single precision holds them
-  for (std::size_t k = 0; k < order; ++k) {
-    rows_[k] = v[static_cast<std::size_t>(stiffness_.axis_of_row[k])];
-    scale = std::max(scale, std::abs(rows_[k]));
-  }
+  for (const std::int64_t at : stiffness_.axis_of_row)
+    for (std::size_t a = 0; a < (alike_ ? 3U : 1U); ++a)
+      scale = std::max(scale, std::abs(v[static_cast<std::size_t>(at) + a]));
   if (!(scale > 0 && std::isfinite(scale)))
     return;
-  for (double& value : rows_)
-    value /= scale;
-  single_->solve(rows_, context);
-  std::ranges::fill(v, 0.0);
-  for (std::size_t k = 0; k < order; ++k)
-    v[static_cast<std::size_t>(stiffness_.axis_of_row[k])] = scale * rows_[k];
+  const std::size_t order = stiffness_.order();
+  rows_.resize(order);
+  solved_.assign(v.size(), 0);
+  for (std::size_t a = 0; a < (alike_ ? 3U : 1U); ++a) {
+    for (std::size_t k = 0; k < order; ++k)
+      rows_[k] = v[static_cast<std::size_t>(stiffness_.axis_of_row[k]) + a] / scale;
+    single_->solve(rows_, context);
+    for (std::size_t k = 0; k < order; ++k)
+      solved_[static_cast<std::size_t>(stiffness_.axis_of_row[k]) + a] = scale * rows_[k];
+  }
+  v.swap(solved_);
 }
 
 } // namespace gewebe

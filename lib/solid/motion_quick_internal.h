@@ -53,13 +53,14 @@ private:
   double step_ = 0;
   std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
   bool all_still_ = false;
+  bool alike_ = false; ///< the matrix is of nodes, and serves each axis
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;
   void solve_constant(Numbers& v, const Context& context);
 
   const MotionVolumes* filled_ = nullptr;
-  Numbers rotations_, rows_;
+  Numbers rotations_, rows_, solved_;
   Secants secants_;
   MotionScratch scratch_;
   double rate_ = 1;

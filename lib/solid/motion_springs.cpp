@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "solid/assembly.h"
+#include "solid/motion_kernel_internal.h"
 
 #include <algorithm>
 #include <array>
@@ -66,46 +67,31 @@ StiffnessMatrix with_blocks(const StiffnessMatrix& of_elements,
 } // namespace
 
 MotionSprings::MotionSprings(std::span<const SolidSpring> springs)
-    : springs_(springs.begin(), springs.end()), lengths_(springs.size()), kept_(springs.size()) {}
-
-double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<double> forces) {
-  // In turn for some springs: from here, by the compiler several at a time, and to there.
-  constexpr std::size_t some = 64;
-  std::array<double, some> x{}, y{}, z{}, pull{};
-  double damped = 0;
-  elastic_ = 0;
-  for (std::size_t first = 0; first < springs_.size(); first += some) {
-    const std::size_t count = std::min(some, springs_.size() - first);
-    const SolidSpring* const s = springs_.data() + first;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double *const from = at.data() + 3 * std::size_t{s[k].i}, *const to =
-                                                                          at.data() +
-                                                                          3 * std::size_t{s[k].j};
-      x[k] = to[0] - from[0];
-      y[k] = to[1] - from[1];
-      z[k] = to[2] - from[2];
-    }
-    for (std::size_t k = 0; k < some; ++k)
-      pull[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
-    for (std::size_t k = 0; k < count; ++k) {
-      const double length = lengths_[first + k] = pull[k], off = length - s[k].rest,
-                   grown = length - kept_[first + k], viscous = s[k].damping * per_time;
-      elastic_ += s[k].stiffness * off * off / 2;
-      damped += viscous * grown * grown / 2;
-      pull[k] = length > 0 ? (s[k].stiffness * off + viscous * grown) / length : 0; // no direction
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      double *const from = forces.data() + 3 * std::size_t{s[k].i}, *const to =
-                                                                        forces.data() +
-                                                                        3 * std::size_t{s[k].j};
-      const std::array<double, 3> force = {pull[k] * x[k], pull[k] * y[k], pull[k] * z[k]};
-      for (std::size_t a = 0; a < 3; ++a) {
-        from[a] += force[a];
-        to[a] -= force[a];
-      }
-    }
+    : springs_(springs.begin(), springs.end()) {
+  const std::size_t whole =
+      (springs.size() + SpringColumns::batch - 1) / SpringColumns::batch * SpringColumns::batch;
+  for (const SolidSpring& s : springs) {
+    i_.push_back(s.i);
+    j_.push_back(s.j);
+    stiffness_.push_back(s.stiffness);
+    damping_.push_back(s.damping);
+    rest_.push_back(s.rest);
   }
-  return elastic_ + damped;
+  i_.resize(whole);
+  j_.resize(whole);
+  for (Numbers* const column : {&stiffness_, &damping_, &rest_, &lengths_, &kept_})
+    column->resize(whole);
+}
+
+double MotionSprings::evaluate(const Numbers& at, double per_time, std::span<double> forces,
+                               const Context& context) {
+  SpringEnergies energies;
+  motion_kernel(context.cpu)
+      .pull({i_.data(), j_.data(), stiffness_.data(), damping_.data(), rest_.data(), kept_.data(),
+             lengths_.data(), springs_.size()},
+            at.data(), per_time, forces.data(), energies);
+  elastic_ = energies.elastic;
+  return energies.elastic + energies.damped;
 }
 
 StiffnessMatrix MotionSprings::with_bound(const StiffnessMatrix& of_elements,

@@ -5,10 +5,12 @@
 // that it began with the length l₀: a damper along its axis, so that neither part turns a body that
 // turns as a whole.
 
+#include "base/context.h"
 #include "solid/motion_numbers_internal.h"
 #include "solid/solid_motion.h"
 #include "solve/stiffness.h"
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -21,7 +23,8 @@ public:
   bool empty() const noexcept { return springs_.empty(); }
   /// The energy of the springs at these places and what their dampers take, 1/h being `per_time`,
   /// or 0 at rest; its negative gradient is added to the forces.
-  double evaluate(const Numbers& at, double per_time, std::span<double> forces);
+  double evaluate(const Numbers& at, double per_time, std::span<double> forces,
+                  const Context& context);
   double elastic() const noexcept { return elastic_; } ///< in the last evaluation
   /// Dampers count from the last evaluation on.
   void keep() { kept_ = lengths_; }
@@ -35,7 +38,8 @@ public:
 
 private:
   std::vector<SolidSpring> springs_;
-  Numbers lengths_, kept_;
+  std::vector<std::uint32_t> i_, j_; ///< of springs, by columns, whole batches of SpringColumns
+  Numbers stiffness_, damping_, rest_, lengths_, kept_;
   double elastic_ = 0;
 };
 

@@ -1,31 +1,12 @@
 #include "solid/secants_internal.h"
 
+#include "solid/motion_kernel_internal.h"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace gewebe {
-
-namespace {
-
-/// Of a block of a long vector.
-template <class Vector>
-auto part(Vector& v, std::size_t begin, std::size_t end) {
-  return std::span(v).subspan(begin, end - begin);
-}
-std::span<const double> part(const Numbers& v, std::size_t begin, std::size_t end) {
-  return std::span(v).subspan(begin, end - begin);
-}
-std::span<const float> part(const std::vector<float>& v, std::size_t begin, std::size_t end) {
-  return std::span(v).subspan(begin, end - begin);
-}
-
-void increase(std::span<double> to, double factor, std::span<const float> of) {
-  for (std::size_t k = 0; k < to.size(); ++k)
-    to[k] += factor * static_cast<double>(of[k]);
-}
-
-} // namespace
 
 void Secants::drop(std::size_t oldest) {
   for (std::size_t k = 0; k + oldest < count_; ++k) {
@@ -47,6 +28,7 @@ void Secants::add(const Numbers& moved, const Numbers& turned, const Context& co
   Pair& pair = pairs_[count_];
   pair.moved.resize(moved.size());
   pair.turned.resize(moved.size());
+  const MotionKernel& kernel = motion_kernel(context.cpu);
   const auto sums = sums_of_axes<most>(
       context, moved.size(), [&](std::size_t begin, std::size_t end, Parts& products) {
         for (std::size_t k = begin; k < end; ++k) {
@@ -55,7 +37,7 @@ void Secants::add(const Numbers& moved, const Numbers& turned, const Context& co
         }
         for (std::size_t k = 0; k <= count_; ++k)
           products[k] =
-              product(part(std::as_const(pairs_[k].moved), begin, end), part(turned, begin, end));
+              kernel.product(pairs_[k].moved.data() + begin, turned.data() + begin, end - begin);
       });
   if (!(sums[count_] > 0 && std::isfinite(sums[count_])))
     return;
@@ -68,11 +50,12 @@ void Secants::add(const Numbers& moved, const Numbers& turned, const Context& co
 Secants::Parts Secants::remove(Numbers& gradient, const Context& context) const {
   if (count_ == 0)
     return {};
+  const MotionKernel& kernel = motion_kernel(context.cpu);
   Parts parts = sums_of_axes<most>(
       context, gradient.size(), [&](std::size_t begin, std::size_t end, Parts& products) {
         for (std::size_t k = 0; k < count_; ++k)
           products[k] =
-              product(part(pairs_[k].moved, begin, end), part(std::as_const(gradient), begin, end));
+              kernel.product(pairs_[k].moved.data() + begin, gradient.data() + begin, end - begin);
       });
   for (std::size_t k = count_; k-- > 0;) {
     for (std::size_t newer = k + 1; newer < count_; ++newer)
@@ -81,7 +64,8 @@ Secants::Parts Secants::remove(Numbers& gradient, const Context& context) const 
   }
   parallel_blocks(context, gradient.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = count_; k-- > 0;)
-      increase(part(gradient, begin, end), -parts[k], part(pairs_[k].turned, begin, end));
+      kernel.increase(gradient.data() + begin, -parts[k], pairs_[k].turned.data() + begin,
+                      end - begin);
   });
   return parts;
 }
@@ -90,11 +74,12 @@ Secants::Parts Secants::remove(Numbers& gradient, const Context& context) const 
 void Secants::restore(const Parts& first, Numbers& direction, const Context& context) const {
   if (count_ == 0)
     return;
+  const MotionKernel& kernel = motion_kernel(context.cpu);
   Parts parts = sums_of_axes<most>(
       context, direction.size(), [&](std::size_t begin, std::size_t end, Parts& products) {
         for (std::size_t k = 0; k < count_; ++k)
-          products[k] = product(part(pairs_[k].turned, begin, end),
-                                part(std::as_const(direction), begin, end));
+          products[k] = kernel.product(pairs_[k].turned.data() + begin, direction.data() + begin,
+                                       end - begin);
       });
   for (std::size_t k = 0; k < count_; ++k) {
     for (std::size_t older = 0; older < k; ++older)
@@ -103,7 +88,8 @@ void Secants::restore(const Parts& first, Numbers& direction, const Context& con
   }
   parallel_blocks(context, direction.size(), axes_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = 0; k < count_; ++k)
-      increase(part(direction, begin, end), parts[k], part(pairs_[k].moved, begin, end));
+      kernel.increase(direction.data() + begin, parts[k], pairs_[k].moved.data() + begin,
+                      end - begin);
   });
 }
 

@@ -137,7 +137,7 @@ double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,
   }
   if (springs_.empty())
     return energy;
-  energy += springs_.evaluate(at, damping.per_time, forces);
+  energy += springs_.evaluate(at, damping.per_time, forces, context);
   elastic_ += springs_.elastic();
   return energy;
 }

@@ -30,7 +30,8 @@
 // ones may stay tangled where rotations of elements jump, and either may stay wound up.
 //
 // Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
-// The constant matrix has their stiffness along every axis, which bounds them however they turn.
+// The constant matrix has their stiffness along every axis, which bounds them however they turn: of
+// springs alone, held by whole nodes, it is one of nodes that serves each axis.
 //
 // Damping is Rayleigh's: `drag` (1/s) by masses, `damping` (s) by the stiffness, but in the
 // elements' own frames, so that rotations aren't slowed down.
@@ -57,7 +58,7 @@ struct SolidMotionOptions {
   double drag = 0;    ///< per mass, 1/s
   double damping = 0; ///< per stiffness, s
   /// A round that is expected to leave less than this part of the step's whole displacement is the
-  /// last one.
+  /// last one; where axes are held, a step counts as 1e-5 of the body's displacement at least.
   double tolerance = 0.005;
   int max_rounds = 32;    ///< of the quick way
   bool reference = false; ///< Newton's method until rounding; no limit of time

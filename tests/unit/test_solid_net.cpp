@@ -260,6 +260,84 @@ double droop_of_halves(double stiffness, int count) {
   return droop(s, 1, right);
 }
 
+/// A square cloth of springs that hangs by two corners; beside it, where asked for, a node that is
+/// tied to nothing and held along one axis.
+struct Cloth {
+  static constexpr std::uint32_t side = 7;
+  TetMesh mesh;
+  std::vector<SolidSpring> springs;
+  Numbers masses, drag;
+  std::vector<std::uint8_t> held;
+
+  explicit Cloth(bool beside) {
+    for (std::uint32_t r = 0; r < side; ++r)
+      for (std::uint32_t c = 0; c < side; ++c)
+        mesh.points.push_back({5.0 * c, 5.0 * r, 0.3 * ((r * 7 + c * 3) % 5)});
+    for (std::uint32_t k = 0; k < side * side; ++k)
+      for (const std::uint32_t by : {1U, side, side + 1, side - 1}) {
+        const std::uint32_t to = k + by;
+        if (to >= side * side || norm(mesh.points[to] - mesh.points[k]) > 8)
+          continue;
+        springs.push_back({k, to, 3000, 4, norm(mesh.points[to] - mesh.points[k])});
+      }
+    if (beside)
+      mesh.points.push_back({0, 0, 99});
+    masses.assign(mesh.points.size(), 0.1);
+    drag.assign(mesh.points.size(), 5);
+    held.resize(3 * mesh.points.size());
+    for (const std::uint32_t corner : {side * (side - 1), side * side - 1})
+      for (std::uint32_t a = 0; a < 3; ++a)
+        held[3 * corner + a] = 1;
+    if (beside)
+      held.back() = 1;
+  }
+  SolidMotion moving(double tolerance) const {
+    SolidMotionOptions options;
+    options.tolerance = tolerance;
+    options.max_rounds = 200;
+    SolidMotion body(mesh, std::vector<SolidMaterial>{}, {springs, masses, drag}, options);
+    body.hold(held);
+    Numbers load;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+      load.insert(load.end(), {0, i < side * side ? -980.0 : 0, i < side * side ? 300.0 : 0});
+    body.set_load(load);
+    return body;
+  }
+};
+
+/// Where nodes are held as a whole one matrix of nodes serves each axis, else there is one of axes:
+/// it is the same matrix.
+TEST(SolidNet, OneMatrixServesTheThreeAxesOfANet) {
+  std::array<int, 2> rounds{};
+  std::array<Numbers, 2> end;
+  for (const bool beside : {false, true}) {
+    const std::size_t way = beside ? 1 : 0;
+    SolidMotion body = Cloth(beside).moving(1e-6);
+    for (int n = 0; n < 20; ++n)
+      rounds[way] += body.step(0.02, {}).rounds;
+    end[way] = body.displacement();
+  }
+  end[1].resize(end[0].size());
+  EXPECT_LT(largest_difference(end[0], end[1]), 1e-4);
+  EXPECT_NEAR(rounds[0], rounds[1], 0.1 * rounds[1]);
+}
+
+TEST(SolidNet, NoRoundsAreSpentOnWhatAllButStands) {
+  SolidMotion body = Cloth(false).moving(0.02);
+  int still = 0, most = 0;
+  for (int n = 0; n < 400; ++n) {
+    const Numbers before = body.displacement();
+    const SolidStep step = body.step(0.05, {});
+    const Numbers now = body.displacement(), none(now.size());
+    if (!(largest_difference(before, now) < 1e-7 * largest_difference(now, none)))
+      continue;
+    ++still;
+    most = std::max(most, step.rounds);
+  }
+  EXPECT_GT(still, 100);
+  EXPECT_LE(most, 3);
+}
+
 /// A bar in two that stiff ties hold together is nearly the whole one.
 TEST(SolidNet, TwoHalvesThatAreTiedBendAsOne) {
   const Model model = bar(0, 6);
