@@ -335,7 +335,7 @@ SkinCut cut_skin(const Skin& skin, const SkinSheet& sheet, double cell, double r
   result.region.assign(skin.triangles.size(), 0);
   std::vector<std::uint32_t> shell = shells_of(skin);
   RegionSheet now{sheet.surface, std::vector<std::uint32_t>(sheet.surface.triangles.size(), 0),
-                  sheet.end, 0};
+                  sheet.end};
   // What is inside first, so that the sheet has its curve where what is outside is cut.
   const std::uint32_t last = shell.empty() ? 0 : *std::ranges::max_element(shell);
   for (std::uint32_t n = last; n > 0 && !now.surface.triangles.empty(); --n) {
@@ -361,6 +361,7 @@ SkinCut cut_skin(const Skin& skin, const SkinSheet& sheet, double cell, double r
     }
     result = std::move(cut);
   }
+  result.material = now.material;
   for (const std::uint32_t p : now.end)
     result.end.push_back(now.surface.points[p]);
   return result;

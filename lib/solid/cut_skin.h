@@ -27,6 +27,8 @@ struct SkinCut {
   std::vector<bool> fresh; ///< of each point: it has no tetrahedron yet, or may need another
   /// Of each triangle, if of a wall: what curves enclose of the sheet, a number for each region.
   std::vector<std::uint32_t> region;
+  /// Of each region: in a surface inside another one that of its triangles, else -1.
+  std::vector<std::int32_t> material{-1};
   std::vector<Vec3> end; ///< the sheet's end with the points that the skin has there
 };
 

@@ -35,8 +35,8 @@ Box3 wider(const Box3& box, double by) {
   return {box.min - all, box.max + all};
 }
 
-/// Of walls: those of the elements that their first corners follow, but where most of what the
-/// curve encloses is of one, all of it is, so that an inner surface bounds its material.
+/// Of walls: in a surface inside another one its own; else those of the elements that their first
+/// corners follow, but where most of what the curve encloses is of one, all of it is.
 void give_materials(Model& model, const SkinCut& cut) {
   constexpr double most = 0.8; // of the area
   Skin& skin = model.skin;
@@ -53,6 +53,10 @@ void give_materials(Model& model, const SkinCut& cut) {
   for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
     if (cut.triangle[t] != SkinCut::none)
       continue;
+    if (const std::int32_t own = cut.material[cut.region[t]]; own >= 0) {
+      skin.material[t] = own;
+      continue;
+    }
     double sum = 0;
     for (const auto& [material, area] : areas[cut.region[t]])
       sum += area;

@@ -23,7 +23,7 @@ SkinSheet sheet_beside(const Model& model, std::span<const WallTriangle> wall,
 /// Gives each point an element: of those that are fresh, whose element has changed, or stands on
 /// the other side, the nearest one that does not stand on the other side. Triangles of walls get
 /// the material of the element that their first corner follows; where four fifths of what the curve
-/// encloses are of one material, all of it is.
+/// encloses are of one material, all of it is; inside an inner surface they get that surface's.
 /// \param elements sides_of_elements()  \param changed elements, ascending
 /// \pre model.skin is the cut's, model.tetrahedra are those after the cut
 void bind_skin(Model& model, const SkinCut& cut, std::span<const std::int8_t> elements,

@@ -66,7 +66,8 @@ class Crosser {
 public:
   Crosser(const Skin& skin, std::span<const std::uint32_t> shell, std::uint32_t cut,
           const RegionSheet& sheet, double gap)
-      : skin_(skin), shell_(shell), cut_(cut), sheet_(sheet), gap_(gap) {
+      : skin_(skin), shell_(shell), cut_(cut), sheet_(sheet), gap_(gap),
+        materials_(sheet.material) {
     x_.places = skin.points;
   }
 
@@ -217,8 +218,19 @@ private:
     const std::uint32_t before = sheet_.region[x_.crossing.b.from[t]];
     if (!inside)
       return before;
-    const auto next = static_cast<std::uint32_t>(regions_.size() + 1) + sheet_.regions;
-    return regions_.emplace(std::pair(before, set_[t]), next).first->second;
+    const auto [at, added] = regions_.emplace(std::pair(before, set_[t]), materials_.size());
+    if (added)
+      materials_.push_back(materials_[before] >= 0 || cut_ == 1 ? materials_[before]
+                                                                : usual_material());
+    return static_cast<std::uint32_t>(at->second);
+  }
+
+  /// That most triangles of the shell have near the sheet.
+  std::int32_t usual_material() const {
+    std::map<std::int32_t, std::size_t> count;
+    for (const std::uint32_t t : x_.local)
+      ++count[skin_.material[t]];
+    return std::ranges::max_element(count, {}, [](const auto& one) { return one.second; })->first;
   }
 
   RegionSheet refined_sheet() const {
@@ -226,7 +238,7 @@ private:
     refined.surface.points = x_.crossing.b.points;
     refined.surface.triangles = x_.crossing.b.triangles;
     refined.region = x_.region;
-    refined.regions = sheet_.regions + static_cast<std::uint32_t>(regions_.size());
+    refined.material = materials_;
     refined.end = sheet_.end;
     if (sheet_.end.empty())
       return refined;
@@ -399,7 +411,8 @@ private:
   const RegionSheet& sheet_;
   double gap_;
   std::vector<std::uint32_t> set_; // of triangles of the sheet: what hangs together
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> regions_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> regions_;
+  std::vector<std::int32_t> materials_; // of regions
   SkinCrossing x_;
 };
 

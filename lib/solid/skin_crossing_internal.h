@@ -38,11 +38,12 @@ inline bool meet(const Box3& a, const Box3& b) {
   return true;
 }
 
-/// A sheet whose triangles have numbers by what curves enclose: 0, or the numbers up to `regions`.
+/// A sheet whose triangles have numbers by what curves enclose: 0, or that of a region.
 struct RegionSheet {
   TriangleMesh surface;
   std::vector<std::uint32_t> region, end;
-  std::uint32_t regions = 0;
+  /// Of each region: that of the shell in it, if it lies in another one, or -1.
+  std::vector<std::int32_t> material{-1};
 };
 
 /// What hangs together as skin, by how many surfaces lie round it, which is the shell of each

@@ -235,6 +235,28 @@ test_gravity_is_borne_by_what_fills_a_net() {
   done
 }
 
+# A wedge with a tumour: it comes off with its piece of skin, closed, and the tumour in it.
+test_a_tumour_is_cut_out_with_a_margin() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  local file
+  unset MAKEFLAGS MAKELEVEL
+  mkdir resection cholecystectomy
+  cp "$GEWEBE_ROOT"/examples/resection/{Makefile,*.awk,*.scene,*.particles} resection
+  cp "$GEWEBE_ROOT"/examples/cholecystectomy/liver.particles cholecystectomy
+  cd resection || fail 'no folder'
+  make SIZE=200x140 VOXEL=4 CELL=11 >log 2>&1 || fail 'the example fails:' "$(tail -3 log)"
+  read -r specimen tumour margin < <(sed -n 's/^specimen \([0-9.]*\) ml, tumour in it \([0-9.]*\) ml, margin \([0-9.]*\) mm$/\1 \2 \3/p' log)
+  awk -v s="$specimen" -v t="$tumour" -v m="$margin" 'BEGIN {
+    exit !(s > 125 && s < 140 && t > 6 && t < 7 && m > 4 && m < 7) }' || fail 'other volumes' "$(tail -2 log)"
+  awk -f "$GEWEBE_ROOT/tests/golden/skin_check.awk" specimen.ela >volume || fail 'the specimen is open:' "$(cat volume)"
+  ! cmp -s wound.png off.png || fail 'it is not lifted off'
+  ! cmp -s off.png halves.png || fail 'it is not cut in two'
+  make -s clean
+  for file in *; do
+    [[ $file == log || $file == volume || -e $GEWEBE_ROOT/examples/resection/$file ]] || fail "clean left $file"
+  done
+}
+
 # The relief of two pictures, as what light adds to the same look without heights: their correlation.
 rims() { # FLAT A B (PPMs)
   python3 - "$@" <<'END'

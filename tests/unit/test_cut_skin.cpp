@@ -218,11 +218,22 @@ TEST(CutSkin, ASurfaceInsideIsCutByItself) {
   both.points.insert(both.points.end(), inner.points.begin(), inner.points.end());
   for (const Triangle& t : inner.triangles)
     both.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  const Skin skin = skin_of(both);
+  Skin skin = skin_of(both);
+  std::fill(skin.material.end() - static_cast<std::ptrdiff_t>(inner.triangles.size()),
+            skin.material.end(), 3);
   const SkinCut whole = checked(skin, plane_sheet(skin, {{0.15, 0, 0}, {1, 0.1, 0}}, cell));
   EXPECT_EQ(examine_mesh(mesh_of(whole.skin)).components, 4U);
   // Of the walls: what is in the inner one, of both shells, and what is round it; 0 of the skin.
   EXPECT_EQ(std::set<std::uint32_t>(whole.region.begin(), whole.region.end()).size(), 4U);
+  // All that lies in the inner one has its material, of either shell.
+  for (std::size_t t = 0; t < whole.triangle.size(); ++t) {
+    if (whole.triangle[t] != SkinCut::none)
+      continue;
+    Vec3 middle;
+    for (const std::uint32_t p : whole.skin.triangles[t])
+      middle += whole.skin.points[p] / 3;
+    EXPECT_EQ(whole.material[whole.region[t]], norm(middle - Vec3{0.1, 0.2, 0}) < 0.4 ? 3 : -1);
+  }
   Skin now = skin;
   std::vector<Vec3> start = rows_down(0.123, 1.5, 1.5, 1)[0];
   for (const double z : {0.7, 0.3, 0.0, -0.3, -1.5}) {
