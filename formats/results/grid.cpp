@@ -69,7 +69,7 @@ bool Shapes::set(std::span<const FrameInstrument> instruments) {
   if (other) {
     all_.resize(objects_);
     for (Instrument& one : there) {
-      InstrumentSurface made = round_surface(shown_radius(one.shape), one.shape.axis, around);
+      InstrumentSurface made = shown_surface(one.shape, around);
       one.own = std::move(made.points);
       Shape& shape = all_.emplace_back();
       shape.instrument = one.number;

@@ -103,13 +103,20 @@ void InstrumentSets::show(Series& to, const FrameInstrument& of, std::uint64_t f
       !same_surface(to.surfaces.back().shape, of.shape)) {
     hdf5::Group group = to.surface_group.create_group(std::to_string(to.surfaces.size() + 1));
     group.set("first_frame", frame);
-    InstrumentSurface made = round_surface(radius, of.shape.axis, around);
+    InstrumentSurface made = shown_surface(of.shape, around);
     std::vector<std::uint32_t> corners;
     corners.reserve(3 * made.triangles.size());
     for (const Triangle& t : made.triangles)
       corners.insert(corners.end(), t.begin(), t.end());
     group.write("triangles", std::span<const std::uint32_t>(corners), {made.triangles.size(), 3});
     const std::uint64_t points = made.points.size();
+    if (of.shape.core) { // which a reader can't make anew
+      std::vector<float> normals;
+      for (const Vec3& n : made.normals)
+        for (int a = 0; a < 3; ++a)
+          normals.push_back(static_cast<float>(n[a] + 0.0));
+      group.write("normals", std::span<const float>(normals), {points, 3});
+    }
     hdf5::Dataset places = group.create_growing("points", hdf5::Number::float32, {points, 3},
                                                 65536 / (12 * points) + 1);
     to.surfaces.push_back({of.shape, frame, frame, points, made.triangles.size(), std::move(places),

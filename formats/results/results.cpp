@@ -222,11 +222,38 @@ bool is_rotation(const std::array<Vec3, 3>& rows) {
          std::fabs(dot(z, z) - 1) < 1e-6 && norm(cross(x, y) - z) < 1e-6;
 }
 
+/// The surface of a mesh in a frame, of those that it had one after the other.
+TriangleMesh read_shown(const hdf5::Group& surfaces, std::uint64_t frame) {
+  for (std::size_t k = 1; surfaces.has(std::to_string(k)); ++k) {
+    const hdf5::Group group = surfaces.group(std::to_string(k));
+    const auto first = group.number<std::uint64_t>("first_frame");
+    const hdf5::Dataset places = group.dataset("points", hdf5::Number::float32);
+    if (frame < first || frame - first >= places.rows())
+      continue;
+    TriangleMesh mesh;
+    read_triangles(group, mesh);
+    const hdf5::Dataset normals = group.dataset("normals", hdf5::Number::float32);
+    const std::uint64_t count = normals.rows();
+    normals.require_shape({count, 3});
+    places.require_shape({places.rows(), count, 3});
+    std::vector<float> place(3 * count);
+    places.read_rows(frame - first, std::span<float>(place));
+    mesh.normals.resize(count);
+    normals.read_rows(0, std::span<float>(mesh.normals.data()->data(), 3 * count));
+    for (std::size_t i = 0; i < count; ++i)
+      mesh.points.push_back({place[3 * i], place[3 * i + 1], place[3 * i + 2]});
+    check_mesh(mesh);
+    return mesh;
+  }
+  surfaces.fail("has no surface in frame " + std::to_string(frame));
+}
+
 /// Nothing where it is not there in this row, or of a kind that is not known.
-std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::uint64_t row) {
+std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::uint64_t row,
+                                                std::uint64_t frame) {
   std::uint8_t kind = 0;
   group.dataset("kind", hdf5::Number::uint8).read_rows(row, std::span<std::uint8_t>(&kind, 1));
-  if (kind == 0 || kind > static_cast<std::uint8_t>(InstrumentKind::blade))
+  if (kind == 0 || kind > static_cast<std::uint8_t>(InstrumentKind::mesh))
     return std::nullopt;
   const auto vector = [&](const char* name) {
     const auto [x, y, z] = read_row<3>(group, name, {3}, row);
@@ -252,6 +279,8 @@ std::optional<ResultInstrument> read_instrument(const hdf5::Group& group, std::u
   group.dataset("touched", hdf5::Number::uint32)
       .read_rows(row, std::span<std::uint32_t>(&touched, 1));
   read.touched = touched;
+  if (read.kind == InstrumentKind::mesh)
+    read.surface = read_shown(group.group("surfaces"), frame);
   return read;
 }
 
@@ -285,7 +314,7 @@ std::vector<ResultInstrument> read_result_instruments(const std::string& path, s
     const auto first = group.number<std::uint64_t>("first_frame");
     if (frame < first)
       continue;
-    if (std::optional<ResultInstrument> there = read_instrument(group, frame - first)) {
+    if (std::optional<ResultInstrument> there = read_instrument(group, frame - first, frame)) {
       there->name = name;
       found.push_back(std::move(*there));
     }

@@ -58,10 +58,12 @@ struct ResultInstrument {
   Vec3 place;
   Vec3 force, torque; ///< 1e-6 N, and 1e-9 N m about its place
   std::uint64_t touched = 0;
+  /// Of a mesh: what it is shown as, where it stands, and its normals in its own coordinates.
+  TriangleMesh surface{};
 };
 /// Those that are there then, in the order of the scene, and of a kind that is known here.
-/// \throw Error, place = path; if there is no such frame, a number is beyond 1e100 or a
-/// pose no rotation
+/// \throw Error, place = path; if there is no such frame, a number is beyond 1e100, a
+/// pose no rotation or a mesh without its surface
 std::vector<ResultInstrument> read_result_instruments(const std::string& path, std::size_t frame);
 
 /// The fields of a result: "displacement", its length in mm; "von-mises", the equivalent stress of

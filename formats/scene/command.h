@@ -25,6 +25,7 @@ struct ChangeCommand {
   std::optional<Selector> nodes{}, others{};
   bool total = false;  ///< a force is divided among the nodes
   std::string stage{}; ///< file of the second stage's model; none: ""
+  std::string mesh{};  ///< file of an instrument's mesh; none: ""
 };
 /// Writes the model as it is now, at rest.
 struct EmitModelCommand {

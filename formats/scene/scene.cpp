@@ -154,32 +154,6 @@ What parse_release(Words& in) {
   return parse_about(in, Release{});
 }
 
-What parse_instrument(Words& in) {
-  SetInstrument set;
-  set.name = in.name();
-  const std::string& kind = in.word("shape");
-  if (kind != "blade" && kind != "sphere" && kind != "capsule")
-    in.fail(shown(kind) + " is no shape");
-  set.shape.blade = kind == "blade";
-  set.shape.radius = 0;
-  if (!set.shape.blade) {
-    set.shape.radius = in.number("radius");
-    if (!(set.shape.radius > 0))
-      in.fail("a radius that is not positive");
-  }
-  set.pose.place = in.vector("number");
-  if (kind != "sphere")
-    set.shape.axis = in.vector("number") - set.pose.place;
-  if (set.shape.blade && set.shape.axis == Vec3{})
-    in.fail("an edge without length");
-  if (!set.shape.blade && in.take("friction"))
-    set.shape.friction = in.number("friction");
-  if (!(set.shape.friction >= 0))
-    in.fail("a negative friction");
-  std::string name = set.name;
-  return ChangeCommand{.change = std::move(set), .instrument = std::move(name)};
-}
-
 /// A quaternion, or the degrees of a turn about an axis.
 std::optional<Quaternion> parse_turn(Words& in) {
   if (in.take("turn")) {
@@ -197,6 +171,57 @@ std::optional<Quaternion> parse_turn(Words& in) {
   if (q == Quaternion{0, 0, 0, 0})
     in.fail("a quaternion of length 0");
   return unit(q);
+}
+
+/// Its friction, which all but blades may have.
+void parse_friction(Words& in, InstrumentShape& shape) {
+  if (!shape.blade && in.take("friction"))
+    shape.friction = in.number("friction");
+  if (!(shape.friction >= 0))
+    in.fail("a negative friction");
+}
+
+/// The rest of a mesh's line; its radius stays 0 where none is said.
+What parse_mesh(Words& in, SetInstrument set) {
+  ChangeCommand c;
+  c.instrument = set.name;
+  c.mesh = in.word("file");
+  set.shape.radius = 0;
+  if (std::optional<std::string> radius = in.take_after("radius=")) {
+    set.shape.radius = in.number_in(*radius, "radius");
+    if (!(set.shape.radius > 0))
+      in.fail("a radius that is not positive");
+  }
+  set.pose.place = in.vector("number");
+  set.pose.turn = parse_turn(in).value_or(Quaternion{});
+  parse_friction(in, set.shape);
+  c.change = std::move(set);
+  return c;
+}
+
+What parse_instrument(Words& in) {
+  SetInstrument set;
+  set.name = in.name();
+  const std::string& kind = in.word("shape");
+  if (kind == "mesh")
+    return parse_mesh(in, std::move(set));
+  if (kind != "blade" && kind != "sphere" && kind != "capsule")
+    in.fail(shown(kind) + " is no shape");
+  set.shape.blade = kind == "blade";
+  set.shape.radius = 0;
+  if (!set.shape.blade) {
+    set.shape.radius = in.number("radius");
+    if (!(set.shape.radius > 0))
+      in.fail("a radius that is not positive");
+  }
+  set.pose.place = in.vector("number");
+  if (kind != "sphere")
+    set.shape.axis = in.vector("number") - set.pose.place;
+  if (set.shape.blade && set.shape.axis == Vec3{})
+    in.fail("an edge without length");
+  parse_friction(in, set.shape);
+  std::string name = set.name;
+  return ChangeCommand{.change = std::move(set), .instrument = std::move(name)};
 }
 
 What parse_move(Words& in) {
@@ -348,7 +373,8 @@ const std::array<Verb, 29>& verbs() {
       {"release", "release NAME NODES", true, parse_release},
       {"instrument",
        "instrument NAME sphere R x y z [friction MU], instrument NAME capsule R x y z x y z "
-       "[friction MU] or instrument NAME blade x y z x y z",
+       "[friction MU], instrument NAME mesh FILE [radius=R] x y z [turn ax ay az DEGREES|"
+       "quaternion w x y z] [friction MU] or instrument NAME blade x y z x y z",
        true, parse_instrument},
       {"move", "move NAME x y z [turn ax ay az DEGREES|quaternion w x y z] [over T]", true,
        parse_move},

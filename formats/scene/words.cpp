@@ -28,6 +28,12 @@ bool Words::take(std::string_view word) {
   return same;
 }
 
+std::optional<std::string> Words::take_after(std::string_view start) {
+  if (done() || !words_[at_].starts_with(start) || words_[at_].size() == start.size())
+    return std::nullopt;
+  return words_[at_++].substr(start.size());
+}
+
 double Words::number(const char* what) {
   return number_in(word(what), what);
 }

@@ -5,6 +5,7 @@
 #include "model/selector.h"
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,6 +28,8 @@ public:
   const std::string& word(const char* what);
   /// Takes the next word if it is this one.
   bool take(std::string_view word);
+  /// What follows `start` in the next word, which is taken if it starts so and goes on.
+  std::optional<std::string> take_after(std::string_view start);
   /// \throw Error if the word is no number, or not finite
   double number(const char* what);
   /// The same of a text that is not a word of its own.

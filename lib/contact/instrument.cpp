@@ -1,5 +1,6 @@
 #include "contact/instrument.h"
 
+#include "contact/convex_core.h"
 #include "contact/load.h"
 
 #include <algorithm>
@@ -77,9 +78,10 @@ Pose PoseWay::at(double time) const {
 }
 
 InstrumentKind kind_of(const InstrumentShape& shape) {
-  return shape.blade            ? InstrumentKind::blade
-         : shape.axis == Vec3{} ? InstrumentKind::sphere
-                                : InstrumentKind::capsule;
+  return shape.blade             ? InstrumentKind::blade
+         : shape.core != nullptr ? InstrumentKind::mesh
+         : shape.axis == Vec3{}  ? InstrumentKind::sphere
+                                 : InstrumentKind::capsule;
 }
 
 const char* instrument_kind_name(InstrumentKind kind) {
@@ -88,14 +90,20 @@ const char* instrument_kind_name(InstrumentKind kind) {
     return "sphere";
   case InstrumentKind::capsule:
     return "capsule";
+  case InstrumentKind::mesh:
+    return "mesh";
   default:
     return "blade";
   }
 }
 
+double reach_of(const InstrumentShape& shape) {
+  return shape.core ? shape.core->reach() : norm(shape.axis);
+}
+
 PlacedInstrument::PlacedInstrument(const InstrumentShape& shape, const Pose& pose)
     : a(pose.place), ab(rotated(pose.turn, shape.axis)), radius(shape.radius),
-      friction(shape.friction) {
+      friction(shape.friction), core(shape.core), turn(pose.turn) {
   const double square = dot(ab, ab);
   inverse_square = square > 0 && std::isfinite(1 / square) ? 1 / square : 0;
 }
@@ -104,7 +112,23 @@ Vec3 PlacedInstrument::nearest(const Vec3& p) const {
   return a + std::clamp(dot(p - a, ab) * inverse_square, 0.0, 1.0) * ab;
 }
 
+double PlacedInstrument::distance(const Vec3& p) const {
+  return (core ? core->nearest(pose().inverse(p)).distance : norm(p - nearest(p))) - radius;
+}
+
+double PlacedInstrument::support(const Vec3& n) const {
+  if (!core)
+    return dot(n, a) + std::fmax(0, dot(n, ab)) + radius;
+  const Vec3 own = rotated_back(turn, n);
+  double most = -HUGE_VAL;
+  for (const Vec3& corner : core->corners())
+    most = std::fmax(most, dot(own, corner));
+  return dot(n, a) + most + radius;
+}
+
 Vec3 PlacedInstrument::normal(const Vec3& p, const Vec3& wish) const {
+  if (core)
+    return rotated(turn, core->nearest(pose().inverse(p)).normal);
   const Vec3 out = p - nearest(p);
   const double size = norm(out);
   if (size > 1e-9 * radius)
@@ -118,10 +142,16 @@ Vec3 PlacedInstrument::normal(const Vec3& p, const Vec3& wish) const {
 Box3 PlacedInstrument::box() const {
   const Vec3 r{radius, radius, radius};
   Box3 b;
-  for (const Vec3& end : {a, a + ab}) {
-    b.add(end - r);
-    b.add(end + r);
+  if (core) {
+    const Pose stands = pose();
+    for (const Vec3& corner : core->corners())
+      b.add(stands(corner));
+  } else {
+    b.add(a);
+    b.add(a + ab);
   }
+  b.min -= r;
+  b.max += r;
   return b;
 }
 
@@ -131,7 +161,7 @@ double path_length(const InstrumentShape& shape, const Pose& from, const Pose& t
   const Quaternion back{from.turn.w, -from.turn.x, -from.turn.y, -from.turn.z};
   const Quaternion by = from.turn == to.turn ? Quaternion{} : back * to.turn;
   const double sine = std::sqrt(by.x * by.x + by.y * by.y + by.z * by.z);
-  return norm(to.place - from.place) + 3.2 * sine * norm(shape.axis);
+  return norm(to.place - from.place) + 3.2 * sine * reach_of(shape);
 }
 
 } // namespace gewebe

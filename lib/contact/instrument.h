@@ -1,11 +1,13 @@
 #pragma once
-// Rigid instruments that touch objects: a sphere or a capsule (all points within a radius of a
-// segment), where it stands and how it moves; and blades, which push nothing. Both are convex, so
-// that for any unit vector n all that lies beyond the support plane n·y = support(n) is outside.
+// Rigid instruments that touch objects: a sphere, a capsule or a convex mesh (all points within a
+// radius of a point, a segment, a polyhedron), where it stands and how it moves; and blades, which
+// push nothing. All are convex, so that for any unit vector n all that lies beyond the support
+// plane n·y = support(n) is outside.
 
 #include "base/vec3.h"
 
 #include <cstdint>
+#include <memory>
 
 namespace gewebe {
 
@@ -48,39 +50,50 @@ struct PoseWay {
   bool operator==(const PoseWay&) const = default;
 };
 
-/// The origin is a sphere's centre, or the first end of a capsule's segment.
+class ConvexCore;
+
+/// The origin is a sphere's centre, the first end of a capsule's segment, or that of the mesh.
 struct InstrumentShape {
   double radius = 1;   ///< mm, > 0; of a blade 0
   Vec3 axis;           ///< from the first end to the second; 0: a sphere
   double friction = 0; ///< Coulomb's coefficient
   bool blade = false;  ///< an edge along the axis, without radius: it cuts what it sweeps over
+  /// Of a mesh, which the radius rounds outwards; its axis is 0.
+  std::shared_ptr<const ConvexCore> core{};
 };
 
 /// Numbers are those that results hold; 0 is none there.
-enum class InstrumentKind : std::uint8_t { sphere = 1, capsule = 2, blade = 3 };
+enum class InstrumentKind : std::uint8_t { sphere = 1, capsule = 2, blade = 3, mesh = 4 };
 InstrumentKind kind_of(const InstrumentShape& shape);
-/// "sphere", "capsule", "blade".
+/// "sphere", "capsule", "blade", "mesh".
 const char* instrument_kind_name(InstrumentKind kind);
+/// How far the origin's farthest point is, but for the radius.
+double reach_of(const InstrumentShape& shape);
 
 /// An instrument at one moment.
 struct PlacedInstrument {
   Vec3 a, ab;                ///< first end of the segment, and from there to the second
   double inverse_square = 0; ///< 1/|ab|², or 0
   double radius = 0, friction = 0;
+  std::shared_ptr<const ConvexCore> core; ///< of a mesh, whose origin is at `a`
+  Quaternion turn;                        ///< of a mesh
 
   PlacedInstrument() = default;
   PlacedInstrument(const InstrumentShape& shape, const Pose& pose);
 
-  /// The point of the segment nearest to p.
-  Vec3 nearest(const Vec3& p) const;
+  Pose pose() const { return {a, turn}; }
   /// Of p from the surface, below 0 inside.
-  double distance(const Vec3& p) const { return norm(p - nearest(p)) - radius; }
+  double distance(const Vec3& p) const;
   /// The largest n·y of all its points. \pre norm(n) == 1
-  double support(const Vec3& n) const { return dot(n, a) + std::fmax(0, dot(n, ab)) + radius; }
+  double support(const Vec3& n) const;
   /// Out of the surface nearest to p; where p is on the segment (within 1e-9 of the radius) any way
   /// out that is perpendicular to it, along `wish` as far as may be.
   Vec3 normal(const Vec3& p, const Vec3& wish = {}) const;
   Box3 box() const;
+
+private:
+  /// The point of the segment nearest to p.
+  Vec3 nearest(const Vec3& p) const;
 };
 
 /// No point of the shape moves further between the two poses than this.

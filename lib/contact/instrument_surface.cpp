@@ -1,5 +1,8 @@
 #include "contact/instrument_surface.h"
 
+#include "contact/convex_core.h"
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -87,12 +90,62 @@ InstrumentSurface round_surface(double radius, const Vec3& axis, std::size_t aro
   return surface;
 }
 
+InstrumentSurface hull_surface(const ConvexCore& core, double radius) {
+  InstrumentSurface surface;
+  std::vector<std::uint32_t> first; // point of each face
+  const auto point_of = [&](std::uint32_t face, std::uint32_t corner) {
+    const std::vector<std::uint32_t>& loop = core.faces()[face].corners;
+    return first[face] + static_cast<std::uint32_t>(std::ranges::find(loop, corner) - loop.begin());
+  };
+  for (const ConvexCore::Face& face : core.faces()) {
+    const auto at = static_cast<std::uint32_t>(surface.points.size());
+    first.push_back(at);
+    for (const std::uint32_t corner : face.corners) {
+      surface.points.push_back(core.corners()[corner] + radius * face.normal);
+      surface.normals.push_back(face.normal);
+    }
+    for (std::uint32_t k = 1; k + 1 < face.corners.size(); ++k)
+      surface.triangles.push_back({at, at + k, at + k + 1});
+  }
+  // Around a corner each edge goes from a face to the next one.
+  std::vector<std::vector<std::array<std::uint32_t, 2>>> around(core.corners().size());
+  for (const ConvexCore::Edge& e : core.edges()) {
+    const std::uint32_t a = point_of(e.left, e.a), b = point_of(e.left, e.b),
+                        c = point_of(e.right, e.b), d = point_of(e.right, e.a);
+    surface.triangles.push_back({b, a, d});
+    surface.triangles.push_back({b, d, c});
+    around[e.a].push_back({d, a});
+    around[e.b].push_back({b, c});
+  }
+  for (const std::vector<std::array<std::uint32_t, 2>>& steps : around) {
+    std::vector<std::uint32_t> loop{steps[0][0]};
+    for (std::size_t k = 1; k < steps.size(); ++k)
+      for (const auto& [from, to] : steps)
+        if (from == loop.back()) {
+          loop.push_back(to);
+          break;
+        }
+    for (std::size_t k = 1; k + 1 < loop.size(); ++k)
+      surface.triangles.push_back({loop[0], loop[k], loop[k + 1]});
+  }
+  return surface;
+}
+
+InstrumentSurface shown_surface(const InstrumentShape& shape, std::size_t around,
+                                std::size_t along) {
+  if (shape.core)
+    return hull_surface(*shape.core, shape.radius);
+  const double radius = shown_radius(shape);
+  return radius > 0 ? round_surface(radius, shape.axis, around, along) : InstrumentSurface{};
+}
+
 double shown_radius(const InstrumentShape& shape) {
   return shape.blade ? norm(shape.axis) / 100 : shape.radius;
 }
 
 bool same_surface(const InstrumentShape& a, const InstrumentShape& b) {
-  return a.radius == b.radius && a.axis == b.axis && a.blade == b.blade;
+  return a.radius == b.radius && a.axis == b.axis && a.blade == b.blade &&
+         (a.core == b.core || (a.core && b.core && *a.core == *b.core));
 }
 
 } // namespace gewebe

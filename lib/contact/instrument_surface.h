@@ -24,6 +24,15 @@ struct InstrumentSurface {
 InstrumentSurface round_surface(double radius, const Vec3& axis, std::size_t around,
                                 std::size_t along = 1);
 
+/// All points at a radius from a polyhedron: its faces moved out, strips along its edges and caps
+/// on its corners between them, flat but with the normals of the faces. Closed and oriented alike.
+InstrumentSurface hull_surface(const ConvexCore& core, double radius);
+
+/// What an instrument is shown as, around its own origin; none of a blade without length. \param
+/// around, along as round_surface has them
+InstrumentSurface shown_surface(const InstrumentShape& shape, std::size_t around,
+                                std::size_t along = 1);
+
 /// The radius that an instrument is shown with: its own; of a blade, which has none, a hundredth of
 /// its length.
 double shown_radius(const InstrumentShape& shape);

@@ -1,6 +1,7 @@
 #include "contact/surface_facets.h"
 
 #include "base/vector_at.h"
+#include "contact/box_blocks.h"
 
 #include <algorithm>
 #include <utility>
@@ -53,40 +54,11 @@ SurfaceFacets::SurfaceFacets(const Model& model) {
   for (const Facet& f : facets_)
     middle.push_back(model.nodes[f[0]].position + model.nodes[f[1]].position +
                      model.nodes[f[2]].position);
-  std::vector<std::uint32_t> order(facets_.size());
-  for (std::uint32_t k = 0; k < order.size(); ++k)
-    order[k] = k;
-  // Halved along the longest side until small; ties by number, so that the order is one.
-  std::vector<std::pair<std::size_t, std::size_t>> open{{0, order.size()}};
-  while (!open.empty()) {
-    const auto [begin, end] = open.back();
-    open.pop_back();
-    if (end - begin <= max_in_block) {
-      first_.push_back(begin);
-      continue;
-    }
-    Box3 box;
-    for (std::size_t k = begin; k < end; ++k)
-      box.add(middle[order[k]]);
-    const Vec3 size = box.size();
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const std::size_t half = begin + (end - begin) / 2;
-    const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
-    std::nth_element(at(begin), at(half), at(end), [&](std::uint32_t i, std::uint32_t j) {
-      const double a = middle[i][axis], b = middle[j][axis];
-      return a < b || (a == b && i < j);
-    });
-    open.emplace_back(begin, half);
-    open.emplace_back(half, end);
-  }
-  std::sort(first_.begin(), first_.end());
-  boxes_.resize(first_.size());
-  first_.push_back(order.size());
-  for (std::size_t b = 0; b < boxes_.size(); ++b)
-    std::sort(order.begin() + static_cast<std::ptrdiff_t>(first_[b]),
-              order.begin() + static_cast<std::ptrdiff_t>(first_[b + 1]));
+  BlockOrder blocks = block_order(middle, max_in_block);
+  first_ = std::move(blocks.first);
+  boxes_.resize(first_.size() - 1);
   std::vector<Facet> sorted;
-  for (const std::uint32_t k : order)
+  for (const std::uint32_t k : blocks.order)
     sorted.push_back(facets_[k]);
   facets_ = std::move(sorted);
   for (std::size_t b = 0; b < boxes_.size(); ++b) {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 // Based on: J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988
 // (contact by velocities); M. Jean, The non-smooth contact dynamics method, 1999.
@@ -26,7 +27,7 @@ Vec3 scaled(const Vec3& v, const Vec3& by) {
 
 Vec3 way_out(const PlacedInstrument& instrument, const MassPoints& points, const Facet& piece,
              const SurfacePoint& point) {
-  if (point.distance > 1e-9 * instrument.radius)
+  if (point.has_normal(1e-9 * instrument.radius))
     return point.normal({});
   Vec3 wish;
   for (std::size_t c = 0; c < 3; ++c)
@@ -67,6 +68,7 @@ void for_near(const MassPoints& points, std::span<const MovingCore> cores, doubl
     const double more = std::max(0.0, margin) * instrument.radius;
     box.min -= {more, more, more};
     box.max += {more, more, more};
+    std::vector<char> seen(instrument.core ? points.place.size() : 0); // by the whole of a mesh
     for (const Facet& whole : points.pieces) {
       if (!may_touch(box, corners_of(whole, points.place)))
         continue;
@@ -76,12 +78,17 @@ void for_near(const MassPoints& points, std::span<const MovingCore> cores, doubl
       });
       if (!left || held(points, *left))
         continue;
-      for_parts(instrument, *left, [&](CorePart part, const Facet& piece) {
-        const auto point =
-            nearest_points(instrument, part, corners_of(piece, points.place), corner_count(piece));
-        if (point && point->distance < (1 + margin) * instrument.radius && !held(points, piece))
-          visit(k, part, piece, *point);
-      });
+      for_parts(instrument, *left, corners_of(*left, points.place),
+                (1 + std::max(0.0, margin)) * instrument.radius,
+                [&](CorePart part, const Facet& piece) {
+                  if (part == CorePart::whole && std::exchange(seen[piece[0]], 1) != 0)
+                    return;
+                  const auto point = nearest_points(
+                      instrument, part, corners_of(piece, points.place), corner_count(piece));
+                  if (point && !point->behind &&
+                      point->distance < (1 + margin) * instrument.radius && !held(points, piece))
+                    visit(k, part, piece, *point);
+                });
     }
   }
 }

@@ -30,7 +30,7 @@ Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to)
   Box3 box = joined(box_at(shape, from), box_at(shape, to));
   if (from.turn == to.turn)
     return box;
-  const double reach = norm(shape.axis); // an end turns about the place
+  const double reach = reach_of(shape); // an end turns about the place
   return joined(box, {box.min - Vec3{reach, reach, reach}, box.max + Vec3{reach, reach, reach}});
 }
 

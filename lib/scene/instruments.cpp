@@ -157,7 +157,8 @@ std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t inst
 // ---- changes
 
 void Rule<SetInstrument>::check(World&, const SetInstrument& c) {
-  require_single({c.pose.place, c.shape.axis}, c.shape.radius);
+  require_single({c.pose.place, c.shape.axis},
+                 c.shape.core ? std::max(c.shape.radius, reach_of(c.shape)) : c.shape.radius);
 }
 void Rule<SetInstrument>::enter(World& w, const SetInstrument& c) {
   if (c.instrument == w.now.instruments.size())

@@ -113,7 +113,7 @@ private:
           std::array<Vec3, 3> corners = corners_of(p.piece, at_);
           corners[static_cast<std::size_t>(c)][a] += side;
           const auto found = nearest_points(instrument, p.part, corners, count);
-          if (!found || !(found->distance > 1e-3 * instrument.radius))
+          if (!found || !found->has_normal(1e-3 * instrument.radius))
             return std::nullopt;
           const Vec3 n = found->normal({});
           for (int d = 0; d < count; ++d)

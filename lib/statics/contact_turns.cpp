@@ -1,5 +1,6 @@
 #include "statics/contact_scene_internal.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -86,7 +87,8 @@ public:
         }
       }
       vain += exact ? 0 : 1;
-      const bool joined = join(turns_.at, outside);
+      const bool stopped = stop_before_core();
+      const bool joined = join(turns_.at, outside) || stopped;
       turns_.solved = exact && !joined && change <= fair_place;
       turns_.change = change;
       since_best = joined || change < 0.8 * best ? 0 : since_best + 1;
@@ -99,19 +101,19 @@ public:
       at_ = turns_.at;
       forces_ = next_forces_;
     }
-    turns_.solved = turns_.solved && !pierced();
+    turns_.solved = turns_.solved && !pierced(turns_.at);
     if (!turns_.solved)
       move_out();
   }
 
 private:
   /// Whether a core goes through a piece: no pair leads it out again.
-  bool pierced() const {
+  bool pierced(std::span<const Vec3> at) const {
     for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
       for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p)
         if (const Facet& piece = scene_.nodes.pieces[p];
             scene_.nodes.meet(k, p) && corner_count(piece) == 3 &&
-            goes_through(*scene_.placed[k], corners_of(piece, turns_.at)))
+            goes_through(*scene_.placed[k], corners_of(piece, at)))
           return true;
     return false;
   }
@@ -167,20 +169,22 @@ private:
         });
         if (!piece)
           continue;
-        for_parts(instrument, *piece, [&](CorePart part, const Facet& corners) {
-          const auto found =
-              nearest_points(instrument, part, corners_of(corners, at), corner_count(corners));
-          if (!found || !(found->distance < (1 - depth) * instrument.radius))
-            return;
-          TouchPair pair{k, part, corners, *found, {}, {}};
-          const auto there = std::ranges::lower_bound(turns_.pairs, key_of(pair), {}, key_of);
-          if (there != turns_.pairs.end() && key_of(*there) == key_of(pair))
-            return;
-          if (!movable(pair))
-            return;
-          turns_.pairs.insert(there, pair);
-          joined = true;
-        });
+        for_parts(
+            instrument, *piece, corners_of(*piece, at), instrument.radius,
+            [&](CorePart part, const Facet& corners) {
+              const auto found =
+                  nearest_points(instrument, part, corners_of(corners, at), corner_count(corners));
+              if (!found || found->behind || !(found->distance < (1 - depth) * instrument.radius))
+                return;
+              TouchPair pair{k, part, corners, *found, {}, {}};
+              const auto there = std::ranges::lower_bound(turns_.pairs, key_of(pair), {}, key_of);
+              if (there != turns_.pairs.end() && key_of(*there) == key_of(pair))
+                return;
+              if (!movable(pair))
+                return;
+              turns_.pairs.insert(there, pair);
+              joined = true;
+            });
       }
     }
     return joined;
@@ -208,7 +212,7 @@ private:
         continue;
       }
       p.point = *found;
-      const Vec3 normal = p.point.distance > 1e-9 * instrument.radius
+      const Vec3 normal = p.point.has_normal(1e-9 * instrument.radius)
                               ? p.point.normal({})
                               : instrument.normal(p.point.core, inward(p));
       if (dot(normal, p.normal) < 0) { // through: out the way it came
@@ -292,12 +296,50 @@ private:
       best = there;
       part = way;
     }
-    if (part != 1) {
-      for (std::size_t k = 0; k < scene_.nodes.moving; ++k)
-        turns_.at[k] = at_[k] + part * (turns_.at[k] - at_[k]);
-      next_forces_ = forces_ + part * (next_forces_ - forces_);
-    }
+    if (part != 1)
+      take(part);
     return part;
+  }
+
+  std::vector<Vec3> on_the_way(double part) const {
+    std::vector<Vec3> at(turns_.at);
+    for (std::size_t k = 0; k < scene_.nodes.moving; ++k)
+      at[k] = at_[k] + part * (turns_.at[k] - at_[k]);
+    return at;
+  }
+  /// This part of the last way alone.
+  void take(double part) {
+    turns_.at = on_the_way(part);
+    if (forces_.size() == 0) { // of the first turn: those that hold the nodes where it begins
+      const MatrixXd w = scene_.w;
+      forces_ = w.ldlt().solve(scene_.rows_of(at_) - scene_.rows_of(scene_.free));
+    }
+    next_forces_ = forces_ + part * (next_forces_ - forces_);
+  }
+
+  /// Less of the last way where it leads into a polyhedron, in which pairs of its edges and corners
+  /// don't tell the way out: what comes near on the way joins first. \return whether it does
+  bool stop_before_core() {
+    double reach = HUGE_VAL; // what is farther may pass all of one
+    for (const auto& placed : scene_.placed)
+      if (placed && placed->core)
+        reach = std::min(reach, placed->radius + 0.05 * placed->core->size());
+    if (!(reach < HUGE_VAL) || pierced(at_))
+      return false;
+    double far = 0;
+    for (std::size_t k = 0; k < scene_.nodes.moving; ++k)
+      far = std::max(far, norm(turns_.at[k] - at_[k]));
+    const double parts = std::ceil(std::clamp(far / reach, 1.0, 16.0));
+    double part = 0;
+    for (double n = 1; n <= parts && !pierced(on_the_way(n / parts)); ++n)
+      part = n / parts;
+    if (part == 1)
+      return false;
+    double step = 0.5 / parts;
+    for (; part == 0 && step > 1e-3 && pierced(on_the_way(step)); step /= 2) {
+    }
+    take(part > 0 ? part : step);
+    return true;
   }
 
   /// Forces of the active pairs, and where the nodes are under them.

@@ -25,19 +25,20 @@ constexpr std::size_t max_vain_pairs = 256;
 /// Of a piece from an instrument's core, the least.
 double distance_of(const PlacedInstrument& instrument, const Facet& piece,
                    const std::array<Vec3, 3>& corners) {
-  if (corner_count(piece) == 3 && goes_through(instrument, corners))
+  const bool through = corner_count(piece) == 3 && goes_through(instrument, corners);
+  if (through && !instrument.core)
     return 0;
-  double least = HUGE_VAL;
+  double least = through ? 0 : HUGE_VAL; // below 0 a corner of it is in a polyhedron
   for_parts(instrument,
             {0, piece[1] == piece[0] ? 0U : 1U,
              piece[1] == piece[0]   ? 0U
              : piece[2] == piece[1] ? 1U
                                     : 2U},
-            [&](CorePart part, const Facet& some) {
+            corners, instrument.radius, [&](CorePart part, const Facet& some) {
               const auto found = nearest_points(
                   instrument, part, {corners[some[0]], corners[some[1]], corners[some[2]]},
                   corner_count(some));
-              if (found && !(found->distance >= least))
+              if (found && !found->behind && !(found->distance >= least))
                 least = found->distance;
             });
   return least;
@@ -212,7 +213,7 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
       }
       solved_ = turns.solved;
       if (turns.stuck && !stuck_) {
-        const auto& [weights, place, core, distance] = turns.stuck->point;
+        const std::array<double, 3>& weights = turns.stuck->point.weights;
         const auto most = std::ranges::max_element(weights) - weights.begin();
         stuck_ = NodeTouch{node_of(turns.stuck->piece[static_cast<std::size_t>(most)]),
                            turns.stuck->instrument,

@@ -25,10 +25,14 @@ inline double surface_depth(const Model& model, std::span<const double> u,
     for (const std::uint32_t i : f)
       if (model.nodes[i].fixed != fixed_none)
         return;
-    for_parts(placed, f, [&](CorePart part, const Facet& piece) {
+    const std::array<Vec3, 3> corners{place(f[0]), place(f[1]), place(f[2])};
+    if (placed.core && goes_through(placed, corners))
+      least = smaller(least, 0.0);
+    for_parts(placed, f, corners, 2 * placed.radius, [&](CorePart part, const Facet& piece) {
       if (const auto found =
               nearest_points(placed, part, {place(piece[0]), place(piece[1]), place(piece[2])},
-                             corner_count(piece)))
+                             corner_count(piece));
+          found && !found->behind)
         least = smaller(least, found->distance);
     });
   };

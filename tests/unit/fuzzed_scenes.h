@@ -7,12 +7,14 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "base/number_text.h"
+#include "contact/convex_core.h"
 #include "model/build.h"
 #include "model/primitive.h"
 #include "solid/model_stiffness.h"
 #include "solid/solid_model.h"
 #include "solve/condition.h"
 #include "tests/bench/memory_columns.h"
+#include "tests/unit/convex_meshes.h"
 #include "tests/unit/fuzzed_door.h"
 #include "tests/unit/scratch.h"
 #include "tests/unit/simulation_scenes.h"
@@ -213,7 +215,7 @@ private:
   }
 
   std::string instrument() {
-    static const std::vector<std::string> names{"p", "q", "k"};
+    static const std::vector<std::string> names{"p", "q", "k", "j"};
     return instruments_.empty() || one_in(6) ? of(names) : of(instruments_);
   }
   /// Each shape has its name.
@@ -229,6 +231,11 @@ private:
       return new_instrument("k") + " blade " + (one_in(20) ? triple(1e300) : numbers(at)) + " " +
              numbers(at + vector(size));
     const std::string friction = one_in(2) ? " friction " + number_text(real(0, 1.5)) : "";
+    if (one_in(4))
+      return new_instrument("j") + " mesh jaw" + std::to_string(1 + below(4)) + ".ply" +
+             (one_in(2) ? " radius=" + number_text(real(0.01, 0.2) * size) : "") + " " +
+             numbers(at) + (one_in(2) ? " turn " + numbers(vector(1)) + " " + number(180) : "") +
+             friction;
     const std::string radius = one_in(30) ? number(1e3) : number_text(real(0.05, 0.4) * size);
     if (one_in(2))
       return new_instrument("q") + " capsule " + radius + " " + numbers(at) + " " +
@@ -484,6 +491,16 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   };
   options.files.second_stage = [&](const std::string& name, const Model&) {
     return [file = base(name)] { return compliance_of_store(fuzzed_store(file, 4)); };
+  };
+  options.files.instrument = [&](const std::string& name, InstrumentShape shape) {
+    const int kind = base(name)[3] - '0';
+    TriangleMesh mesh = kind < 3 ? divided_box({8, 4, 0.5 + kind}, 2) : icosphere(5, 1);
+    if (kind == 4) // dented
+      mesh.points[0] *= 0.5;
+    shape.core = std::make_shared<const ConvexCore>(mesh);
+    if (!(shape.radius > 0))
+      shape.radius = shape.core->size() / 100;
+    return shape;
   };
   options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
   const std::string shapes = serve ? ScratchFile(".shapes").path() : "";

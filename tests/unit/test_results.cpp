@@ -1,4 +1,7 @@
 #include "base/error.h"
+#include "contact/convex_core.h"
+#include "contact/instrument_surface.h"
+#include "convex_meshes.h"
 #include "formats/mesh/ply.h"
 #include "formats/results/results.h"
 #include "formats/results/results_writer.h"
@@ -19,6 +22,7 @@
 #include <functional>
 #include <gtest/gtest.h>
 #include <iterator>
+#include <memory>
 #include <sstream>
 #include <string>
 
@@ -105,6 +109,12 @@ void write_instruments(Kind kind, const std::string& path, const Model& model) {
   all.push_back(
       {"knife", true, {.radius = 0, .axis = {0, 0, 8}, .blade = true}, {}, {}, {}, {}, 0});
   add(4);
+  InstrumentShape jaw{0.25, {}, 0};
+  jaw.core = std::make_shared<const ConvexCore>(test::divided_box({2, 3, 4}, 2));
+  all[1] = {"knife", true, jaw, turned, {}, {}, {}, 0};
+  add(5);
+  all[1].pose.place.x += 1;
+  add(6);
   result->commit();
 }
 
@@ -132,7 +142,21 @@ TEST(Results, InstrumentsAreReadAsTheyWereWritten) {
   EXPECT_LT(norm(last[0].ends[1] - Vec3{5, 4, 1}), 1e-15);
   EXPECT_LT(norm(last[0].rotation[1] - Vec3{1, 0, 0}), 1e-15);
   EXPECT_EQ(last[1].kind, InstrumentKind::blade);
-  EXPECT_THROW((void)read_result_instruments(path, 5), Error);
+  const std::vector<ResultInstrument> mesh = read_result_instruments(path, 6);
+  ASSERT_EQ(mesh.size(), 2U);
+  EXPECT_EQ(mesh[1].kind, InstrumentKind::mesh);
+  EXPECT_EQ(mesh[1].radius, 0.25);
+  EXPECT_TRUE(mesh[0].surface.points.empty());
+  const InstrumentSurface shown = hull_surface(ConvexCore(test::divided_box({2, 3, 4}, 2)), 0.25);
+  const Pose stands{{6, 0, 1}, turn_about({0, 0, 1}, 90)};
+  ASSERT_EQ(mesh[1].surface.points.size(), shown.points.size());
+  EXPECT_EQ(mesh[1].surface.triangles, shown.triangles);
+  for (std::size_t i = 0; i < shown.points.size(); ++i) {
+    EXPECT_LT(norm(mesh[1].surface.points[i] - stands(shown.points[i])), 1e-6);
+    const auto& [x, y, z] = mesh[1].surface.normals[i];
+    EXPECT_LT(norm(Vec3{x, y, z} - shown.normals[i]), 1e-6);
+  }
+  EXPECT_THROW((void)read_result_instruments(path, 7), Error);
   // Nothing of it where there are none, whose bytes are those of before.
   write(Kind::hdf5, folder / "bare.h5", test::organ(1), test::two_masses());
   EXPECT_TRUE(read_result_index(folder / "bare.h5").instruments.empty());

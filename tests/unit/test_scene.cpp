@@ -126,6 +126,14 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(capsule.shape.axis, (Vec3{0, 5, 0})); // from one end to the other
   EXPECT_EQ(capsule.shape.friction, 0.3);
   EXPECT_EQ(change<SetInstrument>("instrument k sphere 4 1 2 3").shape.axis, Vec3{});
+  const auto mesh = change<SetInstrument>(
+      "instrument k mesh jaw.ply radius=0.5 1 2 3 turn 0 0 2 90 friction 0.3");
+  EXPECT_EQ(mesh.shape.radius, 0.5);
+  EXPECT_EQ(mesh.shape.friction, 0.3);
+  EXPECT_EQ(mesh.pose.place, (Vec3{1, 2, 3}));
+  EXPECT_EQ(mesh.pose.turn, turn_about({0, 0, 1}, 90));
+  EXPECT_EQ(said("at 2 instrument k mesh \"a jaw.ply\" 1 2 3").mesh, "a jaw.ply");
+  EXPECT_EQ(change<SetInstrument>("instrument k mesh jaw.ply 1 2 3").shape.radius, 0);
   const auto move = change<MoveInstrument>("move k 1 2 3 quaternion 2 0 0 0 over 0.5");
   EXPECT_EQ(move.place, (Vec3{1, 2, 3}));
   EXPECT_EQ(move.turn, (Quaternion{1, 0, 0, 0}));

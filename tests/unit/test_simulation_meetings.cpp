@@ -276,7 +276,12 @@ TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
     add(s, "above", block(2, 2, 1, {3.7, 4.1, 4.1}));
     s.apply(SetTimestep{1.0 / 600});
     s.apply(SetContact{0, 1, 0.3});
-    s.apply(SetInstrument{0, {6, {}, friction}, {{7.7, 8.1, 14.3}, {}}, "probe"});
+    SetInstrument ball;
+    ball.name = "probe";
+    ball.shape.radius = 6;
+    ball.shape.friction = friction;
+    ball.pose.place = {7.7, 8.1, 14.3};
+    s.apply(ball);
     s.apply(MoveInstrument{0, {7.7, 8.1, 13.1}, {}, 0.1});
     for (int k = 0; k < 12; ++k) {
       s.step(1.0 / 60);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Random instruments on organs, judged by what ffe-run answers alone.
 
-  instruments.py [--count N] [--seed S] [--data FOLDER] [--keep FOLDER] [--only WORD]
+  instruments.py [--count N] [--seed S] [--data FOLDER] [--keep FOLDER] [--only WORD] [--meshes]
 
-Spheres and capsules from half an edge up, with and without friction, are pressed into organs and drawn along them, by
-both methods. From each answer (forces, shapes, instruments) this script finds for itself, by its own geometry,
+Spheres, capsules and convex meshes from half an edge up, with and without friction, are pressed into organs and drawn along
+them, by both methods. From each answer (forces, shapes, instruments) this script finds for itself, by its own geometry,
 
   depth            how deep the surface is in the instrument, over its radius
   cone             how far the forces at nodes are from any sum of pushes within the cones of friction at the points where
@@ -115,6 +115,76 @@ def near_points(corners, a, b):
             if np.linalg.norm(w[0] @ corners[k] - p) < 1e-9 * np.linalg.norm(b - a):
                 add(every[k : k + 1], w, p)
     return np.concatenate(index), np.concatenate(weights), np.concatenate(cores)
+
+
+# --- Geometry: convex meshes --------------------------------------------------------------------------------------------
+
+
+class Hull:
+    """The triangles around points, of which each is a corner."""
+
+    def __init__(self, points):
+        count, faces = len(points), []
+        for i in range(count):
+            for j in range(i + 1, count):
+                for k in range(j + 1, count):
+                    normal = np.cross(points[j] - points[i], points[k] - points[i])
+                    height = np.delete((points - points[i]) @ normal, [i, j, k])
+                    if height.max() < 0:
+                        faces.append((i, j, k))
+                    elif height.min() > 0:
+                        faces.append((i, k, j))
+        self.faces = np.array(faces)
+        used = np.unique(self.faces)
+        self.points, self.faces = points[used], np.searchsorted(used, self.faces)
+        self.edges = np.array(sorted({tuple(sorted((int(f[k]), int(f[k - 1])))) for f in self.faces for k in range(3)}))
+
+    def text(self):
+        rows = [numbers(p) for p in self.points] + ["3 " + " ".join(map(str, f)) for f in self.faces]
+        return "\n".join(["OFF", f"{len(self.points)} {len(self.faces)} 0"] + rows) + "\n"
+
+
+def near_hull(corners, hull, points):
+    """As near_points, of a hull whose corners are at `points`; and which triangles come into it, how deep."""
+    n, every = len(corners), np.arange(len(corners))
+    index, weights, cores = [], [], []
+    for p in points:
+        index.append(every)
+        weights.append(on_triangles(p, corners))
+        cores.append(np.broadcast_to(p, (n, 3)))
+    faces = points[hull.faces]
+    for i in range(3):  # corners of the triangles and faces
+        for k in range(n):
+            w = on_triangles(corners[k, i], faces)
+            index.append(np.full(len(faces), k))
+            weights.append(np.tile(np.eye(3)[i], (len(faces), 1)))
+            cores.append(np.einsum("nk,nkd->nd", w, faces))
+    for a, b in hull.edges:
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            s, t = between_segments(np.broadcast_to(points[a], (n, 3)), np.broadcast_to(points[b], (n, 3)), corners[:, i],
+                                    corners[:, j])
+            there = ~np.isnan(s)
+            w = np.zeros((there.sum(), 3))
+            w[:, i], w[:, j] = 1 - t[there], t[there]
+            index.append(every[there])
+            weights.append(w)
+            cores.append(points[a] + s[there, None] * (points[b] - points[a]))
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    deep = np.zeros(n)
+    for k in range(n):  # what is left of it behind each face
+        left = list(corners[k])
+        for normal, face in zip(normals, faces):
+            height = [normal @ (p - face[0]) for p in left]
+            left = [q for m in range(len(left)) for q in
+                    ([left[m]] if height[m] < 0 else [])
+                    + ([left[m] + height[m] / (height[m] - height[m - len(left) + 1]) * (left[m - len(left) + 1] - left[m])]
+                       if (height[m] < 0) != (height[m - len(left) + 1] < 0) else [])]
+            if not left:
+                break
+        if left:
+            deep[k] = max(min(normal @ (face[0] - p) for normal, face in zip(normals, faces)) for p in left)
+    return np.concatenate(index), np.concatenate(weights), np.concatenate(cores), deep
 
 
 # --- Forces: the nearest sum of pushes within cones -------------------------------------------------------------------
@@ -258,7 +328,8 @@ def numbers(*values):
 class Case:
     """An instrument on its way: lines of a scene, and where it is at each of its steps."""
 
-    def __init__(self, body, random):
+    def __init__(self, body, random, mesh):
+        self.mesh = mesh
         while not self.drawn(body, random):
             pass
 
@@ -272,32 +343,38 @@ class Case:
         out = normals[at] / areas[at]
         self.radius = m.edge * np.exp(random.uniform(np.log(0.5), np.log(3)))
         self.friction = 0 if random.random() < 0.4 else random.uniform(0.05, 0.8)
-        self.axis = np.zeros(3)
-        if random.random() < 0.5:
+        self.axis, self.hull = np.zeros(3), None
+        if self.mesh:
+            self.draw_hull(random)
+        elif random.random() < 0.5:
             way = random.normal(size=3)
             way -= random.uniform(0.3, 1) * (way @ out) * out
             self.axis = random.uniform(1, 6) * self.radius * way / np.linalg.norm(way)
         point = random.dirichlet([1, 1, 1]) @ corners[at]
-        depth = random.uniform(0.05, 0.6) * min(self.radius, 3 * m.edge)
+        self.core = np.stack([np.zeros(3), self.axis]) if not self.hull else self.hull.points
+        lowest = -(self.core @ out).min() if self.hull else 0
+        depth = random.uniform(0.05, 0.6) * min(self.radius + (lowest if self.hull else 0), 3 * m.edge)
         aside = np.cross(out, random.normal(size=3))
         aside *= random.uniform(0, 2) * m.edge / np.linalg.norm(aside)
-        self.turn = (random.normal(size=3), random.uniform(0, 20) if self.axis.any() and random.random() < 0.5 else 0.0)
-        start = point - self.axis / 2 + out * self.radius
-        while self.clearance(m, m.rest, start, self.axis) < 0:
-            start = start + 0.2 * self.radius * out
-        pressed = point - self.axis / 2 + out * (self.radius - depth)
+        self.turn = (random.normal(size=3), random.uniform(0, 20) if self.core.any() and random.random() < 0.5 else 0.0)
+        start = point - self.axis / 2 + out * (self.radius + lowest)
+        while self.clearance(m, m.rest, start, self.core) < 0:
+            start = start + 0.2 * (self.radius + lowest) * out
+        pressed = point - self.axis / 2 + out * (self.radius + lowest - depth)
         held = m.rest[m.fixed & m.surface]
+        reach = np.linalg.norm(self.core, axis=1).max() if self.hull else 0
         for place in (start, pressed, pressed + aside):
             foot = on_segment(held, place, place + self.axis)
             far = np.linalg.norm(place + foot[:, None] * self.axis - held, axis=1)
-            if far.min(initial=np.inf) < self.radius + 2 * m.edge:
+            if far.min(initial=np.inf) < self.radius + reach + 2 * m.edge:
                 return False
         shape = "capsule" if self.axis.any() else "sphere"
         ends = numbers(start, start + self.axis) if self.axis.any() else numbers(start)
+        what = f"mesh {{mesh}} radius={numbers(self.radius)}" if self.hull else f"{shape} {numbers(self.radius)}"
         self.lines = [f"object organ {body.path} {body.words}".rstrip(), "emit forces", "emit shapes", "emit instruments",
-                      f"instrument probe {shape} {numbers(self.radius)} {ends}"
+                      f"instrument probe {what} {ends}"
                       + (f" friction {numbers(self.friction)}" if self.friction else "")]
-        self.axes, self.strict = [], []
+        self.cores, self.strict = [], []
         for k in range(1, body.steps + 1):
             x = k / body.steps
             down, along = min(1.0, 2 * x), max(0.0, 2 * x - 1)
@@ -306,39 +383,60 @@ class Case:
             turn = f" turn {numbers(self.turn[0], angle)}" if self.turn[1] else ""
             self.lines += [f"move probe {numbers(place)}{turn}" + (f" over {body.step}" if body.over else ""),
                            f"step {body.step}"]
-            self.axes.append(turned(self.turn[0], angle, self.axis))
+            self.cores.append(np.array([turned(self.turn[0], angle, p) for p in self.core]))
             self.strict.append(not body.moment)
             if body.moment:  # one step of integration, whose forces are those of where it ends
                 self.lines.append(f"step {body.moment}")
-                self.axes.append(self.axes[-1])
+                self.cores.append(self.cores[-1])
                 self.strict.append(True)
         return True
 
-    def clearance(self, m, shape, place, axis):
+    def draw_hull(self, random):
+        """A jaw, tapered and a little crooked, or the hull of some points; rounded by a part of its size."""
+        size = 2 * self.radius
+        if random.random() < 0.5:
+            box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+            box *= np.where(box[:, :1] > 0, random.uniform(0.5, 0.9), 1)
+            points = box * size * np.array([random.uniform(1, 2.5), random.uniform(0.4, 1), random.uniform(0.2, 0.5)])
+            points += 0.01 * size * random.normal(size=points.shape)
+        else:
+            points = random.normal(size=(random.integers(5, 13), 3))
+            points *= size / np.linalg.norm(points, axis=1)[:, None] * random.uniform(0.3, 1, size=3)
+        turn, angle = random.normal(size=3), random.uniform(0, 180)
+        self.hull = Hull(np.array([turned(turn, angle, p) for p in points]))
+        self.radius = size * np.exp(random.uniform(np.log(0.03), np.log(0.3)))
+
+    def clearance(self, m, shape, place, core):
         """Of triangles that can give way, and their pairs of nearest points with the distances."""
-        near = self.near(m, shape, place, axis)
+        near = self.near(m, shape, place, core)
         return near[0] - self.radius if near else np.inf
 
-    def near(self, m, shape, place, axis):
-        corners = shape[m.triangles]
-        low, high = np.minimum(place, place + axis), np.maximum(place, place + axis)
+    def near(self, m, shape, place, core):
+        corners, points = shape[m.triangles], place + core
         reach = 1.05 * self.radius
-        close = np.flatnonzero(((corners.min(axis=1) <= high + reach) & (corners.max(axis=1) >= low - reach)).all(axis=1))
+        low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
+        close = np.flatnonzero(((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(axis=1))
         if not len(close):
             return None
-        index, weights, cores = near_points(corners[close], place, place + axis)
+        deep = np.zeros(len(close))
+        if self.hull:
+            index, weights, cores, deep = near_hull(corners[close], self.hull, points)
+        else:
+            index, weights, cores = near_points(corners[close], points[0], points[1])
         places = np.einsum("nk,nkd->nd", weights, corners[close][index])
         far = np.linalg.norm(places - cores, axis=1)
         # A triangle with a corner that is held in the instrument can't leave it.
         held = m.fixed[m.triangles[close]].any(axis=1)
         least = far[~held[index]].min(initial=np.inf)
+        if (deep[~held] > 0).any():
+            least = -deep[~held].max()
         return least, far, close[index], weights, places, cores
 
 
-def judge(case, m, step, axis, began=None):
+def judge(case, m, step, core, began=None):
     """What a step breaks. Explicit steps push where they began, by that shape."""
     found = {"depth": 0.0, "cone": 0.0, "apart": 0.0, "sum": 0.0, "nodes": len(step["forces"])}
-    near = case.near(m, step["shape"], step["place"], axis)
+    near = case.near(m, step["shape"], step["place"], core)
     if near:
         found["depth"] = 1 - near[0] / case.radius
     forces = {node: f for node, f in step["forces"].items() if f.any()}
@@ -353,7 +451,7 @@ def judge(case, m, step, axis, began=None):
         touched.update(m.triangles[triangles[far <= (1 + TOUCH) * case.radius]].ravel())
     reach = TOUCH
     if began is not None:
-        near, reach = case.near(m, began, step["place"], axis), MAY_COME
+        near, reach = case.near(m, began, step["place"], core), MAY_COME
     if near:
         _, far, triangles, weights, places, cores = near
         for k in np.flatnonzero((far <= (1 + reach) * case.radius) & (far > 0)):
@@ -434,6 +532,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--data", type=pathlib.Path)
     parser.add_argument("--keep", type=pathlib.Path, help="models, and the scenes that break a bound")
+    parser.add_argument("--meshes", action="store_true", help="convex meshes in place of spheres and capsules")
     parser.add_argument("--only", default="", help="bodies whose names hold this word")
     parser.add_argument("--case", type=int, help="this one alone of each body, and its steps")
     options = parser.parse_args()
@@ -456,9 +555,13 @@ def main():
             worst = dict.fromkeys(("depth", "cone", "apart", "sum"), 0.0)
             tally = dict.fromkeys(("steps", "touched", "inexact", "failed", "broken"), 0)
             for k in range(count) if options.case is None else [options.case]:
-                case = Case(body, np.random.default_rng([options.seed, number, k]))
+                random = np.random.default_rng([options.seed, number, k] + [1] * options.meshes)
+                case = Case(body, random, options.meshes)
                 scene = folder / f"{body.path.stem}-{k}.scene"
-                scene.write_text("\n".join(case.lines) + "\n")
+                mesh = scene.with_suffix(".off")
+                if case.hull:
+                    mesh.write_text(case.hull.text())
+                scene.write_text("\n".join(case.lines).format(mesh=mesh.name) + "\n")
                 try:
                     ran = subprocess.run(["ffe-run", "-j", "1", str(scene)], capture_output=True, text=True, timeout=LONG)
                 except subprocess.TimeoutExpired:
@@ -474,7 +577,7 @@ def main():
                     wrong.append((ran.stderr.splitlines() or [f"status {ran.returncode}"])[-1])
                 for s, step in enumerate(steps):
                     began = steps[s - 1]["shape"] if body.explicit and s > 0 else None
-                    found = judge(case, body.model, step, case.axes[s], began)
+                    found = judge(case, body.model, step, case.cores[s], began)
                     tally["steps"] += 1
                     tally["touched"] += found["nodes"] > 0
                     if options.case is not None:
@@ -493,6 +596,7 @@ def main():
                     broken.append((scene, "inexact" if inexact else "failed" if ran.returncode else "broken", wrong))
                 else:
                     scene.unlink()
+                    mesh.unlink(missing_ok=True)
             cases, told = cases + count, told + tally["inexact"]
             widths = {"steps": 7, "touched": 8, "inexact": 8, "failed": 7, "broken": 7}
             print(f"{body.name:34}{count:6}" + "".join(f"{tally[t]:{w}}" for t, w in widths.items())

@@ -83,7 +83,7 @@ std::size_t pieces_along(double length, double radius) {
   return static_cast<std::size_t>(std::clamp(std::ceil(length / (2 * radius)), 1.0, most));
 }
 
-Surface instrument_surface(const ResultInstrument& of, std::size_t ring) {
+Surface instrument_surface(ResultInstrument of, std::size_t ring) {
   const Vec3 along = of.ends[1] - of.ends[0];
   // Back into its own coordinates.
   const auto& m = of.rotation;
@@ -92,14 +92,26 @@ Surface instrument_surface(const ResultInstrument& of, std::size_t ring) {
   const double radius = shown_radius({of.radius, axis, of.friction, blade});
   Surface surface;
   surface.instrument = true;
+  const auto rotated = [&](const Vec3& r) {
+    return Vec3{dot(m[0], r), dot(m[1], r), dot(m[2], r)};
+  };
+  if (of.kind == InstrumentKind::mesh) {
+    surface.mesh = std::move(of.surface);
+    for (std::array<float, 3>& own : surface.mesh.normals) {
+      const Vec3 n = rotated({own[0], own[1], own[2]});
+      own = {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)};
+    }
+    for (const Vec3& p : surface.mesh.points) {
+      const Vec3 r = p - of.place;
+      surface.rest.push_back(m[0] * r.x + m[1] * r.y + m[2] * r.z);
+    }
+    return surface;
+  }
   if (!(radius > 0))
     return surface;
   InstrumentSurface own = sphere
                               ? round_surface(radius, {}, ring)
                               : round_surface(radius, axis, ring, pieces_along(norm(axis), radius));
-  const auto rotated = [&](const Vec3& r) {
-    return Vec3{dot(m[0], r), dot(m[1], r), dot(m[2], r)};
-  };
   for (std::size_t i = 0; i < own.points.size(); ++i) {
     surface.mesh.points.push_back(of.place + rotated(own.points[i]));
     const Vec3 n = rotated(own.normals[i]);
@@ -140,8 +152,8 @@ std::vector<Surface> read_result_surfaces(const Input& input, const SurfaceReadO
   if (options.clip && surfaces.empty())
     throw Error(frame.path, takes_all_away);
   if (options.ring > 0)
-    for (const ResultInstrument& instrument : read_result_instruments(frame.path, frame.number))
-      surfaces.push_back(instrument_surface(instrument, options.ring));
+    for (ResultInstrument& instrument : read_result_instruments(frame.path, frame.number))
+      surfaces.push_back(instrument_surface(std::move(instrument), options.ring));
   return surfaces;
 }
 

@@ -122,6 +122,8 @@ void SceneRun::State::schedule(const Command& command, const ChangeCommand& what
                   "two-step");
     add_stage(*two_step, what.stage);
   }
+  if (auto* const set = std::get_if<SetInstrument>(&change); set != nullptr && !what.mesh.empty())
+    set->shape = options.files.instrument(what.mesh, set->shape);
   if (command.every)
     simulation.schedule(simulation.time(), change, *command.at);
   else if (command.at)

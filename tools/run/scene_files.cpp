@@ -1,6 +1,8 @@
 // What a scene's names of files stand for.
 
 #include "base/error.h"
+#include "contact/convex_core.h"
+#include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/store/stiffness_store.h"
 #include "tools/run/scene_run.h"
@@ -90,6 +92,22 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
   };
   files.node_list = [resolve](const std::string& name) {
     return list_text(Input(resolve(name), false));
+  };
+  files.instrument = [resolve](const std::string& name, InstrumentShape shape) {
+    const std::string path = resolve(name);
+    (void)facts_of(path);
+    Input input(path, true);
+    MeshReadOptions options;
+    options.kind = input_kind(input.peek(4096), path, "");
+    if (std::ranges::find(readable_mesh_kinds(), options.kind) == readable_mesh_kinds().end())
+      throw Error(path, "is no mesh, expected one of " + kind_list(readable_mesh_kinds()));
+    options.weld = Weld::all;
+    options.drop_unused = true;
+    const TriangleMesh mesh = read_mesh(input, options);
+    shape.core = at(path, [&] { return std::make_shared<const ConvexCore>(mesh); });
+    if (!(shape.radius > 0))
+      shape.radius = shape.core->size() / 100;
+    return shape;
   };
   files.write_model = [resolve, context](const std::string& name, const Model& model) {
     Output::Options whole;

@@ -5,6 +5,7 @@
 #include "formats/scene/scene.h"
 #include "model/selector.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <vector>
 
@@ -86,7 +87,8 @@ void SceneRecord::line(std::string_view text, const Command& command,
   const bool model = std::holds_alternative<EmitModelCommand>(command.what);
   const auto* const change = std::get_if<ChangeCommand>(&command.what);
   const bool stage = change != nullptr && !change->stage.empty();
-  if (object || model || stage ? prefix_.empty() : lists.empty())
+  const bool mesh = change != nullptr && !change->mesh.empty();
+  if (object || model || stage || mesh ? prefix_.empty() : lists.empty())
     return write(text);
   std::vector<std::string> words = scene_words(text);
   if (model) {
@@ -98,6 +100,8 @@ void SceneRecord::line(std::string_view text, const Command& command,
         word = "store=" + moved(word.substr(6));
   } else if (stage) {
     words.back() = "stage=" + moved(change->stage);
+  } else if (mesh) { // at [every] T may stand before it
+    *(std::ranges::find(words, "instrument") + 3) = moved(change->mesh);
   } else {
     for (std::string& word : words)
       word = numbered(word, lists);

@@ -35,6 +35,9 @@ struct SceneFiles {
                                                                    const Model& model)>
       second_stage;
   LoadNodeList node_list;
+  /// An instrument's shape with the mesh of a file; a radius of 0 becomes a hundredth of its size.
+  /// \throw Error
+  std::function<InstrumentShape(const std::string& name, InstrumentShape shape)> instrument;
   /// Writes a model whole or not at all. May be absent. \throw Error
   std::function<void(const std::string& name, const Model& model)> write_model;
 };

@@ -1,0 +1,99 @@
+#pragma once
+// Convex polyhedra: the cores of instruments that are meshes. Faces are flat polygons, whatever
+// triangles they came as, so that neither an edge nor a corner lies within a flat part.
+
+#include "base/mesh.h"
+#include "base/vec3.h"
+#include "contact/box_blocks.h"
+#include "contact/instrument.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class ConvexCore {
+public:
+  struct Face {
+    Vec3 normal;                        ///< of unit length, out
+    double offset = 0;                  ///< normal·y of its points; no corner is beyond
+    std::vector<std::uint32_t> corners; ///< counter-clockwise seen from outside
+    bool operator==(const Face&) const = default;
+  };
+  struct Edge {
+    std::uint32_t a = 0, b = 0;        ///< a < b
+    std::uint32_t left = 0, right = 0; ///< faces: one goes from a to b, the other back
+  };
+  /// The point of the surface that is nearest to a point.
+  struct Nearest {
+    Vec3 point, normal;  ///< the normal of unit length, out, to where the point is or should be
+    double distance = 0; ///< below 0 inside
+  };
+
+  /// Of a mesh whose triangles go round as one, either way, and share their corners; triangles
+  /// within 1e-6 of its size (the diagonal of its box) of a plane make one face.
+  /// \throw Error if it has no or over 20,000 triangles, is not closed, not convex (by 1e-5 of its
+  /// size at an edge or a point, which are named), or flat: thinner than 1e-3 of its size
+  explicit ConvexCore(const TriangleMesh& mesh);
+
+  std::span<const Vec3> corners() const noexcept { return corners_; }
+  std::span<const Face> faces() const noexcept { return faces_; }
+  std::span<const Edge> edges() const noexcept { return edges_; }
+  const Box3& box() const noexcept { return box_; }
+  double size() const { return norm(box_.size()); }
+  /// Of the corner that is farthest from the origin.
+  double reach() const noexcept { return reach_; }
+
+  Nearest nearest(const Vec3& p) const;
+  /// Whether a triangle comes into it, deeper than rounding.
+  bool meets(const std::array<Vec3, 3>& triangle) const;
+  /// Whether a way from a corner or from the midst of an edge leads inside.
+  bool leads_in_from_corner(std::uint32_t corner, const Vec3& way) const;
+  bool leads_in_from_edge(std::uint32_t edge, const Vec3& way) const;
+
+  /// Call visit(number) for all corners, or edges, that may be in the box.
+  template <class Visit>
+  void visit_corners(const Box3& box, Visit&& visit) const {
+    corner_blocks_.visit(box, visit);
+  }
+  template <class Visit>
+  void visit_edges(const Box3& box, Visit&& visit) const {
+    edge_blocks_.visit(box, visit);
+  }
+
+  bool operator==(const ConvexCore& other) const {
+    return corners_ == other.corners_ && faces_ == other.faces_;
+  }
+
+private:
+  struct Blocks {
+    BlockOrder blocks;
+    std::vector<Box3> around, own; ///< of each block, of each thing
+
+    explicit Blocks(std::vector<Box3> boxes = {});
+    template <class Visit>
+    void visit(const Box3& box, Visit&& visit) const {
+      for (std::size_t b = 0; b < around.size(); ++b)
+        if (near(box, around[b]))
+          for (std::size_t k = blocks.first[b]; k < blocks.first[b + 1]; ++k)
+            if (near(box, own[blocks.order[k]]))
+              visit(blocks.order[k]);
+    }
+  };
+
+  std::vector<Vec3> corners_;
+  std::vector<Face> faces_;
+  std::vector<Edge> edges_;
+  std::vector<std::vector<std::uint32_t>> faces_at_; ///< by corner
+  Box3 box_;
+  double reach_ = 0;
+  Blocks corner_blocks_, edge_blocks_;
+};
+
+/// Weights of a and b at the point between them that is nearest to p.
+std::array<double, 2> weights_on_segment(const Vec3& p, const Vec3& a, const Vec3& b);
+
+} // namespace gewebe

@@ -1,0 +1,285 @@
+// Instruments that are convex meshes, by both methods.
+
+#include "contact/convex_core.h"
+#include "contact/instrument_surface.h"
+#include "contact_checks.h"
+#include "convex_meshes.h"
+#include "larger.h"
+#include "scene/simulation.h"
+#include "sim_models.h"
+#include "statics/elastostatic.h"
+#include "statics/static_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::organ;
+
+/// The organ of the tests is a ball of radius 20 about this.
+const Vec3 middle{100, -50, 30};
+const Quaternion askew = unit({0.8, 0.3, -0.5, 0.1});
+
+InstrumentShape shape_of(const TriangleMesh& mesh, double radius, double friction = 0) {
+  InstrumentShape shape{radius, {}, friction};
+  shape.core = std::make_shared<const ConvexCore>(mesh);
+  return shape;
+}
+
+/// A jaw: a box with its middle in the origin.
+InstrumentShape jaw(double radius, double friction) {
+  TriangleMesh box = test::divided_box({9, 4, 2}, 3);
+  for (Vec3& p : box.points)
+    p -= {4.5, 2, 1};
+  return shape_of(box, radius, friction);
+}
+
+struct Felt {
+  Vec3 force, torque;
+};
+
+Felt pressed(const InstrumentShape& shape, const Pose& pose, Method method,
+             Integration integration = Integration::semi_implicit) {
+  Simulation s(test::one_thread(), {});
+  s.add_object("o", organ(3), method, {}, integration);
+  s.apply(SetInstrument{0, shape, {pose.place + Vec3{0, 0, 5}, pose.turn}});
+  for (int k = 4; k >= 0; --k) {
+    s.apply(MoveInstrument{0, pose.place + Vec3{0, 0, 1.0 * k}, {}, 0.05});
+    s.step(0.05);
+  }
+  s.step(0.1);
+  const InstrumentReport tool = s.instrument(0);
+  return {tool.force, tool.torque};
+}
+
+TEST(MeshInstrument, ARefinedMeshHasTheForcesOfTheSphereAndTheCapsule) {
+  const double whole = 8, radius = 1.5;
+  const int turns = 4; // of the mesh: where its corners are is chance
+  for (const bool capsule : {false, true}) {
+    const Vec3 axis = capsule ? Vec3{9, 3, 1} : Vec3{};
+    const Pose pose{middle + Vec3{0.3, 0.2, 26} - 0.5 * axis, {}};
+    const Felt exact = pressed({whole, axis, 0.2}, pose, Method::ffe);
+    std::vector<double> push, all; // what is missing of the push, and of the force
+    for (const unsigned k : {1U, 2U, 3U}) {
+      push.push_back(0);
+      all.push_back(0);
+      for (int n = 0; n < turns; ++n) {
+        TriangleMesh mesh;
+        if (capsule) {
+          InstrumentSurface round = round_surface(whole - radius, axis, std::size_t{4} << k);
+          mesh.points = std::move(round.points);
+          mesh.triangles = std::move(round.triangles);
+        } else {
+          mesh = test::icosphere(whole - radius, static_cast<int>(k));
+        }
+        const Quaternion turn =
+            capsule ? turn_about(axis, 13.7 * n) : unit({0.8, 0.3 + 0.31 * n, 0.7 * n - 0.5, 0.1});
+        for (Vec3& p : mesh.points)
+          p = rotated(turn, p);
+        const Felt found = pressed(shape_of(mesh, radius, 0.2), pose, Method::ffe);
+        push.back() += (exact.force.z - found.force.z) / exact.force.z / turns;
+        all.back() += norm(exact.force - found.force) / norm(exact.force) / turns;
+      }
+    }
+    // The push is of second order in the length of an edge, as the gap to the round surface; where
+    // it acts, and with that its direction, of first.
+    EXPECT_LT(push[0], 0.3) << capsule;
+    EXPECT_LT(std::abs(push[1]), 0.5 * push[0]) << capsule;
+    EXPECT_LT(std::abs(push[2]), 0.15 * push[0]) << capsule;
+    EXPECT_LT(std::abs(push[2]), 0.02) << capsule;
+    EXPECT_LT(all[2], 0.25 * all[0]) << capsule;
+    RecordProperty(capsule ? "capsule" : "sphere", std::to_string(push[0]) + " " +
+                                                       std::to_string(push[1]) + " " +
+                                                       std::to_string(push[2]));
+  }
+}
+
+TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
+  for (const auto& [method, integration] : {std::pair(Method::ffe, Integration::semi_implicit),
+                                            std::pair(Method::ela, Integration::semi_implicit),
+                                            std::pair(Method::ela, Integration::implicit)})
+    for (const double friction : {0.0, 0.4}) {
+      Simulation s(test::one_thread(), {});
+      s.add_object("o", organ(3), method, {}, integration);
+      const InstrumentShape shape = jaw(0.5, friction);
+      const Vec3 start = middle + Vec3{0.3, 0.2, 26};
+      s.apply(SetInstrument{0, shape, {start, askew}});
+      bool touched = false;
+      const auto step = [&](const Vec3& to, const Quaternion& turn) {
+        s.apply(MoveInstrument{0, to, turn, 0.02});
+        s.step(0.02);
+        const InstrumentReport tool = s.instrument(0);
+        EXPECT_LT(
+            test::surface_depth(s.model(0), s.displacement(0), PlacedInstrument(shape, tool.pose)),
+            1e-6);
+        Vec3 sum;
+        double size = 0;
+        for (const NodeVector& f : s.contact_forces(0)) {
+          sum += f.value;
+          size += norm(f.value);
+        }
+        EXPECT_LE(norm(tool.force + sum), 1e-12 * size);
+        EXPECT_GE(tool.force.z, 0); // pushed out
+        touched = touched || norm(tool.force) > 0;
+      };
+      for (int k = 1; k <= 6; ++k)
+        step(start - Vec3{0, 0, 0.7 * k}, askew);
+      for (int k = 1; k <= 4; ++k)
+        step(start + Vec3{0.4 * k, 0, -4.2}, unit({0.8, 0.3 + 0.05 * k, -0.5, 0.1}));
+      EXPECT_TRUE(touched);
+      s.apply(MoveInstrument{0, start + Vec3{0, 0, 30}, {}, 0.02});
+      s.step(0.02);
+      s.step(0.02);
+      EXPECT_EQ(s.instrument(0).force, Vec3{});
+    }
+}
+
+TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
+  const Model model = organ(3);
+  Elastostatic solver(model, nullptr, test::one_thread());
+  double edges = 0;
+  for (const Triangle& t : model.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      edges += norm(model.nodes[t[k]].position - model.nodes[t[(k + 1) % 3]].position);
+  const double edge = edges / (3 * static_cast<double>(model.triangles.size()));
+  const double radius = 0.5 * edge, along = 0.04;
+  for (const double friction : {0.0, 0.3}) {
+    const InstrumentShape shape = jaw(radius, friction);
+    std::vector<double> u(3 * model.nodes.size());
+    StaticContact contact(model, u);
+    Pose last{middle + Vec3{-1.5, 0.3, 30}, askew};
+    double before = HUGE_VAL, jump = 0, depth = 0, cone = 0, pull = 0;
+    const auto go = [&](const Pose& to, bool judged) {
+      const MovedInstrument moved{shape, last, to};
+      contact.update([&]() -> Elastostatic& { return solver; }, {},
+                     std::vector<std::optional<MovedInstrument>>{moved}, u);
+      EXPECT_TRUE(contact.solved());
+      last = to;
+      const PlacedInstrument placed(shape, to);
+      depth = test::larger(depth, test::surface_depth(model, u, placed));
+      double largest = 0;
+      Vec3 sum;
+      for (const PointTouch& t : contact.points()) {
+        largest = test::larger(largest, norm(t.force));
+        sum += t.force;
+      }
+      for (const PointTouch& t : contact.points()) {
+        Vec3 p;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t i = t.nodes[c];
+          p +=
+              t.weights[c] * (model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]});
+        }
+        const Vec3 n = placed.normal(p);
+        if (norm(t.force) > 1e-9 * largest) {
+          EXPECT_NEAR(placed.distance(p), 0, 1e-6 * radius); // complementarity
+        }
+        const double push = dot(t.force, n);
+        pull = test::larger(pull, -push / largest);
+        cone = test::larger(cone, (norm(t.force - push * n) - friction * push) / largest);
+      }
+      if (judged && before < HUGE_VAL)
+        jump = test::larger(jump, std::abs(-sum.z - before) / std::min(-sum.z, before));
+      before = -sum.z;
+    };
+    for (double z = 30; z > 23.2; z -= 0.1)
+      go({middle + Vec3{-1.5, 0.3, z}, askew}, false);
+    EXPECT_GT(before, 0);
+    go({middle + Vec3{-1.5, 0.15, 23.2}, askew}, false);
+    for (double x = -1.5; x < 1.5; x += along)
+      go({middle + Vec3{x, 0.3 + 0.1 * x, 23.2}, askew}, true);
+    EXPECT_LT(depth, 1e-6);
+    EXPECT_LT(pull, 1e-9);
+    EXPECT_LT(cone, 1e-6);
+    EXPECT_LT(jump, 0.02) << friction;
+    RecordProperty("jump", std::to_string(jump));
+  }
+}
+
+TEST(MeshInstrument, NoWorkIsLeftOverAClosedWay) {
+  const InstrumentShape shape = jaw(0.8, 0);
+  std::vector<double> left;
+  for (const int steps : {20, 40, 80}) {
+    Simulation s(test::one_thread(), {});
+    s.add_object("o", organ(2), Method::ffe);
+    const auto pose = [&](int k) {
+      const double angle = 2 * 3.14159265358979323846 * k / steps;
+      return Pose{middle + Vec3{1.5 * std::sin(angle), 0.5 * std::sin(2 * angle),
+                                22.5 + 1.2 * std::cos(angle)},
+                  unit({0.8, 0.3 + 0.1 * std::sin(angle), -0.5 - 0.1 * std::cos(angle), 0.1})};
+    };
+    s.apply(SetInstrument{0, shape, {pose(0).place + Vec3{0, 0, 9}, pose(0).turn}});
+    s.step(0.01);
+    Felt last;
+    Pose before;
+    double work = 0, all = 0;
+    for (int k = 0; k <= 2 * steps; ++k) {
+      s.apply(MoveInstrument{0, pose(k).place, pose(k).turn, 0});
+      s.step(0.01);
+      const InstrumentReport tool = s.instrument(0);
+      if (k > steps) { // the second time round
+        // Of the mean force over the way, and of the mean torque over the turn.
+        const Quaternion &p = before.turn, &q = tool.pose.turn;
+        const Vec3 from{p.x, p.y, p.z}, to{q.x, q.y, q.z};
+        const Vec3 turn = 2 * (p.w * to - q.w * from + cross(from, to));
+        const double one = 0.5 * (dot(last.force + tool.force, tool.pose.place - before.place) +
+                                  dot(last.torque + tool.torque, turn));
+        work += one;
+        all += std::abs(one);
+      }
+      last = {tool.force, tool.torque};
+      before = tool.pose;
+    }
+    ASSERT_GT(all, 0);
+    left.push_back(std::abs(work) / all);
+  }
+  EXPECT_LT(left[0], 0.05);
+  EXPECT_LT(left[2], 0.002);
+  EXPECT_LT(left[2], 0.3 * left[0]);
+}
+
+TEST(MeshInstrument, AFastOneDoesNotPassThrough) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(test::one_thread(), {});
+    s.add_object("o", organ(3), method);
+    const InstrumentShape shape = jaw(0.5, 0);
+    s.apply(SetInstrument{0, shape, {middle + Vec3{0.3, 0.2, 26}, askew}});
+    s.step(0.01);
+    s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 20}, {}, 0});
+    s.step(0.01);
+    const InstrumentReport tool = s.instrument(0);
+    EXPECT_LT(
+        test::surface_depth(s.model(0), s.displacement(0), PlacedInstrument(shape, tool.pose)),
+        1e-6);
+    EXPECT_GT(tool.force.z, 0);
+  }
+}
+
+TEST(MeshInstrument, TheSameBytesForAnyNumberOfThreads) {
+  std::vector<std::vector<double>> found;
+  for (const int threads : {1, 3}) {
+    Context context;
+    context.threads = threads;
+    Simulation s(context, {});
+    s.add_object("o", organ(3), Method::ela);
+    s.apply(SetInstrument{0, jaw(0.5, 0.3), {middle + Vec3{0.3, 0.2, 26}, askew}});
+    s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 22}, {}, 0.02});
+    s.step(0.02);
+    const InstrumentReport tool = s.instrument(0);
+    found.emplace_back(s.displacement(0).begin(), s.displacement(0).end());
+    for (const Vec3& v : {tool.force, tool.torque})
+      found.back().insert(found.back().end(), {v.x, v.y, v.z});
+  }
+  EXPECT_EQ(found[0], found[1]);
+}
+
+} // namespace
+} // namespace gewebe
