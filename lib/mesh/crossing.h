@@ -2,6 +2,7 @@
 // Two surfaces that pass through each other, both refined along the curve in which they do, so that
 // they share its points and edges.
 
+#include "base/error.h"
 #include "base/mesh.h"
 
 #include <array>
@@ -27,12 +28,18 @@ struct SurfaceCrossing {
   std::vector<Edge> curve;
 };
 
+/// They meet in a way that no two sheets do.
+class MeetingOfNoSheets : public Error {
+public:
+  using Error::Error;
+};
+
 /// By exact predicates and constructions, points rounded at the end (CGAL's corefinement). Points
 /// that stand on the other surface already are taken as they are. Time grows with the triangles
 /// whose boxes meet.
 /// \pre check_mesh() passes for both, each is oriented; neither passes through itself where it
 /// meets the other
-/// \throw Error if they meet in a way that no two sheets do
+/// \throw MeetingOfNoSheets
 SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b);
 
 } // namespace gewebe

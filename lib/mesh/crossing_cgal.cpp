@@ -1,4 +1,3 @@
-#include "base/error.h"
 #include "mesh/crossing.h"
 #include "mesh/sheets.h"
 
@@ -149,7 +148,8 @@ SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b) {
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception&) {
-    throw Error("the surfaces meet where one of them passes through itself, expected two sheets");
+    throw MeetingOfNoSheets(
+        "the surfaces meet where one of them passes through itself, expected two sheets");
   }
   const std::vector<Marked> of_a = marked_edges(one, a.points.size()),
                             of_b = marked_edges(other, b.points.size());
@@ -157,8 +157,9 @@ SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b) {
   for (std::size_t n = 0; n < std::max(of_a.size(), of_b.size()); ++n) {
     if (n >= of_a.size() || n >= of_b.size() || of_a[n].places != of_b[n].places ||
         of_a[n].places[0] == of_a[n].places[1] || (n > 0 && of_a[n].places == of_a[n - 1].places))
-      throw Error("the surfaces meet in a curve that has other edges on one of them than on the "
-                  "other, expected two sheets");
+      throw MeetingOfNoSheets(
+          "the surfaces meet in a curve that has other edges on one of them than on the "
+          "other, expected two sheets");
     crossing.curve.push_back({of_a[n].ends, of_b[n].ends});
   }
   return crossing;

@@ -1,6 +1,8 @@
 // Cuts of solids: planes at rest, blades where the solid is, piece by piece of their ways.
 
+#include "base/number_text.h"
 #include "base/vector_at.h"
+#include "mesh/crossing.h"
 #include "scene/world_internal.h"
 #include "solid/cut_solid.h"
 #include "solid/solid_model.h"
@@ -327,10 +329,20 @@ void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas) 
     at_object(w, object, [&] {
       BladeCutOptions options;
       options.places = carried->places();
-      if (std::optional<CutByBlade> cut =
-              cut_by(w, index, strip_of(edges), options, strip_sheet(rows))) {
+      std::optional<CutByBlade> cut;
+      bool skin_too = !rows.empty();
+      try {
+        cut = cut_by(w, index, strip_of(edges), options, strip_sheet(rows));
+      } catch (const MeetingOfNoSheets& error) { // it may be with the rows to come
+        skin_too = false;
+        cut = cut_by(w, index, strip_of(edges), options, {});
+        if (w.options.warn)
+          w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                         " s: its skin is not cut by this step: " + error.what());
+      }
+      if (cut) {
         for (BladeTrail& trail : object.cut.trails)
-          if (trail.instrument == instrument && !rows.empty())
+          if (trail.instrument == instrument && skin_too)
             trail.rows = {std::move(cut->skin_end)};
         carry_out(w, index, std::move(cut->cut));
         carried.reset();
