@@ -350,6 +350,23 @@ What parse_renew(Words& in) {
   return ChangeCommand{.change = Renew{}, .object = in.name()};
 }
 
+What parse_prepare(Words& in) {
+  ChangeCommand c;
+  c.object = in.name();
+  Prepare prepare;
+  if (in.take("contact")) {
+    prepare.cut = false;
+    if (!in.done())
+      c.nodes = in.nodes();
+  } else if (!in.done()) {
+    if (!in.take("cut"))
+      in.fail(shown(in.word("")) + " is nothing to prepare");
+    prepare.contact = false;
+  }
+  c.change = prepare;
+  return c;
+}
+
 struct Verb {
   std::string_view name;
   const char* usage;
@@ -357,8 +374,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 29>& verbs() {
-  static const std::array<Verb, 29> all{{
+const std::array<Verb, 30>& verbs() {
+  static const std::array<Verb, 30> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -397,6 +414,7 @@ const std::array<Verb, 29>& verbs() {
       {"step", "step [dt], dt 0 or more", false, parse_step},
       {"run", "run UNTIL every DT", false, parse_run},
       {"renew", "renew NAME", false, parse_renew},
+      {"prepare", "prepare NAME [contact [NODES]|cut]", false, parse_prepare},
       {"sync", "sync", false, parse_sync},
       {"end", "end", false, parse_end},
       {"nodes", "nodes NAME [rest|positions]", false, parse_nodes},

@@ -45,6 +45,11 @@ struct Names {
       throw Error("object " + said.object + " with itself, expected contact " + said.object +
                   " self");
   }
+  void find(Prepare& c) const {
+    c.object = find_object(simulation, said.object);
+    if (said.nodes)
+      c.nodes_ahead = nodes(c.object, *said.nodes);
+  }
   void find(SetInstrument& c) const { c.instrument = instrument_place(simulation, c.name); }
   void find(CutObject& c) const {
     c.object = find_object(simulation, said.object);

@@ -1,5 +1,6 @@
 #include "compliance/column_cache.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "compliance/column_sum.h"
 #include "compliance/costs.h"
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
 
 namespace gewebe {
@@ -62,7 +64,12 @@ bool ColumnCache::stored(std::uint32_t node) const {
          std::binary_search(source_->nodes().begin(), source_->nodes().end(), node);
 }
 
+/// \param count of columns that come, some of which may have been made ahead
 void ColumnCache::make_room(std::size_t count) {
+  while (!ahead_.empty() && kept_.size() + count + ahead_.size() > capacity_) {
+    wide_.give_back(ahead_.begin()->second);
+    ahead_.erase(ahead_.begin());
+  }
   if (kept_.size() + count <= capacity_)
     return;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> old;
@@ -126,19 +133,44 @@ void ColumnCache::need(std::span<const std::uint32_t> nodes) {
     ++read_;
     bound(columns);
   }
+  std::erase_if(unknown, [&](std::uint32_t node) {
+    const auto made = ahead_.find(node);
+    if (made == ahead_.end())
+      return false;
+    Columns& columns = kept_[node];
+    columns.wide = made->second;
+    columns.used = clock_;
+    ahead_.erase(made);
+    bound(columns);
+    return true;
+  });
+  solve_for(unknown, [&](std::uint32_t node) { return fresh(node, false).wide; });
+  for (const std::uint32_t node : unknown)
+    bound(kept_.at(node));
+}
+
+void ColumnCache::solve_for(std::span<const std::uint32_t> nodes,
+                            const std::function<double*(std::uint32_t node)>& place) {
   std::vector<double> solved;
-  for (std::size_t begin = 0; begin < unknown.size(); begin += solved_at_once) {
-    const auto some =
-        std::span(unknown).subspan(begin, std::min(solved_at_once, unknown.size() - begin));
+  for (std::size_t begin = 0; begin < nodes.size(); begin += solved_at_once) {
+    const auto some = nodes.subspan(begin, std::min(solved_at_once, nodes.size() - begin));
     solved.resize(3 * axes_ * some.size());
     solve_(some, solved);
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      Columns& columns = fresh(some[k], false);
+    for (std::size_t k = 0; k < some.size(); ++k)
       std::copy_n(solved.begin() + static_cast<std::ptrdiff_t>(3 * axes_ * k), 3 * axes_,
-                  columns.wide);
-      bound(columns);
-    }
+                  place(some[k]));
   }
+}
+
+void ColumnCache::prepare(std::span<const std::uint32_t> nodes) {
+  std::vector<std::uint32_t> missing;
+  for (const std::uint32_t node : nodes)
+    if (!stored(node) && !resident(node) && !ahead_.contains(node))
+      missing.push_back(node);
+  if (kept_.size() + ahead_.size() + missing.size() > capacity_)
+    throw Error("the columns of " + std::to_string(kept_.size() + ahead_.size() + missing.size()) +
+                " nodes do not fit in memory, expected at most " + std::to_string(capacity_));
+  solve_for(missing, [&](std::uint32_t node) { return ahead_[node] = wide_.take(); });
 }
 
 void ColumnCache::bound(Columns& columns) const {

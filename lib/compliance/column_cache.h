@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -37,6 +38,10 @@ public:
   /// \pre at most capacity() of them   \throw Error if they can't be read or solved
   void need(std::span<const std::uint32_t> nodes);
 
+  /// Solves ahead of `need` for what is neither stored nor resident; nothing but `need` sees it,
+  /// and it leaves memory before what was needed. \throw Error if all does not fit
+  void prepare(std::span<const std::uint32_t> nodes);
+
   /// Entry of a row (axis 3 i + a) in the column of a node's axis. \pre the node is resident
   double entry(std::uint32_t node, int axis, std::size_t row) const;
 
@@ -63,6 +68,8 @@ private:
   void drop(std::uint32_t node);
   void bound(Columns& columns) const;
   void make_room(std::size_t count);
+  void solve_for(std::span<const std::uint32_t> nodes,
+                 const std::function<double*(std::uint32_t node)>& place);
 
   std::size_t axes_ = 0; ///< 3 m
   const ColumnSource* source_ = nullptr;
@@ -72,6 +79,7 @@ private:
   SlotPool<double> wide_;
   SlotPool<float> narrow_;
   std::unordered_map<std::uint32_t, Columns> kept_;
+  std::map<std::uint32_t, double*> ahead_;
   std::uint64_t clock_ = 0, read_ = 0;
   mutable std::uint64_t taken_ = 0, skipped_ = 0;
 };

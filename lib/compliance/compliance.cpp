@@ -91,6 +91,14 @@ void Compliance::need(std::span<const std::uint32_t> nodes) {
     inside_->need(others);
 }
 
+void Compliance::prepare(std::span<const std::uint32_t> nodes) {
+  std::vector<std::uint32_t> some;
+  for (const std::uint32_t node : nodes)
+    if (!compressed(node) && outer(node))
+      some.push_back(node);
+  cache_.prepare(some);
+}
+
 bool Compliance::fit(std::span<const std::uint32_t> nodes) const {
   const auto others = static_cast<std::size_t>(
       std::count_if(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return !outer(node); }));

@@ -195,6 +195,7 @@ bool CutStiffness::woodbury_pays(std::size_t rank) const {
 CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std::uint32_t> origin,
                           std::span<const std::uint32_t> place, std::optional<CutWay> way) {
   CutWork work;
+  work.unprepared = factor_ == nullptr;
   prepare(); // whether it was announced or not, the same way is gone
   follow(first_origin_, first_place_, origin, place);
   now_ = std::move(next);

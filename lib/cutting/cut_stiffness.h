@@ -28,8 +28,9 @@ enum class CutWay : std::uint8_t {
 
 struct CutWork {
   CutWay way = CutWay::fresh;
-  std::size_t rank = 0; ///< for Woodbury, all cuts since the factor counted
-  FrontalWork factor;   ///< of refactor and fresh
+  bool unprepared = false; ///< the factor of the model before was made for it
+  std::size_t rank = 0;    ///< for Woodbury, all cuts since the factor counted
+  FrontalWork factor;      ///< of refactor and fresh
 };
 
 class CutStiffness {

@@ -126,6 +126,13 @@ struct SetMethod {
 struct Renew {
   std::size_t object = 0;
 };
+/// Makes what a first contact, or a first cut, of an elastostatic object needs, and what contacts
+/// at these nodes do.
+struct Prepare {
+  std::size_t object = 0;
+  bool contact = true, cut = true;
+  std::vector<std::uint32_t> nodes_ahead{};
+};
 /// What a cut severs: springs between sets of nodes, or what a plane passes, of all nodes or some.
 struct SpringsToCut {
   std::vector<std::uint32_t> from, to;
@@ -151,7 +158,7 @@ struct Restore {
 using Change =
     std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
                  MoveInstrument, SetCoupling, Grasp, Withdraw, SetContact, SetGravity, SetTimestep,
-                 SetTwoStep, SetWarp, Emit, SetMethod, Renew, CutObject, SetTear, Restore>;
+                 SetTwoStep, SetWarp, Emit, SetMethod, Renew, Prepare, CutObject, SetTear, Restore>;
 
 /// What a log says of an instrument alone; what does not apply stays empty.
 struct InstrumentRow {

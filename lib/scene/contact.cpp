@@ -172,8 +172,14 @@ void take_touches(World& w, double duration) {
 namespace {
 
 void need_contact(Object& object) {
-  if (!object.contact)
+  if (object.contact)
+    return;
+  if (object.contact_ahead) {
+    object.contact = std::exchange(object.contact_ahead, nullptr);
+    object.contact->restart(*object.shown.displacement, {});
+  } else {
     object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement);
+  }
 }
 
 } // namespace

@@ -55,6 +55,7 @@ cut_source(World& w, Object& object, std::shared_ptr<const Model> next, const Cu
     ++(work.way == CutWay::woodbury   ? w.now.counts.cut_woodbury
        : work.way == CutWay::refactor ? w.now.counts.cut_refactors
                                       : w.now.counts.cut_factors);
+    w.now.counts.cut_unprepared += work.unprepared ? 1 : 0;
     return stiffness->compliance();
   } catch (...) {
     object.statics->stiffness.reset();

@@ -54,7 +54,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
                 .time = old.shown.time,
                 .posed = old.shown.posed};
   next.came = {.load = gravity_of(*old.came.load), .duration = old.came.duration};
-  next.contact = nullptr;
+  next.contact = next.contact_ahead = nullptr;
   next.impulses.clear();
   next.cut = {.tear = old.cut.tear};
   return next;

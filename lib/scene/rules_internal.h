@@ -77,6 +77,15 @@ struct Rule<Renew> : Plain<Renew> {
   static void log(const World&, const Renew&, ChangeRow& row) { row.what = "renew"; }
 };
 
+// prepare.cpp
+template <>
+struct Rule<Prepare> : Plain<Prepare> {
+  static void check(World& w, const Prepare& c);
+  static constexpr bool may_fail = true;
+  static void apply(World& w, const Prepare& c);
+  static void log(const World&, const Prepare& c, ChangeRow& row);
+};
+
 // bodies.cpp
 template <>
 struct Rule<Attach> : Plain<Attach> {

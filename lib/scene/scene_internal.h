@@ -194,8 +194,9 @@ struct Object {
   Shown shown;
   CameFrom came;
   RangeWatch range;
-  std::shared_ptr<StaticContact> contact; // of ffe, once there are instruments
-  std::vector<NodeTouch> impulses;        // in this step so far, from bodies it has left: 1e-6 N s
+  std::shared_ptr<StaticContact> contact;       // of ffe, once there are instruments
+  std::shared_ptr<StaticContact> contact_ahead; // of the model at rest, made before that
+  std::vector<NodeTouch> impulses; // in this step so far, from bodies it has left: 1e-6 N s
   CutState cut;
 
   const Model& model() const { return *matter->model; }

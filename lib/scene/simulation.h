@@ -87,6 +87,7 @@ struct SimulationCounts {
   std::uint64_t cuts = 0;          ///< that changed a model
   /// Of elastostatic objects: how their stiffness followed, see CutWay.
   std::uint64_t cut_woodbury = 0, cut_refactors = 0, cut_factors = 0;
+  std::uint64_t cut_unprepared = 0; ///< of these, how many had to factorise before
 };
 
 /// What is known of an object without reading it.

@@ -48,14 +48,15 @@ enum class Feature : std::uint8_t {
   two_step,
   renew,
   warp,         ///< large rotations
+  prepare,      ///< what contacts and cuts need
   contact,      ///< with another object's surface
   self_contact, ///< of its surface with itself
 };
 inline constexpr std::array all_features{
-    Feature::force,   Feature::pressure, Feature::displace, Feature::grasp,
-    Feature::touch,   Feature::cut,      Feature::blade,    Feature::tear,
-    Feature::restore, Feature::attach,   Feature::method,   Feature::two_step,
-    Feature::renew,   Feature::warp,     Feature::contact,  Feature::self_contact};
+    Feature::force,   Feature::pressure,    Feature::displace, Feature::grasp,   Feature::touch,
+    Feature::cut,     Feature::blade,       Feature::tear,     Feature::restore, Feature::attach,
+    Feature::method,  Feature::two_step,    Feature::renew,    Feature::warp,    Feature::prepare,
+    Feature::contact, Feature::self_contact};
 
 /// A pair that does not go together.
 struct Gap {
@@ -97,6 +98,10 @@ inline constexpr std::array gaps{
         "is elastodynamic (ela), expected an elastostatic one for rotation=warp"},
     Gap{Way::implicit_motion, Feature::warp, true,
         "is elastodynamic (ela), expected an elastostatic one for rotation=warp"},
+    Gap{Way::explicit_motion, Feature::prepare, true,
+        "is elastodynamic (ela), expected an elastostatic one for prepare"},
+    Gap{Way::implicit_motion, Feature::prepare, true,
+        "is elastodynamic (ela), expected an elastostatic one for prepare"},
     Gap{Way::two_step, Feature::warp, true,
         "goes on by two steps, expected none for rotation=warp"},
     Gap{Way::net, Feature::warp, true, "has no tetrahedra, expected a solid for rotation=warp"},

@@ -340,6 +340,10 @@ DelassusOperator Elastostatic::delassus_operator(const Load& load,
   return state_->delassus_operator(load, nodes);
 }
 
+void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {
+  state_->compliance.prepare(nodes);
+}
+
 ElastostaticCounts Elastostatic::counts() const noexcept {
   ElastostaticCounts counts = state_->counts;
   counts.solves = state_->compliance.solves() + state_->held.solves();

@@ -114,6 +114,11 @@ public:
   /// them displaced by the load   \throw Error as update, and if memory does not hold their columns
   DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
 
+  /// Solves for the columns of these nodes, unless they are stored, so that contacts there need
+  /// not: updates, shapes and forces are the same to the bit with and without.
+  /// \pre nodes exist, no other twice   \throw Error if memory does not hold them, or as update
+  void prepare(std::span<const std::uint32_t> nodes);
+
   ElastostaticCounts counts() const noexcept;
 
 private:

@@ -93,6 +93,8 @@ public:
         line(std::string("emit ") + what);
     const std::size_t rounds = 4 + below(10);
     for (std::size_t round = 0; round < rounds; ++round) {
+      if (contacts_() % 12 == 0) // by numbers of its own, as below
+        line(prepare());
       for (std::size_t k = below(4); k > 0; --k)
         command();
       go_on();
@@ -329,6 +331,16 @@ private:
     default:
       return load();
     }
+  }
+  std::string prepare() {
+    const Known& o = objects_[contacts_() % objects_.size()];
+    const auto kind = contacts_() % 4;
+    return "prepare " + o.name +
+           (kind == 0   ? ""
+            : kind == 1 ? " cut"
+            : kind == 2 ? " contact"
+                        : " contact " + std::to_string(contacts_() % o.model->nodes.size()) + "," +
+                              std::to_string(contacts_() % o.model->nodes.size()));
   }
   /// By numbers of its own: the rest of a scene is as it was without.
   std::string contact() {

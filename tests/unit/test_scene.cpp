@@ -156,7 +156,8 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known =
       "expected one of object, force, pressure, displace, attach, contact, release, "
       "instrument, move, couple, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
-      "two-step, emit, step, run, renew, sync, end, nodes, select, objects, instruments, at";
+      "two-step, emit, step, run, renew, prepare, sync, end, nodes, select, objects, instruments, "
+      "at";
   for (const char* word : {"slice", "steps", "STEP", "\"\""})
     EXPECT_NE(complaint(std::string(word) + " a").find(known), std::string::npos) << word;
   const std::vector<std::pair<std::string, std::string>> bad{
@@ -239,6 +240,9 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"tear a", "no strain, expected tear NAME STRAIN"},
       {"tear a -0.1", "a negative strain"},
       {"restore", "no NAME, expected restore NAME"},
+      {"prepare a b", "'b' is nothing to prepare, expected prepare NAME [contact [NODES]|cut]"},
+      {"prepare a cut b", "surplus word 'b'"},
+      {"at 1 prepare a", "'prepare' is no command behind at T"},
       {"instrument a blade 0 0 0 0 0 0", "an edge without length"},
       {"instrument a blade 0 0 0 0 0", "no number"},
       {"instrument a blade 0 0 0 0 0 1 friction 1", "surplus word 'friction'"},

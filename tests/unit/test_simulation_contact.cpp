@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <optional>
 #include <string>
 
 namespace gewebe {
@@ -638,6 +639,66 @@ TEST(SimulationContact, InstrumentsMovedAtOnceGoTogether) {
   const auto one = led(false);
   EXPECT_GT(norm(one.first), 0);
   EXPECT_EQ(one, led(true));
+}
+
+/// A sphere that is put beside an organ, pressed in and led aside.
+struct PreparedContact {
+  std::vector<double> answers; ///< shapes and forces, one behind the other
+  std::uint64_t solves = 0;    ///< behind the preparation
+};
+
+PreparedContact contact_with(const std::optional<Prepare>& prepare) {
+  Simulation s(test::one_thread(), {});
+  s.add_object("organ", organ(3), Method::ffe);
+  if (prepare)
+    s.apply(*prepare);
+  const std::uint64_t before = s.counts().elastostatic.solves;
+  PreparedContact all;
+  s.apply(sphere(5, middle + Vec3{0, 0, 26}, 0.3));
+  for (int k = 0; k < 8; ++k) {
+    s.apply(MoveInstrument{0, middle + Vec3{0.5 * k, 0.1, 24.3}, {}, 0.001});
+    s.step(0.001);
+    const std::span<const double> u = s.displacement(0);
+    all.answers.insert(all.answers.end(), u.begin(), u.end());
+    for (const NodeVector& f : s.contact_forces(0))
+      all.answers.insert(all.answers.end(), {f.value.x, f.value.y, f.value.z});
+  }
+  all.solves = s.counts().elastostatic.solves - before;
+  return all;
+}
+
+TEST(SimulationContact, PreparedContactsAreTheSameAndSolveNothing) {
+  const PreparedContact plain = contact_with(std::nullopt);
+  EXPECT_GT(plain.solves, 0);
+  Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
+  const PreparedContact factor = contact_with(prepare);
+  EXPECT_EQ(factor.solves, plain.solves);
+  const Model model = organ(3);
+  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+    prepare.nodes_ahead.push_back(i);
+  const PreparedContact columns = contact_with(prepare);
+  EXPECT_EQ(columns.solves, 0);
+  ASSERT_FALSE(plain.answers.empty());
+  for (const PreparedContact* const other : {&factor, &columns}) {
+    ASSERT_EQ(other->answers.size(), plain.answers.size());
+    EXPECT_EQ(std::memcmp(other->answers.data(), plain.answers.data(),
+                          plain.answers.size() * sizeof(double)),
+              0);
+  }
+}
+
+TEST(SimulationContact, ColumnsThatDoNotFitAreNotPrepared) {
+  Context context = test::one_thread();
+  const Model model = organ(3);
+  context.max_memory = 64 * 9 * sizeof(double) * model.nodes.size(); // 16 nodes' columns
+  Simulation s(context, {});
+  s.add_object("organ", model, Method::ffe);
+  Prepare prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}};
+  for (std::uint32_t i = 0; i < 17; ++i)
+    prepare.nodes_ahead.push_back(i);
+  EXPECT_THROW(s.apply(prepare), Error);
+  prepare.nodes_ahead.pop_back();
+  s.apply(prepare);
 }
 
 } // namespace

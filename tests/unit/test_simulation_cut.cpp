@@ -494,5 +494,23 @@ TEST(SimulationCut, ForcesDoNotDependOnShapesThatWereAskedFor) {
   EXPECT_GE(with.size(), 45U);
 }
 
+TEST(SimulationCut, APreparedFirstCutIsTheSameAndFactorisesNothingBefore) {
+  const auto shape = [](bool prepared) {
+    Simulation s(test::one_thread(), {});
+    const Model model = test::organ(3);
+    s.add_object("organ", model, Method::ffe);
+    s.apply(SetForce{0, {test::highest(model)}, {0, 0, 2000}});
+    s.step(0.001);
+    if (prepared)
+      s.apply(Prepare{.object = 0, .contact = false, .cut = true, .nodes_ahead = {}});
+    s.apply(CutObject{0, test::incision(model)});
+    s.step(0.001);
+    EXPECT_EQ(s.counts().cuts, 1);
+    EXPECT_EQ(s.counts().cut_unprepared, prepared ? 0 : 1);
+    return std::vector<double>(s.displacement(0).begin(), s.displacement(0).end());
+  };
+  EXPECT_EQ(shape(true), shape(false));
+}
+
 } // namespace
 } // namespace gewebe

@@ -81,6 +81,7 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("cut_corrections", steps.cut_woodbury);
     stats.set("cut_renewals", steps.cut_refactors);
     stats.set("cut_factors", steps.cut_factors);
+    stats.set("cut_unprepared", steps.cut_unprepared);
   }
   stats.set("digest", counts.digest);
   if (report.rate > 0) {

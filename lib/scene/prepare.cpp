@@ -1,0 +1,48 @@
+// What a first contact or cut of an elastostatic object needs, made before it is needed: nothing
+// that is answered depends on when.
+
+#include "scene/rules_internal.h"
+
+#include <memory>
+
+namespace gewebe::simulation {
+
+void Rule<Prepare>::check(World& w, const Prepare& c) {
+  Object& object = w.now.objects.at(c.object);
+  require_support(w, object, Feature::prepare);
+  need_model(object);
+  if (c.cut)
+    require_support(w, object, Feature::cut);
+  if (c.contact)
+    require_support(w, object, Feature::touch);
+  if (!c.nodes_ahead.empty() && object.warp)
+    throw Error("object " + object.name() +
+                " has large rotations (rotation=warp), expected no nodes to prepare");
+}
+
+void Rule<Prepare>::apply(World& w, const Prepare& c) {
+  Object& object = w.now.objects.at(c.object);
+  need_model(object);
+  object.statics->ahead = true;
+  if (object.warp) {
+    (void)warped_of(w, object);
+  } else {
+    Elastostatic& solver = solver_of(w, object);
+    if (object.stages.options)
+      (void)two_step_of(w, object);
+    solver.prepare(c.nodes_ahead);
+  }
+  if (c.contact && !object.contact && !object.contact_ahead)
+    object.contact_ahead =
+        std::make_shared<StaticContact>(object.model(), std::span<const double>{});
+  if (c.cut)
+    announce_cut(w, c.object);
+}
+
+void Rule<Prepare>::log(const World&, const Prepare& c, ChangeRow& row) {
+  row.what = "prepare";
+  row.nodes = c.nodes_ahead;
+  row.text = c.contact && c.cut ? "contact cut" : c.cut ? "cut" : "contact";
+}
+
+} // namespace gewebe::simulation
