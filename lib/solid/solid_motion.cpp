@@ -8,6 +8,7 @@
 #include "solid/motion_limit_internal.h"
 #include "solid/motion_objective_internal.h"
 #include "solid/motion_quick_internal.h"
+#include "solid/motion_recovery_internal.h"
 #include "solid/motion_tangent_internal.h"
 #include "solid/solid_energy_internal.h"
 
@@ -60,15 +61,19 @@ struct SolidMotion::State {
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
+  MotionRecovery recovery;
+  bool recovered = false; ///< since the last step
 
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
-        energy(body, net, with) {
+        energy(body, net, with), recovery(body, materials, net, with) {
     const std::size_t axes = body.axes();
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
+  void take_over(SolidMotion& soft);
+  SolidStep step_softly(double h, const Context& context);
 };
 
 SolidMotion::~SolidMotion() = default;
@@ -103,6 +108,41 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
   state_->energy.keep();
 }
 
+/// What the body that moves meanwhile has come to.
+void SolidMotion::State::take_over(SolidMotion& soft) {
+  std::ranges::copy(soft.places(), now.place.begin());
+  std::ranges::copy(soft.velocity(), now.velocity.begin());
+  std::ranges::copy(soft.reactions(), reactions.begin());
+  elastic = recovery.elastic();
+}
+
+/// A step of recovery.
+SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
+  SolidMotion& soft = recovery.soft();
+  soft.set_load(now.load);
+  soft.set_tolerance(options.tolerance, options.max_rounds);
+  if (std::exchange(moved, false))
+    soft.move_held(target);
+  if (!guess.empty())
+    soft.guess(std::exchange(guess, {}));
+  const SolidStep step = soft.step(h, context);
+  take_over(soft);
+  last_step = h;
+  if (!MotionRecovery::is_right(body, now.place))
+    return step;
+  Numbers forces(body.axes());
+  const double whole = energy.evaluate(now.place, {}, forces, context);
+  if (!(whole <= elastic))
+    return step;
+  elastic = whole;
+  energy.keep();
+  quick.forget();
+  forecast.clear();
+  recovery.end();
+  recovered = true;
+  return step;
+}
+
 void SolidMotion::set_load(std::span<const double> forces) {
   std::ranges::copy(forces, state_->now.load.begin());
 }
@@ -117,6 +157,8 @@ void SolidMotion::hold(std::span<const std::uint8_t> held) {
     s.forecast.hold(axis);
   }
   s.tangent.renew();
+  if (s.recovery.on())
+    s.recovery.soft().hold(held);
 }
 
 void SolidMotion::move_held(std::span<const double> displacement) {
@@ -127,8 +169,13 @@ void SolidMotion::move_held(std::span<const double> displacement) {
 
 SolidStep SolidMotion::step(double h, const Context& context) {
   State& s = *state_;
+  s.recovery.look(s.body, s.now, s.elastic, s.options, context);
+  if (s.recovery.on())
+    return s.step_softly(h, context);
   SolidStep step;
   step.change = step.left = HUGE_VAL;
+  if (std::exchange(s.recovered, false))
+    ++step.factorisations; // another one answers again
   if (!s.options.reference)
     step.factorisations +=
         s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
@@ -222,6 +269,7 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
                           const Context& context) {
   state_->quick.forget();
+  state_->recovery.end();
   begin_again(places, velocity, context);
 }
 
@@ -233,6 +281,11 @@ void SolidMotion::begin_again(std::span<const double> places, std::span<const do
   s.forecast.clear();
   s.energy.forget_bubbles();
   s.last_step = 0;
+  if (s.recovery.on()) {
+    s.recovery.soft().begin_again(places, velocity, context);
+    s.elastic = s.recovery.elastic();
+    return;
+  }
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   s.energy.keep();
@@ -240,6 +293,11 @@ void SolidMotion::begin_again(std::span<const double> places, std::span<const do
 
 void SolidMotion::nudge(std::span<const double> displacement, const Context& context) {
   State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().nudge(displacement, context);
+    s.take_over(s.recovery.soft());
+    return;
+  }
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] == 0) {
       s.now.place[axis] += displacement[axis];
@@ -260,6 +318,10 @@ void SolidMotion::set_tolerance(double tolerance, int max_rounds) {
 }
 
 void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
+  if (state_->recovery.on()) {
+    state_->recovery.soft().respond(over_axes, context);
+    return;
+  }
   Numbers all(over_axes.begin(), over_axes.end());
   state_->quick.into_frames(all, context);
   state_->quick.solve(all, context);
@@ -269,6 +331,12 @@ void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
 
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().set_load(s.now.load);
+    s.recovery.soft().find_reactions(context);
+    s.take_over(s.recovery.soft());
+    return;
+  }
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)

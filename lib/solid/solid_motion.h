@@ -26,8 +26,11 @@
 // the default tolerance it is below 0.6 % in each step, in 1.9 rounds (2.7 without what earlier
 // steps knew). The reference way has a factor of the tangent where the body is, anew as it moves.
 //
-// From scrambled shapes the elements of stable Neo-Hookean bodies turn right again; corotational
-// ones may stay tangled where rotations of elements jump, and either may stay wound up.
+// A body of which more than a hundredth of the volume is inside out moves without Poisson's ratio
+// until all of its elements are right side out again (solid/motion_recovery_internal.h; not beside
+// springs, nor by the reference way). Of 8,000 scrambled corotational bodies of up to 162 linear
+// elements all but four got there (18 elements each, one of which stayed). They may stay wound up,
+// in a minimum of their own with every element right side out: 193 of these.
 //
 // Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
 // The constant matrix has their stiffness along every axis, which bounds them however they turn: of

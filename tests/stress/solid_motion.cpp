@@ -7,12 +7,12 @@
 // momentum that load and drag leave it, to 1e-9 of the sum over its nodes; no number is lost.
 //
 // Then bodies whose nodes are anywhere in their box, let go: no number is lost, energy falls, in
-// each step and in the end. Where they end is counted, not judged: at rest in their own shape;
-// elsewhere with every element right side out (wound up, a minimum of their own); or with elements
-// inside out (corotational ones whose rotations jump).
+// each step and in the end, and no element stays inside out. Counted, not judged, is whether they
+// rest in their own shape or elsewhere (wound up, a minimum of their own).
 //
-// Arguments: number of bodies (default 1500, of 40 steps), of scrambled states for each law and
-// order (default 12; a quarter of Neo-Hookean ones, which take their time).
+// Arguments: number of bodies (default 1500, of 40 steps), of scrambled states (default 100; a
+// quarter of each are of quadratic corotational and of linear Neo-Hookean elements, 1 in 100 of
+// quadratic Neo-Hookean ones, which take their time).
 
 #include "solid/solid_motion.h"
 #include "tests/unit/larger.h"
@@ -267,7 +267,6 @@ void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
   const TetMesh mesh = some_mesh(chance, kind);
   SolidMotionOptions options;
   options.law = kind.law;
-  options.max_rounds = 20;
   const double poisson = std::array{0.0, 0.3, 0.45, 0.49}.at(seed % 4);
   SolidMotion body(mesh, std::vector<SolidMaterial>{{2e4, poisson, 1e-3}}, options);
   Vec3 most;
@@ -283,10 +282,12 @@ void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
   const double first = body.elastic_energy();
   double before = first;
   bool good = true;
-  for (int n = 0; n < 200 && good && !(body.elastic_energy() <= 1e-9 * first); ++n) {
+  int still = 0;
+  for (int n = 0; n < 1000 && still < 10 && good && !(body.elastic_energy() <= 1e-9 * first); ++n) {
     (void)body.step(0.05, {});
     const double after = energy(body);
     good = after <= before + energy_tolerance * first && sound(body.places());
+    still = before - after < 1e-7 * after ? still + 1 : 0;
     before = after;
   }
   good = good && body.elastic_energy() < first;
@@ -294,9 +295,11 @@ void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
     ++ends.failed;
     std::printf("scrambled %u (%s): FAILED (energy %.6g of the first)\n", seed, kind.name(),
                 before / first);
-  } else if (inverted(mesh, body.places()) > 0)
+  } else if (inverted(mesh, body.places()) > 0) {
     ++ends.inside_out;
-  else if (body.elastic_energy() <= 1e-6 * first)
+    std::printf("scrambled %u (%s): FAILED (%d elements inside out)\n", seed, kind.name(),
+                inverted(mesh, body.places()));
+  } else if (body.elastic_energy() <= 1e-6 * first)
     ++ends.at_rest;
   else
     ++ends.wound_up;
@@ -316,15 +319,18 @@ int run(std::uint32_t bodies, std::uint32_t scrambled) {
   std::uint64_t failed = totals.failed;
   for (const Kind& kind : kinds) {
     Ends ends;
-    for (std::uint32_t seed = 0;
-         seed < (kind.law == SolidLaw::corotational ? scrambled : scrambled / 4); ++seed)
+    const bool plain = kind.law == SolidLaw::corotational && !kind.quadratic;
+    const std::uint32_t count = plain         ? scrambled - 2 * (scrambled / 4) - scrambled / 100
+                                : kind.slow() ? scrambled / 100
+                                              : scrambled / 4;
+    for (std::uint32_t seed = 0; seed < count; ++seed)
       scramble(seed, kind, ends);
     std::printf(
         "%llu scrambled, %s: %llu at rest in their shape, %llu wound up, %llu with elements "
         "inside out, %llu failed\n",
         number(ends.states), kind.name(), number(ends.at_rest), number(ends.wound_up),
         number(ends.inside_out), number(ends.failed));
-    failed += ends.failed;
+    failed += ends.failed + ends.inside_out;
   }
   return failed == 0 ? 0 : 1;
 }
@@ -332,7 +338,7 @@ int run(std::uint32_t bodies, std::uint32_t scrambled) {
 } // namespace
 
 int main(int argc, char** argv) {
-  std::array<std::uint32_t, 2> counts = {1500, 12};
+  std::array<std::uint32_t, 2> counts = {1500, 100};
   for (int k = 1; k < argc; ++k) {
     const std::string_view text = argv[k];
     std::uint32_t count = 0;
