@@ -88,6 +88,7 @@ Section benchmarks();
 Section hertz();
 Section sliding();
 Section passivity();
+Section hand();
 Section peers();
 Section silicone();
 Section swings();

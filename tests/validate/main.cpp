@@ -20,12 +20,13 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 10> all{{{"patch", constant_strain},
+  const std::array<std::pair<std::string, Section (*)()>, 11> all{{{"patch", constant_strain},
                                                                    {"order", manufactured},
                                                                    {"benchmarks", benchmarks},
                                                                    {"contact", hertz},
                                                                    {"sliding", sliding},
                                                                    {"passivity", passivity},
+                                                                   {"hand", hand},
                                                                    {"peers", peers},
                                                                    {"beam", silicone},
                                                                    {"swing", swings},
