@@ -106,7 +106,7 @@ public:
       each_of_ring(at, ring, [&](std::size_t cell) {
         for (std::size_t k = start_[cell]; k < start_[cell + 1]; ++k) {
           const std::uint32_t t = element_[k];
-          if (!may(t))
+          if (!may(t) || squared_to_box(t, x) > least * (1 + 1e-12))
             continue;
           const Vec3 away = x - nearest_in(corners_of(model_, t), x);
           const double squared = dot(away, away);
@@ -121,6 +121,18 @@ public:
   }
 
 private:
+  /// From a point to the box of an element: the element is no nearer.
+  double squared_to_box(std::uint32_t t, const Vec3& x) const {
+    Box3 box;
+    for (const std::uint32_t node : model_.tetrahedra[t])
+      box.add(model_.nodes[node].position);
+    double squared = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double away = std::max({box.min[a] - x[a], x[a] - box.max[a], 0.0});
+      squared += away * away;
+    }
+    return squared;
+  }
   std::size_t cells() const {
     return static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]) *
            static_cast<std::size_t>(count_[2]);
