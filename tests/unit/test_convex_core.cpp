@@ -147,6 +147,10 @@ TEST(ConvexCore, PairsOfPartsHaveTheDistanceOfAllFeatures) {
                            found->weights[2] * corners[piece[2]];
         EXPECT_LT(norm(place - found->place), 1e-13);
         EXPECT_LT(norm(found->core + found->distance * found->normal({}) - found->place), 1e-13);
+        if (part != CorePart::whole) { // it leads out
+          const Vec3 begun = found->core + 0.01 * (found->place - found->core);
+          EXPECT_GT(core->nearest(pose.inverse(begun)).distance, -1e-13);
+        }
       });
       if (overlap) {
         ++overlapping;

@@ -11,6 +11,7 @@
 #include "statics/static_contact.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <memory>
@@ -150,8 +151,10 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
     for (std::size_t k = 0; k < 3; ++k)
       edges += norm(model.nodes[t[k]].position - model.nodes[t[(k + 1) % 3]].position);
   const double edge = edges / (3 * static_cast<double>(model.triangles.size()));
-  const double radius = 0.5 * edge, along = 0.04;
-  for (const double friction : {0.0, 0.3}) {
+  // Rounded by half an edge; and all but sharp, so that a turn may lead into it.
+  for (const auto& way : {std::array{0.5 * edge, 0.04, 0.0}, std::array{0.5 * edge, 0.04, 0.3},
+                          std::array{0.1, 0.02, 0.0}}) {
+    const double radius = way[0], along = way[1], friction = way[2];
     const InstrumentShape shape = jaw(radius, friction);
     std::vector<double> u(3 * model.nodes.size());
     StaticContact contact(model, u);
@@ -190,7 +193,7 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
         jump = test::larger(jump, std::abs(-sum.z - before) / std::min(-sum.z, before));
       before = -sum.z;
     };
-    for (double z = 30; z > 23.2; z -= 0.1)
+    for (double z = 30; z > 23.2; z -= 2.5 * along)
       go({middle + Vec3{-1.5, 0.3, z}, askew}, false);
     EXPECT_GT(before, 0);
     go({middle + Vec3{-1.5, 0.15, 23.2}, askew}, false);
@@ -199,7 +202,9 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
     EXPECT_LT(depth, 1e-6);
     EXPECT_LT(pull, 1e-9);
     EXPECT_LT(cone, 1e-6);
-    EXPECT_LT(jump, 0.02) << friction;
+    if (radius > 0.2 * edge) {
+      EXPECT_LT(jump, 0.02) << friction;
+    }
     RecordProperty("jump", std::to_string(jump));
   }
 }
