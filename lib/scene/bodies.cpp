@@ -271,24 +271,28 @@ void move_bodies(World& w, double to) {
     if (w.now.objects[i].method == Method::ela &&
         (!w.now.objects[i].load->empty() || instruments_there(w)))
       need_body(w, i);
-  meet(w, to);
+  Extents extents(w);
+  meet(w, to, extents);
   for (const auto& body : w.now.bodies)
-    if (body->changed)
+    if (body->changed) {
       load_body(w, *body);
+      for (const std::size_t part : body->parts)
+        extents.forget(part);
+    }
   if (!(duration > 0))
     return;
-  lead_on(w, to);
+  lead_on(w, to, extents);
   std::vector<Body*> awake;
   std::vector<double> step;
   for (const auto& body : w.now.bodies) {
     body->taken = 0;
-    guide(w, *body, to);
+    guide(w, *body, to, extents);
     if (body->moving->resting()) {
       body->moving->rest_on(duration);
       continue;
     }
     body->ahead = true;
-    body->rest_box.reset();
+    body->rest_extents.clear();
     awake.push_back(body.get());
     step.push_back(integration_step(w, *body));
   }

@@ -66,7 +66,7 @@ bool touched_by(const World& w, const Body& body, std::size_t instrument) {
 // ---- elastodynamic objects
 
 /// Tells a body that is to move of the instruments, and wakes it where one comes.
-void guide(World& w, Body& body, double to) {
+void guide(World& w, Body& body, double to, Extents& extents) {
   if (!instruments_there(w))
     return;
   std::vector<std::optional<MovingInstrument>> all;
@@ -82,26 +82,18 @@ void guide(World& w, Body& body, double to) {
   };
   for (const Instrument& i : w.now.instruments)
     all.push_back(i.present && !i.shape.blade ? std::optional(met_by(i)) : std::nullopt);
-  if (!body.moving->resting()) {
-    body.rest_box.reset();
-  } else {
-    if (!body.rest_box) {
-      body.rest_box.emplace();
-      for (const std::size_t part : body.parts) {
-        const Object& object = w.now.objects[part];
-        const std::size_t surface = surface_count(object.model());
-        for (std::size_t k = 0; k < surface; ++k)
-          body.rest_box->add(object.model().nodes[k].position +
-                             body.moving->motion()[object.offset + k].displacement);
-      }
-    }
+  if (body.moving->resting()) {
+    const auto near_any = [&](const Box3& way) {
+      return std::ranges::any_of(body.parts,
+                                 [&](std::size_t part) { return near(way, extents.of(part).box); });
+    };
     for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
       const Instrument& i = w.now.instruments[k];
       const Pose now = i.present && i.coupled ? i.coupled->end : i.way.at(to);
       if (!i.changed && (i.before == now || i.shape.blade))
         continue;
-      if (touched_by(w, body, k) || (i.present && !i.shape.blade &&
-                                     near(box_between(i.shape, i.before, now), *body.rest_box)))
+      if (touched_by(w, body, k) ||
+          (i.present && !i.shape.blade && near_any(box_between(i.shape, i.before, now))))
         body.moving->wake();
     }
   }

@@ -3,7 +3,6 @@
 // most in the last step, or else one that it comes near to. The others meet it where it goes, and
 // what they push it with counts from the next step on.
 
-#include "base/vector_at.h"
 #include "scene/world_internal.h"
 
 #include <algorithm>
@@ -13,19 +12,9 @@ namespace gewebe::simulation {
 
 namespace {
 
-Box3 box_of(const Object& object) {
-  Box3 box;
-  const bool moves = object.body != nullptr;
-  const std::size_t surface = surface_count(object.model());
-  for (std::size_t k = 0; k < surface; ++k)
-    box.add(object.model().nodes[k].position +
-            (moves ? motion_of(object)[k].displacement
-                   : vector_at(*object.shown.displacement, static_cast<std::uint32_t>(k))));
-  return box;
-}
-
 /// An object that it is about to meet.
-std::optional<std::size_t> near_object(const World& w, const Instrument& i, const Pose& end) {
+std::optional<std::size_t> near_object(const World& w, const Instrument& i, const Pose& end,
+                                       Extents& extents) {
   if (w.now.objects.size() == 1)
     return 0;
   Box3 box = PlacedInstrument(i.shape, i.pose(w.now.clock.time)).box();
@@ -33,8 +22,7 @@ std::optional<std::size_t> near_object(const World& w, const Instrument& i, cons
   box.add(there.min);
   box.add(there.max);
   for (std::size_t k = 0; k < w.now.objects.size(); ++k) {
-    const Object& object = w.now.objects[k];
-    if (object.matter->known && near(box_of(object), box, i.shape.radius))
+    if (w.now.objects[k].matter->known && near(extents.of(k).box, box, i.shape.radius))
       return k;
   }
   return std::nullopt;
@@ -54,7 +42,7 @@ Vec3 force_of(const Object& object, std::size_t instrument) {
 } // namespace
 
 /// Before a way to `to`: where each will be if it feels what it felt.
-void lead_on(World& w, double to) {
+void lead_on(World& w, double to, Extents& extents) {
   const double duration = to - w.now.clock.time;
   for (Instrument& i : w.now.instruments) {
     if (!is_led(i))
@@ -65,7 +53,7 @@ void lead_on(World& w, double to) {
     const bool rests = norm(guess - c.led.place) <= led_to_rest * i.shape.radius;
     c.end.place = rests ? c.led.place : guess;
     if (!c.giver)
-      c.giver = near_object(w, i, c.end);
+      c.giver = near_object(w, i, c.end, extents);
   }
 }
 

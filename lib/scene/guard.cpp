@@ -11,7 +11,7 @@ namespace gewebe::simulation {
 void Body::restore(const Snapshot& was) {
   changed = was.changed;
   touched = was.touched;
-  rest_box = was.rest_box;
+  rest_extents = was.rest_extents;
   moving->go_back(was.motion);
   failure = nullptr;
 }

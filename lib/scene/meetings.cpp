@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -17,43 +16,13 @@ namespace {
 constexpr double near_part = 0.05; ///< of the smaller one's size: so near they move as one
 constexpr double far_parts = 3;    ///< of what is near: so far they are two again
 
-/// Where an object's surface is, and how fast.
-struct Extent {
-  Box3 box;
-  double speed = 0;
-};
-
-Extent extent_of(const Object& object) {
-  Extent all;
-  const Model& model = object.model();
-  if (object.body == nullptr) {
-    for (const Node& node : model.nodes)
-      all.box.add(node.position);
-    return all;
-  }
-  const std::span<const NodeMotion> motion = motion_of(object);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    all.box.add(model.nodes[i].position + motion[i].displacement);
-    all.speed = std::max(all.speed, dot(motion[i].velocity, motion[i].velocity));
-  }
-  all.speed = std::sqrt(all.speed);
-  return all;
-}
-
 bool awake(const Object& object) {
   return object.body != nullptr && (object.body->changed || !object.body->moving->resting());
 }
 
 /// Whether they may come to touch within a time; of such as were near already, with more room.
-bool are_near(const World& w, const Meeting& m, double duration,
-              std::map<std::size_t, Extent>& extents) {
-  const auto extent = [&](std::size_t object) -> const Extent& {
-    const auto known = extents.find(object);
-    return known != extents.end()
-               ? known->second
-               : extents.emplace(object, extent_of(w.now.objects[object])).first->second;
-  };
-  const Extent &a = extent(m.object), &b = extent(m.other);
+bool are_near(const World& w, const Meeting& m, double duration, Extents& extents) {
+  const Extent &a = extents.of(m.object), &b = extents.of(m.other);
   const double margin = near_part * std::min(a.box.longest_side(), b.box.longest_side()) +
                         2 * duration * (a.speed + b.speed) +
                         duration * duration * norm(w.now.gravity);
@@ -106,8 +75,7 @@ std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::siz
 }
 
 /// Before objects move: those that may touch by then become one body, others come apart.
-void meet(World& w, double to) {
-  std::map<std::size_t, Extent> extents;
+void meet(World& w, double to, Extents& extents) {
   std::set<std::size_t> changed;
   for (Meeting& m : w.now.meetings) {
     const Object &a = w.now.objects[m.object], &b = w.now.objects[m.other];

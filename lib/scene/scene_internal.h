@@ -7,6 +7,7 @@
 #include "cutting/cut_stiffness.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_dynamic.h"
+#include "scene/extents.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/static_contact.h"
@@ -97,19 +98,19 @@ struct Body {
   std::unique_ptr<BodyMotion> moving;
   double safe = 0; // largest stable step
   bool changed = true;
-  bool touched = false;         // by an instrument, in the last step
-  std::optional<Box3> rest_box; // while at rest
-  bool ahead = false;           // it has moved on since the scene was saved
+  bool touched = false;                         // by an instrument, in the last step
+  std::map<std::size_t, Extent> rest_extents{}; // by part, while at rest: see Extents
+  bool ahead = false;                           // it has moved on since the scene was saved
   bool warned_step = false;
   std::uint64_t taken = 0; // by the last advance
   std::exception_ptr failure;
 
   struct Snapshot {
     bool changed = true, touched = false;
-    std::optional<Box3> rest_box;
+    std::map<std::size_t, Extent> rest_extents{};
     std::any motion;
   };
-  Snapshot snapshot() const { return {changed, touched, rest_box, moving->snapshot()}; }
+  Snapshot snapshot() const { return {changed, touched, rest_extents, moving->snapshot()}; }
   void restore(const Snapshot& was);
 };
 

@@ -130,7 +130,7 @@ inline bool moves_implicitly(const Object& object) {
 std::span<const NodeMotion> motion_of(const Object& object);
 
 // meetings.cpp: whose surfaces touch
-void meet(World& w, double to);
+void meet(World& w, double to, Extents& extents);
 std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::size_t> parts,
                                         std::span<const std::size_t> offset);
 void move_meetings(World& w, std::size_t index, const Moves& moves);
@@ -165,7 +165,7 @@ bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
 // coupled.cpp: instruments that hands lead through a spring
-void lead_on(World& w, double to);
+void lead_on(World& w, double to, Extents& extents);
 void follow_hands(World& w, double to);
 bool gives_way_to(const World& w, const Instrument& instrument, const Object& object);
 MovedInstrument led_here(const World& w, const Instrument& instrument, const MovedInstrument& way);
@@ -173,7 +173,7 @@ void settle(World& w, std::size_t instrument, const Object& object);
 void end_leading(World& w);
 
 // contact.cpp: whom they touch
-void guide(World& w, Body& body, double to);
+void guide(World& w, Body& body, double to, Extents& extents);
 void end_guiding(World& w, double to);
 void take_touches(World& w, double duration);
 void gather_impulses(World& w, Body& body);
