@@ -275,7 +275,8 @@ void push_out(const Local& l, VectorXd& f) {
 }
 
 /// Along the centre, then by Newton's steps. \pre e is of f; so it is behind
-void go_inside(const Local& l, std::span<const Contact> contacts, VectorXd& f, Residual& e) {
+void go_inside(const Local& l, std::span<const Contact> contacts, VectorXd& f, Residual& e,
+               double tolerance) {
   std::vector<Index> rows;
   std::vector<double> friction;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -297,9 +298,9 @@ void go_inside(const Local& l, std::span<const Contact> contacts, VectorXd& f, R
       f = std::move(all);
       e = std::move(there);
     }
-    return e.size <= 0.1 * contact_solver_tolerance || idle == max_idle;
+    return e.size <= 0.1 * tolerance || idle == max_idle;
   });
-  for (int k = 0; k < max_newton && !(e.size <= contact_solver_tolerance); ++k)
+  for (int k = 0; k < max_newton && !(e.size <= tolerance); ++k)
     if (!newton(l, contacts, f, e))
       break;
 }
@@ -307,7 +308,8 @@ void go_inside(const Local& l, std::span<const Contact> contacts, VectorXd& f, R
 } // namespace
 
 ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
-                             std::span<const Contact> contacts, std::span<const Vec3> start) {
+                             std::span<const Contact> contacts, std::span<const Vec3> start,
+                             double tolerance) {
   ContactForces result;
   if (contacts.empty()) {
     result.solved = true;
@@ -329,11 +331,11 @@ ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
   push_out(l, f);
   Residual e = equations(l, contacts, f);
   double best = HUGE_VAL;
-  for (int vain = 0; rough && vain < max_vain && !(e.size <= contact_solver_tolerance);) {
-    for (int k = 0; k < max_newton && !(e.size <= contact_solver_tolerance); ++k)
+  for (int vain = 0; rough && vain < max_vain && !(e.size <= tolerance);) {
+    for (int k = 0; k < max_newton && !(e.size <= tolerance); ++k)
       if (!newton(l, contacts, f, e))
         break;
-    if (e.size <= contact_solver_tolerance)
+    if (e.size <= tolerance)
       break;
     for (int k = 0; k < max_sweeps; ++k)
       sweep(l, contacts, f);
@@ -341,10 +343,9 @@ ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
     vain = e.size < 0.5 * best ? 0 : vain + 1;
     best = e.size < best ? e.size : best;
   }
-  if (rough && !(e.size <= contact_solver_tolerance))
-    go_inside(l, contacts, f, e);
-  if (rough &&
-      !(e.size <= contact_solver_tolerance)) { // rather nothing inside, than friction right
+  if (rough && !(e.size <= tolerance))
+    go_inside(l, contacts, f, e, tolerance);
+  if (rough && !(e.size <= tolerance)) { // rather nothing inside, than friction right
     VectorXd out = f;
     push_out(l, out);
     if (Residual there = equations(l, contacts, out); there.size < e.size) {
@@ -357,7 +358,7 @@ ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
     result.force.push_back({g[0], g[1], g[2]});
   }
   result.residual = e.size;
-  result.solved = e.size <= contact_solver_tolerance;
+  result.solved = e.size <= tolerance;
   return result;
 }
 

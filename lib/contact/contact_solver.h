@@ -38,9 +38,10 @@ struct ContactForces {
 };
 
 /// \param compliance W, (3 m)² numbers, columns one behind the other \param start a guess, by
-/// contact, or empty   \pre contacts' nodes < m
+/// contact, or empty \param tolerance of the residual, with friction   \pre contacts' nodes < m
 ContactForces solve_contacts(std::span<const double> compliance, std::size_t m,
-                             std::span<const Contact> contacts, std::span<const Vec3> start = {});
+                             std::span<const Contact> contacts, std::span<const Vec3> start = {},
+                             double tolerance = contact_solver_tolerance);
 
 /// The residual of any forces, as above.
 double contact_residual(std::span<const double> compliance, std::size_t m,

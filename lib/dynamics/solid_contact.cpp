@@ -44,6 +44,13 @@ public:
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
     if (!ran_)
       run();
+    if (step_.meets && !nodes.empty() && !took_tangent_) {
+      took_tangent_ = true;
+      if (step_.engine.take_tangent(context_)) {
+        ++took_.factorisations;
+        all_.renew();
+      }
+    }
     const std::size_t size = 3 * nodes.size();
     need_columns(nodes);
     DelassusOperator delassus;
@@ -280,7 +287,7 @@ private:
   int pushes_ = 0, idle_ = 0, unfinished_ = 0;
   double best_ = HUGE_VAL; ///< miss of a push
   std::vector<double> noted_force_, noted_place_;
-  bool ran_ = false, exact_ = true;
+  bool ran_ = false, took_tangent_ = false, exact_ = true;
   SolidStep took_;
 };
 
@@ -291,14 +298,11 @@ SolidContact::SolidContact(const Model& model, std::vector<SurfaceMeeting> meeti
 }
 
 SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>& touches,
-                                        const Context& context) {
+                                        std::vector<SurfacePush>& pushes, const Context& context) {
   std::vector<NodeTouch> by_instruments;
-  std::vector<std::uint32_t> met;
   for (const NodeTouch& t : touches)
-    if (t.instrument == other_surface)
-      met.push_back(t.node);
-    else if (t.instrument < step.instruments.size() && step.instruments[t.instrument] &&
-             !step.displaced.contains(t.node))
+    if (t.instrument < step.instruments.size() && step.instruments[t.instrument] &&
+        !step.displaced.contains(t.node))
       by_instruments.push_back(t);
   std::erase_if(touches, [&](const NodeTouch& t) {
     return t.instrument == other_surface
@@ -317,21 +321,25 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
   if (!step.meets) {
     contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
     touches = contact_.touches();
+    pushes.clear();
   } else {
     MeetingYielding both(
         object, *pairs_,
         [&](std::uint32_t node) {
           return model_.nodes[node].fixed == fixed_all || step.displaced.contains(node);
         },
-        shape, std::move(met));
+        shape, std::move(pushes));
     contact_.update(both, step.displaced, step.instruments, shape, !step.clearing);
     met_.add(both.counts());
     touches = both.touches();
+    pushes = both.kept();
     touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
     touches = sums_of_touches(std::move(touches));
     object.distrust(!both.solved());
   }
   object.end();
+  if (pushes.empty())
+    step.engine.drop_tangent();
   step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);
   return {object.took(), object.exact() && contact_.solved()};
 }

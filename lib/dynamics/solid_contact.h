@@ -8,8 +8,10 @@
 // where tissue is pressed in deeply by far, so W is corrected by what each round's forces have
 // moved (the update of BFGS: Nocedal, Wright, Numerical optimization, 2006, 6.1), and each round
 // starts from the last one's end. Surfaces of parts that may touch push each other in it
-// (statics/meeting_yielding.h), to 1e-4 of an edge. Nothing of a step's velocity into an instrument
-// is left at its end, and friction acts against the slip over the step.
+// (statics/meeting_yielding.h), to 1e-4 of an edge; of a net A has the tangent of its springs
+// there, whose bound lets W know nothing of how easily a wall gives way across itself. Nothing of a
+// step's velocity into an instrument is left at its end, and friction acts against the slip over
+// the step.
 
 #include "base/context.h"
 #include "dynamics/dynamic_contact.h"
@@ -33,8 +35,12 @@ public:
   explicit SolidContact(const Model& model, std::vector<SurfaceMeeting> meetings = {});
 
   /// Whether surfaces may touch each other within a step of h from these places.
-  bool may_meet(std::span<const double> places, std::span<const double> velocity, double h) const {
+  bool may_meet(std::span<const double> places, std::span<const double> velocity, double h) {
     return pairs_ && pairs_->may_touch(places, velocity, h);
+  }
+  /// Behind a step where they may not: whether they may have done so nevertheless.
+  bool may_have_met(std::span<const double> places) const {
+    return pairs_ && pairs_->may_have_touched(places);
   }
 
   struct Step {
@@ -52,9 +58,10 @@ public:
     SolidStep took; ///< of all rounds
     bool exact = true;
   };
-  /// Takes the engine on by a step; one that clears, where something is in the way. \param touches
-  /// forces of the last step, then of this one \throw as SolidMotion::step
-  Result step(const Step& step, std::vector<NodeTouch>& touches, const Context& context);
+  /// Takes the engine on by a step; one that clears, where something is in the way. \param touches,
+  /// pushes of the last step, then of this one \throw as SolidMotion::step
+  Result step(const Step& step, std::vector<NodeTouch>& touches, std::vector<SurfacePush>& pushes,
+              const Context& context);
   /// Of contacts since the last call.
   TouchCounts take_counts() {
     TouchCounts all = contact_.take_counts();

@@ -347,16 +347,32 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
   const auto& instruments = state_.instruments;
   if (!contact_ && !meetings_.empty())
     contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  const bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
+  bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
+  std::vector<double> places, velocity; // where it begins, if that may be needed again
+  if (!meetings_.empty() && !meets) {
+    places.assign(moving.places().begin(), moving.places().end());
+    velocity.assign(moving.velocity().begin(), moving.velocity().end());
+  }
+  const auto begin_again = [&] {
+    if (meets || !contact_ || !contact_->may_have_met(moving.places()))
+      return false;
+    moving.begin_again(places, velocity, context);
+    meets = true;
+    return true;
+  };
+  SolidStep all;
   if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
     state_.touched.clear();
+    state_.pushes.clear();
+    moving.drop_tangent();
     if (!target.empty())
       moving.move_held(target);
-    return moving.step(h, context);
+    all = moving.step(h, context);
+    if (!begin_again())
+      return all;
   }
   if (!contact_)
     contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  SolidStep all;
   bool exact = true;
   const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
     std::vector<std::optional<MovedInstrument>> moved;
@@ -379,7 +395,7 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     const SolidContact::Result result = contact_->step(
         {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
          state_.load->displacement, moved, h, options_, clearing, meets},
-        state_.touched, context);
+        state_.touched, state_.pushes, context);
     counts_.touches.add(contact_->take_counts());
     all.rounds += result.took.rounds;
     all.factorisations += result.took.factorisations;
@@ -402,10 +418,14 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     return static_cast<double>(part) / static_cast<double>(of);
   };
   const std::size_t jumps = first ? parts(true) : 0, ways = std::max<std::size_t>(1, parts(false));
-  for (std::size_t p = 0; p < jumps; ++p)
-    go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
-  for (std::size_t p = 0; p < ways; ++p)
-    go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
+  const std::vector<NodeTouch> touched = state_.touched;
+  do {
+    state_.touched = touched;
+    for (std::size_t p = 0; p < jumps; ++p)
+      go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
+    for (std::size_t p = 0; p < ways; ++p)
+      go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
+  } while (begin_again());
   lead_instruments(to, h);
   for (NodeTouch t : state_.touched) {
     t.force *= h;
@@ -464,6 +484,7 @@ void SolidDynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
   if (meetings == meetings_)
     return;
   meetings_ = std::move(meetings);
+  state_.pushes.clear();
   contact_.reset();
 }
 

@@ -78,6 +78,7 @@ private:
 
     std::vector<std::optional<MovingInstrument>> instruments{};
     std::vector<NodeTouch> touched{};  ///< forces in the last step
+    std::vector<SurfacePush> pushes{}; ///< of surfaces, in the last step
     std::vector<NodeTouch> impulses{}; ///< of steps since they were taken
     double held_time = 0;              ///< s that `touched` acted at rest since then
     bool exact = true;                 ///< all forces so far

@@ -26,7 +26,7 @@ public:
   /// Keeps a reference to it.
   explicit Extents(World& world) : w_(world) {}
 
-  const Extent& of(std::size_t object);
+  const Extent& of(std::size_t index);
   /// It has been moved.
   void forget(std::size_t object) { known_.erase(object); }
 

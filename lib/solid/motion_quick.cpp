@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace gewebe {
 
@@ -71,6 +72,7 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   single_.emplace(*factor_);
   step_ = h;
   held_ = held;
+  tangent_.taken = false;
   forget();
   still_.resize(body.nodes());
   for (std::size_t i = 0; i < body.nodes(); ++i)
@@ -78,6 +80,31 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
                 held[3 * i + 2] != 0;
   all_still_ = std::ranges::all_of(still_, [](std::uint8_t still) { return still != 0; });
   return 1;
+}
+
+bool MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& springs,
+                               const Numbers& at, const Context& context) {
+  if (!all_still_ || !body.elements.empty())
+    return false;
+  const bool same_pattern = tangent_.factor && tangent_.held == held_;
+  if (!same_pattern)
+    tangent_.axes = solid_stiffness(body.mesh, body.elements, held_, context);
+  StiffnessMatrix a = springs.with_tangent(tangent_.axes, at, 1 / step_);
+  add_masses(body, step_, a);
+  if (same_pattern)
+    tangent_.factor->refactor(a, context);
+  else
+    tangent_.factor.emplace(a, context);
+  tangent_.single.emplace(*tangent_.factor);
+  tangent_.held = held_;
+  tangent_.taken = true;
+  forget();
+  return true;
+}
+
+void MotionQuick::drop_tangent() noexcept {
+  if (std::exchange(tangent_.taken, false))
+    forget();
 }
 
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
@@ -137,21 +164,24 @@ void MotionQuick::solve(Numbers& v, const Context& context) {
 }
 
 void MotionQuick::solve_constant(Numbers& v, const Context& context) {
+  const StiffnessMatrix& axes = tangent_.taken ? tangent_.axes : stiffness_;
+  SingleFactor& factor = tangent_.taken ? *tangent_.single : *single_;
+  const std::size_t alike = alike_ && !tangent_.taken ? 3 : 1;
   double scale = 0; // whatever the numbers are, single precision holds them
-  for (const std::int64_t at : stiffness_.axis_of_row)
-    for (std::size_t a = 0; a < (alike_ ? 3U : 1U); ++a)
+  for (const std::int64_t at : axes.axis_of_row)
+    for (std::size_t a = 0; a < alike; ++a)
       scale = std::max(scale, std::abs(v[static_cast<std::size_t>(at) + a]));
   if (!(scale > 0 && std::isfinite(scale)))
     return;
-  const std::size_t order = stiffness_.order();
+  const std::size_t order = axes.order();
   rows_.resize(order);
   solved_.assign(v.size(), 0);
-  for (std::size_t a = 0; a < (alike_ ? 3U : 1U); ++a) {
+  for (std::size_t a = 0; a < alike; ++a) {
     for (std::size_t k = 0; k < order; ++k)
-      rows_[k] = v[static_cast<std::size_t>(stiffness_.axis_of_row[k]) + a] / scale;
-    single_->solve(rows_, context);
+      rows_[k] = v[static_cast<std::size_t>(axes.axis_of_row[k]) + a] / scale;
+    factor.solve(rows_, context);
     for (std::size_t k = 0; k < order; ++k)
-      solved_[static_cast<std::size_t>(stiffness_.axis_of_row[k]) + a] = scale * rows_[k];
+      solved_[static_cast<std::size_t>(axes.axis_of_row[k]) + a] = scale * rows_[k];
   }
   v.swap(solved_);
 }

@@ -29,6 +29,11 @@ public:
   int prepare(const MotionBody& body, const MotionSprings& springs,
               const std::vector<std::uint8_t>& held, double h, const SolidMotionOptions& options,
               const Context& context);
+  /// In place of the bound of springs, their tangent at these places, until `step` or `held` change
+  /// or drop_tangent. \return whether it was taken: not where elements turn \pre prepared
+  bool take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
+                    const Context& context);
+  void drop_tangent() noexcept;
   /// Frames as in the last evaluation; those of nodes held along an axis, or of no tetrahedron,
   /// don't turn.
   /// \pre prepared
@@ -57,6 +62,14 @@ private:
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;
+  /// The tangent's, of all axes, in place of these.
+  struct Tangent {
+    bool taken = false;
+    std::vector<std::uint8_t> held;
+    StiffnessMatrix axes;
+    std::optional<Factor> factor;
+    std::optional<SingleFactor> single;
+  } tangent_;
   void solve_constant(Numbers& v, const Context& context);
 
   const MotionVolumes* filled_ = nullptr;

@@ -329,6 +329,18 @@ void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
   std::ranges::copy(all, over_axes.begin());
 }
 
+bool SolidMotion::take_tangent(const Context& context) {
+  State& s = *state_;
+  if (!s.quick.take_tangent(s.body, s.energy.springs(), s.now.place, context))
+    return false;
+  s.quick.fill(s.energy.volumes(), context);
+  return true;
+}
+
+void SolidMotion::drop_tangent() {
+  state_->quick.drop_tangent();
+}
+
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   if (s.recovery.on()) {

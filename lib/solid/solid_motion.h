@@ -166,6 +166,11 @@ public:
   /// What forces on the 3 n axes move by the constant matrix of the last step, in frames as it left
   /// them, to single precision, in place; 0 on held axes. \pre a step was taken, the quick way
   void respond(std::span<double> over_axes, const Context& context);
+  /// The constant matrix of a net without elements has the tangent of its springs where it stands,
+  /// in place of their bound, until a step of another length or drop_tangent: respond() is right to
+  /// first order then. \return whether it was made \pre a step was taken, the quick way
+  bool take_tangent(const Context& context);
+  void drop_tangent();
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
 

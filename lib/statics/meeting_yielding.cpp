@@ -1,7 +1,7 @@
 #include "statics/meeting_yielding.h"
 
 #include "base/vector_at.h"
-#include "contact/contact_solver.h"
+#include "statics/meeting_linear_internal.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <tuple>
 #include <utility>
 
 namespace gewebe {
@@ -19,72 +18,56 @@ namespace {
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 // Of an edge.
-constexpr double come_apart = 0.05; ///< of what overlaps, a step
-constexpr double keep_near = 0.1;   ///< of what was touched
-constexpr double same_gap = 1e-6, fair_gap = surface_depth;
+constexpr double come_apart = 0.05;                ///< of what overlaps, a step
+constexpr double keep_near = 0.1;                  ///< of what was touched
+constexpr double same_gap = 1e-6, near_gap = 1e-5; ///< behind some turns
+constexpr double fair_gap = surface_depth;
 constexpr double same_place = 1e-8;
+constexpr double next_to_nothing = 1e-4; ///< of the largest force
 
-constexpr double immovable = 1e-12; ///< of the largest compliance
 constexpr int max_turns = 40, turns_at_once = 8;
 constexpr int turns_of_step = 400;   ///< behind which its forces are told not to be exact
 constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
 constexpr int max_asked = 8;         ///< times that triangles beyond the operator's nodes are met
 constexpr int max_waits = 40;        ///< for instruments
 
-auto key_of(const SurfacePair& p) {
-  return std::tuple(p.meeting, !p.first_side, p.node);
-}
-
-Eigen::Vector3d eigen(const Vec3& v) {
-  return {v.x, v.y, v.z};
-}
-Vec3 vec(const Eigen::Vector3d& v) {
-  return {v[0], v[1], v[2]};
-}
-
 } // namespace
 
 class MeetingYielding::Work {
 public:
   Work(Yielding& object, SurfacePairs& pairs, std::function<bool(std::uint32_t)> held,
-       std::span<const double> was, std::vector<std::uint32_t> touched);
+       std::span<const double> was, std::vector<SurfacePush> kept);
 
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes);
   bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at);
   std::span<const double> shape() { return object_.shape(); }
 
   std::vector<NodeTouch> touches() const;
+  std::vector<SurfacePush> kept() const;
   bool solved() const noexcept { return solved_; }
   TouchCounts counts() const;
 
 private:
-  using Key = std::tuple<std::uint32_t, bool, std::uint32_t>;
-  struct Columns {
-    Eigen::MatrixXd moved;      ///< by pairs' forces, three columns each: nodes of the operator
-    Eigen::MatrixXd compliance; ///< of the pairs
-  };
+  using Key = decltype(std::declval<const SurfacePair&>().key());
 
   void begin();
-  bool join(std::vector<SurfacePair> found, bool first);
+  bool join(std::vector<SurfacePair> found, bool passed);
   void ask();
   void take_shape();
   void solve();
   bool gather_nodes();
   Eigen::VectorXd without_pairs() const;
-  Columns columns_of(std::span<const SurfacePush> pairs) const;
-  Vec3 between(const SurfacePair& pair, std::span<const Vec3> at) const;
+  bool is_held(const SurfacePair& pair) const { return std::ranges::all_of(pair.nodes, held_); }
   double target_of(const SurfacePair& pair) const;
   double miss_of(std::span<const SurfacePush> pairs) const;
   void solve_linear(std::vector<SurfacePush>& pairs, const Eigen::VectorXd& base,
                     Eigen::VectorXd& x);
-  std::vector<std::size_t> counting(std::span<const SurfacePush> pairs) const;
 
   Yielding& object_;
   SurfacePairs& pairs_;
   std::function<bool(std::uint32_t)> held_;
   std::vector<double> was_;
   std::vector<Vec3> was_at_;
-  std::vector<std::uint32_t> touched_;
   std::map<Key, double> overlaps_; ///< gaps when the step began
 
   std::vector<std::uint32_t> own_; ///< nodes that instruments may touch
@@ -101,56 +84,51 @@ private:
 
 MeetingYielding::Work::Work(Yielding& object, SurfacePairs& pairs,
                             std::function<bool(std::uint32_t)> held, std::span<const double> was,
-                            std::vector<std::uint32_t> touched)
+                            std::vector<SurfacePush> kept)
     : object_(object), pairs_(pairs), held_(std::move(held)), was_(was.begin(), was.end()),
-      was_at_(pairs.places_of(was)), touched_(std::move(touched)) {
-  std::erase_if(touched_, held_);
-}
+      was_at_(pairs.places_of(was)), all_(std::move(kept)) {}
 
 /// The step under the last forces, and who touches whom in it.
 void MeetingYielding::Work::begin() {
   begun_ = true;
-  nodes_ = own_;
-  nodes_.insert(nodes_.end(), touched_.begin(), touched_.end());
-  std::ranges::sort(nodes_);
-  nodes_.erase(std::ranges::unique(nodes_).begin(), nodes_.end());
+  (void)gather_nodes();
   delassus_ = object_.delassus_operator(nodes_);
   fresh_ = true;
   take_shape();
-  std::vector<SurfacePair> found = pairs_.find(object_.shape(), was_, keep_near * pairs_.edge());
+  for (SurfacePush& p : all_)
+    pairs_.follow(p.pair, at_);
+  std::erase_if(all_, [&](const SurfacePush& p) {
+    return p.pair.apart || !(p.pair.gap < keep_near * pairs_.edge()) || is_held(p.pair);
+  });
+  std::vector<SurfacePair> found = pairs_.find(object_.shape(), was_, 0);
   if (std::ranges::any_of(
           found, [&](const SurfacePair& p) { return p.gap < -come_apart * pairs_.edge(); }))
     for (const SurfacePair& p : pairs_.find(was_, was_, 0))
-      overlaps_[key_of(p)] = p.gap;
-  join(std::move(found), true);
+      overlaps_[p.key()] = p.gap;
+  if (!join(std::move(found), false))
+    join(pairs_.find_passed(object_.shape(), was_, surface_depth * pairs_.edge()), true);
 }
 
 void MeetingYielding::Work::take_shape() {
   at_ = pairs_.places_of(object_.shape());
 }
 
-/// \param first some of these were touched already \return whether any is new
-bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool first) {
-  const auto touched = [&](std::uint32_t node) {
-    return std::ranges::binary_search(touched_, node);
-  };
+/// \param passed on their way, from where they were outside \return whether any is new
+bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool passed) {
   bool joined = false;
   if (found.size() > max_new) {
     std::ranges::stable_sort(found, {}, &SurfacePair::gap);
-    if (!first)
+    if (begun_)
       found.resize(max_new);
   }
   for (const SurfacePair& p : found) {
-    if (held_(p.node) && std::ranges::all_of(p.piece, held_))
-      continue;
-    const bool near = first && (touched(p.node) || std::ranges::any_of(p.piece, touched));
-    if (!near && !(p.gap < target_of(p) - surface_depth * pairs_.edge()))
+    if (is_held(p) || (!passed && !(p.gap < target_of(p) - surface_depth * pairs_.edge())))
       continue;
     const auto there = std::ranges::lower_bound(
-        all_, key_of(p), {}, [](const SurfacePush& push) { return key_of(push.pair); });
-    if (there != all_.end() && key_of(there->pair) == key_of(p))
+        all_, p.key(), {}, [](const SurfacePush& push) { return push.pair.key(); });
+    if (there != all_.end() && there->pair.key() == p.key())
       continue;
-    all_.insert(there, {p, {}});
+    all_.insert(there, {p, {}, passed});
     joined = true;
   }
   return joined;
@@ -161,8 +139,7 @@ bool MeetingYielding::Work::gather_nodes() {
   std::vector<std::uint32_t> nodes = own_;
   nodes.insert(nodes.end(), more_.begin(), more_.end());
   for (const SurfacePush& p : all_) {
-    nodes.push_back(p.pair.node);
-    nodes.insert(nodes.end(), p.pair.piece.begin(), p.pair.piece.end());
+    nodes.insert(nodes.end(), p.pair.nodes.begin(), p.pair.nodes.end());
   }
   std::erase_if(nodes, held_);
   std::ranges::sort(nodes);
@@ -197,64 +174,10 @@ VectorXd MeetingYielding::Work::without_pairs() const {
   return x;
 }
 
-/// From the triangle's point to the node.
-Vec3 MeetingYielding::Work::between(const SurfacePair& pair, std::span<const Vec3> at) const {
-  return at[pair.node] - pair.weights[0] * at[pair.piece[0]] - pair.weights[1] * at[pair.piece[1]] -
-         pair.weights[2] * at[pair.piece[2]];
-}
-
 /// The least gap that a pair may have.
 double MeetingYielding::Work::target_of(const SurfacePair& pair) const {
-  const auto known = overlaps_.find(key_of(pair));
+  const auto known = overlaps_.find(pair.key());
   return known == overlaps_.end() ? 0 : std::min(0.0, known->second + come_apart * pairs_.edge());
-}
-
-/// Calls visit(row of the operator's nodes, weight) for those of a pair that give way.
-template <class Visit>
-void for_weights(const SurfacePair& p, std::span<const std::uint32_t> nodes, Visit&& visit) {
-  const auto one = [&](std::uint32_t node, double weight) {
-    const auto at = std::ranges::lower_bound(nodes, node);
-    if (weight != 0 && at != nodes.end() && *at == node)
-      visit(3 * (at - nodes.begin()), weight);
-  };
-  one(p.node, 1);
-  for (std::size_t c = 0; c < 3; ++c)
-    one(p.piece[c], -p.weights[c]);
-}
-
-MeetingYielding::Work::Columns
-MeetingYielding::Work::columns_of(std::span<const SurfacePush> pairs) const {
-  const auto size = static_cast<Index>(3 * nodes_.size());
-  const auto count = static_cast<Index>(3 * pairs.size());
-  const Eigen::Map<const MatrixXd> w(delassus_.compliance.data(), size, size);
-  Columns c{MatrixXd::Zero(size, count), MatrixXd::Zero(count, count)};
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    for_weights(pairs[k].pair, nodes_, [&](Index row, double weight) {
-      c.moved.middleCols<3>(static_cast<Index>(3 * k)) += weight * w.middleCols<3>(row);
-    });
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    for_weights(pairs[k].pair, nodes_, [&](Index row, double weight) {
-      c.compliance.middleRows<3>(static_cast<Index>(3 * k)) += weight * c.moved.middleRows<3>(row);
-    });
-  c.compliance = (0.5 * (c.compliance + c.compliance.transpose())).eval();
-  return c;
-}
-
-/// One of those that say the same: a node on a corner, and that corner on the node.
-std::vector<std::size_t> MeetingYielding::Work::counting(std::span<const SurfacePush> pairs) const {
-  std::vector<std::size_t> all;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> met;
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const SurfacePair& p = pairs[k].pair;
-    const auto corner = std::ranges::find(p.weights, 1.0);
-    if (corner != p.weights.end()) {
-      const std::uint32_t other = p.piece[static_cast<std::size_t>(corner - p.weights.begin())];
-      if (!met.try_emplace(std::minmax(p.node, other), k).second)
-        continue;
-    }
-    all.push_back(k);
-  }
-  return all;
 }
 
 /// Forces of pairs, whose points and normals stay.
@@ -263,69 +186,34 @@ void MeetingYielding::Work::solve_linear(std::vector<SurfacePush>& pairs, const 
   std::vector<Vec3> without(at_);
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     without[nodes_[k]] = vec(base.segment<3>(static_cast<Index>(3 * k)));
-  const std::vector<std::size_t> some = counting(pairs);
+  const std::vector<std::size_t> some = counting_pairs(pairs);
   std::vector<SurfacePush> looked;
-  for (const std::size_t k : some)
-    looked.push_back(pairs[k]);
-  const Columns columns = columns_of(looked);
-  const double largest = looked.empty() ? 0 : columns.compliance.diagonal().cwiseAbs().maxCoeff();
   std::vector<Contact> contacts;
-  std::vector<Vec3> guess;
-  bool rough = false;
-  for (std::uint32_t k = 0; k < looked.size(); ++k) {
-    const SurfacePair& p = looked[k].pair;
-    const auto row = static_cast<Index>(3 * k);
-    const double own =
-        eigen(p.normal).dot(columns.compliance.block<3, 3>(row, row) * eigen(p.normal));
-    if (!(own > immovable * largest))
-      continue;
+  for (const std::size_t k : some) {
+    const SurfacePair& p = pairs[k].pair;
     const Vec3 here = between(p, without);
-    const double friction = pairs_.meetings()[p.meeting].friction;
-    rough = rough || friction > 0;
-    contacts.push_back(
-        {k, p.normal, dot(p.normal, here) - target_of(p), here - between(p, was_at_), friction});
-    guess.push_back(looked[k].force);
+    contacts.push_back({static_cast<std::uint32_t>(looked.size()), p.normal,
+                        dot(p.normal, here) - target_of(p), here - between(p, was_at_),
+                        pairs_.meetings()[p.meeting].friction});
+    looked.push_back(pairs[k]);
   }
+  const MeetingColumns columns = columns_of_pairs(looked, nodes_, delassus_.compliance);
+  solved_ = push_pairs(columns, contacts, looked) && solved_;
   for (SurfacePush& p : pairs)
     p.force = {};
-  if (rough) {
-    const ContactForces found = solve_contacts(
-        {columns.compliance.data(), static_cast<std::size_t>(columns.compliance.size())},
-        looked.size(), contacts, guess);
-    solved_ = solved_ && found.solved;
-    for (std::size_t i = 0; i < contacts.size(); ++i)
-      pairs[some[contacts[i].node]].force = found.force[i];
-  } else {
-    const auto count = static_cast<Index>(contacts.size());
-    MatrixXd along(count, count);
-    std::vector<double> gap, start;
-    for (Index i = 0; i < count; ++i) {
-      const Contact& a = contacts[static_cast<std::size_t>(i)];
-      for (Index j = 0; j < count; ++j) {
-        const Contact& b = contacts[static_cast<std::size_t>(j)];
-        along(i, j) =
-            eigen(a.normal).dot(columns.compliance.block<3, 3>(3 * static_cast<Index>(a.node),
-                                                               3 * static_cast<Index>(b.node)) *
-                                eigen(b.normal));
-      }
-      gap.push_back(a.gap);
-      start.push_back(dot(guess[static_cast<std::size_t>(i)], a.normal));
-    }
-    const PushForces found =
-        solve_pushes({along.data(), static_cast<std::size_t>(along.size())}, gap, start);
-    solved_ = solved_ && found.solved;
-    for (std::size_t i = 0; i < contacts.size(); ++i)
-      pairs[some[contacts[i].node]].force = found.push[i] * contacts[i].normal;
-  }
   x = base;
-  for (std::size_t k = 0; k < some.size(); ++k)
-    x += columns.moved.middleCols<3>(static_cast<Index>(3 * k)) * eigen(pairs[some[k]].force);
+  for (std::size_t k = 0; k < some.size(); ++k) {
+    pairs[some[k]].force = looked[k].force;
+    x += columns.moved.middleCols<3>(static_cast<Index>(3 * k)) * eigen(looked[k].force);
+  }
 }
 
 /// How far gaps are from what the forces say, over an edge.
 double MeetingYielding::Work::miss_of(std::span<const SurfacePush> pairs) const {
   double most = 0;
   for (const SurfacePush& p : pairs) {
+    if (p.pair.apart && p.force == Vec3{})
+      continue;
     const double off = p.pair.gap - target_of(p.pair);
     const double miss = p.force == Vec3{} ? std::max(0.0, -off) : std::abs(off);
     most = miss <= most ? most : miss;
@@ -341,7 +229,8 @@ void MeetingYielding::Work::solve() {
     double part = 1;
     for (int turn = 0;; ++turn) {
       for (SurfacePush& p : all_)
-        pairs_.follow(p.pair, at_);
+        if (!std::exchange(p.fresh, false))
+          pairs_.follow(p.pair, at_);
       solved_ = true;
       solve_linear(all_, base, x_);
       ++turns_;
@@ -352,9 +241,10 @@ void MeetingYielding::Work::solve() {
       for (SurfacePush& p : then)
         pairs_.follow(p.pair, there);
       left_ = miss_of(then);
-      if (!(left_ > same_gap) || turn == max_turns || turns_ >= turns_of_step || !solved_)
+      if (!(left_ > (turn < turns_at_once ? same_gap : near_gap)) || turn == max_turns ||
+          turns_ >= turns_of_step || !solved_)
         break;
-      part = turn < turns_at_once ? 1 : 0.5;
+      part = turn < turns_at_once ? 1 : turn < 2 * turns_at_once ? 0.5 : 0.25;
       for (const std::uint32_t node : nodes_)
         at_[node] += part * (there[node] - at_[node]);
     }
@@ -362,9 +252,9 @@ void MeetingYielding::Work::solve() {
     // Triangles that nodes have come to, whose corners must give way too.
     bool beyond = false;
     for (const SurfacePush& p : all_)
-      for (std::size_t c = 0; c < 3; ++c)
-        if (p.pair.weights[c] > 0 && !held_(p.pair.piece[c]) &&
-            !std::ranges::binary_search(nodes_, p.pair.piece[c]))
+      for (std::size_t c = 0; c < 4; ++c)
+        if (p.pair.share[c] != 0 && !held_(p.pair.nodes[c]) &&
+            !std::ranges::binary_search(nodes_, p.pair.nodes[c]))
           beyond = true;
     if (!beyond || turns_ >= turns_of_step)
       return;
@@ -381,10 +271,10 @@ DelassusOperator MeetingYielding::Work::delassus_operator(std::span<const std::u
   solve();
   // What the pairs that push hold together: along the normal, and where they stick.
   std::vector<SurfacePush> on;
-  for (const std::size_t k : counting(all_))
+  for (const std::size_t k : counting_pairs(all_))
     if (all_[k].force != Vec3{})
       on.push_back(all_[k]);
-  const Columns columns = columns_of(on);
+  const MeetingColumns columns = columns_of_pairs(on, nodes_, delassus_.compliance);
   MatrixXd ways = MatrixXd::Zero(static_cast<Index>(3 * on.size()), 0);
   for (std::size_t k = 0; k < on.size(); ++k) {
     const SurfacePush& p = on[k];
@@ -437,7 +327,7 @@ bool MeetingYielding::Work::push(std::span<const NodeTouch> touches, std::span<c
   const bool begins = !begun_;
   if (begins)
     begin();
-  if (begins && touched_.empty() && all_.empty() && touches.empty()) // it ran as it is
+  if (begins && all_.empty() && touches.empty()) // it ran as it is
     return true;
   solve();
   double miss = 0;
@@ -460,7 +350,8 @@ bool MeetingYielding::Work::push(std::span<const NodeTouch> touches, std::span<c
     solved_ = solved_ && agreed;
     return true;
   }
-  return agreed && !join(pairs_.find(object_.shape(), was_, 0), false);
+  return agreed && !join(pairs_.find(object_.shape(), was_, 0), false) &&
+         !join(pairs_.find_passed(object_.shape(), was_, surface_depth * pairs_.edge()), true);
 }
 
 std::vector<NodeTouch> MeetingYielding::Work::touches() const {
@@ -468,12 +359,23 @@ std::vector<NodeTouch> MeetingYielding::Work::touches() const {
   for (const SurfacePush& p : all_) {
     if (p.force == Vec3{})
       continue;
-    all.push_back({p.pair.node, other_surface, p.force});
-    for (std::size_t c = 0; c < 3; ++c)
-      if (p.pair.weights[c] > 0)
-        all.push_back({p.pair.piece[c], other_surface, -p.pair.weights[c] * p.force});
+    for (std::size_t c = 0; c < 4; ++c)
+      if (p.pair.share[c] != 0)
+        all.push_back({p.pair.nodes[c], other_surface, p.pair.share[c] * p.force});
   }
   return sums_of_touches(std::move(all));
+}
+
+std::vector<SurfacePush> MeetingYielding::Work::kept() const {
+  double largest = 0;
+  for (const SurfacePush& p : all_)
+    largest = std::max(largest, norm(p.force));
+  std::vector<SurfacePush> some;
+  for (const SurfacePush& p : all_)
+    if (norm(p.force) > next_to_nothing * largest ||
+        (!p.pair.edges && !p.pair.apart && p.pair.gap < keep_near * pairs_.edge()))
+      some.push_back(p);
+  return some;
 }
 
 TouchCounts MeetingYielding::Work::counts() const {
@@ -485,8 +387,8 @@ TouchCounts MeetingYielding::Work::counts() const {
 
 MeetingYielding::MeetingYielding(Yielding& object, SurfacePairs& pairs,
                                  std::function<bool(std::uint32_t)> held,
-                                 std::span<const double> was, std::vector<std::uint32_t> touched)
-    : work_(std::make_unique<Work>(object, pairs, std::move(held), was, std::move(touched))) {}
+                                 std::span<const double> was, std::vector<SurfacePush> kept)
+    : work_(std::make_unique<Work>(object, pairs, std::move(held), was, std::move(kept))) {}
 
 MeetingYielding::~MeetingYielding() = default;
 
@@ -501,6 +403,9 @@ std::span<const double> MeetingYielding::shape() {
 }
 std::vector<NodeTouch> MeetingYielding::touches() const {
   return work_->touches();
+}
+std::vector<SurfacePush> MeetingYielding::kept() const {
+  return work_->kept();
 }
 bool MeetingYielding::solved() const noexcept {
   return work_->solved();

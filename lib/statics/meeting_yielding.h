@@ -8,8 +8,9 @@
 // with the Delassus operator B W Bᵀ, B the weights of nodes and corners; where these put the nodes,
 // until the points stay. Who asks what instruments can do meets the object with the pairs that push
 // held together, W - W Cᵀ (C W Cᵀ)⁻¹ C W. Nodes that are behind a triangle in the whole shape join,
-// and it begins again. What overlaps when a step begins comes apart by a twentieth of an edge a
-// step.
+// then what has passed each other on the way there, nodes and triangles or two edges, and it begins
+// again: nothing passes unless it is told that the forces are not solved. What overlaps when a step
+// begins comes apart by a twentieth of an edge a step.
 
 #include "contact/surface_pairs.h"
 #include "statics/static_contact.h"
@@ -28,18 +29,19 @@ inline constexpr std::uint32_t other_surface = UINT32_MAX;
 /// Of an edge: so deep is not inside.
 inline constexpr double surface_depth = 1e-4;
 
-/// A pair and the force on its node; its triangle has the opposite one.
+/// A pair and the force on its first part; the second has the opposite one.
 struct SurfacePush {
   SurfacePair pair;
-  Vec3 force;
+  Vec3 force{};
+  bool fresh = false; ///< points and normal are taken as they are, once
 };
 
 class MeetingYielding final : public Yielding {
 public:
   /// Keeps references. \param held whether a node gives way along no axis \param was displacements
-  /// when the step began \param touched nodes that surfaces pushed in the last step, ascending
+  /// when the step began \param kept of the last step
   MeetingYielding(Yielding& object, SurfacePairs& pairs, std::function<bool(std::uint32_t)> held,
-                  std::span<const double> was, std::vector<std::uint32_t> touched);
+                  std::span<const double> was, std::vector<SurfacePush> kept);
   ~MeetingYielding() override;
 
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override;
@@ -48,6 +50,8 @@ public:
 
   /// Sums of the pairs' forces on nodes, by ascending ones.
   std::vector<NodeTouch> touches() const;
+  /// Those that push or nearly touch, for the next step.
+  std::vector<SurfacePush> kept() const;
   /// Whether the last forces meet the conditions.
   bool solved() const noexcept;
   TouchCounts counts() const;
