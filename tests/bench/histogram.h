@@ -53,10 +53,8 @@ inline void draw(std::ostream& out, std::span<const Bin> bins, const std::string
   constexpr double left = 60, top = 54, width = 560, height = 300;
   const double low = std::floor(std::log10(bins.front().from)),
                high = std::ceil(std::log10(std::max(bins.back().to, 1.0001)));
-  std::size_t most = 1;
-  for (const Bin& bin : bins)
-    most = std::max(most, bin.count);
-  const double decades = std::ceil(std::log10(static_cast<double>(most) + 1));
+  const std::size_t highest = std::ranges::max_element(bins, {}, &Bin::count)->count;
+  const double decades = std::ceil(std::log10(static_cast<double>(highest) + 1));
   const auto x = [&](double ms) { return left + (std::log10(ms) - low) / (high - low) * width; };
   // One answer is to be seen: counts begin at a half.
   const auto y = [&](double count) {

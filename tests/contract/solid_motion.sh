@@ -164,7 +164,7 @@ method organ ela
 step 0.02
 END
   awk '{ print }
-    NR == 4 { print "force organ nobody 1 2 3"; print "cut organ plane 0 0 0 1 0 0"; print "displace organ 0 nan 0 0" }
+    NR == 4 { print "force organ nobody 1 2 3"; print "cut organ plane 0 0 0 0 0 0"; print "displace organ 0 nan 0 0" }
     NR == 9 { print "object organ organ.ela"; print "attach organ 1 organ 2 100"; print "step -1"; print "force organ z>25 inf 0 0" }
     NR == 14 { print "grasp nothing organ all"; print "tear organ 3" }' right >mixed
   ffe-run -q --serve <right >expected || fail 'a right line is refused'

@@ -141,7 +141,9 @@ class Hull:
 
     def text(self):
         rows = [numbers(p) for p in self.points] + ["3 " + " ".join(map(str, f)) for f in self.faces]
-        return "\n".join(["OFF", f"{len(self.points)} {len(self.faces)} 0"] + rows) + "\n"
+        head = ["ply", "format ascii 1.0", f"element vertex {len(self.points)}"] + [f"property double {a}" for a in "xyz"]
+        head += [f"element face {len(self.faces)}", "property list uchar int vertex_indices", "end_header"]
+        return "\n".join(head + rows) + "\n"
 
 
 def near_hull(corners, hull, points):
@@ -558,7 +560,7 @@ def main():
                 random = np.random.default_rng([options.seed, number, k] + [1] * options.meshes)
                 case = Case(body, random, options.meshes)
                 scene = folder / f"{body.path.stem}-{k}.scene"
-                mesh = scene.with_suffix(".off")
+                mesh = scene.with_suffix(".ply")
                 if case.hull:
                     mesh.write_text(case.hull.text())
                 scene.write_text("\n".join(case.lines).format(mesh=mesh.name) + "\n")
