@@ -23,8 +23,7 @@ namespace gewebe {
 namespace {
 
 bool is_solid(Way way) {
-  return way == Way::solid || way == Way::warped || way == Way::solid_motion ||
-         way == Way::sprung;
+  return way == Way::solid || way == Way::warped || way == Way::solid_motion || way == Way::sprung;
 }
 
 /// All that an object is which goes on this way, in these tests, but for what it consists of.
