@@ -73,7 +73,7 @@ VALIDATE_SRC := $(wildcard tests/validate/*.cpp)
 PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
-SCRIPTS := .ci/run .ci/sanitize tests/run tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
+SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -103,8 +103,9 @@ sets_demo := build
 sets_bench := build bench
 sets_validate := build
 sets_lint := build check lint
+sets_deb := build deb
 SETS ?= $(sort $(foreach goal,$(MAKECMDGOALS),$(sets_$(goal))) $(if $(filter fuzz,$(config)),fuzz))
-ifneq ($(filter check golden-update stress demo bench validate lint,$(MAKECMDGOALS)),)
+ifneq ($(filter check golden-update stress demo bench validate lint deb,$(MAKECMDGOALS)),)
 ifneq ($(DEPS),no)
 FIRST := deps
 endif
@@ -264,6 +265,11 @@ html:
 	@scripts/html '$(BUILD)/html' && scripts/html --check '$(BUILD)/html'
 	@echo 'The manual is $(abspath $(BUILD))/html/index.html'
 
+# Debian packages of the last commit; NOCHECK= runs the quick tests within, too.
+NOCHECK ?= nocheck
+deb: | $(FIRST)
+	@DEB_BUILD_OPTIONS='$(NOCHECK) noautodbgsym' scripts/deb '$(BUILD)/deb'
+
 # --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
 
 LINT := build/lint
@@ -362,15 +368,16 @@ help:
 	@echo '  bench          measure time against error'
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
+	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'
 	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
 	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, completions, library, headers, gewebe.pc'
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo
-	@echo 'demo, check, golden-update, stress, bench, validate and lint install their packages first; DEPS=no turns that off.'
+	@echo 'demo, check, golden-update, stress, bench, validate, deb and lint install their packages first; DEPS=no turns that off.'
 	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
 
 FORCE:
 
 .DELETE_ON_ERROR:
-.PHONY: all deps check golden-update stress bench validate demo html lint install uninstall clean help FORCE
+.PHONY: all deps check golden-update stress bench validate demo html deb lint install uninstall clean help FORCE
