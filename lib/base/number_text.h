@@ -14,6 +14,14 @@ inline std::string number_text(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+/// Six digits, for messages.
+inline std::string six_digits(double value) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value,
+                                     std::chars_format::general, 6)
+                           .ptr};
+}
+
 /// The double whose shortest text is that of the float, so that 0.1f does not become 0.10000000149…
 inline double decimal_of(float value) {
   std::array<char, 32> text{};

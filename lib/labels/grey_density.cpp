@@ -1,6 +1,7 @@
 #include "labels/grey_density.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "labels/label_density.h"
 #include "volume/resample.h"
@@ -8,24 +9,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 namespace gewebe {
 namespace {
 
-std::string number(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
-
 double depth(double value, const GreyDensityOptions& options) {
   return std::fmin(value - options.low, options.high - value);
 }
 
-/// The largest and the smallest depth of each row, and those of three neighbours along i of kinds
-/// that differ: what the 26 neighbours of a voxel are is found axis by axis.
+/// Of what kinds the voxels about a row are: of each of its voxels the nine at its place along i.
 class Sides {
 public:
   Sides(const GreyVolume& scan, const GreyDensityOptions& options)
@@ -80,7 +73,8 @@ void look(const GreyVolume& scan, const GreyDensityOptions& options, GreyDensity
   if (r.voxels == 0 || r.voxels == scan.values.size())
     throw Error(std::string(r.voxels == 0 ? "no" : "every") +
                 " voxel lies within the thresholds; values go from " +
-                number(static_cast<double>(r.min)) + " to " + number(static_cast<double>(r.max)));
+                six_digits(static_cast<double>(r.min)) + " to " +
+                six_digits(static_cast<double>(r.max)));
 }
 
 double width_of(const Context& context, const GreyVolume& scan, const GreyDensityOptions& options) {

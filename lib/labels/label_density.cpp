@@ -1,6 +1,7 @@
 #include "labels/label_density.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "labels/label_field_internal.h"
 
@@ -8,18 +9,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 
 namespace gewebe {
 namespace {
 
 constexpr double largest_ratio = 6;
-
-std::string number(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
 
 using Matrix = std::array<Vec3, 3>; // columns
 
@@ -280,8 +274,9 @@ GridTransform label_lattice(const LabelMask& mask, double voxel, double* shear) 
     *shear = farthest;
   const double smallest = *std::min_element(spacing.begin(), spacing.end());
   if (!(farthest <= 0.1 * smallest))
-    throw Error("the axes are oblique: right angles would move a corner by " + number(farthest) +
-                " mm, expected at most a tenth of the spacing of " + number(smallest) + " mm");
+    throw Error("the axes are oblique: right angles would move a corner by " +
+                six_digits(farthest) + " mm, expected at most a tenth of the spacing of " +
+                six_digits(smallest) + " mm");
   GridTransform t;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t a = 0; a < 3; ++a)
@@ -300,8 +295,9 @@ void lay_out(const LabelMask& mask, const LabelDensityOptions& options, LabelFie
   const double smallest = std::fmin(size.x, std::fmin(size.y, size.z));
   sampling.voxel = options.voxel.value_or(smallest);
   if (!(sampling.voxel <= largest_ratio * smallest))
-    throw Error("a voxel of " + number(sampling.voxel) + " mm over labels every " +
-                number(smallest) + " mm, expected at most " + number(largest_ratio * smallest));
+    throw Error("a voxel of " + six_digits(sampling.voxel) + " mm over labels every " +
+                six_digits(smallest) + " mm, expected at most " +
+                six_digits(largest_ratio * smallest));
   for (std::size_t a = 0; a < 3; ++a) {
     field.spacing[a] = size[static_cast<int>(a)];
     sampling.ratio[a] = sampling.voxel / field.spacing[a];

@@ -1,6 +1,7 @@
 #include "solid/cut_solid.h"
 
 #include "base/error.h"
+#include "base/perpendicular.h"
 #include "solid/assembly.h"
 #include "solid/skin_binding.h"
 #include "solid/solid_model.h"
@@ -467,14 +468,8 @@ TriangleMesh plane_blade(const Model& model, const CutPlane& plane) {
     box.add(node.position);
   const Vec3 normal = plane.normal / norm(plane.normal), middle = (box.min + box.max) * 0.5;
   const Vec3 foot = middle - dot(normal, middle - plane.point) * normal;
-  int least = 0;
-  for (int a = 1; a < 3; ++a)
-    if (std::abs(normal[a]) < std::abs(normal[least]))
-      least = a;
-  Vec3 axis;
-  axis[least] = 1;
   const double reach = 2 * norm(box.max - box.min) + 1;
-  Vec3 u = cross(normal, axis);
+  Vec3 u = some_perpendicular(normal);
   u = u * (reach / norm(u));
   const Vec3 v = cross(normal, u);
   TriangleMesh blade;

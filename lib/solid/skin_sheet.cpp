@@ -1,5 +1,7 @@
 #include "solid/skin_sheet.h"
 
+#include "base/perpendicular.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,13 +14,7 @@ SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell) {
   constexpr double most = 1000;  // cells along a side
   constexpr double there = 1e-6; // of a cell: on the plane
   const Vec3 normal = plane.normal / norm(plane.normal);
-  int least = 0;
-  for (int a = 1; a < 3; ++a)
-    if (std::abs(normal[a]) < std::abs(normal[least]))
-      least = a;
-  Vec3 axis;
-  axis[least] = 1;
-  Vec3 u = cross(normal, axis);
+  Vec3 u = some_perpendicular(normal);
   u = u / norm(u);
   const Vec3 v = cross(normal, u);
   // Where triangles pass it.

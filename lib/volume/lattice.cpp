@@ -1,6 +1,7 @@
 #include "volume/lattice.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +11,6 @@ namespace gewebe {
 namespace {
 
 constexpr double index_limit = 1 << 30;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
 
 } // namespace
 
@@ -27,7 +22,8 @@ GridTransform lattice_for_dim(const Box3& box, std::int64_t dim) {
   const double side = box.longest_side();
   const double voxel = side / static_cast<double>(dim);
   if (!(side > 0 && std::isfinite(side)) || !(voxel > 0))
-    throw Error("the box has no extent (" + number(side) + " mm), so --dim has nothing to divide");
+    throw Error("the box has no extent (" + six_digits(side) +
+                " mm), so --dim has nothing to divide");
   return uniform_transform(voxel);
 }
 
@@ -44,7 +40,7 @@ bool index_range(const GridTransform& transform, const Box3& box, Int3& min, Int
     const double low = std::ceil(index_box.min[a]), high = std::floor(index_box.max[a]);
     if (!(std::fabs(low) < index_limit && std::fabs(high) < index_limit))
       throw Error("the lattice would need the voxel index " +
-                  number(std::fabs(low) < index_limit ? high : low) +
+                  six_digits(std::fabs(low) < index_limit ? high : low) +
                   ", expected at most 2^30 in magnitude: choose a larger voxel");
     const auto n = static_cast<std::size_t>(a);
     min[n] = static_cast<std::int32_t>(low);

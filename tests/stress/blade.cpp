@@ -5,6 +5,7 @@
 // blade and what becomes of angles. Argument: number of cuts (default 1000).
 
 #include "stuffing/stuffing.h"
+#include "tests/stress/cuts_argument.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 #include "tests/unit/tet_cut_checks.h"
@@ -12,15 +13,12 @@
 #include "tetrahedra/order.h"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <numeric>
 #include <random>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace {
@@ -220,19 +218,5 @@ int run(std::uint64_t cuts) {
 } // namespace
 
 int main(int argc, char** argv) {
-  std::uint64_t cuts = 1000;
-  if (argc > 1) {
-    const std::string_view text = argv[1];
-    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), cuts);
-    if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() || cuts < 1) {
-      (void)std::fputs("stress_blade: expected a number of cuts\n", stderr);
-      return 2;
-    }
-  }
-  try {
-    return run(cuts);
-  } catch (const std::exception& error) {
-    (void)std::fprintf(stderr, "stress_blade: %s\n", error.what());
-    return 1;
-  }
+  return gewebe::test::stress_cuts("stress_blade", argc, argv, run);
 }

@@ -7,20 +7,18 @@
 #include "base/error.h"
 #include "mesh/check.h"
 #include "solid/cut_skin.h"
+#include "tests/stress/cuts_argument.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/model_meshes.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
-#include <exception>
 #include <map>
 #include <random>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -192,19 +190,5 @@ int run(std::uint64_t cuts) {
 } // namespace
 
 int main(int argc, char** argv) {
-  std::uint64_t cuts = 1000;
-  if (argc > 1) {
-    const std::string_view text = argv[1];
-    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), cuts);
-    if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() || cuts < 1) {
-      (void)std::fputs("stress_skin: expected a number of cuts\n", stderr);
-      return 2;
-    }
-  }
-  try {
-    return run(cuts);
-  } catch (const std::exception& error) {
-    (void)std::fprintf(stderr, "stress_skin: %s\n", error.what());
-    return 1;
-  }
+  return gewebe::test::stress_cuts("stress_skin", argc, argv, run);
 }

@@ -4,9 +4,7 @@
 #include "base/mesh.h"
 #include "base/vec3.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -73,39 +71,6 @@ inline TriangleMesh divided_box(const Vec3& size, std::uint32_t parts) {
           mesh.triangles.push_back(far ? Triangle{a, b, c} : Triangle{a, c, b});
           mesh.triangles.push_back(far ? Triangle{a, c, d} : Triangle{a, d, c});
         }
-  return mesh;
-}
-
-/// A sphere about the origin: an icosahedron whose edges are halved some times.
-inline TriangleMesh icosphere(double radius, int times) {
-  const double g = (1 + std::sqrt(5.0)) / 2;
-  TriangleMesh mesh;
-  mesh.points = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
-                 {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-  mesh.triangles = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
-                    {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                    {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
-                    {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-  for (int k = 0; k < times; ++k) {
-    std::map<std::array<std::uint32_t, 2>, std::uint32_t> middle;
-    const auto between = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [there, added] = middle.emplace(std::array{std::min(a, b), std::max(a, b)},
-                                                 static_cast<std::uint32_t>(mesh.points.size()));
-      if (added) {
-        const Vec3 p = mesh.points[a] + mesh.points[b];
-        mesh.points.push_back(p * (norm(mesh.points[a]) / norm(p)));
-      }
-      return there->second;
-    };
-    std::vector<Triangle> parts;
-    for (const auto& [a, b, c] : mesh.triangles) {
-      const std::uint32_t ab = between(a, b), bc = between(b, c), ca = between(c, a);
-      parts.insert(parts.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
-    }
-    mesh.triangles = std::move(parts);
-  }
-  for (Vec3& p : mesh.points)
-    p *= radius / norm(p);
   return mesh;
 }
 

@@ -16,6 +16,7 @@
 #include "tests/bench/memory_columns.h"
 #include "tests/unit/convex_meshes.h"
 #include "tests/unit/fuzzed_door.h"
+#include "tests/unit/mesh_fixtures.h"
 #include "tests/unit/scratch.h"
 #include "tests/unit/simulation_scenes.h"
 #include "tests/unit/tet_fixtures.h"
@@ -506,7 +507,7 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   };
   options.files.instrument = [&](const std::string& name, InstrumentShape shape) {
     const int kind = base(name)[3] - '0';
-    TriangleMesh mesh = kind < 3 ? divided_box({8, 4, 0.5 + kind}, 2) : icosphere(5, 1);
+    TriangleMesh mesh = kind < 3 ? divided_box({8, 4, 0.5 + kind}, 2) : sphere_mesh(1, 5, {});
     if (kind == 4) // dented
       mesh.points[0] *= 0.5;
     shape.core = std::make_shared<const ConvexCore>(mesh);

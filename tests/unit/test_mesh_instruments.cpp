@@ -5,6 +5,7 @@
 #include "contact_checks.h"
 #include "convex_meshes.h"
 #include "larger.h"
+#include "mesh_fixtures.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "statics/elastostatic.h"
@@ -79,7 +80,7 @@ TEST(MeshInstrument, ARefinedMeshHasTheForcesOfTheSphereAndTheCapsule) {
           mesh.points = std::move(round.points);
           mesh.triangles = std::move(round.triangles);
         } else {
-          mesh = test::icosphere(whole - radius, static_cast<int>(k));
+          mesh = test::sphere_mesh(static_cast<int>(k), whole - radius, {});
         }
         const Quaternion turn =
             capsule ? turn_about(axis, 13.7 * n) : unit({0.8, 0.3 + 0.31 * n, 0.7 * n - 0.5, 0.1});
