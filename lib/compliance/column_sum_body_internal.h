@@ -1,6 +1,7 @@
 #pragma once
 // The body of column_sum_*.cpp, each of which compiles it for its instruction set.
 
+#include "base/four_lanes.h"
 #include "compliance/column_sum.h"
 
 #include <cstring>
@@ -8,23 +9,6 @@
 
 namespace gewebe {
 namespace {
-
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
-using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
-
-inline const Four& four(const double* at) {
-  return *reinterpret_cast<const Four*>(at);
-}
-inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
-  return *reinterpret_cast<Four*>(at);
-}
-
-inline void load(const double* at, Four& to) {
-  to = four(at);
-}
-inline void load(const float* at, Four& to) {
-  to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
-}
 
 // Small integers take intrinsics: compilers widen them one by one.
 inline void widen(__m128i whole, Four& to) { // four of 32 bits

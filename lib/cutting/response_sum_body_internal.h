@@ -1,12 +1,12 @@
 #pragma once
 // The body of response_sum_*.cpp, each of which compiles it for its instruction set.
 
+#include "base/four_lanes.h"
 #include "cutting/response_sum.h"
 
 namespace gewebe {
 namespace {
 
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
 inline constexpr std::size_t parts = response_tile / 4;
 
 /// Twelve sums stay in registers.

@@ -1,9 +1,10 @@
 // Cuts of solids: planes at rest, blades where the solid is, piece by piece of their ways.
 
+#include "base/boxes_meet.h"
 #include "base/number_text.h"
 #include "base/vector_at.h"
-#include "mesh/crossing.h"
 #include "scene/world_internal.h"
+#include "solid/cut_skin.h"
 #include "solid/cut_solid.h"
 #include "solid/solid_model.h"
 #include "solid/solid_place.h"
@@ -238,13 +239,6 @@ void leave_trail(Object& object, std::size_t instrument, const std::vector<Edge>
 Box3 wider(const Box3& box) {
   const double by = 0.25 * box.longest_side();
   return {box.min - Vec3{by, by, by}, box.max + Vec3{by, by, by}};
-}
-
-bool meet(const Box3& a, const Box3& b) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis]))
-      return false;
-  return true;
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 #pragma once
 // The body of corotational_kernel_*.cpp, each of which compiles it for its instruction set.
 
+#include "base/four_lanes.h"
 #include "solid/corotational_kernel_internal.h"
 
 #include <array>
@@ -9,15 +10,7 @@
 namespace gewebe {
 namespace {
 
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
 using Whole = long long __attribute__((vector_size(32)));
-
-inline const Four& four(const double* at) {
-  return *reinterpret_cast<const Four*>(at);
-}
-inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
-  return *reinterpret_cast<Four*>(at);
-}
 
 /// Entries xx xy xz yy yz zz of a symmetric matrix by row and column.
 inline constexpr int entry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};

@@ -8,6 +8,7 @@
 // the same, for the walls enclose none, and so is the area beside them. A surface inside another,
 // as of a tumour, is cut and closed by itself: there walls lie on walls.
 
+#include "mesh/crossing.h" // MeetingOfNoSheets
 #include "model/model.h"
 #include "solid/skin_sheet.h"
 

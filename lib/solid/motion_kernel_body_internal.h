@@ -1,6 +1,7 @@
 #pragma once
 // The body of motion_kernel_*.cpp, each of which compiles it for its instruction set.
 
+#include "base/four_lanes.h"
 #include "solid/motion_kernel_internal.h"
 
 #include <array>
@@ -9,20 +10,6 @@
 
 namespace gewebe {
 namespace {
-
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
-using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
-
-inline const Four& four(const double* at) {
-  return *reinterpret_cast<const Four*>(at);
-}
-inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
-  return *reinterpret_cast<Four*>(at);
-}
-/// Four numbers of single precision. (A vector would be returned by another rule on each level.)
-inline void read(const float* at, Four& to) {
-  to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
-}
 
 // Loops over a whole batch have a length that compilers know, so that they take several at a time.
 inline void pull(const SpringColumns& springs, const double* at, double per_time, double* forces,
@@ -78,7 +65,7 @@ inline double product(const float* a, const double* b, std::size_t count) {
   Four sum{}, values;
   std::size_t k = 0;
   for (; k + 4 <= count; k += 4) {
-    read(a + k, values);
+    load(a + k, values);
     sum += values * four(b + k);
   }
   for (; k < count; ++k)
@@ -90,7 +77,7 @@ inline void increase(double* to, double factor, const float* of, std::size_t cou
   Four values;
   std::size_t k = 0;
   for (; k + 4 <= count; k += 4) {
-    read(of + k, values);
+    load(of + k, values);
     four(to + k) += factor * values;
   }
   for (; k < count; ++k)

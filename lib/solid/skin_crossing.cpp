@@ -1,5 +1,6 @@
 #include "solid/skin_crossing_internal.h"
 
+#include "base/boxes_meet.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 

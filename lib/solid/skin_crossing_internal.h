@@ -31,13 +31,6 @@ inline Box3 box_of(std::span<const Vec3> points, const Triangle& t) {
   return box;
 }
 
-inline bool meet(const Box3& a, const Box3& b) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis]))
-      return false;
-  return true;
-}
-
 /// A sheet whose triangles have numbers by what curves enclose: 0, or that of a region.
 struct RegionSheet {
   TriangleMesh surface;

@@ -2,6 +2,7 @@
 
 #include "base/disjoint_sets.h"
 #include "solid/element_boxes_internal.h"
+#include "solid/skin_crossing_internal.h"
 
 #include <algorithm>
 #include <array>
@@ -16,12 +17,10 @@
 namespace gewebe {
 namespace {
 
+using skins::directed;
+
 constexpr std::uint32_t none = CutModel::gone;
 constexpr std::size_t lost = 100; // of so many points one may follow another part
-
-std::uint64_t directed(std::uint32_t from, std::uint32_t to) {
-  return std::uint64_t{from} << 32 | to;
-}
 
 class Parter {
 public:

@@ -1,23 +1,11 @@
 #pragma once
 // The body of warp_kernel_*.cpp, each of which compiles it for its instruction set.
 
+#include "base/four_lanes.h"
 #include "solid/warp_kernel_internal.h"
 
 namespace gewebe {
 namespace {
-
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
-using FourSingle = float __attribute__((vector_size(16), aligned(4), may_alias));
-
-inline const Four& four(const double* at) {
-  return *reinterpret_cast<const Four*>(at);
-}
-inline Four& four(double* at) { // NOLINT(readability-non-const-parameter)
-  return *reinterpret_cast<Four*>(at);
-}
-inline void load(const float* at, Four& to) {
-  to = __builtin_convertvector(*reinterpret_cast<const FourSingle*>(at), Four);
-}
 
 struct Vector {
   Four x, y, z;
