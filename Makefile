@@ -104,8 +104,9 @@ sets_bench := build bench
 sets_validate := build
 sets_lint := build check lint
 sets_deb := build deb
+sets_wheel := build wheel
 SETS ?= $(sort $(foreach goal,$(MAKECMDGOALS),$(sets_$(goal))) $(if $(filter fuzz,$(config)),fuzz))
-ifneq ($(filter check golden-update stress demo bench validate lint deb,$(MAKECMDGOALS)),)
+ifneq ($(filter check golden-update stress demo bench validate lint deb wheel,$(MAKECMDGOALS)),)
 ifneq ($(DEPS),no)
 FIRST := deps
 endif
@@ -270,6 +271,12 @@ NOCHECK ?= nocheck
 deb: | $(FIRST)
 	@DEB_BUILD_OPTIONS='$(NOCHECK) noautodbgsym' scripts/deb '$(BUILD)/deb'
 
+# A wheel for Python: programs with the libraries that they load, and the module; tried in an environment of its own.
+wheel: $(TOOLS) $(PLUGIN) | $(FIRST)
+	@test '$(config)' = release || { echo 'wheel: for config=release' >&2; exit 1; }
+	@scripts/wheel '$(BUILD)' '$(BUILD)/wheel'
+	@GEWEBE_WHEEL="$$(echo '$(abspath $(BUILD))'/wheel/gewebe-*.whl)" tests/run --config '$(config)' --test 'wheel/*'
+
 # --- Lint: one stamp a file, so that only what changed is looked at again ------------------------------
 
 LINT := build/lint
@@ -369,15 +376,16 @@ help:
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'
+	@echo '  wheel          for Python, in build/CONFIG/wheel: programs with their libraries and the module gewebe, tried in a venv'
 	@echo '  lint           clang-format, clang-tidy, mandoc, shellcheck, direction of includes'
 	@echo '  install        into PREFIX (/usr/local) under DESTDIR: programs, man pages, completions, library, headers, gewebe.pc'
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo
-	@echo 'demo, check, golden-update, stress, bench, validate, deb and lint install their packages first; DEPS=no turns that off.'
+	@echo 'demo, check, golden-update, stress, bench, validate, deb, wheel and lint install their packages first; DEPS=no turns that off.'
 	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
 
 FORCE:
 
 .DELETE_ON_ERROR:
-.PHONY: all deps check golden-update stress bench validate demo html deb lint install uninstall clean help FORCE
+.PHONY: all deps check golden-update stress bench validate demo html deb wheel lint install uninstall clean help FORCE

@@ -81,7 +81,7 @@ test_an_unknown_set_is_an_error() {
 }
 
 test_the_list_is_well_formed() {
-  awk '!/^#/ && (NF != 2 || $2 !~ /^(build|check|lint|bench|fuzz|deb|ci)(,(build|check|lint|bench|fuzz|deb|ci))*$/) { print; bad = 1 } END { exit bad }' \
+  awk '!/^#/ && (NF != 2 || $2 !~ /^(build|check|lint|bench|fuzz|deb|wheel|ci)(,(build|check|lint|bench|fuzz|deb|wheel|ci))*$/) { print; bad = 1 } END { exit bad }' \
     "$GEWEBE_ROOT/packages.txt" || fail 'lines that name no set'
   [[ -z $(awk '!/^#/ { print $1 }' "$GEWEBE_ROOT/packages.txt" | sort | uniq -d) ]] || fail 'a package twice'
 }

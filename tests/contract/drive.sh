@@ -2,12 +2,12 @@
 # shellcheck shell=bash disable=SC2317 # functions are called by name
 
 test_clients_in_c_and_python_find_the_same() {
-  command -v python3 >/dev/null || skip 'no python3'
+  python3 -c 'import numpy' 2>/dev/null || skip 'no numpy for python3'
   command -v "${CC:-cc}" >/dev/null || skip 'no C compiler'
   local file
   unset MAKEFLAGS MAKELEVEL
   cp "$GEWEBE_ROOT"/examples/drive/{Makefile,drive.c,drive.py,README.md} .
-  make CC="${CC:-cc}" CFLAGS='-O1 -Wconversion -Werror' >log 2>&1 || fail 'the example fails:' "$(tail -5 log)"
+  make PYTHON="$(python3 -c 'import sys; print(sys.executable)')" CC="${CC:-cc}" CFLAGS='-O1 -Wconversion -Werror' >log 2>&1 || fail 'the example fails:' "$(tail -5 log)"
   # What README shows is what comes out.
   sed -n 's/^    \([TPiAav].*\.\|.*,\)$/\1/p' README.md | cmp - c.figures || fail 'other figures' "$(<c.figures)"
   cmp c.figures python.figures || fail 'Python finds others' "$(<python.figures)"

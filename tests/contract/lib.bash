@@ -6,6 +6,8 @@
 PATH=$BUILD:$PATH
 # Debian's own Python, whose modules packages.txt lists, before one that stands earlier in the PATH.
 [[ ! -x /usr/bin/python3 ]] || python3() { /usr/bin/python3 "$@"; }
+# The module gewebe as it stands here; examples use it.
+export PYTHONPATH=$GEWEBE_ROOT/python PYTHONDONTWRITEBYTECODE=1
 
 fail() {
   printf '%s\n' "$@"

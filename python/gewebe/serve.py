@@ -1,0 +1,189 @@
+"""Running scenes, gewebe_serve(5): ffe-run --serve, driven through a socket, with shapes in shared memory."""
+import mmap
+import os
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+
+import numpy
+
+from .errors import Error
+from .programs import path_of
+
+
+class Scene:
+    """A client of ffe-run --serve --ack --listen PATH. time is that of the scene in s when the client came. A context
+    manager."""
+
+    def __init__(self, path, patience=10.0):
+        until = time.monotonic() + patience
+        while time.monotonic() < until:
+            self.socket = socket.socket(socket.AF_UNIX)
+            try:
+                self.socket.connect(os.fspath(path))
+            except (FileNotFoundError, ConnectionRefusedError):  # the run may not listen yet
+                self.socket.close()
+                time.sleep(0.02)
+                continue
+            self.answers = self.socket.makefile('r')
+            word, *more = self.answers.readline().split() or ['']
+            if word == 'ready':
+                self.time = float(more[0])
+                self.number = 0  # of lines that were sent
+                return
+            self._leave()
+            time.sleep(0.02)  # busy: the client before is on its way out
+        raise Error(f'{path}: nobody lets me in')
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def _leave(self):
+        self.answers.close()
+        self.socket.close()
+
+    def close(self):
+        """Goes away; the scene stays as it is."""
+        self._leave()
+
+    def send(self, line):
+        if '\n' in line:
+            raise ValueError('more than one line')
+        self.number += 1
+        self.socket.sendall((line + '\n').encode())
+
+    def ask(self, *lines):
+        """Sends all lines at once, then collects what they are answered until the last one is done: lists of words, one
+        for each line of the answers. Error: what the first line that is refused is told, once all are answered."""
+        if not lines:
+            return []
+        for line in lines:
+            self.send(line)
+        said, refused = [], None
+        for line in self.answers:
+            word, *more = line.split()
+            if word == 'error':
+                number = int(more[0].rstrip(':'))
+                refused = refused or line.strip()
+            elif word == 'ok':
+                number = int(more[0])
+            else:
+                said.append([word, *more])
+                continue
+            if number == self.number or number == 0:
+                if refused:
+                    raise Error(refused)
+                return said
+        raise Error(refused or 'the connection ended')
+
+
+class Shapes:
+    """The file of ffe-run --shapes-in."""
+
+    def __init__(self, path):
+        self.file = open(path, 'rb')
+        self._map()
+        # Words are of 64 bits, so that each is one load.
+        if bytes(self.memory[:8]) != b'GWBSHAPE' or self.words[1] != 1:
+            raise Error(f'{path}: no shapes, or of another version')
+
+    def _map(self):
+        self.memory = memoryview(mmap.mmap(self.file.fileno(), 0, prot=mmap.PROT_READ))
+        self.words = self.memory.cast('Q')
+
+    def close(self):
+        self.file.close()
+
+    def last(self):
+        """Coordinates of all nodes, [n, 3] in mm, by name of the object, of the last answer; none before the first."""
+        while True:
+            sequence = self.words[3]
+            if sequence == 0:
+                return {}
+            place = 4 + sequence % 2 * 2
+            start, size = self.words[place], self.words[place + 1]
+            if start + size > len(self.memory):  # the file has grown
+                self._map()
+                continue
+            frame = bytes(self.memory[start:start + size])
+            if self.words[2] < sequence + 2:  # else it was overwritten meanwhile
+                break
+        shapes = {}
+        for k in range(struct.unpack_from('<Q', frame, 32)[0]):
+            name, length, positions, nodes = struct.unpack_from('<4Q', frame, 64 + 32 * k)
+            shapes[frame[name:name + length].decode()] = numpy.frombuffer(frame, '<f8', 3 * nodes, positions).reshape(-1, 3)
+        return shapes
+
+
+class Driven(Scene):
+    """A scene of a run of its own, which ends with it."""
+
+    def __init__(self, *options, cwd=None):
+        self.folder = tempfile.TemporaryDirectory(prefix='gewebe-')
+        at, shapes_at = os.path.join(self.folder.name, 'socket'), os.path.join(self.folder.name, 'shapes')
+        with open(os.path.join(self.folder.name, 'said'), 'wb') as said:
+            self.process = subprocess.Popen(
+                [path_of('ffe-run'), '--serve', '--ack', '--listen', at, '--shapes-in', shapes_at, *options],
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said, cwd=cwd)
+        try:
+            while not os.path.exists(at):
+                if self.process.poll() is not None:
+                    raise Error(self._said() or 'ffe-run: ended', self.process.returncode)
+                time.sleep(0.01)
+            super().__init__(at)
+            self._shapes = Shapes(shapes_at)
+        except BaseException:
+            self._stop()
+            raise
+
+    def _said(self):
+        with open(os.path.join(self.folder.name, 'said'), encoding='utf-8', errors='replace') as said:
+            return said.read().strip()
+
+    def _stop(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.wait()
+        self.folder.cleanup()
+
+    def shapes(self):
+        """Coordinates of all nodes, [n, 3] in mm, by name of the object, of the last answer."""
+        return self._shapes.last()
+
+    def __exit__(self, kind, *_):
+        try:
+            self.close()
+        except Error:  # what was raised within counts more
+            if kind is None:
+                raise
+
+    def close(self):
+        """Ends the run; what it records (-o, --record among options) is whole then. Error: what it complains of."""
+        try:
+            self.ask('end')
+        except (Error, OSError):
+            pass  # what it was tells its status
+        self._leave()
+        self._shapes.close()
+        self.process.wait()
+        said = (self._said().splitlines() or ['ffe-run: failed'])[-1]
+        at = os.path.join(self.folder.name, 'socket')
+        self._stop()
+        # That lines were refused has been raised where they were asked.
+        if self.process.returncode and not said.startswith(f'ffe-run: {at}, client '):
+            raise Error(said, self.process.returncode)
+
+
+def drive(*options, cwd=None):
+    """Starts ffe-run with further options ('-o', 'run.h5') and returns its scene, Driven; paths in lines count from cwd.
+
+        with gewebe.drive() as scene:
+            scene.ask('object ball ball.ela', 'force near:0,0,50,5 0 0 1000', 'step 0.1')
+            scene.shapes()['ball']
+    """
+    return Driven(*options, cwd=cwd)

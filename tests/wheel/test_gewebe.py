@@ -1,0 +1,292 @@
+"""The module gewebe and the programs that its wheel brings: run in a folder that may be written, by tests/contract/wheel.sh."""
+import itertools
+import math
+import os
+import subprocess
+import sys
+import threading
+import unittest
+import warnings
+from pathlib import Path
+
+import numpy
+
+import gewebe
+
+try:
+    import h5py  # noqa: F401
+except ImportError:
+    h5py = None
+
+needs_h5py = unittest.skipUnless(h5py, 'no h5py')
+
+
+def ball():
+    return gewebe.run('metaball2vol --voxel 1', 'mc-opt', input='0 0 0 20\n').mesh()
+
+
+def sphere_model(path='ball.ela', more=()):
+    gewebe.run(['exp2ela', '--primitive', 'sphere:24x16', '--size', '50', '--fix', 'z<-20', '--name', 'ball', *more, '-o', Path(path)])
+    return path
+
+
+def volume(points, triangles):
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return float(numpy.einsum('ij,ij->', a, numpy.cross(b, c))) / 6
+
+
+class Programs(unittest.TestCase):
+    def test_a_pipe_gives_what_the_shell_gives(self):
+        env = {**os.environ, 'PATH': os.path.dirname(gewebe.path_of('mc-opt')) + ':' + os.environ['PATH']}
+        said = subprocess.run(['bash', '-c', "echo '0 0 0 20' | metaball2vol --voxel 1 | mc-opt --resample 2"],
+                              env=env, capture_output=True, check=True)
+        ours = gewebe.run('metaball2vol --voxel 1', ['mc-opt', '--resample', '2'], input='0 0 0 20\n')
+        self.assertEqual(said.stdout, ours.output)
+        self.assertGreater(len(ours.output), 1000)
+
+    def test_programs_are_those_of_the_wheel(self):
+        for name in ('gewebe', 'metaball2vol', 'voxelize', 'csg', 'mc-opt', 'exp2ela', 'ffe-precompute', 'ffe-run', 'emboss-render'):
+            path = gewebe.path_of(name)
+            if 'GEWEBE_TEST_WHEEL' in os.environ:
+                self.assertEqual(os.path.dirname(path), os.path.join(sys.prefix, 'bin'))
+            said = subprocess.run([path, '--version'], capture_output=True, text=True, check=True).stdout
+            self.assertTrue(said.startswith(name + ' '), said)
+        with self.assertRaisesRegex(gewebe.Error, 'no program nothing'):
+            gewebe.path_of('nothing')
+
+    def test_progress_goes_from_0_to_1(self):
+        told = []
+        gewebe.run('metaball2vol --voxel 0.25', 'mc-opt', input='0 0 0 40\n', progress=lambda *what: told.append(what))
+        self.assertEqual({name for name, _ in told}, {'metaball2vol', 'mc-opt'})
+        self.assertTrue(all(0 <= done <= 1 for _, done in told))
+        self.assertGreater(len({done for _, done in told}), 1)
+
+    def test_what_progress_raises_is_raised(self):
+        def stop(name, done):
+            raise KeyError('enough')
+        with self.assertRaisesRegex(KeyError, 'enough'):
+            gewebe.run('metaball2vol --voxel 0.25', input='0 0 0 40\n', progress=stop)
+
+    def test_stats_of_each_program(self):
+        outcome = gewebe.run('metaball2vol --voxel 1', 'mc-opt', input='0 0 0 20\n', stats=True)
+        self.assertEqual([stats['tool'] for stats in outcome.stats], ['metaball2vol', 'mc-opt'])
+
+    def test_the_first_failure_is_raised_with_its_status(self):
+        with self.assertRaisesRegex(gewebe.Error, '^metaball2vol: -?:?.*1') as caught:
+            gewebe.run('metaball2vol --voxel 1', 'mc-opt', input='0 0 zero 20\n')
+        self.assertEqual(caught.exception.status, 1)
+        with self.assertRaisesRegex(gewebe.Error, '^mc-opt: ') as caught:
+            gewebe.run('metaball2vol --voxel 1', 'mc-opt --nonsense', input='0 0 0 20\n')
+        self.assertEqual(caught.exception.status, 2)
+        with self.assertRaises(ValueError):
+            gewebe.run()
+
+    def test_much_input_and_much_output(self):
+        particles = '\n'.join(f'{x} {y} {z} 1.5' for x, y, z in itertools.product(range(0, 150, 3), repeat=3))
+        self.assertGreater(len(particles), 1 << 20)
+        self.assertGreater(len(gewebe.run('metaball2vol --voxel 1', input=particles).output), 1 << 16)
+        # One that does not read it.
+        with self.assertRaises(gewebe.Error):
+            gewebe.run('metaball2vol --voxel nothing', input=particles)
+
+    def test_warnings_are_those_of_python(self):
+        mesh = ball()
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter('always')
+            gewebe.run('exp2ela --unit m', input=mesh)
+        self.assertTrue(all(str(w.message).startswith('exp2ela: warning: ') for w in caught), caught)
+
+
+class Files(unittest.TestCase):
+    def test_a_mesh_is_a_view(self):
+        data = gewebe.run('metaball2vol --voxel 1', 'mc-opt', input='0 0 0 20\n').output
+        mesh = gewebe.read_ply(data)
+        self.assertEqual(mesh.points.shape[1], 3)
+        self.assertTrue(numpy.shares_memory(mesh.points, numpy.frombuffer(data, 'u1')))
+        self.assertTrue(numpy.shares_memory(mesh.triangles, numpy.frombuffer(data, 'u1')))
+        radius = numpy.linalg.norm(mesh.points, axis=1)
+        self.assertLess(radius.max() / radius.min(), 1.01)
+        self.assertAlmostEqual(volume(mesh.points, mesh.triangles) / (4 / 3 * math.pi * radius.mean() ** 3), 1, delta=0.01)
+        # From a file, written again to the byte, and read by a program.
+        Path('ball.ply').write_bytes(data)
+        again = gewebe.read_ply('ball.ply')
+        self.assertTrue((again.points == mesh.points).all() and (again.triangles == mesh.triangles).all())
+        self.assertEqual(again.to_bytes(), data)
+        self.assertIn(b'ela_expl 1', gewebe.run('exp2ela', input=again).output)
+
+    def test_normals_and_tetrahedra(self):
+        self.assertIsNone(ball().normals)
+        mesh = gewebe.run('metaball2vol --voxel 1', 'mc-opt --normals', input='0 0 0 20\n').mesh()
+        outward = (mesh.normals * mesh.points).sum(axis=1) / numpy.linalg.norm(mesh.points, axis=1)
+        self.assertGreater(outward.min(), 0.9)
+        solid = gewebe.run('metaball2vol --voxel 1', 'mc-opt --tets --cell 4', input='0 0 0 20\n').mesh()
+        a, b, c, d = (solid.points[solid.tetrahedra[:, k]] for k in range(4))
+        self.assertGreater(numpy.einsum('ij,ij->i', numpy.cross(b - a, c - a), d - a).min(), 0)
+
+    def test_meshes_of_ones_own(self):
+        points = numpy.array([(0, 0, 0), (10, 0, 0), (0, 10, 0), (0, 0, 10)], float)
+        triangles = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+        gewebe.write_ply('tetra.ply', points=points, triangles=triangles)
+        mesh = gewebe.read_ply('tetra.ply')
+        self.assertTrue((mesh.points == points).all() and (mesh.triangles == triangles).all())
+        outcome = gewebe.run('voxelize --voxel 0.5 tetra.ply', 'mc-opt')
+        self.assertAlmostEqual(volume(outcome.mesh().points, outcome.mesh().triangles), 1000 / 6, delta=12)
+        with self.assertRaises(ValueError):
+            gewebe.write_ply('bad.ply', points=points, triangles=[(0, 1, 4)])
+
+    def test_broken_meshes_are_refused(self):
+        data = ball().to_bytes()
+        for at in (0, 3, 60, len(data) // 2, len(data) - 1):
+            with self.assertRaises(gewebe.Error, msg=at):
+                gewebe.read_ply(data[:at])
+        with self.assertRaisesRegex(gewebe.Error, 'expected a binary one'):
+            gewebe.read_ply(b'ply\nformat ascii 1.0\nelement vertex 0\nend_header\n')
+        with self.assertRaisesRegex(gewebe.Error, 'expected a count that fits'):
+            gewebe.read_ply(data.replace(b'element vertex', b'element vertex 9999', 1).replace(b'9999 ', b'9999', 1))
+        mixed = (b'ply\nformat binary_little_endian 1.0\nelement face 2\nproperty list uchar uchar vertex_indices\nend_header\n'
+                 b'\3\0\0\0\4\0\0\0')
+        with self.assertRaisesRegex(gewebe.Error, 'different lengths'):
+            gewebe.read_ply(mixed)
+
+    def test_a_model(self):
+        model = gewebe.read_ela(sphere_model())
+        self.assertEqual(model.name, 'ball')
+        self.assertEqual(model.points.shape, (len(model.mass), 3))
+        surface = numpy.arange(len(model.points)) <= model.triangles.max()
+        held = model.fixed.all(axis=1)
+        self.assertTrue((held[surface] == (model.points[surface, 2] < -20)).all())
+        self.assertTrue(held[~surface].all() and (model.central[~surface] == -1).all())  # central nodes
+        i, j = model.springs['i'], model.springs['j']
+        length = numpy.linalg.norm(model.points[i] - model.points[j], axis=1)
+        self.assertLess(abs(length - model.springs['rest']).max(), 1e-9)
+        self.assertEqual(model.materials[0]['name'], 'generic')
+        self.assertIsNone(model.tetrahedra)
+        for text in (b'', b'ela_expl 1\n', b'ela_expl 2\nend\n', b'ela_expl 1\nname "a"\nnodes 3\n0 0 0 1 1 - -1 0\nend\n'):
+            with self.assertRaises(gewebe.Error):
+                gewebe.read_ela(text)
+
+    def test_a_solid(self):
+        gewebe.run('metaball2vol --voxel 1', 'mc-opt --tets --cell 5', 'exp2ela -o solid.ela', input='0 0 0 20\n')
+        model = gewebe.read_ela('solid.ela')
+        self.assertEqual(model.tetrahedra.shape, (len(model.tetrahedron_material), model.tetrahedra.shape[1]))
+        self.assertIn(model.tetrahedra.shape[1], (4, 10))
+        self.assertLess(model.tetrahedra.max(), len(model.points))
+        self.assertGreater(model.materials[0]['poisson'], 0)
+
+    @needs_h5py
+    def test_a_store_answers_as_the_run_does(self):
+        sphere_model()
+        model = gewebe.read_ela('ball.ela')
+        tip = int(model.points[:, 2].argmax())
+        gewebe.run(f'ffe-precompute --columns {tip} ball.ela -o ball.h5')
+        with gewebe.Store('ball.h5') as store:
+            self.assertEqual(list(store), ['ball'])
+            self.assertEqual(store['ball'].nodes().tolist(), [tip])
+            u = store['ball'].displacement({tip: (100, 0, 300)})
+            with self.assertRaisesRegex(gewebe.Error, 'has no column'):
+                store['ball'].displacement({tip: (1, 0, 0), 0: (1, 0, 0)})
+            p, i, x, axis = store['ball'].matrix
+            self.assertEqual(len(i), p[-1])
+        Path('pull.scene').write_text(f'object ball ball.ela store=ball.h5\nforce ball {tip} 100 0 300\nstep\n')
+        gewebe.run('ffe-run pull.scene -o run.h5')
+        with gewebe.Results('run.h5') as results:
+            self.assertEqual(list(results), ['ball'])
+            moved = results['ball']
+            self.assertLess(abs(moved.displacement() - u).max(), 1e-5 * abs(u).max())
+            self.assertTrue((moved.shape(0) == model.points).all())
+            self.assertGreater(moved.shape()[tip, 2], model.points[tip, 2])
+            with self.assertRaises(IndexError):
+                moved.displacement(len(results.time))
+        for kind in (gewebe.Store, gewebe.Results):
+            with self.assertRaises(gewebe.Error):
+                kind('run.h5' if kind is gewebe.Store else 'ball.h5')
+
+    @needs_h5py
+    def test_results_of_what_was_cut(self):
+        sphere_model('cut.ela', ['--bend', '--centrals', '0'])
+        Path('cut.scene').write_text('object ball cut.ela method=ela\ntimestep 0.01\nstep\ncut ball plane 0 0 5 0 0 1\nstep\nstep\n')
+        gewebe.run('ffe-run -q cut.scene -o cut.h5')
+        with gewebe.Results('cut.h5') as results:
+            names = list(results)
+            self.assertGreater(len(names), 1)
+            whole = results['ball']
+            for name in names:
+                for frame in range(results[name].first, len(results.time)):
+                    shape, triangles = results[name].shape(frame), results[name].triangles(frame)
+                    self.assertLess(triangles.max(), len(shape))
+            part = results[names[1]]
+            self.assertEqual(part.first, 2)
+            with self.assertRaises(IndexError):
+                part.shape(1)
+            self.assertNotEqual(len(whole.shape(1)), len(whole.shape(2)))
+
+    @needs_h5py
+    def test_stress_of_a_solid(self):
+        gewebe.run('metaball2vol --voxel 1', 'mc-opt --tets --cell 6', ['exp2ela', '--fix', 'z<-5', '--name', 's', '-o', 's.ela'],
+                   input='0 0 0 20\n')
+        Path('s.scene').write_text("object s s.ela\nstep\nemit stress s\nforce s z>5 0 0 100\nstep\n")
+        gewebe.run('ffe-run s.scene -o s.h5')
+        with gewebe.Results('s.h5') as results:
+            s = results['s']
+            self.assertIsNone(s.field('stress', 1))
+            self.assertEqual(s.field('stress').shape, (len(s.points()), 6))
+            self.assertGreater(s.field('von_mises').max(), 0)
+            self.assertEqual(s.field('element_stress').shape, (len(s.tetrahedra()), 6))
+            self.assertIsNone(s.field('nothing'))
+
+
+class Driving(unittest.TestCase):
+    def test_a_scene_of_ones_own(self):
+        sphere_model()
+        model = gewebe.read_ela('ball.ela')
+        tip = int(model.points[:, 2].argmax())
+        with gewebe.drive('-o', 'driven.ply') as scene:
+            self.assertEqual(scene.time, 0)
+            self.assertEqual(scene.shapes(), {})
+            scene.ask('object ball ball.ela', f'displace ball {tip} 0 0 3', 'emit shapes', 'step 0.1')
+            shape = scene.shapes()['ball']
+            self.assertTrue(numpy.allclose(shape[tip], model.points[tip] + (0, 0, 3), atol=1e-9))
+            with self.assertRaisesRegex(gewebe.Error, 'error 5: .*nowhere'):
+                scene.ask('force nowhere 0 0 0 1')
+            # All lines behind one that is refused are carried out.
+            with self.assertRaisesRegex(gewebe.Error, '^error 6: '):
+                scene.ask('nonsense', 'step 0.1')
+            self.assertAlmostEqual(float(scene.ask('sync')[0][1]), 0.2)
+            with self.assertRaises(ValueError):
+                scene.ask('step\nstep')
+            folder = scene.folder.name
+        self.assertFalse(os.path.exists(folder))
+        mesh = gewebe.read_ply('driven.ply')
+        self.assertTrue(numpy.allclose(mesh.points[tip], shape[tip]))
+
+    def test_a_run_that_can_not_begin(self):
+        with self.assertRaisesRegex(gewebe.Error, 'nonsense') as caught:
+            gewebe.drive('--nonsense')
+        self.assertEqual(caught.exception.status, 2)
+
+    def test_two_scenes_at_once(self):
+        sphere_model()
+        times = []
+
+        def run(steps):
+            with gewebe.drive() as scene:
+                scene.ask('object ball ball.ela', *['step 0.1'] * steps)
+                times.append(round(float(scene.ask('sync')[0][1]), 6))
+
+        threads = [threading.Thread(target=run, args=(steps,)) for steps in (3, 7)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(sorted(times), [0.3, 0.7])
+
+    def test_an_exception_ends_the_run(self):
+        with self.assertRaises(ZeroDivisionError):
+            with gewebe.drive() as scene:
+                process = scene.process
+                1 / 0
+        self.assertIsNotNone(process.returncode)
+
+
+if __name__ == '__main__':
+    unittest.main(verbosity=2)
