@@ -1,10 +1,13 @@
 #include "contact/contact_interior_internal.h"
 
+#include "contact/contact_rank_internal.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 namespace gewebe {
@@ -21,6 +24,9 @@ using Eigen::VectorXd;
 constexpr double short_of = 0.99;  ///< the way to the border that a step takes
 constexpr double least_part = 0.1; ///< of a step; a shorter one goes towards the centre
 constexpr double no_centre = 1e-18;
+constexpr Index few_rows = 48;      ///< of which a factor costs nothing
+constexpr double same_rank = 3e-12; ///< of the largest compliance
+constexpr double exact = 1e-13;     ///< of a row's parts, may be left of it
 
 /// sqrt(x_n² - |x_t|²), without cancellation. \pre x in its cone
 double depth_of(const Vector3d& x) {
@@ -105,8 +111,12 @@ public:
     w_ = scale_.asDiagonal() * w_ * scale_.asDiagonal() / largest_w_;
     q_ = scale_.cwiseProduct(q) / largest_q_;
     x_ = z_ = VectorXd::Zero(size_);
-    for (const Index at : first_)
-      x_[at] = z_[at] = 1;
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      x_[first_[i]] = z_[first_[i]] = 1;
+      sizes_.push_back(rough(i) ? 3 : 1);
+    }
+    if (size_ >= few_rows)
+      shared_ = shared_compliance(w_, size_ / 3, same_rank);
   }
 
   VectorXd forces() const { return largest_q_ / largest_w_ * scale_.cwiseProduct(x_); }
@@ -141,6 +151,7 @@ private:
   void linearise(double gap) {
     VectorXd there = w_ * x_ + q_;
     slope_ = w_;
+    slip_ = VectorXd::Zero(size_);
     const double soft = std::min(1e-2, 10 * gap);
     for (std::size_t i = 0; i < first_.size(); ++i) {
       if (!rough(i))
@@ -149,6 +160,7 @@ private:
       const Vector2d slip = there.segment<2>(k + 1);
       const double size = std::sqrt(slip.squaredNorm() + soft * soft);
       there[k] += size - soft;
+      slip_.segment<2>(k + 1) = slip / size;
       slope_.row(k) += slip.transpose() / size * w_.middleRows(k + 1, 2);
     }
     missing_ = there - z_;
@@ -162,6 +174,23 @@ private:
   }
 
   bool factorise() {
+    solver_.reset();
+    if (!shared_)
+      return factorise_whole();
+    std::vector<Matrix3d> slips(first_.size(), Matrix3d::Identity()), own(first_.size());
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      if (rough(i)) {
+        slips[i].block<1, 2>(0, 1) = slip_.segment<2>(first_[i] + 1).transpose();
+        own[i] = scaling_[i].inverse * scaling_[i].inverse;
+      } else {
+        own[i](0, 0) = z_[first_[i]] / x_[first_[i]];
+      }
+    }
+    solver_.emplace(*shared_, slope_, first_, sizes_, slips, own);
+    return true;
+  }
+
+  bool factorise_whole() {
     MatrixXd m = slope_;
     for (std::size_t i = 0; i < first_.size(); ++i) {
       const Index k = first_[i];
@@ -196,11 +225,19 @@ private:
       }
     }
     rhs -= missing_;
-    if (rough_)
-      dx_ = lu_.solve(rhs);
-    else
-      dx_ = llt_.solve(rhs);
+    dx_ = solved(rhs);
     dz_ = slope_ * dx_ + missing_;
+  }
+
+  VectorXd solved(const VectorXd& rhs) {
+    if (solver_) {
+      if (std::optional<VectorXd> x = solver_->solve(rhs, exact))
+        return *std::move(x);
+      solver_.reset();
+      if (!factorise_whole())
+        return VectorXd::Constant(size_, NAN);
+    }
+    return rough_ ? VectorXd(lu_.solve(rhs)) : VectorXd(llt_.solve(rhs));
   }
 
   double longest() const {
@@ -233,10 +270,13 @@ private:
   std::span<const double> friction_;
   Index size_;
   VectorXd scale_, q_, x_, z_, dx_, dz_, corrected_x_, corrected_z_, missing_;
-  std::vector<Index> first_; ///< row of each contact
+  std::vector<Index> first_, sizes_; ///< rows of each contact
   bool rough_ = false;
   double largest_w_ = 0, largest_q_ = 0;
   MatrixXd slope_;
+  VectorXd slip_;                          ///< directions, behind each contact's first row
+  std::optional<SharedCompliance> shared_; ///< where the contacts share most of it
+  std::optional<SharedSolver> solver_;
   std::vector<Scaling> scaling_;
   Eigen::PartialPivLU<MatrixXd> lu_;
   Eigen::LLT<MatrixXd> llt_;

@@ -480,7 +480,8 @@ inline StoredStiffness fuzzed_store(const std::string& name, double stiffer) {
 struct FuzzedRun {
   std::string replies, answers, fault, digest, result;
   std::uint64_t errors = 0, steps = 0;
-  bool slow = false; ///< it took too long and was ended
+  double seconds = 0; ///< of the processor
+  bool slow = false;  ///< it took too long and was ended
 };
 
 /// \param serve lines are acknowledged as well, and shapes shared \param record written if it is
@@ -538,7 +539,8 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   Context context;
   context.threads = threads;
   // Of the processor, for others may be at work.
-  const auto end = std::clock() + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC);
+  const std::clock_t begin = std::clock();
+  const auto end = begin + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC);
   std::atomic<unsigned> asked = 0; // that clock is slow to read
   context.cancelled = [&, end] {
     return asked.fetch_add(1, std::memory_order_relaxed) % 32 == 0 && std::clock() > end;
@@ -569,6 +571,7 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
   out.answers = serve ? door.answers : out.replies;
   out.errors = run.counts().errors;
   out.steps = run.simulation().counts().steps;
+  out.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   out.digest = run.counts().digest;
   out.result = result.hex() + " " + std::to_string(result.frames);
   return out;
@@ -628,7 +631,8 @@ inline std::string fault_of_scene(const std::vector<std::string>& lines, FuzzedC
   const std::vector<std::string> again = lines_in(file);
   if (again.empty())
     return "";
-  const FuzzedRun replay = run_fuzzed(again, false, 2, "", 100);
+  // A run may take longer than it may where nothing long asks it to stop.
+  const FuzzedRun replay = run_fuzzed(again, false, 2, "", 100 + 10 * live.seconds);
   if (!replay.fault.empty() || replay.slow)
     return "the record does not run: " + replay.fault;
   if (replay.answers != live.answers)
