@@ -35,12 +35,24 @@ VoxelRule rule_from_text(const std::string& text) {
                              : VoxelRule::parity;
 }
 
-void complete(Arguments& a) {
+/// What says how a mesh is read and filled.
+void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
+  for (const std::string name :
+       {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format"})
+    if (p.given(name))
+      throw UsageError(asked + ": " + name + " is for meshes, expected no " + name);
+}
+
+void complete(const cli::Program& p, Arguments& a) {
   const bool own_lattice = a.dim || !a.like.empty();
-  if (!a.threshold.empty())
-    return check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
-  if (!a.labels.empty())
-    return check_labels(a.labels, a.voxel.has_value(), own_lattice);
+  if (!a.threshold.empty()) {
+    check_thresholds(a.threshold, !a.labels.empty(), own_lattice);
+    return refuse_mesh_options(p, "--threshold");
+  }
+  if (!a.labels.empty()) {
+    check_labels(a.labels, a.voxel.has_value(), own_lattice);
+    return refuse_mesh_options(p, "--label");
+  }
   if (int{a.voxel.has_value()} + int{a.dim.has_value()} + int{!a.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh, a.like});
@@ -146,7 +158,7 @@ int main(int argc, char** argv) {
   p.output_kinds({Kind::vdb});
   p.input_kinds(readable_mesh_kinds());
   p.operand("MESH", a.mesh, "the mesh");
-  p.check([&] { complete(a); });
+  p.check([&] { complete(p, a); });
   return p.run(argc, argv, [&](cli::Run& run) {
     if (!a.threshold.empty())
       voxelize_scan(run, a.mesh, thresholds_from_text(a.threshold), a.voxel);

@@ -219,6 +219,11 @@ void Program::input_kinds(const std::vector<Kind>& kinds) {
       .one_of(kind_words(kinds));
 }
 
+bool Program::given(std::string_view name) const {
+  const Spec& spec = *state_->line.find(name);
+  return spec.flag != nullptr ? *spec.flag : !spec.words.empty();
+}
+
 void Program::check(std::function<void()> check) {
   state_->checks.push_back(std::move(check));
 }

@@ -147,6 +147,8 @@ public:
   /// Declares --to (kinds that this tool writes) and/or --format (kinds that it reads).
   void output_kinds(const std::vector<Kind>& kinds);
   void input_kinds(const std::vector<Kind>& kinds);
+  /// Whether the command line has the option of that long name, for checks. \pre it is declared
+  bool given(std::string_view name) const;
   /// Cross-option checks, run after parsing; throw UsageError.
   void check(std::function<void()> check);
 

@@ -67,6 +67,7 @@ struct CommandLine {
   /// after `=`. A negative number is an operand.
   /// \throw UsageError for a value that is missing or too much, a long option behind one dash
   void take(const std::vector<std::string>& words);
+  Spec* find(std::string_view name) const; ///< or nullptr
   /// \throw UsageError for words that are unknown, operands that are missing
   void check_complete() const;
   /// The text of --help.
@@ -78,7 +79,6 @@ struct CommandLine {
 
 private:
   using NextWord = std::function<std::optional<std::string>()>;
-  Spec* find(std::string_view name) const;
   void take_value(Spec& spec, const std::optional<std::string>& value);
   void take_short(std::string word, const NextWord& next);
   void take_long(const std::string& word, const NextWord& next);
