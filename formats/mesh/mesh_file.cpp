@@ -4,6 +4,7 @@
 #include "formats/mesh/assimp_child.h"
 #include "formats/mesh/obj_stl.h"
 #include "formats/mesh/ply.h"
+#include "formats/mesh/vtp.h"
 
 #include <algorithm>
 #include <utility>
@@ -72,6 +73,15 @@ TriangleMesh read_unwelded(Input& input, const MeshReadOptions& options, MeshRea
     stats.skipped_properties = counts.skipped_properties;
     return mesh;
   }
+  if (options.kind == Kind::vtp) {
+    VtpStats counts;
+    TriangleMesh mesh = read_vtp(bytes, input.name(), &counts);
+    if (mesh.triangles.empty())
+      throw Error("no polygon, expected one");
+    stats.polygons = counts.polygons;
+    stats.skipped_primitives = counts.skipped_primitives;
+    return mesh;
+  }
   AssimpSource source;
   source.bytes = bytes;
   source.kind = options.kind;
@@ -97,7 +107,7 @@ std::uint64_t count_parts(const TriangleMesh& mesh) {
 
 const std::vector<Kind>& readable_mesh_kinds() {
   static const std::vector<Kind> kinds{Kind::ply,  Kind::obj, Kind::stl,      Kind::off, Kind::dxf,
-                                       Kind::gltf, Kind::glb, Kind::three_ds, Kind::dae};
+                                       Kind::gltf, Kind::glb, Kind::three_ds, Kind::dae, Kind::vtp};
   return kinds;
 }
 

@@ -10,7 +10,7 @@
 namespace gewebe {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 23> names{{
+constexpr std::array<std::pair<Kind, std::string_view>, 24> names{{
     {Kind::particles, "particles"},
     {Kind::vdb, "vdb"},
     {Kind::ply, "ply"},
@@ -26,6 +26,7 @@ constexpr std::array<std::pair<Kind, std::string_view>, 23> names{{
     {Kind::three_ds, "3ds"},
     {Kind::dae, "dae"},
     {Kind::vtu, "vtu"},
+    {Kind::vtp, "vtp"},
     {Kind::msh, "msh"},
     {Kind::msh4, "msh4"},
     {Kind::medit, "medit"},
@@ -75,11 +76,16 @@ std::string_view first_word(std::string_view text) {
   return text.substr(at, end - at);
 }
 
-/// Whether a tag of XML, with which `text` begins, says type="UnstructuredGrid".
-bool is_unstructured_grid(std::string_view text) {
+/// What a file of VTK in XML holds, by its outermost tag, with which `text` begins.
+Kind vtk_kind(std::string_view text) {
   const std::string_view tag = text.substr(0, text.find('>'));
-  return tag.find("\"UnstructuredGrid\"") != std::string_view::npos ||
-         tag.find("'UnstructuredGrid'") != std::string_view::npos;
+  const auto says = [&](const char* word) {
+    for (const char* const quote : {"\"", "'"})
+      if (tag.find(quote + std::string(word) + quote) != std::string_view::npos)
+        return true;
+    return false;
+  };
+  return says("UnstructuredGrid") ? Kind::vtu : says("PolyData") ? Kind::vtp : Kind::unknown;
 }
 
 } // namespace
@@ -155,10 +161,10 @@ Kind kind_from_magic(std::string_view bytes) {
     return Kind::nifti;
   if (bytes.starts_with("$MeshFormat") || bytes.starts_with("$Comments"))
     return Kind::msh;
-  if (const std::size_t at = bytes.find("<VTKFile"); at != std::string_view::npos &&
-                                                     first_word(bytes).starts_with('<') &&
-                                                     is_unstructured_grid(bytes.substr(at)))
-    return Kind::vtu;
+  if (const std::size_t at = bytes.find("<VTKFile");
+      at != std::string_view::npos && first_word(bytes).starts_with('<'))
+    if (const Kind kind = vtk_kind(bytes.substr(at)); kind != Kind::unknown)
+      return kind;
   const std::string_view word = first_word(bytes);
   if (word == "MeshVersionFormatted")
     return Kind::medit;

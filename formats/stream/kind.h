@@ -24,6 +24,7 @@ enum class Kind {
   three_ds,
   dae,
   vtu,    ///< VTK's unstructured grids
+  vtp,    ///< VTK's surfaces
   msh,    ///< Gmsh, 2.2 where written
   msh4,   ///< Gmsh 4.1, for outputs; inputs are msh
   medit,  ///< .mesh
@@ -43,7 +44,7 @@ std::string kind_list(const std::vector<Kind>& kinds);
 Kind kind_from_name(std::string_view name);
 /// The kind that a file name's suffix stands for, or unknown. Case does not matter.
 Kind kind_from_suffix(std::string_view path);
-/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, VTU, Gmsh; `ela_expl`
+/// The kind that the first bytes prove (PLY, VDB, HDF5, NIfTI, GLB, PNG, VTU, VTP, Gmsh; `ela_expl`
 /// and Medit's word after blank lines and comments), or unknown.
 Kind kind_from_magic(std::string_view first_bytes);
 /// Magic, else the name given by --format (may be empty), else the suffix. `peeked` are the first

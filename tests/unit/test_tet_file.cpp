@@ -8,9 +8,9 @@
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
+#include "vtk_writer.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -27,6 +27,7 @@
 namespace gewebe {
 namespace {
 
+using test::put;
 using test::same_bytes;
 
 const std::vector<Kind> in_memory{Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit};
@@ -81,15 +82,6 @@ std::vector<TetMesh> meshes() {
   all.push_back({}); // nothing at all
   all.back().points = {{1, 2, 3}};
   return all;
-}
-
-template <class T>
-void put(std::string& bytes, T value, bool swap = false) {
-  std::array<char, sizeof(T)> raw;
-  std::memcpy(raw.data(), &value, sizeof(T));
-  if (swap)
-    std::reverse(raw.begin(), raw.end());
-  bytes.append(raw.data(), raw.size());
 }
 
 // ---- What we write
@@ -208,7 +200,9 @@ TEST(TetFile, KindsByName) {
   for (const Kind kind : writable_tet_kinds())
     EXPECT_EQ(kind_from_name(kind_name(kind)), kind);
   EXPECT_EQ(kind_from_name("mesh"), Kind::ply);
-  EXPECT_EQ(kind_from_magic("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">"), Kind::unknown);
+  EXPECT_EQ(kind_from_magic("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">"), Kind::vtp);
+  EXPECT_EQ(kind_from_magic("<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\">"),
+            Kind::unknown);
   EXPECT_EQ(kind_from_magic("# a\n\nMeshVersionFormatted 2"), Kind::medit);
   EXPECT_EQ(complaint("", Kind::obj),
             "m: obj has no tetrahedra, expected one of ply, vtu, msh, medit, tetgen by content, "
@@ -332,148 +326,53 @@ TEST(TetFile, PlyByHand) {
 
 // ---- VTU, however it is stored
 
-struct VtuStyle {
-  bool text = false, appended = false, base64 = false, zlib = false, big = false, wide = false;
-};
-
-std::string base64(const std::string& bytes) {
-  const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t n = 0; n < bytes.size(); n += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = bits << 8U | (n + k < bytes.size() ? static_cast<std::uint8_t>(bytes[n + k]) : 0U);
-    for (std::uint32_t k = 0; k < 4; ++k)
-      text += n + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63U];
+/// The mesh, behind a triangle.
+std::string vtu(const TetMesh& mesh, const test::VtkStyle& style) {
+  std::vector<double> points;
+  std::vector<std::int64_t> nodes, offsets, types, material;
+  for (const Vec3& p : mesh.points)
+    points.insert(points.end(), {p.x, p.y, p.z});
+  nodes = {0, 1, 2};
+  offsets = {3};
+  types = {5};
+  material = {77};
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    nodes.insert(nodes.end(), mesh.tetrahedra[t].begin(), mesh.tetrahedra[t].end());
+    if (!mesh.middles.empty())
+      nodes.insert(nodes.end(), mesh.middles[t].begin(), mesh.middles[t].end());
+    offsets.push_back(static_cast<std::int64_t>(nodes.size()));
+    types.push_back(mesh.middles.empty() ? 10 : 24);
+    material.push_back(mesh.material[t]);
   }
-  return text;
+  test::VtkWriter out(style, "UnstructuredGrid",
+                      "NumberOfPoints='" + std::to_string(mesh.points.size()) +
+                          "' NumberOfCells='" + std::to_string(types.size()) + "'");
+  out.text("\n<CellData>");
+  out.array("Int32", "material", std::vector<std::int32_t>(material.begin(), material.end()));
+  out.text("</CellData><Points>");
+  out.array("Float64", "Points", points, 3);
+  out.text("</Points><Cells>");
+  out.array("Int64", "connectivity", nodes);
+  out.array("UInt32", "offsets", std::vector<std::uint32_t>(offsets.begin(), offsets.end()));
+  out.array("UInt8", "types", std::vector<std::uint8_t>(types.begin(), types.end()));
+  out.text("</Cells>");
+  return out.end();
 }
-
-class VtuWriter {
-public:
-  explicit VtuWriter(const VtuStyle& style) : style_(style) {}
-
-  template <class T>
-  void array(const char* type, const char* name, const std::vector<T>& values,
-             const char* components = "") {
-    xml_ += std::string("<DataArray type='") + type + "' Name='" + name + "' " + components;
-    if (style_.text) {
-      xml_ += ">\n";
-      for (const T value : values)
-        xml_ += std::to_string(value) + "\n";
-    } else {
-      std::string data;
-      for (const T value : values)
-        put(data, value, style_.big);
-      const std::string stored = store(data);
-      if (style_.appended) {
-        xml_ += "format='appended' offset='" + std::to_string(appended_.size()) + "'>";
-        xml_ += "<InformationKey name='L2' location='x'><Value>1</Value></InformationKey>";
-        appended_ += stored;
-      } else {
-        xml_ += "format='binary'>\n<InformationKey name='x'> 1 </InformationKey>\n" + stored + "\n";
-      }
-    }
-    xml_ += "</DataArray>\n";
-  }
-
-  std::string write(const TetMesh& mesh) {
-    std::vector<double> points;
-    std::vector<std::int64_t> nodes, offsets, types, material;
-    for (const Vec3& p : mesh.points)
-      points.insert(points.end(), {p.x, p.y, p.z});
-    nodes = {0, 1, 2}; // a triangle first
-    offsets = {3};
-    types = {5};
-    material = {77};
-    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
-      nodes.insert(nodes.end(), mesh.tetrahedra[t].begin(), mesh.tetrahedra[t].end());
-      if (!mesh.middles.empty())
-        nodes.insert(nodes.end(), mesh.middles[t].begin(), mesh.middles[t].end());
-      offsets.push_back(static_cast<std::int64_t>(nodes.size()));
-      types.push_back(mesh.middles.empty() ? 10 : 24);
-      material.push_back(mesh.material[t]);
-    }
-    xml_ =
-        std::string("<?xml version=\"1.0\"?><!-- <Piece> -->\n<VTKFile type='UnstructuredGrid' ") +
-        "version='1.0' byte_order='" + (style_.big ? "BigEndian" : "LittleEndian") + "' " +
-        (style_.wide ? "header_type='UInt64' " : "") +
-        (style_.zlib ? "compressor='vtkZLibDataCompressor'" : "") +
-        "><UnstructuredGrid>\n<FieldData><DataArray type='Int32' Name='x' "
-        "format='ascii'>1</DataArray></FieldData><Piece NumberOfPoints='" +
-        std::to_string(mesh.points.size()) + "' NumberOfCells='" + std::to_string(types.size()) +
-        "'>\n<CellData>";
-    array("Int32", "material", std::vector<std::int32_t>(material.begin(), material.end()));
-    xml_ += "</CellData><Points>";
-    array("Float64", "Points", points, "NumberOfComponents='3'");
-    xml_ += "</Points><Cells>";
-    array("Int64", "connectivity", nodes);
-    array("UInt32", "offsets", std::vector<std::uint32_t>(offsets.begin(), offsets.end()));
-    array("UInt8", "types", std::vector<std::uint8_t>(types.begin(), types.end()));
-    xml_ += "</Cells></Piece></UnstructuredGrid>\n";
-    if (style_.appended)
-      xml_ += std::string("<AppendedData encoding='") + (style_.base64 ? "base64" : "raw") +
-              "'>\n  _" + appended_ + "\n</AppendedData>\n";
-    return xml_ + "</VTKFile>\n";
-  }
-
-private:
-  void size(std::string& to, std::uint64_t number) const {
-    if (style_.wide)
-      put(to, number, style_.big);
-    else
-      put(to, static_cast<std::uint32_t>(number), style_.big);
-  }
-
-  std::string store(const std::string& data) const {
-    const bool coded = style_.base64 || !style_.appended;
-    std::string head, body = data;
-    if (!style_.zlib) {
-      size(head, data.size());
-      return coded ? base64(head + body) : head + body;
-    }
-    constexpr std::size_t block = 100;
-    body.clear();
-    const std::size_t blocks = (data.size() + block - 1) / block;
-    size(head, blocks);
-    size(head, block);
-    size(head, data.size() % block);
-    for (std::size_t n = 0; n < blocks; ++n) {
-      const std::string part = data.substr(n * block, block);
-      uLongf packed = compressBound(static_cast<uLong>(part.size()));
-      std::string bytes(packed, '\0');
-      (void)compress(reinterpret_cast<Bytef*>(bytes.data()), &packed,
-                     reinterpret_cast<const Bytef*>(part.data()), static_cast<uLong>(part.size()));
-      body.append(bytes, 0, packed);
-      size(head, packed);
-    }
-    return coded ? base64(head) + base64(body) : head + body;
-  }
-
-  VtuStyle style_;
-  std::string xml_, appended_;
-};
 
 TEST(TetFile, VtuHoweverItIsStored) {
   for (const bool quadratic : {false, true}) {
     const TetMesh mesh = test::odd_tetrahedra(quadratic, true);
-    std::vector<VtuStyle> styles;
-    for (const bool big : {false, true})
-      for (const bool wide : {false, true})
-        for (const bool zlib : {false, true})
-          for (const auto& [appended, coded] :
-               {std::pair(false, true), std::pair(true, true), std::pair(true, false)})
-            styles.push_back({false, appended, coded, zlib, big, wide});
+    const std::vector<test::VtkStyle> styles = test::binary_vtk_styles();
     for (std::size_t n = 0; n < styles.size(); ++n) {
-      const std::string bytes = VtuWriter(styles[n]).write(mesh);
+      const std::string bytes = vtu(mesh, styles[n]);
       ASSERT_EQ(complaint(bytes, Kind::vtu), "") << n << bytes.substr(0, 600);
       TetReadStats stats;
       EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(bytes, "m", Kind::vtu, &stats), mesh)) << n;
       EXPECT_EQ(stats.skipped_elements, 1U);
     }
-    VtuStyle text;
+    test::VtkStyle text;
     text.text = true;
-    const TetMesh read = tet_mesh_from_bytes(VtuWriter(text).write(mesh), "m", Kind::vtu);
+    const TetMesh read = tet_mesh_from_bytes(vtu(mesh, text), "m", Kind::vtu);
     EXPECT_EQ(read.tetrahedra, mesh.tetrahedra);
     EXPECT_EQ(read.middles, mesh.middles);
     EXPECT_EQ(read.material, mesh.material);
@@ -503,11 +402,11 @@ std::vector<std::pair<Kind, std::string>> samples() {
     all.emplace_back(kind, tet_mesh_bytes(mesh, kind));
   all.emplace_back(Kind::msh, gmsh2);
   all.emplace_back(Kind::medit, medit);
-  VtuStyle style;
+  test::VtkStyle style;
   style.zlib = true;
-  all.emplace_back(Kind::vtu, VtuWriter(style).write(mesh));
+  all.emplace_back(Kind::vtu, vtu(mesh, style));
   style.text = true;
-  all.emplace_back(Kind::vtu, VtuWriter(style).write(mesh));
+  all.emplace_back(Kind::vtu, vtu(mesh, style));
   return all;
 }
 
@@ -587,13 +486,13 @@ TEST(TetFile, BadContentIsNamedWithItsPlace) {
   EXPECT_EQ(in_medit("Vertices 4", "Vertices 4000000000"),
             "m:6: 4000000000 vertices in 155 bytes, expected a count that fits");
 
-  VtuStyle style;
+  test::VtkStyle style;
   style.text = true;
   TetMesh mesh = strange();
   mesh.material = {1, 4};
   for (Vec3& p : mesh.points)
     p = {1, 2, 3};
-  const std::string text = VtuWriter(style).write(mesh);
+  const std::string text = vtu(mesh, style);
   const auto in_vtu = [&](const char* from, const char* to) {
     return complaint(replaced(text, from, to), Kind::vtu);
   };

@@ -1,5 +1,5 @@
 #pragma once
-// The numbers of one DataArray of a VTU file, however they are stored.
+// The numbers of one DataArray of a file of VTK in XML, however they are stored.
 
 #include <cstddef>
 #include <cstdint>
@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-namespace gewebe::tet {
+namespace gewebe::vtk {
 
 /// How the file stores arrays.
-struct VtuEncoding {
+struct Encoding {
   bool big_endian = false;
   bool wide_header = false; ///< sizes before data have 8 bytes, else 4
   bool zlib = false;
@@ -18,7 +18,7 @@ struct VtuEncoding {
   std::string_view appended; ///< what follows the underscore, to the end of the file
 };
 
-struct VtuArray {
+struct Array {
   std::string name, type, format; ///< attributes
   std::uint64_t components = 1, offset = 0;
   std::string_view text; ///< inline: between the tags
@@ -27,10 +27,10 @@ struct VtuArray {
 
 /// The numbers of the array. `place` begins messages.
 /// \throw Error unless there are exactly `count`, all of them finite, \pre count < 2^36
-std::vector<double> vtu_reals(const VtuArray& array, const VtuEncoding& encoding,
-                              std::uint64_t count, const std::string& place);
+std::vector<double> reals(const Array& array, const Encoding& encoding, std::uint64_t count,
+                          const std::string& place);
 /// \throw Error also if one is no integer
-std::vector<std::int64_t> vtu_integers(const VtuArray& array, const VtuEncoding& encoding,
-                                       std::uint64_t count, const std::string& place);
+std::vector<std::int64_t> integers(const Array& array, const Encoding& encoding,
+                                   std::uint64_t count, const std::string& place);
 
-} // namespace gewebe::tet
+} // namespace gewebe::vtk

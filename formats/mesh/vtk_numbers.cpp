@@ -1,16 +1,26 @@
+#include "formats/mesh/vtk_numbers.h"
+
 #include "base/error.h"
-#include "formats/tetrahedra/tet_file_internal.h"
-#include "formats/tetrahedra/vtu_array_internal.h"
+#include "formats/mesh/ply_header.h"
+#include "formats/mesh/text_words.h"
 
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
 #include <cstring>
-#include <limits>
+#include <type_traits>
 // Based on: VTK file formats, docs.vtk.org, "XML file formats"; RFC 4648 (base64).
 
-namespace gewebe::tet {
+namespace gewebe::vtk {
 namespace {
+
+using ply::quoted;
+
+static_assert(std::endian::native == std::endian::little,
+              "numbers are copied from little-endian memory");
 
 int digit_of(char c) {
   if (c >= 'A' && c <= 'Z')
@@ -56,7 +66,7 @@ public:
       std::reverse(raw.begin(), raw.end());
     return std::bit_cast<T>(raw);
   }
-  std::uint64_t size(const VtuEncoding& encoding) {
+  std::uint64_t size(const Encoding& encoding) {
     return encoding.wide_header ? number<std::uint64_t>(encoding.big_endian)
                                 : number<std::uint32_t>(encoding.big_endian);
   }
@@ -115,7 +125,7 @@ constexpr std::array<NumberType, 10> number_types{{{"Int8", 1},
                                                    {"Float32", 4},
                                                    {"Float64", 8}}};
 
-std::size_t size_of(const VtuArray& array, const std::string& place) {
+std::size_t size_of(const Array& array, const std::string& place) {
   for (const NumberType& type : number_types)
     if (type.name == array.type)
       return type.size;
@@ -124,7 +134,7 @@ std::size_t size_of(const VtuArray& array, const std::string& place) {
                          "or Float64");
 }
 
-std::string inflated(Bytes& bytes, const VtuEncoding& encoding, std::uint64_t expected,
+std::string inflated(Bytes& bytes, const Encoding& encoding, std::uint64_t expected,
                      const std::string& place) {
   const std::uint64_t blocks = bytes.size(encoding), block = bytes.size(encoding),
                       last = bytes.size(encoding);
@@ -168,7 +178,7 @@ std::string inflated(Bytes& bytes, const VtuEncoding& encoding, std::uint64_t ex
 }
 
 /// The bytes of a binary array.
-std::string bytes_of(const VtuArray& array, const VtuEncoding& encoding, std::uint64_t expected,
+std::string bytes_of(const Array& array, const Encoding& encoding, std::uint64_t expected,
                      const std::string& place) {
   const bool appended = array.format == "appended";
   if (appended && array.offset > encoding.appended.size())
@@ -218,11 +228,11 @@ void convert(const std::string& bytes, bool swap, std::vector<To>& numbers,
 }
 
 template <class To>
-std::vector<To> numbers_of(const VtuArray& array, const VtuEncoding& encoding, std::uint64_t count,
+std::vector<To> numbers_of(const Array& array, const Encoding& encoding, std::uint64_t count,
                            const std::string& place) {
   const std::size_t size = size_of(array, place);
   if (array.format == "ascii") {
-    Words words(array.text, place, '\0');
+    text::Words words(array.text, place, '\0');
     if (count > (array.text.size() + 1) / 2)
       throw Error(place, std::to_string(count) + " numbers in " +
                              std::to_string(array.text.size()) +
@@ -271,14 +281,14 @@ std::vector<To> numbers_of(const VtuArray& array, const VtuEncoding& encoding, s
 
 } // namespace
 
-std::vector<double> vtu_reals(const VtuArray& array, const VtuEncoding& encoding,
-                              std::uint64_t count, const std::string& place) {
+std::vector<double> reals(const Array& array, const Encoding& encoding, std::uint64_t count,
+                          const std::string& place) {
   return numbers_of<double>(array, encoding, count, place);
 }
 
-std::vector<std::int64_t> vtu_integers(const VtuArray& array, const VtuEncoding& encoding,
-                                       std::uint64_t count, const std::string& place) {
+std::vector<std::int64_t> integers(const Array& array, const Encoding& encoding,
+                                   std::uint64_t count, const std::string& place) {
   return numbers_of<std::int64_t>(array, encoding, count, place);
 }
 
-} // namespace gewebe::tet
+} // namespace gewebe::vtk
