@@ -1,8 +1,8 @@
 // ffe-run: scene -> replies, shapes, forces.
 
-#include "formats/results/results_writer.h"
 #include "formats/results/shared_shapes.h"
 #include "tools/run/event_log.h"
+#include "tools/run/result_choice.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_answers.h"
 #include "tools/run/scene_record.h"
@@ -26,25 +26,13 @@ struct Arguments {
   std::optional<double> rate;
   double tolerance = 0;
   std::string listen, shapes, events, record, latencies;
+  ResultChoice result;
 };
 
-/// The kind of result, or unknown where there is none but replies.
-Kind result_kind(const cli::Run& run) {
-  if (run.output() == "-" && run.to().empty())
-    return Kind::unknown;
-  const Kind kind = output_kind(run.to(), run.output(), Kind::hdf5, result_kinds());
-  if ((kind == Kind::hdf5 || kind == Kind::vtkhdf) && run.output() == "-")
-    throw UsageError(std::string(kind_name(kind)) +
-                     " can't go to standard output, expected -o FILE");
-  return kind;
-}
-
 void work(cli::Run& run, const Arguments& in) {
-  const Kind kind = result_kind(run);
+  const Kind kind = in.result.kind(run);
   const auto warn = [&](const std::string& text) { run.warn(text); };
-  std::unique_ptr<ResultWriter> result;
-  if (kind != Kind::unknown)
-    result = open_result(kind, run.output(), run.output_options(is_binary(kind)));
+  const std::unique_ptr<ResultWriter> result = in.result.open(run, kind);
   const bool reads = in.listen.empty() || in.scene != "-";
   const bool spoken = reads && (kind == Kind::unknown || (run.output() != "-" && !run.quiet()));
   if (!spoken && in.listen.empty() && (in.serve || in.binary))
@@ -123,7 +111,7 @@ void work(cli::Run& run, const Arguments& in) {
 int main(int argc, char** argv) {
   cli::Program p("ffe-run", "Runs a scene of deformable objects, command by command.");
   Arguments in;
-  p.output_kinds(result_kinds());
+  in.result.declare(p);
   p.flag("--serve", in.serve, "answer a wrong line and go on");
   p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
   p.option("--listen", in.listen, "PATH", "with --serve, a socket for clients, one at a time");
@@ -144,6 +132,7 @@ int main(int argc, char** argv) {
                                         {!in.shapes.empty(), "--shapes-in"}})
       if (given && !in.serve)
         throw UsageError(std::string(option) + " without --serve, expected both");
+    in.result.check(p);
   });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
 }

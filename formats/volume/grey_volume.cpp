@@ -21,6 +21,18 @@ GreyScan read(ByteSource& source, const std::string& name, const Context& contex
 
 } // namespace
 
+VolumePlace read_volume_place(Input& input, const Context& context) {
+  (void)input.peek(1); // says that it is empty
+  StreamBytes source(input.stream(), input.name());
+  const std::vector<LabelRange> no_labels;
+  const LabelCheck no_check;
+  VoxelLayout layout;
+  const LabelVolume volume = read_radiology(
+      source, input.name(),
+      {no_labels, context, no_check, input.name() != "-", nullptr, nullptr, &layout});
+  return {layout.size, layout.transform, volume.warnings};
+}
+
 GreyScan read_grey_volume(Input& input, const Context& context) {
   (void)input.peek(1); // says that it is empty
   StreamBytes source(input.stream(), input.name());

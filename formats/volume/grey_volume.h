@@ -18,6 +18,15 @@ struct GreyScan {
   std::vector<std::string> warnings;
 };
 
+/// Where the voxels of a volume of any of these formats lie, by its header alone: what stands
+/// behind that is not read. RAS, mm. \throw Error with the place, as below, for a wrong header
+struct VolumePlace {
+  Int3 size{};
+  GridTransform transform;
+  std::vector<std::string> warnings;
+};
+VolumePlace read_volume_place(Input& input, const Context& context);
+
 /// Reads forwards, from a pipe too; only files of two parts need a name. RAS, mm.
 /// \throw Error with the place if it is none of the formats, is cut off or goes on beyond its end,
 /// if the affine is singular, or if the values would need more than context.max_memory

@@ -300,6 +300,10 @@ std::size_t bytes_of(ScalarType type) {
 LabelVolume read_voxels(ByteSource& data, const std::string& name, const VoxelLayout& layout,
                         const LabelRequest& request) {
   LabelVolume volume;
+  if (request.layout != nullptr) {
+    *request.layout = layout;
+    return volume;
+  }
   volume.mask.size = layout.size;
   volume.mask.transform = layout.transform;
   const double words = static_cast<double>(volume.mask.row_words()) * layout.size[1] *

@@ -106,6 +106,7 @@ struct LabelRequest {
   // One of these may receive what is wanted in place of the mask's bits.
   LabelRuns* all;
   GreyVolume* grey;
+  VoxelLayout* layout = nullptr; ///< then no voxel is read
 };
 
 /// Reads a volume of any of the formats for what is asked.
