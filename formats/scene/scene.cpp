@@ -10,7 +10,9 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gewebe {
@@ -335,9 +337,30 @@ What parse_tear(Words& in) {
   ChangeCommand c;
   c.object = in.name();
   SetTear set;
-  set.strain = in.number("strain");
-  if (!(set.strain >= 0))
-    in.fail("a negative strain");
+  std::optional<std::string> of = in.take_after("strain=");
+  if (!of) {
+    of = in.take_after("stress=");
+    set.limit.stress = of.has_value();
+  }
+  if (!of) {
+    set.strain = in.number("strain");
+    if (!(set.strain >= 0))
+      in.fail("a negative strain");
+  } else {
+    for (const char* const what = set.limit.stress ? "stress" : "strain"; of;) {
+      const std::size_t comma = of->find(',');
+      const double most = in.number_in(std::string_view(*of).substr(0, comma), what);
+      if (!(most >= 0))
+        in.fail(std::string("a negative ") + what);
+      set.limit.most.push_back(most);
+      of = comma == std::string::npos ? std::nullopt : std::optional(of->substr(comma + 1));
+    }
+    if (const auto over = in.take_after("over=")) {
+      set.limit.over = in.number_in(*over, "length");
+      if (!(set.limit.over > 0))
+        in.fail("no length to take means over");
+    }
+  }
   c.change = set;
   return c;
 }
@@ -402,7 +425,11 @@ const std::array<Verb, 30>& verbs() {
       {"cut",
        "cut NAME springs NODES [NODES] or cut NAME plane px py pz nx ny nz [NODES] [along=faces]",
        true, parse_cut},
-      {"tear", "tear NAME STRAIN, 0 or more", true, parse_tear},
+      {"tear",
+       "tear NAME STRAIN, 0 or more, or of a solid tear NAME stress=PA[,PA "
+       "...]|strain=STRAIN[,...] "
+       "[over=MM]",
+       true, parse_tear},
       {"restore", "restore NAME", true, parse_restore},
       {"gravity", "gravity gx gy gz", true, parse_gravity},
       {"method", "method NAME ffe|ela", true, parse_method},

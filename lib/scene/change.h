@@ -6,6 +6,7 @@
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "model/cut_select.h"
+#include "solid/tear_solid.h"
 #include "statics/two_step.h"
 
 #include <cstddef>
@@ -146,10 +147,12 @@ struct CutObject {
   std::size_t object = 0;
   std::variant<SpringsToCut, PlaneToCut> what;
 };
-/// Springs that are stretched beyond this tear from now on; 0: none any more.
+/// Springs that are stretched beyond this tear from now on; 0: none any more. A solid is parted
+/// where elements bear more than its limit, or without one where they are strained more than this.
 struct SetTear {
   std::size_t object = 0;
   double strain = 0;
+  TearLimit limit{}; ///< of a solid
 };
 /// The model as it came; what has come off stays an object of its own.
 struct Restore {

@@ -94,7 +94,9 @@ Moves moves_of(const World& w, std::size_t index, const CutModel& cut, const Fre
 /// What cuts have made of the first model's nodes, with one more cut.
 /// \param origin by node: what it was in the object before
 CutState cut_again(const Object& old, std::vector<std::uint32_t> origin, const Moves& moves) {
-  CutState next{.first = old.cut.first ? old.cut.first : old.matter->model, .tear = old.cut.tear};
+  CutState next{.first = old.cut.first ? old.cut.first : old.matter->model,
+                .tear = old.cut.tear,
+                .limit = old.cut.limit};
   if (const std::vector<std::uint32_t>& before = *old.cut.first_nodes; !before.empty())
     for (std::uint32_t& o : origin)
       o = before[o];
@@ -135,7 +137,10 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   Object& old = w.now.objects[index];
   const bool ffe = old.method == Method::ffe;
   FreeParts free = free_parts(old.model(), cut);
-  (void)part_skin(cut.model, free);
+  if (const SkinPartsReport skin = part_skin(cut.model, free); skin.torn > 0 && w.options.warn)
+    w.options.warn("object " + old.name() + " at " + number_text(w.now.clock.time) +
+                   " s: what comes off tears its skin along " + std::to_string(skin.torn) +
+                   " edges that no cut has passed");
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&
@@ -319,26 +324,6 @@ void sweep_blades(World& w) {
     move_bodies(w, w.now.clock.time); // that new bodies know their loads
 }
 
-// ---- tearing
-
-void tear(World& w) {
-  const std::size_t count = w.now.objects.size();
-  for (std::size_t index = 0; index < count; ++index) {
-    Object& object = w.now.objects[index];
-    if (!(object.cut.tear > 0) || !may_cut(w, object, Feature::tear))
-      continue;
-    shape_in_step(w, object);
-    const Cut torn = torn_cut(object.model(), *object.shown.displacement, object.cut.tear);
-    if (torn.empty())
-      continue;
-    of_object(object.name() + " at " + number_text(w.now.clock.time) + " s", [&] {
-      CutModel cut = cut_model(object.model(), merged(torn, object.cut.scored));
-      if (cut.changed())
-        carry_out(w, index, std::move(cut));
-    });
-  }
-}
-
 // ---- what hangs together but can move freely
 
 /// A cut object that an elastostatic shape is asked of may have none: then it goes on
@@ -429,14 +414,6 @@ void Rule<CutObject>::log(const World&, const CutObject& c, ChangeRow& row) {
   const Vec3& n = plane.plane.normal;
   row.text = "plane " + number_text(n.x) + " " + number_text(n.y) + " " + number_text(n.z) +
              (plane.along_faces ? " along=faces" : "");
-}
-
-void Rule<SetTear>::apply(World& w, const SetTear& c) {
-  w.now.objects.at(c.object).cut.tear = c.strain;
-}
-void Rule<SetTear>::log(const World&, const SetTear& c, ChangeRow& row) {
-  row.what = "tear";
-  row.value = c.strain;
 }
 
 namespace {

@@ -56,7 +56,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.came = {.load = gravity_of(*old.came.load), .duration = old.came.duration};
   next.contact = next.contact_ahead = nullptr;
   next.impulses.clear();
-  next.cut = {.tear = old.cut.tear};
+  next.cut = {.tear = old.cut.tear, .limit = old.cut.limit};
   return next;
 }
 

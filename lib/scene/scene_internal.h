@@ -58,7 +58,7 @@ struct Moves {
 
 /// Warnings that are told once. A step back does not untell them.
 struct Told {
-  bool stuck = false, unsolved = false;
+  bool stuck = false, unsolved = false, untorn = false;
   std::array<bool, all_features.size()> passed{}; // see feels()
 };
 
@@ -175,8 +175,9 @@ struct CutState {
   std::shared_ptr<const Model> first{};                  // the model as it came, of a cut one
   CopyOnWrite<std::vector<std::uint32_t>> first_nodes{}; // see Simulation
   CopyOnWrite<std::vector<std::uint32_t>> places{};
-  Cut scored{}; // edges that wait to come apart
-  double tear = 0;
+  Cut scored{};                     // edges that wait to come apart
+  double tear = 0;                  // strain of springs
+  TearLimit limit{};                // of a solid
   std::vector<BladeTrail> trails{}; // of blades in a solid
 };
 

@@ -243,8 +243,8 @@ Box3 wider(const Box3& box) {
 
 } // namespace
 
-/// \throw Error where it parts nothing
-CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
+std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
+                                     bool skin_too) {
   const Model& model = w.now.objects[index].model();
   BladeCutOptions options;
   options.along_faces = plane.along_faces;
@@ -256,9 +256,17 @@ CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plan
     options.among = among;
   }
   SkinSheet sheet;
-  if (!model.skin.points.empty())
+  if (skin_too && !model.skin.points.empty())
     sheet = plane_sheet(model.skin, plane.plane, sheet_cell(model));
   std::optional<CutByBlade> cut = cut_by(w, index, plane_blade(model, plane.plane), options, sheet);
+  if (!cut)
+    return std::nullopt;
+  return std::move(cut->cut);
+}
+
+/// \throw Error where it parts nothing
+CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane) {
+  std::optional<CutModel> cut = cut_by_plane(w, index, plane);
   if (!cut)
     throw Error("the plane through " + number_text(plane.plane.point.x) + " " +
                 number_text(plane.plane.point.y) + " " + number_text(plane.plane.point.z) +
@@ -266,7 +274,7 @@ CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plan
                 number_text(plane.plane.normal.y) + " " + number_text(plane.plane.normal.z) +
                 " parts no tetrahedra" + (plane.nodes ? " of these nodes" : "") +
                 ", expected one that is not cut yet");
-  return std::move(cut->cut);
+  return std::move(*cut);
 }
 
 /// Runs of a blade's way that don't turn back are cut with one after the other.

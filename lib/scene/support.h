@@ -41,7 +41,7 @@ enum class Feature : std::uint8_t {
   touch, ///< by an instrument that pushes
   cut,   ///< by the command
   blade,
-  tear, ///< by strain
+  tear, ///< by strain, or stress
   restore,
   attach,
   method, ///< another one
@@ -76,7 +76,7 @@ inline constexpr std::array gaps{
     Gap{Way::sprung, Feature::cut, true,
         "has springs beside its tetrahedra, expected tetrahedra alone to cut"},
     Gap{Way::sprung, Feature::blade, false, "has springs beside its tetrahedra: it is not cut"},
-    Gap{Way::solid, Feature::tear, false, "holds tetrahedra: it does not tear"},
+    Gap{Way::sprung, Feature::tear, false, "has springs beside its tetrahedra: it does not tear"},
     Gap{Way::filled, Feature::cut, true,
         "keeps the volume it encloses (bulk=), expected none to cut"},
     Gap{Way::filled, Feature::blade, false, "keeps the volume it encloses (bulk=): it is not cut"},

@@ -185,7 +185,6 @@ void add_touches(Object& object);
 void announce_cut(World& w, std::size_t index);
 void find_deferred_shape(World& w, Object& object);
 void sweep_blades(World& w);
-void tear(World& w);
 void find_free_motion(World& w, std::size_t index);
 void carry_out(World& w, std::size_t index, CutModel cut);
 bool may_cut(World& w, Object& object, Feature feature);
@@ -208,7 +207,13 @@ struct BladeArea {
   SweptQuad corners{};
 };
 CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plane);
+/// The same, or nothing where it parts nothing. \param skin_too else that stays as it is
+std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
+                                     bool skin_too = true);
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
+
+// tears.cpp: what gives way at the end of a step
+void tear(World& w);
 
 // moves.cpp: all that names nodes follows them
 Object renumbered(const Object& old, std::shared_ptr<const Model> model);

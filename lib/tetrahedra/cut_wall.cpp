@@ -119,6 +119,21 @@ private:
         if (side_at(part, beyond, face) * side_at(beyond, part, face) < 0)
           part.wall[k] = beyond.wall[other % 4] = true;
       }
+    join_crumbs();
+  }
+
+  /// One with all corners on the blade was said to be on one side, and all around it is on the
+  /// other.
+  void join_crumbs() {
+    for (std::uint32_t p = 0; p < result_.parts.size(); ++p) {
+      const TetPart& part = result_.parts[p];
+      bool alone = std::ranges::all_of(part.corners, [&](std::uint32_t c) { return on_blade(c); });
+      for (std::uint32_t k = 0; k < 4; ++k)
+        alone = alone && (part.wall[k] || part.neighbour[k] == no_neighbour);
+      for (std::uint32_t k = 0; alone && k < 4; ++k)
+        if (part.wall[k])
+          rejoin(4 * p + k);
+    }
   }
 
   // ---- Pieces

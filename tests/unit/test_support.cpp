@@ -182,7 +182,8 @@ public:
       return sweep();
     case Feature::tear:
       scene_.apply(SetTear{0, 0.05});
-      scene_.apply(SetDisplacement{0, {top()}, {0, 0, 6}});
+      scene_.apply(is_solid(way_) ? SetDisplacement{0, right_half(), {6, 0, 0}}
+                                  : SetDisplacement{0, {top()}, {0, 0, 6}});
       for (int k = 0; k < 4; ++k)
         scene_.step(0.001);
       return test::count(scene_, Cutting::Kind::cut) > 0;
@@ -230,6 +231,13 @@ public:
 
 private:
   std::uint32_t top() const { return test::highest(model_); }
+  std::vector<std::uint32_t> right_half() const {
+    std::vector<std::uint32_t> nodes;
+    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+      if (model_.nodes[i].position.x > 101 && model_.nodes[i].fixed == fixed_none)
+        nodes.push_back(i);
+    return nodes;
+  }
   Attach tie() const { return {0, {top()}, 1, {top()}, 1e5}; }
   SetTwoStep two_step() const {
     if (way_ == Way::two_step)

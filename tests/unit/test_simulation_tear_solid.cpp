@@ -1,0 +1,365 @@
+// Solids that tear: where and under which force, what stays of them, and what goes on.
+
+#include "base/error.h"
+#include "cut_bars.h"
+#include "larger.h"
+#include "mesh/check.h"
+#include "simulation_scenes.h"
+#include "solid/assembly.h"
+#include "solid/solid_model.h"
+#include "solid/tear_solid.h"
+#include "tet_fixtures.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::count, test::expect_sound, test::nodes_where, test::one_thread, test::shape;
+
+constexpr double length = 32, side = 8;
+
+/// 32 x 8 x 8 mm, of "strong" with "weak" in x = 12 … 16, or all of one; as stiff all over, and not
+/// narrower where it is pulled. Held at x = 0.
+Model pulled_bar(bool quadratic, int cells = 4, bool weak = true) {
+  const double cell = side / cells;
+  TetMesh mesh = test::box_tetrahedra(4 * cells, cells, cells, cell);
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    double x = 0;
+    for (const std::uint32_t corner : t)
+      x += mesh.points[corner].x / 4;
+    mesh.material.push_back(weak && x > 12 && x < 16 ? 1 : 0);
+  }
+  SolidModelOptions options;
+  options.material.materials = {{"strong", 1e-3, 20000, 1, 0.2, 0.0}};
+  options.material.of_part = {0};
+  if (weak) {
+    options.material.materials.push_back({"weak", 1e-3, 20000, 1, 0.2, 0.0});
+    options.material.of_part = {0, 1};
+  }
+  options.quadratic = quadratic;
+  Model model = solid_model(std::move(mesh), options, {});
+  for (Node& node : model.nodes)
+    node.fixed = node.position.x == 0 ? fixed_all : fixed_none;
+  model.name = "bar";
+  return model;
+}
+
+/// f = K u of the bar, and half of u f.
+struct Pull {
+  double force = 0;  // 1e-6 N, along x, on the nodes that are held
+  double energy = 0; // 1e-9 J
+};
+Pull pull_of(const Model& model, const std::vector<double>& u) {
+  const TetMesh mesh = element_mesh(model);
+  std::vector<double> f(u.size());
+  multiply_solid(mesh, solid_elements(mesh, element_materials(model)), u, f);
+  Pull pull;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].fixed == fixed_all)
+      pull.force -= f[3 * i];
+  for (std::size_t a = 0; a < u.size(); ++a)
+    pull.energy += u[a] * f[a] / 2;
+  return pull;
+}
+
+std::vector<std::uint32_t> end_of(const Model& model) {
+  return nodes_where(model, [](const Vec3& p) { return p.x == length; });
+}
+
+class SolidTears : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Orders, SolidTears, testing::Bool());
+
+/// Displaces the end of what holds x = 0 step by step, until it tears. \return the share before
+double pull_until_torn(Simulation& s, double stretch, double from, double step, double to) {
+  for (double share = from; share < to; share += step) {
+    s.apply(SetDisplacement{0, end_of(s.model(0)), {share * stretch, 0, 0}});
+    s.step(0.1);
+    if (count(s, Cutting::Kind::cut) > 0)
+      return share;
+  }
+  return 0;
+}
+
+TEST_P(SolidTears, ABarTearsInItsWeakestMaterialAtStrengthTimesArea) {
+  const double strength = 500, stretch = strength / 20000 * length;
+  for (const bool stress : {true, false}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", pulled_bar(GetParam(), GetParam() ? 2 : 4), Method::ffe);
+    const double mass = total_mass(s.model(0)), volume = length * side * side;
+    const double of = stress ? 1 : 1 / 20000.0;
+    s.apply(SetTear{0, 0, {stress, {4 * strength * of, strength * of}, 0}});
+    const double share = pull_until_torn(s, stretch, 0.855, 0.01, 1.2);
+    EXPECT_NEAR(share, 1, 0.011); // a step
+    const double force = share * strength * side * side;
+    if (s.object_count() == 1) {
+      const std::vector<double> kept = shape(s, 0); // the tear is closed still, and bears
+      EXPECT_NEAR(pull_of(s.model(0), kept).force, force, 1e-9 * force);
+      EXPECT_NEAR(pull_of(s.model(0), kept).energy,
+                  share * share * strength * strength / 40000 * volume,
+                  1e-6 * strength * strength / 40000 * volume);
+    }
+    double energy = share * share * strength * strength / 40000 * volume;
+    for (int steps = 0; s.object_count() == 1; ++steps) {
+      ASSERT_LT(steps, 20);
+      expect_sound(s.model(0), volume, mass);
+      s.step(0.1);
+      if (s.object_count() > 1)
+        break;
+      const double left = pull_of(s.model(0), shape(s, 0)).energy;
+      EXPECT_LT(left, energy); // under held displacements
+      energy = left;
+    }
+    EXPECT_EQ(count(s, Cutting::Kind::part), 1U);
+    const std::vector<Model> models = test::models_of(s);
+    EXPECT_NEAR(signed_volume(surface_mesh(models[0])) + signed_volume(surface_mesh(models[1])),
+                volume, 1e-12 * volume);
+    EXPECT_NEAR(total_mass(models[0]) + total_mass(models[1]), mass, 1e-12 * mass);
+    for (const Model& model : models)
+      expect_sound(model, signed_volume(surface_mesh(model)), total_mass(model));
+    double left = 0, right = length;
+    for (const Node& node : models[0].nodes)
+      left = test::larger(left, node.position.x);
+    for (const Node& node : models[1].nodes)
+      right = test::smaller(right, node.position.x);
+    EXPECT_NEAR(left, 14, 2 + 1e-9); // in the weak material, or along it
+    EXPECT_NEAR(right, 14, 2 + 1e-9);
+  }
+}
+
+TEST_P(SolidTears, NothingTearsBelowTheLimit) {
+  const double strength = 500, stretch = strength / 20000 * length;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {});
+    const Model before = pulled_bar(GetParam(), 2);
+    s.add_object("bar", Model(before), method);
+    s.apply(SetTear{0, 0, {true, {strength}, 0}});
+    s.apply(SetDisplacement{0, end_of(before), {0.99 * stretch, 0, 0}, 1});
+    for (int k = 0; k < 20; ++k)
+      s.step(0.1);
+    EXPECT_EQ(s.model(0), before) << method_name(method);
+    // Materials of 0 do not tear.
+    s.apply(SetTear{0, 0, {true, {0, 0}, 0}});
+    s.apply(SetDisplacement{0, end_of(before), {3 * stretch, 0, 0}, 0.5});
+    for (int k = 0; k < 10; ++k)
+      s.step(0.1);
+    EXPECT_EQ(s.model(0), before) << method_name(method);
+  }
+}
+
+TEST_P(SolidTears, AMovingBarTearsAndItsPartGoesOn) {
+  const double strength = 500, stretch = strength / 20000 * length;
+  Simulation s(one_thread(), {});
+  s.add_object("bar", pulled_bar(GetParam(), 2), Method::ela);
+  const double mass = total_mass(s.model(0)), volume = length * side * side;
+  s.apply(SetTear{0, 0, {true, {4 * strength, strength}, 0}});
+  s.apply(SetDisplacement{0, end_of(s.model(0)), {2 * stretch, 0, 0}, 4}); // slowly
+  int torn = 0;
+  for (int k = 0; k < 60 && s.object_count() == 1; ++k) {
+    s.step(0.05);
+    if (torn == 0 && count(s, Cutting::Kind::cut) > 0)
+      torn = k + 1;
+    if (s.object_count() == 1)
+      expect_sound(s.model(0), volume, mass);
+  }
+  ASSERT_EQ(s.object_count(), 2U);
+  // The way there goes by a smooth ramp: its middle at half of the time.
+  EXPECT_NEAR(torn * 0.05, 2, 0.2);
+  EXPECT_NEAR(total_mass(s.model(0)) + total_mass(s.model(1)), mass, 1e-12 * mass);
+  s.step(0.05);
+  EXPECT_EQ(s.object(1).name, "bar.1");
+}
+
+/// At what load a notched bar tears, from one shape of it, in shares of that load.
+double load_at_tearing(int cells, double over) {
+  const Model whole = pulled_bar(false, cells, false);
+  PlaneToCut half{{{14 - 1e-3, 0, 0}, {1, 0, 0}},
+                  nodes_where(whole, [](const Vec3& p) { return p.z >= 4; })};
+  Simulation s(one_thread(), {});
+  s.add_object("bar", Model(whole), Method::ffe);
+  s.apply(CutObject{0, half});
+  s.apply(SetDisplacement{0, end_of(s.model(0)), {1, 0, 0}});
+  s.step(0.1);
+  const std::vector<double> u = shape(s, 0);
+  const TearLimit limit{true, {1e-3}, over};
+  const std::optional<SolidTear> tear = find_tear(s.model(0), u, StrainFrames::resting, limit);
+  EXPECT_TRUE(tear.has_value());
+  EXPECT_NEAR(tear->plane.point.x, 14, 32.0 / (4 * cells));
+  EXPECT_GT(std::abs(tear->plane.normal.x), 0.5);
+  return 1e6 / tear->share;
+}
+
+TEST(SolidTearLoads, MeansOverALengthDependLessOnTheMesh) {
+  const double coarse = load_at_tearing(4, 0), fine = load_at_tearing(8, 0);
+  EXPECT_LT(fine, 0.8 * coarse); // as the root of a square, if the notch were a crack
+  const double coarse_over = load_at_tearing(4, 3), fine_over = load_at_tearing(8, 3);
+  EXPECT_NEAR(fine_over, coarse_over, 0.02 * coarse_over);
+}
+
+TEST_P(SolidTears, ANotchGoesOnFromItsFront) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", pulled_bar(GetParam(), 4, false), Method::ffe);
+  const double mass = total_mass(s.model(0)), volume = length * side * side;
+  s.apply(
+      CutObject{0, PlaneToCut{{{14.1, 0, 0}, {1, 0, 0}},
+                              nodes_where(s.model(0), [](const Vec3& p) { return p.z >= 4; })}});
+  s.take_news();
+  s.apply(SetTear{0, 0, {true, {500}, 1.5}});
+  const double share = pull_until_torn(s, 500 / 20000.0 * length, 0.02, 0.02, 1);
+  EXPECT_GT(share, 0.1);
+  EXPECT_LT(share, 0.9); // long before the bar without it would
+  for (int steps = 0; s.object_count() == 1; ++steps) {
+    ASSERT_LT(steps, 60);
+    expect_sound(s.model(0), volume, mass);
+    const double more = (share + 0.01 * steps) * 500 / 20000 * length; // held, it may stop
+    s.apply(SetDisplacement{0, end_of(s.model(0)), {more, 0, 0}});
+    s.step(0.1);
+  }
+  const std::vector<Model> models = test::models_of(s);
+  double left = 0, right = length;
+  for (const Node& node : models[0].nodes)
+    left = test::larger(left, node.position.x);
+  for (const Node& node : models[1].nodes)
+    right = test::smaller(right, node.position.x);
+  EXPECT_NEAR(left, 14, 4.1);
+  EXPECT_NEAR(right, 14, 4.1);
+}
+
+TEST(SolidTearScenes, AWeakPlaceInsideBecomesACave) {
+  Model model = pulled_bar(false, 8);
+  for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
+    Vec3 middle;
+    for (const std::uint32_t corner : model.tetrahedra[t])
+      middle += model.nodes[corner].position / 4;
+    const bool inside =
+        std::abs(middle.x - 14) < 2 && std::abs(middle.y - 4) < 2 && std::abs(middle.z - 4) < 2;
+    model.tetrahedron_material[t] = inside ? 1 : 0;
+  }
+  Simulation s(one_thread(), {});
+  s.add_object("bar", Model(model), Method::ffe);
+  const double mass = total_mass(s.model(0)), volume = length * side * side;
+  s.apply(SetTear{0, 0, {true, {0, 500}, 0}});
+  s.apply(SetDisplacement{0, end_of(model), {1.05 * 500 / 20000 * length, 0, 0}});
+  for (int k = 0; k < 3; ++k) {
+    s.step(0.1);
+    double volumes = 0, masses = 0;
+    for (const Model& one : test::models_of(s)) { // what comes off inside lies in the cave
+      expect_sound(one, signed_volume(surface_mesh(one)), total_mass(one));
+      volumes += signed_volume(surface_mesh(one));
+      masses += total_mass(one);
+    }
+    EXPECT_NEAR(volumes, volume, 1e-12 * volume);
+    EXPECT_NEAR(masses, mass, 1e-12 * mass);
+  }
+  EXPECT_GT(count(s, Cutting::Kind::cut), 0U);
+  std::size_t shells = 0;
+  for (const Model& one : test::models_of(s))
+    shells += examine_mesh(surface_mesh(one)).components;
+  EXPECT_GT(shells, s.object_count()); // its wall is a surface of its own
+}
+
+TEST(SolidTearScenes, RestoreMakesItWholeAgain) {
+  Simulation s(one_thread(), {});
+  const Model before = pulled_bar(false, 4);
+  s.add_object("bar", Model(before), Method::ffe);
+  s.apply(SetTear{0, 0, {true, {2000, 500}, 0}});
+  s.apply(SetDisplacement{0, end_of(before), {1.05 * 500 / 20000 * length, 0, 0}});
+  s.step(0.1);
+  ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
+  s.apply(Restore{0});
+  EXPECT_EQ(s.model(0), before);
+  s.apply(SetTear{0, 0});
+  s.step(0.1);
+  EXPECT_EQ(s.model(0), before);
+}
+
+/// Splinters of skin may come off by themselves.
+double closed_skins(const Simulation& s) {
+  double volume = 0;
+  for (const Model& model : test::models_of(s)) {
+    check_model(model);
+    if (model.skin.points.empty())
+      continue;
+    const MeshReport report = examine_mesh(shown_mesh(model));
+    EXPECT_TRUE(report.closed() && report.oriented() && report.manifold());
+    volume += signed_volume(shown_mesh(model));
+  }
+  return volume;
+}
+
+TEST(SolidTearScenes, ASkinGoesAlong) {
+  for (const Method method : {Method::ffe, Method::ela}) {
+    std::vector<std::string> warnings;
+    Simulation s(one_thread(), {.warn = [&](const std::string& t) { warnings.push_back(t); }});
+    const Model whole = test::skinned_bar(false);
+    const double volume = signed_volume(shown_mesh(whole));
+    s.add_object("bar", Model(whole), method);
+    s.apply(SetTear{0, 0, {false, {0, 0.04}, 0}});
+    const auto end = nodes_where(whole, [](const Vec3& p) { return p.x == 20; });
+    s.apply(SetDisplacement{0, end, {2, 0, 0}, method == Method::ela ? 1.0 : 0.0});
+    for (int k = 0; k < 60 && s.object_count() == 1; ++k) {
+      s.step(0.05);
+      EXPECT_NEAR(closed_skins(s), volume, 1e-6 * volume);
+    }
+    EXPECT_EQ(s.object_count(), 2U) << method_name(method);
+    EXPECT_TRUE(std::ranges::any_of(warnings, [](const std::string& text) {
+      return text.find("edges that no cut has passed") != std::string::npos;
+    })) << method_name(method);
+  }
+}
+
+TEST(SolidTearScenes, TheSameForAnyNumberOfThreads) {
+  std::vector<double> first;
+  for (const int threads : {1, 2}) {
+    Context context;
+    context.threads = threads;
+    Simulation s(context, {});
+    s.add_object("bar", pulled_bar(true, 2), Method::ela);
+    s.apply(SetTear{0, 0, {true, {2000, 500}, 2}});
+    s.apply(SetDisplacement{0, end_of(s.model(0)), {2 * 500 / 20000.0 * length, 0, 0}, 0.2});
+    for (int k = 0; k < 10; ++k)
+      s.step(0.05);
+    ASSERT_GT(count(s, Cutting::Kind::cut), 0U);
+    std::vector<double> all = shape(s, 0);
+    for (std::size_t k = 1; k < s.object_count(); ++k) {
+      const std::vector<double> part = shape(s, k);
+      all.insert(all.end(), part.begin(), part.end());
+    }
+    if (threads == 1)
+      first = all;
+    else
+      EXPECT_EQ(all, first);
+  }
+}
+
+TEST(SolidTearScenes, BadLimitsAreRefused) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", pulled_bar(false, 2), Method::ffe);
+  const auto refusal = [&](const Change& change) -> std::string {
+    try {
+      s.apply(change);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(SetTear{0, 0, {true, {1, 2, 3}, 0}}),
+            "object bar: 3 limits to tear at, expected one or those of its 2 materials");
+  s.apply(
+      SetTwoStep{0, {.threshold = 1e4}, {}, std::make_shared<const Model>(pulled_bar(false, 2))});
+  EXPECT_EQ(refusal(SetTear{0, 0, {true, {1}, 0}}),
+            "object bar has a second stage, so that its stress is that of no one material, "
+            "expected no two-step to tear by stress");
+  EXPECT_EQ(refusal(SetTear{0, 0, {false, {1}, 0}}), "");
+}
+
+} // namespace
+} // namespace gewebe
