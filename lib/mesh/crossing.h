@@ -39,7 +39,7 @@ public:
 /// whose boxes meet.
 /// \pre check_mesh() passes for both, each is oriented; neither passes through itself where it
 /// meets the other
-/// \throw MeetingOfNoSheets
+/// \throw MeetingOfNoSheets; before any work where edges of one lie on each other near the other
 SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b);
 
 } // namespace gewebe

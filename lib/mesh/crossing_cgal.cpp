@@ -1,4 +1,6 @@
 #include "mesh/crossing.h"
+
+#include "base/boxes_meet.h"
 #include "mesh/sheets.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -109,9 +111,58 @@ struct Parts : pmp::Corefinement::Default_visitor<Surface> {
   }
 };
 
+using Places = std::array<std::array<double, 3>, 2>; // of an edge, ascending
+
+/// Of all triangles one that may come there.
+bool may_meet(const TriangleMesh& mesh, const Box3& box) {
+  return std::ranges::any_of(mesh.triangles, [&](const Triangle& triangle) {
+    Box3 own;
+    for (const std::uint32_t corner : triangle)
+      own.add(mesh.points[corner]);
+    return meet(own, box);
+  });
+}
+
+/// Where edges lie on each other and have different points CGAL's corefinement puts points at one
+/// place into a face of the other surface, whose triangulation then may have no end.
+void require_apart(const TriangleMesh& mesh, const TriangleMesh& other) {
+  struct Edge {
+    Places places;
+    std::array<std::uint32_t, 2> ends{}; // in their order
+    auto operator<=>(const Edge&) const = default;
+  };
+  std::vector<Edge> edges;
+  edges.reserve(3 * mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      Edge edge;
+      edge.ends = {t[k], t[(k + 1) % 3]};
+      for (std::size_t end = 0; end < 2; ++end) {
+        const Vec3& p = mesh.points[edge.ends[end]];
+        edge.places[end] = {p.x, p.y, p.z};
+      }
+      if (std::pair(edge.places[1], edge.ends[1]) < std::pair(edge.places[0], edge.ends[0])) {
+        std::swap(edge.places[0], edge.places[1]);
+        std::swap(edge.ends[0], edge.ends[1]);
+      }
+      edges.push_back(edge);
+    }
+  std::ranges::sort(edges);
+  for (std::size_t n = 1; n < edges.size(); ++n) {
+    if (edges[n].places != edges[n - 1].places || edges[n].ends == edges[n - 1].ends)
+      continue;
+    Box3 box;
+    for (const std::uint32_t end : edges[n].ends)
+      box.add(mesh.points[end]);
+    if (may_meet(other, box))
+      throw MeetingOfNoSheets("the surfaces meet where one of them lies on itself, expected two "
+                              "sheets");
+  }
+}
+
 struct Marked {
-  std::array<std::array<double, 3>, 2> places; // ascending
-  std::array<std::uint32_t, 2> ends{};         // in their order
+  Places places;
+  std::array<std::uint32_t, 2> ends{}; // in their order
   auto operator<=>(const Marked&) const = default;
 };
 
@@ -140,6 +191,8 @@ std::vector<Marked> marked_edges(const Side& side, std::size_t points) {
 } // namespace
 
 SurfaceCrossing cross_surfaces(const TriangleMesh& a, const TriangleMesh& b) {
+  require_apart(a, b);
+  require_apart(b, a);
   Side one(a), other(b);
   try {
     pmp::corefine(one.surface, other.surface,
