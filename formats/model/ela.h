@@ -19,10 +19,6 @@ Model parse_ela(std::string_view text, const std::string& name, const Context& c
 /// context.max_memory
 Model read_ela(Input& input, const Context& context);
 
-/// The same for what knows springs alone. \throw Error too if the model holds tetrahedra, which
-/// would be left out of its answer
-Model read_spring_model(Input& input, const Context& context);
-
 /// The text of a model. Numbers are the shortest that read back exactly, so parse_ela(ela_text(m))
 /// == m. \pre the invariants of model.h hold
 std::string ela_text(const Model& model);

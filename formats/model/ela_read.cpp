@@ -472,13 +472,4 @@ Model read_ela(Input& input, const Context& context) {
   return parse_ela(text, input.name(), context);
 }
 
-Model read_spring_model(Input& input, const Context& context) {
-  Model model = read_ela(input, context);
-  if (!model.tetrahedra.empty())
-    throw Error(input.name(), "the model '" + model.name + "' holds " +
-                                  std::to_string(model.tetrahedra.size()) +
-                                  " tetrahedra, expected springs and triangles alone");
-  return model;
-}
-
 } // namespace gewebe
