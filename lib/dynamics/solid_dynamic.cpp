@@ -323,7 +323,8 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
   const bool quiet = moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
-                     !(state_.load->changes_until() > to) && !instruments_move(first, from, to);
+                     !moving.recovering() && !(state_.load->changes_until() > to) &&
+                     !instruments_move(first, from, to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
     return;

@@ -1,7 +1,9 @@
 #include "solid/hyperelastic.h"
 
+#include "solid/matrix3_internal.h"
 #include "tetrahedra/tet_mesh.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include <cmath>
@@ -265,6 +267,106 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
     for (std::size_t column = 0; column < row; ++column)
       if (row / 3 != column / 3)
         response.tangent[33 * row + column] = response.tangent[33 * column + row];
+}
+
+namespace {
+
+/// What the energy of an element is by its bubble w. With g the bubble's gradient F is F0 + w gᵀ,
+/// and so J = J0 + w · cof F0 g: the projected part is quadratic, and W needs two products a point.
+class BubbleEnergy {
+public:
+  BubbleEnergy(const SolidElement& element, std::span<const Vec3> u) : mu_(element.material.mu) {
+    const std::span<const IntegrationPoint> at = points_of(true);
+    std::array<double, 4> moment{};
+    std::array<Eigen::Vector3d, 4> slope;
+    slope.fill(Eigen::Vector3d::Zero());
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      Part& q = parts_[n];
+      const Gradients gradient = gradients_at(element, at[n].at, true);
+      SolidBlock f{1, 0, 0, 0, 1, 0, 0, 0, 1};
+      for (std::size_t a = 0; a < 10; ++a)
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j)
+            f[static_cast<std::size_t>(3 * i + j)] += u[a][i] * gradient[a][j];
+      const SolidBlock cofactor = cofactors(f);
+      q.weight = at[n].weight * element.volume;
+      q.square = dot(gradient[10], gradient[10]);
+      q.along = eigen(product(f, gradient[10]));
+      q.of_j = eigen(product(cofactor, gradient[10]));
+      q.j = f[0] * cofactor[0] + f[1] * cofactor[1] + f[2] * cofactor[2];
+      for (const double value : f)
+        q.i_c += value * value;
+      for (std::size_t p = 0; p < 4; ++p) {
+        moment[p] += at[n].weight * at[n].at[p] * (q.j - 1);
+        slope[p] += at[n].weight * at[n].at[p] * q.of_j;
+      }
+    }
+    // As in hyperelastic_response: 20 (1 - 1/5) of the moments and their sum.
+    const double scale = 20 * element.material.lambda * element.volume;
+    const auto add = [&](double factor, double m, const Eigen::Vector3d& by) {
+      constant_ += factor / 2 * m * m;
+      linear_ += factor * m * by;
+      square_ += factor * by * by.transpose();
+    };
+    for (std::size_t p = 0; p < 4; ++p)
+      add(scale, moment[p], slope[p]);
+    add(-scale / 5, moment[0] + moment[1] + moment[2] + moment[3],
+        slope[0] + slope[1] + slope[2] + slope[3]);
+  }
+
+  double evaluate(const Eigen::Vector3d& w) {
+    energy_ = constant_ + w.dot(linear_) + w.dot(square_ * w) / 2;
+    gradient_ = linear_ + square_ * w;
+    second_ = square_;
+    for (const Part& q : parts_) {
+      const Eigen::Vector3d along = q.along + q.square * w;
+      const Derivatives d = derivatives(HyperelasticLaw::stable_neo_hookean, mu_,
+                                        q.i_c + w.dot(q.along + along), q.j + w.dot(q.of_j));
+      energy_ += q.weight * d.energy;
+      gradient_ += q.weight * (d.a * along + d.d * q.of_j);
+      second_ += q.weight * (d.b * along * along.transpose() + d.c * q.of_j * q.of_j.transpose());
+      second_.diagonal().array() += q.weight * q.square * (d.a + 1e-9 * mu_); // definite if flat
+    }
+    return energy_;
+  }
+  const Eigen::Vector3d& gradient() const { return gradient_; }
+  const Matrix3& second() const { return second_; }
+
+private:
+  struct Part {
+    double weight = 0, square = 0, j = 0, i_c = 0; ///< times the volume; |g|²; of w = 0
+    Eigen::Vector3d along, of_j;                   ///< F0 g, cof F0 g
+  };
+  double mu_, constant_ = 0, energy_ = 0;
+  std::array<Part, 24> parts_;
+  Eigen::Vector3d linear_ = Eigen::Vector3d::Zero(), gradient_;
+  Matrix3 square_ = Matrix3::Zero(), second_;
+};
+
+} // namespace
+
+Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const Vec3& start) {
+  BubbleEnergy bubble(element, u);
+  Eigen::Vector3d w = eigen(start);
+  double energy = bubble.evaluate(w);
+  for (int round = 0; round < 60; ++round) {
+    const Eigen::Vector3d by = -bubble.second().ldlt().solve(bubble.gradient());
+    const double slope = -by.dot(bubble.gradient()),
+                 unsure = 1e-14 * (std::abs(energy) + element.material.mu * element.volume);
+    // Of the second order in what the bubble is off by: what is left changes no force.
+    if (!(slope > 1e-10 * unsure))
+      break;
+    double s = 1, next = bubble.evaluate(w + by);
+    while (!(next <= energy - 1e-4 * s * slope + unsure) && s > 1e-6) {
+      s /= 2;
+      next = bubble.evaluate(w + s * by);
+    }
+    if (!(s > 1e-6))
+      break;
+    w += s * by;
+    energy = next;
+  }
+  return {w[0], w[1], w[2]};
 }
 
 void hyperelastic_body_load(const SolidElement& element, const Vec3& force_density,

@@ -62,6 +62,12 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
                            std::span<const Vec3> u, const Vec3& bubble, HyperelasticPart part,
                            HyperelasticResponse& response);
 
+/// The bubble of least energy of a quadratic stable Neo-Hookean element, its nodes displaced by u,
+/// by Newton's method from `start`. J is affine in the bubble and W convex in the rest, so there is
+/// one minimum; what is left of the force on it is of the second order in the energy's rounding.
+/// \pre u.size() is 10, all finite
+Vec3 settled_bubble(const SolidElement& element, std::span<const Vec3> u, const Vec3& start);
+
 /// The forces that a force per volume at rest puts on the nodes, and on the bubble as the last.
 /// \pre force.size() is 4 (no bubble) or 11
 void hyperelastic_body_load(const SolidElement& element, const Vec3& force_density,

@@ -3,12 +3,8 @@
 #include "base/parallel.h"
 #include "solid/assembly_internal.h"
 #include "solid/hyperelastic.h"
-#include "solid/matrix3_internal.h"
-
-#include <Eigen/Core>
 
 #include <algorithm>
-#include <cmath>
 
 namespace gewebe {
 
@@ -50,7 +46,7 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
       const std::array<Vec3, 10> u = displacements(at, t);
       Vec3 bubble;
       if (count == 10)
-        bubble = new_bubbles_[t] = settled_bubble(t, u);
+        bubble = new_bubbles_[t] = settled_bubble(body_.elements[t], u, bubbles_[t]);
       hyperelastic_response(body_.elements[t], HyperelasticLaw::stable_neo_hookean,
                             std::span(u).first(count), bubble, HyperelasticPart::force, response);
       energy[t] = response.energy;
@@ -77,47 +73,6 @@ std::array<Vec3, 10> SolidEnergy::displacements(const Numbers& at, std::size_t t
             at[axis + 2] - body_.rest[axis + 2]};
   }
   return u;
-}
-
-/// The least energy's bubble, from the state's: BFGS from the bubble's flexibility at rest.
-Vec3 SolidEnergy::settled_bubble(std::size_t t, const std::array<Vec3, 10>& u) const {
-  constexpr auto law = HyperelasticLaw::stable_neo_hookean;
-  const SolidElement& e = body_.elements[t];
-  const SymmetricBlock& f = e.bubble_flexibility;
-  const double integral = 32.0 / 105 * e.volume;
-  const Matrix3 r = matrix(frames_.frame(t).rotation);
-  Matrix3 inverse;
-  inverse << f[0], f[1], f[2], f[1], f[3], f[4], f[2], f[4], f[5];
-  inverse = r * inverse * r.transpose() / (integral * integral);
-  HyperelasticResponse response;
-  const auto at = [&](const Eigen::Vector3d& w) {
-    hyperelastic_response(e, law, u, {w[0], w[1], w[2]}, HyperelasticPart::force, response);
-  };
-  Eigen::Vector3d w = eigen(bubbles_[t]);
-  at(w);
-  for (int round = 0; round < 60; ++round) {
-    const Eigen::Vector3d force = eigen(response.force[10]), by = inverse * force;
-    const double slope = force.dot(by), energy = response.energy,
-                 unsure = 1e-14 * (std::abs(energy) + e.material.mu * e.volume);
-    // Of the second order in what the bubble is off by: what is left changes no force.
-    if (!(slope > 1e-10 * unsure))
-      break;
-    double s = 1;
-    for (; s > 1e-6; s /= 2) {
-      at(w + s * by);
-      if (response.energy <= energy - 1e-4 * s * slope + unsure)
-        break;
-    }
-    if (!(s > 1e-6))
-      break;
-    w += s * by;
-    const Eigen::Vector3d step = s * by, turned = force - eigen(response.force[10]);
-    if (const double curvature = step.dot(turned); curvature > 0) {
-      const Matrix3 side = Matrix3::Identity() - step * turned.transpose() / curvature;
-      inverse = (side * inverse * side.transpose() + step * step.transpose() / curvature).eval();
-    }
-  }
-  return {w[0], w[1], w[2]};
 }
 
 double SolidEnergy::evaluate(const Numbers& at, const StepDamping& damping,

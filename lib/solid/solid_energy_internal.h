@@ -57,7 +57,6 @@ public:
 
 private:
   double hyperelastic(const Numbers& at, std::span<double> forces, const Context& context);
-  Vec3 settled_bubble(std::size_t t, const std::array<Vec3, 10>& u) const;
 
   const MotionBody& body_;
   SolidLaw law_;

@@ -169,7 +169,7 @@ void SolidMotion::move_held(std::span<const double> displacement) {
 
 SolidStep SolidMotion::step(double h, const Context& context) {
   State& s = *state_;
-  s.recovery.look(s.body, s.now, s.elastic, s.options, context);
+  s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
   if (s.recovery.on())
     return s.step_softly(h, context);
   SolidStep step;
@@ -355,6 +355,9 @@ void SolidMotion::find_reactions(const Context& context) {
     s.reactions[axis] = s.now.held[axis] != 0 ? -forces[axis] - s.now.load[axis] : 0;
 }
 
+bool SolidMotion::recovering() const noexcept {
+  return state_->recovery.on();
+}
 double SolidMotion::kinetic_energy() const {
   return motion_energy(state_->body, state_->now.velocity);
 }

@@ -27,10 +27,12 @@
 // steps knew). The reference way has a factor of the tangent where the body is, anew as it moves.
 //
 // A body of which more than a hundredth of the volume is inside out moves without Poisson's ratio
-// until all of its elements are right side out again (solid/motion_recovery_internal.h; not beside
-// springs, nor by the reference way). Of 8,000 scrambled corotational bodies of up to 162 linear
-// elements all but four got there (18 elements each, one of which stayed). They may stay wound up,
-// in a minimum of their own with every element right side out: 193 of these.
+// and without damping by the stiffness until all of its elements are right side out again
+// (solid/motion_recovery_internal.h; not beside springs, nor by the reference way). 10,000
+// scrambled corotational bodies of up to 162 linear elements, 1,000 of quadratic ones, 1,000 linear
+// Neo-Hookean ones and 200 of quadratic elements all got there (tests/stress/scrambled.cpp). They
+// may stay wound up, in a minimum of their own with every element right side out: 255 of the first,
+// a quarter of quadratic ones.
 //
 // Springs may move along with the elements: those of nets that are tied to a solid, and the ties.
 // The constant matrix has their stiffness along every axis, which bounds them however they turn: of
@@ -65,6 +67,7 @@ struct SolidMotionOptions {
   double tolerance = 0.005;
   int max_rounds = 32;    ///< of the quick way
   bool reference = false; ///< Newton's method until rounding; no limit of time
+  bool recover = true;    ///< scrambled bodies find back; else they move by the law alone
 };
 
 /// A spring between two nodes, with a damper along it.
@@ -174,6 +177,8 @@ public:
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
 
+  /// Whether it was scrambled, and has not found back yet.
+  bool recovering() const noexcept;
   double kinetic_energy() const;   ///< g mm²/s²
   double elastic_energy() const;   ///< of the state
   double potential_energy() const; ///< elastic, and that of the load, 0 at rest

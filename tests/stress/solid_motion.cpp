@@ -6,18 +6,11 @@
 // of what it is made of, where nothing moved held nodes; a body that is held nowhere has the
 // momentum that load and drag leave it, to 1e-9 of the sum over its nodes; no number is lost.
 //
-// Then bodies whose nodes are anywhere in their box, let go: no number is lost, energy falls, in
-// each step and in the end, and no element stays inside out. Counted, not judged, is whether they
-// rest in their own shape or elsewhere (wound up, a minimum of their own).
-//
-// Arguments: number of bodies (default 1500, of 40 steps), of scrambled states (default 100; a
-// quarter of each are of quadratic corotational and of linear Neo-Hookean elements, 1 in 100 of
-// quadratic Neo-Hookean ones, which take their time).
+// Argument: number of bodies (default 1500, of 40 steps).
 
 #include "solid/solid_motion.h"
+#include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
-#include "tests/unit/tet_fixtures.h"
-#include "tetrahedra/order.h"
 
 #include <algorithm>
 #include <array>
@@ -32,71 +25,17 @@
 namespace {
 
 using namespace gewebe;
+using namespace gewebe::test;
 using Numbers = std::vector<double>;
 
 constexpr int steps_of_body = 40;
 constexpr double energy_tolerance = 1e-10, momentum_tolerance = 1e-9;
-constexpr double cell = 5; // mm
-
-struct Chance {
-  std::mt19937 random;
-
-  double from(double low, double high) {
-    return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
-  }
-  double over_decades(double low, double high) {
-    return std::exp(from(std::log(low), std::log(high)));
-  }
-  bool one_in(std::uint32_t n) { return random() % n == 0; }
-  Numbers numbers(std::size_t count, double by) {
-    Numbers all(count);
-    for (double& one : all)
-      one = from(-by, by);
-    return all;
-  }
-};
-
-struct Kind {
-  SolidLaw law;
-  bool quadratic;
-
-  bool slow() const { return law != SolidLaw::corotational && quadratic; }
-  const char* name() const {
-    return law == SolidLaw::corotational ? quadratic ? "corotational quadratic" : "corotational"
-           : quadratic                   ? "Neo-Hookean quadratic"
-                                         : "Neo-Hookean";
-  }
-};
-constexpr std::array<Kind, 4> kinds = {{{SolidLaw::corotational, false},
-                                        {SolidLaw::corotational, true},
-                                        {SolidLaw::stable_neo_hookean, false},
-                                        {SolidLaw::stable_neo_hookean, true}}};
-
-/// A box whose inner nodes, and those of its faces within them, are shifted.
-TetMesh some_mesh(Chance& chance, const Kind& kind) {
-  const std::uint32_t most = kind.slow() ? 1 : kind.quadratic ? 2 : 3;
-  std::array<std::uint32_t, 3> size{};
-  for (std::uint32_t& n : size)
-    n = 1 + static_cast<std::uint32_t>(chance.random()) % most;
-  TetMesh mesh = test::box_tetrahedra(size[0], size[1], size[2], cell);
-  for (Vec3& p : mesh.points)
-    for (int a = 0; a < 3; ++a)
-      if (p[a] > 0 && p[a] < cell * size[static_cast<std::size_t>(a)])
-        p[a] += chance.from(-0.15, 0.15) * cell;
-  if (kind.quadratic)
-    make_quadratic(mesh);
-  return mesh;
-}
 
 std::vector<std::uint8_t> held_end(const TetMesh& mesh) {
   std::vector<std::uint8_t> held;
   for (const Vec3& p : mesh.points)
     held.insert(held.end(), 3, p.x == 0 ? 1 : 0);
   return held;
-}
-
-bool sound(std::span<const double> numbers) {
-  return std::ranges::all_of(numbers, [](double n) { return std::isfinite(n); });
 }
 
 double energy(const SolidMotion& body) {
@@ -153,7 +92,7 @@ struct Thrown {
       body.hold(held);
       break;
     default:
-      body.set_state(chance.numbers(axes, 0.1 * cell),
+      body.set_state(chance.numbers(axes, 0.1 * body_cell),
                      chance.numbers(axes, chance.over_decades(1, 1000)));
       body.hold(held); // what is held doesn't move
     }
@@ -186,7 +125,7 @@ private:
       mass += m;
     size = 1e5 * mass / static_cast<double>(mesh.points.size());
     rest_energy = 1e-3 * young * mass / 1e-3;
-    rest_momentum = 1e-2 * cell * mass;
+    rest_momentum = 1e-2 * body_cell * mass;
   }
 };
 
@@ -197,7 +136,7 @@ void throw_body(std::uint32_t seed, Totals& totals) {
   ++totals.bodies;
   double h = chance.over_decades(1e-5, 1);
   for (int n = 0; n < (t.kind.slow() ? steps_of_body / 8 : steps_of_body); ++n) {
-    const auto far = [](double x) { return std::abs(x) > 1e4 * cell; };
+    const auto far = [](double x) { return std::abs(x) > 1e4 * body_cell; };
     if (std::ranges::any_of(body.places(), far)) // where rounding of places would be judged
       body.set_state(Numbers(t.held.size()), Numbers(t.held.size()));
     if (n % 8 == 0)
@@ -208,7 +147,7 @@ void throw_body(std::uint32_t seed, Totals& totals) {
     if (led) {
       Numbers target = body.displacement();
       for (double& u : target)
-        u += chance.from(-0.05, 0.05) * cell;
+        u += chance.from(-0.05, 0.05) * body_cell;
       body.move_held(target);
     }
     const double before = energy(body);
@@ -247,65 +186,7 @@ void throw_body(std::uint32_t seed, Totals& totals) {
   }
 }
 
-int inverted(const TetMesh& mesh, std::span<const double> x) {
-  int count = 0;
-  for (const Tetrahedron& t : mesh.tetrahedra) {
-    std::array<Vec3, 4> p;
-    for (std::size_t k = 0; k < 4; ++k)
-      p[k] = {x[3 * std::size_t{t[k]}], x[3 * std::size_t{t[k]} + 1], x[3 * std::size_t{t[k]} + 2]};
-    count += tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
-  }
-  return count;
-}
-
-struct Ends {
-  std::uint64_t states = 0, at_rest = 0, wound_up = 0, inside_out = 0, failed = 0;
-};
-
-void scramble(std::uint32_t seed, const Kind& kind, Ends& ends) {
-  Chance chance{std::mt19937(1000000 + seed)};
-  const TetMesh mesh = some_mesh(chance, kind);
-  SolidMotionOptions options;
-  options.law = kind.law;
-  const double poisson = std::array{0.0, 0.3, 0.45, 0.49}.at(seed % 4);
-  SolidMotion body(mesh, std::vector<SolidMaterial>{{2e4, poisson, 1e-3}}, options);
-  Vec3 most;
-  for (const Vec3& p : mesh.points)
-    for (int a = 0; a < 3; ++a)
-      most[a] = test::larger(most[a], p[a]);
-  Numbers u;
-  for (const Vec3& p : mesh.points)
-    for (int a = 0; a < 3; ++a)
-      u.push_back(chance.from(0, most[a]) - p[a]);
-  body.set_state(u, Numbers(u.size()));
-  ++ends.states;
-  const double first = body.elastic_energy();
-  double before = first;
-  bool good = true;
-  int still = 0;
-  for (int n = 0; n < 1000 && still < 10 && good && !(body.elastic_energy() <= 1e-9 * first); ++n) {
-    (void)body.step(0.05, {});
-    const double after = energy(body);
-    good = after <= before + energy_tolerance * first && sound(body.places());
-    still = before - after < 1e-7 * after ? still + 1 : 0;
-    before = after;
-  }
-  good = good && body.elastic_energy() < first;
-  if (!good) {
-    ++ends.failed;
-    std::printf("scrambled %u (%s): FAILED (energy %.6g of the first)\n", seed, kind.name(),
-                before / first);
-  } else if (inverted(mesh, body.places()) > 0) {
-    ++ends.inside_out;
-    std::printf("scrambled %u (%s): FAILED (%d elements inside out)\n", seed, kind.name(),
-                inverted(mesh, body.places()));
-  } else if (body.elastic_energy() <= 1e-6 * first)
-    ++ends.at_rest;
-  else
-    ++ends.wound_up;
-}
-
-int run(std::uint32_t bodies, std::uint32_t scrambled) {
+int run(std::uint32_t bodies) {
   Totals totals;
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   for (std::uint32_t seed = 0; seed < bodies; ++seed)
@@ -316,42 +197,24 @@ int run(std::uint32_t bodies, std::uint32_t scrambled) {
       "of its parts, momentum was off by %.3g; %llu failed\n",
       number(totals.bodies), number(totals.steps), number(totals.limited),
       number(totals.unfinished), totals.growth, totals.momentum, number(totals.failed));
-  std::uint64_t failed = totals.failed;
-  for (const Kind& kind : kinds) {
-    Ends ends;
-    const bool plain = kind.law == SolidLaw::corotational && !kind.quadratic;
-    const std::uint32_t count = plain         ? scrambled - 2 * (scrambled / 4) - scrambled / 100
-                                : kind.slow() ? scrambled / 100
-                                              : scrambled / 4;
-    for (std::uint32_t seed = 0; seed < count; ++seed)
-      scramble(seed, kind, ends);
-    std::printf(
-        "%llu scrambled, %s: %llu at rest in their shape, %llu wound up, %llu with elements "
-        "inside out, %llu failed\n",
-        number(ends.states), kind.name(), number(ends.at_rest), number(ends.wound_up),
-        number(ends.inside_out), number(ends.failed));
-    failed += ends.failed + ends.inside_out;
-  }
-  return failed == 0 ? 0 : 1;
+  return totals.failed == 0 ? 0 : 1;
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
-  std::array<std::uint32_t, 2> counts = {1500, 100};
-  for (int k = 1; k < argc; ++k) {
-    const std::string_view text = argv[k];
-    std::uint32_t count = 0;
+  std::uint32_t count = 1500;
+  if (argc > 1) {
+    const std::string_view text = argv[1];
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
-    if (k > 2 || parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() || count < 1) {
-      (void)std::fputs("stress_solid_motion: expected numbers of bodies and of scrambled states\n",
-                       stderr);
+    if (argc > 2 || parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() ||
+        count < 1) {
+      (void)std::fputs("stress_solid_motion: expected a number of bodies\n", stderr);
       return 2;
     }
-    counts.at(static_cast<std::size_t>(k - 1)) = count;
   }
   try {
-    return run(counts[0], counts[1]);
+    return run(count);
   } catch (const std::exception& error) {
     (void)std::fprintf(stderr, "stress_solid_motion: %s\n", error.what());
     return 1;

@@ -4,6 +4,7 @@
 #include "solid/hyperelastic_statics.h"
 #include "solid/solid_motion.h"
 #include "solve/factor.h"
+#include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/solid_bodies.h"
 #include "tet_fixtures.h"
@@ -230,18 +231,6 @@ TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
   EXPECT_LT(difference(a, end(8, false, SolidMotionOptions().tolerance)), 0.02 * largest(a));
 }
 
-/// Volumes of tetrahedra at the places.
-int inverted(const TetMesh& mesh, std::span<const double> x) {
-  int count = 0;
-  for (const Tetrahedron& t : mesh.tetrahedra) {
-    std::array<Vec3, 4> p;
-    for (std::size_t k = 0; k < 4; ++k)
-      p[k] = {x[3 * std::size_t{t[k]}], x[3 * std::size_t{t[k]} + 1], x[3 * std::size_t{t[k]} + 2]};
-    count += tetrahedron_volume(p[0], p[1], p[2], p[3]) > 0 ? 0 : 1;
-  }
-  return count;
-}
-
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
 TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
   const TetMesh m = mesh(test::box_tetrahedra(2, 1, 1, 5));
@@ -266,33 +255,9 @@ TEST_P(SolidMotionOf, ScrambledBodiesFindBack) {
     for (int k = 0; k < 60 && !(moving.elastic_energy() <= 1e-10 * first); ++k)
       (void)moving.step(0.05, {});
     EXPECT_LT(moving.elastic_energy(), 0.2 * first) << n;
-    right += inverted(m, moving.places()) == 0 ? 1 : 0;
+    right += test::inverted(m, moving.places()) == 0 ? 1 : 0;
   }
   EXPECT_EQ(right, states);
-}
-
-/// Where corotational elements have minima inside out: without another way back every fifth stays.
-TEST(SolidMotion, ScrambledBodiesThatKeepTheirVolumeFindBack) {
-  const TetMesh m = test::box_tetrahedra(3, 3, 2, 5);
-  const std::size_t axes = 3 * m.points.size();
-  std::mt19937 random(11);
-  for (int n = 0; n < 20; ++n) {
-    SolidMotion moving(m, std::vector<SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
-    Numbers u = random_numbers(axes, 7, random);
-    moving.set_state(u, Numbers(axes));
-    const double first = moving.elastic_energy();
-    double before = first;
-    for (int k = 0; k < 100 && !(moving.elastic_energy() <= 1e-10 * first); ++k) {
-      (void)moving.step(0.05, {});
-      const double after = moving.elastic_energy() + moving.kinetic_energy();
-      EXPECT_LE(after, before + 1e-10 * first) << n;
-      before = after;
-    }
-    EXPECT_EQ(inverted(m, moving.places()), 0) << n;
-    SolidMotion standing(m, std::vector<SolidMaterial>{{2e4, 0.49, 1e-3}}, {});
-    standing.set_state(moving.displacement(), Numbers(axes)); // it is its own again
-    EXPECT_NEAR(moving.elastic_energy(), standing.elastic_energy(), 1e-7 * first) << n;
-  }
 }
 
 TEST_P(SolidMotionOf, ItsElasticEnergyIsThatOfItsPlaces) {
