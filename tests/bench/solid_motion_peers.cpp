@@ -1,9 +1,10 @@
-// Solids in motion beside MuJoCo's flex (status of its script: absent where Python has none), on
-// equal meshes of linear tetrahedra and one thread: a beam of 100 x 25 x 25 mm, E = 50 kPa, nu =
-// 0.45, held at one end, falls under its weight for 0.2 s. Both at several steps, explicit and
-// implicit where the peer has it; the error is that of the end's mean height at four times over its
-// largest fall, against the same program at its finest step: the laws differ (MuJoCo's is St.
-// Venant and Kirchhoff's), what is compared is what accuracy in time costs.
+// Solids in motion beside MuJoCo's flex and Warp's explicit elements (named and left out where
+// Python has none), on equal meshes of linear tetrahedra and one thread: a beam of 100 x 25 x 25
+// mm, E = 50 kPa, nu = 0.45, held at one end, falls under its weight for 0.2 s. Each at several
+// steps, explicit and implicit where the peer has it; the error is that of the end's mean height at
+// four times over its largest fall, against the same program at its finest step: the laws differ
+// (MuJoCo's is St. Venant and Kirchhoff's; Warp's is our Neo-Hookean one, and in single precision),
+// what is compared is what accuracy in time costs.
 //
 // Writes CSV to standard output: stage, program, tetrahedra, step in s, threads, median, fastest
 // and slowest time of the processor for 0.2 s in ms, of three runs, error, what it is of.
@@ -56,9 +57,11 @@ struct Run {
   std::vector<double> heights; ///< of the end, in mm
 };
 
-Run ours(const Beam& beam, int steps) {
+Run ours(const Beam& beam, SolidLaw law, int steps) {
   const std::vector<SolidMaterial> materials{{young, poisson, 1e-3}};
-  SolidMotion moving(beam.mesh, materials, {}, with_threads(1));
+  SolidMotionOptions options;
+  options.law = law;
+  SolidMotion moving(beam.mesh, materials, options, with_threads(1));
   const std::size_t axes = 3 * beam.mesh.points.size();
   std::vector<std::uint8_t> held(axes);
   for (const std::uint64_t node : beam.held)
@@ -106,17 +109,20 @@ void write(const Beam& beam, const std::string& path) {
   put(beam.held);
 }
 
-/// Nothing where there is none, or where it became unstable.
-Run mujoco(const std::string& path, const char* integrator, int steps) {
+/// What a script says, called with the beam, a step, `more` and how many steps; nothing where it
+/// can't run, or where it became unstable.
+Run peer(const char* script, const std::string& path, const char* more, int steps) {
   std::array<char, 400> call{};
-  (void)std::snprintf(call.data(), call.size(),
-                      "tests/bench/solid_motion_mujoco.py '%s' %.17g %.17g %.17g %s %d %d",
-                      path.c_str(), young, poisson, duration / steps, integrator, steps,
+  (void)std::snprintf(call.data(), call.size(), "tests/bench/%s '%s' %.17g %.17g %.17g %s %d %d",
+                      script, path.c_str(), young, poisson, duration / steps, more, steps,
                       steps / looks);
   const std::vector<double> numbers = numbers_of_script(call.data());
   if (numbers.size() != 1 + looks)
     return {};
   return {numbers[0], {numbers.begin() + 1, numbers.end()}};
+}
+Run mujoco(const std::string& path, const char* integrator, int steps) {
+  return peer("solid_motion_mujoco.py", path, integrator, steps);
 }
 
 /// Against its own run of the finest step, the last one.
@@ -164,11 +170,15 @@ int main() {
     const Beam body = beam(across);
     write(body, path);
     show("gewebe", body, std::array{12, 40, 100, 400, 1600, 6400},
-         [&](int steps) { return ours(body, steps); });
+         [&](int steps) { return ours(body, SolidLaw::corotational, steps); });
+    show("gewebe Neo-Hookean", body, std::array{12, 40, 100, 400, 3200},
+         [&](int steps) { return ours(body, SolidLaw::stable_neo_hookean, steps); });
     show("mujoco discrete", body, std::array{12, 40, 100, 400, 3200},
          [&](int steps) { return mujoco(path, "discrete", steps); });
     show("mujoco Euler", body, std::array{400, 800, 1600, 6400},
          [&](int steps) { return mujoco(path, "Euler", steps); });
+    show("warp", body, std::array{800, 1600, 3200, 12800},
+         [&](int steps) { return peer("solid_motion_warp.py", path, "", steps); });
   }
   (void)std::filesystem::remove(path);
   return EXIT_SUCCESS;
