@@ -186,6 +186,15 @@ bool SurfacePairs::may_touch(std::span<const double> places, std::span<const dou
   return any;
 }
 
+double SurfacePairs::way_of(std::span<const double> moved) const {
+  double most = 0;
+  for (const SurfaceMeeting& m : meetings_) {
+    const double way = speed_of(m, moved) / edge_;
+    most = way <= most ? most : way;
+  }
+  return most;
+}
+
 bool SurfacePairs::may_have_touched(std::span<const double> places) const {
   for (std::size_t k = 0; k < meetings_.size(); ++k)
     if (!(moved_since(looks_[k], meetings_[k], places) < looks_[k].clear))

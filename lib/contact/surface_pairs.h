@@ -96,6 +96,9 @@ public:
   /// Behind a step that was held for free: whether they may have touched nevertheless.
   bool may_have_touched(std::span<const double> places) const;
 
+  /// How far surfaces move against each other if nodes move so far, at most, over an edge.
+  double way_of(std::span<const double> moved) const;
+
   /// Nodes and triangles whose gap is below `margin`, and over -edge(): of each node and meeting
   /// the nearest. \param displacement 3 n, of the surface's nodes at least \param was as well:
   /// where nodes were outside

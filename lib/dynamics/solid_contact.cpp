@@ -15,8 +15,9 @@ namespace {
 constexpr double same_place = 1e-4; ///< of the smallest radius
 constexpr double sure = 3e-4;       ///< tolerance of a step that instruments touch
 constexpr int max_pushes = 40;
-constexpr int max_idle = 8;    ///< pushes on end that came no nearer
-constexpr double nearer = 0.9; ///< than the best one
+constexpr int max_idle = 8;       ///< pushes on end that came no nearer
+constexpr double nearer = 0.9;    ///< than the best one
+constexpr int max_held_back = 12; ///< times that half of a way is left
 /// Pushes in all whose rounds ran out: of what comes of such nothing is learned.
 constexpr int max_unfinished = 2;
 
@@ -253,11 +254,21 @@ private:
     } else if (step_.clearing) {
       engine.restore(places_, velocity_, context_);
     }
-    std::vector<double> forces(step_.forces.begin(), step_.forces.end());
-    for (const NodeTouch& t : force_)
-      for (int a = 0; a < 3; ++a)
+    std::vector<double> forces(step_.forces.begin(), step_.forces.end()), between;
+    if (step_.meets)
+      between.resize(forces.size());
+    double pushed_with = 0;
+    for (const NodeTouch& t : force_) {
+      pushed_with += t.instrument == other_surface ? norm(t.force) / 2 : 0;
+      for (int a = 0; a < 3; ++a) {
         forces[axis_of(t.node, a)] += t.force[a];
-    engine.set_load(forces);
+        if (t.instrument == other_surface)
+          between[axis_of(t.node, a)] += t.force[a];
+      }
+    }
+    // They are right within the depth that they may miss by.
+    const double depth = all_.pairs_ ? surface_depth * all_.pairs_->edge() : 0;
+    engine.set_load(forces, {between, depth * pushed_with});
     if (!step_.target.empty())
       engine.move_held(step_.target);
     const bool pushed = !force_.empty() || ran_;
@@ -272,6 +283,7 @@ private:
     took_.change = took.change;
     took_.left = took.left;
     took_.limited = took.limited;
+    took_.excess = took.excess;
     if (took.factorisations > 0)
       all_.renew();
   }
@@ -312,11 +324,13 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
   std::erase_if(columns_, [&](const auto& of) {
     return std::ranges::none_of(touches, [&](const NodeTouch& t) { return t.node == of.first; });
   });
+  const std::vector<double> places(step.engine.places().begin(), step.engine.places().end());
   std::vector<double> shape;
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a)
       shape.push_back(step.engine.places()[axis_of(i, a)] - model_.nodes[i].position[a]);
   contact_.restart(shape, std::move(by_instruments));
+  bool met = true;
   Object object(*this, step, touches, context);
   if (!step.meets) {
     contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
@@ -336,12 +350,46 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
     touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
     touches = sums_of_touches(std::move(touches));
     object.distrust(!both.solved());
+    met = object.exact() && (!(object.took().excess > 0) || overlaps(shape));
   }
   object.end();
+  if (!met)
+    hold_back(step, places, object.took().excess, context);
   if (pushes.empty())
     step.engine.drop_tangent();
   step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);
-  return {object.took(), object.exact() && contact_.solved()};
+  return {object.took(), object.exact() && contact_.solved(), met};
+}
+
+/// Whether surfaces are in each other: they have energy of their own.
+bool SolidContact::overlaps(std::span<const double> shape) {
+  return std::ranges::any_of(pairs_->find(shape, shape, 0), [&](const SurfacePair& p) {
+    return p.gap < -surface_depth * pairs_->edge();
+  });
+}
+
+/// Where forces were not found nothing has passed another surface nevertheless, and none has won.
+void SolidContact::hold_back(const Step& step, std::span<const double> places, double excess,
+                             const Context& context) {
+  const auto shape_at = [&](std::span<const double> at) {
+    std::vector<double> shape(at.begin(), at.end());
+    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+      for (int a = 0; a < 3; ++a)
+        shape[axis_of(i, a)] -= model_.nodes[i].position[a];
+    return shape;
+  };
+  const std::vector<double> was = shape_at(places);
+  const auto passed = [&] {
+    return !pairs_->find_passed(shape_at(step.engine.places()), was, surface_depth * pairs_->edge())
+                .empty();
+  };
+  if (excess > 0 && overlaps(was))
+    excess = 0;
+  for (int halved = 0; excess > 0 || passed(); ++halved) {
+    excess = step.engine.hold_back(places, halved < max_held_back ? 0.5 : 0, context);
+    if (halved == max_held_back)
+      return;
+  }
 }
 
 } // namespace gewebe

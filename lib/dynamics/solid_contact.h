@@ -43,6 +43,9 @@ public:
     return pairs_ && pairs_->may_have_touched(places);
   }
 
+  /// How far surfaces that may touch move against each other, of what moves so far, over an edge.
+  double way_of(std::span<const double> moved) const { return pairs_ ? pairs_->way_of(moved) : 0; }
+
   struct Step {
     SolidMotion& engine;                            ///< where the step begins
     std::span<const double> forces;                 ///< on the 3 n axes, without instruments
@@ -57,6 +60,7 @@ public:
   struct Result {
     SolidStep took; ///< of all rounds
     bool exact = true;
+    bool met = true; ///< surfaces touch as they should
   };
   /// Takes the engine on by a step; one that clears, where something is in the way. \param touches,
   /// pushes of the last step, then of this one \throw as SolidMotion::step
@@ -76,6 +80,9 @@ public:
 
 private:
   class Object;
+  bool overlaps(std::span<const double> shape);
+  void hold_back(const Step& step, std::span<const double> places, double excess,
+                 const Context& context);
 
   const Model& model_;
   StaticContact contact_;

@@ -20,8 +20,11 @@ namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 constexpr int quiet_steps = 2;
-constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
-constexpr double same_step = 1e-9;     ///< lengths that differ by less are one
+constexpr int max_halvings = 8; ///< of a step whose surfaces meet too fast
+/// Steps in vain that halves may cost at once, and in each step on average: where forces are never
+/// found a scene goes on nevertheless.
+constexpr int max_tries = 24, more_tries = 4;
+constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
 constexpr double largest_force = 1e38; ///< squares of what it does are finite
 constexpr double same_mass = 1e-6;
@@ -263,7 +266,8 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
     return step == steps ? start + duration : start + static_cast<double>(step) * h;
   };
   while (taken < steps && !state_.resting) {
-    step(h, at(taken), at(taken + 1), taken == 0, context);
+    state_.tries = std::min(max_tries, state_.tries + more_tries);
+    step_in_parts(h, at(taken), at(taken + 1), taken == 0, max_halvings, context);
     ++taken;
   }
   if (state_.resting)
@@ -276,10 +280,12 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
   return taken;
 }
 
-void SolidDynamic::step(double h, double from, double to, bool first, const Context& context) {
+/// \return whether surfaces touch as they should
+bool SolidDynamic::step(double h, double from, double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
   const std::vector<double> forces = forces_at(to);
+  bool met = true;
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
     if (!(std::abs(forces[axis]) <= largest_force))
       throw MotionError(static_cast<std::uint32_t>(axis / 3), to,
@@ -308,7 +314,7 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
     moving.find_reactions(context);
     lead_instruments(to, h);
   } else {
-    const SolidStep took = push(forces, target, h, from, to, first, context);
+    const SolidStep took = push(forces, target, h, from, to, first, met, context);
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
     counts_.factors += static_cast<std::uint64_t>(took.factorisations);
     counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
@@ -322,129 +328,16 @@ void SolidDynamic::step(double h, double from, double to, bool first, const Cont
       moved = by <= moved ? moved : by; // NaN stays
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
-  const bool quiet = moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
+  const bool quiet = met && moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
                      !moving.recovering() && !(state_.load->changes_until() > to) &&
                      !instruments_move(first, from, to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
-    return;
+    return met;
   state_.resting = true;
   moving.restore(std::vector<double>(moving.places().begin(), moving.places().end()),
                  std::vector<double>(before.size()), context);
-}
-
-bool SolidDynamic::instruments_move(bool first, double from, double to) const {
-  return std::ranges::any_of(state_.instruments, [&](const auto& i) {
-    if (i && i->led)
-      return i->way.end > to || i->moves(to, to - from);
-    return i && (i->way.end > to || (first && i->before != i->way.at(from)));
-  });
-}
-
-/// A step, with what instruments do in it.
-SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vector<double>& target,
-                             double h, double from, double to, bool first, const Context& context) {
-  SolidMotion& moving = *engine_;
-  const auto& instruments = state_.instruments;
-  if (!contact_ && !meetings_.empty())
-    contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
-  std::vector<double> places, velocity; // where it begins, if that may be needed again
-  if (!meetings_.empty() && !meets) {
-    places.assign(moving.places().begin(), moving.places().end());
-    velocity.assign(moving.velocity().begin(), moving.velocity().end());
-  }
-  const auto begin_again = [&] {
-    if (meets || !contact_ || !contact_->may_have_met(moving.places()))
-      return false;
-    moving.begin_again(places, velocity, context);
-    meets = true;
-    return true;
-  };
-  SolidStep all;
-  if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
-    state_.touched.clear();
-    state_.pushes.clear();
-    moving.drop_tangent();
-    if (!target.empty())
-      moving.move_held(target);
-    all = moving.step(h, context);
-    if (!begin_again())
-      return all;
-  }
-  if (!contact_)
-    contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  bool exact = true;
-  const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
-    std::vector<std::optional<MovedInstrument>> moved;
-    for (const auto& i : instruments) {
-      if (!i) {
-        moved.emplace_back();
-        continue;
-      }
-      const auto at = [&](double of_jump, double of_way) {
-        const Pose start = i->at(from);
-        return of_jump < 1 ? between(i->before, start, of_jump)
-                           : between(start, i->guess(to, h), of_way);
-      };
-      moved.emplace_back(MovedInstrument{i->shape, at(jump, way), at(jump_to, way_to)});
-      if (i->led && !clearing) {
-        moved.back()->compliance = CouplingStep(i->led->coupling, i->led->lag, h).compliance;
-        moved.back()->pushed = i->led->force;
-      }
-    }
-    const SolidContact::Result result = contact_->step(
-        {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
-         state_.load->displacement, moved, h, options_, clearing, meets},
-        state_.touched, state_.pushes, context);
-    counts_.touches.add(contact_->take_counts());
-    all.rounds += result.took.rounds;
-    all.factorisations += result.took.factorisations;
-    all.change = result.took.change;
-    all.left = result.took.left;
-    all.limited = result.took.limited;
-    exact = clearing || result.exact;
-  };
-  const auto parts = [&](bool jump) {
-    std::vector<MovedInstrument> ways;
-    for (const auto& i : instruments)
-      if (i && jump)
-        ways.push_back({i->shape, i->before, i->at(from)});
-      else if (i)
-        ways.push_back({i->shape, i->at(from), i->guess(to, h)});
-    const bool moves = std::ranges::any_of(ways, [](const auto& w) { return w.before != w.now; });
-    return moves ? parts_of_way(ways, max_parts) : 0;
-  };
-  const auto share = [](std::size_t part, std::size_t of) {
-    return static_cast<double>(part) / static_cast<double>(of);
-  };
-  const std::size_t jumps = first ? parts(true) : 0, ways = std::max<std::size_t>(1, parts(false));
-  const std::vector<NodeTouch> touched = state_.touched;
-  do {
-    state_.touched = touched;
-    for (std::size_t p = 0; p < jumps; ++p)
-      go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
-    for (std::size_t p = 0; p < ways; ++p)
-      go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
-  } while (begin_again());
-  lead_instruments(to, h);
-  for (NodeTouch t : state_.touched) {
-    t.force *= h;
-    state_.impulses.push_back(t);
-  }
-  state_.exact = state_.exact && exact;
-  return all;
-}
-
-/// Where those that are led have gone in a step, by what they felt.
-void SolidDynamic::lead_instruments(double to, double h) {
-  for (std::uint32_t k = 0; k < state_.instruments.size(); ++k)
-    if (auto& i = state_.instruments[k]; i && i->led) {
-      Vec3 felt;
-      for (const NodeTouch& t : state_.touched)
-        felt -= t.instrument == k ? t.force : Vec3{};
-      i->led->settle(i->way.at(to).place, h, felt);
-    }
+  return met;
 }
 
 /// The engine's state, to be kept.

@@ -82,6 +82,7 @@ private:
     std::vector<NodeTouch> impulses{}; ///< of steps since they were taken
     double held_time = 0;              ///< s that `touched` acted at rest since then
     bool exact = true;                 ///< all forces so far
+    int tries = 64;                    ///< that steps in halves have yet
   };
 
   void read_load();
@@ -91,10 +92,12 @@ private:
   SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;
-  void step(double h, double from, double to, bool first, const Context& context);
+  void step_in_parts(double h, double from, double to, bool first, int halvings,
+                     const Context& context);
+  bool step(double h, double from, double to, bool first, const Context& context);
   bool instruments_move(bool first, double from, double to) const;
   SolidStep push(const std::vector<double>& forces, const std::vector<double>& target, double h,
-                 double from, double to, bool first, const Context& context);
+                 double from, double to, bool first, bool& met, const Context& context);
 
   const Model& model_;
   SolidMotionOptions options_;

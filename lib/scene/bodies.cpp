@@ -4,8 +4,10 @@
 #include "scene/rules_internal.h"
 
 #include <algorithm>
+#include <any>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -265,14 +267,18 @@ void drop_body(World& w, const Body* body) {
   std::erase_if(w.now.bodies, [&](const auto& one) { return one.get() == body; });
 }
 
-void move_bodies(World& w, double to) {
+namespace {
+
+/// \param again those that are near stay so \return whether some met that were not near: all stand
+/// where they stood then, to move once more
+bool move_bodies(World& w, double to, bool again) {
   const double duration = to - w.now.clock.time;
   for (std::size_t i = 0; i < w.now.objects.size(); ++i)
     if (w.now.objects[i].method == Method::ela &&
         (!w.now.objects[i].load->empty() || instruments_there(w)))
       need_body(w, i);
   Extents extents(w);
-  meet(w, to, extents);
+  meet(w, to, extents, again);
   for (const auto& body : w.now.bodies)
     if (body->changed) {
       load_body(w, *body);
@@ -280,21 +286,27 @@ void move_bodies(World& w, double to) {
         extents.forget(part);
     }
   if (!(duration > 0))
-    return;
+    return false;
+  note_extents(w, extents);
+  const bool may_meet = std::ranges::any_of(
+      w.now.meetings, [](const Meeting& m) { return !m.near && m.object != m.other; });
   lead_on(w, to, extents);
-  std::vector<Body*> awake;
+  std::vector<Body*> awake, resting;
+  std::vector<std::any> before;
   std::vector<double> step;
   for (const auto& body : w.now.bodies) {
     body->taken = 0;
     guide(w, *body, to, extents);
     if (body->moving->resting()) {
-      body->moving->rest_on(duration);
+      resting.push_back(body.get());
       continue;
     }
     body->ahead = true;
     body->rest_extents.clear();
     awake.push_back(body.get());
     step.push_back(integration_step(w, *body));
+    if (may_meet)
+      before.push_back(body->moving->snapshot());
   }
   // One body has all threads, several have one each.
   Context context = w.context;
@@ -310,6 +322,17 @@ void move_bodies(World& w, double to) {
   for (Body* const body : awake)
     if (body->failure)
       raise(w, *body);
+  Extents after(w);
+  if (const std::set<std::size_t> late =
+          may_meet ? met_late(w, extents, after) : std::set<std::size_t>();
+      !late.empty()) {
+    for (std::size_t k = 0; k < awake.size(); ++k)
+      awake[k]->moving->go_back(before[k]);
+    join_late(w, late);
+    return true;
+  }
+  for (Body* const body : resting)
+    body->moving->rest_on(duration);
   end_guiding(w, to);
   SimulationCounts& counts = w.now.counts;
   for (Body* const body : awake) {
@@ -330,6 +353,14 @@ void move_bodies(World& w, double to) {
       shown.valid = shown.valid && body->taken == 0;
     }
   }
+  return false;
+}
+
+} // namespace
+
+void move_bodies(World& w, double to) {
+  for (bool again = false; move_bodies(w, to, again);)
+    again = true;
 }
 
 // ---- attachments

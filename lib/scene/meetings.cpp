@@ -74,21 +74,56 @@ std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::siz
   return all;
 }
 
-/// Before objects move: those that may touch by then become one body, others come apart.
-void meet(World& w, double to, Extents& extents) {
+/// Before objects move: those that may touch by then become one body, others come apart, unless all
+/// stay.
+void meet(World& w, double to, Extents& extents, bool stay) {
   std::set<std::size_t> changed;
   for (Meeting& m : w.now.meetings) {
     const Object &a = w.now.objects[m.object], &b = w.now.objects[m.other];
     if (m.object == m.other || (!awake(a) && !awake(b)))
       continue;
     const bool now = are_near(w, m, to - w.now.clock.time, extents);
-    if (now == m.near)
+    if (now == m.near || (stay && m.near))
       continue;
     m.near = now;
     changed.insert({m.object, m.other});
   }
   if (!changed.empty())
     regroup(w, changed);
+}
+
+/// Where those stand that may touch but are not near.
+void note_extents(const World& w, Extents& extents) {
+  for (const Meeting& m : w.now.meetings)
+    if (!m.near && m.object != m.other)
+      for (const std::size_t object : {m.object, m.other})
+        (void)extents.of(object);
+}
+
+/// Behind the way of all: those that were not near but have come, by what pulled at them, where the
+/// others have been. \param before as noted
+std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after) {
+  std::set<std::size_t> all;
+  const auto passed = [&](std::size_t object) {
+    Box3 box = before.of(object).box;
+    box.add(after.of(object).box.min);
+    box.add(after.of(object).box.max);
+    return box;
+  };
+  for (const Meeting& m : w.now.meetings)
+    if (!m.near && m.object != m.other &&
+        (awake(w.now.objects[m.object]) || awake(w.now.objects[m.other])) &&
+        near(passed(m.object), passed(m.other)))
+      all.insert({m.object, m.other});
+  return all;
+}
+
+/// They are one body from now on, while `meet` lets those that are near stay.
+void join_late(World& w, const std::set<std::size_t>& objects) {
+  for (Meeting& m : w.now.meetings)
+    if (objects.contains(m.object) && objects.contains(m.other))
+      m.near = true;
+  regroup(w, objects);
 }
 
 std::vector<std::size_t> together(const World& w, std::size_t object) {

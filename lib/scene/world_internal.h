@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -130,7 +131,10 @@ inline bool moves_implicitly(const Object& object) {
 std::span<const NodeMotion> motion_of(const Object& object);
 
 // meetings.cpp: whose surfaces touch
-void meet(World& w, double to, Extents& extents);
+void meet(World& w, double to, Extents& extents, bool stay = false);
+void note_extents(const World& w, Extents& extents);
+std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after);
+void join_late(World& w, const std::set<std::size_t>& objects);
 std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::size_t> parts,
                                         std::span<const std::size_t> offset);
 void move_meetings(World& w, std::size_t index, const Moves& moves);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace gewebe {
 
@@ -47,16 +48,19 @@ void rigid_parts(const MotionBody& body, const MotionState& state, Numbers& movi
 } // namespace
 
 bool limit_energy(const MotionBody& body, MotionState& state, double elastic, double before,
-                  double rounding) {
+                  double rounding, bool all) {
   const double kinetic_now = motion_energy(body, state.velocity),
                excess =
-                   kinetic_now + elastic - work_of_load(body, state.load, state.place) - before;
+                   kinetic_now + elastic - work_of_load(body, state.outer, state.place) - before;
   if (!(excess > rounding))
     return false;
   Numbers moving(body.axes()), turning(body.axes());
   if (!state.any_held())
     rigid_parts(body, state, moving, turning);
-  Numbers inner = state.velocity;
+  Numbers inner = state.velocity, held(body.axes());
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (state.held[axis] != 0)
+      held[axis] = std::exchange(inner[axis], 0);
   add(inner, -1, moving);
   add(inner, -1, turning);
   const double inner_energy = motion_energy(body, inner),
@@ -67,11 +71,12 @@ bool limit_energy(const MotionBody& body, MotionState& state, double elastic, do
     return energy > 0 ? std::sqrt(std::max(0.0, 1 - taken / energy)) : 0;
   };
   double left = excess;
-  const double of_inner = take(inner_energy, left), of_turning = take(turning_energy, left),
-               of_body = take(motion_energy(body, moving), left);
+  const double of_inner = take(inner_energy, left),
+               of_turning = all ? take(turning_energy, left) : 1,
+               of_body = all ? take(motion_energy(body, moving), left) : 1;
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
     state.velocity[axis] =
-        of_inner * inner[axis] + of_turning * turning[axis] + of_body * moving[axis];
+        of_inner * inner[axis] + of_turning * turning[axis] + of_body * moving[axis] + held[axis];
   return true;
 }
 

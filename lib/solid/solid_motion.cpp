@@ -13,6 +13,7 @@
 #include "solid/solid_energy_internal.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -53,11 +54,15 @@ struct SolidMotion::State {
   MotionState now;
   SolidEnergy energy;
   double elastic = 0;      ///< energy of now.place
+  double allowed = 0;      ///< at the end of the last step, of all kinds
   MotionForecast forecast; ///< of steps of `last_step`
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
-  Numbers guess; ///< of the next step; empty: none
+  Numbers guess;                    ///< of the next step; empty: none
+  Numbers between;                  ///< of the load, among the body's nodes; empty: none
+  double slack = 0;                 ///< of energy, of these
+  double lent = 0, lent_before = 0; ///< of it so far, and when the last step began
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
@@ -69,10 +74,11 @@ struct SolidMotion::State {
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
         energy(body, net, with), recovery(body, materials, net, with) {
     const std::size_t axes = body.axes();
-    now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
+    now = {body.rest, Numbers(axes), Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
   void take_over(SolidMotion& soft);
+  void limit(SolidStep& step);
   SolidStep step_softly(double h, const Context& context);
 };
 
@@ -108,6 +114,20 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
   state_->energy.keep();
 }
 
+/// Speeds at the end of a step.
+void SolidMotion::State::limit(SolidStep& step) {
+  const double work = work_of_load(body, now.outer, now.place),
+               rounding =
+                   energy.unsure_at_rest() + 1e-12 * (motion_energy(body, now.velocity) + elastic +
+                                                      std::abs(allowed) + std::abs(work));
+  const double most = between.empty() ? allowed : allowed + std::max(0.0, slack - lent_before);
+  step.limited = limit_energy(body, now, elastic, most, rounding, between.empty());
+  const double growth = motion_energy(body, now.velocity) + elastic - work - allowed;
+  lent = between.empty() ? 0 : std::max(0.0, lent_before + growth);
+  if (const double left = growth + allowed - most; step.limited && !(left <= 2 * rounding))
+    step.excess = left;
+}
+
 /// What the body that moves meanwhile has come to.
 void SolidMotion::State::take_over(SolidMotion& soft) {
   std::ranges::copy(soft.places(), now.place.begin());
@@ -119,19 +139,19 @@ void SolidMotion::State::take_over(SolidMotion& soft) {
 /// A step of recovery.
 SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   SolidMotion& soft = recovery.soft();
-  soft.set_load(now.load);
+  soft.set_load(now.load, {between, slack});
   soft.set_tolerance(options.tolerance, options.max_rounds);
   if (std::exchange(moved, false))
     soft.move_held(target);
   if (!guess.empty())
     soft.guess(std::exchange(guess, {}));
-  const SolidStep step = soft.step(h, context);
+  SolidStep step = soft.step(h, context);
   take_over(soft);
   last_step = h;
   if (!MotionRecovery::is_right(body, now.place))
     return step;
   Numbers forces(body.axes());
-  const double whole = energy.evaluate(now.place, {}, forces, context);
+  const double whole = energy.evaluate(now.place, {}, forces, context, true);
   if (!(whole <= elastic))
     return step;
   elastic = whole;
@@ -140,11 +160,20 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   forecast.clear();
   recovery.end();
   recovered = true;
+  // It may never have taken a step: what is asked of one behind it is answered from here.
+  step.factorisations += quick.prepare(body, energy.springs(), now.held, h, options, context);
+  quick.turn(energy, context);
   return step;
 }
 
-void SolidMotion::set_load(std::span<const double> forces) {
-  std::ranges::copy(forces, state_->now.load.begin());
+void SolidMotion::set_load(std::span<const double> forces, const Between& between) {
+  State& s = *state_;
+  s.now.load.assign(forces.begin(), forces.end());
+  s.between.assign(between.forces.begin(), between.forces.end());
+  s.slack = between.slack;
+  s.now.outer = s.now.load;
+  if (!s.between.empty())
+    add(s.now.outer, -1, s.between);
 }
 
 void SolidMotion::hold(std::span<const std::uint8_t> held) {
@@ -179,8 +208,9 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   if (!s.options.reference)
     step.factorisations +=
         s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  const double energy = motion_energy(s.body, s.now.velocity) + s.elastic -
-                        work_of_load(s.body, s.now.load, s.now.place);
+  s.lent_before = s.lent;
+  s.allowed = motion_energy(s.body, s.now.velocity) + s.elastic -
+              work_of_load(s.body, s.now.outer, s.now.place);
   const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
   MotionPoint found;
   found.at = s.now.place;
@@ -224,17 +254,16 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
     const double speed = (found.at[axis] - s.now.place[axis]) / h;
     acceleration[axis] = (speed - s.now.velocity[axis]) / h;
+    s.allowed += s.reactions[axis] * (found.at[axis] - s.now.place[axis]);
     s.now.velocity[axis] = speed;
   }
   s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(found.at);
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
-  if (!s.moved)
-    step.limited = limit_energy(
-        s.body, s.now, s.elastic, energy,
-        s.energy.unsure_at_rest() +
-            1e-12 * (motion_energy(s.body, s.now.velocity) + s.elastic + std::abs(energy) +
-                     std::abs(work_of_load(s.body, s.now.load, s.now.place))));
+  if (!s.moved || !s.between.empty())
+    s.limit(step);
+  else
+    s.lent = 0;
   step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;
@@ -270,6 +299,7 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
                           const Context& context) {
   state_->quick.forget();
   state_->recovery.end();
+  state_->lent_before = 0;
   begin_again(places, velocity, context);
 }
 
@@ -281,6 +311,7 @@ void SolidMotion::begin_again(std::span<const double> places, std::span<const do
   s.forecast.clear();
   s.energy.forget_bubbles();
   s.last_step = 0;
+  s.lent = s.lent_before;
   if (s.recovery.on()) {
     s.recovery.soft().begin_again(places, velocity, context);
     s.elastic = s.recovery.elastic();
@@ -306,6 +337,37 @@ void SolidMotion::nudge(std::span<const double> displacement, const Context& con
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   s.energy.keep();
+}
+
+double SolidMotion::hold_back(std::span<const double> places, double part, const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    const double excess = s.recovery.soft().hold_back(places, part, context);
+    s.take_over(s.recovery.soft());
+    return excess;
+  }
+  std::array<double, 3> mean{}; // way of the body as a whole
+  if (!s.now.any_held()) {
+    double mass = 0;
+    for (const double m : s.body.masses)
+      mass += m;
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      mean[axis % 3] += s.body.masses[axis / 3] / mass * (s.now.place[axis] - places[axis]);
+  }
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] == 0) {
+      const double whole = mean[axis % 3],
+                   way = whole + part * (s.now.place[axis] - places[axis] - whole);
+      s.now.place[axis] = places[axis] + way;
+      s.now.velocity[axis] = way / s.last_step;
+    }
+  Numbers forces(s.body.axes());
+  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
+  s.energy.keep();
+  s.forecast.clear();
+  SolidStep step;
+  s.limit(step);
+  return step.excess;
 }
 
 void SolidMotion::guess(std::span<const double> places) {
@@ -344,7 +406,7 @@ void SolidMotion::drop_tangent() {
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   if (s.recovery.on()) {
-    s.recovery.soft().set_load(s.now.load);
+    s.recovery.soft().set_load(s.now.load, {s.between, s.slack});
     s.recovery.soft().find_reactions(context);
     s.take_over(s.recovery.soft());
     return;
@@ -365,7 +427,7 @@ double SolidMotion::elastic_energy() const {
   return state_->elastic;
 }
 double SolidMotion::potential_energy() const {
-  return state_->elastic - work_of_load(state_->body, state_->now.load, state_->now.place);
+  return state_->elastic - work_of_load(state_->body, state_->now.outer, state_->now.place);
 }
 
 } // namespace gewebe

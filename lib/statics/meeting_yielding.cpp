@@ -126,8 +126,14 @@ bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool passed) {
       continue;
     const auto there = std::ranges::lower_bound(
         all_, p.key(), {}, [](const SurfacePush& push) { return push.pair.key(); });
-    if (there != all_.end() && there->pair.key() == p.key())
+    if (there != all_.end() && there->pair.key() == p.key()) {
+      // One that let go, as if beside, has passed nevertheless.
+      if (passed && there->force == Vec3{}) {
+        *there = {p, {}, true};
+        joined = true;
+      }
       continue;
+    }
     all_.insert(there, {p, {}, passed});
     joined = true;
   }
@@ -343,15 +349,15 @@ bool MeetingYielding::Work::push(std::span<const NodeTouch> touches, std::span<c
   std::vector<Vec3> there;
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     there.push_back(vec(x_.segment<3>(static_cast<Index>(3 * k))));
-  const bool agreed = object_.push(all, there);
+  const bool agreed =
+      object_.push(all, there) && !join(pairs_.find(object_.shape(), was_, 0), false) &&
+      !join(pairs_.find_passed(object_.shape(), was_, surface_depth * pairs_.edge()), true);
   fresh_ = false;
   take_shape();
-  if (turns_ >= turns_of_step) {
-    solved_ = solved_ && agreed;
-    return true;
-  }
-  return agreed && !join(pairs_.find(object_.shape(), was_, 0), false) &&
-         !join(pairs_.find_passed(object_.shape(), was_, surface_depth * pairs_.edge()), true);
+  if (turns_ < turns_of_step)
+    return agreed;
+  solved_ = solved_ && agreed;
+  return true;
 }
 
 std::vector<NodeTouch> MeetingYielding::Work::touches() const {

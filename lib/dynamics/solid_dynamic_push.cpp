@@ -1,0 +1,172 @@
+// What touches within a step of a solid that moves: instruments and surfaces.
+
+#include "base/vector_at.h"
+#include "dynamics/solid_dynamic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace gewebe {
+
+namespace {
+
+constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
+constexpr double slow_way = 0.1;       ///< of an edge: halves would do no better
+
+} // namespace
+
+/// A step; in halves where surfaces come together too fast for its forces to be found.
+void SolidDynamic::step_in_parts(double h, double from, double to, bool first, int halvings,
+                                 const Context& context) {
+  if (meetings_.empty()) {
+    (void)step(h, from, to, first, context);
+    return;
+  }
+  const State was = state_;
+  const TouchCounts touches = counts_.touches;
+  const std::vector<double> places(engine_->places().begin(), engine_->places().end()),
+      velocity(engine_->velocity().begin(), engine_->velocity().end());
+  const bool met = step(h, from, to, first, context);
+  if (met || halvings == 0 || state_.tries <= 0)
+    return;
+  std::vector<double> free(velocity), moved(engine_->places().begin(), engine_->places().end());
+  for (std::size_t axis = 0; axis < moved.size(); ++axis) {
+    free[axis] *= h;
+    moved[axis] -= places[axis];
+  }
+  if (!(std::max(contact_->way_of(free), contact_->way_of(moved)) > slow_way))
+    return;
+  const int tries = state_.tries - 1;
+  state_ = was;
+  state_.tries = tries;
+  counts_.touches = touches;
+  ++counts_.steps;
+  engine_->begin_again(places, velocity, context);
+  const double middle = from + h / 2;
+  step_in_parts(h / 2, from, middle, first, halvings - 1, context);
+  if (state_.resting)
+    state_.held_time += to - middle;
+  else
+    step_in_parts(h / 2, middle, to, false, halvings - 1, context);
+}
+
+bool SolidDynamic::instruments_move(bool first, double from, double to) const {
+  return std::ranges::any_of(state_.instruments, [&](const auto& i) {
+    if (i && i->led)
+      return i->way.end > to || i->moves(to, to - from);
+    return i && (i->way.end > to || (first && i->before != i->way.at(from)));
+  });
+}
+
+/// A step, with what instruments do in it.
+SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vector<double>& target,
+                             double h, double from, double to, bool first, bool& met,
+                             const Context& context) {
+  SolidMotion& moving = *engine_;
+  const auto& instruments = state_.instruments;
+  if (!contact_ && !meetings_.empty())
+    contact_ = std::make_unique<SolidContact>(model_, meetings_);
+  bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
+  std::vector<double> places, velocity; // where it begins, if that may be needed again
+  if (!meetings_.empty() && !meets) {
+    places.assign(moving.places().begin(), moving.places().end());
+    velocity.assign(moving.velocity().begin(), moving.velocity().end());
+  }
+  const auto begin_again = [&] {
+    if (meets || !contact_ || !contact_->may_have_met(moving.places()))
+      return false;
+    moving.begin_again(places, velocity, context);
+    meets = true;
+    return true;
+  };
+  SolidStep all;
+  if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
+    state_.touched.clear();
+    state_.pushes.clear();
+    moving.drop_tangent();
+    if (!target.empty())
+      moving.move_held(target);
+    all = moving.step(h, context);
+    if (!begin_again())
+      return all;
+  }
+  if (!contact_)
+    contact_ = std::make_unique<SolidContact>(model_, meetings_);
+  bool exact = true;
+  const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
+    std::vector<std::optional<MovedInstrument>> moved;
+    for (const auto& i : instruments) {
+      if (!i) {
+        moved.emplace_back();
+        continue;
+      }
+      const auto at = [&](double of_jump, double of_way) {
+        const Pose start = i->at(from);
+        return of_jump < 1 ? between(i->before, start, of_jump)
+                           : between(start, i->guess(to, h), of_way);
+      };
+      moved.emplace_back(MovedInstrument{i->shape, at(jump, way), at(jump_to, way_to)});
+      if (i->led && !clearing) {
+        moved.back()->compliance = CouplingStep(i->led->coupling, i->led->lag, h).compliance;
+        moved.back()->pushed = i->led->force;
+      }
+    }
+    const SolidContact::Result result = contact_->step(
+        {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
+         state_.load->displacement, moved, h, options_, clearing, meets},
+        state_.touched, state_.pushes, context);
+    counts_.touches.add(contact_->take_counts());
+    all.rounds += result.took.rounds;
+    all.factorisations += result.took.factorisations;
+    all.change = result.took.change;
+    all.left = result.took.left;
+    all.limited = result.took.limited;
+    exact = clearing || result.exact;
+    met = met && result.met;
+  };
+  const auto parts = [&](bool jump) {
+    std::vector<MovedInstrument> ways;
+    for (const auto& i : instruments)
+      if (i && jump)
+        ways.push_back({i->shape, i->before, i->at(from)});
+      else if (i)
+        ways.push_back({i->shape, i->at(from), i->guess(to, h)});
+    const bool moves = std::ranges::any_of(ways, [](const auto& w) { return w.before != w.now; });
+    return moves ? parts_of_way(ways, max_parts) : 0;
+  };
+  const auto share = [](std::size_t part, std::size_t of) {
+    return static_cast<double>(part) / static_cast<double>(of);
+  };
+  const std::size_t jumps = first ? parts(true) : 0, ways = std::max<std::size_t>(1, parts(false));
+  const std::vector<NodeTouch> touched = state_.touched;
+  do {
+    state_.touched = touched;
+    met = true;
+    for (std::size_t p = 0; p < jumps; ++p)
+      go(share(p, jumps), 0, share(p + 1, jumps), 0, true);
+    for (std::size_t p = 0; p < ways; ++p)
+      go(1, share(p, ways), 1, share(p + 1, ways), p + 1 < ways);
+  } while (begin_again());
+  lead_instruments(to, h);
+  for (NodeTouch t : state_.touched) {
+    t.force *= h;
+    state_.impulses.push_back(t);
+  }
+  state_.exact = state_.exact && exact;
+  return all;
+}
+
+/// Where those that are led have gone in a step, by what they felt.
+void SolidDynamic::lead_instruments(double to, double h) {
+  for (std::uint32_t k = 0; k < state_.instruments.size(); ++k)
+    if (auto& i = state_.instruments[k]; i && i->led) {
+      Vec3 felt;
+      for (const NodeTouch& t : state_.touched)
+        felt -= t.instrument == k ? t.force : Vec3{};
+      i->led->settle(i->way.at(to).place, h, felt);
+    }
+}
+
+} // namespace gewebe
