@@ -209,9 +209,11 @@ public:
       return bends();
     case Feature::contact: // a node of the other one is brought into it from above
       scene_.apply(SetContact{0, 1, 0});
-      scene_.apply(SetDisplacement{1, {top()}, {-100, 0, 1}});
-      scene_.step(0.005);
-      scene_.apply(SetDisplacement{1, {top()}, {-100, 0, -1}, 0.01});
+      for (const Vec3& at : {Vec3{0, 0, 10}, Vec3{-100, 0, 10}, Vec3{-100, 0, -1}}) {
+        scene_.apply(SetDisplacement{1, {top()}, at, 0.02});
+        for (int k = 0; k < 4; ++k)
+          scene_.step(0.005);
+      }
       return bends() && !scene_.contact_forces(0).empty();
     case Feature::self_contact:
       scene_.apply(SetContact{0, 0, 0});
