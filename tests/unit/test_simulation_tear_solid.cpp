@@ -29,7 +29,7 @@ constexpr double length = 32, side = 8;
 
 /// 32 x 8 x 8 mm, of "strong" with "weak" in x = 12 … 16, or all of one; as stiff all over, and not
 /// narrower where it is pulled. Held at x = 0.
-Model pulled_bar(bool quadratic, int cells = 4, bool weak = true) {
+Model pulled_bar(bool quadratic, std::uint32_t cells = 4, bool weak = true) {
   const double cell = side / cells;
   TetMesh mesh = test::box_tetrahedra(4 * cells, cells, cells, cell);
   for (const Tetrahedron& t : mesh.tetrahedra) {
@@ -179,7 +179,7 @@ TEST_P(SolidTears, AMovingBarTearsAndItsPartGoesOn) {
 }
 
 /// At what load a notched bar tears, from one shape of it, in shares of that load.
-double load_at_tearing(int cells, double over) {
+double load_at_tearing(std::uint32_t cells, double over) {
   const Model whole = pulled_bar(false, cells, false);
   PlaneToCut half{{{14 - 1e-3, 0, 0}, {1, 0, 0}},
                   nodes_where(whole, [](const Vec3& p) { return p.z >= 4; })};
