@@ -291,9 +291,9 @@ TEST(SceneServe, AnyScenePlaysAgainToTheLastByte) {
   // The time that a scene may take is the processor's: sanitizers take some ten times as much, so
   // that more scenes are ended early there.
 #ifdef GEWEBE_SANITIZE
-  constexpr std::uint64_t scenes = 60, may_be_slow = 6;
+  constexpr std::uint64_t scenes = 60, may_be_slow = 8;
 #else
-  constexpr std::uint64_t scenes = 200, may_be_slow = 2;
+  constexpr std::uint64_t scenes = 200, may_be_slow = 4;
 #endif
   test::FuzzedCounts seen;
   for (std::uint64_t seed = 1; seed <= scenes; ++seed)
