@@ -1,7 +1,6 @@
 #include "contact/contact_rank_internal.h"
 
-#include <algorithm>
-#include <vector>
+#include <cmath>
 
 namespace gewebe {
 
@@ -39,8 +38,8 @@ std::optional<SharedCompliance> shared_compliance(const MatrixXd& w, Index most,
 SharedSolver::SharedSolver(const SharedCompliance& shared, const MatrixXd& g_w,
                            std::span<const Index> first, std::span<const Index> size,
                            std::span<const Matrix3d> g, std::span<const Matrix3d> d)
-    : shared_(shared), g_w_(g_w), first_(first), size_(size), d_(d.begin(), d.end()),
-      inverse_(d.size()), spread_(shared.l.rows(), shared.l.cols()) {
+    : shared_(shared), g_w_(g_w), size_of_g_w_(g_w.cwiseAbs()), first_(first), size_(size),
+      d_(d.begin(), d.end()), inverse_(d.size()), spread_(shared.l.rows(), shared.l.cols()) {
   for (std::size_t i = 0; i < first.size(); ++i) {
     const Index k = first[i], n = size[i];
     Matrix3d own = Matrix3d::Identity();
@@ -75,7 +74,7 @@ std::optional<VectorXd> SharedSolver::solve(const VectorXd& b, double enough) co
     if (!left.allFinite())
       break;
     // Rows of contacts that push are many orders smaller than those of others: each by its own.
-    const VectorXd size = g_w_.cwiseAbs() * x.cwiseAbs() + own.cwiseAbs() + b.cwiseAbs();
+    const VectorXd size = size_of_g_w_ * x.cwiseAbs() + own.cwiseAbs() + b.cwiseAbs();
     if ((left.array().abs() <= enough * size.array()).all())
       return x;
   }

@@ -42,6 +42,7 @@ private:
 
   const SharedCompliance& shared_;
   const Eigen::MatrixXd& g_w_;
+  Eigen::MatrixXd size_of_g_w_; ///< of each entry
   std::span<const Eigen::Index> first_, size_;
   std::vector<Eigen::Matrix3d> d_, inverse_; ///< D; (D + G rest)⁻¹
   Eigen::MatrixXd spread_;                   ///< (D + G rest)⁻¹ G L

@@ -21,6 +21,15 @@ constexpr int max_held_back = 12; ///< times that half of a way is left
 /// Pushes in all whose rounds ran out: of what comes of such nothing is learned.
 constexpr int max_unfinished = 2;
 
+/// Displacements of nodes that are there.
+std::vector<double> shape_at(const Model& model, std::span<const double> places) {
+  std::vector<double> shape(3 * model.nodes.size());
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      shape[axis_of(i, a)] = places[axis_of(i, a)] - model.nodes[i].position[a];
+  return shape;
+}
+
 } // namespace
 
 /// A step that gives way to forces of contact.
@@ -324,11 +333,10 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
   std::erase_if(columns_, [&](const auto& of) {
     return std::ranges::none_of(touches, [&](const NodeTouch& t) { return t.node == of.first; });
   });
-  const std::vector<double> places(step.engine.places().begin(), step.engine.places().end());
-  std::vector<double> shape;
-  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
-    for (int a = 0; a < 3; ++a)
-      shape.push_back(step.engine.places()[axis_of(i, a)] - model_.nodes[i].position[a]);
+  std::vector<double> places; // where surfaces that meet begin
+  if (step.meets)
+    places.assign(step.engine.places().begin(), step.engine.places().end());
+  std::vector<double> shape = shape_at(model_, step.engine.places());
   contact_.restart(shape, std::move(by_instruments));
   bool met = true;
   Object object(*this, step, touches, context);
@@ -350,7 +358,7 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
     touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
     touches = sums_of_touches(std::move(touches));
     object.distrust(!both.solved());
-    met = object.exact() && (!(object.took().excess > 0) || overlaps(shape));
+    met = object.exact() && (object.took().excess <= 0 || overlaps(shape));
   }
   object.end();
   if (!met)
@@ -371,21 +379,16 @@ bool SolidContact::overlaps(std::span<const double> shape) {
 /// Where forces were not found nothing has passed another surface nevertheless, and none has won.
 void SolidContact::hold_back(const Step& step, std::span<const double> places, double excess,
                              const Context& context) {
-  const auto shape_at = [&](std::span<const double> at) {
-    std::vector<double> shape(at.begin(), at.end());
-    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a)
-        shape[axis_of(i, a)] -= model_.nodes[i].position[a];
-    return shape;
-  };
-  const std::vector<double> was = shape_at(places);
+  const std::vector<double> was = shape_at(model_, places);
   const auto passed = [&] {
-    return !pairs_->find_passed(shape_at(step.engine.places()), was, surface_depth * pairs_->edge())
+    return !pairs_
+                ->find_passed(shape_at(model_, step.engine.places()), was,
+                              surface_depth * pairs_->edge())
                 .empty();
   };
-  if (excess > 0 && overlaps(was))
+  if (!(excess <= 0) && overlaps(was))
     excess = 0;
-  for (int halved = 0; excess > 0 || passed(); ++halved) {
+  for (int halved = 0; !(excess <= 0) || passed(); ++halved) {
     excess = step.engine.hold_back(places, halved < max_held_back ? 0.5 : 0, context);
     if (halved == max_held_back)
       return;

@@ -1,31 +1,17 @@
 """Results of a run, gewebe_results(5), by h5py."""
-from .errors import Error
+from .hdf5 import File
 
 
-class Results:
+class Results(File):
     """A file of results, open for reading: a mapping from names of objects to Moved. A context manager.
 
     time [F] holds the time of each frame in s, instruments the groups of the file by name.
     """
 
     def __init__(self, path):
-        import h5py
-
-        self.file = h5py.File(path, 'r')
-        if self.file.attrs.get('format') not in ('gewebe_results', b'gewebe_results'):
-            self.file.close()
-            raise Error(f'{path}: no results of a run')
+        super().__init__(path, 'gewebe_results', 'results of a run')
         self.time = self.file['time'][:]
         self.instruments = self.file.get('instruments', {})
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
-
-    def close(self):
-        self.file.close()
 
     def __iter__(self):
         objects = self.file['objects']

@@ -2,27 +2,14 @@
 import numpy
 
 from .errors import Error
+from .hdf5 import File
 
 
-class Store:
+class Store(File):
     """A store, open for reading: a mapping from names of objects to their Stiffness. A context manager."""
 
     def __init__(self, path):
-        import h5py
-
-        self.file = h5py.File(path, 'r')
-        if self.file.attrs.get('format') not in ('gewebe stiffness store', b'gewebe stiffness store'):
-            self.file.close()
-            raise Error(f'{path}: no stiffness store')
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
-
-    def close(self):
-        self.file.close()
+        super().__init__(path, 'gewebe stiffness store', 'stiffness store')
 
     def __iter__(self):
         return iter(self.file)
