@@ -2,8 +2,8 @@
 
 #include "base/number_text.h"
 #include "base/vector_at.h"
-#include "mesh/crossing.h"
 #include "scene/rules_internal.h"
+#include "solid/cut_skin.h" // MeetingOfNoSheets
 #include "solid/tear_solid.h"
 
 #include <optional>
