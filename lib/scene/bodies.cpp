@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 #include <set>
+#include <tuple>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -173,6 +174,40 @@ std::unique_ptr<BodyMotion> motion_for(const World& w, const std::vector<std::si
   }
 }
 
+/// How it moves from now on, where it is free to choose: by steps of solids where explicit ones
+/// would be many for each.
+Integration chosen_integration(const World& w, const Object& object) {
+  if (object.integration != Integration::automatic)
+    return object.integration;
+  const double wish = w.now.settings.timestep.value_or(implicit_step);
+  const bool asks = object.matter->solid.bulk.has_value();
+  return !is_solid(object) && (asks || safe_step(object.model()) * worth_implicit < wish)
+             ? Integration::implicit
+             : Integration::semi_implicit;
+}
+
+bool moves_implicitly(const Object& object, Integration way) {
+  return way == Integration::implicit || is_solid(object);
+}
+
+/// Of two that are attached: who is free to choose moves as the other does; of two, both implicitly
+/// if one would.
+std::pair<Integration, Integration> chosen_together(const World& w, const Object& a,
+                                                    const Object& b) {
+  const bool is_free = a.integration == Integration::automatic,
+             other_is = b.integration == Integration::automatic;
+  Integration way = chosen_integration(w, a), other_way = chosen_integration(w, b);
+  const auto follow = [](const Object& one, Integration& its, bool implicitly) {
+    if (!is_solid(one))
+      its = implicitly ? Integration::implicit : Integration::semi_implicit;
+  };
+  if (is_free && (!other_is || moves_implicitly(b, other_way)))
+    follow(a, way, moves_implicitly(b, other_way));
+  else if (other_is)
+    follow(b, other_way, moves_implicitly(a, way));
+  return {way, other_way};
+}
+
 } // namespace
 
 /// \param motions of parts, by object; none: as they move now
@@ -189,7 +224,8 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   }
   std::vector<NodeMotion> motion;
   for (const std::size_t part : parts) {
-    const Object& object = w.now.objects[part];
+    Object& object = w.now.objects[part];
+    object.integration = chosen_integration(w, object);
     if (motions == nullptr && object.body == nullptr) {
       motion.resize(motion.size() + object.model().nodes.size());
       continue;
@@ -211,45 +247,11 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   return body;
 }
 
-namespace {
-
-/// Steps of solids where explicit ones would be many for each. Once: it keeps to them.
-void choose_integration(const World& w, Object& object) {
-  Integration& way = object.matter->integration;
-  if (way != Integration::automatic)
-    return;
-  const double wish = w.now.settings.timestep.value_or(implicit_step);
-  const bool asks = object.matter->solid.bulk.has_value();
-  way = !is_solid(object) && (asks || safe_step(object.model()) * worth_implicit < wish)
-            ? Integration::implicit
-            : Integration::semi_implicit;
-}
-
-/// Who is free to choose moves as the other does; of two, both implicitly if one would.
-void choose_together(const World& w, Object& a, Object& b) {
-  const bool is_free = a.matter->integration == Integration::automatic,
-             other_is = b.matter->integration == Integration::automatic;
-  choose_integration(w, a);
-  choose_integration(w, b);
-  const auto follow = [](Object& one, const Object& leader) {
-    if (!is_solid(one))
-      one.matter->integration =
-          moves_implicitly(leader) ? Integration::implicit : Integration::semi_implicit;
-  };
-  if (is_free && (!other_is || moves_implicitly(b)))
-    follow(a, b);
-  else if (other_is)
-    follow(b, a);
-}
-
-} // namespace
-
 /// An elastodynamic object has a body from when something first acts on it.
 void need_body(World& w, std::size_t object) {
   if (w.now.objects[object].body != nullptr)
     return;
   need_model(w.now.objects[object]);
-  choose_integration(w, w.now.objects[object]);
   w.now.bodies.push_back(make_body(w, {object}));
 }
 
@@ -389,14 +391,19 @@ void Rule<Attach>::check(World& w, const Attach& c) {
   }
   if (&a == &b)
     throw Error("object " + a.name() + " can't be attached to itself, expected two objects");
-  choose_together(w, a, b);
-  if (moves_implicitly(a) != moves_implicitly(b))
+  const auto [way, other_way] = chosen_together(w, a, b);
+  if (moves_implicitly(a, way) != moves_implicitly(b, other_way))
     throw Error("one of " + a.name() + " and " + b.name() +
                 " is implicit and the other is not, expected both alike");
   std::vector<std::size_t> all = together(w, c.object);
   const std::vector<std::size_t> others = together(w, c.other);
   all.insert(all.end(), others.begin(), others.end());
   require_like_solids(w, all);
+}
+
+void Rule<Attach>::enter(World& w, const Attach& c) {
+  Object &a = w.now.objects.at(c.object), &b = w.now.objects.at(c.other);
+  std::tie(a.integration, b.integration) = chosen_together(w, a, b);
 }
 
 void Rule<Attach>::apply(World& w, const Attach& c) {

@@ -57,11 +57,12 @@ void announce(World& w, const Change& change) {
 }
 
 void apply(World& w, const Change& change) {
-  accept(w, change);
   std::visit(
       [&]<class Kind>(const Kind& c) {
+        Rule<Kind>::check(w, c);
         Rule<Kind>::require(w, c);
         const auto work = [&] {
+          Rule<Kind>::enter(w, c);
           note_poses(w); // the end of the ways so far
           Rule<Kind>::apply(w, c);
         };

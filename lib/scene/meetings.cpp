@@ -177,8 +177,7 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
 /// Who is free to choose moves implicitly.
 void Rule<SetContact>::enter(World& w, const SetContact& c) {
   for (const std::size_t index : {c.object, c.other})
-    if (Integration& way = w.now.objects.at(index).matter->integration;
-        way == Integration::automatic)
+    if (Integration& way = w.now.objects.at(index).integration; way == Integration::automatic)
       way = Integration::implicit;
 }
 

@@ -13,9 +13,10 @@ namespace gewebe::simulation {
 /// What holds for a kind that says nothing else.
 template <class Kind>
 struct Plain {
-  /// That it can be accepted, now or for later. \throw Error
+  /// That it can be accepted, now or for later. Nothing is changed by it but what is read.
+  /// \throw Error
   static void check(World&, const Kind&) {}
-  /// What is known from when it is accepted, be it for later.
+  /// What is known from when it is accepted, be it for later; twice where it was for later.
   static void enter(World&, const Kind&) {}
   /// That it can take effect now. \throw Error
   static void require(World&, const Kind&) {}
@@ -90,6 +91,7 @@ struct Rule<Prepare> : Plain<Prepare> {
 template <>
 struct Rule<Attach> : Plain<Attach> {
   static void check(World& w, const Attach& c);
+  static void enter(World& w, const Attach& c);
   static constexpr bool may_fail = true;
   static void apply(World& w, const Attach& c);
   static void log(const World& w, const Attach& c, ChangeRow& row);
@@ -161,6 +163,7 @@ template <>
 struct Rule<SetContact> : Plain<SetContact> {
   static void check(World& w, const SetContact& c);
   static void enter(World& w, const SetContact& c);
+  static constexpr bool may_fail = true;
   static void apply(World& w, const SetContact& c);
   static void log(const World& w, const SetContact& c, ChangeRow& row);
 };

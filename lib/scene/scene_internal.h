@@ -66,7 +66,6 @@ struct Told {
 struct Matter {
   std::string name;
   ObjectSource source;
-  Integration integration = Integration::semi_implicit;                 // of a net
   SolidChoice solid;                                                    // how a solid moves
   std::shared_ptr<const Model> model = std::make_shared<const Model>(); // empty until it is known
   bool known = false;
@@ -186,6 +185,7 @@ struct Object {
   std::shared_ptr<Matter> matter = std::make_shared<Matter>();
   std::shared_ptr<Statics> statics = std::make_shared<Statics>();
   Method method = Method::ela;
+  Integration integration = Integration::semi_implicit; // of a net; automatic: it has no body yet
   CopyOnWrite<Load> load{};
   Stages stages;
   bool warp = false;                          // large rotations

@@ -57,7 +57,7 @@ void Simulation::add_object(const std::string& name, ObjectSource source, Method
   Object object;
   object.matter->name = name;
   object.matter->source = std::move(source);
-  object.matter->integration = integration;
+  object.integration = integration;
   object.matter->solid = solid;
   object.method = method;
   insert(*world_, std::move(object));
@@ -70,7 +70,7 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   Object object;
   object.matter->name = name;
   object.matter->source.model = [&] { return std::move(model); };
-  object.matter->integration = integration;
+  object.integration = integration;
   object.matter->solid = solid;
   object.method = method;
   need_model(object);

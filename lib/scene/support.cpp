@@ -12,7 +12,7 @@ namespace {
 
 bool goes(const Object& object, Way way) {
   const bool moves = object.method == Method::ela;
-  const bool implicit = object.matter->integration == Integration::implicit;
+  const bool implicit = object.integration == Integration::implicit;
   switch (way) {
   case Way::explicit_motion:
     return moves && !implicit;
@@ -45,8 +45,8 @@ bool goes(const Object& object, Way way) {
   case Way::filled:
     return object.matter->solid.bulk.has_value();
   case Way::explicit_net:
-    return moves && object.matter->integration == Integration::semi_implicit &&
-           object.matter->known && !is_solid(object);
+    return moves && object.integration == Integration::semi_implicit && object.matter->known &&
+           !is_solid(object);
   case Way::meeting:
     return object.meets;
   }

@@ -125,7 +125,7 @@ inline bool is_solid(const Object& object) {
 }
 /// By steps that keep a factor.
 inline bool moves_implicitly(const Object& object) {
-  return object.matter->integration == Integration::implicit || is_solid(object);
+  return object.integration == Integration::implicit || is_solid(object);
 }
 /// How an object's nodes move. \pre it has a body
 std::span<const NodeMotion> motion_of(const Object& object);

@@ -72,6 +72,38 @@ TEST(Scrambled, ScrambledBodiesThatKeepTheirVolumeFindBack) {
   }
 }
 
+/// Right side out by its first step, which another body has taken for it: it gives way to forces as
+/// one that never was anything else.
+TEST(Scrambled, ABodyThatFindsBackInOneStepAnswersForces) {
+  constexpr double young = 2e4, edge = 5, volume = 2 * edge * edge * edge;
+  const TetMesh m = test::box_tetrahedra(2, 1, 1, edge);
+  const std::size_t axes = 3 * m.points.size();
+  std::vector<std::uint8_t> held(axes);
+  Numbers mirrored(axes);
+  for (std::size_t i = 0; i < m.points.size(); ++i) {
+    if (m.points[i].x == 0)
+      std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, std::uint8_t{1});
+    mirrored[3 * i] = -2 * m.points[i].x;
+  }
+  const auto answered = [&](const Numbers& displacement, int inverted) {
+    SolidMotion body(m, std::vector<SolidMaterial>{{young, 0.3, 1e-3}}, {});
+    body.hold(held);
+    body.set_state(displacement, Numbers(axes));
+    EXPECT_EQ(test::inverted(m, body.places()) > 0, inverted > 0);
+    (void)body.step(10, test::one_thread()); // next to what statics says
+    EXPECT_EQ(test::inverted(m, body.places()), 0);
+    EXPECT_LE(body.elastic_energy(), 1e-9 * young * volume);
+    Numbers moved(axes);
+    moved[axes - 1] = 1000;
+    body.respond(moved, test::one_thread());
+    return moved;
+  };
+  const Numbers right = answered(Numbers(axes), 0), found = answered(mirrored, 1);
+  EXPECT_GT(right[axes - 1], 1e-3);
+  for (std::size_t axis = 0; axis < axes; ++axis)
+    EXPECT_NEAR(found[axis], right[axis], 1e-3 * right[axes - 1]) << axis;
+}
+
 /// A bar held at an end whose surface is anywhere, let go while a ball is pressed onto it.
 TEST(Scrambled, BodiesFindBackUnderAnInstrument) {
   SolidModelOptions options;
