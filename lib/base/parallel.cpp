@@ -115,6 +115,11 @@ int thread_count(const Context& context) noexcept {
 
 void parallel_blocks(const Context& context, std::size_t count, std::size_t grain,
                      const std::function<void(std::size_t, std::size_t)>& body) {
+  parallel_blocks_if(true, context, count, grain, body);
+}
+
+void parallel_blocks_if(bool worth, const Context& context, std::size_t count, std::size_t grain,
+                        const std::function<void(std::size_t, std::size_t)>& body) {
   const std::size_t blocks = count / grain + (count % grain != 0 ? 1 : 0);
   std::size_t done = 0;
   std::mutex mutex;
@@ -127,7 +132,7 @@ void parallel_blocks(const Context& context, std::size_t count, std::size_t grai
       context.progress(static_cast<double>(++done) / static_cast<double>(blocks));
     }
   };
-  const int threads = blocks < 2 ? 1 : thread_count(context);
+  const int threads = blocks < 2 || !worth ? 1 : thread_count(context);
   const int together = threads == 1 ? 1 : arena_threads(threads);
   if (together == 1) {
     for (std::size_t block = 0; block < blocks; ++block)

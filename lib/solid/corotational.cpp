@@ -14,6 +14,8 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t grain = 128; // groups of a block, whose results are summed by themselves
+constexpr std::size_t worth_threads = 4096; // groups times nodes of one
+constexpr std::size_t worth_threads_turns = 1024;
 
 /// Sums of what tetrahedra bring to their nodes: first by blocks of groups, whose sums stay in the
 /// cache, then those of the blocks that a node is in, in order.
@@ -59,13 +61,15 @@ struct NodeSums {
   void sum(const Context& context, const Block& block, const Done& done) {
     if (sums.size() < Width * slot.size())
       sums.resize(Width * slot.size());
-    parallel_blocks(context, local.size(), grain, [&](std::size_t begin, std::size_t end) {
+    const bool worth = Nodes * local.size() >= worth_threads;
+    const auto sum_block = [&](std::size_t begin, std::size_t end) {
       const std::size_t b = begin / grain;
       std::fill(sums.begin() + static_cast<std::ptrdiff_t>(Width * first[b]),
                 sums.begin() + static_cast<std::ptrdiff_t>(Width * first[b + 1]), 0.0);
       block(begin, end, sums.data() + Width * first[b]);
-    });
-    parallel_blocks(context, nodes(), 2048, [&](std::size_t begin, std::size_t end) {
+    };
+    parallel_blocks_if(worth, context, local.size(), grain, sum_block);
+    const auto sum_node = [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         std::array<double, Width> sum{};
         for (std::size_t k = start[i]; k < start[i + 1]; ++k)
@@ -73,7 +77,8 @@ struct NodeSums {
             sum[c] += sums[Width * slot[k] + c];
         done(i, sum);
       }
-    });
+    };
+    parallel_blocks_if(worth, context, nodes(), 2048, sum_node);
   }
 };
 
@@ -232,12 +237,13 @@ void CorotationalSolid::node_rotations(std::span<double> rotations, const Contex
   const CorotationalKernel& kernel = corotational_kernel(context.cpu);
   auto& sums = s.turning;
   s.with([&](auto& of) { sums = of.turns; });
-  parallel_blocks(context, sums.size(), 256, [&](std::size_t begin, std::size_t end) {
+  const auto turn = [&](std::size_t begin, std::size_t end) {
     kernel.turn(sums[begin].data(), end - begin);
     for (std::size_t i = 4 * begin; i < std::min(4 * end, s.nodes); ++i)
       for (std::size_t c = 0; c < 9; ++c)
         rotations[9 * i + c] = sums[i / 4][c][i % 4];
-  });
+  };
+  parallel_blocks_if(sums.size() >= worth_threads_turns, context, sums.size(), 256, turn);
 }
 
 ElementFrame CorotationalSolid::frame(std::size_t t) const {

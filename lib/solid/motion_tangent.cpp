@@ -58,7 +58,8 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
   const std::size_t count = solid_nodes(body.mesh);
   const auto order = static_cast<Eigen::Index>(3 * count);
   std::vector<Numbers> of_element(body.elements.size());
-  parallel_blocks(context, body.elements.size(), 16, [&](std::size_t begin, std::size_t end) {
+  const bool worth = body.elements.size() >= (count == 10 ? 32 : 128);
+  const auto respond = [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const std::array<Vec3, 10> u = energy.displacements(at, t);
@@ -76,7 +77,8 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
         own.noalias() -= between.transpose() * k.bottomRightCorner<3, 3>().llt().solve(between);
       }
     }
-  });
+  };
+  parallel_blocks_if(worth, context, body.elements.size(), 16, respond);
   return of_element;
 }
 

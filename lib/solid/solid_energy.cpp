@@ -40,7 +40,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
   const std::size_t count = solid_nodes(body_.mesh);
   Numbers energy(body_.elements.size());
   std::vector<std::array<Vec3, 10>> part(body_.elements.size());
-  parallel_blocks(context, body_.elements.size(), 64, [&](std::size_t begin, std::size_t end) {
+  const bool worth = body_.elements.size() >= (count == 10 ? 128 : 1024);
+  const auto respond = [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {
       const std::array<Vec3, 10> u = displacements(at, t);
@@ -53,7 +54,8 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
       for (std::size_t a = 0; a < count; ++a)
         part[t][a] = response.force[a];
     }
-  });
+  };
+  parallel_blocks_if(worth, context, body_.elements.size(), 64, respond);
   double sum = 0;
   for (std::size_t t = 0; t < body_.elements.size(); ++t) {
     sum += energy[t];

@@ -8,10 +8,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <numeric>
 #include <thread>
+#include <vector>
 
 using namespace gewebe;
 
@@ -53,6 +55,21 @@ TEST(Parallel, BlocksDependOnTheGrainAlone) {
     EXPECT_EQ(ends[3], 400U);
   }
   parallel_blocks({}, 0, 8, [](std::size_t, std::size_t) { FAIL(); });
+}
+
+TEST(Parallel, WhatIsNotWorthItStaysOnThisThread) {
+  Context context;
+  context.threads = 4;
+  std::vector<std::size_t> begins;
+  bool here = true;
+  const auto id = std::this_thread::get_id();
+  parallel_blocks_if(false, context, 1000, 8, [&](std::size_t begin, std::size_t end) {
+    here = here && std::this_thread::get_id() == id && end == begin + 8;
+    begins.push_back(begin);
+  });
+  EXPECT_TRUE(here);
+  ASSERT_EQ(begins.size(), 125U);
+  EXPECT_TRUE(std::ranges::is_sorted(begins));
 }
 
 TEST(Parallel, ProgressIsToldByOneThreadAtATime) {
