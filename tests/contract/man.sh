@@ -172,4 +172,8 @@ test_html_pages_are_linked() {
   "$GEWEBE_ROOT/scripts/html" pages
   echo '<a href="#nowhere">' >>pages/csg.1.html
   ! "$GEWEBE_ROOT/scripts/html" --check pages >said || fail 'a link to no place passes'
+  "$GEWEBE_ROOT/scripts/html" pages
+  [[ $(grep -c '<img src=' pages/gewebe-tutorial.7.html) == 3 ]] || fail 'the tutorial lacks a picture'
+  rm pages/cut.png
+  ! "$GEWEBE_ROOT/scripts/html" --check pages >said || fail 'a picture that is not there passes'
 }
