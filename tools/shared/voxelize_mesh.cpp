@@ -1,0 +1,80 @@
+#include "tools/shared/voxelize_mesh.h"
+
+#include "formats/mesh/mesh_file.h"
+#include "formats/volume/label_volume.h"
+#include "formats/volume/volume_file.h"
+#include "tools/shared/distrust.h"
+#include "tools/shared/mesh_size.h"
+#include "tools/shared/report.h"
+#include "volume/lattice.h"
+
+#include <cmath>
+
+namespace gewebe {
+
+namespace {
+
+GridTransform lattice(const MeshToVoxelize& a, const Input& input, const TriangleMesh& mesh,
+                      const Context& context) {
+  if (a.voxel)
+    return uniform_transform(*a.voxel);
+  if (a.dim)
+    return at(input.name(), [&] { return lattice_for_dim(bounding_box(mesh), *a.dim); });
+  Input like(a.like);
+  const GridTransform transform = read_volume(like, context).info().transform;
+  if (!transform.is_cubic())
+    throw Error(like.name(), "has " + transform.describe() + ", expected cubic voxels");
+  return transform;
+}
+
+void report(cli::Run& run, const MeshToVoxelize& a, const CoverageReport& r) {
+  cli::Stats& stats = run.stats();
+  stats.set("antialias", a.antialias);
+  stats.set("triangles", r.mesh.triangles);
+  stats.set("triangles_skipped", r.mesh.triangles_skipped);
+  stats.set("boundary_edges", r.mesh.boundary_edges);
+  stats.set("holes", r.mesh.holes);
+  stats.set("odd_rays", r.mesh.odd_rays);
+  stats.set("crossings", r.mesh.crossings);
+  stats.set("exact_tests", r.mesh.exact_tests);
+  stats.set("surface_voxels", r.surface_voxels);
+  stats.set("overlap_voxels", r.overlap_voxels);
+  stats.set("parts", r.mesh.parts);
+  stats.set("parts_turned", r.mesh.parts_turned);
+  stats.set("triangles_turned", r.mesh.triangles_turned);
+  stats.set("triangles_duplicate", r.mesh.triangles_duplicate);
+  stats.set("samples_summed", r.mesh.samples_summed);
+}
+
+} // namespace
+
+void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
+  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
+  Output output(run.output(), run.output_options(true));
+  Input input(a.name);
+  if (is_label_volume(input.peek(4096)))
+    throw Error(input.name(), "is a label volume or a scan, expected a mesh, --label L or "
+                              "--threshold LOW");
+  MeshReadOptions read;
+  read.kind = input_kind(input.peek(4096), a.name, run.format());
+  read.unit = a.unit;
+  read.weld = weld_from_name(a.weld);
+  read.drop_unused = true; // so that they don't count for --dim
+  const TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
+  const GridTransform transform = lattice(a, input, mesh, run.context());
+
+  CoverageReport counts;
+  const Grid grid = run.timed("voxelize", [&] {
+    return antialiased(run, input.name(), mesh, transform, a.choice, a.options, counts);
+  });
+  if (grid.active_voxels() == 0)
+    cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
+  else if (a.unit.empty())
+    cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
+  run.timed("write", [&] { write_volume(output, grid, run.context()); });
+  output.commit();
+  report(run, a, counts);
+  cli::report_volume(run, grid);
+}
+
+} // namespace gewebe
