@@ -41,3 +41,24 @@ test_every_organ_has_its_row() {
   rm said err
   [[ $(printf '%s\n' * | paste -sd ' ') == 'Makefile ball.particles ball.ply liver.particles open.ply table.awk' ]] || fail "clean left $(printf '%s ' *)"
 }
+
+test_snakemake_makes_the_same_table() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  command -v snakemake >/dev/null || skip 'no snakemake'
+  unset MAKEFLAGS MAKELEVEL
+  local organs='ball=ball.particles mesh=ball.ply'
+  cp "$GEWEBE_ROOT"/examples/cohort/{Makefile,Snakefile,table.awk} .
+  printf '0 0 0 60\n' >ball.particles
+  metaball2vol --voxel 3 ball.particles | mc-opt -o ball.ply
+  make -s ORGANS="$organs" CELL=15 >said || fail "$(<said)"
+  cut -d, -f1-8 cohort.csv >expected
+  make -s clean ORGANS="$organs"
+  snakemake -q -j2 --config organs="$organs" cell=15 >said 2>&1 || fail "$(<said)"
+  cut -d, -f1-8 cohort.csv | cmp - expected || fail "$(<cohort.csv)"
+  # Another cell is another organ; what fails is named, with what the program said.
+  snakemake -q -j2 --config organs="$organs" cell=20 >said 2>&1 || fail "$(<said)"
+  ! cut -d, -f1-8 cohort.csv | cmp -s - expected || fail 'another cell makes nothing'
+  cp "$GEWEBE_ROOT/tests/golden/in/open.ply" .
+  ! snakemake -q -j2 --config organs="open=open.ply" >said 2>&1 || fail 'a failure is none'
+  grep -q 'voxelize: open.ply: the mesh is open' said || fail "$(<said)"
+}
