@@ -360,9 +360,9 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
     object.distrust(!both.solved());
     met = object.exact() && (object.took().excess <= 0 || overlaps(shape));
   }
-  object.end();
-  if (!met)
+  if (!met) // by what the step has moved, of which nothing is known behind its end
     hold_back(step, places, object.took().excess, context);
+  object.end();
   if (pushes.empty())
     step.engine.drop_tangent();
   step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);

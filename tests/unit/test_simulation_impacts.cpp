@@ -155,6 +155,25 @@ TEST(SimulationImpacts, WhatIsPulledFromRestIsStoppedToo) {
   }
 }
 
+/// An instrument that is moved at once leads blocks out of its way without time, by forces that
+/// aren't found where they are in each other: they stay as fast as they were, which is not at all.
+TEST(SimulationImpacts, WhatIsInTheWayOfAnInstrumentMovedAtOnceGoesOn) {
+  Simulation s(one_thread(), {});
+  const Model whole = block(2, 1, 1, {});
+  add(s, "one", whole);
+  add(s, "other", whole);
+  s.apply(SetContact{0, 1, 0});
+  s.apply(SetInstrument{0, {4, {}, 0}, {{4, 2, -5}, {}}, "ball"});
+  s.step(1e-4);
+  constexpr double way = 14;
+  s.apply(MoveInstrument{0, {4, 2, -5 + way}, {}, 0});
+  s.step(1e-4);
+  EXPECT_GT(s.counts().solids.touches.unsolved, 0U);
+  for (const std::size_t k : {0U, 1U})
+    for (const double u : shape(s, k))
+      EXPECT_LE(std::abs(u), 2 * way);
+}
+
 INSTANTIATE_TEST_SUITE_P(SizesAStep, Impacts, testing::Values(0.1, 0.5, 1, 2, 5, 10, 20, 50));
 
 } // namespace
