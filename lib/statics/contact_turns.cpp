@@ -26,6 +26,7 @@ constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
 constexpr int max_sweeps = 200;
 constexpr double least_square = 1e-6; ///< of weights of nodes that give way
+constexpr double most_parts = 256;    ///< of a way that is looked at
 constexpr int max_idle = 40;          ///< turns on end that came no nearer
 
 auto key_of(const TouchPair& p) {
@@ -67,6 +68,7 @@ public:
     std::ranges::sort(turns_.pairs, {}, key_of);
     join(scene_.nodes.was, 0);
     join(scene_.free, outside);
+    join_passed();
     const bool known = last.size() == scene_.free.size(); // of a round before
     at_ = known ? last : scene_.nodes.was;
     turns_.solved = turns_.pairs.empty();
@@ -154,40 +156,67 @@ private:
   /// Pairs of every piece with whatever it is in.
   bool join(std::span<const Vec3> at, double depth) {
     bool joined = false;
-    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k) {
-      if (!scene_.placed[k])
-        continue;
-      const PlacedInstrument& instrument = *scene_.placed[k];
-      for (std::size_t number = 0; number < scene_.nodes.pieces.size(); ++number) {
-        const Facet& whole = scene_.nodes.pieces[number];
-        if (!scene_.nodes.meet(k, number))
-          continue;
-        // A piece can't be moved out while a corner that is held is in.
-        const std::optional<Facet> piece = part_of(whole, [&](std::uint32_t i) {
-          return i < scene_.nodes.moving ||
-                 instrument.distance(scene_.free[i]) >= -outside * instrument.radius;
-        });
-        if (!piece)
-          continue;
-        for_parts(
-            instrument, *piece, corners_of(*piece, at), instrument.radius,
-            [&](CorePart part, const Facet& corners) {
-              const auto found =
-                  nearest_points(instrument, part, corners_of(corners, at), corner_count(corners));
-              if (!found || found->behind || !(found->distance < (1 - depth) * instrument.radius))
-                return;
-              TouchPair pair{k, part, corners, *found, {}, {}};
-              const auto there = std::ranges::lower_bound(turns_.pairs, key_of(pair), {}, key_of);
-              if (there != turns_.pairs.end() && key_of(*there) == key_of(pair))
-                return;
-              if (!movable(pair))
-                return;
-              turns_.pairs.insert(there, pair);
-              joined = true;
-            });
-      }
-    }
+    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
+      for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p)
+        if (scene_.nodes.meet(k, p))
+          joined = join(k, scene_.nodes.pieces[p], at, depth) == Joined::fresh || joined;
     return joined;
+  }
+
+  enum class Joined { none, known, fresh };
+  Joined join(std::uint32_t k, const Facet& whole, std::span<const Vec3> at, double depth) {
+    const PlacedInstrument& instrument = *scene_.placed[k];
+    // A piece can't be moved out while a corner that is held is in.
+    const std::optional<Facet> piece = part_of(whole, [&](std::uint32_t i) {
+      return i < scene_.nodes.moving ||
+             instrument.distance(scene_.free[i]) >= -outside * instrument.radius;
+    });
+    Joined result = Joined::none;
+    if (!piece)
+      return result;
+    for_parts(instrument, *piece, corners_of(*piece, at), instrument.radius,
+              [&](CorePart part, const Facet& corners) {
+                const auto found = nearest_points(instrument, part, corners_of(corners, at),
+                                                  corner_count(corners));
+                if (!found || found->behind || !(found->distance < (1 - depth) * instrument.radius))
+                  return;
+                TouchPair pair{k, part, corners, *found, {}, {}};
+                const auto there = std::ranges::lower_bound(turns_.pairs, key_of(pair), {}, key_of);
+                if (there != turns_.pairs.end() && key_of(*there) == key_of(pair)) {
+                  result = std::max(result, Joined::known);
+                  return;
+                }
+                if (!movable(pair))
+                  return;
+                turns_.pairs.insert(there, pair);
+                result = Joined::fresh;
+              });
+    return result;
+  }
+
+  /// What pushed last time may now be so far behind an instrument that it is in it neither before
+  /// nor then: it joins where it passes.
+  void join_passed() {
+    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
+      for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p) {
+        if (!scene_.nodes.meet(k, p))
+          continue;
+        const Facet& piece = scene_.nodes.pieces[p];
+        const double radius = scene_.placed[k]->radius;
+        double far = 0;
+        for (const std::uint32_t i : piece)
+          far = std::max(far, norm(scene_.free[i] - scene_.nodes.was[i]));
+        if (!(far > 2 * radius) || join(k, piece, scene_.nodes.was, 0) != Joined::none ||
+            join(k, piece, scene_.free, outside) != Joined::none)
+          continue;
+        const double parts = std::min(std::ceil(far / radius), most_parts);
+        std::vector<Vec3> at(scene_.nodes.was);
+        for (double n = 1; n < parts; ++n) {
+          for (const std::uint32_t i : piece)
+            at[i] = scene_.nodes.was[i] + n / parts * (scene_.free[i] - scene_.nodes.was[i]);
+          (void)join(k, piece, at, 0);
+        }
+      }
   }
 
   Vec3 inward(const TouchPair& p) const {

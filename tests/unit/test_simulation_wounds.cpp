@@ -1,0 +1,416 @@
+// Scenes in which the walls of wounds touch: instruments, each other, what lies around.
+
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "contact/surface_facets.h"
+#include "contact_checks.h"
+#include "convex_meshes.h"
+#include "cut_bars.h"
+#include "larger.h"
+#include "simulation_scenes.h"
+#include "solid/solid_model.h"
+#include "tet_fixtures.h"
+#include "touching_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using namespace test;
+
+/// The two copies of each node of a wound at rest: that on the side of lower x first.
+std::vector<std::array<std::uint32_t, 2>> copies(const Model& model) {
+  std::map<std::tuple<double, double, double>, std::uint32_t> at;
+  std::vector<std::array<std::uint32_t, 2>> all;
+  const std::vector<Vec3> inward = inward_directions(model);
+  for (std::uint32_t i = 0; i < surface_count(model); ++i) {
+    const Vec3& p = model.nodes[i].position;
+    const auto [there, fresh] = at.try_emplace({p.x, p.y, p.z}, i);
+    if (fresh)
+      continue;
+    all.push_back({there->second, i});
+    if (inward[there->second].x > inward[i].x)
+      std::swap(all.back()[0], all.back()[1]);
+  }
+  return all;
+}
+
+Vec3 place(const Simulation& s, std::size_t object, std::uint32_t node) {
+  return s.model(object).nodes[node].position + vector_at(shape(s, object), node);
+}
+
+/// Pulled (or, below 0, pressed) at its end.
+void pull(Simulation& s, std::size_t object, double force) {
+  const std::vector<std::uint32_t> end =
+      nodes_where(s.model(object), [](const Vec3& p) { return p.x == 20; });
+  for (const std::uint32_t node : end)
+    s.apply(SetForce{object, {node}, {force / static_cast<double>(end.size()), 0, 0}});
+}
+
+/// How far the end has moved along the bar, in the mean.
+double end_moved(const Simulation& s, std::size_t object) {
+  const std::vector<double> u = shape(s, object);
+  const auto end = nodes_where(s.model(object), [](const Vec3& p) { return p.x == 20; });
+  double sum = 0;
+  for (const std::uint32_t node : end)
+    sum += u[3 * std::size_t{node}] / static_cast<double>(end.size());
+  return sum;
+}
+
+// ---- instruments
+
+enum class Tool { sphere, capsule, mesh };
+
+SetInstrument tool(Tool kind, double friction) {
+  SetInstrument set;
+  set.name = "tool";
+  set.shape.radius = 0.3; // elements are of 2.5
+  set.shape.friction = friction;
+  if (kind == Tool::capsule)
+    set.shape.axis = {0, 0, 6};
+  if (kind == Tool::mesh) {
+    set.shape.radius = 0.05;
+    set.shape.core = std::make_shared<const ConvexCore>(divided_box({0.2, 1.5, 4}, 1));
+  }
+  return set;
+}
+
+void expect_pushed_wall(const Simulation& s, bool sphere, double friction) {
+  const Model& model = s.model(0);
+  const InstrumentReport report = s.instrument(0);
+  const std::vector<NodeVector>& forces = s.contact_forces(0);
+  EXPECT_GE(forces.size(), 3U);
+  std::vector<std::uint32_t> left;
+  for (const auto& pair : copies(model))
+    left.push_back(pair[0]);
+  const std::vector<Vec3> inward = inward_directions(model);
+  Vec3 sum;
+  double sizes = 0;
+  for (const NodeVector& f : forces) {
+    EXPECT_TRUE(std::ranges::find(left, f.node) != left.end()) << f.node;
+    EXPECT_GT(dot(f.value, inward[f.node]), 0) << "it pulls at " << f.node;
+    sum += f.value;
+    sizes += norm(f.value);
+  }
+  EXPECT_LE(norm(sum + report.force), 1e-12 * norm(sum));
+  EXPECT_LE(test::surface_depth(model, shape(s, 0), PlacedInstrument(report.shape, report.pose)),
+            1e-6);
+  if (sphere) { // a point of it has no other arm
+    EXPECT_LE(norm(report.torque), (friction + 1e-7) * report.shape.radius * sizes);
+  }
+}
+
+class ToolsInWounds : public testing::TestWithParam<std::tuple<bool, Method>> {};
+INSTANTIATE_TEST_SUITE_P(Solids, ToolsInWounds,
+                         testing::Combine(testing::Bool(),
+                                          testing::Values(Method::ffe, Method::ela)));
+
+TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
+  const auto [quadratic, method] = GetParam();
+  for (const Tool kind : {Tool::sphere, Tool::capsule, Tool::mesh})
+    for (const double friction : {0.0, 0.4}) {
+      if (quadratic && (kind == Tool::mesh || (kind == Tool::sphere) == (friction == 0)))
+        continue;
+      SCOPED_TRACE(std::to_string(static_cast<int>(kind)) + " " + std::to_string(friction));
+      Simulation s(one_thread(), {});
+      s.add_object("bar", bar(quadratic), method);
+      s.apply(notch(s.model(0), 9.9));
+      pull(s, 0, 5e5);
+      for (int k = 0; k < (method == Method::ela ? 40 : 1); ++k)
+        s.step(1.0 / 60);
+      double least = HUGE_VAL;
+      Vec3 middle, across;
+      for (const auto& [left, right] : copies(s.model(0)))
+        if (const double off = norm(s.model(0).nodes[left].position - Vec3{9.2, 5, 7.5});
+            off < least) {
+          least = off;
+          across = place(s, 0, right) - place(s, 0, left);
+          middle = place(s, 0, left) + 0.5 * across;
+        }
+      ASSERT_GT(across.x, 2) << "it opens";
+      SetInstrument set = tool(kind, friction);
+      set.pose.place = middle + Vec3{0, 0.2, 0};
+      s.apply(set);
+      s.step(1.0 / 60);
+      EXPECT_TRUE(s.contact_forces(0).empty());
+      s.apply(MoveInstrument{0, middle + Vec3{-0.5 * norm(across) - 0.3, 0.4, -0.2}, {}, 0.1});
+      for (int k = 0; k < 10; ++k)
+        s.step(1.0 / 60);
+      for (int k = 0; k < 4; ++k) {
+        s.step(1.0 / 600); // a single step, whose forces are no means
+        expect_pushed_wall(s, kind == Tool::sphere, friction);
+      }
+      if (kind != Tool::sphere) // which reach out of the wound
+        continue;
+      // Without the wound it is inside, where no surface is.
+      s.apply(Restore{0});
+      for (int k = 0; k < 2; ++k)
+        s.step(1.0 / 600);
+      EXPECT_TRUE(s.contact_forces(0).empty());
+    }
+}
+
+// ---- walls
+
+/// A bar as test::bar of larger elements, whose motion comes to rest.
+Model short_bar(bool quadratic) {
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.3}};
+  options.quadratic = quadratic;
+  options.drag_rate = 40;
+  Model model = solid_model(box_tetrahedra(4, 2, 2, 5), options, {});
+  for (Node& node : model.nodes)
+    node.fixed = node.position.x == 0 ? fixed_all : fixed_none;
+  return model;
+}
+
+const PlaneToCut slanted{{{9.7, 5, 5}, {1, 0.1, 0.2}}, {}};
+
+/// The least gap of a wound's nodes over the triangles of the other wall, straight.
+double wall_gap(const Simulation& s) {
+  const Model& model = s.model(0);
+  std::map<std::uint32_t, int> side;
+  for (const auto& [left, right] : copies(model)) {
+    side[left] = -1;
+    side[right] = 1;
+  }
+  double least = HUGE_VAL;
+  for (const Triangle& t : model.triangles) {
+    const Vec3& rest = model.nodes[t[0]].position;
+    const Vec3 n = cross(model.nodes[t[1]].position - rest, model.nodes[t[2]].position - rest);
+    int which = 0;
+    for (const std::uint32_t corner : t)
+      which += side.contains(corner) ? side.at(corner) : 0;
+    if (which == 0 || std::abs(n.x) < 0.9 * norm(n))
+      continue;
+    const Vec3 a = place(s, 0, t[0]), b = place(s, 0, t[1]) - a, c = place(s, 0, t[2]) - a;
+    const Vec3 now = cross(b, c);
+    for (const auto& [node, of] : side) {
+      if (of * which > 0)
+        continue;
+      const Vec3 off = place(s, 0, node) - a;
+      const double second = dot(cross(off, c), now) / dot(now, now),
+                   third = dot(cross(b, off), now) / dot(now, now);
+      if (second >= 0 && third >= 0 && second + third <= 1)
+        least = smaller(least, dot(off, now) / norm(now));
+    }
+  }
+  return least / 5;
+}
+
+class Wounds : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Orders, Wounds, testing::Bool());
+
+TEST_P(Wounds, HalvesThatArePressedTogetherDoNotPass) {
+  double whole = 0;
+  for (const std::string how : {"whole", "touch", "pass"}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(GetParam()), Method::ela);
+    if (how == "touch")
+      s.apply(SetContact{0, 0, 0.8});
+    if (how != "whole")
+      s.apply(CutObject{0, slanted});
+    const std::size_t last = s.object_count() - 1;
+    ASSERT_EQ(last, how == "whole" ? 0U : 1U);
+    pull(s, last, -1e5);
+    for (int k = 0; k < (GetParam() ? 5 : 10); ++k) {
+      s.step(1.0 / 60);
+      if (how != "touch")
+        continue;
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      const Vec3 one = sum_of_forces(s, 0);
+      EXPECT_LE(norm(one + sum_of_forces(s, 1)), 1e-11 * norm(one));
+    }
+    const double moved = end_moved(s, last);
+    if (how == "whole")
+      whole = moved;
+    else if (how == "touch") {
+      EXPECT_NEAR(moved, whole, 0.05 * std::abs(whole)) << "as if it were one";
+      EXPECT_NEAR(norm(sum_of_forces(s, 1)), 1e5, 1e3);
+    } else {
+      EXPECT_LT(moved, -10) << "through each other";
+    }
+  }
+}
+
+TEST_P(Wounds, WhatComesOffFallsOnWhatItsParentTouched) {
+  for (const bool meets : {true, false}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(GetParam()), Method::ela);
+    SolidModelOptions options;
+    options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.3}};
+    options.quadratic = GetParam();
+    Model plate = solid_model(box_tetrahedra(4, 3, 1, 7), options, {});
+    for (Node& node : plate.nodes) {
+      node.fixed = node.position.z == 0 ? fixed_all : fixed_none;
+      node.position += Vec3{-1, -6, -9};
+    }
+    s.add_object("plate", plate, Method::ela);
+    s.apply(SetGravity{{0, 0, -9810}});
+    if (meets)
+      s.apply(SetContact{0, 1, 0.8});
+    s.step(0.01);
+    s.apply(CutObject{0, slanted});
+    ASSERT_EQ(s.object_count(), 3U);
+    double up = 0;
+    for (int k = 0; k < 24; ++k) {
+      s.step(1.0 / 60);
+      if (!meets)
+        continue;
+      EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+      const Vec3 force = sum_of_forces(s, 2);
+      EXPECT_GE(force.z, 0);
+      EXPECT_LE(norm(force + sum_of_forces(s, 1)), 1e-11 * norm(force));
+      up += k < 12 ? 0 : force.z / 12;
+    }
+    if (meets)
+      EXPECT_NEAR(up, weight_of(s, 2), 0.1 * weight_of(s, 2));
+    else
+      EXPECT_LT(shape(s, 2)[2], -50) << "it falls through";
+  }
+}
+
+TEST(WoundScenes, ItsWallsDoNotPass) {
+  double whole = 0;
+  for (const std::string how : {"whole", "touch", "pass"}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", short_bar(false), Method::ela);
+    if (how == "touch")
+      s.apply(SetContact{0, 0, 0.8});
+    if (how != "whole")
+      s.apply(CutObject{0, PlaneToCut{slanted.plane, nodes_where(s.model(0), [](const Vec3& p) {
+                                        return p.z > 2;
+                                      })}});
+    ASSERT_EQ(s.object_count(), 1U);
+    pull(s, 0, -1e5);
+    for (int k = 0; k < 10; ++k)
+      s.step(1.0 / 60);
+    const double moved = end_moved(s, 0);
+    if (how == "whole") {
+      whole = moved;
+    } else if (how == "touch") {
+      EXPECT_NEAR(moved, whole, 0.1 * std::abs(whole)) << "closed, it is as if it were whole";
+      EXPECT_GE(wall_gap(s), -1e-2);
+      EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-9 * 1e5) << "what it does to itself";
+    } else {
+      EXPECT_LT(moved, 1.5 * whole) << "it bends into itself";
+    }
+  }
+}
+
+TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
+  for (const bool meets : {true, false}) {
+    Simulation s(one_thread(), {});
+    Model held = block(3, 3, 3, {}, true);
+    add(s, "block", held);
+    s.apply(SetGravity{{0, 0, -9810}});
+    if (meets)
+      s.apply(SetContact{0, 0, 0.5});
+    s.step(0.01);
+    s.apply(CutObject{0, PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
+    ASSERT_EQ(s.object_count(), 2U);
+    for (int k = 0; k < 10; ++k) {
+      s.step(1.0 / 60);
+      if (meets) {
+        EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      }
+    }
+    if (meets) {
+      const Vec3 up = sum_of_forces(s, 1);
+      EXPECT_NEAR(up.z, weight_of(s, 1), 0.1 * weight_of(s, 1));
+      EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-11 * norm(up));
+    } else {
+      EXPECT_LT(shape(s, 1)[2], -10) << "through its parent";
+    }
+  }
+}
+
+/// The part of an elastostatic object moves, and may touch what moves: the object itself may not.
+TEST(WoundScenes, WhatComesOffAnElastostaticObjectMayTouchWhatMoves) {
+  Simulation s(one_thread(), {});
+  s.add_object("bar", short_bar(false), Method::ffe);
+  Model plate = block(8, 6, 1, {-4, -7, -9});
+  for (Node& node : plate.nodes)
+    node.fixed = node.position.z == -9 ? fixed_all : fixed_none;
+  add(s, "plate", plate);
+  s.apply(SetGravity{{0, 0, -9810}});
+  s.step(0.01);
+  s.apply(CutObject{0, slanted});
+  ASSERT_EQ(s.object_count(), 3U);
+  try {
+    s.apply(SetContact{0, 2, 0});
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "object bar is elastostatic (ffe), expected ela objects for contact");
+  }
+  s.apply(SetContact{2, 1, 0.8});
+  for (int k = 0; k < 16; ++k) {
+    s.step(1.0 / 60);
+    EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+  }
+  EXPECT_GT(sum_of_forces(s, 2).z, 0.5 * weight_of(s, 2));
+}
+
+TEST(WoundScenes, RestoreTakesTheWallsOutOfContact) {
+  Simulation s(one_thread(), {}), never(one_thread(), {});
+  for (Simulation* const one : {&s, &never}) {
+    one->add_object("bar", short_bar(false), Method::ela);
+    one->apply(SetContact{0, 0, 0.3});
+    pull(*one, 0, -1e5);
+    one->step(1.0 / 60);
+  }
+  s.apply(CutObject{0, PlaneToCut{slanted.plane,
+                                  nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
+  for (int k = 0; k < 4; ++k)
+    s.step(1.0 / 60);
+  EXPECT_FALSE(s.contact_forces(0).empty());
+  s.apply(Restore{0});
+  EXPECT_EQ(s.model(0), never.model(0));
+  for (int k = 0; k < 20; ++k)
+    s.step(1.0 / 60);
+  EXPECT_TRUE(s.contact_forces(0).empty());
+  for (int k = 0; k < 24; ++k)
+    never.step(1.0 / 60);
+  EXPECT_NEAR(end_moved(s, 0), end_moved(never, 0), 0.02 * std::abs(end_moved(never, 0)));
+}
+
+TEST(WoundScenes, AStepThatFailsLeavesTheSurfaceThatTouches) {
+  const auto run = [](bool fails) {
+    Simulation s(one_thread(), {.guard = true});
+    add(s, "block", block(3, 3, 3, {}, true));
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(SetContact{0, 0, 0.5});
+    s.step(0.01);
+    if (fails) {
+      s.schedule(0.015, CutObject{0, PlaneToCut{{{0, 0, 6.6}, {0.05, 0.02, 1}}, {}}});
+      s.schedule(0.018, CutObject{0, PlaneToCut{{{0, 0, 500}, {0, 0, 1}}, {}}}); // misses
+      EXPECT_THROW(s.step(0.01), Error);
+      EXPECT_EQ(s.object_count(), 1U);
+    }
+    s.step_to(0.014);
+    EXPECT_TRUE(s.contact_forces(0).empty());
+    return shape(s, 0);
+  };
+  const std::vector<double> once = run(false), again = run(true);
+  double most = 0;
+  for (std::size_t k = 0; k < once.size(); ++k)
+    most = larger(most, std::abs(once[k] - again[k]));
+  EXPECT_LE(most, 1e-3 * block_edge); // what was learned is forgotten
+}
+
+} // namespace
+} // namespace gewebe
