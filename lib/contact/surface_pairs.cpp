@@ -37,7 +37,7 @@ Vec3 point_of(const Facet& f, const std::array<double, 3>& weights, std::span<co
 SurfacePair node_pair(std::uint32_t meeting, bool first, int side, std::uint32_t node,
                       const Facet& f, const std::array<double, 3>& w) {
   return {meeting, first, false, side, {node, f[0], f[1], f[2]}, {1, -w[0], -w[1], -w[2]},
-          {},      0,     false};
+          {},      0,     false, false};
 }
 
 Box3 grown(Box3 box, double by) {
@@ -270,15 +270,19 @@ void SurfacePairs::follow_node(SurfacePair& pair, std::span<const Vec3> at) cons
     weights = some;
   };
   look(before);
-  for (const std::uint32_t corner : before)
-    for (const std::uint32_t number : facets_.at_node(corner)) {
-      const Facet& f = facets_.facets()[number];
-      if (f != before && is_triangle(f) && dot(face_normal(f, at), own) < 0 &&
-          !(m.itself() && around(node, f)))
-        look(f);
-    }
+  if (!pair.more)
+    for (const std::uint32_t corner : before)
+      for (const std::uint32_t number : facets_.at_node(corner)) {
+        const Facet& f = facets_.facets()[number];
+        if (f != before && is_triangle(f) && dot(face_normal(f, at), own) < 0 &&
+            !(m.itself() && around(node, f)))
+          look(f);
+      }
+  const bool more = pair.more;
   pair = node_pair(pair.meeting, pair.first_side, pair.side, node, piece, weights);
-  pair.normal = pair.side * normal_at(piece, weights, at);
+  pair.more = more;
+  const Vec3 across = face_normal(piece, at);
+  pair.normal = pair.side * (more ? across / norm(across) : normal_at(piece, weights, at));
   const Vec3 off = p - point_of(piece, weights, at);
   pair.gap = dot(pair.normal, off);
   pair.apart = is_beside(pair, off, at);

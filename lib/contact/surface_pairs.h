@@ -65,15 +65,19 @@ struct SurfacePair {
   Vec3 normal;                          ///< out of the second
   double gap = 0;                       ///< along it
   bool apart = false;                   ///< beside each other: whatever the gap is, they don't meet
+  /// A node and a triangle that it has passed while another one held it, as in a valley between
+  /// both: it meets this one beside its nearest, and along its plane's normal.
+  bool more = false;
 
   auto key() const {
     return std::tuple(meeting, edges, !first_side, side, nodes[0], rest_of_key());
   }
 
 private:
-  /// Of a node one triangle is met.
+  /// Of a node one triangle is met, and such as it has passed beside.
   std::array<std::uint32_t, 3> rest_of_key() const {
-    return edges ? std::array{nodes[1], nodes[2], nodes[3]} : std::array<std::uint32_t, 3>{};
+    return edges || more ? std::array{nodes[1], nodes[2], nodes[3]}
+                         : std::array<std::uint32_t, 3>{};
   }
 };
 
@@ -112,7 +116,7 @@ public:
                                        std::span<const double> was, double depth);
 
   /// Takes a pair's points, normal and gap to nodes at these places; that of a node to the nearest
-  /// triangle around its own one. \param at by node, of the surface's at least
+  /// triangle around its own one, unless it has more. \param at by node, of the surface's at least
   void follow(SurfacePair& pair, std::span<const Vec3> at) const;
 
 private:

@@ -158,6 +158,7 @@ void SurfacePairs::nodes_passed(std::uint32_t meeting, bool first, std::span<con
                {1, -weights[0], -weights[1], -weights[2]},
                side / area * across,
                gap,
+               false,
                false}};
     });
     for (const auto& best : earliest)
@@ -231,6 +232,7 @@ void SurfacePairs::edges_passed(std::uint32_t meeting, std::span<const Vec3> at,
                        shares(parts),
                        side / size * then,
                        gap,
+                       false,
                        false});
     };
     tree_.visit_near(box, [&](std::uint32_t number) {

@@ -30,6 +30,14 @@ constexpr int turns_of_step = 400;   ///< behind which its forces are told not t
 constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
 constexpr int max_asked = 8;         ///< times that triangles beyond the operator's nodes are met
 constexpr int max_waits = 40;        ///< for instruments
+constexpr double valley = 0.9;       ///< cosine of the angle from where on a node meets both sides
+
+/// Whether a node meets two triangles at a corner of both, at an angle to each other.
+bool is_valley(const SurfacePair& p, const SurfacePair& q) {
+  return !p.edges && p.nodes != q.nodes && dot(p.normal, q.normal) < valley &&
+         std::find_first_of(p.nodes.begin() + 1, p.nodes.end(), q.nodes.begin() + 1,
+                            q.nodes.end()) != p.nodes.end();
+}
 
 } // namespace
 
@@ -121,12 +129,22 @@ bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool passed) {
     if (begun_)
       found.resize(max_new);
   }
-  for (const SurfacePair& p : found) {
+  for (SurfacePair p : found) {
     if (is_held(p) || (!passed && !(p.gap < target_of(p) - surface_depth * pairs_.edge())))
       continue;
-    const auto there = std::ranges::lower_bound(
-        all_, p.key(), {}, [](const SurfacePush& push) { return push.pair.key(); });
-    if (there != all_.end() && there->pair.key() == p.key()) {
+    const auto place_of = [&] {
+      return std::ranges::lower_bound(all_, p.key(), {},
+                                      [](const SurfacePush& push) { return push.pair.key(); });
+    };
+    const auto is_there = [&](const auto& at) {
+      return at != all_.end() && at->pair.key() == p.key();
+    };
+    auto there = place_of();
+    if (passed && is_there(there) && there->force != Vec3{} && is_valley(there->pair, p)) {
+      p.more = true;
+      there = place_of();
+    }
+    if (is_there(there)) {
       // One that let go, as if beside, has passed nevertheless.
       if (passed && there->force == Vec3{}) {
         *there = {p, {}, true};
@@ -379,7 +397,7 @@ std::vector<SurfacePush> MeetingYielding::Work::kept() const {
   std::vector<SurfacePush> some;
   for (const SurfacePush& p : all_)
     if (norm(p.force) > next_to_nothing * largest ||
-        (!p.pair.edges && !p.pair.apart && p.pair.gap < keep_near * pairs_.edge()))
+        (!p.pair.edges && !p.pair.more && !p.pair.apart && p.pair.gap < keep_near * pairs_.edge()))
       some.push_back(p);
   return some;
 }

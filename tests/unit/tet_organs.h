@@ -9,11 +9,8 @@
 
 namespace gewebe::test {
 
-/// Its longest side is so many cells; empty where there is no such file.
-inline TetMesh organ_tetrahedra(const std::string& file, double cells) {
-  const TriangleMesh surface = load_test_mesh(file);
-  if (surface.triangles.empty())
-    return {};
+/// What is in a closed surface, its longest side so many cells.
+inline TetMesh surface_tetrahedra(const TriangleMesh& surface, double cells) {
   const double cell = bounding_box(surface).longest_side() / cells;
   VoxelizeOptions exact;
   exact.samples = 3;
@@ -22,6 +19,12 @@ inline TetMesh organ_tetrahedra(const std::string& file, double cells) {
   StuffingOptions options;
   options.cell = cell;
   return stuff({}, grid, options);
+}
+
+/// As that; empty where there is no such file.
+inline TetMesh organ_tetrahedra(const std::string& file, double cells) {
+  const TriangleMesh surface = load_test_mesh(file);
+  return surface.triangles.empty() ? TetMesh{} : surface_tetrahedra(surface, cells);
 }
 
 } // namespace gewebe::test
