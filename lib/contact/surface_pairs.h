@@ -65,8 +65,8 @@ struct SurfacePair {
   Vec3 normal;                          ///< out of the second
   double gap = 0;                       ///< along it
   bool apart = false;                   ///< beside each other: whatever the gap is, they don't meet
-  /// A node and a triangle that it has passed while another one held it, as in a valley between
-  /// both: it meets this one beside its nearest, and along its plane's normal.
+  /// A node and a triangle that it has passed while another one beside that held it, as in a valley
+  /// between both: it meets this one beside its nearest, and along its plane's normal.
   bool more = false;
 
   auto key() const {

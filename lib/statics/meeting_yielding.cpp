@@ -30,11 +30,12 @@ constexpr int turns_of_step = 400;   ///< behind which its forces are told not t
 constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
 constexpr int max_asked = 8;         ///< times that triangles beyond the operator's nodes are met
 constexpr int max_waits = 40;        ///< for instruments
-constexpr double valley = 0.9;       ///< cosine of the angle from where on a node meets both sides
+constexpr double fold = 0.9;         ///< cosine of the angle from where on a node meets both sides
 
-/// Whether a node meets two triangles at a corner of both, at an angle to each other.
-bool is_valley(const SurfacePair& p, const SurfacePair& q) {
-  return !p.edges && p.nodes != q.nodes && dot(p.normal, q.normal) < valley &&
+/// Whether a node that one triangle holds has passed another one that hangs together with that, at
+/// an angle: it slid into a valley, or went through a ridge from one side to the other.
+bool passed_beside(const SurfacePair& p, const SurfacePair& q) {
+  return !p.edges && p.nodes != q.nodes && dot(p.normal, q.normal) < fold &&
          std::find_first_of(p.nodes.begin() + 1, p.nodes.end(), q.nodes.begin() + 1,
                             q.nodes.end()) != p.nodes.end();
 }
@@ -140,7 +141,10 @@ bool MeetingYielding::Work::join(std::vector<SurfacePair> found, bool passed) {
       return at != all_.end() && at->pair.key() == p.key();
     };
     auto there = place_of();
-    if (passed && is_there(there) && there->force != Vec3{} && is_valley(there->pair, p)) {
+    // Not of one surface: beside the front of a wound, where its walls meet at an angle, what keeps
+    // a node in front of both would push one wall into the other.
+    if (passed && is_there(there) && there->force != Vec3{} &&
+        !pairs_.meetings()[p.meeting].itself() && passed_beside(there->pair, p)) {
       p.more = true;
       there = place_of();
     }
