@@ -281,8 +281,12 @@ void SurfacePairs::follow_node(SurfacePair& pair, std::span<const Vec3> at) cons
   const bool more = pair.more;
   pair = node_pair(pair.meeting, pair.first_side, pair.side, node, piece, weights);
   pair.more = more;
-  const Vec3 across = face_normal(piece, at);
-  pair.normal = pair.side * (more ? across / norm(across) : normal_at(piece, weights, at));
+  if (more) {
+    const Vec3 across = face_normal(piece, at);
+    pair.normal = pair.side * (across / norm(across));
+  } else {
+    pair.normal = pair.side * normal_at(piece, weights, at);
+  }
   const Vec3 off = p - point_of(piece, weights, at);
   pair.gap = dot(pair.normal, off);
   pair.apart = is_beside(pair, off, at);

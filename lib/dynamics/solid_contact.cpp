@@ -115,11 +115,7 @@ public:
   }
 
   std::span<const double> shape() override {
-    const std::span<const double> places = step_.engine.places();
-    shape_.resize(places.size());
-    for (std::uint32_t i = 0; i < all_.model_.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a)
-        shape_[axis_of(i, a)] = places[axis_of(i, a)] - all_.model_.nodes[i].position[a];
+    shape_ = shape_at(all_.model_, step_.engine.places());
     return shape_;
   }
 

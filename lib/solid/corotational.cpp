@@ -14,8 +14,9 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t grain = 128; // groups of a block, whose results are summed by themselves
-constexpr std::size_t worth_threads = 4096; // groups times nodes of one
-constexpr std::size_t worth_threads_turns = 1024;
+// From where on other threads are worth it, see parallel_blocks_if.
+constexpr std::size_t worth_threads = 4096;       // groups times nodes of an element
+constexpr std::size_t worth_threads_turns = 1024; // sums of four nodes
 
 /// Sums of what tetrahedra bring to their nodes: first by blocks of groups, whose sums stay in the
 /// cache, then those of the blocks that a node is in, in order.

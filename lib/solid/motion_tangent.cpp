@@ -18,6 +18,9 @@ namespace gewebe {
 
 namespace {
 
+// Elements from where on other threads are worth it, see parallel_blocks_if.
+constexpr std::size_t worth_linear = 128, worth_quadratic = 32;
+
 /// What the turning of the frame adds to the tangent of a corotational element, where positive:
 /// the energy aᵀ m a of a = Rᵀ curl of the displacement, over twice the volume. Exact for linear
 /// elements without damping.
@@ -58,7 +61,7 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
   const std::size_t count = solid_nodes(body.mesh);
   const auto order = static_cast<Eigen::Index>(3 * count);
   std::vector<Numbers> of_element(body.elements.size());
-  const bool worth = body.elements.size() >= (count == 10 ? 32 : 128);
+  const bool worth = body.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
   const auto respond = [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {

@@ -8,6 +8,13 @@
 
 namespace gewebe {
 
+namespace {
+
+// Elements from where on other threads are worth it, see parallel_blocks_if.
+constexpr std::size_t worth_linear = 1024, worth_quadratic = 128;
+
+} // namespace
+
 SolidEnergy::SolidEnergy(const MotionBody& body, const SolidNet& net,
                          const SolidMotionOptions& options)
     : body_(body), law_(options.law), springs_(net.springs),
@@ -40,7 +47,7 @@ double SolidEnergy::hyperelastic(const Numbers& at, std::span<double> forces,
   const std::size_t count = solid_nodes(body_.mesh);
   Numbers energy(body_.elements.size());
   std::vector<std::array<Vec3, 10>> part(body_.elements.size());
-  const bool worth = body_.elements.size() >= (count == 10 ? 128 : 1024);
+  const bool worth = body_.elements.size() >= (count == 10 ? worth_quadratic : worth_linear);
   const auto respond = [&](std::size_t begin, std::size_t end) {
     HyperelasticResponse response;
     for (std::size_t t = begin; t < end; ++t) {

@@ -197,6 +197,7 @@ private:
   /// What pushed last time may now be so far behind an instrument that it is in it neither before
   /// nor then: it joins where it passes.
   void join_passed() {
+    std::vector<Vec3> at; // on its way: of the piece that is looked at, else before it
     for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
       for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p) {
         if (!scene_.nodes.meet(k, p))
@@ -210,12 +211,15 @@ private:
             join(k, piece, scene_.free, outside) != Joined::none)
           continue;
         const double parts = std::min(std::ceil(far / radius), most_parts);
-        std::vector<Vec3> at(scene_.nodes.was);
+        if (at.empty())
+          at = scene_.nodes.was;
         for (double n = 1; n < parts; ++n) {
           for (const std::uint32_t i : piece)
             at[i] = scene_.nodes.was[i] + n / parts * (scene_.free[i] - scene_.nodes.was[i]);
           (void)join(k, piece, at, 0);
         }
+        for (const std::uint32_t i : piece)
+          at[i] = scene_.nodes.was[i];
       }
   }
 

@@ -43,7 +43,6 @@ TEST_P(PressedBalls, RestOnEachOther) {
   Press press;
   press.force = kinds.force;
   press.friction = 0.3;
-  press.look_at_ways = false;
   expect_fair(pressed_together(below, above, press), press.force);
 }
 
@@ -61,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, PressedBalls,
                          testing::Values(Kinds{true, true, 5e5}, Kinds{false, false, 3e4},
                                          Kinds{true, false, 3e4}));
 
-/// A node comes to lie in a valley, between two triangles that both push it.
+/// A node that one triangle holds comes to pass another one beside it, through a ridge.
 TEST(Touch, ALiverRestsOnASpleen) {
   const TriangleMesh spleen = load_test_mesh("hubmap_F_spleen_uv.obj"),
                      liver = load_test_mesh("sofa_liver_smooth.obj");
@@ -74,7 +73,6 @@ TEST(Touch, ALiverRestsOnASpleen) {
   const Model above = solid_of(stuffed(placed(liver, tall, {1.7, 0.9, box.max.z + 1}), 6));
   Press press;
   press.force = 5e5;
-  press.look_at_ways = false;
   expect_fair(pressed_together(below, above, press), press.force);
 }
 
@@ -86,7 +84,6 @@ TEST(Touch, AFoldedTubeTouchesItself) {
     Press press;
     press.force = 5e5;
     press.meet = meets;
-    press.look_at_ways = false;
     const Rest rest = folded(model, ends_of(model, true), ends_of(model, false), press);
     EXPECT_TRUE(rest.rests);
     if (!meets) {

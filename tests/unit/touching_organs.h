@@ -165,13 +165,11 @@ inline Pushed pushed(const Simulation& s, std::size_t object) {
 
 struct Rest {
   bool rests = false;
-  double time = 0;         ///< s of the scene
   Vec3 up;                 ///< force on the upper one
   double size = 0;         ///< of all forces on it, or on what touches itself
   double off = 0;          ///< of that: the most in any step that nobody answers
-  Overlap inside, way;     ///< at rest, and the most on the way
+  Overlap inside;          ///< at rest
   std::size_t touched = 0; ///< its nodes at rest
-  std::uint64_t unsolved = 0, problems = 0, steps = 0;
 };
 
 constexpr double press_step = 1.0 / 60;
@@ -225,21 +223,12 @@ struct Press {
   double longest = 3;  ///< s that it may take to rest
   double friction = 0; ///< Coulomb's
   bool meet = true;
-  bool look_at_ways = true;
 };
 
 /// Presses the upper end of an object straight down.
 inline void press_down(Simulation& s, std::size_t object, const std::vector<std::uint32_t>& led,
                        double force) {
   s.apply(SetForce{object, led, {0, 0, -force / static_cast<double>(led.size())}});
-}
-
-inline void finish(const Simulation& s, Rest& rest) {
-  rest.time = s.time();
-  const SolidStepCounts counts = s.counts().solids;
-  rest.unsolved = counts.touches.unsolved;
-  rest.problems = counts.touches.problems;
-  rest.steps = counts.steps;
 }
 
 /// Presses the upper one, by its upper end, onto the lower one, which is held below.
@@ -274,11 +263,8 @@ inline Rest pressed_together(Model below, Model above, const Press& press) {
     rest.touched = one.nodes;
     if (one.size > 0 || other.size > 0)
       rest.off = larger(rest.off, norm(one.sum + other.sum) / smaller(one.size, other.size));
-    if (press.look_at_ways)
-      rest.way.add(overlap_now());
   });
   rest.inside = overlap_now();
-  finish(s, rest);
   return rest;
 }
 
@@ -302,11 +288,8 @@ inline Rest folded(Model model, const std::vector<std::uint32_t>& held,
     rest.touched = all.nodes;
     if (all.size > 0)
       rest.off = larger(rest.off, norm(all.sum) / all.size);
-    if (press.look_at_ways)
-      rest.way.edges = larger(rest.way.edges, depth_in_itself(surface_of(s, 0), edge));
   });
   rest.inside.edges = depth_in_itself(surface_of(s, 0), edge);
-  finish(s, rest);
   return rest;
 }
 
