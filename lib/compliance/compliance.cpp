@@ -124,6 +124,10 @@ void Compliance::need_blocks(std::span<const std::uint32_t> nodes) {
 ComplianceBlock Compliance::block(std::uint32_t node, std::uint32_t other) const {
   if (const ForwardBlocks* const blocks = source_->blocks(); blocks != nullptr)
     return blocks->block(node, other);
+  return column_block(node, other);
+}
+
+ComplianceBlock Compliance::column_block(std::uint32_t node, std::uint32_t other) const {
   if (compressed(node) && outer(other))
     return compressed_->block(node, other);
   ComplianceBlock block{};

@@ -43,6 +43,8 @@ public:
   void need_blocks(std::span<const std::uint32_t> nodes);
   /// \pre both nodes were among those of the last need_blocks; 0 where an axis is fixed
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
+  /// The same of columns, bit by bit as `entry`. \pre the node was among those of the last need
+  ComplianceBlock column_block(std::uint32_t node, std::uint32_t other) const;
 
   // ---- rows
 

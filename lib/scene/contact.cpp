@@ -259,6 +259,7 @@ void follow_instruments(World& w, Object& object) {
   }
   w.now.counts.touches.add(object.contact->take_counts());
   object.shown.touches = object.contact->touches();
+  object.shown.points = object.contact->points();
   for (std::size_t k = 0; k < count; ++k)
     if (pose_at(w, w.now.poses.size() - 1, k) && gives_way_to(w, w.now.instruments[k], object))
       settle(w, k, object);

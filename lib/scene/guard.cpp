@@ -45,7 +45,7 @@ void take_back(World& w, Saved&& saved) noexcept {
     renew(object);
     if (object.contact) // as it was, with what it touched
       object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
-                                                       object.shown.touches);
+                                                       object.shown.touches, object.shown.points);
     w.renewed.push_back(i);
   }
 }

@@ -136,6 +136,7 @@ struct Shown {
   CopyOnWrite<std::vector<double>> displacement{}, whole{};
   CopyOnWrite<std::vector<NodeVector>> forces{};
   std::vector<NodeTouch> touches{};
+  std::vector<PointTouch> points{}; ///< of these, of an elastostatic object
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
   std::shared_ptr<const DeferredShape>

@@ -10,10 +10,21 @@ BentCompliance::BentCompliance(const Compliance& w, std::vector<Index> rows, Mat
     : w_(w), rows_(std::move(rows)), h_(std::move(h)) {
   if (rows_.empty())
     return;
-  const MatrixXd some = w_(Eigen::all, rows_);
-  spread_ = some * h_;
-  const MatrixXd own = spread_(rows_, Eigen::all);
-  lu_.compute(MatrixXd::Identity(own.rows(), own.cols()) - own);
+  // Instruments apart from each other share no rows: most of H is 0.
+  spread_ = MatrixXd::Zero(w_.rows(), h_.cols());
+  for (Index c = 0; c < h_.cols(); ++c)
+    for (Index r = 0; r < h_.rows(); ++r)
+      if (h_(r, c) != 0)
+        spread_.col(c) += h_(r, c) * w_.col(rows_[static_cast<std::size_t>(r)]);
+  MatrixXd own = MatrixXd::Identity(h_.rows(), h_.cols());
+  own -= spread_(rows_, Eigen::all);
+  lu_.compute(own);
+  for (Index r = 0, next = 0; r < w_.rows(); ++r)
+    if (next < std::ssize(rows_) && rows_[static_cast<std::size_t>(next)] == r)
+      ++next;
+    else
+      others_.push_back(r);
+  spread_ = spread_(others_, Eigen::all).eval();
 }
 
 void BentCompliance::apply(MatrixXd& columns) const {
@@ -21,7 +32,9 @@ void BentCompliance::apply(MatrixXd& columns) const {
     return;
   const MatrixXd some = columns(rows_, Eigen::all);
   const MatrixXd bent = lu_.solve(some);
-  columns += spread_ * bent;
+  columns(rows_, Eigen::all) = bent;
+  if (!others_.empty())
+    columns(others_, Eigen::all) += spread_ * bent;
 }
 
 VectorXd BentCompliance::turning(const VectorXd& x) const {

@@ -25,8 +25,8 @@ public:
 
 private:
   Compliance w_;
-  std::vector<Eigen::Index> rows_;
-  Eigen::MatrixXd h_, spread_; ///< H, and W H of these columns
+  std::vector<Eigen::Index> rows_, others_; ///< on which forces turn, and do not
+  Eigen::MatrixXd h_, spread_;              ///< H, and rows of W H on which they don't turn
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
 };
 

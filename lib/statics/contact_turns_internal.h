@@ -7,7 +7,9 @@
 // Forces turn and wander over the surface with the nodes they push: with H = ∂(Bᵀf)/∂x at the last
 // forces, B the weights of the points, x = (1 - W H)⁻¹ (x_free + W (Bᵀ f - H x_last)), which is
 // Newton's method on the conditions of the energy's minimum. Less of it is taken where it isn't
-// stable; near the end, where that is so only but for the contacts, these hold their points.
+// stable; near the end, where that is so only but for the contacts, these hold their points. Turns
+// that begin with the last forces end before one that would change less than 1e-9, by what the last
+// ones changed.
 
 #include "contact/surface_parts.h"
 #include "contact/surface_point.h"
@@ -49,6 +51,7 @@ struct ContactNodes {
 };
 
 struct ContactTurns {
+  std::vector<TouchPair> last;  ///< what pushed the nodes to where they were, if that was near
   std::vector<TouchPair> pairs; ///< in and out: all that were ever nearer than the radius
   std::vector<Vec3> at;         ///< the nodes' places
   bool solved = true;

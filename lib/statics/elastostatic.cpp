@@ -279,9 +279,15 @@ struct Elastostatic::State {
       throw Error("the columns of " + std::to_string(all.size()) +
                   " nodes in contact do not fit in memory, expected more of it or fewer contacts");
     compliance.need(all);
-    symmetric([&](std::size_t c, std::size_t r) {
-      return compliance.entry(node_at(c), axis_at(c), where[r]);
-    });
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t j = i; j < nodes.size(); ++j) {
+        const ComplianceBlock own = compliance.column_block(nodes[i], nodes[j]);
+        for (std::size_t a = 0; a < 3; ++a)
+          for (std::size_t b = i == j ? a : 0; b < 3; ++b) {
+            const std::size_t c = 3 * i + a, r = 3 * j + b;
+            delassus.compliance[c * size + r] = delassus.compliance[r * size + c] = own[a][b];
+          }
+      }
     delassus.free = answer.at(now, where);
     if (now.displacement.empty())
       return delassus;

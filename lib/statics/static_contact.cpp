@@ -18,7 +18,8 @@ namespace {
 constexpr std::size_t max_new = 256; ///< pieces that join at once, the deepest
 constexpr double outside = 1e-9;     ///< of the radius: so deep is not inside
 constexpr double deep = 1e-6;
-constexpr int max_rounds = 300; ///< until an object agrees
+constexpr int max_rounds = 300;    ///< until an object agrees
+constexpr double short_way = 0.05; ///< of the radius: the last forces tell how the next ones turn
 /// Rounds whose forces were not found, in all: what comes of such is not exact anyway.
 constexpr std::size_t max_vain_pairs = 256;
 
@@ -42,6 +43,34 @@ double distance_of(const PlacedInstrument& instrument, const Facet& piece,
                 least = found->distance;
             });
   return least;
+}
+
+bool short_ways(std::span<const std::optional<MovedInstrument>> instruments) {
+  return std::ranges::all_of(instruments, [](const auto& i) {
+    return !i || path_length(i->shape, i->before, i->now) <= short_way * i->shape.radius;
+  });
+}
+
+/// What pushed these nodes to where they were.
+std::vector<TouchPair> pairs_of(std::span<const PointTouch> points, const ContactNodes& all) {
+  std::vector<TouchPair> pairs;
+  for (const PointTouch& t : points) {
+    TouchPair pair{t.instrument, t.part, {}, {}, t.normal, t.force};
+    const bool known = std::ranges::all_of(std::array{0U, 1U, 2U}, [&](std::size_t c) {
+      const auto moving = std::span(all.node).first(all.moving),
+                 held = std::span(all.node).subspan(all.moving);
+      for (const auto& some : {moving, held})
+        if (const auto there = std::ranges::lower_bound(some, t.nodes[c]);
+            there != some.end() && *there == t.nodes[c]) {
+          pair.piece[c] = static_cast<std::uint32_t>(&*there - all.node.data());
+          return true;
+        }
+      return false;
+    });
+    if (known)
+      pairs.push_back(pair);
+  }
+  return pairs;
 }
 
 } // namespace
@@ -77,9 +106,9 @@ std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size
 }
 
 StaticContact::StaticContact(const Model& model, std::span<const double> shape,
-                             std::vector<NodeTouch> touches)
+                             std::vector<NodeTouch> touches, std::vector<PointTouch> points)
     : model_(model), facets_(model), inward_(inward_directions(model)),
-      touches_(std::move(touches)) {
+      touches_(std::move(touches)), points_(std::move(points)) {
   facets_.set_shape(model, shape);
 }
 
@@ -180,14 +209,16 @@ void StaticContact::restart(std::span<const double> shape, std::vector<NodeTouch
 bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
                               const std::map<std::uint32_t, Vec3>& displaced, const Placed& placed,
                               std::span<const std::optional<MovedInstrument>> moved,
-                              std::span<const double> before, std::size_t& vain_pairs,
-                              std::vector<Vec3>& at) {
+                              std::span<const double> before, std::span<const PointTouch> last,
+                              std::size_t& vain_pairs, std::vector<Vec3>& at) {
   const ContactNodes all = around(nodes, displaced, before);
   std::optional<GivingContact> giving;
   if (!gave_.empty())
     giving.emplace(all, moved, gave_);
   const auto node_of = [&](std::uint32_t i) { return all.node[giving ? giving->node(i) : i]; };
   ContactTurns turns;
+  if (!giving)
+    turns.last = pairs_of(last, all);
   for (int round = 0; round < max_rounds; ++round) {
     touches_.clear();
     points_.clear();
@@ -226,6 +257,8 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
         points_.push_back({{node_of(f[0]), node_of(f[1]), node_of(f[2])},
                            pair.point.weights,
                            pair.instrument,
+                           pair.part,
+                           pair.normal,
                            pair.force});
         for (std::size_t c = 0; c < 3; ++c)
           if (pair.point.weights[c] > 0)
@@ -271,12 +304,14 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
   for (std::size_t k = 0; nodes.empty() && k < gave_.size(); ++k) // nothing pushes it
     gave_[k] = instruments[k] ? -instruments[k]->compliance * instruments[k]->pushed : Vec3{};
   const std::vector<double> before = shape;
+  const std::vector<PointTouch> pushed =
+      short_ways(instruments) ? points_ : std::vector<PointTouch>{};
   solved_ = true;
   std::size_t vain_pairs = 0;
   for (;;) {
     std::vector<Vec3> at;
     const bool agreed =
-        solve_all(object, nodes, displaced, placed, instruments, before, vain_pairs, at);
+        solve_all(object, nodes, displaced, placed, instruments, before, pushed, vain_pairs, at);
     solved_ = solved_ && agreed;
     const std::span<const double> u = object.shape();
     shape.assign(u.begin(), u.end());

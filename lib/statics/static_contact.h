@@ -13,6 +13,7 @@
 #include "contact/instrument.h"
 #include "contact/load.h"
 #include "contact/surface_facets.h"
+#include "contact/surface_parts.h"
 #include "model/model.h"
 #include "statics/elastostatic.h"
 
@@ -41,7 +42,9 @@ struct PointTouch {
   Facet nodes{};                   ///< of the piece that it is on
   std::array<double, 3> weights{}; ///< by which its place is theirs, and its force is on them
   std::uint32_t instrument = 0;
-  Vec3 force; ///< 1e-6 N
+  CorePart part = CorePart::first_end; ///< of the instrument
+  Vec3 normal;                         ///< from the instrument's core to the point
+  Vec3 force;                          ///< 1e-6 N
 };
 
 /// One for each node and instrument, by ascending ones, with the sum of its forces in their order.
@@ -93,9 +96,9 @@ public:
 class StaticContact {
 public:
   /// Keeps a reference to the model. \param shape the present one
-  /// \param touches what is touched in it, by ascending node and instrument
+  /// \param touches what is touched in it, by ascending node and instrument \param points of these
   StaticContact(const Model& model, std::span<const double> shape,
-                std::vector<NodeTouch> touches = {});
+                std::vector<NodeTouch> touches = {}, std::vector<PointTouch> points = {});
 
   /// Takes the object's shape on to that with the instruments where they are now; `shape` (as
   /// Yielding has it) is the last one before and the new one after. An absent instrument is no
@@ -139,7 +142,8 @@ private:
   bool solve_all(Yielding& object, std::span<const std::uint32_t> nodes,
                  const std::map<std::uint32_t, Vec3>& displaced, const Placed& placed,
                  std::span<const std::optional<MovedInstrument>> moved,
-                 std::span<const double> before, std::size_t& vain_pairs, std::vector<Vec3>& at);
+                 std::span<const double> before, std::span<const PointTouch> last,
+                 std::size_t& vain_pairs, std::vector<Vec3>& at);
   Vec3 rest(std::uint32_t node) const { return model_.nodes[node].position; }
 
   const Model& model_;

@@ -5,6 +5,7 @@
 #include "statics/elastostatic.h"
 #include "statics/static_contact.h"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 
@@ -56,6 +57,50 @@ TEST(StaticContact, PushesAlongTheNormalAndNoFurther) {
   EXPECT_TRUE(contact.touches().empty());
   for (const double x : u)
     EXPECT_LT(std::abs(x), 1e-9);
+}
+
+/// What pushed before shortens the search for what pushes now; it does not change what that is.
+TEST(StaticContact, GoesOnWithTheLastForcesOnShortWays) {
+  const Model model = test::organ(4);
+  Elastostatic solver(model, {}, Context{});
+  const auto object = [&]() -> Elastostatic& { return solver; };
+  for (const double friction : {0.0, 0.3}) {
+    const InstrumentShape shape{8, {}, friction};
+    std::vector<double> u(3 * model.nodes.size());
+    StaticContact following(model, u);
+    TouchCounts going, anew;
+    for (int step = 0; step < 30; ++step) {
+      const auto pose = [&](int n) {
+        return Pose{middle + Vec3{0.3 + 0.04 * n, 0.2, 27 - 0.02 * n}, {}};
+      };
+      const std::vector<std::optional<MovedInstrument>> moved{
+          MovedInstrument{shape, pose(std::max(0, step - 1)), pose(step)}};
+      std::vector<double> v = u, w = u;
+      StaticContact other(model, u, following.touches()),
+          restored(model, u, following.touches(), following.points());
+      following.update(object, {}, moved, u);
+      other.update(object, {}, moved, v);
+      restored.update(object, {}, moved, w);
+      EXPECT_EQ(following.touches(), restored.touches());
+      EXPECT_EQ(u, w);
+      ASSERT_TRUE(following.solved() && other.solved()) << friction << " " << step;
+      going.add(following.take_counts());
+      anew.add(other.take_counts());
+      EXPECT_LT(test::surface_depth(model, u, PlacedInstrument(shape, pose(step))), 8e-9);
+      Vec3 sum, difference;
+      for (const NodeTouch& t : following.touches()) {
+        sum += t.force;
+        difference += t.force;
+      }
+      for (const NodeTouch& t : other.touches())
+        difference = difference - t.force;
+      EXPECT_LE(norm(difference), 1e-7 * norm(sum)) << friction << " " << step;
+      for (std::size_t r = 0; r < u.size(); ++r)
+        ASSERT_NEAR(u[r], v[r], 1e-8) << friction << " " << step;
+    }
+    EXPECT_LT(static_cast<double>(going.turns), 0.9 * static_cast<double>(anew.turns)) << friction;
+    EXPECT_LT(going.change, 1e-9);
+  }
 }
 
 TEST(DynamicContact, KeepsMovingNodesOutAndBalancesThemAtRest) {
