@@ -94,4 +94,31 @@ inline void draw(std::ostream& out, std::span<const Bin> bins, const std::string
       << "'>ms</text>\n</svg>\n";
 }
 
+/// MB that a program has in memory by seconds, as a line from 0 up. \param points not empty
+inline void draw_memory(std::ostream& out, std::span<const std::pair<double, double>> points,
+                        const std::string& title) {
+  constexpr double left = 60, top = 40, width = 560, height = 200;
+  const double most =
+      std::ranges::max_element(points, {}, &std::pair<double, double>::second)->second;
+  const double last = std::max(points.back().first, 1e-3);
+  out << "<svg xmlns='http://www.w3.org/2000/svg' width='660' height='300' viewBox='0 0 660 300' "
+         "font-family='sans-serif' font-size='12'>\n<rect width='100%' height='100%' "
+         "fill='white'/>\n<text x='"
+      << left << "' y='20' font-size='14'>" << title << "</text>\n";
+  for (int part = 0; part <= 4; ++part)
+    out << "<path d='M" << left << ',' << top + height * (1 - 0.25 * part) << " h" << width
+        << "' stroke='#ddd'/><text text-anchor='end' x='" << left - 6 << "' y='"
+        << top + height * (1 - 0.25 * part) + 4 << "'>" << std::round(0.25 * part * most)
+        << "</text><text text-anchor='middle' x='" << left + width * 0.25 * part << "' y='"
+        << top + height + 18 << "'>" << std::round(0.25 * part * last) << "</text>\n";
+  out << "<path fill='none' stroke='#0072b2' stroke-width='2' d='";
+  const char* verb = "M";
+  for (const auto& [second, megabytes] : points) {
+    out << verb << left + width * second / last << ',' << top + height * (1 - megabytes / most);
+    verb = " L";
+  }
+  out << "'/>\n<text text-anchor='middle' x='" << left + width / 2 << "' y='" << top + height + 40
+      << "'>s; MB in memory</text>\n</svg>\n";
+}
+
 } // namespace gewebe::timing
