@@ -80,6 +80,18 @@ double stiffness_bound(const Model& model) {
   return max;
 }
 
+/// ‖K‖₁, where the norms of these rows are others. \param norms by node
+double follow_norms(const NodeMatrix& matrix, std::span<const std::uint32_t> rows,
+                    std::vector<double>& norms) {
+  norms.resize(matrix.nodes());
+  for (const std::uint32_t row : rows)
+    norms[row] = row_norm(matrix, row);
+  double norm = 0;
+  for (const double of_row : norms)
+    norm = of_row <= norm ? norm : of_row; // NaN stays
+  return norm;
+}
+
 /// The factor of a cut model, or one before that is corrected; columns of the first model, to be
 /// corrected; blocks where the factor is that of the model.
 class CutSource final : public ComplianceSource {
@@ -158,7 +170,7 @@ void CutStiffness::prepare() {
     return;
   if (is_solid()) {
     matrix_ = node_stiffness(*now_);
-    norm_ = one_norm(matrix_);
+    norm_ = follow_norms(matrix_, identity(matrix_.nodes()), row_norm_);
     factorise([&] { factor_ = std::make_shared<FrontalFactor>(matrix_, context_); });
   } else {
     norm_ = stiffness_bound(*now_);
@@ -176,11 +188,13 @@ std::vector<std::uint32_t> CutStiffness::follow_matrix() {
   bool stay = true;
   for (std::uint32_t i = 0; i < place_.size(); ++i)
     stay = stay && place_[i] == i;
-  if (stay)
+  if (stay) {
     update_node_stiffness(matrix_, *now_, rows);
-  else
+    norm_ = follow_norms(matrix_, rows, row_norm_);
+  } else {
     matrix_ = node_stiffness(*now_);
-  norm_ = one_norm(matrix_);
+    norm_ = follow_norms(matrix_, identity(matrix_.nodes()), row_norm_);
+  }
   return rows;
 }
 

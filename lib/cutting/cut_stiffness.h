@@ -67,6 +67,7 @@ private:
   std::vector<std::uint32_t> first_origin_, first_place_; ///< from first_ to now_
   std::vector<std::uint32_t> origin_, place_;             ///< from factored_ to now_
   NodeMatrix matrix_;                                     ///< of a solid: that of factor_
+  std::vector<double> row_norm_;                          ///< of its nodes
   std::shared_ptr<FrontalFactor> factor_;
   std::shared_ptr<const WoodburySolver> woodbury_;
   std::shared_ptr<std::uint64_t> generation_ = std::make_shared<std::uint64_t>(0); ///< of factor_

@@ -52,7 +52,8 @@ void StiffnessOperator::multiply(std::span<const double> u, std::span<double> f)
 
 std::vector<double> weight_of(const Model& model, const Vec3& acceleration) {
   std::vector<double> weight(3 * model.nodes.size()), lumped(model.nodes.size());
-  if (!model.tetrahedra.empty()) {
+  // On linear elements the consistent load is that of the lumped masses.
+  if (!model.middles.empty()) {
     const TetMesh mesh = element_mesh(model);
     const std::vector<SolidMaterial> materials = element_materials(model);
     weight = gravity_load(mesh, materials, solid_elements(mesh, materials), acceleration);

@@ -35,8 +35,6 @@ public:
     find_elements();
   }
 
-  bool has(std::uint32_t node) const { return row_of_[node] != none; }
-
   /// Appends those of the node, with their blocks.
   void write(std::uint32_t node, NodeMatrix& matrix) {
     const std::uint32_t r = row_of_[node];
@@ -161,17 +159,28 @@ void update_node_stiffness(NodeMatrix& matrix, const Model& model,
     }
     next.block = std::move(kept);
   }
-  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
-    if (written.has(i)) {
-      written.write(i, next);
-    } else {
-      const auto begin = static_cast<std::ptrdiff_t>(matrix.start[i]),
-                 end = static_cast<std::ptrdiff_t>(matrix.start[i + 1]);
-      next.node.insert(next.node.end(), matrix.node.begin() + begin, matrix.node.begin() + end);
-      next.at.insert(next.at.end(), matrix.at.begin() + begin, matrix.at.begin() + end);
-    }
+  const auto keep = [&](std::size_t first, std::size_t last) { // rows that are as they were
+    if (first == last)
+      return;
+    const std::size_t begin = matrix.start[first], end = matrix.start[last], now = next.node.size();
+    const auto append = [&](std::vector<std::uint32_t>& to,
+                            const std::vector<std::uint32_t>& from) {
+      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin),
+                from.begin() + static_cast<std::ptrdiff_t>(end));
+    };
+    append(next.node, matrix.node);
+    append(next.at, matrix.at);
+    for (std::size_t i = first; i < last; ++i)
+      next.start.push_back(matrix.start[i + 1] - begin + now);
+  };
+  std::size_t done = 0;
+  for (const std::uint32_t row : rows) {
+    keep(done, row);
+    written.write(row, next);
     next.start.push_back(next.node.size());
+    done = row + std::size_t{1};
   }
+  keep(done, model.nodes.size());
   write_axes(model, next);
   matrix = std::move(next);
 }
@@ -247,23 +256,22 @@ std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
   return rows;
 }
 
-double one_norm(const NodeMatrix& matrix) {
+double row_norm(const NodeMatrix& matrix, std::size_t node) {
   constexpr std::array<std::array<std::size_t, 3>, 3> entry{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
   double norm = 0;
-  for (std::size_t i = 0; i < matrix.nodes(); ++i)
-    for (std::size_t a = 0; a < 3; ++a) {
-      if ((matrix.fixed[i] >> a & 1) != 0)
-        continue;
-      double sum = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if ((matrix.fixed[node] >> a & 1) != 0)
+      continue;
+    double sum = 0;
+    for (std::size_t b = 0; b < 3; ++b)
+      sum += (matrix.fixed[node] >> b & 1) != 0 ? 0 : std::abs(matrix.diagonal[node][entry[a][b]]);
+    for (std::size_t k = matrix.start[node]; k < matrix.start[node + 1]; ++k)
       for (std::size_t b = 0; b < 3; ++b)
-        sum += (matrix.fixed[i] >> b & 1) != 0 ? 0 : std::abs(matrix.diagonal[i][entry[a][b]]);
-      for (std::size_t k = matrix.start[i]; k < matrix.start[i + 1]; ++k)
-        for (std::size_t b = 0; b < 3; ++b)
-          sum += (matrix.fixed[matrix.node[k]] >> b & 1) != 0
-                     ? 0
-                     : std::abs(matrix.block[matrix.at[k]][3 * a + b]);
-      norm = sum <= norm ? norm : sum;
-    }
+        sum += (matrix.fixed[matrix.node[k]] >> b & 1) != 0
+                   ? 0
+                   : std::abs(matrix.block[matrix.at[k]][3 * a + b]);
+    norm = sum <= norm ? norm : sum;
+  }
   return norm;
 }
 

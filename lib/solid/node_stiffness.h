@@ -25,7 +25,7 @@ void update_node_stiffness(NodeMatrix& matrix, const Model& model,
 std::vector<std::uint32_t> changed_rows(const Model& before, const Model& now,
                                         std::span<const std::uint32_t> place);
 
-/// ‖K‖₁.
-double one_norm(const NodeMatrix& matrix);
+/// The largest sum of magnitudes along a row of the node; of all nodes the largest is ‖K‖₁.
+double row_norm(const NodeMatrix& matrix, std::size_t node);
 
 } // namespace gewebe

@@ -16,13 +16,15 @@
 namespace gewebe {
 namespace {
 
-#if defined(__AVX2__)
-inline constexpr std::size_t lanes = 4, max_parts = 3;
-#else
-inline constexpr std::size_t lanes = 2, max_parts = 2;
-#endif
 /// A tile: rows of one strip, in so many registers, by so many columns.
-inline constexpr std::size_t strip_rows = lanes * max_parts, tile_columns = 4;
+#if defined(__AVX512F__)
+inline constexpr std::size_t lanes = 8, max_parts = 3, tile_columns = 8;
+#elif defined(__AVX2__)
+inline constexpr std::size_t lanes = 4, max_parts = 3, tile_columns = 4;
+#else
+inline constexpr std::size_t lanes = 2, max_parts = 2, tile_columns = 4;
+#endif
+inline constexpr std::size_t strip_rows = lanes * max_parts;
 static_assert(strip_rows % tile_columns == 0);
 using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
 using Unaligned =
@@ -30,7 +32,9 @@ using Unaligned =
 
 /// sum - a b, rounded once, at every level.
 inline Lanes lose(Lanes sum, Lanes a, double b) {
-#if defined(__AVX2__)
+#if defined(__AVX512F__)
+  return _mm512_fnmadd_pd(a, _mm512_set1_pd(b), sum);
+#elif defined(__AVX2__)
   return _mm256_fnmadd_pd(a, _mm256_set1_pd(b), sum);
 #else
   return lose_fused(sum, a, Lanes{b, b});

@@ -61,5 +61,6 @@ struct FrontKernel {
 
 extern const FrontKernel front_kernel_baseline;
 extern const FrontKernel front_kernel_avx2;
+extern const FrontKernel front_kernel_avx512;
 
 } // namespace gewebe

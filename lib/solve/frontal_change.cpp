@@ -94,13 +94,56 @@ bool FrontalFactor::State::still_fits(const SpringGraph& now,
 }
 
 std::vector<std::uint32_t>
+FrontalFactor::State::fronts_for(const SpringGraph& now, std::span<const std::uint32_t> origin,
+                                 std::span<const std::uint32_t> place) const {
+  std::vector<std::uint32_t> smallest(tree.fronts()); // of the branch of each front
+  for (std::uint32_t f = 0; f < tree.fronts(); ++f)
+    smallest[f] = f;
+  for (std::uint32_t f = 0; f < tree.fronts(); ++f)
+    if (const std::uint32_t parent = tree.parent[f]; parent != none)
+      smallest[parent] = std::min(smallest[parent], smallest[f]);
+  std::vector<std::uint32_t> old_front(graph.axes.size(), none);
+  for (std::uint32_t f = 0; f < tree.fronts(); ++f)
+    for (const std::uint32_t node : tree.eliminated(f))
+      old_front[node] = f;
+  std::vector<std::uint32_t> front(now.axes.size(), none);
+  for (std::uint32_t i = 0; i < front.size(); ++i)
+    if (const std::uint32_t old = origin.empty() ? i : origin[i]; old < old_front.size())
+      front[i] = old_front[old];
+  for (std::uint32_t i = 0; i < origin.size(); ++i) {
+    if (place[origin[i]] == i || front[i] == none)
+      continue;
+    std::uint32_t lowest = none;
+    for (const std::uint32_t other : now.view().of(i)) {
+      std::uint32_t f = front[other];
+      if (f == none || f < smallest[front[i]] || f > front[i])
+        continue; // eliminated later
+      if (lowest == none)
+        lowest = f;
+      while (f != lowest)
+        (f < lowest ? f : lowest) = tree.parent[std::min(f, lowest)];
+    }
+    if (lowest != none)
+      front[i] = lowest;
+  }
+  return front;
+}
+
+std::vector<std::uint32_t>
 FrontalFactor::State::order_for(const SpringGraph& now, std::span<const std::uint32_t> origin,
                                 std::span<const std::uint32_t> place) const {
   const std::size_t n = now.axes.size();
+  const std::vector<std::uint32_t> front = fronts_for(now, origin, place);
   std::vector<std::uint32_t> copy(graph.axes.size(), none), next(n, none); // lists of copies
+  std::vector<std::uint32_t> down(tree.fronts(), none); // and of those that went down into a front
   for (std::size_t i = origin.size(); i-- > 0;)
-    if (place[origin[i]] != i)
-      next[i] = std::exchange(copy[origin[i]], static_cast<std::uint32_t>(i));
+    if (place[origin[i]] != i) {
+      const std::uint32_t of = front[i];
+      const std::uint32_t at = tree.position[origin[i]];
+      const bool stays =
+          of == none || (tree.first[of] <= at && at < tree.first[of + std::size_t{1}]);
+      next[i] = std::exchange(stays ? copy[origin[i]] : down[of], static_cast<std::uint32_t>(i));
+    }
   std::vector<std::uint32_t> order;
   order.reserve(n);
   std::vector<char> ordered(n, 0);
@@ -111,10 +154,16 @@ FrontalFactor::State::order_for(const SpringGraph& now, std::span<const std::uin
       order.push_back(node);
     ordered[node] = 1;
   };
-  for (const std::uint32_t old : tree.sequence) {
-    put(place.empty() ? old : place[old]);
-    for (std::uint32_t c = copy[old]; c != none; c = next[c])
+  const auto put_all = [&](std::uint32_t first) {
+    for (std::uint32_t c = first; c != none; c = next[c])
       put(c);
+  };
+  for (std::uint32_t f = 0; f < tree.fronts(); ++f) {
+    for (const std::uint32_t old : tree.eliminated(f)) {
+      put(place.empty() ? old : place[old]);
+      put_all(copy[old]);
+    }
+    put_all(down[f]);
   }
   for (std::uint32_t i = 0; i < n; ++i) // what was not free before
     put(i);

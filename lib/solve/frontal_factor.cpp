@@ -87,34 +87,41 @@ FrontalFactor::forward_solves(std::span<const std::uint32_t> nodes) const {
   constexpr std::size_t at_once = panel_width;
   const State& s = *state_;
   std::vector<ForwardSolve> all(nodes.size());
-  std::vector<double> x, work;
+  const auto x = std::make_unique_for_overwrite<double[]>(
+      s.axis_of_row.size() * solve_width(3 * std::min(at_once, nodes.size())));
+  std::vector<double> work;
   std::vector<std::uint32_t> blocks;
   for (std::size_t first = 0; first < nodes.size(); first += at_once) {
     const std::size_t count = std::min(at_once, nodes.size() - first);
     const std::size_t width = solve_width(3 * count);
     blocks.clear();
-    x.assign(s.axis_of_row.size() * width, 0.0);
     work.resize(s.blocks.longest * width);
     for (std::size_t k = 0; k < count; ++k) {
-      const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
-      all[first + k].front = s.front_of_node(node);
+      all[first + k].front = s.front_of_node(nodes[first + k]);
       for (std::uint32_t f = all[first + k].front; f != none; f = s.tree.parent[f])
         for (std::uint32_t b = s.blocks.first[f]; b < s.blocks.first[f + std::size_t{1}]; ++b)
           blocks.push_back(b);
-      for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
-        x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
     }
     std::sort(blocks.begin(), blocks.end());
     blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+    for (const std::uint32_t b : blocks) // what is on the ways reaches nothing else
+      std::fill(x.get() + static_cast<std::size_t>(s.blocks.super[b]) * width,
+                x.get() + static_cast<std::size_t>(s.blocks.super[b + std::size_t{1}]) * width,
+                0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t node = nodes[first + k], row = s.row_of_node[node];
+      for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
+        x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
+    }
     (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
-        s.arrays(), blocks, x.data(), width, work.data());
+        s.arrays(), blocks, x.get(), width, work.data());
     for (std::size_t k = 0; k < count; ++k) {
       ForwardSolve& solution = all[first + k];
       if (solution.front != none)
         solution.values.reserve(s.to_root[solution.front]);
       for (std::uint32_t f = solution.front; f != none; f = s.tree.parent[f])
         for (std::size_t row = s.first_row(f); row < s.first_row(f + std::size_t{1}); ++row) {
-          const double* const values = x.data() + row * width + 3 * k;
+          const double* const values = x.get() + row * width + 3 * k;
           solution.values.push_back({values[0], values[1], values[2]});
         }
     }

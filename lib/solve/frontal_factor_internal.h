@@ -132,8 +132,15 @@ struct FrontalFactor::State {
   /// Whether the tree serves this graph too: the same nodes free, and no spring where none was.
   bool still_fits(const SpringGraph& now, std::span<const std::uint32_t> place) const;
 
+  /// By node of the later graph: in which of the present fronts it is eliminated. A copy that has
+  /// neighbours in one branch below its origin's front alone goes down into that: it separates
+  /// nothing there.
+  std::vector<std::uint32_t> fronts_for(const SpringGraph& now,
+                                        std::span<const std::uint32_t> origin,
+                                        std::span<const std::uint32_t> place) const;
+
   /// The order of elimination before, with what came since. A copy is eliminated right behind what
-  /// it is a copy of, so that it fills as that does.
+  /// it is a copy of, so that it fills as that does, or at the end of the front it goes down into.
   std::vector<std::uint32_t> order_for(const SpringGraph& now,
                                        std::span<const std::uint32_t> origin,
                                        std::span<const std::uint32_t> place) const;

@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::uint32_t none = FrontTree::none;
 constexpr double worth_threads = 1e6;                   // operations
+constexpr std::size_t worth_large_tiles = 96;           // rows of a front
 constexpr std::size_t worth_threads_entries = 1U << 18; // to be added or cleared
 
 } // namespace
@@ -58,7 +59,7 @@ struct Scratch {
   std::vector<double> min_pivot;
   std::vector<Run> runs;
   std::vector<Gain> gains;
-  std::vector<double> square, strips;
+  FrontMemory square, strips;
   UpdateStacks stacks;
 };
 
@@ -132,19 +133,21 @@ void gather(const Multifrontal& task, const FrontArrays& into,
   over(context, packed_triangle(into.rows) >= worth_threads_entries, into.rows, 4 * at_once, work);
 }
 
+/// The quickest; all give the same bits. Tiles of AVX-512 are too large for small fronts.
+const FrontKernel& kernel_for(const Front& front, CpuLevel cpu) {
+  if (cpu == CpuLevel::avx512 && front.rows >= worth_large_tiles)
+    return front_kernel_avx512;
+  return cpu == CpuLevel::baseline ? front_kernel_baseline : front_kernel_avx2;
+}
+
 /// \throw PivotTooSmall
 void eliminate(Front& front, std::size_t f, const FrontArrays& arrays, Scratch& scratch,
                const Context& context) {
-  const FrontKernel& kernel =
-      context.cpu == CpuLevel::baseline ? front_kernel_baseline : front_kernel_avx2;
-  const auto room = [](std::vector<double>& of, std::size_t size) {
-    if (of.size() < size)
-      of.resize(size);
-    return of.data();
-  };
+  const FrontKernel& kernel = kernel_for(front, context.cpu);
   const FrontScratch space{
-      room(scratch.square, kernel.square_size(front_block)),
-      room(scratch.strips, kernel.strips_size(front.rows, std::min(front.columns, front_block)))};
+      scratch.square.reserve(kernel.square_size(front_block), false),
+      scratch.strips.reserve(kernel.strips_size(front.rows, std::min(front.columns, front_block)),
+                             true)};
   for (std::size_t begin = 0; begin < front.columns; begin += front_block) {
     const std::size_t count = std::min(front_block, front.columns - begin);
     const std::size_t done =

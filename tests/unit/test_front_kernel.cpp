@@ -65,6 +65,16 @@ bool has_avx2() {
   return best_cpu_level() != CpuLevel::baseline;
 }
 
+/// Those that this processor can run.
+std::vector<const FrontKernel*> kernels() {
+  std::vector<const FrontKernel*> all{&front_kernel_baseline};
+  if (has_avx2())
+    all.push_back(&front_kernel_avx2);
+  if (best_cpu_level() == CpuLevel::avx512)
+    all.push_back(&front_kernel_avx512);
+  return all;
+}
+
 TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
   for (const auto& [columns, below] :
        std::vector<std::pair<std::size_t, std::size_t>>{{1, 0},
@@ -84,9 +94,7 @@ TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
                                                         {300, 100}}) {
     MadeFront plain(columns, below);
     plainly(plain.arrays);
-    for (const FrontKernel* kernel : {&front_kernel_baseline, &front_kernel_avx2}) {
-      if (kernel == &front_kernel_avx2 && !has_avx2())
-        continue;
+    for (const FrontKernel* kernel : kernels()) {
       for (const std::size_t parts : std::array<std::size_t, 2>{1, 3}) {
         MadeFront made(columns, below);
         by_kernel(*kernel, made.arrays, parts);
