@@ -129,7 +129,8 @@ kernel = $(if $(filter release,$(config)),-O3) -fno-math-errno -fno-trapping-mat
 $(BUILD)/obj/%_avx2.o: FILE_FLAGS := -mavx2 -mfma $(kernel)
 $(BUILD)/obj/%_avx512.o: FILE_FLAGS := -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma $(kernel)
 $(BUILD)/obj/lib/voxelize/coverage_exact.o: FILE_FLAGS := $(kernel)
-# Eight lanes on four: its vectors cross no call that is not inlined.
+# Eight lanes on four, or on two: their vectors cross no call that is not inlined.
+$(BUILD)/obj/lib/raster/raster_kernel_%.o: FILE_FLAGS += -Wno-psabi
 $(BUILD)/obj/lib/raster/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
 # CGAL's interval arithmetic changes the rounding mode.
 $(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math

@@ -53,17 +53,18 @@ public:
             guard_y_ * v.w - v.y};
   }
 
-  /// One bit for each side of the view on whose far side the vertex lies, 32 beyond the guard band.
-  std::uint8_t outside(const ClipVertex& v) const {
-    unsigned sides = (v.w < near_ ? 1U : 0U) | (v.x < -v.w ? 2U : 0U) | (v.x > v.w ? 4U : 0U) |
-                     (v.y < -v.w ? 8U : 0U) | (v.y > v.w ? 16U : 0U);
-    if (sides != 0 && !std::ranges::all_of(guard_distances(v), [](double d) { return d >= 0; }))
-      sides |= 32U;
-    return static_cast<std::uint8_t>(sides);
-  }
-
   double pixel_x(const ClipVertex& v) const { return (v.x / v.w + 1) * half_x_; }
   double pixel_y(const ClipVertex& v) const { return (1 - v.y / v.w) * half_y_; }
+
+  KernelView kernel_view() const {
+    KernelView view{{}, {}, {}, near_, half_x_, half_y_, guard_x_, guard_y_};
+    for (std::size_t c = 0; c < 4; ++c) {
+      view.x[c] = m_[0][c];
+      view.y[c] = m_[1][c];
+      view.w[c] = m_[3][c];
+    }
+    return view;
+  }
 
   /// Rows x, y, w of the matrix to pixels times w.
   void rows(double (&clip)[3][4]) const {
@@ -104,156 +105,143 @@ std::vector<ClipVertex> clipped(const Viewport& viewport, std::vector<ClipVertex
   return polygon;
 }
 
-/// Vertices on the picture; triangles over them, pieces of clipped ones at the end.
+/// Vertices on the picture, those of clipped triangles at the end.
 struct Screen {
   std::vector<std::int32_t> x, y; ///< in subpixels, y downwards
   std::vector<float> nearness;    ///< 1 / w
-  std::vector<std::uint32_t> corners, shown;
-  std::vector<std::uint8_t> outside; ///< of the drawing's vertices
+  std::vector<std::uint8_t> outside;
+  std::vector<std::uint32_t> pieces, whole; ///< see KernelScreen
 
-  void set(std::size_t v, const Viewport& viewport, const ClipVertex& clip) {
-    const auto fixed = [](double pixels) {       // to the nearest, without a call
+  void add(const Viewport& viewport, const ClipVertex& clip) {
+    const auto fixed = [](double pixels) {       // as kernels round
       const double shifter = 6755399441055744.0; // 1.5 · 2^52
       return static_cast<std::int32_t>((pixels * subpixels + shifter) - shifter);
     };
-    x[v] = fixed(viewport.pixel_x(clip));
-    y[v] = fixed(viewport.pixel_y(clip));
-    nearness[v] = static_cast<float>(1 / clip.w);
+    x.push_back(fixed(viewport.pixel_x(clip)));
+    y.push_back(fixed(viewport.pixel_y(clip)));
+    nearness.push_back(static_cast<float>(1 / clip.w));
   }
 };
 
-Screen project(const Drawing& drawing, const Viewport& viewport, const Context& context) {
-  constexpr std::size_t grain = 8192;
+Screen project(const Drawing& drawing, const Viewport& viewport, const RasterKernels& kernels,
+               const Context& context) {
+  constexpr std::size_t grain = 4096;
   Screen screen;
-  const std::size_t vertices = drawing.vertices.size(), triangles = drawing.triangles.size();
+  const std::size_t vertices = drawing.vertices.size();
   screen.x.resize(vertices);
   screen.y.resize(vertices);
   screen.nearness.resize(vertices);
   screen.outside.resize(vertices);
+  const KernelView view = viewport.kernel_view();
+  const KernelPlaces places{screen.x.data(), screen.y.data(), screen.nearness.data(),
+                            screen.outside.data()};
   parallel_blocks(context, vertices, grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const ClipVertex clip = viewport.transform(drawing.vertices[v]);
-      screen.outside[v] = viewport.outside(clip);
-      if ((screen.outside[v] & 32U) == 0)
-        screen.set(v, viewport, clip);
-    }
+    kernels.place(view, reinterpret_cast<const float*>(drawing.vertices.data()), begin, end,
+                  places);
   });
-  screen.corners.resize(3 * triangles);
-  screen.shown.resize(triangles);
-  std::vector<std::vector<std::uint32_t>> cut((triangles + grain - 1) / grain);
-  parallel_blocks(context, triangles, grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const Triangle& t = drawing.triangles[n];
-      const unsigned a = screen.outside[t[0]], b = screen.outside[t[1]], c = screen.outside[t[2]];
-      const bool away = (a & b & c & 31U) != 0, clips = ((a | b | c) & 32U) != 0;
-      screen.shown[n] = static_cast<std::uint32_t>(n);
-      for (std::size_t k = 0; k < 3; ++k) // a point where nothing is to be drawn
-        screen.corners[3 * n + k] = away || clips ? 0 : t[k];
-      if (clips && !away)
-        cut[begin / grain].push_back(static_cast<std::uint32_t>(n));
-    }
-  });
-  for (const std::vector<std::uint32_t>& some : cut)
-    for (const std::uint32_t n : some) {
-      const Triangle& t = drawing.triangles[n];
-      const std::vector<ClipVertex> polygon =
-          clipped(viewport, {viewport.transform(drawing.vertices[t[0]]),
-                             viewport.transform(drawing.vertices[t[1]]),
-                             viewport.transform(drawing.vertices[t[2]])});
-      const auto first = static_cast<std::uint32_t>(screen.x.size());
-      screen.x.resize(first + polygon.size());
-      screen.y.resize(screen.x.size());
-      screen.nearness.resize(screen.x.size());
-      for (std::size_t k = 0; k < polygon.size(); ++k)
-        screen.set(first + k, viewport, polygon[k]);
-      for (std::uint32_t k = 2; k < polygon.size(); ++k) {
-        screen.corners.insert(screen.corners.end(), {first, first + k - 1, first + k});
-        screen.shown.push_back(n);
-      }
-    }
   return screen;
 }
 
-/// The triangles that may be seen in each tile, in order.
+/// Adds the pieces inside the guard band of a triangle that reaches beyond it.
+void clip(const Drawing& drawing, const Viewport& viewport, std::uint32_t n, Screen& screen) {
+  const Triangle& t = drawing.triangles[n];
+  const std::vector<ClipVertex> polygon =
+      clipped(viewport, {viewport.transform(drawing.vertices[t[0]]),
+                         viewport.transform(drawing.vertices[t[1]]),
+                         viewport.transform(drawing.vertices[t[2]])});
+  const auto first = static_cast<std::uint32_t>(screen.x.size());
+  for (const ClipVertex& vertex : polygon)
+    screen.add(viewport, vertex);
+  for (std::uint32_t k = 2; k < polygon.size(); ++k) {
+    screen.pieces.insert(screen.pieces.end(), {first, first + k - 1, first + k});
+    screen.whole.push_back(n);
+  }
+}
+
+/// The triangles that may be seen in each tile: those that face the viewer, then others, in order.
 struct Bins {
   std::size_t across = 0, down = 0;
-  std::vector<std::uint32_t> start; ///< of each tile, and the end
+  std::vector<std::uint32_t> start; ///< of each of the tiles' two bins, and the end
   std::vector<std::uint32_t> list;
   std::uint64_t triangles = 0; ///< that are in some
 };
 
-struct TileRange {
-  std::uint16_t left = 1, right = 0, top = 0, bottom = 0; // none
+/// Some triangles one after the other, and what there is of them.
+struct SortedBlock {
+  std::vector<KernelSeen> seen;
+  std::vector<std::uint32_t> cut;
+  std::vector<std::uint32_t> counters; ///< of bins: triangles, then the place of the next one
 };
 
-TileRange tiles_of(const Screen& screen, std::size_t n, std::int32_t width, std::int32_t height,
-                   int samples) {
-  const std::uint32_t *const c = &screen.corners[3 * n], a = c[0], b = c[1], d = c[2];
-  const std::int32_t ax = screen.x[a], bx = screen.x[b], dx = screen.x[d];
-  const std::int32_t ay = screen.y[a], by = screen.y[b], dy = screen.y[d];
-  const std::int32_t early = samples == 1 ? subpixels / 2 - 1 : 0;
-  const std::int32_t late = samples == 1 ? subpixels / 2 : 0;
-  const std::int32_t left = (std::min({ax, bx, dx}) + early) >> raster_subpixel_bits;
-  const std::int32_t right = (std::max({ax, bx, dx}) - late) >> raster_subpixel_bits;
-  const std::int32_t top = (std::min({ay, by, dy}) + early) >> raster_subpixel_bits;
-  const std::int32_t bottom = (std::max({ay, by, dy}) - late) >> raster_subpixel_bits;
-  if (left > right || top > bottom || right < 0 || bottom < 0 || left >= width || top >= height ||
-      std::int64_t{bx - ax} * (dy - ay) == std::int64_t{by - ay} * (dx - ax))
-    return {};
-  const auto tile = [](std::int32_t pixel, std::int32_t last, std::int32_t size) {
-    return static_cast<std::uint16_t>(std::clamp(pixel, 0, last) / size);
-  };
-  return {tile(left, width - 1, raster_tile_width), tile(right, width - 1, raster_tile_width),
-          tile(top, height - 1, raster_tile_height), tile(bottom, height - 1, raster_tile_height)};
+template <class Use>
+void each_bin(const KernelSeen& seen, std::size_t across, Use&& use) {
+  for (std::size_t y = 0; y <= seen.rows; ++y)
+    for (std::size_t x = 0; x <= seen.columns; ++x)
+      use(seen.bin + 2 * (y * across + x));
 }
 
-Bins sorted(const Screen& screen, std::uint32_t width, std::uint32_t height, int samples,
-            const Context& context) {
+/// Clips triangles that must be, and sorts all.
+Bins sorted(const Drawing& drawing, const Viewport& viewport, const RasterKernels& kernels,
+            std::uint32_t width, std::uint32_t height, int samples, const Context& context,
+            Screen& screen) {
   Bins bins;
   bins.across = (width + raster_tile_width - 1) / raster_tile_width;
   bins.down = (height + raster_tile_height - 1) / raster_tile_height;
-  const std::size_t tiles = bins.across * bins.down, count = screen.shown.size();
+  const std::size_t bin_count = 2 * bins.across * bins.down, count = drawing.triangles.size();
   // Blocks so that their counters stay within 16 MiB.
-  const std::size_t max = std::max<std::size_t>(1, (std::size_t{1} << 22) / tiles);
+  const std::size_t max = std::max<std::size_t>(1, (std::size_t{1} << 22) / bin_count);
   const std::size_t grain = std::max<std::size_t>(4096, (count + max - 1) / max);
-  const std::size_t blocks = (count + grain - 1) / grain;
-  std::vector<TileRange> ranges(count);
-  std::vector<std::uint32_t> counters(blocks * tiles);
-  std::vector<std::uint64_t> drawn(blocks);
-  const auto each = [&](std::size_t n, auto&& use) {
-    const TileRange r = ranges[n];
-    for (std::size_t y = r.top; y <= r.bottom && r.left <= r.right; ++y)
-      for (std::size_t x = r.left; x <= r.right; ++x)
-        use(y * bins.across + x);
+  std::vector<SortedBlock> blocks((count + grain - 1) / grain);
+  KernelSorting sorting{screen.x.data(),
+                        screen.y.data(),
+                        screen.outside.data(),
+                        static_cast<std::int32_t>(width),
+                        static_cast<std::int32_t>(height),
+                        samples,
+                        static_cast<std::int32_t>(bins.across)};
+  const auto sort = [&](const std::uint32_t* corners, std::size_t some, std::size_t number,
+                        SortedBlock& block) {
+    block.seen.resize(some);
+    block.cut.resize(some);
+    KernelSorted to{block.seen.data(), block.cut.data(), 0, 0};
+    kernels.sort(sorting, corners, some, static_cast<std::uint32_t>(number), to);
+    block.seen.resize(to.seen_count);
+    block.cut.resize(to.cut_count);
+    block.counters.resize(bin_count);
+    for (const KernelSeen& seen : block.seen)
+      each_bin(seen, bins.across, [&](std::size_t bin) { ++block.counters[bin]; });
   };
+  const auto* const corners = reinterpret_cast<const std::uint32_t*>(drawing.triangles.data());
   parallel_blocks(context, count, grain, [&](std::size_t begin, std::size_t end) {
-    const std::size_t block = begin / grain;
-    std::uint32_t* const mine = &counters[block * tiles];
-    for (std::size_t n = begin; n < end; ++n) {
-      ranges[n] = tiles_of(screen, n, static_cast<std::int32_t>(width),
-                           static_cast<std::int32_t>(height), samples);
-      drawn[block] += ranges[n].left <= ranges[n].right ? 1U : 0U;
-      each(n, [&](std::size_t tile) { ++mine[tile]; });
-    }
+    sort(corners + 3 * begin, end - begin, begin, blocks[begin / grain]);
   });
-  bins.start.resize(tiles + 1);
+  for (const SortedBlock& block : blocks)
+    for (const std::uint32_t n : block.cut)
+      clip(drawing, viewport, n, screen);
+  if (!screen.whole.empty()) {
+    sorting.x = screen.x.data();
+    sorting.y = screen.y.data();
+    sorting.outside = nullptr;
+    sort(screen.pieces.data(), screen.whole.size(), count, blocks.emplace_back());
+  }
+  bins.start.resize(bin_count + 1);
   std::uint32_t sum = 0;
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    bins.start[tile] = sum;
-    for (std::size_t block = 0; block < blocks; ++block) {
-      const std::uint32_t here = counters[block * tiles + tile];
-      counters[block * tiles + tile] = sum;
+  for (std::size_t bin = 0; bin < bin_count; ++bin) {
+    bins.start[bin] = sum;
+    for (SortedBlock& block : blocks) {
+      const std::uint32_t here = block.counters[bin];
+      block.counters[bin] = sum;
       sum += here;
     }
   }
-  bins.start[tiles] = sum;
-  for (const std::uint64_t n : drawn)
-    bins.triangles += n;
+  bins.start[bin_count] = sum;
+  for (const SortedBlock& block : blocks)
+    bins.triangles += block.seen.size();
   bins.list.resize(sum);
-  parallel_blocks(context, count, grain, [&](std::size_t begin, std::size_t end) {
-    std::uint32_t* const mine = &counters[begin / grain * tiles];
-    for (std::size_t n = begin; n < end; ++n)
-      each(n, [&](std::size_t tile) { bins.list[mine[tile]++] = static_cast<std::uint32_t>(n); });
+  parallel_blocks(context, blocks.size(), 1, [&](std::size_t b, std::size_t) {
+    for (const KernelSeen& seen : blocks[b].seen)
+      each_bin(seen, bins.across,
+               [&](std::size_t bin) { bins.list[blocks[b].counters[bin]++] = seen.number; });
   });
   return bins;
 }
@@ -383,25 +371,35 @@ std::list<MaterialScene> scenes_of(const Drawing& drawing, const Viewport& viewp
   return scenes;
 }
 
+struct alignas(64) CacheLine {
+  std::byte bytes[64];
+};
+
 } // namespace
 
 Image render_cpu(const Drawing& drawing, const Projection& projection,
                  const SurfaceMaterial& material, std::uint32_t width, std::uint32_t height,
                  int samples, const Context& context, RenderReport* report) {
   const Viewport viewport(projection, width, height);
-  const Screen screen = project(drawing, viewport, context);
-  const Bins bins = sorted(screen, width, height, samples, context);
+  const RasterKernels& kernels =
+      context.cpu == CpuLevel::baseline ? raster_kernels_baseline : raster_kernels_avx2;
+  Screen screen = project(drawing, viewport, kernels, context);
+  const Bins bins = sorted(drawing, viewport, kernels, width, height, samples, context, screen);
   const std::list<MaterialScene> scenes = scenes_of(drawing, viewport, material);
-  const KernelScreen kernel_screen{screen.x.data(), screen.y.data(), screen.nearness.data(),
-                                   screen.corners.data(), screen.shown.data()};
-  const TileKernel draw_tile =
-      context.cpu == CpuLevel::baseline ? draw_tile_baseline : draw_tile_avx2;
+  const KernelScreen kernel_screen{screen.x.data(),
+                                   screen.y.data(),
+                                   screen.nearness.data(),
+                                   scenes.front().scene.triangles,
+                                   static_cast<std::uint32_t>(drawing.triangles.size()),
+                                   screen.pieces.data(),
+                                   screen.whole.data()};
   Image image{width, height, 3, {}};
   image.values.resize(std::size_t{3} * width * height);
   const std::size_t tiles = bins.across * bins.down;
   std::vector<std::uint64_t> covered(tiles);
   parallel_blocks(context, tiles, 1, [&](std::size_t t, std::size_t) {
-    const std::unique_ptr<std::byte[]> scratch(new std::byte[raster_scratch_bytes(samples)]);
+    const auto scratch =
+        std::make_unique_for_overwrite<CacheLine[]>(raster_scratch_bytes(samples) / 64 + 1);
     const auto left = static_cast<std::uint32_t>(t % bins.across * raster_tile_width);
     const auto top = static_cast<std::uint32_t>(t / bins.across * raster_tile_height);
     KernelTile tile{};
@@ -411,12 +409,13 @@ Image render_cpu(const Drawing& drawing, const Projection& projection,
     tile.height =
         std::min<std::int32_t>(raster_tile_height, static_cast<std::int32_t>(height - top));
     tile.samples = samples;
-    tile.list = bins.list.data() + bins.start[t];
-    tile.count = bins.start[t + 1] - bins.start[t];
+    tile.list = bins.list.data() + bins.start[2 * t];
+    tile.facing = bins.start[2 * t + 1] - bins.start[2 * t];
+    tile.count = bins.start[2 * t + 2] - bins.start[2 * t];
     tile.scratch = scratch.get();
     tile.row_bytes = std::size_t{3} * width;
     tile.out = &image.values[tile.row_bytes * top + std::size_t{3} * left];
-    covered[t] = draw_tile(scenes.front().scene, kernel_screen, tile);
+    covered[t] = kernels.draw_tile(scenes.front().scene, kernel_screen, tile);
   });
   if (report != nullptr) {
     report->triangles = bins.triangles;
@@ -431,7 +430,7 @@ double render_cpu_bytes(std::uint32_t width, std::uint32_t height, int samples,
                         const Context& context) {
   const double tiles =
       (width / double{raster_tile_width} + 1) * (height / double{raster_tile_height} + 1);
-  return 3.0 * width * height + 12 * tiles + 4.0 * (1 << 22) +
+  return 3.0 * width * height + 16 * tiles + 4.0 * (1 << 22) +
          static_cast<double>(raster_scratch_bytes(samples)) * thread_count(context);
 }
 

@@ -1,11 +1,9 @@
 #include "raster/raster_kernel_rest_lanes_internal.h"
+#include "raster/raster_kernel_screen_lanes_internal.h"
 #include "raster/raster_kernel_tile_lanes_internal.h"
 
 namespace gewebe {
 
-std::uint64_t draw_tile_avx2(const KernelScene& scene, const KernelScreen& screen,
-                             const KernelTile& tile) {
-  return draw_tile(scene, screen, tile);
-}
+const RasterKernels raster_kernels_avx2{place_all, sort_all, draw_tile};
 
 } // namespace gewebe

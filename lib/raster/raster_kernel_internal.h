@@ -8,7 +8,9 @@
 
 namespace gewebe {
 
-constexpr int raster_tile_width = 64, raster_tile_height = 32; // pixels
+constexpr int raster_tile_bits_x = 6, raster_tile_bits_y = 5;
+constexpr int raster_tile_width = 1 << raster_tile_bits_x; // pixels
+constexpr int raster_tile_height = 1 << raster_tile_bits_y;
 constexpr int raster_subpixel_bits = 8;
 
 struct KernelLevel {
@@ -72,32 +74,77 @@ struct KernelScene {
   std::uint32_t background; ///< red, green, blue from the lowest byte
 };
 
+/// From places to the picture.
+struct KernelView {
+  double x[4], y[4], w[4]; ///< rows of the matrix to clip space
+  double near, half_x, half_y;
+  double guard_x, guard_y; ///< of the band in which coordinates fit, times w
+};
+
+/// Where vertices are on the picture.
+struct KernelPlaces {
+  std::int32_t *x, *y; ///< in subpixels, y downwards; 0 where the vertex has bit 32
+  float* nearness;     ///< 1 / w; 0 likewise
+  /// One bit for each side of the view on whose far side the vertex lies, 32 beyond the guard band.
+  std::uint8_t* outside;
+};
+
+/// A triangle that may be seen: in (columns + 1)(rows + 1) tiles.
+struct KernelSeen {
+  std::uint32_t number;
+  std::uint32_t bin; ///< of the first tile; a tile has two: those that face the viewer, and others
+  std::uint16_t columns, rows;
+};
+
+/// How triangles are sorted into tiles.
+struct KernelSorting {
+  const std::int32_t *x, *y;
+  const std::uint8_t* outside;         ///< null: all corners are on the picture
+  std::int32_t width, height, samples; ///< of the picture
+  std::int32_t across;                 ///< tiles in a row
+};
+
+/// Room for as many as are sorted, and how many there are.
+struct KernelSorted {
+  KernelSeen* seen;
+  std::uint32_t* cut; ///< those that must be clipped first
+  std::size_t seen_count, cut_count;
+};
+
 /// Vertices on the picture in subpixels, 1 / w, and which of them make triangles.
 struct KernelScreen {
   const std::int32_t* x;
   const std::int32_t* y;
   const float* nearness;
-  const std::uint32_t* corners; ///< three per triangle
-  const std::uint32_t* shown;   ///< what a triangle is a piece of, in KernelScene::triangles
+  const std::uint32_t* triangles; ///< three corners each
+  std::uint32_t count;            ///< of them
+  const std::uint32_t* pieces;    ///< of clipped ones, likewise; their numbers follow
+  const std::uint32_t* whole;     ///< the triangle of each piece
 };
 
 struct KernelTile {
   std::int32_t left, top, width, height; ///< pixels
   int samples;                           ///< 1 or 4
-  const std::uint32_t* list;             ///< triangles that may reach the tile, in order
-  std::size_t count;
+  /// Triangles that may reach the tile: first those that face the viewer, then others, in order.
+  const std::uint32_t* list;
+  std::size_t facing, count;
   void* scratch;     ///< raster_scratch_bytes(samples), aligned to 64
   std::uint8_t* out; ///< the tile's upper left pixel, three bytes each
   std::size_t row_bytes;
 };
 
-/// Draws one tile; returns how many samples are covered.
-using TileKernel = std::uint64_t (*)(const KernelScene& scene, const KernelScreen& screen,
-                                     const KernelTile& tile);
-std::uint64_t draw_tile_baseline(const KernelScene& scene, const KernelScreen& screen,
-                                 const KernelTile& tile);
-std::uint64_t draw_tile_avx2(const KernelScene& scene, const KernelScreen& screen,
+struct RasterKernels {
+  /// Vertices of 10 floats from `begin` to `end`.
+  void (*place)(const KernelView& view, const float* vertices, std::size_t begin, std::size_t end,
+                const KernelPlaces& to);
+  /// Adds those of `count` triangles that may be seen, the first of which has the given number.
+  void (*sort)(const KernelSorting& sorting, const std::uint32_t* corners, std::size_t count,
+               std::uint32_t number, KernelSorted& to);
+  /// Draws one tile; returns how many samples are covered.
+  std::uint64_t (*draw_tile)(const KernelScene& scene, const KernelScreen& screen,
                              const KernelTile& tile);
+};
+extern const RasterKernels raster_kernels_baseline, raster_kernels_avx2;
 
 std::size_t raster_scratch_bytes(int samples);
 

@@ -89,6 +89,10 @@ inline Floats root(Floats x) {
 }
 #endif
 
+inline float larger(float a, float b) {
+  return a > b ? a : b;
+}
+
 inline Ints to_ints(Floats x) {
   return __builtin_convertvector(x, Ints);
 }
@@ -143,12 +147,12 @@ struct PixelBox { // of the tile, the last ones too
   std::int32_t left, right, top, bottom;
 };
 
-template <class Number>
+template <bool Behind, class Number>
 inline void rasterise(const Edges<Number>& edges, const Nearness& near, const PixelBox& box,
-                      std::uint32_t shown, float* depth, std::uint32_t* seen) {
+                      std::uint32_t number, float* depth, std::uint32_t* seen) {
   const Floats min = splat(near.min), max = splat(near.max);
   const Floats slope = ramp() * splat(static_cast<float>(near.dx));
-  const Ints id = splat(static_cast<std::int32_t>(shown));
+  const Ints id = splat(static_cast<std::int32_t>(number));
   for (std::int32_t y = box.top; y <= box.bottom; ++y) {
     Number e[3];
     for (int k = 0; k < 3; ++k)
@@ -164,11 +168,61 @@ inline void rasterise(const Edges<Number>& edges, const Nearness& near, const Pi
       const auto start = static_cast<float>(near.c + near.dx * x + near.dy * y);
       const Floats z = smaller(larger(splat(start) + slope, min), max);
       const auto old = load<Floats>(depth + at);
-      const Ints wins = covered & (z > old);
+      const auto by = load<Ints>(seen + at);
+      Ints wins = covered & (z > old);
+      if constexpr (Behind)
+        wins |= covered & (z == old) & (id < by);
       store(depth + at, choose(wins, z, old));
-      store(seen + at, choose(wins, id, load<Ints>(seen + at)));
+      store(seen + at, choose(wins, id, by));
     }
   }
+}
+
+/// The same for a box of at most eight columns, by windows that start at multiples of eight: what
+/// one triangle has stored there the next one loads without waiting for the cache. `Behind`: some
+/// triangles after it in the order may have been drawn.
+template <bool Behind>
+inline void rasterise_narrow(const Edges<std::int32_t>& edges, const Nearness& near,
+                             const PixelBox& box, std::uint32_t number, float* depth,
+                             std::uint32_t* seen) {
+  const std::int32_t first = box.left & -lanes;
+  const Floats min = splat(near.min), max = splat(near.max);
+  const Floats step = splat(static_cast<float>(near.dx));
+  const Ints id = splat(static_cast<std::int32_t>(number));
+  for (std::int32_t y = box.top; y <= box.bottom; ++y) {
+    std::int32_t e[3];
+    for (int k = 0; k < 3; ++k)
+      e[k] = edges.c[k] + edges.dy[k] * y + edges.dx[k] * first;
+    const Floats start = splat(static_cast<float>(near.c + near.dx * box.left + near.dy * y));
+    for (std::int32_t x = first; x <= box.right; x += lanes) {
+      const Ints covered = inside<std::int32_t>(e, edges.dx, step);
+      for (int k = 0; k < 3; ++k)
+        e[k] += edges.dx[k] * lanes;
+      const Floats along = ramp() + splat(static_cast<float>(x - box.left));
+      const Floats z = smaller(larger(start + along * step, min), max);
+      const std::ptrdiff_t at = std::ptrdiff_t{y} * stride + x;
+      const auto old = load<Floats>(depth + at);
+      const auto by = load<Ints>(seen + at); // `nothing` is -1 and before all
+      Ints wins = covered & (z > old);
+      if constexpr (Behind)
+        wins |= covered & (z == old) & (id < by);
+      store(depth + at, choose(wins, z, old));
+      store(seen + at, choose(wins, id, by));
+    }
+  }
+}
+
+/// Whether all that a triangle with this greatest nearness could cover has something nearer.
+inline bool hidden(const PixelBox& box, float max, const float* depth) {
+  const std::int32_t first = box.left & -lanes;
+  const Ints lane{0, 1, 2, 3, 4, 5, 6, 7};
+  Ints shows = splat(0);
+  for (std::int32_t x = first; x <= box.right; x += lanes) {
+    const Ints within = (lane >= box.left - x) & (lane <= box.right - x);
+    for (std::int32_t y = box.top; y <= box.bottom; ++y)
+      shows |= within & (load<Floats>(depth + std::ptrdiff_t{y} * stride + x) <= splat(max));
+  }
+  return !any(shows);
 }
 
 inline std::int32_t min_of(const std::int32_t (&a)[3]) {
@@ -180,10 +234,21 @@ inline std::int32_t max_of(const std::int32_t (&a)[3]) {
   return m > a[2] ? m : a[2];
 }
 
-template <class Number>
+template <bool Behind, class Number>
+inline void draw(const Edges<Number>& edges, const Nearness& near, const PixelBox& box,
+                 std::uint32_t number, float* depth, std::uint32_t* seen) {
+  if constexpr (sizeof(Number) == sizeof(std::int32_t))
+    if (box.right - box.left < lanes) {
+      rasterise_narrow<Behind>(edges, near, box, number, depth, seen);
+      return;
+    }
+  rasterise<Behind>(edges, near, box, number, depth, seen);
+}
+
+template <bool Behind, class Number>
 inline void rasterise_samples(const std::int32_t (&x)[3], const std::int32_t (&y)[3],
                               const float (&z)[3], double area, const PixelBox& box, int samples,
-                              std::uint32_t shown, float* depth, std::uint32_t* seen) {
+                              std::uint32_t number, float* depth, std::uint32_t* seen) {
   Edges<Number> edges;
   Nearness near{0, 0, 0, z[0], z[0]};
   constexpr std::int32_t pixel = 1 << raster_subpixel_bits, half = pixel / 2;
@@ -208,7 +273,7 @@ inline void rasterise_samples(const std::int32_t (&x)[3], const std::int32_t (&y
       edges.c[k] -= 1;
   }
   if (samples == 1) {
-    rasterise<Number>(edges, near, box, shown, depth, seen);
+    draw<Behind>(edges, near, box, number, depth, seen);
     return;
   }
   for (int s = 0; s < 4; ++s) {
@@ -218,14 +283,19 @@ inline void rasterise_samples(const std::int32_t (&x)[3], const std::int32_t (&y
       moved.c[k] +=
           ex[k] * static_cast<Number>(sample_y[s]) - ey[k] * static_cast<Number>(sample_x[s]);
     there.c += (near.dx * sample_x[s] + near.dy * sample_y[s]) / pixel;
-    rasterise<Number>(moved, there, box, shown, depth + std::ptrdiff_t{s} * plane,
-                      seen + std::ptrdiff_t{s} * plane);
+    draw<Behind>(moved, there, box, number, depth + std::ptrdiff_t{s} * plane,
+                 seen + std::ptrdiff_t{s} * plane);
   }
 }
 
+/// Of what is as near as another the first in the order is seen. `Behind`: other triangles after it
+/// in the order were drawn before it.
+template <bool Behind>
 inline void rasterise_triangle(const KernelScreen& screen, const KernelTile& tile, std::uint32_t n,
                                float* depth, std::uint32_t* seen) {
-  const std::uint32_t* const corner = screen.corners + std::size_t{3} * n;
+  const std::uint32_t* const corner = n < screen.count
+                                          ? screen.triangles + std::size_t{3} * n
+                                          : screen.pieces + std::size_t{3} * (n - screen.count);
   std::int32_t x[3], y[3];
   float z[3];
   constexpr std::int32_t pixel = 1 << raster_subpixel_bits;
@@ -233,17 +303,6 @@ inline void rasterise_triangle(const KernelScreen& screen, const KernelTile& til
     x[k] = screen.x[corner[k]] - tile.left * pixel;
     y[k] = screen.y[corner[k]] - tile.top * pixel;
     z[k] = screen.nearness[corner[k]];
-  }
-  std::int64_t area =
-      std::int64_t{x[1] - x[0]} * (y[2] - y[0]) - std::int64_t{y[1] - y[0]} * (x[2] - x[0]);
-  if (area == 0)
-    return;
-  if (area < 0) {
-    const std::int32_t sx = x[1], sy = y[1];
-    const float sz = z[1];
-    x[1] = x[2], y[1] = y[2], z[1] = z[2];
-    x[2] = sx, y[2] = sy, z[2] = sz;
-    area = -area;
   }
   const std::int32_t low_x = min_of(x), high_x = max_of(x), low_y = min_of(y), high_y = max_of(y);
   // The centre of pixel p is at (p + 1/2) subpixels; samples are less than half a pixel away.
@@ -257,14 +316,30 @@ inline void rasterise_triangle(const KernelScreen& screen, const KernelTile& til
   box.bottom = box.bottom < tile.height ? box.bottom : tile.height - 1;
   if (box.left > box.right || box.top > box.bottom)
     return;
+  if (Behind && box.right - box.left < lanes) {
+    const float max = larger(larger(z[0], z[1]), z[2]);
+    bool all = true;
+    for (int s = 0; s < tile.samples; ++s)
+      all = all && hidden(box, max, depth + std::ptrdiff_t{s} * plane);
+    if (all)
+      return;
+  }
+  std::int64_t area =
+      std::int64_t{x[1] - x[0]} * (y[2] - y[0]) - std::int64_t{y[1] - y[0]} * (x[2] - x[0]);
+  if (area < 0) {
+    const std::int32_t sx = x[1], sy = y[1];
+    const float sz = z[1];
+    x[1] = x[2], y[1] = y[2], z[1] = z[2];
+    x[2] = sx, y[2] = sy, z[2] = sz;
+    area = -area;
+  }
   // Within 96 pixels edge functions fit in 31 bits, over all lanes; else doubles hold them exactly.
   constexpr std::int32_t small = 96 * pixel;
-  const std::uint32_t shown = screen.shown[n];
   const auto twice = static_cast<double>(area);
   if (high_x - low_x <= small && high_y - low_y <= small)
-    rasterise_samples<std::int32_t>(x, y, z, twice, box, tile.samples, shown, depth, seen);
+    rasterise_samples<Behind, std::int32_t>(x, y, z, twice, box, tile.samples, n, depth, seen);
   else
-    rasterise_samples<double>(x, y, z, twice, box, tile.samples, shown, depth, seen);
+    rasterise_samples<Behind, double>(x, y, z, twice, box, tile.samples, n, depth, seen);
 }
 
 // --- What it looks like

@@ -119,6 +119,17 @@ inline void draw_row(const KernelScene& scene, const KernelTile& tile, std::int3
       to_bytes(mean[x], out + std::size_t{3} * static_cast<std::size_t>(x));
 }
 
+/// Where pieces of clipped triangles are seen, names these.
+inline void name_pieces(const KernelScreen& screen, const KernelTile& tile, std::uint32_t* seen) {
+  const auto some = [&](std::size_t end) { // they are the last ones of each part
+    return end > 0 && tile.list[end - 1] >= screen.count;
+  };
+  if (some(tile.facing) || some(tile.count))
+    for (std::ptrdiff_t at = 0; at < std::ptrdiff_t{tile.samples} * plane; ++at)
+      if (seen[at] != nothing && seen[at] >= screen.count)
+        seen[at] = screen.whole[seen[at] - screen.count];
+}
+
 inline std::uint64_t draw_tile(const KernelScene& scene, const KernelScreen& screen,
                                const KernelTile& tile) {
   float* const depth = static_cast<float*>(tile.scratch);
@@ -128,8 +139,11 @@ inline std::uint64_t draw_tile(const KernelScene& scene, const KernelScreen& scr
     std::memset(depth, 0, static_cast<std::size_t>(planes) * sizeof *depth);
     std::memset(seen, 0xff, static_cast<std::size_t>(planes) * sizeof *seen);
   }
-  for (std::size_t n = 0; n < tile.count; ++n)
-    rasterise_triangle(screen, tile, tile.list[n], depth, seen);
+  for (std::size_t n = 0; n < tile.facing; ++n)
+    rasterise_triangle<false>(screen, tile, tile.list[n], depth, seen);
+  for (std::size_t n = tile.facing; n < tile.count; ++n)
+    rasterise_triangle<true>(screen, tile, tile.list[n], depth, seen);
+  name_pieces(screen, tile, seen);
   std::uint64_t covered = 0;
   Corners corners;
   Slots slots;
