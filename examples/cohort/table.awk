@@ -1,4 +1,4 @@
-# One row an organ, of what the programs' --stats tell: awk -f table.awk NAME.told ...
+# One row an organ, of what the programs' --stats tell and the forces of its lift: awk -f table.awk NAME.told ...
 function row() {
   if (organ == "") return
   if (failed != "") { print organ ",,,,,,,,," failed; return } # what stands there may be of a run before
@@ -9,7 +9,8 @@ function row() {
 function scaled(key, by) { return key in value ? sprintf("%.4g", value[key] * by) : "" }
 BEGIN { print "organ,volume_cm3,area_cm2,surface_nodes,tetrahedra,smallest_angle,mass_g,lift_mN,seconds,failed" }
 /^organ / { row(); organ = $2; seconds = 0; failed = force = ""; delete value }
-/^force / { force = sprintf("%.4g", $2) }
+/^time,object,node,/ { lift = 0; force = "0" }
+/^[-+0-9.e]+,/ { split($0, part, ","); lift += part[6]; force = sprintf("%.4g", lift / 1e3) }
 /^failed / { failed = substr($0, 8); gsub(/[,"]/, ";", failed) }
 /^\{/ {
   match($0, /"tool":"[^"]*"/)

@@ -5,7 +5,7 @@ test_every_organ_has_its_row() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   unset MAKEFLAGS MAKELEVEL
   local status=0 organs
-  cp "$GEWEBE_ROOT"/examples/cohort/{Makefile,table.awk} .
+  cp "$GEWEBE_ROOT"/examples/cohort/{Makefile,*.awk} .
   cp "$GEWEBE_ROOT/examples/gravity/liver.particles" .
   printf '0 0 0 60\n' >ball.particles
   cp "$GEWEBE_ROOT/tests/golden/in/open.ply" .
@@ -39,7 +39,7 @@ test_every_organ_has_its_row() {
   awk -F, '$1 == "ball" { exit !($2 > 120) }' cohort.csv || fail "$(<cohort.csv)"
   make -s clean ORGANS="$organs"
   rm said err
-  [[ $(printf '%s\n' * | paste -sd ' ') == 'Makefile ball.particles ball.ply liver.particles open.ply table.awk' ]] || fail "clean left $(printf '%s ' *)"
+  [[ $(printf '%s\n' * | paste -sd ' ') == 'Makefile ball.particles ball.ply ends.awk liver.particles open.ply table.awk' ]] || fail "clean left $(printf '%s ' *)"
 }
 
 test_snakemake_makes_the_same_table() {
@@ -47,7 +47,7 @@ test_snakemake_makes_the_same_table() {
   command -v snakemake >/dev/null || skip 'no snakemake'
   unset MAKEFLAGS MAKELEVEL
   local organs='ball=ball.particles mesh=ball.ply'
-  cp "$GEWEBE_ROOT"/examples/cohort/{Makefile,Snakefile,table.awk} .
+  cp "$GEWEBE_ROOT"/examples/cohort/{Makefile,Snakefile,*.awk} .
   printf '0 0 0 60\n' >ball.particles
   metaball2vol --voxel 3 ball.particles | mc-opt -o ball.ply
   make -s ORGANS="$organs" CELL=15 >said || fail "$(<said)"
