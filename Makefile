@@ -102,11 +102,12 @@ sets_stress := build check
 sets_demo := build
 sets_bench := build bench
 sets_validate := build
+sets_report := build $(if $(QUICK),,bench)
 sets_lint := build check lint
 sets_deb := build deb
 sets_wheel := build wheel
 SETS ?= $(sort $(foreach goal,$(MAKECMDGOALS),$(sets_$(goal))) $(if $(filter fuzz,$(config)),fuzz))
-ifneq ($(filter check golden-update stress demo bench validate lint deb wheel,$(MAKECMDGOALS)),)
+ifneq ($(filter check golden-update stress demo bench validate report lint deb wheel,$(MAKECMDGOALS)),)
 ifneq ($(DEPS),no)
 FIRST := deps
 endif
@@ -254,9 +255,17 @@ bench: $(BENCH) $(TOOLS) | $(FIRST)
 	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
 
 # PAGE says where the page goes: examples/validate holds one. S=WORD makes the section of that name alone.
-PAGE ?= $(BUILD)/validation
+validate: PAGE ?= $(BUILD)/validation
 validate: $(VALIDATE) | $(FIRST)
 	@$(VALIDATE) '$(PAGE)' $(S)
+
+# What report FZKA 7190 claims, measured here: a page a claim in the folder REPORT.
+# PAGE=NAME makes that page alone, QUICK=1 small ones without benchmarks.
+REPORT ?= $(BUILD)/report
+REPORT_BENCH := antialias break_even csg density ela factor geometry latency render solid_motion_peers stiffness stuffing_cgal \
+  surface_quality_cgal voxelize work_error
+report: $(TOOLS) $(PLUGIN) $(if $(QUICK),,$(REPORT_BENCH:%=$(BUILD)/bench_%) $(VALIDATE)) | $(FIRST)
+	@python3 tests/report/report.py '$(REPORT)' --build '$(BUILD)' $(if $(PAGE),--page '$(PAGE)') $(if $(QUICK),--quick)
 
 # The example's own Makefile is a user's: it finds the programs in the PATH.
 demo: $(TOOLS) | $(FIRST)
@@ -375,6 +384,7 @@ help:
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
+	@echo '  report         what report FZKA 7190 claims beside what is measured here; REPORT=FOLDER for the pages, PAGE=NAME, QUICK=1'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'
 	@echo '  wheel          for Python, in build/CONFIG/wheel: programs with their libraries and the module gewebe, tried in a venv'
@@ -383,10 +393,10 @@ help:
 	@echo '  uninstall      the reverse'
 	@echo '  clean          remove build/'
 	@echo
-	@echo 'demo, check, golden-update, stress, bench, validate, deb, wheel and lint install their packages first; DEPS=no turns that off.'
+	@echo 'demo, check, golden-update, stress, bench, validate, report, deb, wheel and lint install their packages first; DEPS=no turns that off.'
 	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
 
 FORCE:
 
 .DELETE_ON_ERROR:
-.PHONY: all deps check golden-update stress bench validate demo html deb wheel lint install uninstall clean help FORCE
+.PHONY: all deps check golden-update stress bench validate report demo html deb wheel lint install uninstall clean help FORCE

@@ -5,7 +5,8 @@
 // no shared data) with central springs. Nothing is written to a disk.
 //
 // Writes CSV to standard output: stage, program, nodes, columns solved, threads, median, fastest
-// and slowest time in ms, a figure and its unit.
+// and slowest time in ms, a figure and its unit. Words on the command line choose among columns
+// (of the colon), colon and liver (their relaxation).
 
 #include "compliance/compliance_columns.h"
 #include "dynamics/relaxation.h"
@@ -212,19 +213,25 @@ Model model_of(const TriangleMesh& mesh) {
 
 } // namespace
 
-int main() {
+int main(int count, char** words) {
+  const auto wanted = [&](const char* stage) {
+    return count < 2 || std::any_of(words + 1, words + count,
+                                    [&](const char* w) { return std::strcmp(w, stage) == 0; });
+  };
   std::puts("stage,program,nodes,columns,threads,median_ms,fastest_ms,slowest_ms,figure,unit");
-  const double rate = product_rate();
   TriangleMesh organ = test::load_test_mesh("gca90_large_intestine_20k.stl");
   if (organ.triangles.empty()) {
     (void)std::fputs("stiffness: no shared data, a ball instead\n", stderr);
     organ = test::sphere_mesh(5, 100, {});
   }
-  bench_columns(model_of(organ), rate);
-  bench_relaxation("colon", model_of(organ), false);
+  if (wanted("columns"))
+    bench_columns(model_of(organ), product_rate());
+  if (wanted("colon"))
+    bench_relaxation("colon", model_of(organ), false);
   TriangleMesh liver = test::load_test_mesh("sofa_liver_smooth.obj");
   if (liver.triangles.empty())
     liver = test::sphere_mesh(4, 100, {});
-  bench_relaxation("liver", model_of(liver), true);
+  if (wanted("liver"))
+    bench_relaxation("liver", model_of(liver), true);
   return EXIT_SUCCESS;
 }

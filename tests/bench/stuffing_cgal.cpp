@@ -13,7 +13,8 @@
 // at most. Rows "times of ours" hold a peer's time over that of ours on two threads; rows "over
 // tetrahedra" are for scripts/plot.
 //
-// Arguments: some of size, cgal, tetgen, ftetwild; all where there are none.
+// Arguments: some of size, cgal, tetgen, ftetwild, all where there are none; and few, which leaves
+// out the larger number of tetrahedra.
 
 #include "formats/mesh/mesh_file.h"
 #include "formats/tetrahedra/tet_file.h"
@@ -411,6 +412,8 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   for (const Scene& scene : make_scenes()) {
     for (const double count : {3e4, 3e5}) {
+      if (count > 1e5 && argc > 1 && wanted("few"))
+        continue;
       Run reference = ours(scene, scene.cell(count), 2);
       report(scene, reference);
       write_surface(scene, reference.cell, folder / "surface.off");

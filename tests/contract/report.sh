@@ -1,0 +1,87 @@
+# The pages of `make report`: all of them small and without data, and one of rows that are known.
+# shellcheck shell=bash disable=SC2317 # functions are called by name
+
+report() { python3 "$GEWEBE_ROOT/tests/report/report.py" "$@"; }
+
+# Each page of the list is there, says which machine it is of, and shows only pictures that are there and can be read.
+pages_are_whole() { # FOLDER
+  python3 - "$1" "$GEWEBE_ROOT/tests/report" <<'END'
+import pathlib, re, sys
+import xml.etree.ElementTree as tree
+
+folder = pathlib.Path(sys.argv[1])
+sys.path.insert(0, sys.argv[2])
+from report import PAGES
+
+failed, listed = [], (folder / "README.md").read_text()
+for name, title, *_ in PAGES:
+    text = (folder / f"{name}.md").read_text() if (folder / f"{name}.md").exists() else ""
+    if not text.startswith(f"# {title}\n"):
+        failed.append(f"{name}.md is absent or another page")
+    if not re.search(r"Measured 20\d\d-\d\d-\d\d on .+, \d+ cores, load average [0-9.]+", text):
+        failed.append(f"{name}.md does not say where it was measured")
+    if f"]({name}.md)" not in listed:
+        failed.append(f"README.md does not list {name}.md")
+    if "**failed**: " in text:
+        failed.append(f"{name}.md: {text.split('**failed**: ')[1].splitlines()[0]}")
+for page in folder.glob("*.md"):
+    for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+        path = folder / link
+        if not path.exists():
+            failed.append(f"{page.name} refers to {link}, which does not exist")
+        elif path.suffix == ".svg":
+            tree.parse(path)
+        elif path.suffix == ".png" and path.read_bytes()[:8] != b"\x89PNG\r\n\x1a\n":
+            failed.append(f"{link} is no PNG")
+print(*failed, sep="\n")
+sys.exit(bool(failed))
+END
+}
+
+test_quick_makes_every_page_without_data() {
+  [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
+  GEWEBE_SHARED=$PWD/nothing report pages --build "$BUILD" --quick >log 2>&1 || fail 'a page fails:' "$(grep fail log)"
+  pages_are_whole pages >said || fail "$(<said)"
+  # What needs data says so; what was measured is what the programs say.
+  grep -q '^\*skipped: the DXF of figure 4-3, no ts_liver_gallbladder_portal.dxf' pages/cycles.md || fail 'a model from nowhere'
+  grep -q '^\*skipped: the real organ, no hubmap_female_reproductive.obj' pages/myoma.md || fail 'an organ from nowhere'
+  metaball2vol --voxel 4.2 "$GEWEBE_ROOT/examples/pull/five.particles" | mc-opt --stats -o /dev/null 2>stats
+  local nodes
+  nodes=$(sed 's/.*"points":\([0-9]*\).*/\1/' stats)
+  grep -q "^| nodes, springs of five particles | 920, 2,658 | $nodes, " pages/cycles.md || fail "not $nodes nodes" "$(<pages/cycles.md)"
+  # The checks see a picture that is absent, a page that is, and one that failed.
+  rm pages/two-step-curve.svg
+  ! pages_are_whole pages >said || fail 'a picture that does not exist passes'
+  printf "<svg xmlns='http://www.w3.org/2000/svg'></svg>" >pages/two-step-curve.svg
+  pages_are_whole pages >said || fail "$(<said)"
+  echo '**failed**: nothing' >>pages/storage.md
+  ! pages_are_whole pages >said || fail 'a page that failed passes'
+}
+
+# Benchmarks of known rows: a page compares equal threads, and names of stages may hold commas.
+test_page_of_known_rows() {
+  mkdir build
+  for program in bench_factor ffe-run; do
+    printf '#!/bin/bash\n%s\n' "cat '$PWD/rows'" >build/$program
+    chmod +x build/$program
+  done
+  cat >rows <<'END'
+stage,program,rows,columns,threads,fastest_ms,median_ms,figure,unit
+matrix product,BLAS,64,64,1,1,1,57.9,GFLOP/s
+net, factor,gewebe,300,0,1,9,10,5,GFLOP/s
+net, factor,gewebe,300,0,2,4,5,5,GFLOP/s
+net, factor,CHOLMOD,300,0,1,30,40,7,MB
+END
+  report pages --build build --page work-factor >log 2>&1 || fail "$(<log)"
+  grep -q '^| factor of a net, 300 rows, one thread | – | 10 ms on 1 thread, CHOLMOD 40 ms on 1 thread: 4 times as long |$' pages/work-factor.md ||
+    fail 'other times than the rows have' "$(<pages/work-factor.md)"
+  cmp rows pages/factor.csv
+  # A page that can't be made fails the whole; one that nobody knows is refused.
+  printf '#!/bin/bash\nexit 3\n' >build/bench_factor
+  local status=0
+  report pages --build build --page work-factor >log 2>&1 || status=$?
+  [[ $status == 1 && $(tail -1 log) == 'report: failed: work-factor' ]] || fail "status $status" "$(<log)"
+  status=0
+  report pages --page nobody >log 2>&1 || status=$?
+  [[ $status == 2 ]] || fail "status $status for a page that nobody knows"
+}
