@@ -88,7 +88,7 @@ double follow_norms(const NodeMatrix& matrix, std::span<const std::uint32_t> row
     norms[row] = row_norm(matrix, row);
   double norm = 0;
   for (const double of_row : norms)
-    norm = of_row <= norm ? norm : of_row; // NaN stays
+    norm = std::isnan(norm) || of_row <= norm ? norm : of_row; // NaN stays
   return norm;
 }
 

@@ -270,7 +270,7 @@ double row_norm(const NodeMatrix& matrix, std::size_t node) {
         sum += (matrix.fixed[matrix.node[k]] >> b & 1) != 0
                    ? 0
                    : std::abs(matrix.block[matrix.at[k]][3 * a + b]);
-    norm = sum <= norm ? norm : sum;
+    norm = std::isnan(norm) || sum <= norm ? norm : sum; // NaN stays
   }
   return norm;
 }

@@ -255,18 +255,14 @@ struct Elastostatic::State {
         where.push_back(axis_of(node, a));
     const std::size_t size = where.size();
     delassus.compliance.resize(size * size);
-    const auto symmetric = [&](const auto& entry) {
-      for (std::size_t c = 0; c < size; ++c)
-        for (std::size_t r = c; r < size; ++r)
-          delassus.compliance[c * size + r] = delassus.compliance[r * size + c] = entry(c, r);
-    };
     const auto node_at = [&](std::size_t row) { return nodes[row / 3]; };
     const auto axis_at = [&](std::size_t row) { return static_cast<int>(row % 3); };
     if (!now.displacement.empty() && !by_block) {
       const ColumnCache& columns = held.columns(nodes);
-      symmetric([&](std::size_t c, std::size_t r) {
-        return columns.entry(node_at(c), axis_at(c), where[r]);
-      });
+      for (std::size_t c = 0; c < size; ++c)
+        for (std::size_t r = c; r < size; ++r)
+          delassus.compliance[c * size + r] = delassus.compliance[r * size + c] =
+              columns.entry(node_at(c), axis_at(c), where[r]);
       const std::vector<double>& shape = need_whole();
       for (const std::size_t axis : where)
         delassus.free.push_back(shape[axis]);

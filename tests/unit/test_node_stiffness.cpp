@@ -112,6 +112,34 @@ TEST_P(NodeStiffness, IsThatOfTheElements) {
   expect_like(node_stiffness(model), model, 1e-15);
 }
 
+TEST_P(NodeStiffness, ItsNormIsThatOfTheRowsAndNoNumberWhereOneIsNone) {
+  const Model model = block(GetParam(), 4);
+  NodeMatrix matrix = node_stiffness(model);
+  const StiffnessMatrix k = stiffness_matrix(model);
+  std::vector<double> sums(3 * model.nodes.size());
+  for (std::size_t c = 0; c < k.order(); ++c)
+    for (auto at = static_cast<std::size_t>(k.column_start[c]);
+         at < static_cast<std::size_t>(k.column_start[c + 1]); ++at) {
+      const auto r = static_cast<std::size_t>(k.row[at]);
+      sums[static_cast<std::size_t>(k.axis_of_row[r])] += std::abs(k.value[at]);
+      if (r != c)
+        sums[static_cast<std::size_t>(k.axis_of_row[c])] += std::abs(k.value[at]);
+    }
+  for (std::size_t i = 0; i < matrix.nodes(); ++i) {
+    const double most = std::max({sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]});
+    ASSERT_NEAR(row_norm(matrix, i), most, 1e-13 * most) << i;
+  }
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < matrix.nodes(); ++i)
+    if (matrix.fixed[i] == fixed_none)
+      last = i;
+  for (const std::size_t entry : {0U, 3U, 5U}) { // of one axis alone
+    NodeMatrix spoilt = matrix;
+    spoilt.diagonal[last][entry] = std::nan("");
+    EXPECT_TRUE(std::isnan(row_norm(spoilt, last))) << entry;
+  }
+}
+
 TEST_P(NodeStiffness, FollowsCuts) {
   Model model = block(GetParam(), 4);
   NodeMatrix matrix = node_stiffness(model);

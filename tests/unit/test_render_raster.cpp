@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <random>
+#include <utility>
 
 namespace gewebe {
 namespace {
@@ -116,6 +117,73 @@ TEST(RenderRaster, FirstOfCoincidentAndNearestOfAllIsSeen) {
   EXPECT_NEAR(seen(3), 229.5, 0.5); // 0.9
 }
 
+// Triangles that face the viewer are drawn before others, but which is seen goes by depth and order
+// alone: small and large ones, clipped ones, and some on the same places, each with its own shade.
+TEST(RenderRaster, WhereTrianglesFaceChangesNothing) {
+  constexpr std::uint32_t side = 150;
+  std::mt19937 random(11);
+  const auto below = [&](double end) {
+    return end * (static_cast<double>(random()) / 4294967296.0);
+  };
+  Projection projection = pixels(side, side);
+  projection.matrix[3] = {0, 0, 1, 1};
+  Drawing drawing;
+  const auto add = [&](std::uint32_t a) {
+    for (std::uint32_t k = a; k < a + 3; ++k)
+      drawing.vertices[k].shade = static_cast<float>(drawing.triangles.size() % 250) / 255;
+    drawing.triangles.push_back({a, a + 1, a + 2});
+  };
+  for (int n = 0; n < 900; ++n) {
+    const double size = n % 300 == 7 ? 1e6 : n % 20 == 0 ? 240 : n % 3 == 0 ? 40 : 4;
+    const double x = below(side), y = below(side), base = 1 + std::floor(below(4)) / 4;
+    const bool tilted = n % 2 == 0 && size < 1e6;
+    const auto first = static_cast<std::uint32_t>(drawing.vertices.size());
+    for (const int copy : {0, 1}) { // of some, with another shade
+      if (copy == 1 && n % 4 != 0)
+        break;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        if (copy == 1) {
+          drawing.vertices.push_back(drawing.vertices[first + k]);
+          continue;
+        }
+        const double w = base + (tilted ? below(1) : 0), half = side / 2.0;
+        const double px = x + below(size) - size / 2, py = y + below(size) - size / 2;
+        DrawVertex v = vertex(half + w * (px - half), half + w * (py - half));
+        v.position[2] = static_cast<float>(w - 1);
+        drawing.vertices.push_back(v);
+      }
+      add(static_cast<std::uint32_t>(drawing.vertices.size()) - 3);
+    }
+  }
+  const auto faces_the_viewer = [&](const Triangle& t) {
+    std::array<std::array<double, 2>, 3> p{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& at = drawing.vertices[t[k]].position;
+      const double w = 1.0 + static_cast<double>(at[2]);
+      for (std::size_t a = 0; a < 2; ++a)
+        p[k][a] = (static_cast<double>(at[a]) - side / 2.0) / w;
+    }
+    return (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) < (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
+  };
+  for (Triangle& t : drawing.triangles)
+    if (!faces_the_viewer(t))
+      std::swap(t[1], t[2]);
+  for (const int samples : {1, 4}) {
+    const Image all_face = render_cpu(drawing, projection, {}, side, side, samples, {});
+    for (const double turned : {1.0, 0.5, 0.1})
+      for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
+        Drawing other = drawing;
+        for (Triangle& t : other.triangles)
+          if (below(1) < turned)
+            std::swap(t[1], t[2]);
+        Context context;
+        context.cpu = level;
+        const Image image = render_cpu(other, projection, {}, side, side, samples, context);
+        EXPECT_EQ(image_digest(image), image_digest(all_face)) << samples << ' ' << turned;
+      }
+  }
+}
+
 TEST(RenderRaster, ASurfaceAroundTheCameraFillsThePictureWhateverIsClipped) {
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = test::sphere_mesh(2, 10, {0, 0, 0});
@@ -142,6 +210,12 @@ TEST(RenderRaster, HugeAndTinyTrianglesAreExact) {
   drawing.vertices = {vertex(-1e7, -1e7), vertex(3e7, -1e7), vertex(-1e7, 3e7)};
   drawing.triangles = {{0, 1, 2}};
   EXPECT_EQ(count(drawing, 640, 480), 640U * 480U);
+  for (DrawVertex& v : drawing.vertices) // and looks like what it is a piece of
+    v.shade = 0.6F;
+  for (const int samples : {1, 4})
+    EXPECT_EQ(std::ranges::count(
+                  render_cpu(drawing, pixels(64, 48), {}, 64, 48, samples, {}).values, 153),
+              3 * 64 * 48);
   // Slivers and points cover nothing and break nothing.
   drawing.vertices = {vertex(1, 1), vertex(1, 1), vertex(6, 6)};
   EXPECT_EQ(count(drawing, 8, 8), 0U);
