@@ -109,7 +109,7 @@ def main():
         )
         print(f"{seconds:.0f} s{word}", flush=True)
     index(folder, about, machine.versions(os.environ.get("PYTHON") or "/usr/bin/python3"), given.quick)
-    print(f"{time.monotonic() - begin:.0f} s in all; the pages are in {folder}, README.md lists them.")
+    print(f"{time.monotonic() - begin:.0f} s in all; the pages are in {folder}, README.md lists them.", flush=True)
     if failed:
         print(f"report: failed: {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
