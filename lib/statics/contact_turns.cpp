@@ -19,8 +19,10 @@ constexpr std::array<Bend, 5> bends{{{1.0, 0}, {1.0, 4}, {0.7, 0}, {0.4, 0}, {0.
 
 constexpr double same_place = 1e-9; ///< of the radius, and of a normal's length
 constexpr double fair_place = 1e-6; ///< that is not worth a warning
-constexpr double outside = 1e-9;    ///< of the radius: so deep is not inside
-constexpr double nearly = 0.03;     ///< from where on each turn comes nearer
+/// From where on a turn may be foreseen instead of taken: drag turns with the points that wander.
+constexpr double sure_place = 1e-7;
+constexpr double outside = 1e-9; ///< of the radius: so deep is not inside
+constexpr double nearly = 0.03;  ///< from where on each turn comes nearer
 constexpr double short_way = 0.1, most_way = 8;
 constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
@@ -102,7 +104,7 @@ public:
       const double ratio = nearer ? change / before : 0;
       // What another turn would change, if it came nearer as fast as the last ones did.
       const double next = change * ratio * (last_ratio > 0 ? std::min(1.0, ratio / last_ratio) : 1);
-      if (near && nearer && turns_.solved && next <= same_place) {
+      if (near && nearer && turns_.solved && change <= sure_place && next <= same_place) {
         locate(turns_.at);
         turns_.change = next;
         ++turns_.turns;
@@ -507,7 +509,19 @@ VectorXd ContactScene::rows_of(std::span<const Vec3> places) const {
 void take_turns(const DelassusOperator& delassus, const ContactNodes& nodes,
                 std::span<const Vec3> free, std::span<const std::optional<PlacedInstrument>> placed,
                 std::span<const std::optional<MovedInstrument>> moved, ContactTurns& turns) {
-  Turns(delassus, nodes, free, placed, moved, turns).run();
+  const auto run = [&] { Turns(delassus, nodes, free, placed, moved, turns).run(); };
+  const ContactTurns before = turns;
+  run();
+  if (before.last.empty() || !before.at.empty() || (turns.solved && turns.change <= same_place))
+    return;
+  // Friction that begins with the last forces may end between two points: without them, then.
+  const ContactTurns found = std::exchange(turns, before);
+  turns.last.clear();
+  run();
+  const int taken = turns.turns + found.turns;
+  if (found.solved && !(turns.solved && turns.change <= found.change))
+    turns = found;
+  turns.turns = taken;
 }
 
 } // namespace gewebe

@@ -9,7 +9,7 @@
 // Newton's method on the conditions of the energy's minimum. Less of it is taken where it isn't
 // stable; near the end, where that is so only but for the contacts, these hold their points. Turns
 // that begin with the last forces end before one that would change less than 1e-9, by what the last
-// ones changed.
+// ones changed, if that was 1e-7 at most; where they don't end so near, they begin without them.
 
 #include "contact/surface_parts.h"
 #include "contact/surface_point.h"
