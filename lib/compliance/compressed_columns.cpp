@@ -220,9 +220,13 @@ void CompressedColumns::add(std::span<const NodeVector> forces, const Context& c
     for (const auto& [a, load] : loads)
       add_product(view(std::min<std::size_t>(a, b), std::max<std::size_t>(a, b)), a < b, load,
                   some.cpu, sum);
-    for (std::size_t k = 0; k < members.size(); ++k)
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        u[3 * std::size_t{members[k]} + axis] += sum[3 * k + axis];
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      double* const to = u.data() + 3 * std::size_t{members[k]};
+      const double* const more = sum.data() + 3 * k;
+      to[0] += more[0];
+      to[1] += more[1];
+      to[2] += more[2];
+    }
   });
 }
 

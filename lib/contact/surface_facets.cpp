@@ -4,6 +4,9 @@
 #include "contact/box_blocks.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <immintrin.h>
 #include <utility>
 
 namespace gewebe {
@@ -30,6 +33,46 @@ std::vector<std::uint32_t> loose_nodes(const Model& model) {
     if (taken[i] == 0)
       loose.push_back(i);
   return loose;
+}
+
+/// The least and the largest displacement along each axis.
+struct Extremes {
+  Vec3 min, max;
+};
+
+struct Two {
+  __m128d value;
+};
+
+/// Of 3 n numbers, passing over a NaN.
+Extremes extremes_of(std::span<const double> displacement) {
+  constexpr std::size_t wide = 12; // side by side: comparisons wait for each other
+  std::array<double, wide> least{}, most{};
+  std::array<Two, wide / 2> low{}, high{};
+  low.fill({_mm_set1_pd(HUGE_VAL)});
+  high.fill({_mm_set1_pd(-HUGE_VAL)});
+  std::size_t k = 0;
+  for (; k + wide <= displacement.size(); k += wide)
+    for (std::size_t pair = 0; pair < wide / 2; ++pair) {
+      const __m128d two = _mm_loadu_pd(displacement.data() + k + 2 * pair);
+      low[pair].value = _mm_min_pd(two, low[pair].value); // the second where one is NaN
+      high[pair].value = _mm_max_pd(two, high[pair].value);
+    }
+  for (std::size_t pair = 0; pair < wide / 2; ++pair) {
+    _mm_storeu_pd(least.data() + 2 * pair, low[pair].value);
+    _mm_storeu_pd(most.data() + 2 * pair, high[pair].value);
+  }
+  for (std::size_t lane = 0; k + lane < displacement.size(); ++lane) {
+    least[lane] = std::min(least[lane], displacement[k + lane]);
+    most[lane] = std::max(most[lane], displacement[k + lane]);
+  }
+  Extremes all{{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
+  for (std::size_t lane = 0; lane < wide; ++lane) {
+    const int a = static_cast<int>(lane % 3);
+    all.min[a] = std::min(all.min[a], least[lane]);
+    all.max[a] = std::max(all.max[a], most[lane]);
+  }
+  return all;
 }
 
 } // namespace
@@ -84,26 +127,50 @@ SurfaceFacets::SurfaceFacets(const Model& model) {
   std::vector<std::size_t> next(first_of_node_.begin(), first_of_node_.end() - 1);
   for_corners([&](std::uint32_t node, std::uint32_t k) { of_node_[next[node]++] = k; });
   set_shape(model, {});
+  rest_ = boxes_;
+}
+
+Box3 SurfaceFacets::box_of(const Model& model, std::span<const double> displacement,
+                           std::size_t block) const {
+  // As Box3::add, which passes over a NaN too, but without a call for each number.
+  Box3 box;
+  Vec3 min = box.min, max = box.max;
+  for (std::size_t k = first_node_[block]; k < first_node_[block + 1]; ++k) {
+    const std::uint32_t i = nodes_[k];
+    const Vec3 at =
+        model.nodes[i].position + (displacement.empty() ? Vec3{} : vector_at(displacement, i));
+    for (int a = 0; a < 3; ++a) {
+      min[a] = at[a] < min[a] ? at[a] : min[a];
+      max[a] = at[a] > max[a] ? at[a] : max[a];
+    }
+  }
+  box.min = min;
+  box.max = max;
+  return box;
 }
 
 void SurfaceFacets::set_shape(const Model& model, std::span<const double> displacement) {
   box_ = {};
   for (std::size_t b = 0; b < boxes_.size(); ++b) {
-    // As Box3::add, which passes over a NaN too, but without a call for each number.
-    Vec3 min = Box3{}.min, max = Box3{}.max;
-    for (std::size_t k = first_node_[b]; k < first_node_[b + 1]; ++k) {
-      const std::uint32_t i = nodes_[k];
-      const Vec3 at =
-          model.nodes[i].position + (displacement.empty() ? Vec3{} : vector_at(displacement, i));
-      for (int a = 0; a < 3; ++a) {
-        min[a] = at[a] < min[a] ? at[a] : min[a];
-        max[a] = at[a] > max[a] ? at[a] : max[a];
-      }
-    }
-    boxes_[b].min = min;
-    boxes_[b].max = max;
-    box_.add(min);
-    box_.add(max);
+    boxes_[b] = box_of(model, displacement, b);
+    box_.add(boxes_[b].min);
+    box_.add(boxes_[b].max);
+  }
+}
+
+void SurfaceFacets::set_shape_near(const Model& model, std::span<const double> displacement,
+                                   std::span<const Box3> places) {
+  const Extremes far = extremes_of(displacement);
+  box_ = {};
+  for (std::size_t b = 0; b < boxes_.size(); ++b) {
+    // Sums round alike at both ends, so that what is in the box at rest is in this one.
+    Box3& box = boxes_[b];
+    box.min = rest_[b].min + far.min;
+    box.max = rest_[b].max + far.max;
+    if (std::ranges::any_of(places, [&](const Box3& place) { return near(place, box); }))
+      box = box_of(model, displacement, b);
+    box_.add(box.min);
+    box_.add(box.max);
   }
 }
 

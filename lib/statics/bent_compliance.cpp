@@ -1,5 +1,8 @@
 #include "statics/bent_compliance_internal.h"
 
+#include "base/cpu.h"
+#include "compliance/column_sum.h"
+
 #include <utility>
 
 namespace gewebe {
@@ -11,20 +14,36 @@ BentCompliance::BentCompliance(const Compliance& w, std::vector<Index> rows, Mat
   if (rows_.empty())
     return;
   // Instruments apart from each other share no rows: most of H is 0.
-  spread_ = MatrixXd::Zero(w_.rows(), h_.cols());
-  for (Index c = 0; c < h_.cols(); ++c)
+  const ColumnSum<double> sum = column_sum<double>(best_cpu_level());
+  MatrixXd spread = MatrixXd::Zero(w_.rows(), h_.cols());
+  std::vector<const double*> columns;
+  std::vector<double> factors;
+  for (Index c = 0; c < h_.cols(); ++c) {
+    columns.clear();
+    factors.clear();
     for (Index r = 0; r < h_.rows(); ++r)
-      if (h_(r, c) != 0)
-        spread_.col(c) += h_(r, c) * w_.col(rows_[static_cast<std::size_t>(r)]);
-  MatrixXd own = MatrixXd::Identity(h_.rows(), h_.cols());
-  own -= spread_(rows_, Eigen::all);
-  lu_.compute(own);
+      if (const double factor = h_(r, c); factor != 0) {
+        columns.push_back(w_.col(rows_[static_cast<std::size_t>(r)]).data());
+        factors.push_back(factor);
+      }
+    sum(columns.data(), factors.data(), columns.size(), spread.col(c).data(), 0,
+        static_cast<std::size_t>(w_.rows()));
+  }
   for (Index r = 0, next = 0; r < w_.rows(); ++r)
     if (next < std::ssize(rows_) && rows_[static_cast<std::size_t>(next)] == r)
       ++next;
     else
       others_.push_back(r);
-  spread_ = spread_(others_, Eigen::all).eval();
+  MatrixXd own(h_.rows(), h_.cols());
+  spread_.resize(std::ssize(others_), h_.cols());
+  for (Index c = 0; c < h_.cols(); ++c) {
+    const double* const from = spread.col(c).data();
+    for (Index r = 0; r < own.rows(); ++r)
+      own(r, c) = (r == c ? 1.0 : 0.0) - from[rows_[static_cast<std::size_t>(r)]];
+    for (Index r = 0; r < spread_.rows(); ++r)
+      spread_(r, c) = from[others_[static_cast<std::size_t>(r)]];
+  }
+  lu_.compute(own);
 }
 
 void BentCompliance::apply(MatrixXd& columns) const {

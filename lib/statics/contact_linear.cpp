@@ -1,5 +1,6 @@
 // The linear problem of a turn: the forces of the pairs that push, or would be inside.
 
+#include "base/vector_at.h"
 #include "contact/contact_solver.h"
 #include "statics/contact_scene_internal.h"
 
@@ -76,13 +77,22 @@ private:
   /// Rows of the points of pairs, along their directions.
   MatrixXd at_points(std::span<const std::uint32_t> pairs, const MatrixXd& rows) const {
     MatrixXd all(width() * static_cast<Index>(pairs.size()), rows.cols());
+    const auto length = static_cast<std::size_t>(rows.rows());
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       const TouchPair& p = pairs_[pairs[k]];
-      MatrixXd own = MatrixXd::Zero(3, rows.cols());
-      for (std::size_t c = 0; c < 3; ++c)
-        if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
-          own += p.point.weights[c] * rows.middleRows(3 * static_cast<Index>(p.piece[c]), 3);
-      all.middleRows(width() * static_cast<Index>(k), width()) = directions(p).transpose() * own;
+      for (Index column = 0; column < rows.cols(); ++column) {
+        const double* const from = rows.col(column).data();
+        double* const to = all.col(column).data() + width() * static_cast<Index>(k);
+        Vec3 own;
+        for (std::size_t c = 0; c < 3; ++c)
+          if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
+            own += p.point.weights[c] * vector_at({from, length}, p.piece[c]);
+        if (rough_)
+          for (int a = 0; a < 3; ++a)
+            to[a] = own[a];
+        else
+          to[0] = dot(p.normal, own);
+      }
     }
     return all;
   }

@@ -10,6 +10,7 @@
 #include "statics/held_contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -29,6 +30,9 @@ struct Elastostatic::State {
   ForcesAt block;
   HeldContacts held;
   bool by_block = false; // how the present load is met
+  // C among the nodes that contact was last found at, most of which are the same the next time.
+  std::vector<std::uint32_t> asked;
+  std::vector<ComplianceBlock> between; // by rows of the upper triangle
 
   // The last load, its contact forces, and its shape, where that was asked for.
   Load load;
@@ -113,10 +117,14 @@ struct Elastostatic::State {
   }
 
   static void require_finite(const std::vector<double>& shape) {
-    double sum = 0;
-    for (const double value : shape)
-      sum += std::abs(value);
-    if (!std::isfinite(sum))
+    std::array<double, 8> sum{}; // side by side: one behind the other waits for each addition
+    std::size_t k = 0;
+    for (; k + sum.size() <= shape.size(); k += sum.size())
+      for (std::size_t l = 0; l < sum.size(); ++l)
+        sum[l] += std::abs(shape[k + l]);
+    for (; k < shape.size(); ++k)
+      sum[0] += std::abs(shape[k]);
+    if (!std::ranges::all_of(sum, [](double s) { return std::isfinite(s); }))
       throw Error("the shape is not finite, expected a smaller load");
   }
 
@@ -245,6 +253,31 @@ struct Elastostatic::State {
 
   // ---- for who finds forces by conditions
 
+  /// Blocks between these nodes, anew only of those that were not asked for last time.
+  /// \pre nodes ascending, whose columns are at hand
+  void ask_blocks(std::span<const std::uint32_t> nodes) {
+    if (std::ranges::equal(nodes, asked))
+      return;
+    const std::size_t before = asked.size();
+    std::vector<std::size_t> place; // among those asked before, or that many
+    for (const std::uint32_t node : nodes) {
+      const auto there = std::ranges::lower_bound(asked, node);
+      place.push_back(there != asked.end() && *there == node
+                          ? static_cast<std::size_t>(there - asked.begin())
+                          : before);
+    }
+    std::vector<ComplianceBlock> blocks;
+    blocks.reserve(nodes.size() * (nodes.size() + 1) / 2);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t j = i; j < nodes.size(); ++j) {
+        const std::size_t a = place[i], b = place[j];
+        blocks.push_back(a < before && b < before ? between[a * before - a * (a + 1) / 2 + b]
+                                                  : compliance.column_block(nodes[i], nodes[j]));
+      }
+    between = std::move(blocks);
+    asked.assign(nodes.begin(), nodes.end());
+  }
+
   DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
     update(now);
     DelassusOperator delassus;
@@ -275,9 +308,10 @@ struct Elastostatic::State {
       throw Error("the columns of " + std::to_string(all.size()) +
                   " nodes in contact do not fit in memory, expected more of it or fewer contacts");
     compliance.need(all);
-    for (std::size_t i = 0; i < nodes.size(); ++i)
+    ask_blocks(nodes);
+    for (std::size_t i = 0, k = 0; i < nodes.size(); ++i)
       for (std::size_t j = i; j < nodes.size(); ++j) {
-        const ComplianceBlock own = compliance.column_block(nodes[i], nodes[j]);
+        const ComplianceBlock& own = between[k++];
         for (std::size_t a = 0; a < 3; ++a)
           for (std::size_t b = i == j ? a : 0; b < 3; ++b) {
             const std::size_t c = 3 * i + a, r = 3 * j + b;

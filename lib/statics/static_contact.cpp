@@ -45,6 +45,17 @@ double distance_of(const PlacedInstrument& instrument, const Facet& piece,
   return least;
 }
 
+/// Whether all corners are on one side of the box, by more than `gap`.
+bool beside(const std::array<Vec3, 3>& corners, const Box3& box, double gap) {
+  for (int a = 0; a < 3; ++a) {
+    const double low = box.min[a] - gap, high = box.max[a] + gap;
+    if ((corners[0][a] < low && corners[1][a] < low && corners[2][a] < low) ||
+        (corners[0][a] > high && corners[1][a] > high && corners[2][a] > high))
+      return true;
+  }
+  return false;
+}
+
 bool short_ways(std::span<const std::optional<MovedInstrument>> instruments) {
   return std::ranges::all_of(instruments, [](const auto& i) {
     return !i || path_length(i->shape, i->before, i->now) <= short_way * i->shape.radius;
@@ -125,13 +136,15 @@ void StaticContact::find(const Placed& placed, const std::map<std::uint32_t, Vec
     if (!placed[k])
       continue;
     const PlacedInstrument& instrument = *placed[k];
-    facets_.visit_near(instrument.box(), [&](std::uint32_t number) {
+    const Box3 box = instrument.box();
+    facets_.visit_near(box, [&](std::uint32_t number) {
       const Facet& f = facets_.facets()[number];
-      const double d =
-          distance_of(instrument, f,
-                      {rest(f[0]) + vector_at(shape, f[0]), rest(f[1]) + vector_at(shape, f[1]),
-                       rest(f[2]) + vector_at(shape, f[2])}) -
-          instrument.radius;
+      const std::array<Vec3, 3> corners{rest(f[0]) + vector_at(shape, f[0]),
+                                        rest(f[1]) + vector_at(shape, f[1]),
+                                        rest(f[2]) + vector_at(shape, f[2])};
+      if (beside(corners, box, outside * instrument.radius))
+        return;
+      const double d = distance_of(instrument, f, corners) - instrument.radius;
       if (!(d < -depth * instrument.radius))
         return;
       for (const std::uint32_t node : f)
@@ -303,7 +316,6 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     return;
   for (std::size_t k = 0; nodes.empty() && k < gave_.size(); ++k) // nothing pushes it
     gave_[k] = instruments[k] ? -instruments[k]->compliance * instruments[k]->pushed : Vec3{};
-  const std::vector<double> before = shape;
   const std::vector<PointTouch> pushed =
       short_ways(instruments) ? points_ : std::vector<PointTouch>{};
   solved_ = true;
@@ -311,23 +323,33 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
   for (;;) {
     std::vector<Vec3> at;
     const bool agreed =
-        solve_all(object, nodes, displaced, placed, instruments, before, pushed, vain_pairs, at);
+        solve_all(object, nodes, displaced, placed, instruments, shape, pushed, vain_pairs, at);
     solved_ = solved_ && agreed;
     const std::span<const double> u = object.shape();
-    shape.assign(u.begin(), u.end());
+    next_.assign(u.begin(), u.end());
     // As the contacts have it, whatever is left out of the rest of the shape.
     for (std::size_t k = 0; k < nodes.size(); ++k)
       for (int a = 0; a < 3; ++a)
-        shape[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
-    facets_.set_shape(model_, shape);
+        next_[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
     const std::size_t known = nodes.size();
     Placed there = placed;
     for (std::size_t k = 0; k < gave_.size(); ++k)
       if (there[k])
         there[k]->a += gave_[k];
-    find(there, displaced, shape, outside, nodes);
-    if (nodes.size() == known)
+    if (touches_.empty()) {
+      facets_.set_shape(model_, next_);
+    } else { // whose box nobody asks for
+      std::vector<Box3> places;
+      for (const auto& instrument : there)
+        if (instrument)
+          places.push_back(instrument->box());
+      facets_.set_shape_near(model_, next_, places);
+    }
+    find(there, displaced, next_, outside, nodes);
+    if (nodes.size() == known) {
+      shape.swap(next_);
       return;
+    }
   }
 }
 

@@ -113,7 +113,7 @@ public:
               std::vector<double>& shape, bool last = true);
   /// From another state: its shape and what is touched in it.
   void restart(std::span<const double> shape, std::vector<NodeTouch> touches);
-  /// Of the last shape.
+  /// Of the last shape; where something is touched, a larger one.
   const Box3& box() const noexcept { return facets_.box(); }
 
   /// By ascending node and instrument; forces that don't vanish.
@@ -154,6 +154,7 @@ private:
   std::vector<Vec3> gave_; ///< by instrument; empty: none gives way
   std::optional<NodeTouch> stuck_;
   bool solved_ = true;
+  std::vector<double> next_; ///< the shape that is found, in the memory of the last but one
   TouchCounts counts_;
 };
 

@@ -6,11 +6,13 @@
 #include "contact/surface_facets.h"
 #include "sim_models.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <gtest/gtest.h>
 #include <set>
+#include <vector>
 
 namespace gewebe {
 namespace {
@@ -126,6 +128,42 @@ TEST(Instrument, ACoreGoesThroughAPieceOrPastIt) {
     EXPECT_FALSE(goes_through(capsule({3, 3, -5}, {3, 3, 5}), corners));  // beside it
     EXPECT_FALSE(goes_through(capsule({1, 1, 1}, {2, 1, 1}), corners));   // along it
     EXPECT_FALSE(goes_through(capsule({1, 1, 0.01}, {1, 1, 0.01}), corners));
+  }
+}
+
+// Where it was told to look it looks as closely; elsewhere it may find more, but never less.
+TEST(SurfaceFacets, NearPlacesFindWhatTheWholeShapeFinds) {
+  const Model model = test::organ(3);
+  SurfaceFacets whole(model), near_places(model);
+  std::vector<double> u(3 * model.nodes.size());
+  for (std::size_t k = 0; k < u.size(); ++k)
+    u[k] = 4 * std::sin(static_cast<double>(k)) + (k % 3 == 0 ? 30 : k % 3 == 1 ? -20 : 5);
+  const auto box_at = [&](std::size_t i) {
+    const Vec3 c = model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
+    return Box3{c - Vec3{3, 3, 3}, c + Vec3{3, 3, 3}};
+  };
+  const std::vector<Box3> places{box_at(2), box_at(100)};
+  whole.set_shape(model, u);
+  near_places.set_shape_near(model, u, places);
+  const auto found = [](const SurfaceFacets& facets, const Box3& box) {
+    std::vector<std::uint32_t> pieces;
+    facets.visit_near(box, [&](std::uint32_t piece) { pieces.push_back(piece); });
+    return pieces;
+  };
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < surface_count(model); i += 5) {
+    const auto all = found(whole, box_at(i)), some = found(near_places, box_at(i));
+    EXPECT_TRUE(std::ranges::includes(some, all));
+    more += some.size() - all.size();
+  }
+  EXPECT_GT(more, 0U);
+  for (const Box3& place : places) {
+    EXPECT_FALSE(found(whole, place).empty());
+    EXPECT_EQ(found(near_places, place), found(whole, place));
+  }
+  for (int a = 0; a < 3; ++a) {
+    EXPECT_LE(near_places.box().min[a], whole.box().min[a]);
+    EXPECT_GE(near_places.box().max[a], whole.box().max[a]);
   }
 }
 

@@ -292,6 +292,31 @@ TEST(SurfaceRows, OfCompressedColumnsGiveWhatAllRowsGive) {
     }
 }
 
+// Of sets that share nodes, one behind the other, and of each of them alone.
+TEST(SurfaceRows, DelassusOperatorsDoNotDependOnThoseBefore) {
+  const Model model = box_model();
+  const std::vector<std::uint32_t> at = places_of(model).outer;
+  ASSERT_GT(at.size(), 9);
+  for (const bool stored : {false, true}) {
+    const auto source = [&] { return stored ? compressed(model, 1e-6) : nullptr; };
+    Elastostatic one(model, source(), {});
+    for (const std::vector<std::size_t>& set : {std::vector<std::size_t>{1, 3, 5},
+                                                {3, 5, 7, 8},
+                                                {3, 5, 7, 8},
+                                                {0, 1, 8},
+                                                {0, 8},
+                                                {2, 4}}) {
+      std::vector<std::uint32_t> nodes;
+      for (const std::size_t k : set)
+        nodes.push_back(at[k]);
+      std::ranges::sort(nodes);
+      Elastostatic alone(model, source(), {});
+      EXPECT_EQ(one.delassus_operator({}, nodes).compliance,
+                alone.delassus_operator({}, nodes).compliance);
+    }
+  }
+}
+
 TEST(SurfaceRows, OfCompressedColumnsHaveBlocksWithTheInside) {
   const Model model = box_model();
   Compliance some(model, compressed(model, 1e-7), {}, false), all(model, nullptr, {}, false);
