@@ -99,6 +99,11 @@ void Compliance::prepare(std::span<const std::uint32_t> nodes) {
   cache_.prepare(some);
 }
 
+void Compliance::read_compressed() const {
+  if (compressed_ != nullptr)
+    compressed_->read_all();
+}
+
 bool Compliance::fit(std::span<const std::uint32_t> nodes) const {
   const auto others = static_cast<std::size_t>(
       std::count_if(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return !outer(node); }));

@@ -54,6 +54,9 @@ public:
   /// Solves for those that are neither stored nor in memory, of the first m nodes, ahead of `need`:
   /// nothing else depends on it. \throw Error if they don't fit
   void prepare(std::span<const std::uint32_t> nodes);
+  /// Reads compressed columns whole, if that is what there is: nothing else depends on it.
+  /// \throw Error if they can't be read
+  void read_compressed() const;
   /// Whether the columns of these nodes fit in memory.
   bool fit(std::span<const std::uint32_t> nodes) const;
   /// C at a row and a node's axis. \pre the node was needed, and that of the row too if it is none

@@ -160,6 +160,11 @@ const Crosses& CompressedColumns::chunk(std::size_t index) const {
   return kept.emplace(std::move(made));
 }
 
+void CompressedColumns::read_all() const {
+  for (std::size_t a = 0; a < layout_.with_columns; ++a)
+    (void)chunk(a);
+}
+
 CrossView CompressedColumns::view(std::size_t chunk_index, std::size_t cluster) const {
   const Crosses& from = chunk(chunk_index);
   CrossView view = shape_of(layout_, chunk_index, cluster);

@@ -73,6 +73,9 @@ public:
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
 
+  /// Reads all chunks that were not yet needed, so that none is waited for later.
+  void read_all() const;
+
   /// A chunk as it was read.
   std::vector<std::uint8_t> chunk_bytes(std::size_t index) const { return bytes_of(chunk(index)); }
 

@@ -30,6 +30,8 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
     Elastostatic& solver = solver_of(w, object);
     if (object.stages.options)
       (void)two_step_of(w, object);
+    if (c.contact)
+      solver.read_compressed();
     solver.prepare(c.nodes_ahead);
   }
   if (c.contact && !object.contact && !object.contact_ahead)

@@ -380,6 +380,10 @@ void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {
   state_->compliance.prepare(nodes);
 }
 
+void Elastostatic::read_compressed() {
+  state_->compliance.read_compressed();
+}
+
 ElastostaticCounts Elastostatic::counts() const noexcept {
   ElastostaticCounts counts = state_->counts;
   counts.solves = state_->compliance.solves() + state_->held.solves();

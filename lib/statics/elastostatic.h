@@ -118,6 +118,9 @@ public:
   /// not: updates, shapes and forces are the same to the bit with and without.
   /// \pre nodes exist, no other twice   \throw Error if memory does not hold them, or as update
   void prepare(std::span<const std::uint32_t> nodes);
+  /// Reads all compressed columns that the source has, so that contacts wherever they are first
+  /// need not; else as prepare.
+  void read_compressed();
 
   ElastostaticCounts counts() const noexcept;
 

@@ -1,15 +1,21 @@
 #include "base/error.h"
+#include "compliance/column_compression.h"
+#include "compliance/compliance_columns.h"
+#include "compliance/compliance_source.h"
 #include "contact_checks.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
 #include "solid/model_stiffness.h"
+#include "solve/condition.h"
+#include "solve/factor.h"
 #include "stiffness_models.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -685,6 +691,55 @@ TEST(SimulationContact, PreparedContactsAreTheSameAndSolveNothing) {
                           plain.answers.size() * sizeof(double)),
               0);
   }
+}
+
+TEST(SimulationContact, PreparedContactsReadNoCompressedColumns) {
+  const Model model = organ(3);
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const Factor factor(k, {});
+  std::vector<Vec3> positions;
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    positions.push_back(model.nodes[i].position);
+    if (i < surface_count(model))
+      nodes.push_back(i);
+  }
+  const CompressedMade made = compress_columns(
+      positions, nodes, 1e-6,
+      [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+        return compliance_columns(k, factor, stiffness_norm(k), of, {}, sink, positions.size());
+      },
+      {});
+  const std::size_t chunks = made.layout.with_columns;
+  ASSERT_GT(chunks, 3);
+  std::vector<std::vector<double>> answers;
+  for (const bool prepared : {false, true}) {
+    std::size_t reads = 0;
+    Simulation s(test::one_thread(), {});
+    s.add_object(
+        "organ", model, Method::ffe,
+        compliance_of_store({std::make_unique<CompressedColumns>(made.layout, model.nodes.size(),
+                                                                 [&](std::size_t chunk) {
+                                                                   ++reads;
+                                                                   return made.chunks[chunk];
+                                                                 }),
+                             [&] { return Factor(k, Context{}); }}));
+    if (prepared)
+      s.apply(Prepare{.object = 0, .contact = true, .cut = false, .nodes_ahead = {}});
+    const std::size_t before = reads;
+    EXPECT_EQ(before, prepared ? chunks : 0);
+    s.apply(sphere(5, middle + Vec3{0, 0, 26}));
+    std::vector<double>& all = answers.emplace_back();
+    for (int step = 0; step < 6; ++step) {
+      s.apply(MoveInstrument{0, middle + Vec3{0.5 * step, 0.1, 24.3}, {}, 0.001});
+      s.step(0.001);
+      for (const NodeVector& f : s.contact_forces(0))
+        all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
+    }
+    EXPECT_EQ(prepared, reads == before);
+  }
+  ASSERT_FALSE(answers[0].empty());
+  EXPECT_EQ(answers[0], answers[1]);
 }
 
 TEST(SimulationContact, ColumnsThatDoNotFitAreNotPrepared) {
