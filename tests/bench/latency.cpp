@@ -8,7 +8,8 @@
 // fifo: both programs have real-time priority, where that is permitted. store: the net's columns
 // are stored before, compressed within 1e-4, so that what is touched first costs no more than the
 // rest. Where FOLDER is named, latency.csv there becomes the histogram and latency.svg
-// its picture, memory.csv what ffe-run had in memory, by the second, and memory.svg its picture.
+// its picture, work.csv and work.svg those of the processor's time, memory.csv what ffe-run had in
+// memory, by the second, and memory.svg its picture.
 //
 // Ten minutes with some 20 contacts that change, on a machine that does nothing else:
 //
@@ -18,7 +19,9 @@
 // Writes CSV to standard output: stage, program, nodes, contacts (nodes with a force, in the mean),
 // answers, what half, 99 % and 99.9 % of all did not exceed and the largest, a figure and its unit.
 // "latency" counts from writing the lines until the answer is there; "work" is the processor's time
-// of ffe-run between two answers, which other programs disturb less.
+// of ffe-run between two answers, which other programs disturb less. "faults" and "switches" count
+// pages that ffe-run had to wait for while it answered, and how often its processor was taken away:
+// who compares "latency" with "work" by them knows whether the machine or the program was late.
 
 #include "formats/model/ela.h"
 #include "model/build.h"
@@ -148,6 +151,7 @@ struct Run {
   double contacts = 0;
   double memory_before = 0, memory_after = 0;    // MB, behind the first tenth and in the end
   std::size_t late = 0;                          // answers beyond their tick
+  Served::Disturbed disturbed;                   // while it answered
   std::vector<std::pair<double, double>> memory; // s, MB
   double load = 0;
 };
@@ -176,6 +180,7 @@ Run drive(const Served& served, const Wanted& w, double edge) {
   run.work.reserve(count);
   const double begin = now() + tick;
   double worked = served.worked();
+  const Served::Disturbed before = served.disturbed();
   for (std::size_t step = 1; step <= count; ++step) {
     const double time = static_cast<double>(step) * tick, due = begin + time;
     std::string lines;
@@ -200,8 +205,29 @@ Run drive(const Served& served, const Wanted& w, double edge) {
   }
   run.contacts /= static_cast<double>(count);
   run.memory_after = served.resident();
+  const Served::Disturbed after = served.disturbed();
+  run.disturbed = {after.faults - before.faults, after.switches - before.switches};
   run.load = load_average();
   return run;
+}
+
+/// The histogram of sorted times and its picture.
+void keep(const std::string& folder, const std::string& name, const std::vector<double>& times,
+          const std::string& title) {
+  std::filesystem::create_directories(folder);
+  std::ofstream csv(folder + "/" + name + ".csv"), picture(folder + "/" + name + ".svg");
+  // The system may tell no time of an answer; it is none of the histogram.
+  const auto first = std::ranges::upper_bound(times, 0.0);
+  const std::span<const double> told(first, times.end());
+  if (told.empty())
+    return;
+  const std::vector<Bin> bins = histogram(told);
+  write_csv(csv, bins);
+  const std::array<std::pair<std::string, double>, 4> marks{{{"half", quantile(told, 0.5)},
+                                                             {"99 %", quantile(told, 0.99)},
+                                                             {"99.9 %", quantile(told, 0.999)},
+                                                             {"largest", told.back()}}};
+  draw(picture, bins, title, marks);
 }
 
 } // namespace
@@ -248,22 +274,22 @@ int main(int argc, char** argv) {
                 quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back(),
                 latency ? static_cast<double>(run.late) : run.memory_after - run.memory_before,
                 latency ? "answers too late" : "MB that memory grew in the last nine tenths");
-    if (latency && !w.folder.empty()) {
-      std::filesystem::create_directories(w.folder);
-      std::ofstream csv(w.folder + "/latency.csv"), picture(w.folder + "/latency.svg");
-      const std::vector<Bin> bins = histogram(times);
-      write_csv(csv, bins);
-      const std::array<std::pair<std::string, double>, 4> marks{{{"half", quantile(times, 0.5)},
-                                                                 {"99 %", quantile(times, 0.99)},
-                                                                 {"99.9 %", quantile(times, 0.999)},
-                                                                 {"largest", times.back()}}};
-      draw(picture, bins, "Answers of ffe-run at 1 kHz, " + program + ", " + processor(), marks);
-      std::ofstream memory(w.folder + "/memory.csv"), curve(w.folder + "/memory.svg");
-      memory << "s,MB\n";
-      for (const auto& [second, megabytes] : run.memory)
-        memory << second << ',' << megabytes << '\n';
-      draw_memory(curve, run.memory, "Memory of ffe-run, " + program);
-    }
+    if (!w.folder.empty())
+      keep(w.folder, latency ? "latency" : "work", times,
+           (latency ? "Answers of ffe-run at 1 kHz, " : "Processor's time of an answer, ") +
+               program + ", " + processor());
+  }
+  for (const bool faults : {true, false})
+    std::printf("%s,%s,%zu,%.1f,%zu,,,,,%.4g,%s\n", faults ? "faults" : "switches", program.c_str(),
+                model.nodes.size(), run.contacts, run.latency.size(),
+                faults ? run.disturbed.faults : run.disturbed.switches,
+                faults ? "page faults while it answered" : "times its processor was taken away");
+  if (!w.folder.empty()) {
+    std::ofstream memory(w.folder + "/memory.csv"), curve(w.folder + "/memory.svg");
+    memory << "s,MB\n";
+    for (const auto& [second, megabytes] : run.memory)
+      memory << second << ',' << megabytes << '\n';
+    draw_memory(curve, run.memory, "Memory of ffe-run, " + program);
   }
   (void)std::fprintf(stderr, "latency: %s, load average %.2f, %.1f MB resident\n",
                      processor().c_str(), run.load, run.memory_after);

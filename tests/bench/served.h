@@ -1,12 +1,15 @@
 #pragma once
 // ffe-run at the other ends of two pipes, for the benchmarks.
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <spawn.h>
+#include <sstream>
 #include <string>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -96,6 +99,27 @@ public:
     double nanoseconds = 0;
     file >> nanoseconds;
     return 1e-6 * nanoseconds;
+  }
+
+  struct Disturbed {
+    double faults = 0;   ///< of pages, with and without the disk
+    double switches = 0; ///< that took the processor from it
+  };
+  /// Since it began; 0 where the system does not tell.
+  Disturbed disturbed() const {
+    const std::string own = "/proc/" + std::to_string(child_);
+    Disturbed all;
+    std::ifstream stat(own + "/stat"), status(own + "/status");
+    std::string line;
+    std::getline(stat, line);
+    std::istringstream words(line.substr(std::min(line.size(), line.rfind(')') + 1)));
+    std::vector<std::string> word{std::istream_iterator<std::string>(words), {}};
+    if (word.size() > 9) // behind the name: the 10th and the 12th of the line
+      all.faults = std::strtod(word[7].c_str(), nullptr) + std::strtod(word[9].c_str(), nullptr);
+    while (std::getline(status, line))
+      if (line.starts_with("nonvoluntary_ctxt_switches:"))
+        all.switches = static_cast<double>(number_behind(line, ":"));
+    return all;
   }
 
   /// MB that it has in memory.
