@@ -141,6 +141,14 @@ while True:
     if not line: break
 assert steps == 3000, steps
 assert two.line() == 'ready 8\n'
+# Also while it looks after a line at the moment when one goes and another comes.
+for i in range(300):
+    two.send('# still here\n')
+    two.socket.shutdown(socket.SHUT_WR)
+    three = Client()
+    assert three.greeting == 'ready 8\n', (i, three.greeting)
+    two.close()
+    two = three
 two.ask('end')
 P
   python3 drive.py || fail 'a client fails' "$(<stderr.txt)"

@@ -24,7 +24,7 @@ public:
 
   int descriptor() const noexcept { return socket_.get(); }
   struct Arrival {
-    Descriptor client;
+    Descriptor client{};
     /// Why it can't stay: no descriptor was left for it. It has one that is kept for this and must
     /// be closed before the next is accepted. "": it may stay
     std::string refusal{};

@@ -42,6 +42,7 @@ void SceneClients::serve(SceneRun& run) {
   }
   flush(0);
   client_ = Descriptor();
+  next_ = {};
   serving_ = false;
 }
 
@@ -73,7 +74,7 @@ void SceneClients::take_lines(SceneRun& run) {
 }
 
 void SceneClients::let_in(SceneRun& run) {
-  LocalListener::Arrival next = listener_.accept();
+  LocalListener::Arrival next = next_.client ? std::exchange(next_, {}) : listener_.accept();
   if (!next.client || refused(next))
     return;
   client_ = std::move(next.client);
@@ -91,14 +92,17 @@ pollfd SceneClients::others() const {
   return {client_ && hung_up() ? -1 : listener_.descriptor(), POLLIN, 0};
 }
 
-/// Those that come while the scene has its client; not while that one is on its way out.
+/// Those that come while the scene has its client; not while that one is on its way out. Whoever
+/// came after it hung up is accepted after that, so it is asked anew behind each.
 void SceneClients::turn_away() {
-  if (hung_up())
-    return;
-  while (true) {
-    const LocalListener::Arrival other = listener_.accept();
+  while (!hung_up()) {
+    LocalListener::Arrival other = listener_.accept();
     if (!other.client)
       return;
+    if (hung_up()) {
+      next_ = std::move(other);
+      return;
+    }
     say(other.client,
         foreign_peer(other.client).value_or("busy, the scene has a client, expected none"));
   }

@@ -54,7 +54,8 @@ private:
   SceneClientsOptions options_;
   LocalListener listener_;
   Descriptor client_;
-  std::vector<char> buffer_; ///< of what the client sends
+  LocalListener::Arrival next_{}; ///< accepted already, let in when the client has gone
+  std::vector<char> buffer_;      ///< of what the client sends
   std::optional<SceneLines> lines_;
   std::string unread_;        ///< answers that wait
   std::uint64_t clients_ = 0; ///< that were let in
