@@ -19,7 +19,8 @@ constexpr std::array<Bend, 5> bends{{{1.0, 0}, {1.0, 4}, {0.7, 0}, {0.4, 0}, {0.
 
 constexpr double same_place = 1e-9; ///< of the radius, and of a normal's length
 constexpr double fair_place = 1e-6; ///< that is not worth a warning
-/// From where on a turn may be foreseen instead of taken: drag turns with the points that wander.
+/// From where on a turn may be foreseen instead of taken where there is friction: drag turns with
+/// the points that wander.
 constexpr double sure_place = 1e-7;
 constexpr double outside = 1e-9; ///< of the radius: so deep is not inside
 constexpr double nearly = 0.03;  ///< from where on each turn comes nearer
@@ -73,7 +74,11 @@ public:
     join_passed();
     const bool known = last.size() == scene_.free.size(); // of a round before
     const bool near = !known && go_on();
+    const bool smooth =
+        std::ranges::all_of(scene_.placed, [](const auto& i) { return !i || !(i->friction > 0); });
     at_ = known ? last : scene_.nodes.was;
+    if (near && go_further())
+      at_ = turns_.guess;
     turns_.solved = turns_.pairs.empty();
     double before = HUGE_VAL, last_ratio = 0;
     double best = HUGE_VAL;
@@ -104,7 +109,8 @@ public:
       const double ratio = nearer ? change / before : 0;
       // What another turn would change, if it came nearer as fast as the last ones did.
       const double next = change * ratio * (last_ratio > 0 ? std::min(1.0, ratio / last_ratio) : 1);
-      if (near && nearer && turns_.solved && change <= sure_place && next <= same_place) {
+      if (near && nearer && turns_.solved && (smooth || change <= sure_place) &&
+          next <= same_place) {
         locate(turns_.at);
         turns_.change = next;
         ++turns_.turns;
@@ -174,6 +180,34 @@ private:
         any = true;
       }
     return any;
+  }
+
+  /// Where the nodes and forces go on as they came, if that is nearer to where the instruments want
+  /// them than where they were.
+  bool go_further() {
+    if (!(miss(turns_.guess) < miss(scene_.nodes.was)))
+      return false;
+    for (std::size_t k = 0; k < turns_.last.size(); ++k)
+      if (const auto there =
+              std::ranges::lower_bound(turns_.pairs, key_of(turns_.last[k]), {}, key_of);
+          there != turns_.pairs.end() && key_of(*there) == key_of(turns_.last[k]) &&
+          dot(there->force + turns_.grown[k], there->normal) > 0)
+        there->force += turns_.grown[k];
+    return true;
+  }
+  /// How far what pushes is from its instrument, over the radius, at these places.
+  double miss(std::span<const Vec3> at) const {
+    double most = 0;
+    for (const TouchPair& p : turns_.pairs) {
+      if (p.force == Vec3{})
+        continue;
+      const PlacedInstrument& instrument = *scene_.placed[p.instrument];
+      const auto found =
+          nearest_points(instrument, p.part, corners_of(p.piece, at), corner_count(p.piece));
+      const double far = found ? std::abs(found->distance - instrument.radius) : HUGE_VAL;
+      most = far / instrument.radius <= most ? most : far / instrument.radius;
+    }
+    return most;
   }
 
   bool movable(const TouchPair& p) const {

@@ -51,7 +51,10 @@ struct ContactNodes {
 };
 
 struct ContactTurns {
-  std::vector<TouchPair> last;  ///< what pushed the nodes to where they were, if that was near
+  std::vector<TouchPair> last; ///< what pushed the nodes to where they were, if that was near
+  /// Where the nodes would be if they went on as they came, and the same of `last`; or empty.
+  std::vector<Vec3> guess;
+  std::vector<Vec3> grown;      ///< what the forces of `last` would change
   std::vector<TouchPair> pairs; ///< in and out: all that were ever nearer than the radius
   std::vector<Vec3> at;         ///< the nodes' places
   bool solved = true;

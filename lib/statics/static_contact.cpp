@@ -62,9 +62,9 @@ bool short_ways(std::span<const std::optional<MovedInstrument>> instruments) {
   });
 }
 
-/// What pushed these nodes to where they were.
-std::vector<TouchPair> pairs_of(std::span<const PointTouch> points, const ContactNodes& all) {
-  std::vector<TouchPair> pairs;
+/// What pushed these nodes to where they were, and how that goes on.
+void set_last(std::span<const PointTouch> points, const ContactNodes& all, ContactTurns& turns) {
+  turns.guess = all.was;
   for (const PointTouch& t : points) {
     TouchPair pair{t.instrument, t.part, {}, {}, t.normal, t.force};
     const bool known = std::ranges::all_of(std::array{0U, 1U, 2U}, [&](std::size_t c) {
@@ -78,10 +78,21 @@ std::vector<TouchPair> pairs_of(std::span<const PointTouch> points, const Contac
         }
       return false;
     });
-    if (known)
-      pairs.push_back(pair);
+    if (!known)
+      continue;
+    turns.last.push_back(pair);
+    turns.grown.push_back(t.grown);
+    for (std::size_t c = 0; c < 3; ++c)
+      turns.guess[pair.piece[c]] = all.was[pair.piece[c]] + t.moved[c];
   }
-  return pairs;
+}
+
+/// How much more it pushes than when it pushed last.
+Vec3 grown_from(std::span<const PointTouch> last, const PointTouch& now) {
+  const auto same = std::ranges::find_if(last, [&](const PointTouch& t) {
+    return t.instrument == now.instrument && t.part == now.part && t.nodes == now.nodes;
+  });
+  return same == last.end() ? Vec3{} : now.force - same->force;
 }
 
 } // namespace
@@ -231,7 +242,7 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
   const auto node_of = [&](std::uint32_t i) { return all.node[giving ? giving->node(i) : i]; };
   ContactTurns turns;
   if (!giving)
-    turns.last = pairs_of(last, all);
+    set_last(last, all, turns);
   for (int round = 0; round < max_rounds; ++round) {
     touches_.clear();
     points_.clear();
@@ -267,12 +278,17 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
         if (pair.force == Vec3{})
           continue;
         const Facet& f = pair.piece;
-        points_.push_back({{node_of(f[0]), node_of(f[1]), node_of(f[2])},
-                           pair.point.weights,
-                           pair.instrument,
-                           pair.part,
-                           pair.normal,
-                           pair.force});
+        PointTouch point{{node_of(f[0]), node_of(f[1]), node_of(f[2])},
+                         pair.point.weights,
+                         pair.instrument,
+                         pair.part,
+                         pair.normal,
+                         pair.force};
+        if (!giving)
+          for (std::size_t c = 0; c < 3; ++c)
+            point.moved[c] = turns.at[f[c]] - all.was[f[c]];
+        point.grown = grown_from(last, point);
+        points_.push_back(point);
         for (std::size_t c = 0; c < 3; ++c)
           if (pair.point.weights[c] > 0)
             touches_.push_back(

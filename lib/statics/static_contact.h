@@ -45,6 +45,9 @@ struct PointTouch {
   CorePart part = CorePart::first_end; ///< of the instrument
   Vec3 normal;                         ///< from the instrument's core to the point
   Vec3 force;                          ///< 1e-6 N
+  /// How the nodes moved and the force changed, from one update to the next.
+  std::array<Vec3, 3> moved{};
+  Vec3 grown{};
 };
 
 /// One for each node and instrument, by ascending ones, with the sum of its forces in their order.

@@ -70,8 +70,9 @@ TEST(StaticContact, GoesOnWithTheLastForcesOnShortWays) {
     StaticContact following(model, u);
     TouchCounts going, anew;
     for (int step = 0; step < 30; ++step) {
-      const auto pose = [&](int n) {
-        return Pose{middle + Vec3{0.3 + 0.04 * n, 0.2, 27 - 0.02 * n}, {}};
+      const auto pose = [&](int n) { // and back from the last but nine
+        const double way = n < 21 ? n : 40 - n;
+        return Pose{middle + Vec3{0.3 + 0.04 * way, 0.2, 27 - 0.02 * way}, {}};
       };
       const std::vector<std::optional<MovedInstrument>> moved{
           MovedInstrument{shape, pose(std::max(0, step - 1)), pose(step)}};
@@ -98,7 +99,8 @@ TEST(StaticContact, GoesOnWithTheLastForcesOnShortWays) {
       for (std::size_t r = 0; r < u.size(); ++r)
         ASSERT_NEAR(u[r], v[r], 1e-8) << friction << " " << step;
     }
-    EXPECT_LT(static_cast<double>(going.turns), 0.9 * static_cast<double>(anew.turns)) << friction;
+    // Less than 0.64 and 0.73; without the places and forces that go on, 0.81 and 0.92.
+    EXPECT_LT(static_cast<double>(going.turns), 0.76 * static_cast<double>(anew.turns)) << friction;
     EXPECT_LT(going.change, 1e-9);
   }
 }
