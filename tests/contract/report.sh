@@ -85,3 +85,8 @@ END
   report pages --page nobody >log 2>&1 || status=$?
   [[ $status == 2 ]] || fail "status $status for a page that nobody knows"
 }
+
+test_pages_of_the_repository_are_whole() {
+  pages_are_whole "$GEWEBE_ROOT/examples/report" >said || fail "$(<said)"
+  ! grep -q 'Made by `QUICK=1`' "$GEWEBE_ROOT/examples/report/README.md" || fail 'the pages are small ones'
+}
