@@ -100,7 +100,8 @@ Int3 child_origin(const Int3& origin, int child, std::int32_t size) {
 DensityKernels density_kernels(CpuLevel level) {
   if (level == CpuLevel::baseline)
     return {add_density_baseline, reach_children_baseline, bound_children_baseline};
-  return {add_density_avx2, reach_children_avx2, bound_children_avx2};
+  return {level == CpuLevel::avx512 ? add_density_avx512 : add_density_avx2, reach_children_avx2,
+          bound_children_avx2};
 }
 
 std::vector<IndexParticle> to_index_space(const Context& context, const Particles& particles,

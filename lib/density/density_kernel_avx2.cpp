@@ -1,133 +1,104 @@
-#include "density/density_kernel_internal.h"
+#include "density/density_add_internal.h"
 
 #include <immintrin.h>
 
 namespace gewebe {
 namespace {
 
-constexpr std::size_t chunk = 32; // particles whose rows fit in the first-level cache
-
-/// What a leaf's rows need of some particles. With rest(i,j) = 1 − sx² − sy² a voxel has
-/// u = rest − sz².
-struct Chunk {
-  alignas(32) float rest[chunk][64];
-  alignas(32) float z2[chunk][8];
-  float cubic[chunk], square[chunk];
-  /// Bit h of byte n: particle n reaches half slice h (four rows), and half slice 8 + h.
-  alignas(32) std::uint8_t low[chunk], high[chunk];
+/// Byte m of entry b: sixteen times the number of the m-th bit that is set in b.
+struct SetBits {
+  constexpr SetBits() {
+    for (unsigned bits = 0; bits < 256; ++bits) {
+      unsigned count = 0;
+      for (unsigned bit = 0; bit < 8; ++bit)
+        if ((bits >> bit & 1) != 0)
+          numbers[bits] |= std::uint64_t{16} * bit << 8 * count++;
+    }
+  }
+  std::uint64_t numbers[256] = {};
 };
+constexpr SetBits set_bits;
 
-__m256 scaled_square(__m256 ramp, float center, __m256 inverse) {
+__m256 scaled_square(float center, __m256 inverse) {
+  const __m256 ramp = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256 s = _mm256_mul_ps(_mm256_sub_ps(ramp, _mm256_set1_ps(center)), inverse);
   return _mm256_mul_ps(s, s);
 }
 
-float smallest(__m256 v) {
-  __m128 m = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-  m = _mm_min_ps(m, _mm_movehl_ps(m, m));
-  return _mm_cvtss_f32(_mm_min_ss(m, _mm_movehdup_ps(m)));
+__m256 added(__m256 sum, const float* rest, const Rows& rows) {
+  const __m256 u = _mm256_max_ps(_mm256_sub_ps(_mm256_broadcast_ss(rest), _mm256_load_ps(rows.z2)),
+                                 _mm256_setzero_ps());
+  const __m256 factor =
+      _mm256_fmadd_ps(_mm256_broadcast_ss(&rows.cubic), u, _mm256_broadcast_ss(&rows.square));
+  return _mm256_fmadd_ps(_mm256_mul_ps(u, u), factor, sum);
 }
 
-/// Returns the half slices that every particle reaches.
-std::uint32_t prepare(const LeafParticle* particles, std::size_t count, Chunk& c) {
-  const __m256 ramp = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
-  std::uint32_t common = 0xffff;
-  for (std::size_t n = 0; n < count; ++n) {
-    const LeafParticle p = particles[n];
-    const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
-    const __m256 y2 = scaled_square(ramp, p.y, inverse);
-    const __m256 z2 = scaled_square(ramp, p.z, inverse);
-    alignas(32) float rest_x[8];
-    _mm256_store_ps(rest_x, _mm256_sub_ps(_mm256_set1_ps(1), scaled_square(ramp, p.x, inverse)));
-    _mm256_store_ps(c.z2[n], z2);
-    c.cubic[n] = p.weight * (4.0F / 9);
-    c.square[n] = p.weight * (5.0F / 9);
-    for (std::size_t i = 0; i < 8; ++i)
-      _mm256_store_ps(c.rest[n] + i * 8, _mm256_sub_ps(_mm256_broadcast_ss(rest_x + i), y2));
-    // Of an axis' squares the largest is at an end: four corner rows tell whether all are reached.
-    const float z2_least = smallest(z2);
-    const float* const rest = c.rest[n];
-    std::uint32_t reached = 0xffff;
-    if (!(rest[0] > z2_least && rest[7] > z2_least && rest[56] > z2_least && rest[63] > z2_least)) {
-      reached = 0;
-      for (std::size_t i = 0; i < 8; ++i) {
-        const int rows = _mm256_movemask_ps(
-            _mm256_cmp_ps(_mm256_load_ps(rest + i * 8), _mm256_set1_ps(z2_least), _CMP_GT_OQ));
-        reached |= ((rows & 15) != 0 ? 1U : 0U) << 2 * i | ((rows >> 4) != 0 ? 2U : 0U) << 2 * i;
+struct OneRow {
+  static std::size_t list(const LeafParticle* particles, std::size_t count, Chunk& c) {
+    Item* items = c.items;
+    for (std::size_t n = 0; n < count; ++n) {
+      const LeafParticle& p = particles[n];
+      Rows& rows = c.rows[n];
+      set_weight(p, rows);
+      const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
+      const __m256 y2 = scaled_square(p.y, inverse);
+      const __m256 rest_x = _mm256_sub_ps(_mm256_set1_ps(1), scaled_square(p.x, inverse));
+      _mm256_store_ps(rows.z2, scaled_square(p.z, inverse));
+      for (int i = 0; i < 8; ++i)
+        _mm256_store_ps(rows.rest + std::ptrdiff_t{8} * i,
+                        _mm256_sub_ps(_mm256_permutevar8x32_ps(rest_x, _mm256_set1_epi32(i)), y2));
+      // A half slice is in reach where its nearest row is.
+      __m256 nearest = _mm256_min_ps(y2, _mm256_permute_ps(y2, 0b10110001));
+      nearest = _mm256_min_ps(nearest, _mm256_permute_ps(nearest, 0b01001110));
+      nearest = _mm256_permutevar8x32_ps(nearest, _mm256_setr_epi32(0, 4, 0, 4, 0, 4, 0, 4));
+      const __m256 least = _mm256_set1_ps(least_square(p));
+      for (int i = 0; i < 8; i += 4) {
+        const __m256i lanes = _mm256_setr_epi32(i, i, i + 1, i + 1, i + 2, i + 2, i + 3, i + 3);
+        const __m256 rest = _mm256_sub_ps(_mm256_permutevar8x32_ps(rest_x, lanes), nearest);
+        const auto reached =
+            static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(rest, least, _CMP_GT_OQ)));
+        const __m256i bits = _mm256_cvtepu8_epi32(
+            _mm_cvtsi64_si128(static_cast<long long>(set_bits.numbers[reached])));
+        const __m256i first = _mm256_set1_epi32(static_cast<int>(n * sizeof(Rows)) + 32 * i);
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(items), _mm256_add_epi32(first, bits));
+        items += __builtin_popcount(reached);
       }
     }
-    c.low[n] = static_cast<std::uint8_t>(reached);
-    c.high[n] = static_cast<std::uint8_t>(reached >> 8);
-    common &= reached;
+    return static_cast<std::size_t>(items - c.items);
   }
-  return common;
-}
 
-/// u² (4w/9 u + 5w/9) added to a row.
-__m256 add_row(__m256 sum, const float* rest, __m256 z2, __m256 cubic, __m256 square) {
-  const __m256 u = _mm256_max_ps(_mm256_sub_ps(_mm256_broadcast_ss(rest), z2), _mm256_setzero_ps());
-  return _mm256_fmadd_ps(_mm256_mul_ps(u, u), _mm256_fmadd_ps(cubic, u, square), sum);
-}
-
-/// Eight rows stay in registers while all particles pass. (Inlined, GCC 12 makes it a fifth
-/// slower.)
-__attribute__((noinline)) void add_slice(const Chunk& c, std::size_t count, std::size_t slice,
-                                         float* rows) {
-  __m256 sum[8] = {_mm256_loadu_ps(rows + 0),
-                   _mm256_loadu_ps(rows + 8),
-                   _mm256_loadu_ps(rows + 16),
-                   _mm256_loadu_ps(rows + 24),
-                   _mm256_loadu_ps(rows + 32),
-                   _mm256_loadu_ps(rows + 40),
-                   _mm256_loadu_ps(rows + 48),
-                   _mm256_loadu_ps(rows + 56)}; // a loop becomes memcpy, which stalls
-  for (std::size_t n = 0; n < count; ++n) {
-    const __m256 z2 = _mm256_load_ps(c.z2[n]);
-    const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
-    const __m256 square = _mm256_broadcast_ss(c.square + n);
-    const float* const rest = c.rest[n] + slice * 8;
-    for (std::size_t row = 0; row < 8; ++row)
-      sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
+  static void add(const Rows& rows, const float* rest, float* values) {
+    for (std::size_t n = 0; n < 4; ++n)
+      _mm256_storeu_ps(values + 8 * n, added(_mm256_loadu_ps(values + 8 * n), rest + n, rows));
   }
-  _mm256_storeu_ps(rows + 0, sum[0]);
-  _mm256_storeu_ps(rows + 8, sum[1]);
-  _mm256_storeu_ps(rows + 16, sum[2]);
-  _mm256_storeu_ps(rows + 24, sum[3]);
-  _mm256_storeu_ps(rows + 32, sum[4]);
-  _mm256_storeu_ps(rows + 40, sum[5]);
-  _mm256_storeu_ps(rows + 48, sum[6]);
-  _mm256_storeu_ps(rows + 56, sum[7]);
-}
 
-/// Bit n: particle n reaches the half slice.
-std::uint32_t reaching(const Chunk& c, std::size_t count, std::size_t half) {
-  const std::uint8_t* const bytes = half < 8 ? c.low : c.high;
-  const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(bytes));
-  const int bits = _mm256_movemask_epi8(
-      _mm256_sll_epi16(all, _mm_cvtsi32_si128(7 - static_cast<int>(half & 7))));
-  return static_cast<std::uint32_t>(bits) &
-         static_cast<std::uint32_t>(~(~std::uint64_t{0} << count));
-}
-
-/// Four rows, and only the particles that reach them.
-__attribute__((noinline)) void add_half_slice(const Chunk& c, std::uint32_t particles,
-                                              std::size_t half, float* rows) {
-  __m256 sum[4] = {_mm256_loadu_ps(rows + 0), _mm256_loadu_ps(rows + 8), _mm256_loadu_ps(rows + 16),
-                   _mm256_loadu_ps(rows + 24)}; // a loop becomes memcpy, which stalls
-  for (; particles != 0; particles &= particles - 1) {
-    const auto n = static_cast<std::size_t>(__builtin_ctz(particles));
-    const __m256 z2 = _mm256_load_ps(c.z2[n]);
-    const __m256 cubic = _mm256_broadcast_ss(c.cubic + n);
-    const __m256 square = _mm256_broadcast_ss(c.square + n);
-    const float* const rest = c.rest[n] + half * 4;
-    for (std::size_t row = 0; row < 4; ++row)
-      sum[row] = add_row(sum[row], rest + row, z2, cubic, square);
+  /// Eight rows stay in registers while all particles pass. (Inlined, GCC 12 makes it a fifth
+  /// slower.)
+  __attribute__((noinline)) static void add_slice(const Rows* rows, std::size_t count,
+                                                  std::size_t slice, float* values) {
+    __m256 sum[8] = {_mm256_loadu_ps(values + 0),
+                     _mm256_loadu_ps(values + 8),
+                     _mm256_loadu_ps(values + 16),
+                     _mm256_loadu_ps(values + 24),
+                     _mm256_loadu_ps(values + 32),
+                     _mm256_loadu_ps(values + 40),
+                     _mm256_loadu_ps(values + 48),
+                     _mm256_loadu_ps(values + 56)}; // a loop becomes memcpy, which stalls
+    for (std::size_t n = 0; n < count; ++n) {
+      const float* const rest = rows[n].rest + slice * 8;
+      for (std::size_t row = 0; row < 8; ++row)
+        sum[row] = added(sum[row], rest + row, rows[n]);
+    }
+    _mm256_storeu_ps(values + 0, sum[0]);
+    _mm256_storeu_ps(values + 8, sum[1]);
+    _mm256_storeu_ps(values + 16, sum[2]);
+    _mm256_storeu_ps(values + 24, sum[3]);
+    _mm256_storeu_ps(values + 32, sum[4]);
+    _mm256_storeu_ps(values + 40, sum[5]);
+    _mm256_storeu_ps(values + 48, sum[6]);
+    _mm256_storeu_ps(values + 56, sum[7]);
   }
-  _mm256_storeu_ps(rows + 0, sum[0]);
-  _mm256_storeu_ps(rows + 8, sum[1]);
-  _mm256_storeu_ps(rows + 16, sum[2]);
-  _mm256_storeu_ps(rows + 24, sum[3]);
-}
+};
 
 __m256 magnitude(__m256 v) {
   return _mm256_andnot_ps(_mm256_set1_ps(-0.0F), v);
@@ -157,21 +128,7 @@ struct Centers {
 } // namespace
 
 void add_density_avx2(const LeafParticle* particles, std::size_t count, float* values) {
-  Chunk c;
-  for (std::size_t begin = 0; begin < count; begin += chunk) {
-    const std::size_t some = count - begin < chunk ? count - begin : chunk;
-    const std::uint32_t common = prepare(particles + begin, some, c);
-    for (std::size_t slice = 0; slice < 8; ++slice) {
-      float* const rows = values + slice * 64;
-      if ((common >> 2 * slice & 3) == 3) {
-        add_slice(c, some, slice, rows);
-        continue;
-      }
-      for (std::size_t half = 2 * slice; half < 2 * slice + 2; ++half)
-        if (const std::uint32_t some_reach = reaching(c, some, half); some_reach != 0)
-          add_half_slice(c, some_reach, half, values + half * 32);
-    }
-  }
+  add_density<OneRow>(particles, count, values);
 }
 
 void reach_children_avx2(const IndexParticle* particles, const std::uint32_t* list,

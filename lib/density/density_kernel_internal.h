@@ -22,6 +22,7 @@ using DensityKernel = void (*)(const LeafParticle* particles, std::size_t count,
 
 void add_density_baseline(const LeafParticle* particles, std::size_t count, float* values);
 void add_density_avx2(const LeafParticle* particles, std::size_t count, float* values);
+void add_density_avx512(const LeafParticle* particles, std::size_t count, float* values);
 
 /// A particle in index space.
 struct IndexParticle {

@@ -8,8 +8,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <random>
 
 using namespace gewebe;
 using test::random_particles;
@@ -56,6 +58,15 @@ DensityOptions options_for(double voxel) {
   DensityOptions options;
   options.info.transform = uniform_transform(voxel);
   return options;
+}
+
+std::vector<DensityKernel> density_add_kernels() {
+  std::vector<DensityKernel> kernels{add_density_baseline};
+  if (best_cpu_level() >= CpuLevel::avx2)
+    kernels.push_back(add_density_avx2);
+  if (best_cpu_level() >= CpuLevel::avx512)
+    kernels.push_back(add_density_avx512);
+  return kernels;
 }
 
 } // namespace
@@ -140,10 +151,10 @@ TEST(Density, SameBitsForAnyThreadCountAndCpuLevel) {
   one.threads = 1;
   const std::uint64_t expected = metaball_density(one, particles, options_for(0.5)).digest();
   for (const int threads : {2, 3})
-    for (const CpuLevel level : {CpuLevel::baseline, best_cpu_level()}) {
+    for (const CpuLevel level : {CpuLevel::baseline, CpuLevel::avx2, CpuLevel::avx512}) {
       Context context;
       context.threads = threads;
-      context.cpu = level;
+      context.cpu = std::min(level, best_cpu_level());
       EXPECT_EQ(metaball_density(context, particles, options_for(0.5)).digest(), expected);
     }
   Particles moved = particles;
@@ -214,6 +225,25 @@ TEST(Density, NegativeControlTheExpandedPolynomialGoesNegative) {
   EXPECT_GT(negative, 0);
 }
 
+TEST(Density, EveryKernelGivesTheSameBits) {
+  std::mt19937 random(12);
+  for (const float R : {0.4F, 3.0F, 6.0F, 12.0F, 40.0F, 1000.0F}) {
+    const float outside = R < 40 ? R : R / 8; // the largest reach all voxels
+    std::uniform_real_distribution<float> place(-outside, 7 + outside), weight(-1, 2);
+    std::vector<LeafParticle> particles(101); // more than a kernel takes at once
+    for (LeafParticle& p : particles)
+      p = {place(random), place(random), place(random), 1 / R, weight(random)};
+    std::vector<float> expected(leaf_voxels);
+    add_density_baseline(particles.data(), particles.size(), expected.data());
+    EXPECT_TRUE(std::ranges::any_of(expected, [](float v) { return v != 0; })) << R;
+    for (const DensityKernel kernel : density_add_kernels()) {
+      std::vector<float> values(leaf_voxels);
+      kernel(particles.data(), particles.size(), values.data());
+      EXPECT_EQ(std::memcmp(values.data(), expected.data(), leaf_voxels * sizeof(float)), 0) << R;
+    }
+  }
+}
+
 TEST(Density, ListsWithParticlesOutOfReachGiveTheSameBits) {
   const Particles particles = random_particles(70, 14, 5, {}, 6);
   std::vector<LeafParticle> all;
@@ -231,12 +261,9 @@ TEST(Density, ListsWithParticlesOutOfReachGiveTheSameBits) {
       near.push_back(local);
   }
   ASSERT_LT(near.size() + 20, all.size());
-  std::vector<DensityKernel> kernels{add_density_baseline};
-  if (best_cpu_level() != CpuLevel::baseline)
-    kernels.push_back(add_density_avx2);
   std::vector<float> expected(leaf_voxels);
   add_density_baseline(near.data(), near.size(), expected.data());
-  for (const DensityKernel kernel : kernels)
+  for (const DensityKernel kernel : density_add_kernels())
     for (const auto* list : {&near, &all}) {
       std::vector<float> values(leaf_voxels);
       kernel(list->data(), list->size(), values.data());
