@@ -283,7 +283,8 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
 /// \return whether surfaces touch as they should
 bool SolidDynamic::step(double h, double from, double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
-  const std::vector<double> before(moving.places().begin(), moving.places().end());
+  const Began start = began(from);
+  const std::vector<double>& before = start.places;
   const std::vector<double> forces = forces_at(to);
   bool met = true;
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
@@ -314,7 +315,11 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
     moving.find_reactions(context);
     lead_instruments(to, h);
   } else {
-    const SolidStep took = push(forces, target, h, from, to, first, met, context);
+    const auto [took, as_it_should, exact] = push(forces, target, h, from, to, first, context);
+    const bool jumped = first && std::ranges::any_of(state_.instruments, [&](const auto& i) {
+                          return i && !i->led && i->before != i->way.at(from);
+                        });
+    met = as_it_should && (exact || !target.empty() || jumped || !thrown(start, forces, to));
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);
     counts_.factors += static_cast<std::uint64_t>(took.factorisations);
     counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;

@@ -96,8 +96,22 @@ private:
                      const Context& context);
   bool step(double h, double from, double to, bool first, const Context& context);
   bool instruments_move(bool first, double from, double to) const;
-  SolidStep push(const std::vector<double>& forces, const std::vector<double>& target, double h,
-                 double from, double to, bool first, bool& met, const Context& context);
+  /// What a step did.
+  struct Pushed {
+    SolidStep took;
+    bool met = true;   ///< surfaces touch as they should
+    bool exact = true; ///< forces of contact are what was asked for
+  };
+  Pushed push(const std::vector<double>& forces, const std::vector<double>& target, double h,
+              double from, double to, bool first, const Context& context);
+  /// Where a step began.
+  struct Began {
+    double energy = 0;
+    std::vector<double> places; ///< 3 n
+    std::vector<Pose> stood;    ///< by instrument
+  };
+  Began began(double from) const;
+  bool thrown(const Began& start, std::span<const double> forces, double to) const;
 
   const Model& model_;
   SolidMotionOptions options_;

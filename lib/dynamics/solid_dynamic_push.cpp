@@ -14,13 +14,45 @@ namespace {
 
 constexpr std::size_t max_parts = 256; ///< of an instrument's way in one step
 constexpr double slow_way = 0.1;       ///< of an edge: halves would do no better
+/// Of a body's energy and what is done to it: so much may come of forces that were not found.
+constexpr double thrown_by = 0.1;
 
 } // namespace
 
-/// A step; in halves where surfaces come together too fast for its forces to be found.
+SolidDynamic::Began SolidDynamic::began(double from) const {
+  Began start{engine_->kinetic_energy() + engine_->elastic_energy(),
+              {engine_->places().begin(), engine_->places().end()},
+              {}};
+  for (const auto& i : state_.instruments)
+    start.stood.push_back(i ? i->at(from) : Pose{});
+  return start;
+}
+
+/// Whether a step left more energy than instruments and other forces gave, by their ways: then
+/// forces that were not found have thrown the body about.
+bool SolidDynamic::thrown(const Began& start, std::span<const double> forces, double to) const {
+  if (state_.instruments.empty())
+    return false;
+  double work = 0;
+  for (const NodeTouch& t : state_.touched) {
+    if (t.instrument >= state_.instruments.size() || !state_.instruments[t.instrument])
+      continue;
+    const Vec3 at = vector_at(engine_->places(), t.node);
+    const Pose now = state_.instruments[t.instrument]->at(to);
+    work += dot(t.force, at - carried(now, start.stood[t.instrument], at));
+  }
+  for (std::size_t axis = 0; axis < forces.size(); ++axis)
+    work += forces[axis] * (engine_->places()[axis] - start.places[axis]);
+  const double now = engine_->kinetic_energy() + engine_->elastic_energy();
+  return !(now - start.energy - work <= thrown_by * (start.energy + std::abs(work)));
+}
+
+/// A step; in halves where surfaces come together too fast for its forces to be found, or where
+/// forces of instruments that were not found throw it about.
 void SolidDynamic::step_in_parts(double h, double from, double to, bool first, int halvings,
                                  const Context& context) {
-  if (meetings_.empty()) {
+  if (meetings_.empty() &&
+      std::ranges::none_of(state_.instruments, [](const auto& i) { return i.has_value(); })) {
     (void)step(h, from, to, first, context);
     return;
   }
@@ -31,13 +63,15 @@ void SolidDynamic::step_in_parts(double h, double from, double to, bool first, i
   const bool met = step(h, from, to, first, context);
   if (met || halvings == 0 || state_.tries <= 0)
     return;
-  std::vector<double> free(velocity), moved(engine_->places().begin(), engine_->places().end());
-  for (std::size_t axis = 0; axis < moved.size(); ++axis) {
-    free[axis] *= h;
-    moved[axis] -= places[axis];
+  if (!meetings_.empty()) {
+    std::vector<double> free(velocity), moved(engine_->places().begin(), engine_->places().end());
+    for (std::size_t axis = 0; axis < moved.size(); ++axis) {
+      free[axis] *= h;
+      moved[axis] -= places[axis];
+    }
+    if (!(std::max(contact_->way_of(free), contact_->way_of(moved)) > slow_way))
+      return;
   }
-  if (!(std::max(contact_->way_of(free), contact_->way_of(moved)) > slow_way))
-    return;
   const int tries = state_.tries - 1;
   state_ = was;
   state_.tries = tries;
@@ -61,9 +95,9 @@ bool SolidDynamic::instruments_move(bool first, double from, double to) const {
 }
 
 /// A step, with what instruments do in it.
-SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vector<double>& target,
-                             double h, double from, double to, bool first, bool& met,
-                             const Context& context) {
+SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
+                                        const std::vector<double>& target, double h, double from,
+                                        double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
   const auto& instruments = state_.instruments;
   if (!contact_ && !meetings_.empty())
@@ -81,7 +115,9 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     meets = true;
     return true;
   };
-  SolidStep all;
+  Pushed pushed;
+  SolidStep& all = pushed.took;
+  bool &met = pushed.met, &exact = pushed.exact;
   if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
     state_.touched.clear();
     state_.pushes.clear();
@@ -90,11 +126,10 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
       moving.move_held(target);
     all = moving.step(h, context);
     if (!begin_again())
-      return all;
+      return pushed;
   }
   if (!contact_)
     contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  bool exact = true;
   const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
     std::vector<std::optional<MovedInstrument>> moved;
     for (const auto& i : instruments) {
@@ -155,7 +190,7 @@ SolidStep SolidDynamic::push(const std::vector<double>& forces, const std::vecto
     state_.impulses.push_back(t);
   }
   state_.exact = state_.exact && exact;
-  return all;
+  return pushed;
 }
 
 /// Where those that are led have gone in a step, by what they felt.

@@ -151,11 +151,14 @@ Section passivity() {
     for (const Way& way : ways) {
       Curve curve{way.name, {}};
       std::vector<double> lost;
+      double worst = 0, won = 0; // at any step
       Cycle c;
       for (int k = 0; k <= halvings; ++k) {
         const double step = way.step / (1 << k);
         c = lead(way.method, way.integration, friction, step);
         lost.push_back((c.work - c.kept) / c.most);
+        worst = test::larger(worst, std::abs(lost.back()));
+        won = test::larger(won, -c.least / c.most);
         curve.points.push_back({step, std::abs(lost.back())});
       }
       const std::size_t n = lost.size();
@@ -174,6 +177,12 @@ Section passivity() {
       if (way.method != Method::ffe)
         check(what + ": energy from nowhere at any time", "0", 0 - c.least / c.most,
               0 - c.least / c.most, 1e-3);
+      if (way.integration == Integration::implicit) {
+        const std::string steps = " at any step up to " + text_of(way.step, 2) + " s";
+        if (!(friction > 0))
+          check(what + ": work that is missing" + steps, "0", worst, worst, 0.3);
+        check(what + ": energy from nowhere" + steps, "0", won, won, 0.5);
+      }
     }
   const double friction_off =
       std::max(std::abs(taken[1] / taken[0] - 1), std::abs(taken[2] / taken[0] - 1));
