@@ -17,6 +17,8 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
+constexpr double thin = 1e-6; ///< the square of a sine
+
 class Bending {
 public:
   Bending(const ContactScene& scene, std::span<const TouchPair> pairs,
@@ -105,6 +107,14 @@ private:
   std::optional<Eigen::Matrix<double, 9, 9>> bending_of(const TouchPair& p) const {
     const PlacedInstrument& instrument = *scene_.placed[p.instrument];
     const int count = corner_count(p.piece);
+    if (p.part.kind == CorePart::Kind::corner) {
+      const std::array<Vec3, 3> corners = corners_of(p.piece, at_);
+      const auto found = nearest_points(instrument, p.part, corners, count);
+      if (!found || !found->has_normal(1e-3 * instrument.radius))
+        return std::nullopt;
+      if (auto own = bending_from_point(*found, corners, count))
+        return own;
+    }
     const double by = 1e-6 * instrument.radius;
     Eigen::Matrix<double, 9, 9> all = Eigen::Matrix<double, 9, 9>::Zero();
     for (int c = 0; c < count; ++c)
@@ -130,6 +140,50 @@ private:
 };
 
 } // namespace
+
+std::optional<Matrix9> bending_from_point(const SurfacePoint& found,
+                                          const std::array<Vec3, 3>& corners, int count) {
+  const auto eigen = [](const Vec3& v) { return Eigen::Vector3d(v.x, v.y, v.z); };
+  const Eigen::Vector3d out = eigen(found.place - found.core), n = out / found.distance;
+  std::array<Index, 3> on{};
+  Index support = 0;
+  for (Index c = 0; c < count; ++c)
+    if (found.weights[static_cast<std::size_t>(c)] > 0)
+      on[static_cast<std::size_t>(support++)] = c;
+  if (support == 0)
+    return std::nullopt;
+  Matrix9 h = Matrix9::Zero();
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - n * n.transpose();
+  Eigen::Matrix<double, 9, 2> mixed = Eigen::Matrix<double, 9, 2>::Zero();
+  std::array<Eigen::Vector3d, 2> edge{};
+  for (Index m = 0; m + 1 < support; ++m)
+    edge[static_cast<std::size_t>(m)] =
+        eigen(corners[static_cast<std::size_t>(on[static_cast<std::size_t>(m + 1)])] -
+              corners[static_cast<std::size_t>(on[0])]);
+  for (Index i = 0; i < support; ++i) {
+    const Index at = on[static_cast<std::size_t>(i)];
+    const double w = found.weights[static_cast<std::size_t>(at)];
+    for (Index j = 0; j < support; ++j) {
+      const Index to = on[static_cast<std::size_t>(j)];
+      h.block<3, 3>(3 * at, 3 * to) = w * found.weights[static_cast<std::size_t>(to)] * across;
+    }
+    for (Index m = 0; m + 1 < support; ++m)
+      mixed.block<3, 1>(3 * at, m) = w * edge[static_cast<std::size_t>(m)] +
+                                     ((i == m + 1 ? 1.0 : 0.0) - (i == 0 ? 1.0 : 0.0)) * out;
+  }
+  if (support == 2)
+    h -= mixed.col(0) * mixed.col(0).transpose() / edge[0].squaredNorm();
+  if (support == 3) {
+    const double a = edge[0].squaredNorm(), b = edge[0].dot(edge[1]), c = edge[1].squaredNorm();
+    const double det = a * c - b * b;
+    if (!(det > thin * a * c))
+      return std::nullopt;
+    Eigen::Matrix2d inverse;
+    inverse << c / det, -b / det, -b / det, a / det;
+    h -= mixed * inverse * mixed.transpose();
+  }
+  return h / found.distance;
+}
 
 BentCompliance bending(const ContactScene& scene, std::span<const TouchPair> pairs,
                        std::span<const std::uint32_t> active, std::span<const Vec3> at,

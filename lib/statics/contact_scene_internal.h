@@ -34,6 +34,20 @@ std::array<Vec3, 3> corners_of(const Facet& piece, std::span<const Vec3> at);
 /// The pair's point, where the nodes are.
 Vec3 point_of(const TouchPair& p, std::span<const Vec3> at);
 
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+
+/// Second derivatives, by the corners' places, of the distance d of a piece from a point c. With
+/// weights w of the nearest point p = Σ w_i x_i, where p moves along edges e_m of the corner, edge
+/// or triangle that it is on by dw_i/dm (its least distance lets it), and f = d²/2:
+///
+///   f_ij = w_i w_j I,  f_im = w_i e_m + (dw_i/dm) (p - c),  f_ml = e_m·e_l,
+///   H = (f_ij - f_im f_ml⁻¹ f_mj - w_i w_j n nᵀ) / d
+///
+/// \return none where the triangle is too thin for its own plane
+/// \pre found is of these corners and a point of the core, and has a normal
+std::optional<Matrix9> bending_from_point(const SurfacePoint& found,
+                                          const std::array<Vec3, 3>& corners, int count);
+
 /// How a turn takes the forces' turning: how much of what makes softer counts, and by how much
 /// (over a contact's own stiffness) what pushes is held to its place, which changes nothing where
 /// that is met and makes stable what is so only under its contacts.
