@@ -67,6 +67,21 @@ test_pages_are_clean_mdoc() {
   mandoc -Tlint -W warning "$GEWEBE_ROOT"/man/*.[1-9] || fail 'mandoc found faults'
 }
 
+# As Debian's man shows them in a terminal of 80 columns, where tables may not fit.
+test_pages_fit_a_terminal() {
+  { command -v man && command -v groff; } >/dev/null || skip 'no man of groff'
+  shown() { LC_ALL=C.UTF-8 MANWIDTH=80 timeout 30 man --warnings -l "$1" 2>warnings >/dev/null && [[ ! -s warnings ]]; }
+  local page
+  for page in "$GEWEBE_ROOT"/man/*.[1-9]; do
+    shown "$page" || fail "$page:" "$(<warnings)"
+  done
+  # That it can fail.
+  printf '%s\n' '.Dd 1 January 2026' '.Dt A 1' .Os '.Sh NAME' '.Nm a' '.Nd b' '.Sh DESCRIPTION' \
+    '.Bl -column "bladder, stretched" "1900 (1000 to 4100)" "shear waves, 127 people [5]" "gallbladder"' \
+    '.It gall bladder Ta 250 Ta wall in tension [4] Ta Cm gallbladder' .El >wide.1
+  ! shown wide.1 || fail 'a table that is too wide passes'
+}
+
 test_pages_have_their_sections() {
   local tool section
   for tool in $(programs); do
