@@ -142,6 +142,11 @@ ComplianceBlock Compliance::column_block(std::uint32_t node, std::uint32_t other
   return block;
 }
 
+std::vector<Vec3> Compliance::carried(std::span<const double> over_axes,
+                                      std::span<const std::uint32_t> nodes) {
+  return source_->blocks()->answers(over_axes, nodes);
+}
+
 bool Compliance::compressed(std::uint32_t node) const {
   return compressed_ != nullptr && compressed_->has(node);
 }

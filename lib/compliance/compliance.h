@@ -45,6 +45,11 @@ public:
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
   /// The same of columns, bit by bit as `entry`. \pre the node was among those of the last need
   ComplianceBlock column_block(std::uint32_t node, std::uint32_t other) const;
+  /// Whether C f at such nodes costs no solve, for the factor carries a load along.
+  bool carries() const noexcept { return source_->blocks() != nullptr; }
+  /// C f there. \pre carries(); the nodes were among those of the last need_blocks
+  std::vector<Vec3> carried(std::span<const double> over_axes,
+                            std::span<const std::uint32_t> nodes);
 
   // ---- rows
 

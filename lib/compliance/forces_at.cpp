@@ -120,7 +120,7 @@ bool ForcesAt::meet(const Load& now) {
   if (!take_nodes(now.displacement))
     return false;
   const std::vector<std::size_t> where = axes();
-  std::vector<double> wanted = answer_.at(now, where);
+  std::vector<double> wanted = answer_.at_blocks(now, where);
   double size = largest_size(wanted);
   for (std::size_t k = 0; k < where.size(); ++k) {
     const double d = now.displacement.at(

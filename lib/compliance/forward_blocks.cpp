@@ -10,8 +10,7 @@ constexpr std::size_t max_kept = 1024; ///< nodes; some 50 kB each on 10,000 nod
 
 } // namespace
 
-ForwardBlocks::ForwardBlocks(std::shared_ptr<const FrontalFactor> factor,
-                             std::function<void()> check)
+ForwardBlocks::ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check)
     : factor_(std::move(factor)), check_(std::move(check)) {}
 
 void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
@@ -33,6 +32,19 @@ void ForwardBlocks::need(std::span<const std::uint32_t> nodes) {
 
 ComplianceBlock ForwardBlocks::block(std::uint32_t node, std::uint32_t other) const {
   return factor_->compliance(solves_.at(node), solves_.at(other));
+}
+
+std::vector<Vec3> ForwardBlocks::answers(std::span<const double> over_axes,
+                                         std::span<const std::uint32_t> nodes) {
+  check_();
+  (void)factor_->carry(over_axes);
+  std::vector<Vec3> all;
+  all.reserve(nodes.size());
+  for (const std::uint32_t node : nodes) {
+    const std::array<double, 3> u = factor_->carried(solves_.at(node));
+    all.push_back({u[0], u[1], u[2]});
+  }
+  return all;
 }
 
 } // namespace gewebe

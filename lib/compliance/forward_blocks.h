@@ -17,15 +17,19 @@ namespace gewebe {
 class ForwardBlocks {
 public:
   /// \param check called before the factor is read; throws where it is no longer that of the model
-  ForwardBlocks(std::shared_ptr<const FrontalFactor> factor, std::function<void()> check);
+  ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check);
 
   /// Prepares blocks between these nodes and all that were needed before; those may be forgotten.
   void need(std::span<const std::uint32_t> nodes);
   /// \pre both nodes were among the last ones needed
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
+  /// C f at these nodes, by a load that the factor carries along from cut to cut.
+  /// \pre the nodes were among the last ones needed
+  std::vector<Vec3> answers(std::span<const double> over_axes,
+                            std::span<const std::uint32_t> nodes);
 
 private:
-  std::shared_ptr<const FrontalFactor> factor_;
+  std::shared_ptr<FrontalFactor> factor_;
   std::function<void()> check_;
   std::unordered_map<std::uint32_t, FrontalFactor::ForwardSolve> solves_;
 };

@@ -146,4 +146,35 @@ std::vector<double> LoadAnswer::at(const Load& load, std::span<const std::size_t
   return values;
 }
 
+std::vector<double> LoadAnswer::at_blocks(const Load& load, std::span<const std::size_t> rows) {
+  const bool columns = compliance_.columns_pay(nodes_of(load.force));
+  if (!compliance_.carries() || (columns && load.gravity == Vec3{}))
+    return at(load, rows);
+  Load carried;
+  carried.gravity = load.gravity;
+  if (!columns)
+    carried.force = load.force;
+  if (!(carried == carried_))
+    carried_at_.clear();
+  carried_ = std::move(carried);
+  std::vector<std::uint32_t> missing;
+  for (const std::size_t row : rows)
+    if (const auto node = static_cast<std::uint32_t>(row / 3);
+        !carried_at_.contains(node) && (missing.empty() || missing.back() != node))
+      missing.push_back(node);
+  if (!missing.empty()) {
+    const std::vector<Vec3> u = compliance_.carried(forces_over_axes(model_, carried_), missing);
+    for (std::size_t k = 0; k < missing.size(); ++k)
+      carried_at_[missing[k]] = u[k];
+  }
+  std::vector<double> values;
+  values.reserve(rows.size());
+  for (const std::size_t row : rows)
+    values.push_back(
+        carried_at_.at(static_cast<std::uint32_t>(row / 3))[static_cast<int>(row % 3)]);
+  if (columns)
+    compliance_.add_rows(as_vectors(load.force), rows, values);
+  return values;
+}
+
 } // namespace gewebe

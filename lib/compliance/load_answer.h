@@ -36,6 +36,9 @@ public:
   const std::vector<double>& weight(const Vec3& gravity);
   /// Rows of the answer at all axes. The same bits whatever answers were asked for.
   std::vector<double> at(const Load& load, std::span<const std::size_t> rows);
+  /// The same of nodes whose blocks the compliance has made ready, to other bits: where it can, by
+  /// a load that its factor carries along.
+  std::vector<double> at_blocks(const Load& load, std::span<const std::size_t> rows);
 
 private:
   std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const;
@@ -52,6 +55,8 @@ private:
   std::uint64_t increments_ = 0; ///< by which it came to be
   Load solved_;                  ///< whose answer over all axes is known
   std::vector<double> everywhere_;
+  Load carried_; ///< whose answer is known at some nodes
+  std::map<std::uint32_t, Vec3> carried_at_;
 };
 
 } // namespace gewebe

@@ -213,6 +213,8 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
   const FrontTree before = std::exchange(tree, front_tree(graph.view(), order));
   std::vector<Front> had = std::exchange(fronts, std::vector<Front>(tree.fronts()));
   std::vector<FrontMemory> held = std::exchange(memory, std::vector<FrontMemory>(tree.fronts()));
+  std::vector<FrontLoad> carried =
+      std::exchange(loads, std::vector<FrontLoad>(loads.empty() ? 0 : tree.fronts()));
   const auto placed = [&](std::uint32_t old) { return place.empty() ? old : place[old]; };
   // Old fronts by the first node that they eliminated.
   std::vector<std::uint32_t> front_of(graph.axes.size(), none);
@@ -236,6 +238,8 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
     if (old != none) { // if only for its memory
       fronts[f] = std::move(had[old]);
       memory[f] = std::move(held[old]);
+      if (!carried.empty())
+        loads[f] = std::move(carried[old]);
     }
     const bool kept =
         !wanted[f] && old != none && kept_children[f] == had_children[old] &&

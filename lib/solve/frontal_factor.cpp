@@ -147,4 +147,18 @@ std::array<std::array<double, 3>, 3> FrontalFactor::compliance(const ForwardSolv
   return block;
 }
 
+std::size_t FrontalFactor::carry(std::span<const double> over_axes) {
+  return state_->carry(over_axes);
+}
+
+std::array<double, 3> FrontalFactor::carried(const ForwardSolve& at) const {
+  std::array<double, 3> u{};
+  const auto* value = at.values.data();
+  for (std::uint32_t f = at.front; f != none; f = state_->tree.parent[f])
+    for (std::size_t c = 0; c < state_->fronts[f].columns; ++c, ++value)
+      for (std::size_t a = 0; a < 3; ++a)
+        u[a] += (*value)[a] * state_->loads[f].values[c];
+  return u;
+}
+
 } // namespace gewebe

@@ -78,6 +78,15 @@ public:
   std::array<std::array<double, 3>, 3> compliance(const ForwardSolve& a,
                                                   const ForwardSolve& b) const;
 
+  /// L⁻¹ of a load, kept front by front: where the load or the factor has changed since, the fronts
+  /// that either reaches are solved anew, and the bits are those of all anew. With it, C f at a few
+  /// nodes costs their ways to the root. What is on fixed axes counts for nothing.
+  /// \pre over_axes.size() == axes() \return how many fronts were solved anew
+  std::size_t carry(std::span<const double> over_axes);
+  /// C f at the axes of a node, of the load carried last. \pre `at` is of this factor, which
+  /// carries a load and has not been refactored since
+  std::array<double, 3> carried(const ForwardSolve& at) const;
+
 private:
   struct State;
   std::unique_ptr<State> state_;

@@ -58,6 +58,13 @@ inline const FreeAxes& free_axes(const Source& k, std::uint32_t node) {
   return all_free_axes[k.fixed(node) & 7U];
 }
 
+/// What a front does to a load that is carried along.
+struct FrontLoad {
+  std::vector<double> load;   ///< on its own rows
+  std::vector<double> values; ///< L⁻¹ of it there, and what the rows below get
+  bool current = false;       ///< of L as it is, and with what its children leave now
+};
+
 } // namespace frontal
 
 struct FrontalFactor::State {
@@ -84,6 +91,8 @@ struct FrontalFactor::State {
   std::size_t entries = 0;
   double weakest = 1;
   std::size_t weakest_row = 0;
+
+  std::vector<frontal::FrontLoad> loads; // of each front, or none: no load is carried
 
   /// The rows of the nodes that a front eliminates.
   void assemble(const Source& k, const FrontAssembly& to) const;
@@ -116,6 +125,16 @@ struct FrontalFactor::State {
 
   /// All anew, in an order of its own finding.
   void begin(const Source& k, const Context& context);
+
+  // ---- a load that is carried along, see FrontalFactor::carry
+
+  std::size_t carry(std::span<const double> over_axes);
+
+  /// L⁻¹ of what a front has in its values. \param row 0, 1, 2 …: as many as it has rows
+  void forward(std::size_t front, std::span<const std::int64_t> row, std::span<double> space);
+
+  /// The rows of L that a front has, its own first.
+  std::span<const std::int64_t> rows_of(std::size_t front) const;
 
   // ---- changes
 

@@ -119,6 +119,9 @@ void FrontalFactor::State::factorise(const Source& k, std::span<const char> want
   } catch (const PivotTooSmall& pivot) {
     throw NotPositiveDefinite(axis_at(k, pivot.front, pivot.column));
   }
+  for (std::size_t f = 0; f < loads.size(); ++f)
+    if (wanted.empty() || wanted[f] != 0)
+      loads[f].current = false;
 }
 
 void FrontalFactor::State::lay_out(const Source& k) {
@@ -197,6 +200,7 @@ void FrontalFactor::State::begin(const Source& k, const Context& context) {
     throw Error("every node is fixed along every axis, expected a node that can move");
   tree = front_tree(graph.view(), order);
   fronts = std::vector<Front>(tree.fronts());
+  loads.clear();
   factorise(k, {}, context);
   lay_out(k);
   remember(k);

@@ -3,12 +3,13 @@
 //
 // A liver of 25,000 linear tetrahedra (a box of as many where there is no shared data), held at one
 // side, cut at random places by small planes that pass through some 24 of them. Times are of the
-// processor, on one thread. Arguments: how many cuts (200), and `errors`: each cut's shape beside
-// that of a factor of its own.
+// processor, in the library on one thread, through the pipe on all of one or two. Arguments: how
+// many cuts (200), and `errors`: each cut's shape beside that of a factor of its own.
 //
 // Writes CSV to standard output: stage, median, 90th and 99th percentile, largest, unit.
 
 #include "solid/cut_solid.h"
+#include "compliance/forward_blocks.h"
 #include "cutting/cut_stiffness.h"
 #include "formats/model/ela.h"
 #include "model/cut.h"
@@ -27,6 +28,7 @@
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -147,13 +149,33 @@ double error_of(const Model& model, ComplianceSource& source) {
   return worst / largest;
 }
 
+/// Some ten nodes of the surface lie beyond it.
+double far_plane(const Model& model) {
+  std::vector<double> x;
+  const std::size_t surface = surface_count(model);
+  for (std::size_t i = 0; i < surface; ++i)
+    x.push_back(model.nodes[i].position.x);
+  std::ranges::sort(x);
+  return x[x.size() - 11];
+}
+
+std::vector<std::uint32_t> far_end(const Model& model) {
+  const double plane = far_plane(model);
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+    if (model.nodes[i].position.x > plane)
+      nodes.push_back(i);
+  return nodes;
+}
+
 void in_library(const Model& first, std::size_t cuts, bool errors) {
   const double radius = 1.8 * mean_edge(first);
   auto model = std::make_shared<const Model>(first);
   CutStiffness stiffness(model, nullptr, with_threads(1));
   std::printf("first factor,%.6g,,,,ms\n", processor_milliseconds([&] { stiffness.prepare(); }));
   Places places(first);
-  std::vector<double> elements, follow, change, solve, all, computed, operations, separated, error;
+  std::vector<double> elements, follow, change, some, solve, all, computed, operations, separated,
+      error;
   double mass = 0, volume = 0, fresh = 0;
   for (std::size_t attempt = 0; all.size() < cuts && attempt < 5 * cuts; ++attempt) {
     const Vec3 place = places.place(), normal = places.normal();
@@ -178,14 +200,20 @@ void in_library(const Model& first, std::size_t cuts, bool errors) {
     const double t3 =
         processor_milliseconds([&] { work = stiffness.cut(next, step.origin, step.place); });
     const std::shared_ptr<ComplianceSource> source = stiffness.compliance();
+    const std::vector<std::uint32_t> end = far_end(*next);
+    const double t5 = processor_milliseconds([&] {
+      source->blocks()->need(end);
+      (void)source->blocks()->answers(weight_of(*next, {0, 0, -9810}), end);
+    });
     std::vector<double> f = some_load(*next);
     const double t4 = processor_milliseconds([&] { source->solve(f, 1); });
     separated.push_back(number);
     elements.push_back(t0);
     follow.push_back(t1 + t2);
     change.push_back(t3);
+    some.push_back(t5);
     solve.push_back(t4);
-    all.push_back(t0 + t1 + t2 + t3 + t4);
+    all.push_back(t0 + t1 + t2 + t3 + t4 + t5);
     computed.push_back(100 * work.factor.operations / work.factor.all_operations);
     operations.push_back(1e-9 * work.factor.operations);
     fresh += work.way == CutWay::fresh ? 1 : 0;
@@ -200,6 +228,7 @@ void in_library(const Model& first, std::size_t cuts, bool errors) {
   tell("elements and surface", elements, "ms");
   tell("nodes and pieces", follow, "ms");
   tell("stiffness and factor", change, "ms");
+  tell("some nodes under the weight", some, "ms");
   tell("a shape", solve, "ms");
   tell("all of it", all, "ms");
   tell("share of operations", computed, "%");
@@ -227,17 +256,7 @@ std::string numbers(const Vec3& v, char by) {
   return text.data();
 }
 
-/// Some ten nodes of the surface lie beyond it.
-double far_end(const Model& model) {
-  std::vector<double> x;
-  const std::size_t surface = surface_count(model);
-  for (std::size_t i = 0; i < surface; ++i)
-    x.push_back(model.nodes[i].position.x);
-  std::ranges::sort(x);
-  return x[x.size() - 11];
-}
-
-void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces) {
+void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces, int threads) {
   const std::string tools = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   std::string folder = (std::filesystem::temp_directory_path() / "gewebe-bench-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr)
@@ -251,10 +270,10 @@ void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces) {
   std::vector<double> worked, felt;
   double announced = 0;
   {
-    const Served run(tools, folder);
+    const Served run(tools, folder, threads);
     run.say(std::string("object liver liver.ela method=ffe\nemit forces\n") +
             (surfaces ? "emit surfaces\n" : "") + "gravity 0 0 -9810\ndisplace liver \"x>" +
-            std::to_string(far_end(first)) +
+            std::to_string(far_plane(first)) +
             "\" 0 0 0.1\nstep 0.0166\ntear liver 0\nstep 0.0166\n"); // which announces cuts
     (void)run.hear();
     (void)run.hear();
@@ -279,10 +298,12 @@ void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces) {
       felt.push_back(time);
     }
   }
-  const std::string what = surfaces ? " with surfaces" : "";
+  const std::string what = " -j" + std::to_string(threads) + (surfaces ? " with surfaces" : "");
   std::printf("through the pipe%s: before,%.6g,,,,ms\n", what.c_str(), announced);
-  if (!worked.empty())
+  if (!worked.empty()) {
     std::printf("through the pipe%s: the first,%.6g,,,,ms\n", what.c_str(), worked[0]);
+    std::printf("through the pipe%s: the first by the clock,%.6g,,,,ms\n", what.c_str(), felt[0]);
+  }
   tell("through the pipe" + what + ": processor", worked, "ms");
   tell("through the pipe" + what + ": clock", felt, "ms");
   std::filesystem::current_path("/");
@@ -304,6 +325,7 @@ int main(int argc, char** argv) {
   std::puts("stage,median,p90,p99,largest,unit");
   std::printf("tetrahedra,%zu,,,,\nnodes,%zu,,,,\n", model.tetrahedra.size(), model.nodes.size());
   in_library(model, cuts, errors);
-  through_the_pipe(model, cuts, false);
-  through_the_pipe(model, cuts, true);
+  for (const int threads : {1, 2})
+    for (const bool surfaces : {false, true})
+      through_the_pipe(model, cuts, surfaces, threads);
 }

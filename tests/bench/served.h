@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <sys/wait.h>
+#include <system_error>
 #include <unistd.h>
 #include <vector>
 
@@ -30,7 +31,7 @@ public:
     std::exit(EXIT_FAILURE);
   }
 
-  Served(const std::string& tools, const std::string& folder) {
+  Served(const std::string& tools, const std::string& folder, int threads = 1) {
     std::array<int, 2> to{}, from{};
     if (pipe(to.data()) != 0 || pipe(from.data()) != 0)
       fail("no pipe");
@@ -41,7 +42,8 @@ public:
     for (const int end : {to[0], to[1], from[0], from[1]})
       (void)posix_spawn_file_actions_addclose(&actions, end);
     const std::string program = tools + "/ffe-run";
-    std::vector<std::string> words{program, "--serve", "-q", "-j1", "--rate", "60"};
+    std::vector<std::string> words{program,  "--serve", "-q", "-j" + std::to_string(threads),
+                                   "--rate", "60"};
     std::vector<char*> arguments;
     for (std::string& word : words)
       arguments.push_back(word.data());
@@ -93,12 +95,18 @@ public:
     fail("ffe-run has ended");
   }
 
-  /// What it has worked so far, on its first thread, ms; 0 where the system does not tell.
+  /// What it has worked so far, on all its threads, ms; 0 where the system does not tell.
   double worked() const {
-    std::ifstream file("/proc/" + std::to_string(child_) + "/schedstat");
-    double nanoseconds = 0;
-    file >> nanoseconds;
-    return 1e-6 * nanoseconds;
+    double sum = 0;
+    std::error_code none;
+    for (const auto& task :
+         std::filesystem::directory_iterator("/proc/" + std::to_string(child_) + "/task", none)) {
+      std::ifstream file(task.path() / "schedstat");
+      double nanoseconds = 0;
+      file >> nanoseconds;
+      sum += 1e-6 * nanoseconds;
+    }
+    return sum;
   }
 
   struct Disturbed {

@@ -386,6 +386,80 @@ TEST(FrontalFactor, ForwardSolvesGiveBlocksOfTheCompliance) {
   }
 }
 
+namespace {
+
+/// C f at these nodes, of the load that the factor carries.
+std::vector<double> carried_at(const FrontalFactor& factor,
+                               const std::vector<std::uint32_t>& nodes) {
+  std::vector<double> u;
+  for (const FrontalFactor::ForwardSolve& at : factor.forward_solves(nodes))
+    for (const double value : factor.carried(at))
+      u.push_back(value);
+  return u;
+}
+
+std::vector<double> solved_at(const FrontalFactor& factor, const std::vector<double>& f,
+                              const std::vector<std::uint32_t>& nodes) {
+  const std::vector<double> all = solved(factor, f);
+  std::vector<double> u;
+  for (const std::uint32_t node : nodes)
+    for (std::size_t a = 0; a < 3; ++a)
+      u.push_back(all[3 * std::size_t{node} + a]);
+  return u;
+}
+
+} // namespace
+
+TEST(FrontalFactor, ALoadThatIsCarriedAlongFollowsTheFactorAndItself) {
+  for (const CpuLevel cpu : {CpuLevel::baseline, best_cpu_level()}) {
+    const Context context = context_of(1, cpu);
+    Model model = round_organ(4);
+    model.nodes[70].fixed = fixed_y;
+    model.nodes[71].fixed = fixed_all;
+    const std::vector<std::uint32_t> nodes{0, 5, 70, 71, 300, 500};
+    FrontalFactor factor(model, context), twin(model, context); // which begins anew at the end
+    std::vector<double> f = loads(3 * model.nodes.size(), 9);
+    EXPECT_EQ(factor.carry(f), factor.work().fronts);
+    EXPECT_LT(relative_difference(carried_at(factor, nodes), solved_at(factor, f, nodes)), 1e-12);
+    EXPECT_EQ(factor.carry(f), 0U);
+    f[3 * 300] += 1;
+    const std::size_t way = factor.carry(f); // from that node's front to the root
+    EXPECT_GT(way, 0U);
+    EXPECT_LT(way, factor.work().fronts / 5);
+    EXPECT_LT(relative_difference(carried_at(factor, nodes), solved_at(factor, f, nodes)), 1e-12);
+    std::mt19937 random(7);
+    for (int cut = 0; cut < 12; ++cut) {
+      FrontalWork work;
+      if (cut % 3 == 1) { // springs alone: the tree stays
+        for (const std::size_t e : near(model, static_cast<std::uint32_t>(random() % 600), 8))
+          model.springs[e].stiffness *= 0.5;
+        work = factor.refactor(model, {}, {}, context);
+        (void)twin.refactor(model, {}, {}, context);
+      } else {
+        const Doubled now = doubled(model, 1000 + static_cast<std::uint32_t>(random() % 200));
+        model = now.model;
+        work = factor.refactor(model, now.origin, now.place, context);
+        (void)twin.refactor(model, now.origin, now.place, context);
+        std::vector<double> followed; // the load of a node stays where it is
+        for (const std::uint32_t old : now.origin)
+          for (std::size_t a = 0; a < 3; ++a)
+            followed.push_back(f[3 * std::size_t{old} + a]);
+        f = std::move(followed);
+      }
+      if (cut % 4 == 3)
+        continue; // two changes at once
+      const std::size_t solved = factor.carry(f);
+      EXPECT_GE(solved, work.computed) << cut;
+      EXPECT_LT(solved, work.fronts / 2) << cut;
+      EXPECT_LT(relative_difference(carried_at(factor, nodes), solved_at(factor, f, nodes)), 1e-12)
+          << cut;
+    }
+    (void)factor.carry(f);
+    EXPECT_EQ(twin.carry(f), twin.work().fronts);
+    EXPECT_TRUE(same_bits(carried_at(factor, nodes), carried_at(twin, nodes)));
+  }
+}
+
 TEST(FrontalFactor, TheWeakestAxisIsThatOfWhatHangsLoosely) {
   Model model = round_organ(3);
   const std::uint32_t loose = 40;

@@ -190,6 +190,30 @@ TEST_P(NodeStiffness, ItsFactorFollowsCutsInPart) {
   EXPECT_GE(in_part, cuts - 3); // of a small one the order is worn out now and then
 }
 
+TEST_P(NodeStiffness, ANewOrderIsCheaperThanTheOneThatIsWornOut) {
+  auto model = std::make_shared<const Model>(block(GetParam(), GetParam() ? 4 : 8));
+  CutStiffness stiffness(model, nullptr, {});
+  stiffness.prepare();
+  const double size = GetParam() ? 8 : 16;
+  double before = 0; // operations of a whole factor
+  for (int k = 0; k < 400; ++k) {
+    const double x = 3 + (size - 5) * (k * 5 % 13) / 13, y = size * (k * 7 % 17) / 17,
+                 z = size * (k * 3 % 11) / 11;
+    std::optional<CutModel> cut = cut_at(*model, {x, y, z}, {1, 0.2 * (k % 9) - 1, 0.4}, 4.2);
+    if (!cut || !free_parts(*model, *cut).parts.empty())
+      continue;
+    model = std::make_shared<const Model>(cut->model);
+    const CutWork work = stiffness.cut(model, cut->origin, cut->place);
+    if (work.way == CutWay::fresh) {
+      EXPECT_GT(before, 0);
+      EXPECT_LT(work.factor.all_operations, 0.8 * before);
+      return;
+    }
+    before = work.factor.all_operations;
+  }
+  ADD_FAILURE() << "no order was worn out";
+}
+
 TEST_P(NodeStiffness, ItsFactorGoesOnWithoutAPiece) {
   auto model = std::make_shared<const Model>(block(GetParam(), 4));
   CutStiffness stiffness(model, nullptr, {});

@@ -336,6 +336,61 @@ TEST(SolidCutScenes, AStepThatFailsTakesACutBack) {
   }
 }
 
+/// Of held nodes, against those of an object that comes as it is now.
+double error_of_forces(const Simulation& s, const Load& load) {
+  const Model model = s.model(0);
+  Elastostatic fresh(model, {}, one_thread());
+  fresh.update(load);
+  const std::vector<NodeVector>& want = fresh.contact_forces();
+  const std::span<const NodeVector> is = s.contact_forces(0);
+  EXPECT_EQ(is.size(), want.size());
+  double largest = 0, worst = 0;
+  for (std::size_t k = 0; k < std::min(want.size(), is.size()); ++k) {
+    EXPECT_EQ(is[k].node, want[k].node);
+    largest = test::larger(largest, norm(want[k].value));
+    worst = test::larger(worst, norm(want[k].value - is[k].value));
+  }
+  EXPECT_GT(largest, 0);
+  return worst / largest;
+}
+
+TEST_P(SolidCuts, ForcesOnHeldNodesAreThoseOfTheCutModel) {
+  // Weight and forces are carried along from cut to cut, and change between them.
+  Simulation s(one_thread(), {});
+  s.add_object("bar", bar(GetParam()), Method::ffe);
+  Load load;
+  const auto step = [&](const char* what) {
+    load.displacement.clear();
+    load.force.clear();
+    const auto end = nodes_where(s.model(0), [](const Vec3& p) { return p.x == 20 && p.z == 10; });
+    for (const std::uint32_t i : end)
+      load.displacement[i] = {0.1, 0, 0.2};
+    const auto pulled = nodes_where(s.model(0), [](const Vec3& p) { return p == Vec3{10, 0, 10}; });
+    if (load.gravity.x != 0)
+      load.force[pulled.at(0)] = {0, -3e5, 0};
+    s.apply(SetGravity{load.gravity});
+    s.apply(SetDisplacement{0, end, {0.1, 0, 0.2}});
+    for (const auto& [node, force] : load.force)
+      s.apply(SetForce{0, {node}, force});
+    s.step(0.1);
+    EXPECT_LT(error_of_forces(s, load), 1e-10) << what;
+  };
+  load.gravity = {0, 0, -9810};
+  step("whole");
+  for (const double x : {5.3, 12.6, 8.9}) {
+    s.apply(notch(s.model(0), x));
+    ASSERT_EQ(count(s, Cutting::Kind::cut), 1U);
+    s.take_news();
+    step("cut");
+    load.gravity = {1000 * x, 0, -9810};
+    step("another weight");
+    load.gravity.x = 0;
+    s.apply(Release{0, nodes_where(s.model(0), [](const Vec3&) { return true; })});
+    step("as it was");
+  }
+  ASSERT_EQ(s.object_count(), 1U);
+}
+
 TEST(SolidCutScenes, TheSameForAnyNumberOfThreads) {
   std::vector<double> first;
   for (const int threads : {1, 2}) {

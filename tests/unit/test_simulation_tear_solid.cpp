@@ -1,6 +1,7 @@
 // Solids that tear: where and under which force, what stays of them, and what goes on.
 
 #include "base/error.h"
+#include "contact_checks.h"
 #include "cut_bars.h"
 #include "larger.h"
 #include "mesh/check.h"
@@ -337,6 +338,66 @@ TEST(SolidTearScenes, TheSameForAnyNumberOfThreads) {
       first = all;
     else
       EXPECT_EQ(all, first);
+  }
+}
+
+TEST(SolidTearScenes, AWoundUnderAnInstrumentHasWallsForIt) {
+  const double strength = 500, stretch = strength / 20000 * length, radius = 1.2;
+  for (const Method method : {Method::ffe, Method::ela}) {
+    Simulation s(one_thread(), {});
+    s.add_object("bar", pulled_bar(false, 4), method);
+    s.apply(SetTear{0, 0, {true, {4 * strength, strength}, 0}});
+    const InstrumentShape ball{radius, {}, 0.2};
+    Vec3 place{14, 4, side + radius + 0.5};
+    s.apply(SetInstrument{0, ball, {place, {}}});
+    double pulled = 0, on_wall = 0;
+    const auto step = [&](const Vec3& to, double pull) {
+      place = to;
+      pulled = pull;
+      for (std::size_t k = 0; k < s.object_count(); ++k)
+        if (const auto end = end_of(s.model(k)); !end.empty())
+          s.apply(SetDisplacement{k, end, {pulled, 0, 0}, 0.05});
+      s.apply(MoveInstrument{0, place, {}, 0.05});
+      s.step(0.05);
+      const InstrumentReport tool = s.instrument(0);
+      EXPECT_TRUE(std::isfinite(norm(tool.force)) && std::isfinite(norm(tool.torque)));
+      for (std::size_t k = 0; k < s.object_count(); ++k) {
+        const Model model = s.model(k);
+        const std::vector<double> u = shape(s, k);
+        for (const double one : u)
+          ASSERT_TRUE(std::isfinite(one));
+        EXPECT_LT(test::surface_depth(model, u, PlacedInstrument(ball, tool.pose)), 1e-6);
+        for (const NodeVector& f : s.contact_forces(k)) {
+          EXPECT_TRUE(std::isfinite(norm(f.value)));
+          const Vec3& rest = model.nodes[f.node].position;
+          const auto inside = [](double at) { return at > 1e-6 && at < side - 1e-6; };
+          if (inside(rest.y) && inside(rest.z) && rest.x < length)
+            on_wall = test::larger(on_wall, norm(f.value));
+        }
+      }
+    };
+    while (norm(s.instrument(0).force) == 0 && place.z > side)
+      step(place - Vec3{0, 0, 0.1}, 0);
+    double pressed = 0; // when it tears
+    for (int k = 1; k <= 60 && s.object_count() == 1; ++k) {
+      if (count(s, Cutting::Kind::cut) == 0)
+        pressed = s.instrument(0).force.z;
+      step(place, (0.6 + 0.02 * k) * stretch);
+    }
+    EXPECT_GT(pressed, 0) << method_name(method);
+    ASSERT_EQ(s.object_count(), 2U) << method_name(method);
+    EXPECT_EQ(on_wall, 0) << method_name(method);
+    for (int k = 0; k < 10; ++k)
+      step(place, pulled + 0.5); // the wound opens
+    for (int k = 0; k < 10; ++k)
+      step(place - Vec3{0, 0, 0.5}, pulled);
+    for (int k = 0; k < 10 && on_wall == 0; ++k)
+      step(place - Vec3{0.4, 0, 0}, pulled);
+    EXPECT_TRUE(place.z > 0 && place.z < side);                   // where nothing but a wall is
+    EXPECT_GT(s.instrument(0).force.x, 0) << method_name(method); // it is pushed back
+    if (method == Method::ffe) { // what moves may give way until it is at the wall's rim
+      EXPECT_GT(on_wall, 0);
+    }
   }
 }
 
