@@ -6,6 +6,8 @@
 
 #include "density/density_kernel_internal.h"
 
+#include <immintrin.h>
+
 namespace gewebe {
 namespace {
 
@@ -31,9 +33,27 @@ struct Chunk {
   Item items[(chunk + 1) * half_slices];
 };
 
-inline void set_weight(const LeafParticle& p, Rows& rows) {
+inline __m256 scaled_square(float center, __m256 inverse) {
+  const __m256 ramp = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
+  const __m256 s = _mm256_mul_ps(_mm256_sub_ps(ramp, _mm256_set1_ps(center)), inverse);
+  return _mm256_mul_ps(s, s);
+}
+
+/// Of a particle along the axes: 1 − sx², sy², and in each lane the least of its four sy².
+struct Squares {
+  __m256 rest_x, y2, nearest;
+};
+
+/// Sets all but the rests.
+inline Squares set_rows(const LeafParticle& p, Rows& rows) {
   rows.cubic = p.weight * (4.0F / 9);
   rows.square = p.weight * (5.0F / 9);
+  const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
+  _mm256_store_ps(rows.z2, scaled_square(p.z, inverse));
+  const __m256 y2 = scaled_square(p.y, inverse);
+  const __m256 pairs = _mm256_min_ps(y2, _mm256_permute_ps(y2, 0b10110001));
+  return {_mm256_sub_ps(_mm256_set1_ps(1), scaled_square(p.x, inverse)), y2,
+          _mm256_min_ps(pairs, _mm256_permute_ps(pairs, 0b01001110))};
 }
 
 /// The least of sz², or less: that of the row's nearest point.

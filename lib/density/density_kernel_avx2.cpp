@@ -19,12 +19,6 @@ struct SetBits {
 };
 constexpr SetBits set_bits;
 
-__m256 scaled_square(float center, __m256 inverse) {
-  const __m256 ramp = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
-  const __m256 s = _mm256_mul_ps(_mm256_sub_ps(ramp, _mm256_set1_ps(center)), inverse);
-  return _mm256_mul_ps(s, s);
-}
-
 __m256 added(__m256 sum, const float* rest, const Rows& rows) {
   const __m256 u = _mm256_max_ps(_mm256_sub_ps(_mm256_broadcast_ss(rest), _mm256_load_ps(rows.z2)),
                                  _mm256_setzero_ps());
@@ -39,18 +33,13 @@ struct OneRow {
     for (std::size_t n = 0; n < count; ++n) {
       const LeafParticle& p = particles[n];
       Rows& rows = c.rows[n];
-      set_weight(p, rows);
-      const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
-      const __m256 y2 = scaled_square(p.y, inverse);
-      const __m256 rest_x = _mm256_sub_ps(_mm256_set1_ps(1), scaled_square(p.x, inverse));
-      _mm256_store_ps(rows.z2, scaled_square(p.z, inverse));
+      const auto [rest_x, y2, least_of_four] = set_rows(p, rows);
       for (int i = 0; i < 8; ++i)
         _mm256_store_ps(rows.rest + std::ptrdiff_t{8} * i,
                         _mm256_sub_ps(_mm256_permutevar8x32_ps(rest_x, _mm256_set1_epi32(i)), y2));
       // A half slice is in reach where its nearest row is.
-      __m256 nearest = _mm256_min_ps(y2, _mm256_permute_ps(y2, 0b10110001));
-      nearest = _mm256_min_ps(nearest, _mm256_permute_ps(nearest, 0b01001110));
-      nearest = _mm256_permutevar8x32_ps(nearest, _mm256_setr_epi32(0, 4, 0, 4, 0, 4, 0, 4));
+      const __m256 nearest =
+          _mm256_permutevar8x32_ps(least_of_four, _mm256_setr_epi32(0, 4, 0, 4, 0, 4, 0, 4));
       const __m256 least = _mm256_set1_ps(least_square(p));
       for (int i = 0; i < 8; i += 4) {
         const __m256i lanes = _mm256_setr_epi32(i, i, i + 1, i + 1, i + 2, i + 2, i + 3, i + 3);

@@ -9,12 +9,6 @@ namespace {
 // are made of variables without a value, and warned of.
 constexpr __mmask16 all = 0xffff;
 
-__m256 scaled_square(float center, __m256 inverse) {
-  const __m256 ramp = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
-  const __m256 s = _mm256_mul_ps(_mm256_sub_ps(ramp, _mm256_set1_ps(center)), inverse);
-  return _mm256_mul_ps(s, s);
-}
-
 __m512 twice(__m256 v) {
   return _mm512_maskz_broadcast_f32x8(all, v);
 }
@@ -51,13 +45,8 @@ struct TwoRows {
     for (std::size_t n = 0; n < count; ++n) {
       const LeafParticle& p = particles[n];
       Rows& rows = c.rows[n];
-      set_weight(p, rows);
-      const __m256 inverse = _mm256_set1_ps(p.inverse_radius);
-      const __m256 y2 = scaled_square(p.y, inverse);
-      const __m512 rest_x =
-          _mm512_castps256_ps512(_mm256_sub_ps(_mm256_set1_ps(1), scaled_square(p.x, inverse)));
-      _mm256_store_ps(rows.z2, scaled_square(p.z, inverse));
-      const __m512 y2_twice = twice(y2);
+      const Squares of = set_rows(p, rows);
+      const __m512 rest_x = _mm512_castps256_ps512(of.rest_x), y2_twice = twice(of.y2);
       for (int i = 0; i < 8; i += 2) {
         const __m512i lanes = _mm512_setr_epi32(i, i, i, i, i, i, i, i, i + 1, i + 1, i + 1, i + 1,
                                                 i + 1, i + 1, i + 1, i + 1);
@@ -65,12 +54,10 @@ struct TwoRows {
                         _mm512_sub_ps(pick(lanes, rest_x), y2_twice));
       }
       // A half slice is in reach where its nearest row is.
-      __m256 nearest = _mm256_min_ps(y2, _mm256_permute_ps(y2, 0b10110001));
-      nearest = _mm256_min_ps(nearest, _mm256_permute_ps(nearest, 0b01001110));
       const __m512 rest = _mm512_sub_ps(
           pick(_mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7), rest_x),
           pick(_mm512_setr_epi32(0, 4, 0, 4, 0, 4, 0, 4, 0, 4, 0, 4, 0, 4, 0, 4),
-               _mm512_castps256_ps512(nearest)));
+               _mm512_castps256_ps512(of.nearest)));
       const __mmask16 reached =
           _mm512_cmp_ps_mask(rest, _mm512_set1_ps(least_square(p)), _CMP_GT_OQ);
       _mm512_storeu_si512(items, _mm512_maskz_compress_epi32(reached, numbers));

@@ -359,8 +359,8 @@ void DynamicContact::keep_out(const ContactMoment& moment, std::span<const NodeT
 
 bool DynamicContact::still(double start, double h) const {
   for (const auto& i : state_.instruments)
-    if (i && ((start < i->way.end && i->way.from != i->way.to) ||
-              (!i->led && i->before != i->way.at(start)) || i->moves(start + h, h)))
+    if (i && ((start < i->way.end && i->way.from != i->way.to) || i->jumped(start) ||
+              i->moves(start + h, h)))
       return false;
   return true;
 }

@@ -48,6 +48,8 @@ struct MovingInstrument {
       pose.place = led->guess(pose.place, h);
     return pose;
   }
+  /// Whether it was elsewhere before the way that begins at `start`.
+  bool jumped(double start) const { return !led && before != way.at(start); }
   /// Whether it moves in the step that ends at `time`.
   bool moves(double time, double h) const {
     return led && !(norm(guess(time, h).place - led->place) <= led_to_rest * shape.radius);

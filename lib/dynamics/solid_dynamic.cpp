@@ -20,7 +20,7 @@ namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 constexpr int quiet_steps = 2;
-constexpr int max_halvings = 8; ///< of a step whose surfaces meet too fast
+constexpr int max_halvings = 8; ///< of a step whose forces of contact are not found
 /// Steps in vain that halves may cost at once, and in each step on average: where forces are never
 /// found a scene goes on nevertheless.
 constexpr int max_tries = 24, more_tries = 4;
@@ -317,7 +317,7 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
   } else {
     const auto [took, as_it_should, exact] = push(forces, target, h, from, to, first, context);
     const bool jumped = first && std::ranges::any_of(state_.instruments, [&](const auto& i) {
-                          return i && !i->led && i->before != i->way.at(from);
+                          return i && i->jumped(from);
                         });
     met = as_it_should && (exact || !target.empty() || jumped || !thrown(start, forces, to));
     counts_.rounds += static_cast<std::uint64_t>(took.rounds);

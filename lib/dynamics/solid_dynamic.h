@@ -106,7 +106,7 @@ private:
               double from, double to, bool first, const Context& context);
   /// Where a step began.
   struct Began {
-    double energy = 0;
+    double energy = 0;          ///< where there are instruments
     std::vector<double> places; ///< 3 n
     std::vector<Pose> stood;    ///< by instrument
   };

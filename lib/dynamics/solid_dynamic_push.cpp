@@ -20,9 +20,9 @@ constexpr double thrown_by = 0.1;
 } // namespace
 
 SolidDynamic::Began SolidDynamic::began(double from) const {
-  Began start{engine_->kinetic_energy() + engine_->elastic_energy(),
-              {engine_->places().begin(), engine_->places().end()},
-              {}};
+  Began start{0, {engine_->places().begin(), engine_->places().end()}, {}};
+  if (!state_.instruments.empty())
+    start.energy = engine_->kinetic_energy() + engine_->elastic_energy();
   for (const auto& i : state_.instruments)
     start.stood.push_back(i ? i->at(from) : Pose{});
   return start;
@@ -90,7 +90,7 @@ bool SolidDynamic::instruments_move(bool first, double from, double to) const {
   return std::ranges::any_of(state_.instruments, [&](const auto& i) {
     if (i && i->led)
       return i->way.end > to || i->moves(to, to - from);
-    return i && (i->way.end > to || (first && i->before != i->way.at(from)));
+    return i && (i->way.end > to || (first && i->jumped(from)));
   });
 }
 

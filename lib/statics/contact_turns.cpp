@@ -169,12 +169,17 @@ private:
     }
   }
 
+  /// The pair of the same part and piece, or null.
+  TouchPair* pair_like(const TouchPair& p) {
+    const auto there = std::ranges::lower_bound(turns_.pairs, key_of(p), {}, key_of);
+    return there != turns_.pairs.end() && key_of(*there) == key_of(p) ? &*there : nullptr;
+  }
+
   /// The first turn begins with the forces that pushed last time. \return whether there are any
   bool go_on() {
     bool any = false;
     for (const TouchPair& p : turns_.last)
-      if (const auto there = std::ranges::lower_bound(turns_.pairs, key_of(p), {}, key_of);
-          there != turns_.pairs.end() && key_of(*there) == key_of(p)) {
+      if (TouchPair* const there = pair_like(p)) {
         there->normal = p.normal;
         there->force = p.force;
         any = true;
@@ -188,10 +193,8 @@ private:
     if (!(miss(turns_.guess) < miss(scene_.nodes.was)))
       return false;
     for (std::size_t k = 0; k < turns_.last.size(); ++k)
-      if (const auto there =
-              std::ranges::lower_bound(turns_.pairs, key_of(turns_.last[k]), {}, key_of);
-          there != turns_.pairs.end() && key_of(*there) == key_of(turns_.last[k]) &&
-          dot(there->force + turns_.grown[k], there->normal) > 0)
+      if (TouchPair* const there = pair_like(turns_.last[k]);
+          there != nullptr && dot(there->force + turns_.grown[k], there->normal) > 0)
         there->force += turns_.grown[k];
     return true;
   }

@@ -42,6 +42,7 @@ test_quick_makes_every_page_without_data() {
   [[ $(basename "$BUILD") == release ]] || skip 'for config=release'
   GEWEBE_SHARED=$PWD/nothing report pages --build "$BUILD" --quick >log 2>&1 || fail 'a page fails:' "$(grep fail log)"
   pages_are_whole pages >said || fail "$(<said)"
+  grep -q 'Made by .QUICK=1' pages/README.md || fail 'small pages do not say that they are'
   # What needs data says so; what was measured is what the programs say.
   grep -q '^\*skipped: the DXF of figure 4-3, no ts_liver_gallbladder_portal.dxf' pages/cycles.md || fail 'a model from nowhere'
   grep -q '^\*skipped: the real organ, no hubmap_female_reproductive.obj' pages/myoma.md || fail 'an organ from nowhere'
