@@ -4,6 +4,7 @@
 #include "formats/volume/volume_file.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/report.h"
+#include "tools/shared/volume_output.h"
 
 using namespace gewebe;
 
@@ -14,6 +15,7 @@ struct Arguments {
   std::vector<std::string> volumes;
   CsgOperation operation = CsgOperation::add;
   CsgOptions options;
+  VolumeOutput output;
 };
 
 void complete(Arguments& a) {
@@ -22,8 +24,7 @@ void complete(Arguments& a) {
 }
 
 void work(cli::Run& run, const Arguments& a) {
-  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
-  Output output(run.output(), run.output_options(true));
+  Output output = open_volume(run);
   std::vector<CsgOperand> operands;
   run.timed("read", [&] {
     for (const std::string& path : a.volumes) {
@@ -34,8 +35,7 @@ void work(cli::Run& run, const Arguments& a) {
   CsgReport counts;
   const Grid grid = run.timed(
       "csg", [&] { return csg(run.context(), a.operation, operands, a.options, &counts); });
-  run.timed("write", [&] { write_volume(output, grid, run.context()); });
-  output.commit();
+  write(run, output, grid, a.output);
 
   cli::Stats& stats = run.stats();
   stats.set("operation", a.word);
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   cli::Program p("csg", "Combines volumes: sums, differences and set operations, left to right.");
   Arguments a;
   p.flag("--resample", a.options.resample, "bring the others to the first volume's lattice");
-  p.output_kinds({Kind::vdb});
+  declare(p, a.output);
   p.operand("OPERATION", a.word, "add, subtract, union, intersect, difference, xor", true,
             csg_operation_names());
   p.operands("VOLUME", a.volumes, "the volumes, - for standard input", 2);

@@ -6,6 +6,7 @@
 #include "formats/volume/volume_file.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/report.h"
+#include "tools/shared/volume_output.h"
 #include "volume/lattice.h"
 
 #include <array>
@@ -20,6 +21,7 @@ struct Arguments {
   std::optional<double> voxel, band;
   std::optional<std::int64_t> dim;
   std::vector<double> bbox;
+  VolumeOutput output;
 };
 
 void check(const Arguments& arguments) {
@@ -55,8 +57,7 @@ std::string count_text(double count) {
 }
 
 void work(cli::Run& run, const Arguments& arguments) {
-  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
-  Output output(run.output(), run.output_options(true));
+  Output output = open_volume(run);
   Input input(arguments.particles, /*binary=*/false);
   const Particles particles = run.timed("read", [&] {
     return read_particles(input.read_all(run.context().max_memory), input.name(),
@@ -79,8 +80,7 @@ void work(cli::Run& run, const Arguments& arguments) {
   });
   if (grid.active_voxels() == 0)
     run.warn("no voxel centre lies inside a particle's support");
-  run.timed("write", [&] { write_volume(output, grid, run.context()); });
-  output.commit();
+  write(run, output, grid, arguments.output);
 
   cli::Stats& stats = run.stats();
   stats.set("particles", static_cast<std::uint64_t>(particles.size()));
@@ -112,7 +112,7 @@ int main(int argc, char** argv) {
                  "keep only what the isosurface of ISO needs, for mc-opt");
   program.option("--unit", arguments.unit, "UNIT", "unit of the particles: m, cm, mm")
       .one_of({"m", "cm", "mm"});
-  program.output_kinds({Kind::vdb});
+  declare(program, arguments.output);
   program.operand("PARTICLES", arguments.particles, "lines of x y z R [weight]");
   program.check([&] { check(arguments); });
   return program.run(argc, argv, [&](cli::Run& run) { work(run, arguments); });

@@ -81,18 +81,19 @@ int main(int argc, char** argv) {
   p.option("--unit", a.mesh.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
   p.option("--weld", a.mesh.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
-  p.output_kinds({Kind::vdb});
+  declare(p, a.mesh.output);
   p.input_kinds(readable_mesh_kinds());
   p.operand("MESH", a.mesh.name, "the mesh");
   p.check([&] { complete(p, a); });
   return p.run(argc, argv, [&](cli::Run& run) {
     if (!a.threshold.empty())
-      voxelize_scan(run, a.mesh.name, thresholds_from_text(a.threshold), a.mesh.voxel);
+      voxelize_scan(run, a.mesh.name, thresholds_from_text(a.threshold), a.mesh.voxel,
+                    a.mesh.output);
     else if (a.labels.empty())
       voxelize_mesh(run, a.mesh);
     else if (a.labels == "list")
-      list_labels(run, a.mesh.name);
+      list_labels(run, a.mesh.name, a.mesh.output);
     else
-      voxelize_labels(run, a.mesh.name, labels_from_text(a.labels), a.mesh.voxel);
+      voxelize_labels(run, a.mesh.name, labels_from_text(a.labels), a.mesh.voxel, a.mesh.output);
   });
 }

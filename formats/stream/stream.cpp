@@ -6,6 +6,7 @@
 #include "formats/stream/program_start.h"
 #include "formats/stream/removal.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -71,6 +72,17 @@ struct Input::State final : std::streambuf {
       (void)::close(fd);
   }
 
+  /// So many bytes at most; 0 at the end.
+  std::size_t read_some(char* to, std::size_t most) const {
+    ssize_t count = 0;
+    do {
+      count = ::read(fd, to, most);
+    } while (count < 0 && errno == EINTR);
+    if (count < 0)
+      throw Error(name, "cannot read: " + error_text(errno));
+    return static_cast<std::size_t>(count);
+  }
+
   /// Reads at least one byte more into the buffer; false at the end.
   bool fill() {
     if (gptr() == egptr()) {
@@ -79,18 +91,18 @@ struct Input::State final : std::streambuf {
     }
     if (end == buffer.size())
       return false;
-    ssize_t count = 0;
-    do {
-      count = ::read(fd, buffer.data() + end, buffer.size() - end);
-    } while (count < 0 && errno == EINTR);
-    if (count < 0)
-      throw Error(name, "cannot read: " + error_text(errno));
+    const std::size_t count = read_some(buffer.data() + end, buffer.size() - end);
     if (count == 0)
       return false;
-    end += static_cast<std::size_t>(count);
+    end += count;
     total += static_cast<std::uint64_t>(count);
     setg(buffer.data(), buffer.data() + start, buffer.data() + end);
     return true;
+  }
+
+  [[noreturn]] void refuse_larger(std::uint64_t max_bytes) const {
+    throw Error(name, "is larger than the limit of " + bytes_text(static_cast<double>(max_bytes)) +
+                          " (--max-memory)");
   }
 
   /// Consumes what is buffered.
@@ -184,9 +196,32 @@ std::string Input::read_all(std::uint64_t max_bytes) {
     bytes.append(state.take());
   }
   if (bytes.size() > max_bytes)
-    throw Error(state.name, "is larger than the limit of " +
-                                bytes_text(static_cast<double>(max_bytes)) + " (--max-memory)");
+    state.refuse_larger(max_bytes);
   return bytes;
+}
+
+InputBytes Input::read_all_pages(std::uint64_t max_bytes) {
+  constexpr std::size_t least = std::size_t{4} << 20;
+  State& state = *state_;
+  (void)peek(1);
+  const std::string_view first = state.take();
+  InputBytes bytes;
+  ZeroPages& pages = bytes.pages_;
+  pages.grow(std::max<std::size_t>(
+      {first.size() + 1, least,
+       state.size_hint <= max_bytes ? static_cast<std::size_t>(state.size_hint) + 1 : 0}));
+  std::memcpy(pages.data(), first.data(), first.size());
+  bytes.size_ = first.size();
+  while (bytes.size_ <= max_bytes) {
+    if (bytes.size_ == pages.size())
+      pages.grow(2 * pages.size());
+    const std::size_t count = state.read_some(reinterpret_cast<char*>(pages.data()) + bytes.size_,
+                                              pages.size() - bytes.size_);
+    if (count == 0)
+      return bytes;
+    bytes.size_ += count;
+  }
+  state.refuse_larger(max_bytes);
 }
 
 std::istream& Input::stream() {

@@ -2,6 +2,8 @@
 // Files and pipes as every program treats them: `-` is the pipe, input is read once and forwards,
 // output appears whole or not at all.
 
+#include "base/zero_pages.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <iosfwd>
@@ -11,6 +13,17 @@
 #include <string_view>
 
 namespace gewebe {
+
+/// Bytes that were read, in pages of their own.
+class InputBytes {
+public:
+  std::string_view view() const { return {reinterpret_cast<const char*>(pages_.data()), size_}; }
+
+private:
+  friend class Input;
+  ZeroPages pages_;
+  std::size_t size_ = 0;
+};
 
 /// A file, FIFO or standard input ("-" or ""), opened for reading forwards.
 class Input {
@@ -31,6 +44,9 @@ public:
   /// Everything that is left.
   /// \throw Error on a read error, if there is nothing at all, or when more than `max_bytes` come
   std::string read_all(std::uint64_t max_bytes = UINT64_MAX);
+  /// The same for what may be large: no byte is copied as they become more, which takes half the
+  /// time where they come from a pipe and it isn't known how many there are.
+  InputBytes read_all_pages(std::uint64_t max_bytes = UINT64_MAX);
   /// A std::istream over what is left; a read error sets badbit.
   std::istream& stream();
 

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <iostream>
@@ -133,8 +134,11 @@ private:
 // ---- leaves, many at a time
 
 constexpr std::size_t leaves_at_once = 64;
-constexpr std::uint32_t usual_compression =
-    openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
+
+constexpr std::uint32_t flags_of(Packing packing) {
+  return packing == Packing::blosc ? openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK
+                                   : openvdb::io::COMPRESS_ACTIVE_MASK;
+}
 
 Context without_progress(const Context& context) {
   Context quiet = context;
@@ -142,10 +146,23 @@ Context without_progress(const Context& context) {
   return quiet;
 }
 
+/// Values of a leaf with this mask and byte.
+std::size_t values_in(const char* mask, char kind) {
+  if (kind == openvdb::io::NO_MASK_AND_ALL_VALS)
+    return leaf_voxels;
+  std::array<std::uint64_t, leaf_voxels / 64> words{};
+  std::memcpy(words.data(), mask, sizeof words);
+  std::size_t count = 0;
+  for (const std::uint64_t word : words)
+    count += static_cast<std::size_t>(std::popcount(word));
+  return count;
+}
+
 /// Bytes of the first leaf in `bytes`, as OpenVDB writes it since file version 222 with these
 /// flags: a mask, a byte that says which inactive values follow, they, a mask that chooses between
-/// them, then the number of compressed bytes (negative: raw ones) and the bytes.
-std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes) {
+/// them, then the values: of all voxels if the byte says so, else of those that are active; by
+/// blosc the number of compressed bytes (negative: raw ones) and the bytes.
+std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes, Packing packing) {
   constexpr std::size_t mask = leaf_voxels / 8;
   const auto need = [&](std::size_t count) {
     if (count > bytes.size())
@@ -175,6 +192,11 @@ std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes) {
     throw Error(buffer.name(), "byte " + std::to_string(bytes.data() + mask - buffer.all().data()) +
                                    ": unknown kind of leaf");
   }
+  if (packing == Packing::none) {
+    size += sizeof(float) * values_in(bytes.data(), bytes[mask]);
+    need(size);
+    return size;
+  }
   std::int64_t count = 0;
   need(size + sizeof count);
   std::memcpy(&count, bytes.data() + size, sizeof count);
@@ -189,9 +211,9 @@ std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes) {
 /// A grid whose leaves are read in parallel, with all their values in one block of memory.
 class ReadGrid final : public openvdb::FloatGrid {
 public:
-  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage)
+  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage, Packing packing)
       : openvdb::FloatGrid(make_tree(0, storage)), context_(without_progress(context)),
-        storage_(storage) {}
+        storage_(storage), packing_(packing) {}
 
   void readBuffers(std::istream& stream) override {
     std::vector<FloatLeaf*> leaves;
@@ -205,7 +227,7 @@ public:
     for (std::size_t n = 0; n < leaves.size(); ++n) {
       if (n % leaves_at_once == 0)
         parts.push_back(buffer.rest().substr(done, 0));
-      const std::size_t size = leaf_bytes(buffer, buffer.rest().substr(done));
+      const std::size_t size = leaf_bytes(buffer, buffer.rest().substr(done), packing_);
       done += size;
       parts.back() = {parts.back().data(), parts.back().size() + size};
     }
@@ -232,6 +254,7 @@ public:
 private:
   Context context_;
   std::shared_ptr<LeafStorage> storage_;
+  Packing packing_;
 };
 
 /// A stream with one float grid, the usual case. What else there may be is left to OpenVDB.
@@ -257,16 +280,45 @@ public:
       return nullptr;
     const auto position = stream.tellg();
     readGridCompression(stream);
-    if (openvdb::io::getDataCompression(stream) != usual_compression)
+    const std::uint32_t flags = openvdb::io::getDataCompression(stream);
+    if (flags != flags_of(Packing::blosc) && flags != flags_of(Packing::none))
       return nullptr;
     stream.seekg(position);
-    auto grid = std::make_shared<ReadGrid>(context, storage);
+    auto grid = std::make_shared<ReadGrid>(
+        context, storage, flags == flags_of(Packing::none) ? Packing::none : Packing::blosc);
     readGrid(grid, descriptor, stream);
     return grid;
   }
 };
 
-/// A grid whose leaves are compressed in parallel; the bytes are the same.
+/// Memory that is written again and again; a string stream gives its own back each time.
+class PartBuffer final : public std::streambuf {
+public:
+  void clear() { used_ = 0; }
+  std::string_view view() const { return {bytes_.data(), used_}; }
+
+private:
+  int_type overflow(int_type c) override {
+    if (traits_type::eq_int_type(c, traits_type::eof()))
+      return traits_type::not_eof(c);
+    const char byte = traits_type::to_char_type(c);
+    (void)xsputn(&byte, 1);
+    return c;
+  }
+  std::streamsize xsputn(const char* data, std::streamsize count) override {
+    const auto size = static_cast<std::size_t>(count);
+    if (bytes_.size() - used_ < size)
+      bytes_.resize(std::max(2 * bytes_.size(), used_ + size));
+    std::memcpy(bytes_.data() + used_, data, size);
+    used_ += size;
+    return count;
+  }
+
+  std::vector<char> bytes_;
+  std::size_t used_ = 0;
+};
+
+/// A grid whose leaves are packed in parallel; the bytes are the same.
 class WriteGrid final : public openvdb::FloatGrid {
 public:
   WriteGrid(openvdb::FloatTree::Ptr tree, const Context& context)
@@ -279,20 +331,24 @@ public:
     const auto metadata = openvdb::io::getStreamMetadataPtr(stream);
     // So many blocks of leaves are held at once that all threads have work.
     const std::size_t batch = leaves_at_once * 64;
+    std::vector<PartBuffer> parts;
     for (std::size_t first = 0; first < leaves.size(); first += batch) {
       const std::size_t count = std::min(batch, leaves.size() - first);
-      std::vector<std::string> parts((count + leaves_at_once - 1) / leaves_at_once);
+      parts.resize(std::max(parts.size(), (count + leaves_at_once - 1) / leaves_at_once));
       parallel_blocks(context_, count, leaves_at_once, [&](std::size_t begin, std::size_t end) {
-        std::ostringstream part;
+        PartBuffer& buffer = parts[begin / leaves_at_once];
+        buffer.clear();
+        std::ostream part(&buffer);
         part.copyfmt(stream); // what OpenVDB knows of the stream is kept there
         auto own = std::make_shared<openvdb::io::StreamMetadata>(*metadata);
         openvdb::io::setStreamMetadataPtr(part, own, /*transfer=*/false);
         for (std::size_t n = begin; n < end; ++n)
           leaves[first + n]->writeBuffers(part, /*toHalf=*/false);
-        parts[begin / leaves_at_once] = std::move(part).str();
       });
-      for (const std::string& part : parts)
+      for (std::size_t n = 0; n < count; n += leaves_at_once) {
+        const std::string_view part = parts[n / leaves_at_once].view();
         stream.write(part.data(), static_cast<std::streamsize>(part.size()));
+      }
     }
   }
 
@@ -304,8 +360,8 @@ private:
 /// their sizes to readers that load on demand.
 class WriteArchive final : public openvdb::io::Archive {
 public:
-  void write_grid(std::ostream& stream, const WriteGrid& grid) {
-    setCompression(usual_compression);
+  void write_grid(std::ostream& stream, const WriteGrid& grid, Packing packing) {
+    setCompression(flags_of(packing));
     auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(stream, metadata, /*transfer=*/false);
     writeHeader(stream, /*seekable=*/false);
@@ -422,7 +478,7 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
   return floats[0];
 }
 
-Grid parse_volume(const std::string& bytes, const std::string& name, const Context& context,
+Grid parse_volume(std::string_view bytes, const std::string& name, const Context& context,
                   StreamWay way) {
   MemoryBuffer buffer(bytes, name);
   std::istream stream(&buffer);
@@ -476,14 +532,14 @@ std::string fault_of(std::string_view remark) {
 } // namespace
 
 Grid read_volume(Input& input, const Context& context) {
-  return volume_from_bytes(input.read_all(context.max_memory), input.name(), context);
+  return volume_from_bytes(input.read_all_pages(context.max_memory).view(), input.name(), context);
 }
 
-Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context) {
-  return volume_from_bytes(std::move(bytes), name, context, usual_way);
+Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context) {
+  return volume_from_bytes(bytes, name, context, usual_way);
 }
 
-Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context,
+Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
                        StreamWay way) {
   initialize_openvdb();
   check_vdb_head(bytes, name);
@@ -502,11 +558,12 @@ Grid volume_from_bytes(std::string bytes, const std::string& name, const Context
   }
 }
 
-void write_volume(Output& output, const Grid& grid, const Context& context) {
-  write_volume(output, grid, context, usual_way);
+void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing) {
+  write_volume(output, grid, context, packing, usual_way);
 }
 
-void write_volume(Output& output, const Grid& grid, const Context& context, StreamWay way) {
+void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+                  StreamWay way) {
   initialize_openvdb();
   const GridInfo& info = grid.info();
   const auto native = std::make_shared<WriteGrid>(grid.native()->tree, context);
@@ -519,16 +576,16 @@ void write_volume(Output& output, const Grid& grid, const Context& context, Stre
     native->insertMeta(band_key, openvdb::DoubleMetadata(*info.band_isovalue));
   native->addStatsMetadata(); // as OpenVDB does
   native->insertMeta(openvdb::GridBase::META_FILE_COMPRESSION,
-                     openvdb::StringMetadata("blosc + active values"));
+                     openvdb::StringMetadata(openvdb::io::compressionToString(flags_of(packing))));
   UuidBuffer buffer(*output.stream().rdbuf(), uuid_of(grid.digest()));
   std::ostream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
   if (way == StreamWay::parallel) {
-    WriteArchive().write_grid(stream, *native);
+    WriteArchive().write_grid(stream, *native, packing);
     return;
   }
   openvdb::io::Stream archive(stream);
-  archive.setCompression(usual_compression);
+  archive.setCompression(flags_of(packing));
   archive.write(openvdb::GridCPtrVec{std::make_shared<openvdb::FloatGrid>(*native)});
 }
 

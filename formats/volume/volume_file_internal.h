@@ -14,8 +14,9 @@ enum class StreamWay {
 /// The way that the others take: parallel, unless OpenVDB writes a format that we don't know.
 extern const StreamWay usual_way;
 
-Grid volume_from_bytes(std::string bytes, const std::string& name, const Context& context,
+Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
                        StreamWay way);
-void write_volume(Output& output, const Grid& grid, const Context& context, StreamWay way);
+void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+                  StreamWay way);
 
 } // namespace gewebe

@@ -38,6 +38,21 @@ ZeroPages::ZeroPages(std::size_t bytes) : bytes_(up_to(bytes, page)) {
     (void)::madvise(data_, bytes_, MADV_HUGEPAGE); // without them it works too
 }
 
+void ZeroPages::grow(std::size_t bytes) {
+  if (bytes <= bytes_)
+    return;
+  ZeroPages larger(bytes);
+  if (bytes_ > 0) {
+    // Onto the begin of the new block, which keeps to the huge pages' multiples if this one does.
+    if (::mremap(data_, bytes_, bytes_, MREMAP_MAYMOVE | MREMAP_FIXED, larger.data_) ==
+        MAP_FAILED) // NOLINT(*-int-to-ptr)
+      throw std::bad_alloc();
+    data_ = nullptr;
+    bytes_ = 0;
+  }
+  *this = std::move(larger);
+}
+
 ZeroPages::~ZeroPages() {
   if (data_ != nullptr)
     (void)::munmap(data_, bytes_);

@@ -27,6 +27,10 @@ public:
   ZeroPages(const ZeroPages&) = delete;
   ZeroPages& operator=(const ZeroPages&) = delete;
 
+  /// At least so many bytes, those that are there first: their pages move, no byte is copied.
+  /// \throw std::bad_alloc, with nothing changed
+  void grow(std::size_t bytes);
+
   std::byte* data() const { return data_; }
   std::size_t size() const { return bytes_; }
   bool holds(const void* p) const {

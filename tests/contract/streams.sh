@@ -157,3 +157,22 @@ test_a_reader_that_stops_early_ends_it_quietly() {
     [[ ! -s stderr.txt ]] || fail "$tool spoke on a closed pipe:" "$(<stderr.txt)"
   done
 }
+
+# Volumes as they are: the content, and so what is made of it, is that of packed ones.
+test_uncompressed_volumes_hold_the_same() {
+  local digest
+  echo '0 0 0 30' | metaball2vol --voxel 1 --stats=packed.json -o packed.vdb
+  echo '0 0 0 30' | metaball2vol --voxel 1 -u --stats=plain.json >plain.vdb
+  digest=$(grep -o '"digest":"[0-9a-f]*"' packed.json)
+  [[ $digest && $digest == "$(grep -o '"digest":"[0-9a-f]*"' plain.json)" ]] || fail 'another digest' "$(<plain.json)"
+  (($(stat -c %s plain.vdb) > $(stat -c %s packed.vdb))) || fail 'what is not packed is smaller'
+  mc-opt packed.vdb -o packed.ply
+  echo '0 0 0 30' | metaball2vol --voxel 1 --uncompressed | csg -u union packed.vdb - | mc-opt -o chain.ply
+  cmp packed.ply chain.ply || fail 'the chain makes another mesh'
+  voxelize --voxel 2 packed.ply -o a.vdb
+  voxelize --voxel 2 -u packed.ply -o b.vdb
+  ! cmp -s a.vdb b.vdb || fail 'voxelize -u packs'
+  csg union a.vdb a.vdb -o a2.vdb
+  csg union b.vdb b.vdb -o b2.vdb
+  cmp a2.vdb b2.vdb || fail 'voxelize -u writes another content'
+}

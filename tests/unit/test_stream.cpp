@@ -51,6 +51,28 @@ void put(const std::string& path, const std::string& text) {
 
 } // namespace
 
+// More than a pipe or the first pages hold, from a file, whose size is known, and from a FIFO.
+TEST(Stream, ManyBytesComeWhole) {
+  const ScratchFolder folder;
+  std::string text(9'000'001, ' ');
+  for (std::size_t k = 0; k < text.size(); ++k)
+    text[k] = static_cast<char>(k * 2'654'435'761U >> 16U);
+  put(folder / "file", text);
+  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
+  std::thread writer([&] { put(folder / "fifo", text); });
+  {
+    Input fifo(folder / "fifo");
+    EXPECT_EQ(fifo.peek(3), text.substr(0, 3));
+    EXPECT_TRUE(fifo.read_all_pages().view() == text);
+  }
+  writer.join();
+  EXPECT_TRUE(Input(folder / "file").read_all_pages().view() == text);
+  EXPECT_TRUE(Input(folder / "file").read_all_pages(text.size()).view() == text);
+  EXPECT_THROW((void)Input(folder / "file").read_all_pages(text.size() - 1), Error);
+  put(folder / "empty", "");
+  EXPECT_THROW((void)Input(folder / "empty").read_all_pages(), Error);
+}
+
 TEST(Stream, OutputAppearsWholeOrNotAtAll) {
   const ScratchFolder folder;
   const std::string path = folder / "a";

@@ -31,10 +31,11 @@ Grid sample_grid(float value = 0.75F) {
   return builder.finish();
 }
 
-std::string bytes_of(const Grid& grid, StreamWay way = usual_way) {
+std::string bytes_of(const Grid& grid, StreamWay way = usual_way,
+                     Packing packing = Packing::blosc) {
   const ScratchFile file(".vdb");
   Output output(file.path(), {});
-  write_volume(output, grid, {}, way);
+  write_volume(output, grid, {}, packing, way);
   output.commit();
   Input input(file.path());
   return input.read_all();
@@ -42,6 +43,27 @@ std::string bytes_of(const Grid& grid, StreamWay way = usual_way) {
 
 Grid grid_of(const std::string& bytes) {
   return volume_from_bytes(bytes, "test.vdb");
+}
+
+/// A leaf for each way to tell inactive values: all background, all another value, two of them, as
+/// many as there are voxels; and one that is all active.
+Grid grid_of_all_kinds() {
+  GridBuilder builder(GridInfo{});
+  const std::vector<Int3> origins{{0, 0, 0}, {8, 0, 0}, {16, 0, 0}, {24, 0, 0}, {32, 0, 0}};
+  const std::vector<LeafRef> leaves = builder.add_leaves({}, origins);
+  for (std::size_t kind = 0; kind < leaves.size(); ++kind)
+    for (int n = 0; n < leaf_voxels; ++n) {
+      const bool active = kind == 4 || n % 3 == 0;
+      const auto number = static_cast<float>(n);
+      leaves[kind].values[n] = active      ? 1 + number
+                               : kind == 0 ? 0
+                               : kind == 1 ? 0.5F
+                               : kind == 2 ? (n % 2 == 0 ? 0.25F : 0.75F)
+                                           : -number;
+      if (active)
+        leaves[kind].active[n / 64] |= std::uint64_t{1} << (n % 64);
+    }
+  return builder.finish();
 }
 
 } // namespace
@@ -76,6 +98,30 @@ TEST(VolumeFile, OpenvdbsOwnReaderAndWriterGiveTheSame) {
     }
   // The leaves, with which a stream ends, are packed to the same bytes.
   EXPECT_EQ(ours.substr(ours.size() - 2000), theirs.substr(theirs.size() - 2000));
+}
+
+TEST(VolumeFile, UncompressedStreamsHoldTheSame) {
+  const Grid grid = grid_of_all_kinds();
+  const std::string packed = bytes_of(grid);
+  const std::string ours = bytes_of(grid, StreamWay::parallel, Packing::none);
+  const std::string theirs = bytes_of(grid, StreamWay::plain, Packing::none);
+  EXPECT_EQ(ours.substr(21, 36), packed.substr(21, 36)); // the UUID is that of the content
+  EXPECT_NE(ours, packed);
+  // The leaves, with which a stream ends, are OpenVDB's own bytes.
+  EXPECT_EQ(ours.substr(ours.size() - 5000), theirs.substr(theirs.size() - 5000));
+  for (const std::string& bytes : {packed, ours, theirs})
+    for (const StreamWay way : {StreamWay::parallel, StreamWay::plain}) {
+      const Grid back = volume_from_bytes(bytes, "test.vdb", {}, way);
+      EXPECT_EQ(back.digest(), grid.digest());
+      EXPECT_EQ(back.active_voxels(), grid.active_voxels());
+      GridAccessor accessor(back);
+      EXPECT_EQ(accessor.value({8, 0, 1}), 0.5F);
+      EXPECT_EQ(accessor.value({16, 0, 1}), 0.75F);
+      EXPECT_EQ(accessor.value({24, 0, 1}), -1.0F);
+      EXPECT_EQ(accessor.value({32, 0, 1}), 2.0F);
+    }
+  for (std::size_t size = 0; size < ours.size(); size += size + 9000 < ours.size() ? 97 : 1)
+    EXPECT_THROW((void)grid_of(ours.substr(0, size)), Error) << size << " of " << ours.size();
 }
 
 TEST(VolumeFile, RotatedTransformSurvivesExactly) {

@@ -42,9 +42,11 @@ void check_labels(const std::string& text, bool voxel, bool own_lattice) {
     throw UsageError("--label: the labels give the lattice, expected --voxel or nothing");
 }
 
-void list_labels(cli::Run& run, const std::string& path) {
+void list_labels(cli::Run& run, const std::string& path, const VolumeOutput& to) {
   if (!run.to().empty())
     throw UsageError("--to for a list of labels, which is text, expected none");
+  if (to.uncompressed)
+    throw UsageError("--uncompressed for a list of labels, which is text, expected none");
   Output output(run.output(), run.output_options(false));
   Input input(path);
   const LabelVolume volume =
@@ -67,9 +69,8 @@ void list_labels(cli::Run& run, const std::string& path) {
 }
 
 void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<LabelRange>& labels,
-                     std::optional<double> voxel) {
-  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
-  Output output(run.output(), run.output_options(true));
+                     std::optional<double> voxel, const VolumeOutput& to) {
+  Output output = open_volume(run);
   Input input(path);
   // What its size rules out is refused before its voxels are unpacked.
   const LabelVolume volume = run.timed("read", [&] {
@@ -84,8 +85,7 @@ void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<L
     return at(input.name(),
               [&] { return label_density(run.context(), volume.mask, {voxel}, &report); });
   });
-  run.timed("write", [&] { write_volume(output, grid, run.context()); });
-  output.commit();
+  write(run, output, grid, to);
 
   cli::Stats& stats = run.stats();
   stats.set("format", volume.format);

@@ -3,6 +3,7 @@
 
 #include "formats/volume/label_volume.h"
 #include "tools/shared/cli.h"
+#include "tools/shared/volume_output.h"
 
 #include <optional>
 #include <string>
@@ -20,11 +21,11 @@ void check_labels(const std::string& text, bool voxel, bool own_lattice);
 
 /// Writes what labels the volume `path` holds: a line each, the label, its voxels, its volume in
 /// mm³.
-void list_labels(cli::Run& run, const std::string& path);
+void list_labels(cli::Run& run, const std::string& path, const VolumeOutput& to);
 
 /// Reads the label volume `path`, writes the density of `labels` with voxels of edge `voxel`
 /// (absent: the smallest spacing), reports.
 void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<LabelRange>& labels,
-                     std::optional<double> voxel);
+                     std::optional<double> voxel, const VolumeOutput& to);
 
 } // namespace gewebe

@@ -49,8 +49,7 @@ void report(cli::Run& run, const MeshToVoxelize& a, const CoverageReport& r) {
 } // namespace
 
 void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
-  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
-  Output output(run.output(), run.output_options(true));
+  Output output = open_volume(run);
   Input input(a.name);
   if (is_label_volume(input.peek(4096)))
     throw Error(input.name(), "is a label volume or a scan, expected a mesh, --label L or "
@@ -71,8 +70,7 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
     cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
   else if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
-  run.timed("write", [&] { write_volume(output, grid, run.context()); });
-  output.commit();
+  write(run, output, grid, a.output);
   report(run, a, counts);
   cli::report_volume(run, grid);
 }

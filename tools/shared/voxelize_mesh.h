@@ -3,6 +3,7 @@
 
 #include "tools/shared/antialias.h"
 #include "tools/shared/cli.h"
+#include "tools/shared/volume_output.h"
 #include "voxelize/voxelize.h"
 
 #include <cstdint>
@@ -21,6 +22,7 @@ struct MeshToVoxelize {
   std::string antialias = "jones";
   AntialiasChoice choice; ///< what that text stands for
   VoxelizeOptions options;
+  VolumeOutput output;
 };
 
 /// Reads, fills and writes it. \pre one of voxel, dim and like is given

@@ -46,9 +46,8 @@ void check_thresholds(const std::string& text, bool labels, bool own_lattice) {
 }
 
 void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thresholds,
-                   std::optional<double> voxel) {
-  (void)output_kind(run.to(), run.output(), Kind::vdb, {Kind::vdb});
-  Output output(run.output(), run.output_options(true));
+                   std::optional<double> voxel, const VolumeOutput& to) {
+  Output output = open_volume(run);
   Input input(path);
   const GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
   for (const std::string& warning : scan.warnings)
@@ -63,8 +62,7 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
   if (report.missing > 0)
     run.warn(input.name() + ": " + std::to_string(report.missing) +
              " voxels have no value (NaN) and count as outside");
-  run.timed("write", [&] { write_volume(output, grid, run.context()); });
-  output.commit();
+  write(run, output, grid, to);
 
   cli::Stats& stats = run.stats();
   stats.set("format", scan.format);

@@ -2,6 +2,7 @@
 // voxelize --threshold: the density of what lies within thresholds of a scan's grey values.
 
 #include "tools/shared/cli.h"
+#include "tools/shared/volume_output.h"
 
 #include <optional>
 #include <string>
@@ -22,6 +23,6 @@ void check_thresholds(const std::string& text, bool labels, bool own_lattice);
 /// Reads the scan `path`, writes the density with voxels of edge `voxel` (absent: the smallest
 /// spacing), reports.
 void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thresholds,
-                   std::optional<double> voxel);
+                   std::optional<double> voxel, const VolumeOutput& to);
 
 } // namespace gewebe
