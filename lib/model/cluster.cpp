@@ -9,6 +9,7 @@
 // Based on:
 // Gonzalez, Clustering to Minimize the Maximum Intercluster Distance, 1985 (farthest-point seeds).
 // Lloyd, Least Squares Quantization in PCM, 1982.
+// Hamerly, Making k-means even faster, 2010 (a bound on the distance of all other centers).
 
 namespace gewebe {
 
@@ -16,7 +17,8 @@ namespace {
 
 constexpr std::size_t grain = 8192;
 constexpr int max_rounds = 100;
-constexpr double alike = 0.98; // of the largest squared distance: what is as far
+constexpr double alike = 0.98;        // of the largest squared distance: what is as far
+constexpr double clearly = 1 + 1e-10; // beyond what rounding does to distances
 
 double square_distance(const Vec3& a, const Vec3& b) {
   const Vec3 d = a - b;
@@ -75,20 +77,32 @@ std::vector<Vec3> farthest_points(const std::vector<Vec3>& points, std::size_t c
   return seeds;
 }
 
-/// Ties the points to their nearest centers; true if a tie changed.
-bool assign(const std::vector<Vec3>& points, Clusters& clusters, const Context& context) {
+/// Ties the points to their nearest centers, of equal ones the first. `others` says of each point
+/// what no center but its own can be nearer than, less `moved`, by which each has moved at most
+/// since; points that this decides are not compared with all. \return whether a tie changed
+bool assign(const std::vector<Vec3>& points, Clusters& clusters, std::span<double> others,
+            double moved, const Context& context) {
   std::vector<std::uint8_t> changed(points.size() / grain + 1);
   parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
+      others[i] -= moved;
+      const double own = square_distance(points[i], clusters.centers[clusters.of_point[i]]);
+      if (others[i] > 0 && own * clearly < others[i] * others[i])
+        continue;
       std::uint32_t best = 0;
       double best_distance = square_distance(points[i], clusters.centers[0]);
+      double next_distance = std::numeric_limits<double>::infinity();
       for (std::uint32_t c = 1; c < clusters.centers.size(); ++c) {
         const double distance = square_distance(points[i], clusters.centers[c]);
         if (distance < best_distance) {
+          next_distance = best_distance;
           best_distance = distance;
           best = c;
+        } else {
+          next_distance = std::min(next_distance, distance);
         }
       }
+      others[i] = std::sqrt(next_distance);
       if (clusters.of_point[i] != best)
         changed[begin / grain] = 1;
       clusters.of_point[i] = best;
@@ -98,8 +112,9 @@ bool assign(const std::vector<Vec3>& points, Clusters& clusters, const Context& 
 }
 
 /// Moves each center to the mean of its points; centers without points vanish.
-void move_centers(const std::vector<Vec3>& points, Clusters& clusters,
-                  std::span<const double> weights) {
+/// \return how far one has moved at most, infinity if some have vanished
+double move_centers(const std::vector<Vec3>& points, Clusters& clusters,
+                    std::span<const double> weights) {
   std::vector<Vec3> sum(clusters.centers.size());
   std::vector<double> size(clusters.centers.size());
   for (std::size_t i = 0; i < points.size();) {
@@ -116,16 +131,21 @@ void move_centers(const std::vector<Vec3>& points, Clusters& clusters,
   }
   std::vector<std::uint32_t> renumbered(size.size());
   std::uint32_t kept = 0;
+  double farthest = 0; // squared
   for (std::size_t c = 0; c < size.size(); ++c) {
     renumbered[c] = kept;
-    if (size[c] > 0)
-      clusters.centers[kept++] = sum[c] / size[c];
+    if (!(size[c] > 0))
+      continue;
+    const Vec3 to = sum[c] / size[c];
+    farthest = std::max(farthest, square_distance(clusters.centers[c], to));
+    clusters.centers[kept++] = to;
   }
   if (kept == size.size())
-    return;
+    return std::sqrt(farthest) * clearly;
   clusters.centers.resize(kept);
   for (std::uint32_t& c : clusters.of_point)
     c = renumbered[c];
+  return std::numeric_limits<double>::infinity();
 }
 
 /// Centers without points vanish.
@@ -149,7 +169,8 @@ void drop_empty(Clusters& clusters) {
 Clusters nearest_clusters(const std::vector<Vec3>& points, const std::vector<Vec3>& centers,
                           const Context& context) {
   Clusters clusters{centers, std::vector<std::uint32_t>(points.size())};
-  assign(points, clusters, context);
+  std::vector<double> others(points.size());
+  assign(points, clusters, others, 0, context);
   drop_empty(clusters);
   return clusters;
 }
@@ -161,14 +182,15 @@ Clusters cluster_points(const std::vector<Vec3>& points, std::size_t count, cons
     return clusters;
   clusters.centers = farthest_points(points, count, context, weights);
   clusters.of_point.assign(points.size(), 0);
-  assign(points, clusters, context);
+  std::vector<double> others(points.size());
+  assign(points, clusters, others, 0, context);
   for (int round = 0; round < max_rounds; ++round) {
-    move_centers(points, clusters, weights);
-    if (!assign(points, clusters, context))
+    const double moved = move_centers(points, clusters, weights);
+    if (!assign(points, clusters, others, moved, context))
       break;
   }
-  move_centers(points, clusters,
-               weights); // after the last round a center may be behind, or without points
+  // After the last round a center may be behind, or without points.
+  (void)move_centers(points, clusters, weights);
   return clusters;
 }
 

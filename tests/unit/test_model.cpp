@@ -389,6 +389,37 @@ TEST(ModelBuild, ClustersAreStationaryAndTheSameForAnyThreads) {
   EXPECT_EQ(cluster_points({{0, 0, 0}, {0, 0, 0}, {1, 0, 0}}, 5, one).centers.size(), 2U);
 }
 
+// Points whose center is known without a comparison with all of them get the one that comparing
+// finds, on lattices too, where many are equally near.
+TEST(Model, ClustersAreWhatComparingAllFinds) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-1, 1);
+  for (const bool lattice : {true, false}) {
+    std::vector<Vec3> points;
+    std::vector<double> weights;
+    for (int i = 0; i < 4000; ++i) {
+      const Vec3 p{place(random), place(random), place(random)};
+      points.push_back(lattice ? Vec3{std::round(8 * p.x), std::round(8 * p.y), std::round(2 * p.z)}
+                               : p);
+      weights.push_back(1 + place(random) / 2);
+    }
+    for (const std::size_t count : {1U, 2U, 9U, 40U}) {
+      const Clusters found = cluster_points(points, count, {}, weights);
+      // At rest a center is the mean of the points that are nearest to it.
+      const Clusters again = nearest_clusters(points, found.centers, {});
+      EXPECT_EQ(again.of_point, found.of_point) << count;
+      std::vector<Vec3> sum(found.centers.size());
+      std::vector<double> size(found.centers.size());
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        sum[found.of_point[i]] += weights[i] * points[i];
+        size[found.of_point[i]] += weights[i];
+      }
+      for (std::size_t c = 0; c < sum.size(); ++c)
+        EXPECT_LE(norm(sum[c] / size[c] - found.centers[c]), 1e-14) << count;
+    }
+  }
+}
+
 TEST(ModelBuild, BadFacesAreLeftOutAndCounted) {
   TriangleMesh mesh = octahedron();
   const Model clean = build(mesh).model;
