@@ -323,8 +323,7 @@ void Factor::solve_panel(std::vector<double>& x, std::size_t width) const {
   const SupernodalArrays l{v.super.size() - 1, v.super.data(), v.pi.data(),
                            v.px.data(),        v.s.data(),     v.x.data()};
   std::vector<double> work(static_cast<std::size_t>(v.max_row_size) * width);
-  (state_->cpu == CpuLevel::baseline ? solve_supernodal_baseline
-                                     : solve_supernodal_avx2)(l, x.data(), width, work.data());
+  solve_supernodal(state_->cpu)(l, x.data(), width, work.data());
 }
 
 void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {

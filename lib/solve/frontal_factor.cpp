@@ -72,8 +72,7 @@ void FrontalFactor::solve(std::span<double> over_axes, std::size_t columns) cons
     for (std::size_t k = 0; k < order; ++k)
       for (std::size_t j = 0; j < count; ++j)
         x[k * width + j] = from[j * all + s.axis_of_row[k]] + 0.0; // no -0
-    (s.cpu == CpuLevel::baseline ? solve_supernodal_baseline
-                                 : solve_supernodal_avx2)(l, x.data(), width, work.data());
+    solve_supernodal(s.cpu)(l, x.data(), width, work.data());
     std::fill_n(from, count * all, 0.0);
     for (std::size_t k = 0; k < order; ++k)
       for (std::size_t j = 0; j < count; ++j)
@@ -113,8 +112,7 @@ FrontalFactor::forward_solves(std::span<const std::uint32_t> nodes) const {
       for (std::uint32_t a = 0; row != none && a < s.graph.axes[node]; ++a)
         x[(row + a) * width + 3 * k + s.axis_of_row[row + a] % 3] = 1;
     }
-    (s.cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
-        s.arrays(), blocks, x.get(), width, work.data());
+    forward_supernodal(s.cpu)(s.arrays(), blocks, x.get(), width, work.data());
     for (std::size_t k = 0; k < count; ++k) {
       ForwardSolve& solution = all[first + k];
       if (solution.front != none)

@@ -28,8 +28,7 @@ void FrontalFactor::State::forward(std::size_t front, std::span<const std::int64
         rows{first, static_cast<std::int64_t>(f.rows)};
     const double* const block = f.l + front_offset(f.rows, c);
     const SupernodalArrays l{1, super.data(), rows.data(), nullptr, row.data(), nullptr, &block};
-    (cpu == CpuLevel::baseline ? forward_supernodal_baseline : forward_supernodal_avx2)(
-        l, only, loads[front].values.data(), 1, space.data());
+    forward_supernodal(cpu)(l, only, loads[front].values.data(), 1, space.data());
   }
 }
 

@@ -3,6 +3,8 @@
 // does every number of right-hand sides. Nothing is shared between calls, so any number of threads
 // may solve at once, which not every BLAS allows.
 
+#include "base/cpu.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -47,11 +49,26 @@ using SupernodalForward = void (*)(const SupernodalArrays& l,
 void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
                                double* work);
 void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vectors, double* work);
+void solve_supernodal_avx512(const SupernodalArrays& l, double* x, std::size_t vectors,
+                             double* work);
 
 void forward_supernodal_baseline(const SupernodalArrays& l,
                                  std::span<const std::uint32_t> supernodes, double* x,
                                  std::size_t vectors, double* work);
 void forward_supernodal_avx2(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
                              double* x, std::size_t vectors, double* work);
+void forward_supernodal_avx512(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
+                               double* x, std::size_t vectors, double* work);
+
+inline SupernodalSolve solve_supernodal(CpuLevel cpu) {
+  return cpu == CpuLevel::baseline ? solve_supernodal_baseline
+         : cpu == CpuLevel::avx2   ? solve_supernodal_avx2
+                                   : solve_supernodal_avx512;
+}
+inline SupernodalForward forward_supernodal(CpuLevel cpu) {
+  return cpu == CpuLevel::baseline ? forward_supernodal_baseline
+         : cpu == CpuLevel::avx2   ? forward_supernodal_avx2
+                                   : forward_supernodal_avx512;
+}
 
 } // namespace gewebe

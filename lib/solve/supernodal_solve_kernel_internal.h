@@ -12,16 +12,21 @@
 namespace gewebe {
 namespace {
 
-#if defined(__AVX2__)
-inline constexpr std::size_t lanes = 4;
+#if defined(__AVX512F__)
+inline constexpr std::size_t lanes = 8, narrow_lanes = 4;
+#elif defined(__AVX2__)
+inline constexpr std::size_t lanes = 4, narrow_lanes = 4;
 #else
-inline constexpr std::size_t lanes = 2;
+inline constexpr std::size_t lanes = 2, narrow_lanes = 2;
 #endif
-/// What a register holds.
+// What a register holds, and the same at any address of a double. Written out for both widths: in a
+// template GCC loses the last two attributes.
 using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
-/// The same at any address of a double.
 using Unaligned =
     double __attribute__((vector_size(lanes * sizeof(double)), aligned(sizeof(double)), may_alias));
+using NarrowLanes = double __attribute__((vector_size(narrow_lanes * sizeof(double))));
+using NarrowUnaligned = double
+    __attribute__((vector_size(narrow_lanes * sizeof(double)), aligned(sizeof(double)), may_alias));
 
 /// The right-hand sides of one row: one number, or a panel of them; how many rows lose products at
 /// once, and of how many columns: so many short streams the caches can hold.
@@ -31,9 +36,10 @@ struct Single {
   using Stored = double;
 };
 struct Narrow {
-  static constexpr std::size_t width = 4, registers = 4 / lanes, rows = 8 / registers, columns = 64;
-  using Value = Lanes;
-  using Stored = Unaligned;
+  static constexpr std::size_t width = 4, registers = width / narrow_lanes, rows = 8 / registers,
+                               columns = 64;
+  using Value = NarrowLanes;
+  using Stored = NarrowUnaligned;
 };
 struct Wide {
   static constexpr std::size_t width = panel_width, registers = panel_width / lanes, rows = lanes,
@@ -347,6 +353,25 @@ void solve(const SupernodalArrays& l, double* x, std::size_t stride, double* wor
     forward<Of>(supernode(l, k), x, stride, work);
   for (std::size_t k = l.supernodes; k-- > 0;)
     backward<Of>(supernode(l, k), x, stride, work);
+}
+
+inline void solve_any(const SupernodalArrays& l, double* x, std::size_t vectors, double* work) {
+  if (vectors == 1)
+    solve<Single>(l, x, 1, work);
+  else if (vectors == 4)
+    solve<Narrow>(l, x, 4, work);
+  else
+    solve<Wide>(l, x, vectors, work);
+}
+
+inline void forward_any(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
+                        double* x, std::size_t vectors, double* work) {
+  if (vectors == 1)
+    forward_some<Single>(l, supernodes, x, 1, work);
+  else if (vectors == 4)
+    forward_some<Narrow>(l, supernodes, x, 4, work);
+  else
+    forward_some<Wide>(l, supernodes, x, vectors, work);
 }
 
 } // namespace

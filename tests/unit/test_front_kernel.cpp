@@ -184,14 +184,13 @@ TEST(SupernodalSolve, IsPlainSubstitutionAtEverySizeWidthAndLevel) {
         for (std::size_t r = 0; r < n; ++r)
           plain[r * width + v] = one[r];
       }
-      for (const bool avx2 : {false, true}) {
-        if (avx2 && !has_avx2())
+      for (const CpuLevel cpu : {CpuLevel::baseline, CpuLevel::avx2, CpuLevel::avx512}) {
+        if (cpu > best_cpu_level())
           continue;
         std::vector<double> solved = x, work(below * width);
-        (avx2 ? solve_supernodal_avx2 : solve_supernodal_baseline)(l.arrays(), solved.data(), width,
-                                                                   work.data());
+        solve_supernodal(cpu)(l.arrays(), solved.data(), width, work.data());
         EXPECT_EQ(std::memcmp(solved.data(), plain.data(), 8 * solved.size()), 0)
-            << columns << " + " << below << ", " << width << " wide" << (avx2 ? ", AVX2" : "");
+            << columns << " + " << below << ", " << width << " wide, " << cpu_level_name(cpu);
       }
     }
   }
