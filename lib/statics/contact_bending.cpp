@@ -25,7 +25,7 @@ public:
           std::span<const std::uint32_t> active, std::span<const Vec3> at)
       : scene_(scene), pairs_(pairs), active_(active), at_(at) {}
 
-  BentCompliance all(const Bend& how, VectorXd& held) const {
+  BentParts all(const Bend& how, const ContactParts* apart, VectorXd& held) const {
     held = VectorXd::Zero(scene_.rows());
     std::vector<Index> rows;
     for (const std::uint32_t i : active_)
@@ -63,6 +63,8 @@ public:
             h.block<3, 3>(row_of(p.piece[to]), row_of(p.piece[from])) +=
                 own->block<3, 3>(3 * static_cast<Index>(to), 3 * static_cast<Index>(from));
     }
+    if (apart != nullptr)
+      return {scene_.w, rows, h, *apart};
     return {scene_.w, std::move(rows), std::move(h)};
   }
 
@@ -185,10 +187,10 @@ std::optional<Matrix9> bending_from_point(const SurfacePoint& found,
   return h / found.distance;
 }
 
-BentCompliance bending(const ContactScene& scene, std::span<const TouchPair> pairs,
-                       std::span<const std::uint32_t> active, std::span<const Vec3> at,
-                       const Bend& how, VectorXd& held) {
-  return Bending(scene, pairs, active, at).all(how, held);
+BentParts bending(const ContactScene& scene, std::span<const TouchPair> pairs,
+                  std::span<const std::uint32_t> active, std::span<const Vec3> at, const Bend& how,
+                  const ContactParts* parts, VectorXd& held) {
+  return Bending(scene, pairs, active, at).all(how, parts, held);
 }
 
 } // namespace gewebe

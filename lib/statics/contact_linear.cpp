@@ -35,11 +35,10 @@ public:
           return scene.placed[pairs[i].instrument]->friction > 0;
         })) {}
 
-  std::optional<LookedContacts> solve(std::span<const Vec3> at, const BentCompliance& bent,
+  std::optional<LookedContacts> solve(std::span<const Vec3> at, const BentParts& bent,
                                       const VectorXd& held, bool careful) {
-    MatrixXd base = scene_.rows_of(scene_.free);
-    base += scene_.w * (held - bent.turning(scene_.rows_of(at)));
-    bent.apply(base);
+    const VectorXd free = scene_.rows_of(scene_.free), last = scene_.rows_of(at);
+    VectorXd base = bent.without(free, held, last, pushed());
     LookedContacts looked;
     looked.columns.resize(scene_.rows(), 0);
     looked.x = base;
@@ -51,14 +50,21 @@ public:
         more.push_back(i);
     if (more.empty())
       more = overlooked(looked);
-    while (!more.empty()) {
-      look_at(more, bent, looked);
-      if (!looked.columns.allFinite())
-        return std::nullopt;
-      MatrixXd compliance = at_points(looked.pairs, looked.columns);
-      compliance = (0.5 * (compliance + compliance.transpose())).eval();
-      if (careful && !stable(looked, compliance))
-        return std::nullopt;
+    MatrixXd compliance;
+    // In parts, once more with what far forces turn by now: most of what each of them left.
+    for (bool left = bent.in_parts(); !more.empty() || (left && !looked.pairs.empty());) {
+      if (more.empty()) {
+        base = bent.without(free, held, last, pushed());
+        left = false;
+      } else {
+        look_at(more, bent, looked);
+        if (!looked.columns.allFinite())
+          return std::nullopt;
+        compliance = at_points(looked.pairs, looked.columns);
+        compliance = (0.5 * (compliance + compliance.transpose())).eval();
+        if (careful && !stable(looked, compliance))
+          return std::nullopt;
+      }
       solve_looked(compliance, base, looked);
       more = overlooked(looked);
     }
@@ -97,8 +103,20 @@ private:
     return all;
   }
 
+  /// The forces on nodes that this turn begins with.
+  VectorXd pushed() const {
+    VectorXd all = VectorXd::Zero(scene_.rows());
+    for (const std::uint32_t i : active_) {
+      const TouchPair& p = pairs_[i];
+      for (std::size_t c = 0; c < 3; ++c)
+        for (int a = 0; a < 3 && p.piece[c] < scene_.nodes.moving; ++a)
+          all[3 * static_cast<Index>(p.piece[c]) + a] += p.point.weights[c] * p.force[a];
+    }
+    return all;
+  }
+
   /// Pairs join those that are looked at.
-  void look_at(std::span<const std::uint32_t> pairs, const BentCompliance& bent,
+  void look_at(std::span<const std::uint32_t> pairs, const BentParts& bent,
                LookedContacts& looked) const {
     MatrixXd more = MatrixXd::Zero(scene_.rows(), width() * static_cast<Index>(pairs.size()));
     for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -112,7 +130,10 @@ private:
     }
     const Index before = looked.columns.cols();
     const VectorXd own = at_points(pairs, more).diagonal();
-    bent.apply(more);
+    std::vector<std::uint32_t> pushed;
+    for (const std::uint32_t i : pairs)
+      pushed.push_back(*std::ranges::min_element(pairs_[i].piece));
+    bent.apply(more, pushed, width());
     looked.straight.conservativeResize(before + more.cols(), 1);
     looked.straight.bottomRows(more.cols()) = own;
     looked.columns.conservativeResize(scene_.rows(), before + more.cols());
@@ -236,7 +257,7 @@ private:
 
 std::optional<LookedContacts> solve_bent(const ContactScene& scene, std::span<TouchPair> pairs,
                                          std::span<const std::uint32_t> active,
-                                         std::span<const Vec3> at, const BentCompliance& bent,
+                                         std::span<const Vec3> at, const BentParts& bent,
                                          const VectorXd& held, bool careful,
                                          std::optional<TouchPair>& stuck) {
   return LinearContacts(scene, pairs, active, stuck).solve(at, bent, held, careful);

@@ -3,7 +3,7 @@
 // surface between them, instruments.
 
 #include "base/vec3.h"
-#include "statics/bent_compliance_internal.h"
+#include "statics/bent_parts_internal.h"
 #include "statics/contact_turns_internal.h"
 
 #include <Eigen/Core>
@@ -55,11 +55,11 @@ struct Bend {
   double loose = 1, hold = 0;
 };
 
-/// ∂(Bᵀ f)/∂x of the last pushes f of these pairs, by differences, at the places `at`. \param held
-/// becomes the forces that hold what pushes to its place
-BentCompliance bending(const ContactScene& scene, std::span<const TouchPair> pairs,
-                       std::span<const std::uint32_t> active, std::span<const Vec3> at,
-                       const Bend& how, Eigen::VectorXd& held);
+/// ∂(Bᵀ f)/∂x of the last pushes f of these pairs, by differences, at the places `at`. \param parts
+/// by which it is taken, or null \param held becomes the forces that hold what pushes to its place
+BentParts bending(const ContactScene& scene, std::span<const TouchPair> pairs,
+                  std::span<const std::uint32_t> active, std::span<const Vec3> at, const Bend& how,
+                  const ContactParts* parts, Eigen::VectorXd& held);
 
 /// The pairs that a turn's linear problem looks at, each with a column of W Bᵀ for its push, or
 /// three for its force where anything rubs.
@@ -76,7 +76,7 @@ struct LookedContacts {
 /// becomes one that can't be moved \return none where it isn't stable
 std::optional<LookedContacts> solve_bent(const ContactScene& scene, std::span<TouchPair> pairs,
                                          std::span<const std::uint32_t> active,
-                                         std::span<const Vec3> at, const BentCompliance& bent,
+                                         std::span<const Vec3> at, const BentParts& bent,
                                          const Eigen::VectorXd& held, bool careful,
                                          std::optional<TouchPair>& stuck);
 

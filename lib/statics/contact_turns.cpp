@@ -24,6 +24,7 @@ constexpr double fair_place = 1e-6; ///< that is not worth a warning
 constexpr double sure_place = 1e-7;
 constexpr double outside = 1e-9; ///< of the radius: so deep is not inside
 constexpr double nearly = 0.03;  ///< from where on each turn comes nearer
+constexpr double slow = 0.1;     ///< to come nearer by: in parts no longer, then
 constexpr double short_way = 0.1, most_way = 8;
 constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
@@ -63,7 +64,7 @@ public:
                moved,
                {delassus.compliance.data(), static_cast<Index>(3 * nodes.moving),
                 static_cast<Index>(3 * nodes.moving)}},
-        turns_(turns) {}
+        turns_(turns), parts_(parts_of(nodes, scene_.w)), in_parts_(parts_.size() > 1) {}
 
   void run() {
     const std::vector<Vec3> last =
@@ -73,7 +74,7 @@ public:
     join(scene_.free, outside);
     join_passed();
     const bool known = last.size() == scene_.free.size(); // of a round before
-    const bool near = !known && go_on();
+    const bool near = near_ = !known && go_on();
     const bool smooth =
         std::ranges::all_of(scene_.placed, [](const auto& i) { return !i || !(i->friction > 0); });
     at_ = known ? last : scene_.nodes.was;
@@ -116,6 +117,8 @@ public:
         ++turns_.turns;
         break;
       }
+      if (near_ || last_change_ < nearly) // turned in parts, or might have been
+        in_parts_ = in_parts_ && (joined || !(before < HUGE_VAL) || change < slow * before);
       last_ratio = ratio;
       if (level_ < bends.size() && bends[level_].hold > 0 && !(change < before))
         can_hold_ = false;
@@ -444,7 +447,7 @@ private:
     std::vector<Vec3> guess;
     for (const TouchPair& p : turns_.pairs)
       guess.push_back(p.force);
-    std::optional<BentCompliance> bent;
+    std::optional<BentParts> bent;
     std::optional<LookedContacts> looked;
     VectorXd held;
     const auto solve_with = [&](bool careful) {
@@ -459,7 +462,9 @@ private:
         continue;
       for (std::size_t i = 0; i < guess.size(); ++i)
         turns_.pairs[i].force = guess[i];
-      bent.emplace(bending(scene_, turns_.pairs, active_, at_, bends[level], held));
+      bent.emplace(bending(
+          scene_, turns_.pairs, active_, at_, bends[level],
+          level == 0 && in_parts_ && (near_ || last_change_ < nearly) ? &parts_ : nullptr, held));
       solve_with(true);
       level_ = level;
     }
@@ -509,6 +514,9 @@ private:
 
   ContactScene scene_;
   ContactTurns& turns_;
+  ContactParts parts_;
+  bool in_parts_;     ///< may turns be taken
+  bool near_ = false; ///< it began with the last forces
   double last_change_ = HUGE_VAL;
   bool can_hold_ = true;              ///< nothing came of it that was worse
   std::size_t level_ = 0;             ///< of looseness

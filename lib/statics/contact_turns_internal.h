@@ -7,9 +7,10 @@
 // Forces turn and wander over the surface with the nodes they push: with H = ∂(Bᵀf)/∂x at the last
 // forces, B the weights of the points, x = (1 - W H)⁻¹ (x_free + W (Bᵀ f - H x_last)), which is
 // Newton's method on the conditions of the energy's minimum. Less of it is taken where it isn't
-// stable; near the end, where that is so only but for the contacts, these hold their points. Turns
-// that begin with the last forces end before one that would change less than 1e-9, by what the last
-// ones changed, if that was 1e-7 at most; where they don't end so near, they begin without them.
+// stable; near the end, where that is so only but for the contacts, these hold their points. Near
+// it, parts far from each other are solved each for itself (bent_parts_internal.h). Turns that
+// begin with the last forces end before one that would change less than 1e-9, by what the last ones
+// changed, if that was 1e-7 at most; where they do not end so near, they begin without them.
 
 #include "contact/surface_parts.h"
 #include "contact/surface_point.h"
