@@ -1,6 +1,7 @@
 #include "compliance/verify.h"
 
 #include "base/error.h"
+#include "base/larger.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,11 +18,6 @@ namespace {
 
 double product(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
-}
-
-/// The larger one; NaN if either is.
-double larger(double a, double b) {
-  return a > b || std::isnan(a) ? a : b;
 }
 
 double largest(std::span<const double> values) {

@@ -1,6 +1,7 @@
 #include "cutting/cut_stiffness.h"
 
 #include "base/error.h"
+#include "base/larger.h"
 #include "compliance/costs.h"
 #include "compliance/forward_blocks.h"
 #include "cutting/corrected_columns.h"
@@ -88,7 +89,7 @@ double follow_norms(const NodeMatrix& matrix, std::span<const std::uint32_t> row
     norms[row] = row_norm(matrix, row);
   double norm = 0;
   for (const double of_row : norms)
-    norm = std::isnan(norm) || of_row <= norm ? norm : of_row; // NaN stays
+    norm = larger(norm, of_row);
   return norm;
 }
 

@@ -1,6 +1,7 @@
 #include "dynamics/solid_dynamic.h"
 
 #include "base/error.h"
+#include "base/larger.h"
 #include "base/number_text.h"
 #include "base/vector_at.h"
 #include "dynamics/spring_force.h"
@@ -330,7 +331,7 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
     for (int a = 0; a < 3; ++a) {
       const std::size_t axis = axis_of(i, a);
       const double by = std::abs(moving.places()[axis] - before[axis]);
-      moved = by <= moved ? moved : by; // NaN stays
+      moved = larger(moved, by);
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
   const bool quiet = met && moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&

@@ -1,5 +1,6 @@
 #include "solid/node_stiffness.h"
 
+#include "base/larger.h"
 #include "model/cut.h"
 #include "solid/assembly_internal.h"
 #include "solid/element.h"
@@ -270,7 +271,7 @@ double row_norm(const NodeMatrix& matrix, std::size_t node) {
         sum += (matrix.fixed[matrix.node[k]] >> b & 1) != 0
                    ? 0
                    : std::abs(matrix.block[matrix.at[k]][3 * a + b]);
-    norm = std::isnan(norm) || sum <= norm ? norm : sum; // NaN stays
+    norm = larger(norm, sum);
   }
   return norm;
 }

@@ -1,5 +1,6 @@
 #include "solid/rotation_warp.h"
 
+#include "base/larger.h"
 #include "solid/warp_kernel_internal.h"
 
 #include <Eigen/Cholesky>
@@ -38,13 +39,8 @@ double sum_of_sizes(std::span<const double> v) {
 double largest_difference(std::span<const double> a, std::span<const double> b) {
   double most = 0;
   for (std::size_t k = 0; k < a.size(); ++k)
-    most = !(std::abs(a[k] - b[k]) <= most) ? std::abs(a[k] - b[k]) : most;
+    most = larger(most, std::abs(a[k] - b[k]));
   return most;
-}
-
-/// The larger one; NaN if one is.
-double larger(double a, double b) {
-  return std::isnan(b) || a <= b ? b : a;
 }
 
 /// r v or rᵀ v of three numbers, in place.

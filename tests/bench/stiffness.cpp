@@ -21,6 +21,7 @@
 #include <cholmod.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -214,6 +215,14 @@ Model model_of(const TriangleMesh& mesh) {
 } // namespace
 
 int main(int count, char** words) {
+  constexpr std::array stages{"columns", "colon", "liver"};
+  for (int k = 1; k < count; ++k)
+    if (std::ranges::none_of(stages,
+                             [&](const char* s) { return std::strcmp(words[k], s) == 0; })) {
+      (void)std::fprintf(stderr, "bench_stiffness: %s: expected columns, colon or liver\n",
+                         words[k]);
+      return 2;
+    }
   const auto wanted = [&](const char* stage) {
     return count < 2 || std::any_of(words + 1, words + count,
                                     [&](const char* w) { return std::strcmp(w, stage) == 0; });

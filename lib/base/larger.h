@@ -1,0 +1,31 @@
+#pragma once
+// The larger and the smaller of two numbers, where std::max, std::fmax and `x > worst` drop a NaN
+// and whoever compares with a bound would not see it.
+
+#include <cmath>
+#include <type_traits>
+
+namespace gewebe {
+
+/// What is no floating-point number is never one.
+template <class T>
+bool is_nan(T x) {
+  if constexpr (std::is_floating_point_v<T>)
+    return std::isnan(x);
+  else
+    return false;
+}
+
+/// The larger one, NaN if either is.
+template <class T>
+T larger(T a, std::type_identity_t<T> b) {
+  return a >= b || is_nan(a) ? a : b;
+}
+
+/// The smaller one, NaN if either is.
+template <class T>
+T smaller(T a, std::type_identity_t<T> b) {
+  return a <= b || is_nan(a) ? a : b;
+}
+
+} // namespace gewebe
