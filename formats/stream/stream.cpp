@@ -2,6 +2,7 @@
 
 #include "base/bytes.h"
 #include "base/error.h"
+#include "base/zero_pages.h"
 #include "formats/stream/file_names.h"
 #include "formats/stream/program_start.h"
 #include "formats/stream/removal.h"
@@ -205,21 +206,25 @@ InputBytes Input::read_all_pages(std::uint64_t max_bytes) {
   State& state = *state_;
   (void)peek(1);
   const std::string_view first = state.take();
-  InputBytes bytes;
-  ZeroPages& pages = bytes.pages_;
+  const auto kept = std::make_shared<ZeroPages>();
+  ZeroPages& pages = *kept;
   pages.grow(std::max<std::size_t>(
       {first.size() + 1, least,
        state.size_hint <= max_bytes ? static_cast<std::size_t>(state.size_hint) + 1 : 0}));
   std::memcpy(pages.data(), first.data(), first.size());
-  bytes.size_ = first.size();
-  while (bytes.size_ <= max_bytes) {
-    if (bytes.size_ == pages.size())
+  std::size_t size = first.size();
+  while (size <= max_bytes) {
+    if (size == pages.size())
       pages.grow(2 * pages.size());
-    const std::size_t count = state.read_some(reinterpret_cast<char*>(pages.data()) + bytes.size_,
-                                              pages.size() - bytes.size_);
-    if (count == 0)
+    char* const begin = reinterpret_cast<char*>(pages.data());
+    const std::size_t count = state.read_some(begin + size, pages.size() - size);
+    if (count == 0) {
+      InputBytes bytes;
+      bytes.pages_ = kept;
+      bytes.bytes_ = {begin, size};
       return bytes;
-    bytes.size_ += count;
+    }
+    size += count;
   }
   state.refuse_larger(max_bytes);
 }

@@ -2,8 +2,6 @@
 // Files and pipes as every program treats them: `-` is the pipe, input is read once and forwards,
 // output appears whole or not at all.
 
-#include "base/zero_pages.h"
-
 #include <cstddef>
 #include <cstdint>
 #include <iosfwd>
@@ -14,15 +12,15 @@
 
 namespace gewebe {
 
-/// Bytes that were read, in pages of their own.
+/// Bytes that were read, in pages of their own, which live as long as a copy of this.
 class InputBytes {
 public:
-  std::string_view view() const { return {reinterpret_cast<const char*>(pages_.data()), size_}; }
+  std::string_view view() const { return bytes_; }
 
 private:
   friend class Input;
-  ZeroPages pages_;
-  std::size_t size_ = 0;
+  std::shared_ptr<const void> pages_;
+  std::string_view bytes_;
 };
 
 /// A file, FIFO or standard input ("-" or ""), opened for reading forwards.
