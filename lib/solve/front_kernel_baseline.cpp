@@ -2,6 +2,6 @@
 
 namespace gewebe {
 
-const FrontKernel front_kernel_baseline{strip_rows, square_size, eliminate, solve, update};
+const FrontKernel front_kernel_baseline{strip_rows, square_size, add, eliminate, solve, update};
 
 } // namespace gewebe

@@ -81,6 +81,45 @@ struct Tile {
   }
 };
 
+/// Gains `count` numbers.
+inline void gain(double* to, const double* from, std::size_t count) {
+  std::size_t k = 0;
+  for (; k + lanes <= count; k += lanes) {
+    Lanes sum = *reinterpret_cast<const Unaligned*>(to + k);
+    sum += *reinterpret_cast<const Unaligned*>(from + k);
+    *reinterpret_cast<Unaligned*>(to + k) = sum;
+  }
+#if defined(__AVX512F__)
+  if (k < count) {
+    const auto some = static_cast<__mmask8>((1U << (count - k)) - 1);
+    _mm512_mask_storeu_pd(
+        to + k, some,
+        _mm512_add_pd(_mm512_maskz_loadu_pd(some, to + k), _mm512_maskz_loadu_pd(some, from + k)));
+  }
+#else
+  for (; k < count; ++k)
+    to[k] += from[k];
+#endif
+}
+
+inline void add(const FrontArrays& f, const FrontGain& child, std::size_t first, std::size_t last) {
+  const auto runs = child.runs;
+  auto run = std::partition_point(runs.begin(), runs.end(), [&](const FrontRun& r) {
+    return r.to + (r.end - r.begin) <= first;
+  });
+  for (; run != runs.end() && run->to < last; ++run) {
+    const std::size_t stop = run->begin + std::min(run->end - run->begin, last - run->to);
+    for (std::size_t c = run->begin + (std::max(first, run->to) - run->to); c < stop; ++c) {
+      // [r] is row r, of the child and of the front
+      const double* const from = child.update + (c * child.below - c * (c + 1) / 2);
+      double* const to = f.column(run->to + c - run->begin);
+      gain(to + run->to + c - run->begin, from + c, run->end - c);
+      for (auto rows = run + 1; rows != runs.end(); ++rows)
+        gain(to + rows->to, from + rows->begin, rows->end - rows->begin);
+    }
+  }
+}
+
 /// The square of `count` columns in its scratch: columns of `step` numbers, with room for whole
 /// tiles at their ends and behind the last, and then the reciprocals of the pivots.
 struct Square {

@@ -6,6 +6,7 @@
 #include "solve/front_layout.h"
 
 #include <cstddef>
+#include <span>
 
 namespace gewebe {
 
@@ -37,9 +38,24 @@ struct FrontScratch {
   double* strips = nullptr; ///< strips_size(rows of the front, count)
 };
 
+/// Rows of a child's update matrix that stand one behind the other in the parent too.
+struct FrontRun {
+  std::size_t begin = 0, end = 0;
+  std::size_t to = 0; ///< where the first stands
+};
+
+/// A child's update matrix, packed as that of a front, and where all of its rows go, ascending.
+struct FrontGain {
+  const double* update = nullptr;
+  std::size_t below = 0;
+  std::span<const FrontRun> runs;
+};
+
 struct FrontKernel {
   std::size_t strip; ///< rows of one
   std::size_t (*square_size)(std::size_t count);
+  /// Columns [first, last) of the front gain a child's. Different ones may be done at once.
+  void (*add)(const FrontArrays& front, const FrontGain& gain, std::size_t first, std::size_t last);
   /// Cholesky of the square of columns [begin, begin + count), a block of L, on the diagonal.
   /// Pivots must exceed `least[column]`. \return how many columns were eliminated: fewer than
   /// count, and nothing is to be used, where a pivot did not

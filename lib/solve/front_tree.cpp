@@ -24,12 +24,17 @@ std::vector<std::uint32_t> positions(std::size_t nodes, std::span<const std::uin
 std::vector<std::uint32_t> elimination_tree(const BlockGraph& graph,
                                             std::span<const std::uint32_t> order,
                                             std::span<const std::uint32_t> position) {
-  std::vector<std::uint32_t> parent(order.size(), none), ancestor(order.size(), none);
-  for (std::uint32_t k = 0; k < order.size(); ++k)
-    for (const std::uint32_t other : graph.of(order[k])) {
-      std::uint32_t at = position[other];
-      if (at == none)
-        continue;
+  std::vector<std::uint32_t> parent(order.size(), none), ancestor(order.size(), none), earlier;
+  for (std::uint32_t k = 0; k < order.size(); ++k) {
+    // Which they are is as good as random, so that they are sorted out without a branch.
+    const auto others = graph.of(order[k]);
+    earlier.resize(std::max(earlier.size(), others.size()));
+    std::size_t count = 0;
+    for (const std::uint32_t other : others) {
+      earlier[count] = position[other];
+      count += earlier[count] < k ? 1U : 0U;
+    }
+    for (std::uint32_t at : std::span(earlier).first(count))
       while (at < k) { // climbs, and shortens the way for who comes later
         const std::uint32_t next = std::exchange(ancestor[at], k);
         if (next == none) {
@@ -38,7 +43,7 @@ std::vector<std::uint32_t> elimination_tree(const BlockGraph& graph,
         }
         at = next;
       }
-    }
+  }
   return parent;
 }
 
@@ -97,7 +102,7 @@ class Runs {
 public:
   Runs(const BlockGraph& graph, const FrontTree& tree, std::span<const std::uint32_t> parent)
       : graph_(graph), tree_(tree), mark_(parent.size(), none), run_of_(parent.size()),
-        child_(parent.size(), none), sibling_(parent.size(), none) {
+        child_(parent.size(), none), sibling_(parent.size(), none), added_(parent.size() + 1) {
     for (std::size_t k = parent.size(); k-- > 0;)
       if (parent[k] != none)
         sibling_[k] = std::exchange(child_[parent[k]], static_cast<std::uint32_t>(k));
@@ -117,21 +122,23 @@ private:
     // The last child ends right before k; what it reaches is most of what k does.
     Run* last = nullptr;
     std::uint32_t mark = static_cast<std::uint32_t>(runs_.size());
-    added_.clear();
+    count_ = 0;
     if (child_[k] != none) {
       last = &runs_.back();
       --mark;
       mark_[k] = mark;
       for (std::uint32_t c = child_[k]; c != k - 1; c = sibling_[c])
         for (const std::uint32_t b : runs_[run_of_[c]].boundary)
-          if (b > k)
-            reach(b, mark);
+          reach(b, b > k, mark);
     }
-    for (const std::uint32_t other : graph_.of(tree_.sequence[k]))
-      if (const std::uint32_t b = tree_.position[other]; b != none && b > k)
-        reach(b, mark);
+    for (const std::uint32_t other : graph_.of(tree_.sequence[k])) {
+      const std::uint32_t b = tree_.position[other];
+      const bool later = b + 1 > k + 1; // none + 1 is 0
+      reach(later ? b : k, later, mark);
+    }
+    const std::span<const std::uint32_t> added = std::span(added_).first(count_);
     std::uint64_t below = 0;
-    for (const std::uint32_t b : added_)
+    for (const std::uint32_t b : added)
       below += axes(b);
     if (last != nullptr) {
       below += last->below - axes(k);
@@ -139,7 +146,7 @@ private:
       const std::uint64_t rows = last->rows + axes(k);
       const std::uint64_t zeros = last->zeros + last->rows * (below + axes(k) - last->below);
       if (may_hold(rows, static_cast<double>(zeros) / static_cast<double>(entries(rows, below)))) {
-        last->boundary.insert(last->boundary.end(), added_.begin(), added_.end());
+        last->boundary.insert(last->boundary.end(), added.begin(), added.end());
         last->last = k;
         last->zeros = zeros;
         last->rows = rows;
@@ -149,29 +156,32 @@ private:
       }
     }
     Run run{k, k, {}, 0, axes(k), below};
-    run.boundary.reserve(added_.size() + (last == nullptr ? 0 : last->boundary.size()));
+    run.boundary.reserve(added.size() + (last == nullptr ? 0 : last->boundary.size()));
     if (last != nullptr)
       for (const std::uint32_t b : last->boundary)
         if (b > k)
           run.boundary.push_back(b);
-    run.boundary.insert(run.boundary.end(), added_.begin(), added_.end());
+    run.boundary.insert(run.boundary.end(), added.begin(), added.end());
     run_of_[k] = static_cast<std::uint32_t>(runs_.size());
     for (const std::uint32_t b : run.boundary)
       mark_[b] = run_of_[k];
     runs_.push_back(std::move(run));
   }
 
-  void reach(std::uint32_t b, std::uint32_t mark) {
-    if (mark_[b] != mark) {
-      mark_[b] = mark;
-      added_.push_back(b);
-    }
+  /// Without a branch, since hardly anything tells which are new. Marks of who is not later than
+  /// the position that is added are read no more.
+  void reach(std::uint32_t b, bool later, std::uint32_t mark) {
+    added_[count_] = b;
+    count_ += std::size_t{later} & std::size_t{mark_[b] != mark};
+    mark_[b] = mark;
   }
 
   const BlockGraph& graph_;
   const FrontTree& tree_;
   std::vector<Run> runs_; // ascending
-  std::vector<std::uint32_t> mark_, run_of_, child_, sibling_, added_;
+  std::vector<std::uint32_t> mark_, run_of_, child_, sibling_;
+  std::vector<std::uint32_t> added_; // the first count_, by the position that is added
+  std::size_t count_ = 0;
 };
 
 } // namespace

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/team.h"
 #include "solve/front_kernel_internal.h"
 #include "solve/front_plan_internal.h"
 
@@ -40,44 +41,34 @@ void FrontMemory::release() noexcept {
 
 namespace {
 
-/// Rows of a child's update matrix that stand one behind the other in the parent too.
-struct Run {
-  std::size_t begin = 0, end = 0;
-  std::size_t to = 0; // where the first stands
-};
-
-/// A child's update matrix, and where it goes.
-struct Gain {
-  const double* update;
-  std::size_t below;
-  std::size_t first, last; // of its runs
-};
-
 /// What a thread works with.
 struct Scratch {
   std::vector<std::uint32_t> row;
   std::vector<double> min_pivot;
-  std::vector<Run> runs;
-  std::vector<Gain> gains;
+  std::vector<FrontRun> runs;
+  std::vector<FrontGain> gains;
   FrontMemory square, strips;
   UpdateStacks stacks;
 };
 
 /// work(begin, end) over [0, count): on all threads if it is worth them.
 template <class Work>
-void over(const Context& context, bool worth, std::size_t count, std::size_t grain,
-          const Work& work) {
-  if (worth && thread_count(context) > 1)
-    parallel_blocks(context, count, grain, work);
+void over(Team& team, bool worth, std::size_t count, std::size_t grain, const Work& work) {
+  if (worth && !team.alone())
+    team.blocks(count, grain, work);
   else
     work(std::size_t{0}, count);
 }
 
 void find_gains(const Multifrontal& task, std::span<const std::uint32_t> children,
                 Scratch& scratch) {
-  std::vector<Run>& runs = scratch.runs;
-  runs.clear();
+  std::vector<FrontRun>& runs = scratch.runs;
   scratch.gains.clear();
+  std::size_t most = 0;
+  for (const std::uint32_t child : children)
+    most += task.tree.boundary_of(child).size();
+  runs.clear();
+  runs.reserve(most); // so that they stay where they are
   for (const std::uint32_t child : children) {
     const std::size_t first = runs.size();
     std::size_t size = 0;
@@ -89,35 +80,15 @@ void find_gains(const Multifrontal& task, std::span<const std::uint32_t> childre
         runs.push_back({size, size + axes, row});
       size += axes;
     }
-    scratch.gains.push_back({task.fronts[child].update, size, first, runs.size()});
-  }
-}
-
-/// Columns [first, last) of the parent gain a child's.
-void extend_add(const FrontArrays& into, const Gain& gain, std::span<const Run> runs,
-                std::size_t first, std::size_t last) {
-  auto run = std::partition_point(runs.begin(), runs.end(),
-                                  [&](const Run& r) { return r.to + (r.end - r.begin) <= first; });
-  for (; run != runs.end() && run->to < last; ++run) {
-    const std::size_t stop = run->begin + std::min(run->end - run->begin, last - run->to);
-    for (std::size_t c = run->begin + (std::max(first, run->to) - run->to); c < stop; ++c) {
-      const double* const column = gain.update + (c * gain.below - c * (c + 1) / 2); // [r] is row r
-      double* const to = into.column(run->to + c - run->begin);
-      for (auto rows = run; rows != runs.end(); ++rows) {
-        const std::size_t begin = rows == run ? c : rows->begin;
-        double* const __restrict there = to + (rows->to + begin - rows->begin);
-        const double* const __restrict here = column + begin;
-        for (std::size_t k = 0; k < rows->end - begin; ++k)
-          there[k] += here[k];
-      }
-    }
+    scratch.gains.push_back({task.fronts[child].update, size, std::span(runs).subspan(first)});
   }
 }
 
 /// The parent's update matrix is cleared, and all of it gains the update matrices of its children:
 /// some columns at a time, which stay in the cache meanwhile.
 void gather(const Multifrontal& task, const FrontArrays& into,
-            std::span<const std::uint32_t> children, Scratch& scratch, const Context& context) {
+            std::span<const std::uint32_t> children, const FrontKernel& kernel, Scratch& scratch,
+            Team& team) {
   constexpr std::size_t at_once = 16;
   find_gains(task, children, scratch);
   const auto work = [&](std::size_t begin, std::size_t end) {
@@ -125,12 +96,11 @@ void gather(const Multifrontal& task, const FrontArrays& into,
       const std::size_t last = std::min(first + at_once, end);
       if (const std::size_t from = std::max(first, into.columns); from < last)
         std::fill(into.column(from) + from, into.column(last - 1) + into.rows, 0.0);
-      for (const Gain& gain : scratch.gains)
-        extend_add(into, gain, std::span(scratch.runs).subspan(gain.first, gain.last - gain.first),
-                   first, last);
+      for (const FrontGain& gain : scratch.gains)
+        kernel.add(into, gain, first, last);
     }
   };
-  over(context, packed_triangle(into.rows) >= worth_threads_entries, into.rows, 4 * at_once, work);
+  over(team, packed_triangle(into.rows) >= worth_threads_entries, into.rows, 4 * at_once, work);
 }
 
 /// The quickest; all give the same bits. Tiles of AVX-512 are too large for small fronts.
@@ -141,9 +111,8 @@ const FrontKernel& kernel_for(const Front& front, CpuLevel cpu) {
 }
 
 /// \throw PivotTooSmall
-void eliminate(Front& front, std::size_t f, const FrontArrays& arrays, Scratch& scratch,
-               const Context& context) {
-  const FrontKernel& kernel = kernel_for(front, context.cpu);
+void eliminate(const Front& front, std::size_t f, const FrontArrays& arrays,
+               const FrontKernel& kernel, Scratch& scratch, Team& team) {
   const FrontScratch space{
       scratch.square.reserve(kernel.square_size(front_block), false),
       scratch.strips.reserve(kernel.strips_size(front.rows, std::min(front.columns, front_block)),
@@ -156,18 +125,19 @@ void eliminate(Front& front, std::size_t f, const FrontArrays& arrays, Scratch& 
       throw PivotTooSmall{f, begin + done};
     const std::size_t rows = front.rows - begin - count, strips = kernel.strips(rows);
     const auto r = static_cast<double>(rows), c = static_cast<double>(count);
-    over(context, r * c * c > worth_threads, strips, 8, [&](std::size_t first, std::size_t last) {
+    over(team, r * c * c > worth_threads, strips, 8, [&](std::size_t first, std::size_t last) {
       kernel.solve(arrays, begin, count, space, first, last);
     });
-    over(context, r * r * c > worth_threads, strips, 4, [&](std::size_t first, std::size_t last) {
+    over(team, r * r * c > worth_threads, strips, 4, [&](std::size_t first, std::size_t last) {
       kernel.update(arrays, begin, count, space, first, last);
     });
   }
 }
 
 void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scratch& scratch,
-             const Context& context) {
+             CpuLevel cpu, Team& team) {
   Front& front = task.fronts[f];
+  const FrontKernel& kernel = kernel_for(front, cpu);
   std::uint32_t next = 0;
   const auto place = [&](std::span<const std::uint32_t> nodes) {
     for (const std::uint32_t node : nodes) {
@@ -182,19 +152,19 @@ void compute(const Multifrontal& task, const FrontPlan& plan, std::size_t f, Scr
                      : scratch.stacks.push(plan.place[f], front.below());
   const FrontArrays arrays{front.rows, front.columns, front.l, front.update};
   const std::size_t size = front.entries();
-  over(context, size >= worth_threads_entries, size, worth_threads_entries / 4,
+  over(team, size >= worth_threads_entries, size, worth_threads_entries / 4,
        [&](std::size_t first, std::size_t last) {
          std::fill(front.l + first, front.l + last, 0.0);
        });
   scratch.min_pivot.assign(front.columns, 0.0);
   task.assemble({f, scratch.row, front.rows, front.l, scratch.min_pivot});
-  gather(task, arrays, plan.children[f], scratch, context);
+  gather(task, arrays, plan.children[f], kernel, scratch, team);
   for (const std::uint32_t child : plan.children[f])
     if (plan.place[child] != FrontPlan::own)
       scratch.stacks.pop(plan.place[child], task.fronts[child].below());
     else if (!task.keep_updates)
       task.fronts[child].kept.release();
-  eliminate(front, f, arrays, scratch, context);
+  eliminate(front, f, arrays, kernel, scratch, team);
   front.weakest = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < front.columns; ++c) {
     const double root = arrays.column(c)[c];
@@ -232,6 +202,11 @@ FrontBlocks front_blocks(const FrontTree& tree, std::span<const std::uint8_t> ax
     row[node] = next;
     next += axes[node];
   }
+  std::size_t all = 0;
+  for (std::size_t f = 0; f < tree.fronts(); ++f)
+    for (std::size_t c = 0; c < fronts[f].columns; c += front_block)
+      all += fronts[f].rows - c;
+  b.s.reserve(all);
   for (std::size_t f = 0; f < tree.fronts(); ++f) {
     rows.clear();
     const auto add = [&](std::span<const std::uint32_t> nodes) {
@@ -302,14 +277,10 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
     if (tree.parent[f] != none)
       under[tree.parent[f]] += under[f];
   }
-  Context quiet = context;
-  quiet.progress = nullptr;
-  Context alone = quiet;
-  alone.threads = 1;
   const FrontPlan plan =
       front_plan(tree, under, work.operations, thread_count(context), task.keep_updates);
   // Those of `some` that are wanted, one after the other.
-  const auto run = [&](const auto& some, const Context& with) {
+  const auto run = [&](const auto& some, Team& team) {
     UpdateStacks::Size size;
     for (const std::size_t f : some)
       size.compute(plan, task.fronts, f);
@@ -318,26 +289,29 @@ FrontalWork factorise(const Multifrontal& task, std::span<const char> wanted,
     scratch.stacks.prepare(size);
     for (const std::size_t f : some)
       if (is_wanted(f)) {
-        if (with.cancelled && with.cancelled())
+        if (context.cancelled && context.cancelled())
           throw Cancelled();
-        compute(task, plan, f, scratch, with);
+        compute(task, plan, f, scratch, context.cpu, team);
       }
   };
   std::vector<std::optional<PivotTooSmall>> failed(plan.subtrees.size());
-  parallel_blocks(quiet, plan.subtrees.size(), 1, [&](std::size_t k, std::size_t) {
-    try {
-      run(std::views::iota(plan.subtrees[k].first, plan.subtrees[k].second), alone);
-    } catch (const PivotTooSmall& pivot) {
-      failed[k] = pivot;
-    }
+  lead_team(context, [&](Team& team) {
+    team.blocks(plan.subtrees.size(), 1, [&](std::size_t k, std::size_t) {
+      Team alone;
+      try {
+        run(std::views::iota(plan.subtrees[k].first, plan.subtrees[k].second), alone);
+      } catch (const PivotTooSmall& pivot) {
+        failed[k] = pivot;
+      }
+    });
+    std::optional<PivotTooSmall> first;
+    for (const auto& pivot : failed)
+      if (pivot && (!first || pivot->front < first->front))
+        first = pivot;
+    if (first)
+      throw PivotTooSmall(*first);
+    run(plan.above, team);
   });
-  std::optional<PivotTooSmall> first;
-  for (const auto& pivot : failed)
-    if (pivot && (!first || pivot->front < first->front))
-      first = pivot;
-  if (first)
-    throw PivotTooSmall(*first);
-  run(plan.above, quiet);
   return work;
 }
 

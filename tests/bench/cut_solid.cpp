@@ -169,7 +169,7 @@ std::vector<std::uint32_t> far_end(const Model& model) {
 }
 
 void in_library(const Model& first, std::size_t cuts, bool errors) {
-  const double radius = 1.8 * mean_edge(first);
+  const double radius = 1.72 * mean_edge(first);
   auto model = std::make_shared<const Model>(first);
   CutStiffness stiffness(model, nullptr, with_threads(1));
   std::printf("first factor,%.6g,,,,ms\n", processor_milliseconds([&] { stiffness.prepare(); }));
@@ -266,7 +266,7 @@ void through_the_pipe(const Model& first, std::size_t cuts, bool surfaces, int t
     write_ela(output, first, Context{});
     output.commit();
   }
-  const double radius = 1.8 * mean_edge(first);
+  const double radius = 1.72 * mean_edge(first);
   std::vector<double> worked, felt;
   double announced = 0;
   {

@@ -5,6 +5,7 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/team.h"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +14,7 @@
 #include <chrono>
 #include <numeric>
 #include <thread>
+#include <utility>
 #include <vector>
 
 using namespace gewebe;
@@ -102,6 +104,68 @@ TEST(Parallel, ErrorsAndCancellingComeThrough) {
   std::atomic<int> asked{0};
   context.cancelled = [&] { return ++asked > 3; };
   EXPECT_THROW(parallel_blocks(context, 100, 1, [](std::size_t, std::size_t) {}), Cancelled);
+}
+
+TEST(Team, EachBlockOfManyShortLoopsIsDoneOnceBeforeTheNextLoop) {
+  for (const int threads : {1, 2, 5}) {
+    Context context;
+    context.threads = threads;
+    std::vector<std::size_t> done(203, 0);
+    std::size_t wrong = 0;
+    lead_team(context, [&](Team& team) {
+      EXPECT_EQ(team.alone(), threads == 1);
+      for (std::size_t loop = 0; loop < 5000; ++loop) {
+        const std::size_t count = loop % 203 + 1, grain = loop % 7 + 1;
+        team.blocks(count, grain, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t n = begin; n < end; ++n)
+            done[n] += begin % grain == 0 && end <= begin + grain ? 1 : 1000;
+        });
+        for (std::size_t n = 0; n < done.size(); ++n)
+          wrong += std::exchange(done[n], 0) != (n < count ? 1U : 0U) ? 1 : 0;
+      }
+      team.blocks(0, 8, [](std::size_t, std::size_t) { FAIL(); });
+    });
+    EXPECT_EQ(wrong, 0U) << threads;
+  }
+}
+
+TEST(Team, OthersHelpTheOneThatLeads) {
+  Context context;
+  context.threads = 2;
+  bool helped = false;
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  lead_team(context, [&](Team& team) {
+    const auto leader = std::this_thread::get_id();
+    std::atomic<bool> other = false;
+    while (!helped && std::chrono::steady_clock::now() < until) {
+      team.blocks(2, 1, [&](std::size_t, std::size_t) {
+        if (std::this_thread::get_id() != leader)
+          other = true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1)); // time for another to take one
+      });
+      helped = other;
+    }
+  });
+  EXPECT_TRUE(helped || std::thread::hardware_concurrency() < 2);
+}
+
+TEST(Team, ErrorsAndCancellingComeThrough) {
+  Context context;
+  context.threads = 2;
+  std::atomic<int> done = 0;
+  lead_team(context, [&](Team& team) {
+    EXPECT_THROW(team.blocks(100, 1,
+                             [](std::size_t b, std::size_t) {
+                               if (b == 50)
+                                 throw Error("no");
+                             }),
+                 Error);
+    team.blocks(100, 1, [&](std::size_t, std::size_t) { ++done; }); // and it goes on
+  });
+  EXPECT_EQ(done, 100);
+  EXPECT_THROW(lead_team(context, [](Team&) { throw Error("no"); }), Error);
+  context.cancelled = [] { return true; };
+  EXPECT_THROW(lead_team(context, [](Team&) {}), Cancelled);
 }
 
 TEST(Error, PlaceIsAddedOnce) {

@@ -108,6 +108,35 @@ TEST(FrontKernel, IsAPlainTripleLoopAtEverySizeAndLevel) {
   }
 }
 
+/// Runs of all lengths up to 17 and gaps between them, over columns and what is below them.
+TEST(FrontKernel, AddsAChildAtItsRowsAtEveryLevel) {
+  std::vector<FrontRun> runs;
+  std::vector<std::size_t> row; // of the front, by that of the child
+  std::size_t rows = 2;
+  for (std::size_t length = 1; length <= 17; ++length) {
+    runs.push_back({row.size(), row.size() + length, rows});
+    for (std::size_t k = 0; k < length; ++k)
+      row.push_back(rows++);
+    rows += length % 4 + 1;
+  }
+  const std::size_t columns = 131, below = row.size();
+  const std::vector<double> update = random_vector(below * (below + 1) / 2, 3);
+  MadeFront plain(columns, rows - columns);
+  std::size_t at = 0;
+  for (std::size_t c = 0; c < below; ++c)
+    for (std::size_t r = c; r < below; ++r)
+      plain.arrays.column(row[c])[row[r]] += update[at++];
+  for (const FrontKernel* kernel : kernels())
+    for (const std::size_t at_once : std::array<std::size_t, 3>{1, 16, 1000}) {
+      MadeFront made(columns, rows - columns);
+      for (std::size_t first = 0; first < rows; first += at_once)
+        kernel->add(made.arrays, {update.data(), below, runs}, first,
+                    std::min(first + at_once, rows));
+      EXPECT_EQ(made.l, plain.l) << at_once;
+      EXPECT_EQ(made.update, plain.update) << at_once;
+    }
+}
+
 /// Columns of all rows, one behind the other: one supernode, however wide.
 std::vector<double> square_columns(const FrontArrays& f) {
   std::vector<double> l(f.rows * f.columns);

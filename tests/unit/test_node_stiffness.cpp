@@ -233,5 +233,30 @@ TEST_P(NodeStiffness, ItsFactorGoesOnWithoutAPiece) {
   EXPECT_LT(error_of(stiffness, *last), 1e-10);
 }
 
+/// Fronts of more rows than one thread is left alone with, computed again after a cut.
+TEST(LargeFronts, FollowACutToTheSameBitsOnAnyThreads) {
+  const auto model = std::make_shared<const Model>(block(false, 17));
+  const std::optional<CutModel> cut = cut_at(*model, {17, 17, 17}, {1, 0.2, 0.1}, 4.5);
+  ASSERT_TRUE(cut.has_value());
+  const auto now = std::make_shared<const Model>(cut->model);
+  std::vector<double> first;
+  for (const int threads : {1, 2, 3}) {
+    Context context;
+    context.threads = threads;
+    CutStiffness stiffness(model, nullptr, context);
+    stiffness.prepare();
+    const CutWork work = stiffness.cut(now, cut->origin, cut->place);
+    EXPECT_EQ(work.way, CutWay::refactor);
+    EXPECT_GT(work.factor.operations, 2e8);
+    std::vector<double> u(3 * now->nodes.size());
+    for (std::size_t k = 0; k < u.size(); ++k)
+      u[k] = static_cast<double>(k * 7 % 23) - 11;
+    stiffness.compliance()->solve(u, 1);
+    if (first.empty())
+      first = u;
+    EXPECT_EQ(u, first) << threads;
+  }
+}
+
 } // namespace
 } // namespace gewebe
