@@ -35,17 +35,13 @@ std::vector<std::uint32_t> loose_nodes(const Model& model) {
   return loose;
 }
 
-/// The least and the largest displacement along each axis.
-struct Extremes {
-  Vec3 min, max;
-};
-
 struct Two {
   __m128d value;
 };
 
-/// Of 3 n numbers, passing over a NaN.
-Extremes extremes_of(std::span<const double> displacement) {
+} // namespace
+
+Box3 range_of(std::span<const double> displacement) {
   constexpr std::size_t wide = 12; // side by side: comparisons wait for each other
   std::array<double, wide> least{}, most{};
   std::array<Two, wide / 2> low{}, high{};
@@ -66,7 +62,7 @@ Extremes extremes_of(std::span<const double> displacement) {
     least[lane] = std::min(least[lane], displacement[k + lane]);
     most[lane] = std::max(most[lane], displacement[k + lane]);
   }
-  Extremes all{{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
+  Box3 all;
   for (std::size_t lane = 0; lane < wide; ++lane) {
     const int a = static_cast<int>(lane % 3);
     all.min[a] = std::min(all.min[a], least[lane]);
@@ -74,8 +70,6 @@ Extremes extremes_of(std::span<const double> displacement) {
   }
   return all;
 }
-
-} // namespace
 
 std::vector<Vec3> inward_directions(const Model& model) {
   std::vector<Vec3> inward(model.nodes.size());
@@ -151,6 +145,7 @@ Box3 SurfaceFacets::box_of(const Model& model, std::span<const double> displacem
 
 void SurfaceFacets::set_shape(const Model& model, std::span<const double> displacement) {
   box_ = {};
+  range_.reset();
   for (std::size_t b = 0; b < boxes_.size(); ++b) {
     boxes_[b] = box_of(model, displacement, b);
     box_.add(boxes_[b].min);
@@ -160,7 +155,7 @@ void SurfaceFacets::set_shape(const Model& model, std::span<const double> displa
 
 void SurfaceFacets::set_shape_near(const Model& model, std::span<const double> displacement,
                                    std::span<const Box3> places) {
-  const Extremes far = extremes_of(displacement);
+  const Box3 far = range_.emplace(range_of(displacement));
   box_ = {};
   for (std::size_t b = 0; b < boxes_.size(); ++b) {
     // Sums round alike at both ends, so that what is in the box at rest is in this one.

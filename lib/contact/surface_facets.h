@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,9 @@ namespace gewebe {
 /// By node: the normal at rest that points into the object, as long as the area around; 0 without
 /// triangles.
 std::vector<Vec3> inward_directions(const Model& model);
+
+/// The box of 3 n displacements; passes over a NaN.
+Box3 range_of(std::span<const double> displacement);
 
 class SurfaceFacets {
 public:
@@ -32,6 +36,8 @@ public:
                       std::span<const Box3> places);
 
   const Box3& box() const noexcept { return box_; }
+  /// range_of the shape, if set_shape_near has had to know it.
+  const std::optional<Box3>& range() const noexcept { return range_; }
   std::span<const Facet> facets() const noexcept { return facets_; }
   /// Numbers of the pieces at a node, ascending.
   std::span<const std::uint32_t> at_node(std::uint32_t node) const {
@@ -59,6 +65,7 @@ private:
   std::vector<std::uint32_t> nodes_;    ///< of the blocks' pieces, ascending in each
   std::vector<std::size_t> first_node_; ///< of each block, and the end
   Box3 box_;
+  std::optional<Box3> range_;
   std::vector<std::uint32_t> of_node_;
   std::vector<std::size_t> first_of_node_;
 };

@@ -18,9 +18,10 @@ namespace {
 constexpr double worth_implicit = 20;       ///< explicit steps for one implicit one
 constexpr double implicit_step = 1.0 / 600; // s, where none is asked for: a tenth of a picture
 
-/// All parts as one model, without what ties them. \param offset of each part's nodes
-Model joined(const World& w, const std::vector<std::size_t>& parts,
-             std::vector<std::size_t>& offset) {
+} // namespace
+
+Model joined_model(const World& w, std::span<const std::size_t> parts,
+                   std::vector<std::size_t>& offset) {
   Model all;
   for (const std::size_t part : parts) {
     const Model& from = w.now.objects[part].model();
@@ -52,6 +53,8 @@ Model joined(const World& w, const std::vector<std::size_t>& parts,
   }
   return all;
 }
+
+namespace {
 
 void add_ties(const World& w, const std::vector<std::size_t>& parts,
               const std::vector<std::size_t>& offset, Model& all) {
@@ -215,7 +218,7 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   auto body = std::make_shared<Body>();
   std::vector<std::size_t> offset;
   if (parts.size() > 1) {
-    Model all = joined(w, parts, offset);
+    Model all = joined_model(w, parts, offset);
     add_ties(w, parts, offset, all);
     body->model = std::make_shared<const Model>(std::move(all));
   } else {
@@ -290,8 +293,8 @@ bool move_bodies(World& w, double to, bool again) {
   if (!(duration > 0))
     return false;
   note_extents(w, extents);
-  const bool may_meet = std::ranges::any_of(
-      w.now.meetings, [](const Meeting& m) { return !m.near && m.object != m.other; });
+  const bool some_may_meet =
+      std::ranges::any_of(w.now.meetings, [&](const Meeting& m) { return may_meet(w, m); });
   lead_on(w, to, extents);
   std::vector<Body*> awake, resting;
   std::vector<std::any> before;
@@ -307,7 +310,7 @@ bool move_bodies(World& w, double to, bool again) {
     body->rest_extents.clear();
     awake.push_back(body.get());
     step.push_back(integration_step(w, *body));
-    if (may_meet)
+    if (some_may_meet)
       before.push_back(body->moving->snapshot());
   }
   // One body has all threads, several have one each.
@@ -326,7 +329,7 @@ bool move_bodies(World& w, double to, bool again) {
       raise(w, *body);
   Extents after(w);
   if (const std::set<std::size_t> late =
-          may_meet ? met_late(w, extents, after) : std::set<std::size_t>();
+          some_may_meet ? met_late(w, extents, after) : std::set<std::size_t>();
       !late.empty()) {
     for (std::size_t k = 0; k < awake.size(); ++k)
       awake[k]->moving->go_back(before[k]);

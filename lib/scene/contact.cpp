@@ -6,6 +6,7 @@
 #include "statics/warped_contact.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -42,6 +43,8 @@ std::vector<NodeTouch> means_of(std::vector<NodeTouch> impulses, double duration
   return all;
 }
 
+} // namespace
+
 /// Once: what is told of forces is not to be trusted.
 void warn_inexact(World& w, Object& object) {
   if (object.matter->told.unsolved || !w.options.warn)
@@ -51,6 +54,8 @@ void warn_inexact(World& w, Object& object) {
                  " s: the forces of " + (w.now.instruments.empty() ? "contact" : "instruments") +
                  " are not exact, expected a slower way");
 }
+
+namespace {
 
 /// Whether the instrument touched it in the last step.
 bool touched_by(const World& w, const Body& body, std::size_t instrument) {
@@ -189,31 +194,24 @@ bool touched_anew(World& w, Object& object) {
   need_model(object);
   shape_in_step(w, object);
   need_contact(object);
+  return passed_by_instruments(w, object.contact->box(), first);
+}
+
+/// Whether one comes near to a box on its way since the scene was shown. \param first where they
+/// stood before counts too
+bool passed_by_instruments(const World& w, const Box3& box, bool first) {
   for (std::size_t k = 0; k < w.now.instruments.size(); ++k)
     for (std::size_t p = first ? 0 : 1; p < w.now.poses.size(); ++p) {
       const std::optional<Pose> now = pose_at(w, p, k), before = p > 0 ? pose_at(w, p - 1, k) : now;
-      if (now && near(box_between(w.now.instruments[k].shape, before.value_or(*now), *now),
-                      object.contact->box()))
+      if (now && near(box_between(w.now.instruments[k].shape, before.value_or(*now), *now), box))
         return true;
     }
   return false;
 }
 
-/// An elastostatic object's shape behind all the ways that the instruments took since it was shown.
-void follow_instruments(World& w, Object& object) {
-  object.statics->ahead = true;
-  need_contact(object);
+std::vector<ShortWay> short_ways(const World& w, std::span<Object* const> objects) {
+  std::vector<ShortWay> all;
   const std::size_t count = w.now.instruments.size();
-  bool solved = true;
-  const TwoStepYielding::Stages stages = [&]() -> std::pair<Elastostatic&, TwoStep&> {
-    Elastostatic& solver = solver_of(w, object);
-    return {solver, two_step_of(w, object)};
-  };
-  std::vector<double>& shape = object.shown.displacement.write();
-  // An object that nothing ever acted on has no shape to find.
-  const bool changed = !object.shown.touches.empty() ||
-                       ((object.statics->made() || !object.load->empty()) &&
-                        (!object.shown.valid || object.load->changes_until() > object.shown.time));
   for (std::size_t p = w.now.poses.size() > 1 ? 1 : 0; p < w.now.poses.size(); ++p) {
     std::vector<MovedInstrument> moved;
     for (std::size_t k = 0; k < count; ++k)
@@ -225,51 +223,90 @@ void follow_instruments(World& w, Object& object) {
       const auto at = [&](std::size_t n) {
         return static_cast<double>(n) / static_cast<double>(parts);
       };
-      const bool whole = p + 1 == w.now.poses.size() && part == parts;
-      std::vector<std::optional<MovedInstrument>> here(count);
+      ShortWay& here = all.emplace_back();
+      here.instruments.resize(count);
+      here.last = p + 1 == w.now.poses.size() && part == parts;
       std::size_t next = 0;
       for (std::size_t k = 0; k < count; ++k)
         if (pose_at(w, p, k)) {
           const MovedInstrument& way = moved[next++];
-          here[k] = MovedInstrument{way.shape, between(way.before, way.now, at(part - 1)),
-                                    between(way.before, way.now, at(part))};
-          if (whole && gives_way_to(w, w.now.instruments[k], object))
-            here[k] = led_here(w, w.now.instruments[k], *here[k]);
+          std::optional<MovedInstrument>& one = here.instruments[k];
+          one = MovedInstrument{way.shape, between(way.before, way.now, at(part - 1)),
+                                between(way.before, way.now, at(part))};
+          if (here.last && std::ranges::any_of(objects, [&](const Object* object) {
+                return gives_way_to(w, w.now.instruments[k], *object);
+              }))
+            one = led_here(w, w.now.instruments[k], *one);
         }
-      const bool last = changed && whole;
-      const Load& load = *object.shown.load;
-      if (object.warp) {
-        WarpedYielding turning(
-            object.model(), [&]() -> WarpedStatics& { return warped_of(w, object); }, load,
-            object.contact->touches());
-        object.contact->update(turning, load.displacement, here, shape, last);
-        solved = solved && turning.solved();
-        if (object.statics->warped)
-          object.warped = object.statics->warped->answer();
-      } else if (object.stages.options) {
-        TwoStepYielding both(object.model(), stages, load);
-        object.contact->update(both, load.displacement, here, shape, last);
-        solved = solved && both.solved();
-      } else {
-        object.contact->update([&]() -> Elastostatic& { return solver_of(w, object); }, load, here,
-                               shape, last);
-      }
-      solved = solved && object.contact->solved();
     }
+  }
+  return all;
+}
+
+// An object that nothing ever acted on has no shape to find.
+bool acted_anew(const Object& object) {
+  return (object.statics->made() || !object.load->empty()) &&
+         (!object.shown.valid || object.load->changes_until() > object.shown.time);
+}
+
+void tell_stuck(World& w, Object& object, const NodeTouch& stuck) {
+  if (object.matter->told.stuck || !w.options.warn)
+    return;
+  object.matter->told.stuck = true;
+  w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) + " s: node " +
+                 std::to_string(stuck.node) + " is fixed, the instrument " +
+                 w.now.instruments[stuck.instrument].name + " goes through it");
+}
+
+/// Those that give way to one of the objects have gone.
+void settle_led(World& w, std::span<Object* const> objects) {
+  for (std::size_t k = 0; k < w.now.instruments.size(); ++k)
+    if (pose_at(w, w.now.poses.size() - 1, k) &&
+        std::ranges::any_of(objects, [&](const Object* object) {
+          return gives_way_to(w, w.now.instruments[k], *object);
+        }))
+      settle(w, k, objects);
+}
+
+/// An elastostatic object's shape behind all the ways that the instruments took since it was shown.
+void follow_instruments(World& w, Object& object) {
+  object.statics->ahead = true;
+  need_contact(object);
+  const std::array<Object*, 1> objects{&object};
+  bool solved = true;
+  const TwoStepYielding::Stages stages = [&]() -> std::pair<Elastostatic&, TwoStep&> {
+    Elastostatic& solver = solver_of(w, object);
+    return {solver, two_step_of(w, object)};
+  };
+  const Load& load = *object.shown.load;
+  std::vector<double>& shape = object.shown.displacement.write();
+  const bool changed = !object.shown.touches.empty() || acted_anew(object);
+  for (const ShortWay& way : short_ways(w, objects)) {
+    const bool last = changed && way.last;
+    if (object.warp) {
+      WarpedYielding turning(
+          object.model(), [&]() -> WarpedStatics& { return warped_of(w, object); }, load,
+          object.contact->touches());
+      object.contact->update(turning, load.displacement, way.instruments, shape, last);
+      solved = solved && turning.solved();
+      if (object.statics->warped)
+        object.warped = object.statics->warped->answer();
+    } else if (object.stages.options) {
+      TwoStepYielding both(object.model(), stages, load);
+      object.contact->update(both, load.displacement, way.instruments, shape, last);
+      solved = solved && both.solved();
+    } else {
+      object.contact->update([&]() -> Elastostatic& { return solver_of(w, object); }, load,
+                             way.instruments, shape, last);
+    }
+    solved = solved && object.contact->solved();
   }
   w.now.counts.touches.add(object.contact->take_counts());
   object.shown.touches = object.contact->touches();
   object.shown.points = object.contact->points();
-  for (std::size_t k = 0; k < count; ++k)
-    if (pose_at(w, w.now.poses.size() - 1, k) && gives_way_to(w, w.now.instruments[k], object))
-      settle(w, k, object);
-  if (const auto stuck = object.contact->stuck();
-      stuck && !object.matter->told.stuck && w.options.warn) {
-    object.matter->told.stuck = true;
-    w.options.warn("object " + object.name() + " at " + number_text(w.now.clock.time) +
-                   " s: node " + std::to_string(stuck->node) + " is fixed, the instrument " +
-                   w.now.instruments[stuck->instrument].name + " goes through it");
-  }
+  settle_led(w, objects);
+  if (const auto stuck = object.contact->stuck())
+    tell_stuck(w, object, *stuck);
   if (!solved)
     warn_inexact(w, object);
 }

@@ -101,12 +101,14 @@ MovedInstrument led_here(const World& w, const Instrument& i, const MovedInstrum
 }
 
 /// Behind that: where it has gone.
-void settle(World& w, std::size_t instrument, const Object& object) {
+void settle(World& w, std::size_t instrument, std::span<Object* const> objects) {
   Instrument& i = w.now.instruments[instrument];
   LedInstrument& led = i.coupled->led;
   led = i.coupled->shown;
-  led.settle(i.way.at(w.now.clock.time).place, w.now.clock.time - w.now.clock.shown,
-             force_of(object, instrument));
+  Vec3 force;
+  for (const Object* const object : objects)
+    force += force_of(*object, instrument);
+  led.settle(i.way.at(w.now.clock.time).place, w.now.clock.time - w.now.clock.shown, force);
   i.before = i.pose(w.now.clock.time);
   w.now.poses.back()[instrument] = i.before;
 }
@@ -134,8 +136,7 @@ void end_leading(World& w) {
     const auto of_body = [&](std::size_t object) {
       Vec3 sum;
       for (std::size_t o = 0; o < w.now.objects.size(); ++o)
-        if (o == object || (w.now.objects[o].body != nullptr &&
-                            w.now.objects[o].body == w.now.objects[object].body))
+        if (as_one(w, object, o))
           sum += force_of(w.now.objects[o], k);
       return sum;
     };

@@ -47,6 +47,8 @@ void take_back(World& w, Saved&& saved) noexcept {
       object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
                                                        object.shown.touches, object.shown.points);
     w.renewed.push_back(i);
+    if (StaticGroup* const group = static_group_of(w, i))
+      group->meeting = nullptr; // it is made anew from what is shown
   }
 }
 

@@ -92,10 +92,14 @@ void meet(World& w, double to, Extents& extents, bool stay) {
     regroup(w, changed);
 }
 
+bool may_meet(const World& w, const Meeting& m) {
+  return !m.near && m.object != m.other && !is_static(w, m);
+}
+
 /// Where those stand that may touch but are not near.
 void note_extents(const World& w, Extents& extents) {
   for (const Meeting& m : w.now.meetings)
-    if (!m.near && m.object != m.other)
+    if (may_meet(w, m))
       for (const std::size_t object : {m.object, m.other})
         (void)extents.of(object);
 }
@@ -111,8 +115,7 @@ std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after) 
     return box;
   };
   for (const Meeting& m : w.now.meetings)
-    if (!m.near && m.object != m.other &&
-        (awake(w.now.objects[m.object]) || awake(w.now.objects[m.other])) &&
+    if (may_meet(w, m) && (awake(w.now.objects[m.object]) || awake(w.now.objects[m.other])) &&
         near(passed(m.object), passed(m.other)))
       all.insert({m.object, m.other});
   return all;
@@ -165,9 +168,14 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
     Object& object = w.now.objects.at(index);
     need_model(object);
     require_support(w, object, itself ? Feature::self_contact : Feature::contact);
+    if (object.method != w.now.objects.at(c.object).method)
+      throw Error("one of " + w.now.objects.at(c.object).name() + " and " + object.name() +
+                  " is elastostatic (ffe) and the other is not, expected both alike for contact");
     if (object.model().triangles.empty())
       throw Error("object " + object.name() + " has no triangles, expected a surface for contact");
   }
+  if (w.now.objects.at(c.object).method == Method::ffe)
+    return;
   std::vector<std::size_t> all = together(w, c.object);
   const std::vector<std::size_t> others = together(w, c.other);
   all.insert(all.end(), others.begin(), others.end());
@@ -192,6 +200,10 @@ void Rule<SetContact>::apply(World& w, const SetContact& c) {
   for (const std::size_t index : {c.object, c.other}) {
     Object& object = w.now.objects[index];
     object.meets = true;
+    if (StaticGroup* const group = static_group_of(w, index)) {
+      group->meeting = nullptr;
+      group->settled = false;
+    }
     if (object.body == nullptr)
       continue;
     Body& body = *object.body;

@@ -11,6 +11,7 @@
 #include "scene/simulation.h"
 #include "scene/support.h"
 #include "statics/static_contact.h"
+#include "statics/static_meeting.h"
 #include "statics/warped_statics.h"
 
 #include <any>
@@ -71,6 +72,7 @@ struct Matter {
   bool known = false;
   double shortest_edge = 0; // mm; 0: not yet known
   double size = 0;          // mm, longest side of the box at rest; 0: not yet known
+  std::optional<Box3> box;  // of the surface at rest, see shown_box
   std::size_t surface = 0;  // nodes that have all of the surface; 0: not yet known
   Told told;
 };
@@ -143,7 +145,8 @@ struct Shown {
       deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};
   double time = 0;
-  bool posed = false; // what is shown is a shape of ffe
+  bool posed = false;        // what is shown is a shape of ffe
+  std::optional<Box3> box{}; // see shown_box; none: nobody has asked for that of this shape
 };
 
 /// Where the shape that ffe shows was one step earlier, see shape_velocity.
@@ -216,7 +219,17 @@ struct Tie {
 struct Meeting {
   std::size_t object = 0, other = 0;
   double friction = 0;
-  bool near = false; // they move as one body
+  bool near = false; // they move as one body, or are in one StaticGroup
+};
+
+/// Elastostatic objects that are near each other, or one that may touch itself: their shapes are
+/// found together.
+struct StaticGroup {
+  std::vector<std::size_t> parts;         // objects, ascending
+  std::vector<SurfacePush> pushes;        // by nodes of all, part behind part
+  bool settled = false;                   // nothing is to be done while nothing moves
+  int tries = 0;                          // that are left for steps whose forces aren't found
+  std::shared_ptr<StaticMeeting> meeting; // what is kept to be quick; null: not yet
 };
 
 struct Instrument {
@@ -268,6 +281,7 @@ struct Scene {
   std::vector<std::shared_ptr<Body>> bodies;
   std::vector<Tie> ties;
   std::vector<Meeting> meetings;
+  std::vector<StaticGroup> static_groups;
   std::vector<Instrument> instruments;
   /// In this step: where the instruments stood, one after the other.
   std::vector<std::vector<std::optional<Pose>>> poses;

@@ -104,6 +104,8 @@ bool may_leave_range(Object& object, double max) {
          (!(max <= 1.02 * object.range.looked_at) || ++object.range.not_looked >= 64);
 }
 
+} // namespace
+
 /// Once, where the shape that is shown is not to be trusted.
 void warn_of_range(World& w, Object& object) {
   if (object.range.warned)
@@ -134,8 +136,6 @@ void warn_of_range(World& w, Object& object) {
        ", the shape is not to be trusted there");
 }
 
-} // namespace
-
 void shape(World& w, Object& object) {
   Shown& shown = object.shown;
   if (shown.shaped)
@@ -150,6 +150,7 @@ void shape(World& w, Object& object) {
     require_bounded(object, u);
     shown.displacement.replace().assign(u.begin(), u.end());
   });
+  shown.box.reset();
   shown.shaped = true;
   warn_of_range(w, object);
 }
@@ -191,6 +192,26 @@ std::span<const double> known_shape(const Object& object) {
   return shown.whole->empty() ? *shown.displacement : *shown.whole;
 }
 
+void begin_showing(World& w, Object& object) {
+  Shown& shown = object.shown;
+  shown.deferred = nullptr;
+  leave_shown(w, object);
+  shown.whole = {};
+  shown.forces = {};
+  shown.box.reset();
+}
+
+void load_shown(const World& w, Object& object) {
+  object.shown.load = load_at(*object.load, object.model(), w.now.clock.time);
+}
+
+void end_showing(World& w, Object& object) {
+  add_touches(object);
+  require_bounded(object);
+  object.shown.time = w.now.clock.time;
+  object.shown.valid = true;
+}
+
 void show(World& w, Object& object) {
   if (object.body != nullptr || !object.load->empty())
     need_model(object);
@@ -198,14 +219,11 @@ void show(World& w, Object& object) {
   const bool meets = near && feels(w, object, Feature::touch);
   if (meets)
     shape_in_step(w, object); // that it comes from
+  begin_showing(w, object);
   Shown& shown = object.shown;
-  shown.deferred = nullptr;
-  leave_shown(w, object);
-  shown.whole = {};
-  shown.forces = {};
   const bool acted_on = object.statics->made() || !object.load->empty();
   if (object.method == Method::ffe && (meets || acted_on))
-    shown.load = load_at(*object.load, object.model(), w.now.clock.time);
+    load_shown(w, object);
   if (meets) {
     follow_instruments(w, object);
     shown.shaped = true;
@@ -225,10 +243,7 @@ void show(World& w, Object& object) {
   } else {
     show_motion(object);
   }
-  add_touches(object);
-  require_bounded(object);
-  shown.time = w.now.clock.time;
-  shown.valid = true;
+  end_showing(w, object);
 }
 
 } // namespace gewebe::simulation

@@ -49,6 +49,8 @@ bool goes(const Object& object, Way way) {
            !is_solid(object);
   case Way::meeting:
     return object.meets;
+  case Way::static_meeting:
+    return object.meets && !moves;
   }
   return false;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -73,20 +74,47 @@ std::vector<std::size_t> order_of_showing(const World& w) {
   return order;
 }
 
+bool needs_showing(World& w, Object& object) {
+  return !object.shown.valid ||
+         (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
+         touched_anew(w, object);
+}
+
+/// Of a group, by any of its objects. An instrument is looked for near all of them at once.
+bool needs_showing(World& w, StaticGroup& group) {
+  return !group.settled || std::ranges::any_of(group.parts, [&](std::size_t part) {
+    const Object& object = w.now.objects[part];
+    return !object.shown.valid || object.load->changes_until() > object.shown.time ||
+           touched_by_instruments(object);
+  }) || (w.now.poses.size() > 1 && passed_by_instruments(w, group_box(w, group), false));
+}
+
+/// Now, so that a failure is one of this step.
+void find_shapes(World& w, Object& object) {
+  if (w.now.settings.emits.any_shapes() || w.options.shapes || w.options.surfaces)
+    shape_in_step(w, object);
+  if (w.now.settings.emits.shapes || w.options.shapes)
+    (void)whole_shape(w, object);
+}
+
 void show_all(World& w) {
+  group_statics(w);
+  const StaticsBefore before = note_statics(w);
+  std::set<const StaticGroup*> looked_at;
   for (const std::size_t number : order_of_showing(w)) {
     Object& object = w.now.objects[number];
     if (w.now.settings.emits.any_shapes())
       need_model(object);
-    if (!object.shown.valid ||
-        (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
-        touched_anew(w, object))
+    if (StaticGroup* const group = static_group_of(w, number)) {
+      if (looked_at.insert(group).second && needs_showing(w, *group))
+        show_group(w, *group);
+    } else if (needs_showing(w, object)) {
       at_object(w, object, [&] { show(w, object); });
-    if (w.now.settings.emits.any_shapes() || w.options.shapes || w.options.surfaces)
-      shape_in_step(w, object); // now, so that a failure is one of this step
-    if (w.now.settings.emits.shapes || w.options.shapes)
-      (void)whole_shape(w, object);
+    }
+    find_shapes(w, object);
   }
+  for (const std::size_t number : show_late_groups(w, before))
+    find_shapes(w, w.now.objects[number]);
 }
 
 } // namespace

@@ -5,6 +5,7 @@
 #include "base/number_text.h"
 #include "scene/scene_internal.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -113,6 +114,9 @@ std::vector<NodeVector> static_forces(const Object& object);
 // bodies.cpp: what is tied together, or near and may touch, and moves as one
 using Motions = std::map<std::size_t, std::vector<NodeMotion>>;
 void need_body(World& w, std::size_t object);
+/// All parts as one model, without what ties them. \param offset becomes the first node of each
+Model joined_model(const World& w, std::span<const std::size_t> parts,
+                   std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
 void drop_body(World& w, const Body* body);
@@ -132,6 +136,8 @@ std::span<const NodeMotion> motion_of(const Object& object);
 
 // meetings.cpp: whose surfaces touch
 void meet(World& w, double to, Extents& extents, bool stay = false);
+/// Whether moving objects that aren't near may come to be.
+bool may_meet(const World& w, const Meeting& m);
 void note_extents(const World& w, Extents& extents);
 std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after);
 void join_late(World& w, const std::set<std::size_t>& objects);
@@ -141,9 +147,43 @@ void move_meetings(World& w, std::size_t index, const Moves& moves);
 /// Objects that may come to move as one with this one, by ties and meetings, itself among them.
 std::vector<std::size_t> together(const World& w, std::size_t object);
 
+// static_meetings.cpp: elastostatic objects whose surfaces touch
+/// Whether all that it is of is elastostatic.
+bool is_static(const World& w, const Meeting& m);
+/// Before objects are shown: those that are near become one group.
+void group_statics(World& w);
+StaticGroup* static_group_of(World& w, std::size_t object);
+/// Whether both go on as one, in one body or one group.
+bool as_one(const World& w, std::size_t object, std::size_t other);
+/// Where its surface is as it is shown, at most.
+const Box3& shown_box(World& w, std::size_t index);
+void show_group(World& w, StaticGroup& group);
+/// Of the surfaces of all its objects, as they are shown.
+const Box3& group_box(World& w, StaticGroup& group);
+/// What those need that may yet turn out to have come near each other: to go back to.
+struct StaticsBefore {
+  struct One {
+    std::size_t object = 0;
+    Shown shown; ///< without its shape
+    CameFrom came;
+    Box3 box;
+  };
+  std::vector<One> all;
+  std::vector<std::optional<Pose>> poses;
+};
+StaticsBefore note_statics(World& w);
+/// Behind the showing of all: those that were not near but have come, or passed each other, are
+/// shown again as one. \return these
+std::vector<std::size_t> show_late_groups(World& w, const StaticsBefore& before);
+
 // time.cpp: steps through events; show.cpp: the picture at their end
 void advance(World& w, double to);
 void show(World& w, Object& object);
+void begin_showing(World& w, Object& object);
+void end_showing(World& w, Object& object);
+/// What acts on it now will be shown.
+void load_shown(const World& w, Object& object);
+void warn_of_range(World& w, Object& object);
 void shape(World& w, Object& object);
 void shape_in_step(World& w, Object& object);
 /// Of all nodes, those inside a solid too.
@@ -173,7 +213,7 @@ void lead_on(World& w, double to, Extents& extents);
 void follow_hands(World& w, double to);
 bool gives_way_to(const World& w, const Instrument& instrument, const Object& object);
 MovedInstrument led_here(const World& w, const Instrument& instrument, const MovedInstrument& way);
-void settle(World& w, std::size_t instrument, const Object& object);
+void settle(World& w, std::size_t instrument, std::span<Object* const> objects);
 void end_leading(World& w);
 
 // contact.cpp: whom they touch
@@ -182,7 +222,25 @@ void end_guiding(World& w, double to);
 void take_touches(World& w, double duration);
 void gather_impulses(World& w, Body& body);
 bool touched_anew(World& w, Object& object);
+bool passed_by_instruments(const World& w, const Box3& box, bool first);
 void follow_instruments(World& w, Object& object);
+/// Instruments over a short part of their ways since the scene was shown.
+struct ShortWay {
+  std::vector<std::optional<MovedInstrument>> instruments;
+  bool last = false;
+};
+/// \param objects some that one of them gives way to, maybe
+std::vector<ShortWay> short_ways(const World& w, std::span<Object* const> objects);
+/// Whether what acts on it beside contact is other than shown. \pre shown.load is that of now
+bool acted_anew(const Object& object);
+/// Behind an update of their contact.
+void settle_led(World& w, std::span<Object* const> objects);
+void tell_stuck(World& w, Object& object, const NodeTouch& stuck);
+void warn_inexact(World& w, Object& object);
+inline bool touched_by_instruments(const Object& object) {
+  return std::ranges::any_of(object.shown.touches,
+                             [](const NodeTouch& t) { return t.instrument != other_surface; });
+}
 void add_touches(Object& object);
 
 // cuts.cpp: what they sever and what comes off

@@ -26,7 +26,6 @@ constexpr double same_place = 1e-8;
 constexpr double next_to_nothing = 1e-4; ///< of the largest force
 
 constexpr int max_turns = 40, turns_at_once = 8;
-constexpr int turns_of_step = 400;   ///< behind which its forces are told not to be exact
 constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
 constexpr int max_asked = 8;         ///< times that triangles beyond the operator's nodes are met
 constexpr int max_waits = 40;        ///< for instruments
@@ -45,7 +44,7 @@ bool passed_beside(const SurfacePair& p, const SurfacePair& q) {
 class MeetingYielding::Work {
 public:
   Work(Yielding& object, SurfacePairs& pairs, std::function<bool(std::uint32_t)> held,
-       std::span<const double> was, std::vector<SurfacePush> kept);
+       std::span<const double> was, std::vector<SurfacePush> kept, int most_turns);
 
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes);
   bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at);
@@ -87,15 +86,15 @@ private:
   std::vector<Vec3> at_;          ///< places of all nodes
   Eigen::VectorXd x_;             ///< of nodes_ under all forces
   bool begun_ = false, fresh_ = false, solved_ = true;
-  int waits_ = 0, turns_ = 0;
+  int waits_ = 0, turns_ = 0, most_turns_ = 0;
   double left_ = 0; ///< of gaps, over an edge
 };
 
 MeetingYielding::Work::Work(Yielding& object, SurfacePairs& pairs,
                             std::function<bool(std::uint32_t)> held, std::span<const double> was,
-                            std::vector<SurfacePush> kept)
+                            std::vector<SurfacePush> kept, int most_turns)
     : object_(object), pairs_(pairs), held_(std::move(held)), was_(was.begin(), was.end()),
-      was_at_(pairs.places_of(was)), all_(std::move(kept)) {}
+      was_at_(pairs.places_of(was)), all_(std::move(kept)), most_turns_(most_turns) {}
 
 /// The step under the last forces, and who touches whom in it.
 void MeetingYielding::Work::begin() {
@@ -270,7 +269,7 @@ void MeetingYielding::Work::solve() {
         pairs_.follow(p.pair, there);
       left_ = miss_of(then);
       if (!(left_ > (turn < turns_at_once ? same_gap : near_gap)) || turn == max_turns ||
-          turns_ >= turns_of_step || !solved_)
+          turns_ >= most_turns_ || !solved_)
         break;
       part = turn < turns_at_once ? 1 : turn < 2 * turns_at_once ? 0.5 : 0.25;
       for (const std::uint32_t node : nodes_)
@@ -284,7 +283,7 @@ void MeetingYielding::Work::solve() {
         if (p.pair.share[c] != 0 && !held_(p.pair.nodes[c]) &&
             !std::ranges::binary_search(nodes_, p.pair.nodes[c]))
           beyond = true;
-    if (!beyond || turns_ >= turns_of_step)
+    if (!beyond || turns_ >= most_turns_)
       return;
     more_ = nodes_; // none leaves again
   }
@@ -376,7 +375,7 @@ bool MeetingYielding::Work::push(std::span<const NodeTouch> touches, std::span<c
       !join(pairs_.find_passed(object_.shape(), was_, surface_depth * pairs_.edge()), true);
   fresh_ = false;
   take_shape();
-  if (turns_ < turns_of_step)
+  if (turns_ < most_turns_)
     return agreed;
   solved_ = solved_ && agreed;
   return true;
@@ -415,8 +414,10 @@ TouchCounts MeetingYielding::Work::counts() const {
 
 MeetingYielding::MeetingYielding(Yielding& object, SurfacePairs& pairs,
                                  std::function<bool(std::uint32_t)> held,
-                                 std::span<const double> was, std::vector<SurfacePush> kept)
-    : work_(std::make_unique<Work>(object, pairs, std::move(held), was, std::move(kept))) {}
+                                 std::span<const double> was, std::vector<SurfacePush> kept,
+                                 int most_turns)
+    : work_(std::make_unique<Work>(object, pairs, std::move(held), was, std::move(kept),
+                                   most_turns)) {}
 
 MeetingYielding::~MeetingYielding() = default;
 

@@ -39,9 +39,10 @@ struct SurfacePush {
 class MeetingYielding final : public Yielding {
 public:
   /// Keeps references. \param held whether a node gives way along no axis \param was displacements
-  /// when the step began \param kept of the last step
+  /// when the step began \param kept of the last step \param most_turns behind which its forces are
+  /// told not to be exact
   MeetingYielding(Yielding& object, SurfacePairs& pairs, std::function<bool(std::uint32_t)> held,
-                  std::span<const double> was, std::vector<SurfacePush> kept);
+                  std::span<const double> was, std::vector<SurfacePush> kept, int most_turns = 400);
   ~MeetingYielding() override;
 
   DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override;

@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "statics/contact_turns_internal.h"
+#include "statics/elastostatic_yielding.h"
 #include "statics/giving_contact_internal.h"
 
 #include <algorithm>
@@ -223,9 +224,10 @@ ContactNodes StaticContact::around(std::span<const std::uint32_t> nodes,
   return all;
 }
 
-void StaticContact::restart(std::span<const double> shape, std::vector<NodeTouch> touches) {
+void StaticContact::restart(std::span<const double> shape, std::vector<NodeTouch> touches,
+                            std::vector<PointTouch> points) {
   touches_ = std::move(touches);
-  points_.clear();
+  points_ = std::move(points);
   facets_.set_shape(model_, shape);
 }
 
@@ -368,35 +370,6 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     }
   }
 }
-
-namespace {
-
-/// One solution for any forces.
-class ElastostaticYielding final : public Yielding {
-public:
-  ElastostaticYielding(const std::function<Elastostatic&()>& solver, const Load& load)
-      : solver_(solver), load_(load) {}
-  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
-    return solver_().delassus_operator(load_, nodes);
-  }
-  bool push(std::span<const NodeTouch> touches, std::span<const Vec3>) override {
-    pushed_ = load_;
-    for (const NodeTouch& t : touches)
-      pushed_.force[t.node] += t.force;
-    return true;
-  }
-  std::span<const double> shape() override {
-    solver_().update(pushed_);
-    return solver_().surface_displacement();
-  }
-
-private:
-  const std::function<Elastostatic&()>& solver_;
-  const Load& load_;
-  Load pushed_;
-};
-
-} // namespace
 
 void StaticContact::update(const std::function<Elastostatic&()>& solver, const Load& load,
                            std::span<const std::optional<MovedInstrument>> instruments,

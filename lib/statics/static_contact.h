@@ -114,14 +114,17 @@ public:
   void update(const std::function<Elastostatic&()>& solver, const Load& load,
               std::span<const std::optional<MovedInstrument>> instruments,
               std::vector<double>& shape, bool last = true);
-  /// From another state: its shape and what is touched in it.
-  void restart(std::span<const double> shape, std::vector<NodeTouch> touches);
+  /// From another state: its shape and what is touched in it, in points if they are known.
+  void restart(std::span<const double> shape, std::vector<NodeTouch> touches,
+               std::vector<PointTouch> points = {});
   /// Of the last shape; where something is touched, a larger one.
   const Box3& box() const noexcept { return facets_.box(); }
+  /// range_of the last shape, if it is known.
+  const std::optional<Box3>& range() const noexcept { return facets_.range(); }
 
   /// By ascending node and instrument; forces that don't vanish.
   const std::vector<NodeTouch>& touches() const noexcept { return touches_; }
-  /// The points that these are of; none behind a restart.
+  /// The points that these are of, where they are known.
   const std::vector<PointTouch>& points() const noexcept { return points_; }
   /// How far an instrument has given way in the last update, from where it is now.
   Vec3 gave(std::size_t instrument) const {

@@ -36,6 +36,8 @@ std::vector<Way> ways_of(Way way) {
     return {Way::explicit_motion, Way::explicit_net, Way::whole};
   case Way::meeting:
     return {Way::implicit_motion, Way::whole, Way::meeting};
+  case Way::static_meeting:
+    return {Way::elastostatic, Way::whole, Way::meeting, Way::static_meeting};
   case Way::two_step:
     return {Way::elastostatic, Way::whole, Way::two_step};
   case Way::two_step_stored:
@@ -129,11 +131,11 @@ public:
     Model beside = test::organ(3);
     for (Node& n : beside.nodes)
       n.position.x += 100;
-    scene_.add_object("p", std::move(beside), Method::ela, {},
+    scene_.add_object("p", std::move(beside), moves ? Method::ela : Method::ffe, {},
                       way == Way::solid_motion ? Integration::implicit : integration);
     if (way == Way::attached)
       scene_.apply(tie());
-    if (way == Way::meeting)
+    if (way == Way::meeting || way == Way::static_meeting)
       scene_.apply(SetContact{0, 1, 0.5});
     if (way == Way::warped)
       scene_.apply(SetWarp{0});
