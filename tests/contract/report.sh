@@ -18,7 +18,7 @@ for name, title, *_ in PAGES:
     text = (folder / f"{name}.md").read_text() if (folder / f"{name}.md").exists() else ""
     if not text.startswith(f"# {title}\n"):
         failed.append(f"{name}.md is absent or another page")
-    if not re.search(r"Measured 20\d\d-\d\d-\d\d on .+, \d+ cores, load average [0-9.]+", text):
+    if not re.search(r"Measured 20\d\d-\d\d-\d\d on .+, \d+ cores, load average [0-9.]+|Measured as the pages of work say", text):
         failed.append(f"{name}.md does not say where it was measured")
     if f"]({name}.md)" not in listed:
         failed.append(f"README.md does not list {name}.md")
@@ -77,6 +77,10 @@ END
   grep -q '^| factor of a net, 300 rows, one thread | – | 10 ms on 1 thread, CHOLMOD 40 ms on 1 thread: 4 times as long |$' pages/work-factor.md ||
     fail 'other times than the rows have' "$(<pages/work-factor.md)"
   cmp rows pages/factor.csv
+  # The picture of all stages is drawn from such rows, on equal threads.
+  report pages --build build --page ratios >log 2>&1 || fail "$(<log)"
+  grep -q '^| factor of a net, 1 thread | CHOLMOD, 1 thread | 4 |$' pages/ratios.md || fail 'another ratio' "$(<pages/ratios.md)"
+  grep -q "^| factor of a net | BLAS's matrix product | 0.0864 |$" pages/ratios.md || fail 'another fraction' "$(<pages/ratios.md)"
   # A page that can't be made fails the whole; one that nobody knows is refused.
   printf '#!/bin/bash\nexit 3\n' >build/bench_factor
   local status=0

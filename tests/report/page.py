@@ -33,7 +33,7 @@ class Page:
 
     def __init__(self, name, title, where, folder):
         self.name, self.title, self.where, self.folder = name, title, where, pathlib.Path(folder)
-        self.claims, self.parts = [], []
+        self.claims, self.parts, self.note = [], [], None  # note: in place of when and where it was measured
 
     def claim(self, what, report, ours):
         """What the report has and what is measured here, numbers or words."""
@@ -72,7 +72,7 @@ class Page:
         )
 
     def write(self, note):
-        lines = [f"# {self.title}\n", f"*{self.where}.* {note}\n"]
+        lines = [f"# {self.title}\n", f"*{self.where}.* {self.note or note}\n"]
         if self.claims:
             lines.append(table(("", "FZKA 7190", "Gewebe"), self.claims))
         (self.folder / f"{self.name}.md").write_text("\n".join(lines + self.parts))

@@ -103,6 +103,34 @@ def curves(title, x_name, y_name, data, log_x=True, log_y=True, marks=True, leve
     return "\n".join(out) + "\n"
 
 
+def bars(title, panels):
+    """Lengths from a mark, on a logarithm unless that is 0: panels [(name of the axis, [(line, beside it, value), ...], mark), ...] below each other."""
+    escape = xml.sax.saxutils.escape
+    left, row = 530, 20
+    out, top = [], 40
+    for name, lines, mark in panels:
+        axis = Axis([value for *_, value in lines] + [mark or 1], mark > 0, left, WIDTH)
+        bottom = top + row * len(lines) + 8
+        for tick in axis.ticks():
+            out.append(f"<path d='M{axis.at(tick):.1f},{top} V{bottom}' stroke='#ddd'/>")
+            out.append(f"<text text-anchor='middle' x='{axis.at(tick):.1f}' y='{bottom + 16}'>{number(tick)}</text>")
+        for k, (line, beside, value) in enumerate(lines):
+            y, a, b = top + 6 + row * k, axis.at(mark), axis.at(value)
+            out.append(f"<rect x='{min(a, b):.1f}' y='{y}' width='{abs(b - a):.1f}' height='13' fill='{COLOURS[0] if value >= mark else COLOURS[1]}'/>")
+            out.append(f"<text text-anchor='end' x='{left - 8}' y='{y + 11}'>{escape(line)} <tspan fill='#555'>{escape(beside)}</tspan></text>")
+            out.append(f"<text x='{left + WIDTH + 8}' y='{y + 11}'>{value:.3g}</text>")
+        out.append(f"<path d='M{axis.at(mark):.1f},{top} V{bottom}' stroke='#444'/>")
+        out.append(f"<text text-anchor='middle' x='{left + WIDTH / 2}' y='{bottom + 34}'>{escape(name)}</text>")
+        top = bottom + 56
+    width = left + WIDTH + 60
+    head = [
+        f"<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='{top}' viewBox='0 0 {width} {top}' font-family='sans-serif' font-size='12'>",
+        "<rect width='100%' height='100%' fill='white'/>",
+        f"<text x='8' y='24' font-size='14'>{escape(title)}</text>",
+    ]
+    return "\n".join(head + out) + "</svg>\n"
+
+
 def front_faces(path, window, pixels=360):
     """The triangles of an OBJ file that look to the front (-y), from back to front, as the text of an SVG.
 

@@ -17,6 +17,7 @@ import time
 import deformation
 import machine
 import modelling
+import ratios
 import rendering
 import work
 from page import Page, Skipped, table
@@ -36,6 +37,7 @@ PAGES = [
     ("hybrid", "Elastodynamic and elastostatic organs in one scene", "Figure 4-9, section 4.3", deformation.hybrid),
     ("latency", "A thousand answers a second", "Beyond the report: who feels the forces", deformation.latency),
     *work.PAGES,
+    *ratios.PAGES,
     ("validation", "Elements judged by theory, benchmarks and an experiment", "Beyond the report: is it right?", work.validation),
 ]
 
