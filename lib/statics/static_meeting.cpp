@@ -32,12 +32,12 @@ bool StaticMeeting::free_update(Yielding& objects, const std::map<std::uint32_t,
                                 std::span<const std::optional<MovedInstrument>> instruments,
                                 std::vector<double>& shape, bool last) {
   const std::vector<double> before = shape, still(shape.size());
-  const bool near = pairs_.may_touch(places(before), still, 0);
+  (void)pairs_.may_touch(places(before), still, 0); // looks how near they are, now and then
   const std::vector<NodeTouch> touches = contact_.touches();
   const std::vector<PointTouch> points = contact_.points();
   const TouchCounts counts = contact_.take_counts();
   contact_.update(objects, displaced, instruments, shape, last);
-  if ((near || pairs_.may_have_touched(places(shape))) && come_together(before, shape)) {
+  if (pairs_.may_have_touched(places(shape)) && come_together(before, shape)) {
     (void)contact_.take_counts();
     shape = before;
     contact_.restart(shape, touches, points);
