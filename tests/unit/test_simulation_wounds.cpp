@@ -354,8 +354,10 @@ TEST(WoundScenes, WhatComesOffAnElastostaticObjectMayTouchWhatMoves) {
     s.apply(SetContact{0, 2, 0});
     ADD_FAILURE() << "no error";
   } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "object bar is elastostatic (ffe), expected ela objects for contact");
+    EXPECT_STREQ(
+        error.what(),
+        "one of bar and bar.1 is elastostatic (ffe) and the other is not, expected both alike for "
+        "contact");
   }
   s.apply(SetContact{2, 1, 0.8});
   for (int k = 0; k < 16; ++k) {
