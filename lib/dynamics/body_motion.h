@@ -8,6 +8,7 @@
 #include "contact/surface_pairs.h"
 #include "dynamics/dynamic_contact.h"
 #include "dynamics/spring_force.h"
+#include "dynamics/standing.h"
 #include "statics/static_contact.h"
 
 #include <any>
@@ -92,6 +93,15 @@ public:
   /// Parts whose surfaces may touch each other, or themselves, from now on. Wakes nobody.
   /// \pre it moves by the steps of solids, or there are none
   virtual void set_meetings(std::vector<SurfaceMeeting> meetings) = 0;
+  /// Elastostatic objects that it may touch stand beside it from now on; their nodes come behind
+  /// its own wherever something touches. \pre before set_meetings, once, by the steps of solids
+  virtual void stand_beside(const StandingStart& start) { (void)start; }
+  /// How they stand during the advances to come. \pre some stand beside it; lives that long
+  virtual void set_standing(Standing* beside) { (void)beside; }
+  /// Displacements of their nodes behind the last advance.
+  virtual std::span<const double> standing_shape() const { return {}; }
+  /// What touched them in the last step, by their own numbers.
+  virtual std::vector<NodeTouch> standing_touches() const { return {}; }
   /// That it rests for `duration` s more, in place of an advance. \pre resting()
   virtual void rest_on(double duration) = 0;
   /// Impulses (forces times s) of the instruments since the last call, by ascending node and

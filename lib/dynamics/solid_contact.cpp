@@ -1,6 +1,7 @@
 #include "dynamics/solid_contact.h"
 
 #include "base/vector_at.h"
+#include "statics/joined_yielding.h"
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -21,14 +22,30 @@ constexpr int max_held_back = 12; ///< times that half of a way is left
 /// Pushes in all whose rounds ran out: of what comes of such nothing is learned.
 constexpr int max_unfinished = 2;
 
-/// Displacements of nodes that are there.
+/// Displacements of nodes that are there, the first ones of a model.
 std::vector<double> shape_at(const Model& model, std::span<const double> places) {
-  std::vector<double> shape(3 * model.nodes.size());
-  for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
+  std::vector<double> shape(places.size());
+  for (std::uint32_t i = 0; i < places.size() / 3; ++i)
     for (int a = 0; a < 3; ++a)
       shape[axis_of(i, a)] = places[axis_of(i, a)] - model.nodes[i].position[a];
   return shape;
 }
+
+/// One that somebody else has.
+class Lent final : public Yielding {
+public:
+  explicit Lent(Yielding& one) : one_(one) {}
+  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
+    return one_.delassus_operator(nodes);
+  }
+  bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) override {
+    return one_.push(touches, at);
+  }
+  std::span<const double> shape() override { return one_.shape(); }
+
+private:
+  Yielding& one_;
+};
 
 } // namespace
 
@@ -115,6 +132,8 @@ public:
   }
 
   std::span<const double> shape() override {
+    if (!ran_) // nothing has asked for it yet
+      run();
     shape_ = shape_at(all_.model_, step_.engine.places());
     return shape_;
   }
@@ -125,6 +144,12 @@ public:
       step_.engine.restore(
           std::vector<double>(step_.engine.places().begin(), step_.engine.places().end()), speed_,
           context_);
+  }
+  /// What pushed in the last step does no more.
+  void let_go() {
+    force_.clear();
+    if (ran_)
+      run();
   }
   bool exact() const { return exact_; }
   void distrust(bool inexact) { exact_ = exact_ && !inexact; }
@@ -260,14 +285,14 @@ private:
       engine.restore(places_, velocity_, context_);
     }
     std::vector<double> forces(step_.forces.begin(), step_.forces.end()), between;
-    if (step_.meets)
+    if (step_.meets && step_.beside == nullptr) // which gives and takes energy that nobody knows
       between.resize(forces.size());
     double pushed_with = 0;
     for (const NodeTouch& t : force_) {
       pushed_with += t.instrument == other_surface ? norm(t.force) / 2 : 0;
       for (int a = 0; a < 3; ++a) {
         forces[axis_of(t.node, a)] += t.force[a];
-        if (t.instrument == other_surface)
+        if (t.instrument == other_surface && !between.empty())
           between[axis_of(t.node, a)] += t.force[a];
       }
     }
@@ -308,14 +333,43 @@ private:
   SolidStep took_;
 };
 
-SolidContact::SolidContact(const Model& model, std::vector<SurfaceMeeting> meetings)
-    : model_(model), contact_(model, std::vector<double>(3 * model.nodes.size())) {
+SolidContact::SolidContact(const Model& model, std::size_t own,
+                           std::vector<SurfaceMeeting> meetings)
+    : model_(model), own_(own), contact_(model, std::vector<double>(3 * model.nodes.size())) {
   if (!meetings.empty())
     pairs_.emplace(model, std::move(meetings));
 }
 
+/// Displacements of all.
+std::vector<double> SolidContact::shape_of(std::span<const double> places,
+                                           std::span<const double> stands) const {
+  std::vector<double> shape = shape_at(model_, places);
+  shape.insert(shape.end(), stands.begin(), stands.end());
+  return shape;
+}
+
+/// What gives way, with surfaces that touch.
+void SolidContact::meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
+                        std::vector<SurfacePush>& pushes, std::vector<double>& shape,
+                        bool& solved) {
+  MeetingYielding both(
+      all, *pairs_,
+      [&](std::uint32_t node) {
+        return model_.nodes[node].fixed == fixed_all || step.displaced.contains(node);
+      },
+      shape, std::move(pushes));
+  contact_.update(both, step.displaced, step.instruments, shape, !step.clearing);
+  met_.add(both.counts());
+  touches = both.touches();
+  pushes = both.kept();
+  touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
+  touches = sums_of_touches(std::move(touches));
+  solved = both.solved();
+}
+
 SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>& touches,
-                                        std::vector<SurfacePush>& pushes, const Context& context) {
+                                        std::vector<SurfacePush>& pushes,
+                                        std::vector<double>& stands, const Context& context) {
   std::vector<NodeTouch> by_instruments;
   for (const NodeTouch& t : touches)
     if (t.instrument < step.instruments.size() && step.instruments[t.instrument] &&
@@ -329,40 +383,58 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
   std::erase_if(columns_, [&](const auto& of) {
     return std::ranges::none_of(touches, [&](const NodeTouch& t) { return t.node == of.first; });
   });
-  std::vector<double> places; // where surfaces that meet begin
+  Began began; // where surfaces that meet begin
+  std::vector<double> shape = shape_of(step.engine.places(), stands);
   if (step.meets)
-    places.assign(step.engine.places().begin(), step.engine.places().end());
-  std::vector<double> shape = shape_at(model_, step.engine.places());
+    began = {{step.engine.places().begin(), step.engine.places().end()}, shape};
   contact_.restart(shape, std::move(by_instruments));
-  bool met = true;
-  Object object(*this, step, touches, context);
-  if (!step.meets) {
-    contact_.update(object, step.displaced, step.instruments, shape, !step.clearing);
-    touches = contact_.touches();
-    pushes.clear();
+  const auto own = static_cast<std::uint32_t>(own_),
+             all = static_cast<std::uint32_t>(model_.nodes.size());
+  const std::vector<NodeTouch> last = touches;
+  Object object(*this, step, touches_of_part(last, 0, own), context);
+  bool met = true, found = true; ///< of what stands beside as well
+  const auto go = [&](Yielding& yielding) {
+    bool solved = true;
+    if (step.meets) {
+      meet(step, yielding, touches, pushes, shape, solved);
+    } else {
+      contact_.update(yielding, step.displaced, step.instruments, shape, !step.clearing);
+      touches = contact_.touches();
+      pushes.clear();
+    }
+    object.distrust(!solved);
+  };
+  if (step.beside == nullptr) {
+    go(object);
   } else {
-    MeetingYielding both(
-        object, *pairs_,
-        [&](std::uint32_t node) {
-          return model_.nodes[node].fixed == fixed_all || step.displaced.contains(node);
-        },
-        shape, std::move(pushes));
-    contact_.update(both, step.displaced, step.instruments, shape, !step.clearing);
-    met_.add(both.counts());
-    touches = both.touches();
-    pushes = both.kept();
-    touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
-    touches = sums_of_touches(std::move(touches));
-    object.distrust(!both.solved());
-    met = object.exact() && (object.took().excess <= 0 || overlaps(shape));
+    const auto with = [&](std::span<const NodeTouch> pushed) {
+      std::vector<JoinedYielding::Part> parts;
+      parts.push_back({std::make_unique<Lent>(object), 0});
+      parts.push_back({step.beside->yielding(step.time, touches_of_part(pushed, own, all)), own});
+      JoinedYielding joined(std::move(parts), all);
+      go(joined);
+      found = step.beside->solved();
+    };
+    with(last);
+    if (step.meets && !step.clearing && touches.empty() && !last.empty()) {
+      // All let go: once more without what they pushed with, which nothing has taken back yet.
+      shape = began.shape;
+      pushes.clear();
+      contact_.restart(shape, {});
+      object.let_go();
+      with({});
+    }
+    stands.assign(shape.begin() + static_cast<std::ptrdiff_t>(3 * own_), shape.end());
   }
+  if (step.meets)
+    met = object.exact() && (object.took().excess <= 0 || overlaps(shape));
   if (!met) // by what the step has moved, of which nothing is known behind its end
-    hold_back(step, places, object.took().excess, context);
+    hold_back(step, began, stands, object.took().excess, context);
   object.end();
   if (pushes.empty())
     step.engine.drop_tangent();
   step.engine.set_tolerance(step.options.tolerance, step.options.max_rounds);
-  return {object.took(), object.exact() && contact_.solved(), met};
+  return {object.took(), object.exact() && found && contact_.solved(), met};
 }
 
 /// Whether surfaces are in each other: they have energy of their own.
@@ -373,19 +445,22 @@ bool SolidContact::overlaps(std::span<const double> shape) {
 }
 
 /// Where forces were not found nothing has passed another surface nevertheless, and none has won.
-void SolidContact::hold_back(const Step& step, std::span<const double> places, double excess,
-                             const Context& context) {
-  const std::vector<double> was = shape_at(model_, places);
+void SolidContact::hold_back(const Step& step, const Began& began, std::vector<double>& stands,
+                             double excess, const Context& context) {
   const auto passed = [&] {
     return !pairs_
-                ->find_passed(shape_at(model_, step.engine.places()), was,
+                ->find_passed(shape_of(step.engine.places(), stands), began.shape,
                               surface_depth * pairs_->edge())
                 .empty();
   };
-  if (!(excess <= 0) && overlaps(was))
+  if (!(excess <= 0) && overlaps(began.shape))
     excess = 0;
+  const std::span<const double> stood = std::span(began.shape).subspan(3 * own_);
   for (int halved = 0; !(excess <= 0) || passed(); ++halved) {
-    excess = step.engine.hold_back(places, halved < max_held_back ? 0.5 : 0, context);
+    const double part = halved < max_held_back ? 0.5 : 0;
+    excess = step.engine.hold_back(began.places, part, context);
+    for (std::size_t k = 0; k < stands.size(); ++k)
+      stands[k] = stood[k] + part * (stands[k] - stood[k]);
     if (halved == max_held_back)
       return;
   }

@@ -11,10 +11,12 @@
 // (statics/meeting_yielding.h), to 1e-4 of an edge; of a net A has the tangent of its springs
 // there, whose bound lets W know nothing of how easily a wall gives way across itself. Nothing of a
 // step's velocity into an instrument is left at its end, and friction acts against the slip over
-// the step.
+// the step. Elastostatic objects that stand beside the body (dynamics/standing.h) are touched and
+// touch with it, as one.
 
 #include "base/context.h"
 #include "dynamics/dynamic_contact.h"
+#include "dynamics/standing.h"
 #include "model/model.h"
 #include "solid/solid_motion.h"
 #include "statics/meeting_yielding.h"
@@ -31,10 +33,11 @@ namespace gewebe {
 
 class SolidContact {
 public:
-  /// Keeps a reference to the model. \param meetings parts whose surfaces may touch
-  explicit SolidContact(const Model& model, std::vector<SurfaceMeeting> meetings = {});
+  /// Keeps a reference to the model. \param own nodes of it that move, the first ones; those behind
+  /// are of what stands beside \param meetings parts whose surfaces may touch
+  SolidContact(const Model& model, std::size_t own, std::vector<SurfaceMeeting> meetings = {});
 
-  /// Whether surfaces may touch each other within a step of h from these places.
+  /// Whether surfaces may touch each other within a step of h from these places of all nodes.
   bool may_meet(std::span<const double> places, std::span<const double> velocity, double h) {
     return pairs_ && pairs_->may_touch(places, velocity, h);
   }
@@ -50,12 +53,14 @@ public:
     SolidMotion& engine;                            ///< where the step begins
     std::span<const double> forces;                 ///< on the 3 n axes, without instruments
     std::span<const double> target;                 ///< of held axes; empty: they stay
-    const std::map<std::uint32_t, Vec3>& displaced; ///< nodes whose axes are all held
+    const std::map<std::uint32_t, Vec3>& displaced; ///< of all, nodes whose axes are all held
     std::span<const std::optional<MovedInstrument>> instruments; ///< during the step
     double h = 0;
     SolidMotionOptions options; ///< of the engine
     bool clearing = false;      ///< only what is in the way moves, from rest, and keeps its speed
     bool meets = false;         ///< surfaces may touch: see may_meet
+    Standing* beside = nullptr; ///< what stands beside the body
+    double time = 0;            ///< of its loads
   };
   struct Result {
     SolidStep took; ///< of all rounds
@@ -63,9 +68,10 @@ public:
     bool met = true; ///< surfaces touch as they should
   };
   /// Takes the engine on by a step; one that clears, where something is in the way. \param touches,
-  /// pushes of the last step, then of this one \throw as SolidMotion::step
+  /// pushes of the last step, then of this one \param stands displacements of what stands beside,
+  /// before and behind it \throw as SolidMotion::step, and as what stands beside
   Result step(const Step& step, std::vector<NodeTouch>& touches, std::vector<SurfacePush>& pushes,
-              const Context& context);
+              std::vector<double>& stands, const Context& context);
   /// Of contacts since the last call.
   TouchCounts take_counts() {
     TouchCounts all = contact_.take_counts();
@@ -80,11 +86,21 @@ public:
 
 private:
   class Object;
+  /// Where a step began.
+  struct Began {
+    std::vector<double> places; ///< of the body's nodes
+    std::vector<double> shape;  ///< of all
+  };
+  std::vector<double> shape_of(std::span<const double> places,
+                               std::span<const double> stands) const;
+  void meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
+            std::vector<SurfacePush>& pushes, std::vector<double>& shape, bool& solved);
   bool overlaps(std::span<const double> shape);
-  void hold_back(const Step& step, std::span<const double> places, double excess,
+  void hold_back(const Step& step, const Began& began, std::vector<double>& stands, double excess,
                  const Context& context);
 
   const Model& model_;
+  std::size_t own_ = 0;
   StaticContact contact_;
   std::optional<SurfacePairs> pairs_;
   TouchCounts met_; ///< of surfaces

@@ -304,6 +304,10 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
         target[axis_of(node, a)] = u[a];
     }
   }
+  if (all_held_ && standing_ != nullptr)
+    throw MotionError(0, to,
+                      "is held as all others of its object are, expected some that are free beside "
+                      "an elastostatic one that it may touch");
   if (all_held_) {
     std::vector<double> velocity(before.size());
     for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
@@ -334,8 +338,10 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
       moved = larger(moved, by);
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
+  moved = larger(moved, moved_beside(start));
   const bool quiet = met && moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
                      !moving.recovering() && !(state_.load->changes_until() > to) &&
+                     !(standing_ != nullptr && standing_->changes(from, to)) &&
                      !instruments_move(first, from, to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
@@ -385,6 +391,13 @@ void SolidDynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
     return;
   meetings_ = std::move(meetings);
   state_.pushes.clear();
+  contact_.reset();
+}
+
+void SolidDynamic::stand_beside(const StandingStart& start) {
+  beside_model_ = start.model;
+  state_.stands.replace() = start.shape;
+  state_.touched.insert(state_.touched.end(), start.touches.begin(), start.touches.end());
   contact_.reset();
 }
 

@@ -8,8 +8,9 @@
 // pressures of a step are those at its end, pressures on the shape at its beginning. Displaced
 // nodes stand at their displacement, or are on their way there. Instruments push within each step
 // (dynamics/solid_contact.h); what one jumps over, or passes by more than half its radius in a
-// step, is moved along before, without speed. The same bytes for any number of
-// threads.
+// step, is moved along before, without speed. Elastostatic objects that stand beside it
+// (dynamics/standing.h) stand at each step's end as their loads say then. The same bytes for any
+// number of threads.
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
@@ -21,6 +22,7 @@
 
 #include <any>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,6 +59,10 @@ public:
   void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
   std::optional<LedInstrument> led(std::size_t instrument) const override;
   void set_meetings(std::vector<SurfaceMeeting> meetings) override;
+  void stand_beside(const StandingStart& start) override;
+  void set_standing(Standing* beside) override { standing_ = beside; }
+  std::span<const double> standing_shape() const override { return *state_.stands; }
+  std::vector<NodeTouch> standing_touches() const override;
   void rest_on(double duration) override;
   std::vector<NodeTouch> take_impulses() override;
   bool touches_exact() const override { return state_.exact; }
@@ -71,6 +77,7 @@ private:
     std::shared_ptr<const Load> load = std::make_shared<const Load>();
     double time = 0;
     CopyOnWrite<std::vector<double>> places{}, velocity{}, reactions{}; ///< 3 n
+    CopyOnWrite<std::vector<double>> stands{}; ///< displacements of what stands beside it
     MotionEnergies energies;
     std::uint64_t version = 0; ///< of all these
     int quiet = 0;             ///< steps in a row that moved next to nothing
@@ -106,12 +113,20 @@ private:
               double from, double to, bool first, const Context& context);
   /// Where a step began.
   struct Began {
-    double energy = 0;          ///< where there are instruments
-    std::vector<double> places; ///< 3 n
-    std::vector<Pose> stood;    ///< by instrument
+    double energy = 0;                       ///< where there are instruments
+    std::vector<double> places;              ///< 3 n
+    std::vector<Pose> stood;                 ///< by instrument
+    CopyOnWrite<std::vector<double>> stands; ///< what stands beside it
   };
   Began began(double from) const;
   bool thrown(const Began& start, std::span<const double> forces, double to) const;
+
+  // What stands beside it.
+  const Model& model_of_all() const { return beside_model_ ? *beside_model_ : model_; }
+  std::vector<double> with_beside(std::span<const double> own, bool places) const;
+  std::map<std::uint32_t, Vec3> displaced(double time) const;
+  void let_stand(double from, double to);
+  double moved_beside(const Began& start) const;
 
   const Model& model_;
   SolidMotionOptions options_;
@@ -129,6 +144,8 @@ private:
   std::vector<PressedCorner> pressed_;
 
   std::vector<SurfaceMeeting> meetings_;
+  std::shared_ptr<const Model> beside_model_; ///< of the body and of what stands beside it
+  Standing* standing_ = nullptr;              ///< that, during advances
 
   std::optional<SolidMotion> engine_;
   double last_step_ = 0;                  ///< of the engine

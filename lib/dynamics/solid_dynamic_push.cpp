@@ -1,10 +1,13 @@
 // What touches within a step of a solid that moves: instruments and surfaces.
 
+#include "base/larger.h"
 #include "base/vector_at.h"
 #include "dynamics/solid_dynamic.h"
+#include "statics/joined_yielding.h"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -20,18 +23,65 @@ constexpr double thrown_by = 0.1;
 } // namespace
 
 SolidDynamic::Began SolidDynamic::began(double from) const {
-  Began start{0, {engine_->places().begin(), engine_->places().end()}, {}};
+  Began start{0, {engine_->places().begin(), engine_->places().end()}, {}, {}};
   if (!state_.instruments.empty())
     start.energy = engine_->kinetic_energy() + engine_->elastic_energy();
   for (const auto& i : state_.instruments)
     start.stood.push_back(i ? i->at(from) : Pose{});
+  start.stands = state_.stands;
   return start;
+}
+
+// ---- what stands beside it
+
+/// Of the body's nodes and those beside it: what is given for its own, and displacements of theirs,
+/// as places, or 0.
+std::vector<double> SolidDynamic::with_beside(std::span<const double> own, bool places) const {
+  std::vector<double> all(own.begin(), own.end());
+  const std::size_t count = own.size();
+  all.resize(count + state_.stands->size());
+  for (std::size_t k = 0; places && k < state_.stands->size(); ++k)
+    all[count + k] = beside_model_->nodes[(count + k) / 3].position[static_cast<int>(k % 3)] +
+                     (*state_.stands)[k];
+  return all;
+}
+
+/// Nodes of all that stand where they must. \pre some stand beside it
+std::map<std::uint32_t, Vec3> SolidDynamic::displaced(double time) const {
+  std::map<std::uint32_t, Vec3> all = state_.load->displacement;
+  for (const auto& [node, u] : standing_->displaced(time))
+    all.emplace_hint(all.end(), static_cast<std::uint32_t>(model_.nodes.size()) + node, u);
+  return all;
+}
+
+/// Where nothing touches them.
+void SolidDynamic::let_stand(double from, double to) {
+  const bool let_go = !standing_touches().empty();
+  if (standing_ == nullptr || (!let_go && !standing_->changes(from, to)))
+    return;
+  const std::unique_ptr<Yielding> all = standing_->yielding(to, {});
+  (void)all->push({}, {});
+  const std::span<const double> shape = all->shape();
+  state_.stands.replace().assign(shape.begin(), shape.end());
+}
+
+std::vector<NodeTouch> SolidDynamic::standing_touches() const {
+  return touches_of_part(state_.touched, static_cast<std::uint32_t>(model_.nodes.size()),
+                         static_cast<std::uint32_t>(model_of_all().nodes.size()));
+}
+
+/// The farthest way of one of their nodes in a step, along an axis.
+double SolidDynamic::moved_beside(const Began& start) const {
+  double most = 0;
+  for (std::size_t k = 0; k < state_.stands->size(); ++k)
+    most = larger(most, std::abs((*state_.stands)[k] - (*start.stands)[k]));
+  return most;
 }
 
 /// Whether a step left more energy than instruments and other forces gave, by their ways: then
 /// forces that were not found have thrown the body about.
 bool SolidDynamic::thrown(const Began& start, std::span<const double> forces, double to) const {
-  if (state_.instruments.empty())
+  if (state_.instruments.empty() || standing_ != nullptr) // whose energy nobody knows
     return false;
   double work = 0;
   for (const NodeTouch& t : state_.touched) {
@@ -64,11 +114,13 @@ void SolidDynamic::step_in_parts(double h, double from, double to, bool first, i
   if (met || halvings == 0 || state_.tries <= 0)
     return;
   if (!meetings_.empty()) {
-    std::vector<double> free(velocity), moved(engine_->places().begin(), engine_->places().end());
-    for (std::size_t axis = 0; axis < moved.size(); ++axis) {
+    std::vector<double> free = with_beside(velocity, false), moved(free.size());
+    for (std::size_t axis = 0; axis < velocity.size(); ++axis) {
       free[axis] *= h;
-      moved[axis] -= places[axis];
+      moved[axis] = engine_->places()[axis] - places[axis];
     }
+    for (std::size_t k = 0; k < state_.stands->size(); ++k)
+      moved[velocity.size() + k] = (*state_.stands)[k] - (*was.stands)[k];
     if (!(std::max(contact_->way_of(free), contact_->way_of(moved)) > slow_way))
       return;
   }
@@ -100,18 +152,25 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
                                         double to, bool first, const Context& context) {
   SolidMotion& moving = *engine_;
   const auto& instruments = state_.instruments;
-  if (!contact_ && !meetings_.empty())
-    contact_ = std::make_unique<SolidContact>(model_, meetings_);
-  bool meets = contact_ && contact_->may_meet(moving.places(), moving.velocity(), h);
+  const auto need_contact = [&] {
+    if (!contact_)
+      contact_ = std::make_unique<SolidContact>(model_of_all(), model_.nodes.size(), meetings_);
+  };
+  if (!meetings_.empty())
+    need_contact();
+  bool meets = contact_ && contact_->may_meet(with_beside(moving.places(), true),
+                                              with_beside(moving.velocity(), false), h);
   std::vector<double> places, velocity; // where it begins, if that may be needed again
+  const CopyOnWrite<std::vector<double>> stands = state_.stands;
   if (!meetings_.empty() && !meets) {
     places.assign(moving.places().begin(), moving.places().end());
     velocity.assign(moving.velocity().begin(), moving.velocity().end());
   }
   const auto begin_again = [&] {
-    if (meets || !contact_ || !contact_->may_have_met(moving.places()))
+    if (meets || !contact_ || !contact_->may_have_met(with_beside(moving.places(), true)))
       return false;
     moving.begin_again(places, velocity, context);
+    state_.stands = stands;
     meets = true;
     return true;
   };
@@ -119,6 +178,7 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
   SolidStep& all = pushed.took;
   bool &met = pushed.met, &exact = pushed.exact;
   if (!meets && std::ranges::none_of(instruments, [](const auto& i) { return i.has_value(); })) {
+    let_stand(from, to);
     state_.touched.clear();
     state_.pushes.clear();
     moving.drop_tangent();
@@ -128,8 +188,10 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
     if (!begin_again())
       return pushed;
   }
-  if (!contact_)
-    contact_ = std::make_unique<SolidContact>(model_, meetings_);
+  need_contact();
+  const std::map<std::uint32_t, Vec3> of_all =
+      standing_ != nullptr ? displaced(to) : std::map<std::uint32_t, Vec3>();
+  const auto& displaced_now = standing_ != nullptr ? of_all : state_.load->displacement;
   const auto go = [&](double jump, double way, double jump_to, double way_to, bool clearing) {
     std::vector<std::optional<MovedInstrument>> moved;
     for (const auto& i : instruments) {
@@ -150,8 +212,8 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
     }
     const SolidContact::Result result = contact_->step(
         {moving, forces, clearing ? std::span<const double>() : std::span<const double>(target),
-         state_.load->displacement, moved, h, options_, clearing, meets},
-        state_.touched, state_.pushes, context);
+         displaced_now, moved, h, options_, clearing, meets, standing_, clearing ? from : to},
+        state_.touched, state_.pushes, state_.stands.write(), context);
     counts_.touches.add(contact_->take_counts());
     all.rounds += result.took.rounds;
     all.factorisations += result.took.factorisations;

@@ -138,6 +138,8 @@ void load_body(const World& w, Body& body) {
     const Object& object = w.now.objects[owner(error.node())];
     throw Error("object " + object.name() + " at " + number_text(error.time()) + " s: node " +
                 std::to_string(error.node() - object.offset) + " " + error.what());
+  } catch (const ObjectError&) { // of one beside it
+    throw;
   } catch (const Error& error) {
     throw Error("object " + w.now.objects[body.parts[0]].name() + " at " +
                 number_text(w.now.clock.time) + " s: " + error.what());
@@ -240,13 +242,16 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
   const Object& first = w.now.objects[parts[0]];
   body->moving = motion_for(w, parts, *body->model);
   body->moving->set_motion(motion);
-  body->moving->set_meetings(meetings_of(w, parts, offset));
   body->safe = moves_implicitly(first) ? HUGE_VAL : safe_step(*body->model);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     w.now.objects[parts[k]].body = body;
     w.now.objects[parts[k]].offset = offset[k];
   }
+  std::vector<std::size_t> beside = near_beside(w, parts);
   body->parts = std::move(parts);
+  if (!beside.empty())
+    stand_beside(w, body, std::move(beside));
+  body->moving->set_meetings(meetings_of(w, *body));
   return body;
 }
 
@@ -296,6 +301,8 @@ bool move_bodies(World& w, double to, bool again) {
   const bool some_may_meet =
       std::ranges::any_of(w.now.meetings, [&](const Meeting& m) { return may_meet(w, m); });
   lead_on(w, to, extents);
+  for (const auto& body : w.now.bodies)
+    wake_by_beside(w, *body);
   std::vector<Body*> awake, resting;
   std::vector<std::any> before;
   std::vector<double> step;
@@ -308,16 +315,20 @@ bool move_bodies(World& w, double to, bool again) {
     }
     body->ahead = true;
     body->rest_extents.clear();
+    begin_standing(w, *body, to);
     awake.push_back(body.get());
     step.push_back(integration_step(w, *body));
     if (some_may_meet)
       before.push_back(body->moving->snapshot());
   }
-  // One body has all threads, several have one each.
-  Context context = w.context;
-  if (awake.size() > 1)
+  // One body has all threads, several have one each; but one after the other where elastostatic
+  // objects may read what they need.
+  Context context = w.context, calling = w.context;
+  if (std::ranges::any_of(awake, [](const Body* body) { return !body->beside.empty(); }))
+    calling.threads = 1;
+  else if (awake.size() > 1)
     context.threads = 1;
-  parallel_blocks(w.context, awake.size(), 1, [&](std::size_t k, std::size_t) {
+  parallel_blocks(calling, awake.size(), 1, [&](std::size_t k, std::size_t) {
     try {
       awake[k]->taken = awake[k]->moving->advance(duration, step[k], context, w.now.clock.time);
     } catch (...) {
@@ -338,6 +349,8 @@ bool move_bodies(World& w, double to, bool again) {
   }
   for (Body* const body : resting)
     body->moving->rest_on(duration);
+  for (Body* const body : awake)
+    end_standing(*body);
   end_guiding(w, to);
   SimulationCounts& counts = w.now.counts;
   for (Body* const body : awake) {
@@ -374,7 +387,7 @@ void require_like_solids(const World& w, std::span<const std::size_t> objects) {
   const Object* first = nullptr;
   for (const std::size_t index : objects) {
     const Object& object = w.now.objects[index];
-    if (!object.matter->known || !is_solid(object))
+    if (!object.matter->known || !is_solid(object) || object.method == Method::ffe)
       continue;
     if (first == nullptr)
       first = &object;

@@ -57,9 +57,16 @@ void warn_inexact(World& w, Object& object) {
 
 namespace {
 
+/// Its objects, and those beside it.
+std::vector<std::size_t> all_of(const Body& body) {
+  std::vector<std::size_t> all = body.parts;
+  all.insert(all.end(), body.beside.begin(), body.beside.end());
+  return all;
+}
+
 /// Whether the instrument touched it in the last step.
 bool touched_by(const World& w, const Body& body, std::size_t instrument) {
-  return body.touched && std::ranges::any_of(body.parts, [&](std::size_t part) {
+  return body.touched && std::ranges::any_of(all_of(body), [&](std::size_t part) {
            return std::ranges::any_of(w.now.objects[part].shown.touches, [&](const NodeTouch& t) {
              return t.instrument == instrument;
            });
@@ -89,7 +96,7 @@ void guide(World& w, Body& body, double to, Extents& extents) {
     all.push_back(i.present && !i.shape.blade ? std::optional(met_by(i)) : std::nullopt);
   if (body.moving->resting()) {
     const auto near_any = [&](const Box3& way) {
-      return std::ranges::any_of(body.parts,
+      return std::ranges::any_of(all_of(body),
                                  [&](std::size_t part) { return near(way, extents.of(part).box); });
     };
     for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
@@ -159,6 +166,10 @@ void take_touches(World& w, double duration) {
       object.shown.valid = object.shown.valid && object.shown.touches.empty() && touches.empty();
       object.shown.touches = std::move(touches);
     }
+    const std::vector<NodeTouch> beside = body->moving->standing_touches();
+    body->touched = body->touched || std::ranges::any_of(beside, [](const NodeTouch& t) {
+                      return t.instrument != other_surface;
+                    });
   }
   for (Object& object : w.now.objects)
     object.impulses.clear(); // of those that left their body for good

@@ -65,7 +65,7 @@ void follow_hands(World& w, double to) {
     if (!is_led(i))
       continue;
     Instrument::Coupled& c = *i.coupled;
-    const Body* const body = c.giver ? w.now.objects[*c.giver].body.get() : nullptr;
+    const Body* const body = c.giver ? body_of(w.now.objects[*c.giver]) : nullptr;
     const std::optional<LedInstrument> led =
         body != nullptr && body->taken > 0 ? body->moving->led(k) : std::nullopt;
     if (led) {
@@ -84,7 +84,8 @@ bool gives_way_to(const World& w, const Instrument& i, const Object& object) {
   if (!is_led(i) || !i.coupled->giver)
     return false;
   const Object& giver = w.now.objects[*i.coupled->giver];
-  return &giver == &object || (giver.body != nullptr && giver.body == object.body);
+  const Body* const body = body_of(giver);
+  return &giver == &object || (body != nullptr && body == body_of(object));
 }
 
 /// The last part of an instrument's way in a step of the scene, as the elastostatic object meets it
@@ -143,7 +144,7 @@ void end_leading(World& w) {
     const bool same = strongest && c.giver && gives_way_to(w, i, w.now.objects[*strongest]);
     if (!strongest)
       c.led.force = c.led.others = {};
-    else if (!same || w.now.objects[*strongest].body == nullptr)
+    else if (!same || body_of(w.now.objects[*strongest]) == nullptr)
       c.led.force = of_body(*strongest);
     if (strongest)
       c.led.others = all - of_body(*strongest);

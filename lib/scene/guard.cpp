@@ -16,16 +16,48 @@ void Body::restore(const Snapshot& was) {
   failure = nullptr;
 }
 
-Saved save(World& w) {
+namespace {
+
+Saved saved_now(const World& w) {
   Saved saved{w.now, {}};
+  for (const auto& body : w.now.bodies)
+    saved.bodies.push_back(body->snapshot());
+  return saved;
+}
+
+/// As it was, with what it touched.
+void restart_contact(Object& object) {
+  if (object.contact)
+    object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
+                                                     object.shown.touches, object.shown.points);
+}
+
+} // namespace
+
+Saved save(World& w) {
   for (const Object& object : w.now.objects)
     object.statics->ahead = false;
-  for (const auto& body : w.now.bodies) {
+  for (const auto& body : w.now.bodies)
     body->ahead = false;
-    saved.bodies.push_back(body->snapshot());
-  }
   w.saved = true;
-  return saved;
+  return saved_now(w);
+}
+
+Saved save_again(World& w) {
+  return saved_now(w);
+}
+
+void take_back_again(World& w, Saved&& saved) noexcept {
+  w.now = std::move(saved.scene);
+  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
+    w.now.bodies[k]->restore(saved.bodies[k]);
+  for (Object& object : w.now.objects) {
+    if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
+      object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
+    restart_contact(object);
+  }
+  for (StaticGroup& group : w.now.static_groups)
+    group.meeting = nullptr;
 }
 
 /// What is kept to be quick depends on the shapes that were asked of it, so it is renewed where one
@@ -43,9 +75,7 @@ void take_back(World& w, Saved&& saved) noexcept {
     if (!ahead && !object.statics->ahead)
       continue;
     renew(object);
-    if (object.contact) // as it was, with what it touched
-      object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
-                                                       object.shown.touches, object.shown.points);
+    restart_contact(object);
     w.renewed.push_back(i);
     if (StaticGroup* const group = static_group_of(w, i))
       group->meeting = nullptr; // it is made anew from what is shown

@@ -1,11 +1,14 @@
 // Meetings: objects whose surfaces may touch each other or themselves. Those that are near move as
-// one body, which knows of them (statics/meeting_yielding.h); others cost no more than a look at
-// their boxes.
+// one body, which knows of them (statics/meeting_yielding.h), elastostatic ones beside it; others
+// cost no more than a look at their boxes.
 
 #include "scene/rules_internal.h"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
+#include <memory>
 #include <set>
 #include <utility>
 
@@ -20,9 +23,15 @@ bool awake(const Object& object) {
   return object.body != nullptr && (object.body->changed || !object.body->moving->resting());
 }
 
+/// What isn't known of an elastostatic one counts as 0: see met_late.
+Extent extent_in(World& w, std::size_t index, Extents& extents) {
+  return w.now.objects[index].method == Method::ffe ? Extent{shown_box(w, index), 0}
+                                                    : extents.of(index);
+}
+
 /// Whether they may come to touch within a time; of such as were near already, with more room.
-bool are_near(const World& w, const Meeting& m, double duration, Extents& extents) {
-  const Extent &a = extents.of(m.object), &b = extents.of(m.other);
+bool are_near(World& w, const Meeting& m, double duration, Extents& extents) {
+  const Extent a = extent_in(w, m.object, extents), b = extent_in(w, m.other, extents);
   const double margin = near_part * std::min(a.box.longest_side(), b.box.longest_side()) +
                         2 * duration * (a.speed + b.speed) +
                         duration * duration * norm(w.now.gravity);
@@ -31,27 +40,32 @@ bool are_near(const World& w, const Meeting& m, double duration, Extents& extent
 
 /// The bodies of these objects anew, by who is near now.
 void regroup(World& w, const std::set<std::size_t>& objects) {
-  std::set<std::size_t> all = objects;
+  std::set<std::shared_ptr<Body>> bodies;
   for (const std::size_t index : objects) {
-    need_body(w, index);
-    const std::vector<std::size_t>& parts = w.now.objects[index].body->parts;
-    all.insert(parts.begin(), parts.end());
+    const Object& object = w.now.objects[index];
+    if (object.method == Method::ela)
+      need_body(w, index);
+    if (const auto& body = object.body != nullptr ? object.body : object.beside; body != nullptr)
+      bodies.insert(body);
   }
   Motions motions;
-  std::set<std::shared_ptr<Body>> bodies;
-  for (const std::size_t index : all) {
-    const Object& object = w.now.objects[index];
-    const std::span<const NodeMotion> motion = motion_of(object);
-    motions[index].assign(motion.begin(), motion.end());
-    bodies.insert(object.body);
-  }
+  std::set<std::size_t> stood;
   for (const auto& body : bodies) {
+    for (const std::size_t part : body->parts) {
+      const std::span<const NodeMotion> motion = motion_of(w.now.objects[part]);
+      motions[part].assign(motion.begin(), motion.end());
+    }
+    stood.insert(body->beside.begin(), body->beside.end());
     gather_impulses(w, *body);
     drop_body(w, body.get());
   }
-  for (const std::size_t index : all)
-    w.now.objects[index].body = nullptr;
+  for (const auto& [part, motion] : motions)
+    w.now.objects[part].body = nullptr;
   renew_bodies(w, motions);
+  for (const std::size_t index : stood)
+    if (bodies.contains(w.now.objects[index].beside))
+      leave_body(w, w.now.objects[index]);
+  regroup_statics(w);
 }
 
 } // namespace
@@ -77,23 +91,97 @@ std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::siz
 /// Before objects move: those that may touch by then become one body, others come apart, unless all
 /// stay.
 void meet(World& w, double to, Extents& extents, bool stay) {
-  std::set<std::size_t> changed;
-  for (Meeting& m : w.now.meetings) {
-    const Object &a = w.now.objects[m.object], &b = w.now.objects[m.other];
-    if (m.object == m.other || (!awake(a) && !awake(b)))
-      continue;
-    const bool now = are_near(w, m, to - w.now.clock.time, extents);
-    if (now == m.near || (stay && m.near))
-      continue;
-    m.near = now;
-    changed.insert({m.object, m.other});
-  }
-  if (!changed.empty())
+  // Who comes to stand beside a body is near to others then by another measure.
+  for (std::size_t round = 0; round <= w.now.meetings.size(); ++round) {
+    std::set<std::size_t> changed;
+    for (Meeting& m : w.now.meetings) {
+      const Object &a = w.now.objects[m.object], &b = w.now.objects[m.other];
+      const bool mixed = is_mixed(w, m);
+      if (m.object == m.other || is_static(w, m) || (!mixed && !awake(a) && !awake(b)))
+        continue;
+      const bool now = are_near(w, m, to - w.now.clock.time, extents);
+      if (now == m.near || ((stay || m.stays) && m.near))
+        continue;
+      m.near = now;
+      changed.insert({m.object, m.other});
+    }
+    if (changed.empty())
+      return;
     regroup(w, changed);
+  }
 }
 
 bool may_meet(const World& w, const Meeting& m) {
-  return !m.near && m.object != m.other && !is_static(w, m);
+  return !m.near && m.object != m.other && !is_static(w, m) && !is_mixed(w, m);
+}
+
+bool is_mixed(const World& w, const Meeting& m) {
+  return (w.now.objects[m.object].method == Method::ffe ||
+          w.now.objects[m.other].method == Method::ffe) &&
+         !is_static(w, m);
+}
+
+namespace {
+
+bool may_be_late(const World& w, const Meeting& m) {
+  return !m.near && m.object != m.other && is_mixed(w, m);
+}
+
+Box3 box_of(World& w, std::size_t index) {
+  Extents extents(w);
+  return extent_in(w, index, extents).box;
+}
+
+} // namespace
+
+bool mixed_may_meet(const World& w) {
+  return std::ranges::any_of(w.now.meetings, [&](const Meeting& m) { return may_be_late(w, m); });
+}
+
+std::map<std::size_t, Box3> note_mixed(World& w) {
+  std::map<std::size_t, Box3> all;
+  for (const Meeting& m : w.now.meetings)
+    if (may_be_late(w, m))
+      for (const std::size_t object : {m.object, m.other})
+        if (!all.contains(object)) {
+          need_model(w.now.objects[object]);
+          all[object] = box_of(w, object);
+        }
+  return all;
+}
+
+bool met_late(World& w, const std::map<std::size_t, Box3>& before,
+              const std::function<void()>& take_back) {
+  const auto passed = [&](std::size_t object) {
+    Box3 box = before.at(object);
+    const Box3 now = box_of(w, object);
+    box.add(now.min);
+    box.add(now.max);
+    return box;
+  };
+  std::vector<std::size_t> late; // meetings
+  for (std::size_t k = 0; k < w.now.meetings.size(); ++k) {
+    const Meeting& m = w.now.meetings[k];
+    if (may_be_late(w, m) && before.contains(m.object) && before.contains(m.other) &&
+        near(passed(m.object), passed(m.other)))
+      late.push_back(k);
+  }
+  if (late.empty())
+    return false;
+  take_back();
+  std::set<std::size_t> objects;
+  for (const std::size_t k : late) {
+    Meeting& m = w.now.meetings[k];
+    m.near = m.stays = true;
+    objects.insert({m.object, m.other});
+  }
+  regroup(w, objects);
+  return true;
+}
+
+void end_mixed(World& w) {
+  for (Meeting& m : w.now.meetings)
+    m.stays = false;
 }
 
 /// Where those stand that may touch but are not near.
@@ -168,14 +256,9 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
     Object& object = w.now.objects.at(index);
     need_model(object);
     require_support(w, object, itself ? Feature::self_contact : Feature::contact);
-    if (object.method != w.now.objects.at(c.object).method)
-      throw Error("one of " + w.now.objects.at(c.object).name() + " and " + object.name() +
-                  " is elastostatic (ffe) and the other is not, expected both alike for contact");
     if (object.model().triangles.empty())
       throw Error("object " + object.name() + " has no triangles, expected a surface for contact");
   }
-  if (w.now.objects.at(c.object).method == Method::ffe)
-    return;
   std::vector<std::size_t> all = together(w, c.object);
   const std::vector<std::size_t> others = together(w, c.other);
   all.insert(all.end(), others.begin(), others.end());
@@ -204,15 +287,12 @@ void Rule<SetContact>::apply(World& w, const SetContact& c) {
       group->meeting = nullptr;
       group->settled = false;
     }
-    if (object.body == nullptr)
+    const std::shared_ptr<Body>& body = object.body != nullptr ? object.body : object.beside;
+    if (body == nullptr)
       continue;
-    Body& body = *object.body;
-    std::vector<std::size_t> offset;
-    for (const std::size_t part : body.parts)
-      offset.push_back(w.now.objects[part].offset);
-    body.ahead = true;
-    body.moving->set_meetings(meetings_of(w, body.parts, offset));
-    body.moving->wake();
+    body->ahead = true;
+    body->moving->set_meetings(meetings_of(w, *body));
+    body->moving->wake();
   }
 }
 

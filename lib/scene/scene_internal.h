@@ -92,10 +92,14 @@ struct Statics {
   bool made() const { return solver || warped; }
 };
 
+class BesideBody;
+
 /// What moves together: one elastodynamic object, or several that are attached to each other.
 struct Body {
-  std::vector<std::size_t> parts;     // objects
-  std::shared_ptr<const Model> model; // of all parts
+  std::vector<std::size_t> parts;         // objects
+  std::vector<std::size_t> beside{};      // elastostatic ones that its steps meet, see beside.cpp
+  std::shared_ptr<BesideBody> standing{}; // these; null: none
+  std::shared_ptr<const Model> model;     // of all parts
   std::unique_ptr<BodyMotion> moving;
   double safe = 0; // largest stable step
   bool changed = true;
@@ -197,6 +201,8 @@ struct Object {
   std::shared_ptr<const WarpedAnswer> warped; // the last one, that the next one starts from
   std::shared_ptr<Body> body;                 // of an elastodynamic object
   std::size_t offset = 0;                     // of its nodes in the body
+  std::shared_ptr<Body> beside;               // that meets it in its steps, of ffe, see beside.cpp
+  std::shared_ptr<const Load> stood_under;    // its load behind the last way of that in this step
   Shown shown;
   CameFrom came;
   RangeWatch range;
@@ -219,7 +225,8 @@ struct Tie {
 struct Meeting {
   std::size_t object = 0, other = 0;
   double friction = 0;
-  bool near = false; // they move as one body, or are in one StaticGroup
+  bool near = false;  // they are in one body, or beside it, or in one StaticGroup
+  bool stays = false; // near for all of this step
 };
 
 /// Elastostatic objects that are near each other, or one that may touch itself: their shapes are

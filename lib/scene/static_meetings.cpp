@@ -3,13 +3,10 @@
 // than a look at their boxes.
 
 #include "base/vector_at.h"
-#include "scene/world_internal.h"
-#include "statics/elastostatic_yielding.h"
-#include "statics/joined_yielding.h"
-#include "statics/two_step_contact.h"
+#include "scene/static_members_internal.h"
 
 #include <algorithm>
-#include <functional>
+#include <array>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -63,73 +60,11 @@ void leave_group(Object& object) {
   object.shown.valid = false;
 }
 
-/// The groups by who is near now; those whose objects stay the same stay as they are.
-void regroup_statics(World& w) {
-  std::vector<StaticGroup> groups;
-  for (const Meeting& m : w.now.meetings) {
-    if (!m.near || !is_static(w, m) || std::ranges::any_of(groups, [&](const StaticGroup& g) {
-          return std::ranges::binary_search(g.parts, m.object);
-        }))
-      continue;
-    StaticGroup group{near_ones(w, m.object), {}, false, max_tries, nullptr};
-    const auto same = std::ranges::find(w.now.static_groups, group.parts, &StaticGroup::parts);
-    groups.push_back(same != w.now.static_groups.end() ? std::move(*same) : std::move(group));
-  }
-  const std::vector<StaticGroup> before = std::exchange(w.now.static_groups, std::move(groups));
-  for (const StaticGroup& group : before)
-    for (const std::size_t part : group.parts)
-      if (static_group_of(w, part) == nullptr)
-        leave_group(w.now.objects[part]);
-  for (const StaticGroup& group : w.now.static_groups)
-    for (const std::size_t part : group.parts)
-      w.now.objects[part].contact = nullptr;
-}
-
 std::vector<Object*> objects_of(World& w, const StaticGroup& group) {
   std::vector<Object*> all;
   for (const std::size_t part : group.parts)
     all.push_back(&w.now.objects[part]);
   return all;
-}
-
-PointTouch shifted(PointTouch point, std::uint32_t up, std::uint32_t down) {
-  for (std::uint32_t& node : point.nodes)
-    node = node + up - down;
-  return point;
-}
-
-/// What acted on an object as it is shown, as a load that leads to the one to come: who is let go
-/// is held by a force, who will be displaced is where it is.
-Load load_before(const Object& object, const Load& next) {
-  Load load = *object.shown.load;
-  std::map<std::uint32_t, Vec3> held = std::exchange(load.displacement, {});
-  std::erase_if(held, [&](const auto& entry) { return next.displacement.contains(entry.first); });
-  for (const NodeVector& f : *object.shown.forces)
-    if (held.contains(f.node))
-      load.force[f.node] = f.value; // its support has borne what else acted there
-  for (const NodeTouch& t : object.shown.touches)
-    if (held.contains(t.node))
-      load.force[t.node] -= t.force;
-  for (const auto& [node, u] : next.displacement)
-    load.displacement[node] = 3 * std::size_t{node} < object.shown.displacement->size()
-                                  ? vector_at(*object.shown.displacement, node)
-                                  : u;
-  return load;
-}
-
-/// Between two that displace the same nodes.
-Load load_between(const Load& from, const Load& to, double part) {
-  if (part == 1)
-    return to;
-  Load load = to;
-  for (auto& [node, f] : load.force)
-    f *= part;
-  for (const auto& [node, f] : from.force)
-    load.force[node] += (1 - part) * f;
-  for (auto& [node, u] : load.displacement)
-    u = from.displacement.at(node) + part * (u - from.displacement.at(node));
-  load.gravity = from.gravity + part * (to.gravity - from.gravity);
-  return load;
 }
 
 /// A part of the ways, from one part to another of them.
@@ -144,137 +79,11 @@ ShortWay part_of(const ShortWay& way, double from, double to) {
   return part;
 }
 
-/// Names its object where it fails.
-class OfObject final : public Yielding {
-public:
-  OfObject(const World& w, Object& object, std::unique_ptr<Yielding> own)
-      : w_(w), object_(object), own_(std::move(own)) {}
-  DelassusOperator delassus_operator(std::span<const std::uint32_t> nodes) override {
-    DelassusOperator all;
-    at_object(w_, object_, [&] { all = own_->delassus_operator(nodes); });
-    return all;
-  }
-  bool push(std::span<const NodeTouch> touches, std::span<const Vec3> at) override {
-    bool agreed = true;
-    at_object(w_, object_, [&] { agreed = own_->push(touches, at); });
-    return agreed;
-  }
-  std::span<const double> shape() override {
-    std::span<const double> u;
-    at_object(w_, object_, [&] { u = own_->shape(); });
-    return u;
-  }
-
-private:
-  const World& w_;
-  Object& object_;
-  std::unique_ptr<Yielding> own_;
-};
-
-/// The objects as they give way to contact, one behind the other.
-class Members {
-public:
-  /// \param first node of each in the whole
-  Members(World& w, std::vector<Object*> objects, std::vector<std::size_t> first)
-      : w_(w), objects_(std::move(objects)), first_(std::move(first)) {
-    for (Object* const object : objects_) {
-      stages_.emplace_back([&w, object]() -> std::pair<Elastostatic&, TwoStep&> {
-        Elastostatic& solver = solver_of(w, *object);
-        return {solver, two_step_of(w, *object)};
-      });
-      nodes_ += object->model().nodes.size();
-    }
-  }
-
-  std::size_t nodes() const { return nodes_; }
-  std::uint32_t first(std::size_t k) const { return static_cast<std::uint32_t>(first_[k]); }
-  std::uint32_t end(std::size_t k) const {
-    return static_cast<std::uint32_t>(k + 1 < first_.size() ? first_[k + 1] : nodes_);
-  }
-  std::size_t of(std::uint32_t node) const {
-    return static_cast<std::size_t>(std::ranges::upper_bound(first_, node) - first_.begin()) - 1;
-  }
-
-  std::vector<double> shape() const {
-    std::vector<double> all(3 * nodes_);
-    for (std::size_t k = 0; k < objects_.size(); ++k)
-      std::ranges::copy(*objects_[k]->shown.displacement,
-                        all.begin() + static_cast<std::ptrdiff_t>(3 * first_[k]));
-    return all;
-  }
-  /// Touches of all that are shown.
-  std::vector<NodeTouch> touches() const {
-    std::vector<NodeTouch> all;
-    for (std::size_t k = 0; k < objects_.size(); ++k)
-      for (NodeTouch t : objects_[k]->shown.touches) {
-        t.node += first(k);
-        all.push_back(t);
-      }
-    return all;
-  }
-  std::vector<PointTouch> points() const {
-    std::vector<PointTouch> all;
-    for (std::size_t k = 0; k < objects_.size(); ++k)
-      for (const PointTouch& p : objects_[k]->shown.points)
-        all.push_back(shifted(p, first(k), 0));
-    return all;
-  }
-  /// What acts on them from now on.
-  void set_loads(std::vector<Load> loads) { loads_ = std::move(loads); }
-  std::map<std::uint32_t, Vec3> displaced() const {
-    std::map<std::uint32_t, Vec3> all;
-    for (std::size_t k = 0; k < objects_.size(); ++k)
-      for (const auto& [node, u] : loads_[k].displacement)
-        all.emplace_hint(all.end(), first(k) + node, u);
-    return all;
-  }
-
-  /// \param last touches by which they are as they are
-  JoinedYielding joined(std::span<const NodeTouch> last) {
-    std::vector<JoinedYielding::Part> parts;
-    both_.clear();
-    for (std::size_t k = 0; k < objects_.size(); ++k) {
-      Object& object = *objects_[k];
-      const Load& load = loads_[k];
-      const std::vector<NodeTouch> own = touches_of_part(last, first(k), end(k));
-      std::unique_ptr<Yielding> one;
-      if (object.stages.options) {
-        auto both = std::make_unique<TwoStepYielding>(object.model(), stages_[k], load);
-        both_.push_back(both.get());
-        one = std::move(both);
-        at_object(w_, object, [&] { (void)one->push({}, {}); });
-      } else {
-        one = std::make_unique<ElastostaticYielding>(
-            [this, &object]() -> Elastostatic& { return solver_of(w_, object); }, load, own);
-      }
-      parts.push_back({std::make_unique<OfObject>(w_, object, std::move(one)), first(k)});
-    }
-    return {std::move(parts), nodes_};
-  }
-  /// Whether the last joined ones found all that was asked of them. \pre they live
-  bool solved() const {
-    return std::ranges::all_of(both_, [](const TwoStepYielding* both) { return both->solved(); });
-  }
-
-private:
-  World& w_;
-  std::vector<Object*> objects_;
-  std::vector<std::size_t> first_;
-  std::size_t nodes_ = 0;
-  std::vector<Load> loads_;
-  std::deque<TwoStepYielding::Stages> stages_; // which those of two steps refer to
-  std::vector<const TwoStepYielding*> both_;
-};
-
-Members members_of(World& w, const StaticGroup& group) {
-  std::vector<std::size_t> first;
-  std::size_t nodes = 0;
-  for (const std::size_t part : group.parts)
-    first.push_back(std::exchange(nodes, nodes + w.now.objects[part].model().nodes.size()));
-  return {w, objects_of(w, group), std::move(first)};
+StaticMembers members_of(World& w, const StaticGroup& group) {
+  return {w, objects_of(w, group)};
 }
 
-StaticMeeting& meeting_of(World& w, StaticGroup& group, const Members& all) {
+StaticMeeting& meeting_of(World& w, StaticGroup& group, const StaticMembers& all) {
   if (!group.meeting) {
     std::vector<std::size_t> first;
     auto model = std::make_shared<const Model>(joined_model(w, group.parts, first));
@@ -286,8 +95,8 @@ StaticMeeting& meeting_of(World& w, StaticGroup& group, const Members& all) {
 }
 
 /// What is shown of its objects from now on. \param known numbers of each one's shape
-void show_members(World& w, StaticGroup& group, const Members& all, std::span<const double> shape,
-                  std::span<const std::size_t> known) {
+void show_members(World& w, StaticGroup& group, const StaticMembers& all,
+                  std::span<const double> shape, std::span<const std::size_t> known) {
   const StaticMeeting& meeting = *group.meeting;
   for (std::size_t k = 0; k < group.parts.size(); ++k) {
     Object& object = w.now.objects[group.parts[k]];
@@ -309,14 +118,16 @@ void show_members(World& w, StaticGroup& group, const Members& all, std::span<co
 } // namespace
 
 bool is_static(const World& w, const Meeting& m) {
-  return w.now.objects[m.object].method == Method::ffe &&
-         w.now.objects[m.other].method == Method::ffe;
+  return std::ranges::all_of(std::array{m.object, m.other}, [&](std::size_t object) {
+    return w.now.objects[object].method == Method::ffe && w.now.objects[object].beside == nullptr;
+  });
 }
 
 bool as_one(const World& w, std::size_t object, std::size_t other) {
   if (object == other)
     return true;
-  const auto &body = w.now.objects[object].body, &other_body = w.now.objects[other].body;
+  const Body *const body = body_of(w.now.objects[object]), *const other_body =
+                                                               body_of(w.now.objects[other]);
   return (body != nullptr && body == other_body) ||
          std::ranges::any_of(w.now.static_groups, [&](const StaticGroup& group) {
            return std::ranges::binary_search(group.parts, object) &&
@@ -349,6 +160,28 @@ const Box3& shown_box(World& w, std::size_t index) {
   box.min += way.min;
   box.max += way.max;
   return box;
+}
+
+/// The groups by who is near now; those whose objects stay the same stay as they are.
+void regroup_statics(World& w) {
+  std::vector<StaticGroup> groups;
+  for (const Meeting& m : w.now.meetings) {
+    if (!m.near || !is_static(w, m) || std::ranges::any_of(groups, [&](const StaticGroup& g) {
+          return std::ranges::binary_search(g.parts, m.object);
+        }))
+      continue;
+    StaticGroup group{near_ones(w, m.object), {}, false, max_tries, nullptr};
+    const auto same = std::ranges::find(w.now.static_groups, group.parts, &StaticGroup::parts);
+    groups.push_back(same != w.now.static_groups.end() ? std::move(*same) : std::move(group));
+  }
+  const std::vector<StaticGroup> before = std::exchange(w.now.static_groups, std::move(groups));
+  for (const StaticGroup& group : before)
+    for (const std::size_t part : group.parts)
+      if (static_group_of(w, part) == nullptr && w.now.objects[part].beside == nullptr)
+        leave_group(w.now.objects[part]);
+  for (const StaticGroup& group : w.now.static_groups)
+    for (const std::size_t part : group.parts)
+      w.now.objects[part].contact = nullptr;
 }
 
 void group_statics(World& w) {
@@ -475,7 +308,7 @@ private:
   World& w_;
   StaticGroup& group_;
   std::vector<Object*> objects_;
-  Members all_;
+  StaticMembers all_;
   StaticMeeting& meeting_;
   std::vector<double> shape_;
   std::vector<NodeTouch> touches_;

@@ -105,7 +105,10 @@ void show_all(World& w) {
     Object& object = w.now.objects[number];
     if (w.now.settings.emits.any_shapes())
       need_model(object);
-    if (StaticGroup* const group = static_group_of(w, number)) {
+    if (object.beside != nullptr) {
+      if (has_stood(object))
+        at_object(w, object, [&] { show_standing(w, object); });
+    } else if (StaticGroup* const group = static_group_of(w, number)) {
       if (looked_at.insert(group).second && needs_showing(w, *group))
         show_group(w, *group);
     } else if (needs_showing(w, object)) {
@@ -119,7 +122,9 @@ void show_all(World& w) {
 
 } // namespace
 
-void advance(World& w, double to) {
+namespace {
+
+void advance_once(World& w, double to) {
   require_few_events(w, to);
   Clock& clock = w.now.clock;
   const double start = clock.time;
@@ -147,6 +152,24 @@ void advance(World& w, double to) {
     require_bounded_instruments(w);
   tear(w);
   ++w.now.counts.steps;
+}
+
+} // namespace
+
+/// Where an elastostatic object and what moves have come together that were not near, the step is
+/// taken once more with them as one.
+void advance(World& w, double to) {
+  while (mixed_may_meet(w)) {
+    const std::map<std::size_t, Box3> before = note_mixed(w);
+    Saved saved = save_again(w);
+    advance_once(w, to);
+    if (!met_late(w, before, [&] { take_back_again(w, std::move(saved)); })) {
+      end_mixed(w);
+      return;
+    }
+  }
+  advance_once(w, to);
+  end_mixed(w);
 }
 
 } // namespace gewebe::simulation

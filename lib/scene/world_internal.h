@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -40,6 +41,9 @@ struct Saved {
 };
 Saved save(World& w);
 void take_back(World& w, Saved&& saved) noexcept;
+/// For who goes the same way once more, whoever else has saved: what is kept to be quick stays.
+Saved save_again(World& w);
+void take_back_again(World& w, Saved&& saved) noexcept;
 
 /// Does all of the work or, if it throws under guard, nothing.
 template <class Work>
@@ -69,6 +73,12 @@ inline void touch(Object& object) {
     object.body->changed = true;
 }
 
+/// One that names its object and time.
+class ObjectError : public Error {
+public:
+  using Error::Error;
+};
+
 /// Names object and time in an Error.
 template <class Work>
 void at_object(const World& w, const Object& object, Work&& work) {
@@ -77,8 +87,8 @@ void at_object(const World& w, const Object& object, Work&& work) {
   } catch (const Cancelled&) {
     throw;
   } catch (const Error& error) {
-    throw Error("object " + object.name() + " at " + number_text(w.now.clock.time) +
-                " s: " + (error.place().empty() ? "" : error.place() + ": ") + error.what());
+    throw ObjectError("object " + object.name() + " at " + number_text(w.now.clock.time) +
+                      " s: " + (error.place().empty() ? "" : error.place() + ": ") + error.what());
   }
 }
 
@@ -138,6 +148,16 @@ std::span<const NodeMotion> motion_of(const Object& object);
 void meet(World& w, double to, Extents& extents, bool stay = false);
 /// Whether moving objects that aren't near may come to be.
 bool may_meet(const World& w, const Meeting& m);
+/// One moves, or meets what moves, and the other is elastostatic.
+bool is_mixed(const World& w, const Meeting& m);
+bool mixed_may_meet(const World& w);
+/// Before a step of the scene: where those are that are mixed and not near.
+std::map<std::size_t, Box3> note_mixed(World& w);
+/// Behind it: whether any have come together. They are near then, until end_mixed. \pre the scene
+/// is as it was before the step once `take_back` was called
+bool met_late(World& w, const std::map<std::size_t, Box3>& before,
+              const std::function<void()>& take_back);
+void end_mixed(World& w);
 void note_extents(const World& w, Extents& extents);
 std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after);
 void join_late(World& w, const std::set<std::size_t>& objects);
@@ -147,9 +167,33 @@ void move_meetings(World& w, std::size_t index, const Moves& moves);
 /// Objects that may come to move as one with this one, by ties and meetings, itself among them.
 std::vector<std::size_t> together(const World& w, std::size_t object);
 
+// beside.cpp: elastostatic objects that may touch what moves
+/// Those that are near to these, or to each other and these.
+std::vector<std::size_t> near_beside(const World& w, std::span<const std::size_t> parts);
+/// They stand beside the body from now on, as they are. \pre nothing stands beside it yet
+void stand_beside(World& w, const std::shared_ptr<Body>& body, std::vector<std::size_t> objects);
+/// It stands beside none any more.
+void leave_body(World& w, Object& object);
+std::vector<SurfaceMeeting> meetings_of(const World& w, const Body& body);
+/// Before a way of a body: wakes it where something else acts on them.
+void wake_by_beside(const World& w, Body& body);
+void begin_standing(World& w, Body& body, double to);
+void end_standing(Body& body);
+/// Whether its body has moved in this step.
+inline bool has_stood(const Object& object) {
+  return object.stood_under != nullptr;
+}
+void show_standing(World& w, Object& object);
+/// What its body's steps meet it in, or move it. Null: none.
+inline const Body* body_of(const Object& object) {
+  return object.body != nullptr ? object.body.get() : object.beside.get();
+}
+
 // static_meetings.cpp: elastostatic objects whose surfaces touch
-/// Whether all that it is of is elastostatic.
+/// Whether all that it is of is elastostatic, and beside no body.
 bool is_static(const World& w, const Meeting& m);
+/// The groups by who is near now.
+void regroup_statics(World& w);
 /// Before objects are shown: those that are near become one group.
 void group_statics(World& w);
 StaticGroup* static_group_of(World& w, std::size_t object);

@@ -71,9 +71,12 @@ TEST(Touch, ALiverRestsOnASpleen) {
   for (const Node& n : below.nodes)
     box.add(n.position);
   const Model above = solid_of(stuffed(placed(liver, tall, {1.7, 0.9, box.max.z + 1}), 6));
-  Press press;
-  press.force = 5e5;
-  expect_fair(pressed_together(below, above, press), press.force);
+  for (const bool still : {false, true}) {
+    Press press;
+    press.force = 5e5;
+    press.still = still;
+    expect_fair(pressed_together(below, above, press), press.force);
+  }
 }
 
 TEST(Touch, AFoldedTubeTouchesItself) {

@@ -223,6 +223,9 @@ struct Press {
   double longest = 3;  ///< s that it may take to rest
   double friction = 0; ///< Coulomb's
   bool meet = true;
+  /// The lower one is elastostatic. Halves of steps tell means of the other's forces, so that the
+  /// last step's count alone.
+  bool still = false;
 };
 
 /// Presses the upper end of an object straight down.
@@ -242,7 +245,12 @@ inline Rest pressed_together(Model below, Model above, const Press& press) {
   for (const std::uint32_t i : led)
     above.nodes[i].fixed = fixed_x | fixed_y;
   Simulation s(one_thread(), {});
-  add(s, "below", below);
+  if (press.still) {
+    s.add_object("below", below, Method::ffe);
+    s.apply(SetTimestep{press_step});
+  } else {
+    add(s, "below", below);
+  }
   add(s, "above", above);
   if (press.meet)
     s.apply(SetContact{1, 0, press.friction});
@@ -261,8 +269,10 @@ inline Rest pressed_together(Model below, Model above, const Press& press) {
     rest.up = one.sum;
     rest.size = one.size;
     rest.touched = one.nodes;
-    if (one.size > 0 || other.size > 0)
-      rest.off = larger(rest.off, norm(one.sum + other.sum) / smaller(one.size, other.size));
+    if (one.size > 0 || other.size > 0) {
+      const double off = norm(one.sum + other.sum) / smaller(one.size, other.size);
+      rest.off = press.still ? off : larger(rest.off, off);
+    }
   });
   rest.inside = overlap_now();
   return rest;

@@ -1,0 +1,342 @@
+// Elastostatic objects that touch what moves: what answers say must meet the conditions of contact,
+// judged by other means than those that found them.
+
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "scene/simulation.h"
+#include "sim_models.h"
+#include "simulation_scenes.h"
+#include "static_blocks.h"
+#include "touching_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using namespace test;
+
+constexpr double h = 1.0 / 600; ///< steps of one step of integration each
+
+/// A block that falls on an elastostatic one.
+void falls_on(Simulation& s, const Vec3& corner, double friction) {
+  add_static(s, "below", block(5, 5, 2, {}, true));
+  add(s, "above", block(3, 3, 2, corner));
+  s.apply(SetContact{0, 1, friction});
+  s.apply(SetGravity{{0, 0, -9810}});
+  s.apply(SetTimestep{h});
+}
+
+Load weight_alone() {
+  Load load;
+  load.gravity = {0, 0, -9810};
+  return load;
+}
+
+TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
+  for (const double friction : {0.0, 0.3}) {
+    Simulation s(one_thread(), {});
+    falls_on(s, {3.7, 4.1, 8.3}, friction);
+    bool touched = false;
+    for (int k = 0; k < 160; ++k) {
+      s.step(h);
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      const Vec3 up = sum_of_forces(s, 1), down = sum_of_forces(s, 0);
+      EXPECT_GE(up.z, 0) << k;
+      EXPECT_LE(norm(up + down), 1e-12 * norm(up)) << k;
+      EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z) << k;
+      EXPECT_LE(miss_of_balance(s, 0, weight_alone()), 1e-9) << k;
+      touched = touched || up.z > 0;
+    }
+    EXPECT_TRUE(touched);
+    for (int k = 0; k < 200; ++k)
+      s.step(h);
+    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
+    EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
+    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+  }
+}
+
+/// Where both come to rest they stand as if both moved.
+TEST(MixedMeetings, AtRestItIsAsIfBothMoved) {
+  std::vector<double> sunk;
+  for (const bool moves : {false, true}) {
+    Simulation s(one_thread(), {});
+    const Model below = block(5, 5, 2, {}, true);
+    if (moves)
+      add(s, "below", below);
+    else
+      add_static(s, "below", below);
+    const Model above = block(3, 3, 2, {3.7, 4.1, 8.05});
+    add(s, "above", above);
+    s.apply(SetContact{0, 1, 0.4});
+    s.apply(SetGravity{{0, 0, -9810}});
+    s.apply(SetTimestep{h});
+    s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -2000}});
+    for (int k = 0; k < 60; ++k)
+      s.step(1.0 / 60);
+    sunk.push_back(s.displacement(1)[2]);
+  }
+  EXPECT_LT(sunk[0], -0.05);
+  EXPECT_NEAR(sunk[0], sunk[1], 0.05 * std::abs(sunk[1]));
+}
+
+/// Neither what moves passes what stands in one step, nor the other way round.
+TEST(MixedMeetings, NothingJumpsThrough) {
+  for (const bool static_jumps : {false, true}) {
+    Simulation s(one_thread(), {});
+    const Model above = hanging(3, 3, 2, {3.7, 4.1, 10.5});
+    const Model below = block(5, 5, 2, {}, true);
+    const std::vector<std::uint32_t> lowest = nodes_below(above, 11);
+    if (static_jumps) {
+      add(s, "below", below);
+      add_static(s, "above", above);
+    } else {
+      add_static(s, "below", below);
+      add(s, "above", above);
+    }
+    s.apply(SetContact{0, 1, 0});
+    s.step(h);
+    const Vec3 force{0, 0, -100000.0};
+    s.apply(SetForce{1, lowest, force});
+    Load push;
+    for (const std::uint32_t node : lowest)
+      push.force[node] = force;
+    bool touched = false;
+    for (int k = 0; k < 30; ++k) {
+      s.step(h);
+      const Vec3 up = sum_of_forces(s, 1);
+      touched = touched || up.z > 0;
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      // Steps that are taken in halves tell means of what moves.
+      EXPECT_LE(norm(up + sum_of_forces(s, 0)), (k > 15 ? 1e-12 : 2) * norm(up)) << k;
+      EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}), 1e-9) << k;
+    }
+    EXPECT_TRUE(touched);
+  }
+}
+
+TEST(MixedMeetings, FarApartNothingIsDifferent) {
+  std::vector<std::vector<double>> shapes;
+  for (const bool may_touch : {false, true}) {
+    Simulation s(one_thread(), {});
+    const Model above = hanging(3, 3, 2, {3.7, 4.1, 40});
+    add_static(s, "below", block(5, 5, 2, {}, true));
+    add(s, "above", above);
+    if (may_touch)
+      s.apply(SetContact{0, 1, 0.3});
+    s.apply(SetForce{1, nodes_below(above, 41), {500, 0, -2000}});
+    s.apply(SetInstrument{0, ball_of(3), {{9, 9, 12}, {}}, "ball"});
+    for (int k = 0; k < 4; ++k) {
+      s.apply(MoveInstrument{0, Vec3{9, 9, 11.0 - k}, {}, 0.1});
+      s.step(0.1);
+    }
+    EXPECT_GT(s.instrument(0).force.z, 0);
+    for (const std::size_t object : {0U, 1U})
+      shapes.push_back(shape(s, object));
+  }
+  EXPECT_EQ(shapes[0], shapes[2]);
+  EXPECT_EQ(shapes[1], shapes[3]);
+}
+
+/// A beam that is held at one end, over a block, and a ball that presses it down.
+void beam_over_block(Simulation& s, bool beam_moves) {
+  Model beam = block(8, 2, 1, {-8, 6, 8.4});
+  for (Node& node : beam.nodes)
+    if (node.position.x < -7)
+      node.fixed = fixed_all;
+  const Model below = block(5, 5, 2, {}, true);
+  if (beam_moves) {
+    add_static(s, "below", below);
+    add(s, "beam", beam);
+  } else {
+    add(s, "below", below);
+    add_static(s, "beam", beam);
+  }
+  s.apply(SetContact{0, 1, 0.2});
+  s.apply(SetTimestep{h});
+}
+
+TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
+  for (const bool beam_moves : {false, true})
+    for (const bool led : {false, true}) {
+      Simulation s(one_thread(), {});
+      beam_over_block(s, beam_moves);
+      s.apply(SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
+      if (led)
+        s.apply(SetCoupling{0, Coupling{1e5, 10}});
+      for (int k = 0; k < 180; ++k) {
+        if (k < 90)
+          s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.02 * (k + 1)}, {}, h});
+        s.step(h);
+        EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+        const Vec3 on_ball = s.instrument(0).force;
+        EXPECT_GE(on_ball.z, -1e-9 * norm(on_ball)) << k;
+        EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + on_ball), 1e-11 * norm(on_ball))
+            << k;
+      }
+      for (int k = 0; k < 200; ++k)
+        s.step(h);
+      const InstrumentReport ball = s.instrument(0);
+      EXPECT_GT(ball.force.z, 0) << beam_moves << led;
+      EXPECT_LT(sum_of_forces(s, 0).z, 0) << beam_moves << led;
+      EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), 1e-6); // touched nodes as contact has
+      if (led) { // at rest the spring bears what presses
+        EXPECT_NEAR(1e5 * (ball.pose.place.z - ball.hand->z), ball.force.z, 1e-2 * ball.force.z);
+      }
+    }
+}
+
+/// What lets go is as it was.
+TEST(MixedMeetings, WhatComesApartIsAsItWas) {
+  Simulation s(one_thread(), {});
+  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
+  add_static(s, "below", block(5, 5, 2, {}, true));
+  add(s, "above", above);
+  s.apply(SetContact{0, 1, 0.3});
+  s.apply(SetTimestep{h});
+  const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
+  s.apply(SetForce{1, lowest, {0, 0, -20000}});
+  for (int k = 0; k < 30; ++k)
+    s.step(1.0 / 60);
+  EXPECT_LT(sum_of_forces(s, 0).z, 0);
+  s.apply(SetForce{1, lowest, {0, 0, 20000}});
+  for (int k = 0; k < 30; ++k)
+    s.step(1.0 / 60);
+  EXPECT_TRUE(s.contact_forces(0).empty());
+  for (const double u : s.displacement(0))
+    EXPECT_EQ(u, 0);
+}
+
+/// Of three in a row the midst hands on what presses it, whoever moves.
+TEST(MixedMeetings, ThreeInARow) {
+  for (const unsigned moving : {1U, 2U, 4U, 3U, 5U, 6U}) {
+    Simulation s(one_thread(), {});
+    Model middle = block(3, 3, 1, {3.7, 4.1, 8.02});
+    for (Node& node : middle.nodes)
+      if (node.position.x < 4)
+        node.fixed = fixed_x | fixed_y;
+    middle.nodes[0].fixed = fixed_all;
+    const Model above = hanging(2, 2, 2, {5.9, 6.3, 12.1});
+    const std::vector<Model> all{block(5, 5, 2, {}, true), middle, above};
+    for (std::size_t k = 0; k < 3; ++k)
+      if ((moving >> k & 1U) != 0)
+        add(s, "block-" + std::to_string(k), all[k]);
+      else
+        add_static(s, "block-" + std::to_string(k), all[k]);
+    s.apply(SetContact{1, 0, 0});
+    s.apply(SetContact{2, 1, 0});
+    s.apply(SetTimestep{h});
+    const std::vector<std::uint32_t> lowest = nodes_below(above, 13);
+    for (int k = 1; k <= 120; ++k) {
+      s.apply(SetForce{2, lowest, {0, 0, -30.0 * k}});
+      s.step(h);
+      const Vec3 sum = sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2);
+      EXPECT_LE(norm(sum), 1e-12 * (norm(sum_of_forces(s, 2)) + norm(sum_of_forces(s, 0))))
+          << moving << " " << k;
+      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << moving << " " << k;
+      EXPECT_GE(least_gap(s, 1, 2), -1e-3) << moving << " " << k;
+    }
+    EXPECT_GT(sum_of_forces(s, 2).z, 0) << moving;
+    EXPECT_LT(sum_of_forces(s, 0).z, 0) << moving;
+  }
+}
+
+/// What fails is taken back, and what comes behind is as if it had not been, on any number of
+/// threads.
+TEST(MixedMeetings, WhatFailsIsTakenBack) {
+  std::vector<std::vector<double>> shapes;
+  for (const bool fails : {false, true})
+    for (const int threads : {1, 2}) {
+      Context context = one_thread();
+      context.threads = threads;
+      Simulation s(context, {.guard = true});
+      falls_on(s, {3.7, 4.1, 8.3}, 0.3);
+      s.apply(SetInstrument{0, ball_of(3), {{1, 1, 11.2}, {}}, "ball"});
+      for (int k = 1; k <= 40; ++k) {
+        s.apply(MoveInstrument{0, Vec3{1, 1, 11.2 - 0.02 * k}, {}, h});
+        if (k == 30) {
+          if (fails) {
+            s.apply(SetForce{1, {0}, {1e39, 0, 0}}); // which is noticed in the step
+            EXPECT_THROW(s.step(h), Error);
+            s.apply(Release{1, {0}});
+          } else {
+            s.apply(Renew{0});
+            s.apply(Renew{1});
+          }
+        }
+        s.step(h);
+      }
+      EXPECT_GT(s.instrument(0).force.z, 0);
+      EXPECT_FALSE(s.contact_forces(1).empty());
+      for (const std::size_t object : {0U, 1U})
+        shapes.push_back(shape(s, object));
+    }
+  for (std::size_t k = 2; k < shapes.size(); ++k)
+    EXPECT_EQ(shapes[k], shapes[k % 2]) << k;
+}
+
+/// A load that jumps leads an elastostatic object over a gap that nobody took for near.
+TEST(MixedMeetings, WhoComesLateIsMet) {
+  Simulation s(one_thread(), {});
+  const Model above = hanging(3, 3, 2, {3.7, 4.1, 12});
+  add(s, "below", block(5, 5, 2, {}, true));
+  add_static(s, "above", above);
+  s.apply(SetContact{0, 1, 0});
+  s.step(h);
+  std::vector<std::uint32_t> lowest = nodes_below(above, 13);
+  s.apply(SetDisplacement{1, lowest, {0, 0, -5}});
+  s.step(h);
+  EXPECT_LT(sum_of_forces(s, 0).z, 0);
+  EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+  for (const std::uint32_t node : lowest)
+    EXPECT_EQ(s.displacement(1)[3 * std::size_t{node} + 2], -5);
+}
+
+/// In the course of a step of the scene, in many steps of what moves: the mean of what presses is
+/// about half of what presses at the end.
+TEST(MixedMeetings, LoadsGoTheirWay) {
+  Simulation s(one_thread(), {});
+  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.02});
+  add(s, "below", block(5, 5, 2, {}, true));
+  add_static(s, "above", above);
+  s.apply(SetContact{0, 1, 0});
+  s.apply(SetTimestep{h});
+  s.step(0.1);
+  s.apply(SetDisplacement{1, nodes_below(above, 9), {0, 0, -0.5}});
+  s.step(0.1);
+  const double mean = -sum_of_forces(s, 0).z;
+  s.step(0.1);
+  const double end = -sum_of_forces(s, 0).z;
+  EXPECT_GT(end, 0);
+  EXPECT_NEAR(mean, 0.5 * end, 0.15 * end);
+}
+
+TEST(MixedMeetings, WhatIsHeldAltogetherIsRefused) {
+  Simulation s(one_thread(), {});
+  Model below = block(5, 5, 2, {}, true);
+  for (Node& node : below.nodes)
+    node.fixed = fixed_all;
+  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+  add(s, "floor", below);
+  add_static(s, "above", above);
+  s.apply(SetContact{0, 1, 0});
+  s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -20000}});
+  try {
+    s.step(h);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("held as all others of its object are"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+} // namespace
+} // namespace gewebe
