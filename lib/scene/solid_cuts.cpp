@@ -24,6 +24,7 @@ namespace {
 constexpr double trail_length = 2; // of the longest edge: a wound ends an element before a blade
 constexpr double trail_step = 1.0 / 32; // of it, at least, between edges that are kept
 constexpr std::size_t most_edges = 256;
+constexpr std::array sheet_shifts{0.0, 0.13, 0.29, 0.41}; // of its cell, one after the other
 constexpr double row_step = 0.25; // of a sheet's cell, at least, between rows that are kept
 
 /// What would no longer be where it is if it were moved: displaced, grasped, tied.
@@ -255,13 +256,23 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
       among[node] = 1;
     options.among = among;
   }
-  SkinSheet sheet;
-  if (skin_too && !model.skin.points.empty())
-    sheet = plane_sheet(model.skin, plane.plane, sheet_cell(model));
-  std::optional<CutByBlade> cut = cut_by(w, index, plane_blade(model, plane.plane), options, sheet);
-  if (!cut)
-    return std::nullopt;
-  return std::move(cut->cut);
+  const TriangleMesh blade = plane_blade(model, plane.plane);
+  const auto cut_with = [&](const SkinSheet& sheet) -> std::optional<CutModel> {
+    std::optional<CutByBlade> cut = cut_by(w, index, blade, options, sheet);
+    return cut ? std::optional(std::move(cut->cut)) : std::nullopt;
+  };
+  if (!skin_too || model.skin.points.empty())
+    return cut_with({});
+  // Where the sheet's lines and the skin's edges meet but for rounding, others lead on.
+  for (const double shift : sheet_shifts) {
+    try {
+      return cut_with(plane_sheet(model.skin, plane.plane, sheet_cell(model), shift));
+    } catch (const MeetingOfNoSheets&) {
+      if (shift == sheet_shifts.back())
+        throw;
+    }
+  }
+  return std::nullopt;
 }
 
 /// \throw Error where it parts nothing

@@ -10,9 +10,10 @@
 
 namespace gewebe {
 
-SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell) {
+SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell, double shift) {
   constexpr double most = 1000;  // cells along a side
   constexpr double there = 1e-6; // of a cell: on the plane
+  constexpr double beside = 1e-6;
   const Vec3 normal = plane.normal / norm(plane.normal);
   Vec3 u = some_perpendicular(normal);
   u = u / norm(u);
@@ -42,14 +43,16 @@ SkinSheet plane_sheet(const Skin& skin, const CutPlane& plane, double cell) {
     return sheet;
   std::array<std::uint32_t, 2> count{};
   for (std::size_t a = 0; a < 2; ++a) {
-    low[a] -= 0.5 * cell;
-    high[a] += 0.5 * cell;
+    // So that neither lines nor diagonals are mirror images of each other.
+    const double by = a == 0 ? shift : 0.73 * shift;
+    low[a] -= (0.5 + by) * cell;
+    high[a] += (0.5 + 0.61 * by) * cell;
     count[a] =
         static_cast<std::uint32_t>(std::clamp(std::ceil((high[a] - low[a]) / cell), 1.0, most));
   }
   for (std::uint32_t j = 0; j <= count[1]; ++j)
     for (std::uint32_t i = 0; i <= count[0]; ++i)
-      sheet.surface.points.push_back(plane.point +
+      sheet.surface.points.push_back(plane.point + shift * beside * cell * normal +
                                      (low[0] + (high[0] - low[0]) * i / count[0]) * u +
                                      (low[1] + (high[1] - low[1]) * j / count[1]) * v);
   const std::uint32_t row = count[0] + 1;
