@@ -171,9 +171,9 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
       s.apply(SetInstrument{0, ball_of(3), {{14, 10, 15.4}, {}}, "ball"});
       if (led)
         s.apply(SetCoupling{0, Coupling{1e5, 10}});
-      for (int k = 0; k < 180; ++k) {
-        if (k < 90)
-          s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.02 * (k + 1)}, {}, h});
+      for (int k = 0; k < 60; ++k) {
+        if (k < 45)
+          s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.04 * (k + 1)}, {}, h});
         s.step(h);
         EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
         const Vec3 on_ball = s.instrument(0).force;
@@ -181,7 +181,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
         EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + on_ball), 1e-11 * norm(on_ball))
             << k;
       }
-      for (int k = 0; k < 200; ++k)
+      for (int k = 0; k < 60; ++k)
         s.step(h);
       const InstrumentReport ball = s.instrument(0);
       EXPECT_GT(ball.force.z, 0) << beam_moves << led;
