@@ -24,6 +24,7 @@ constexpr double same_gap = 1e-6, near_gap = 1e-5; ///< behind some turns
 constexpr double fair_gap = surface_depth;
 constexpr double same_place = 1e-8;
 constexpr double next_to_nothing = 1e-4; ///< of the largest force
+constexpr double is_none = 1e-12;        ///< of it: what solving for others leaves of a force
 
 constexpr int max_turns = 40, turns_at_once = 8;
 constexpr std::size_t max_new = 128; ///< pairs that join at once, the deepest
@@ -237,12 +238,15 @@ void MeetingYielding::Work::solve_linear(std::vector<SurfacePush>& pairs, const 
 
 /// How far gaps are from what the forces say, over an edge.
 double MeetingYielding::Work::miss_of(std::span<const SurfacePush> pairs) const {
-  double most = 0;
+  double most = 0, largest = 0;
+  for (const SurfacePush& p : pairs)
+    largest = std::max(largest, norm(p.force));
   for (const SurfacePush& p : pairs) {
-    if (p.pair.apart && p.force == Vec3{})
+    const bool pushes = !(norm(p.force) <= is_none * largest);
+    if (p.pair.apart && !pushes)
       continue;
     const double off = p.pair.gap - target_of(p.pair);
-    const double miss = p.force == Vec3{} ? std::max(0.0, -off) : std::abs(off);
+    const double miss = pushes ? std::abs(off) : std::max(0.0, -off);
     most = miss <= most ? most : miss;
   }
   return most / pairs_.edge();
