@@ -348,10 +348,9 @@ std::vector<double> SolidContact::shape_of(std::span<const double> places,
   return shape;
 }
 
-/// What gives way, with surfaces that touch.
-void SolidContact::meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
-                        std::vector<SurfacePush>& pushes, std::vector<double>& shape,
-                        bool& solved) {
+/// What gives way, with surfaces that touch. \return whether their forces are found
+bool SolidContact::meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
+                        std::vector<SurfacePush>& pushes, std::vector<double>& shape) {
   MeetingYielding both(
       all, *pairs_,
       [&](std::uint32_t node) {
@@ -364,7 +363,7 @@ void SolidContact::meet(const Step& step, Yielding& all, std::vector<NodeTouch>&
   pushes = both.kept();
   touches.insert(touches.end(), contact_.touches().begin(), contact_.touches().end());
   touches = sums_of_touches(std::move(touches));
-  solved = both.solved();
+  return both.solved();
 }
 
 SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>& touches,
@@ -392,17 +391,15 @@ SolidContact::Result SolidContact::step(const Step& step, std::vector<NodeTouch>
              all = static_cast<std::uint32_t>(model_.nodes.size());
   const std::vector<NodeTouch> last = touches;
   Object object(*this, step, touches_of_part(last, 0, own), context);
-  bool met = true, found = true; ///< of what stands beside as well
+  bool met = true, found = true; // found: what stands beside has found what was asked of it
   const auto go = [&](Yielding& yielding) {
-    bool solved = true;
     if (step.meets) {
-      meet(step, yielding, touches, pushes, shape, solved);
-    } else {
-      contact_.update(yielding, step.displaced, step.instruments, shape, !step.clearing);
-      touches = contact_.touches();
-      pushes.clear();
+      object.distrust(!meet(step, yielding, touches, pushes, shape));
+      return;
     }
-    object.distrust(!solved);
+    contact_.update(yielding, step.displaced, step.instruments, shape, !step.clearing);
+    touches = contact_.touches();
+    pushes.clear();
   };
   if (step.beside == nullptr) {
     go(object);

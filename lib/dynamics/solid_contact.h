@@ -93,8 +93,8 @@ private:
   };
   std::vector<double> shape_of(std::span<const double> places,
                                std::span<const double> stands) const;
-  void meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
-            std::vector<SurfacePush>& pushes, std::vector<double>& shape, bool& solved);
+  bool meet(const Step& step, Yielding& all, std::vector<NodeTouch>& touches,
+            std::vector<SurfacePush>& pushes, std::vector<double>& shape);
   bool overlaps(std::span<const double> shape);
   void hold_back(const Step& step, const Began& began, std::vector<double>& stands, double excess,
                  const Context& context);

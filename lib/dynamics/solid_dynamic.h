@@ -123,7 +123,8 @@ private:
 
   // What stands beside it.
   const Model& model_of_all() const { return beside_model_ ? *beside_model_ : model_; }
-  std::vector<double> with_beside(std::span<const double> own, bool places) const;
+  std::span<const double> with_beside(std::span<const double> own, bool places,
+                                      std::vector<double>& room) const;
   std::map<std::uint32_t, Vec3> displaced(double time) const;
   void let_stand(double from, double to);
   double moved_beside(const Began& start) const;

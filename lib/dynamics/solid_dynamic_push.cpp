@@ -35,15 +35,18 @@ SolidDynamic::Began SolidDynamic::began(double from) const {
 // ---- what stands beside it
 
 /// Of the body's nodes and those beside it: what is given for its own, and displacements of theirs,
-/// as places, or 0.
-std::vector<double> SolidDynamic::with_beside(std::span<const double> own, bool places) const {
-  std::vector<double> all(own.begin(), own.end());
+/// as places, or 0. \param room for it, where there are such
+std::span<const double> SolidDynamic::with_beside(std::span<const double> own, bool places,
+                                                  std::vector<double>& room) const {
+  if (state_.stands->empty())
+    return own;
+  room.assign(own.begin(), own.end());
   const std::size_t count = own.size();
-  all.resize(count + state_.stands->size());
+  room.resize(count + state_.stands->size());
   for (std::size_t k = 0; places && k < state_.stands->size(); ++k)
-    all[count + k] = beside_model_->nodes[(count + k) / 3].position[static_cast<int>(k % 3)] +
-                     (*state_.stands)[k];
-  return all;
+    room[count + k] = beside_model_->nodes[(count + k) / 3].position[static_cast<int>(k % 3)] +
+                      (*state_.stands)[k];
+  return room;
 }
 
 /// Nodes of all that stand where they must. \pre some stand beside it
@@ -114,7 +117,9 @@ void SolidDynamic::step_in_parts(double h, double from, double to, bool first, i
   if (met || halvings == 0 || state_.tries <= 0)
     return;
   if (!meetings_.empty()) {
-    std::vector<double> free = with_beside(velocity, false), moved(free.size());
+    std::vector<double> free(velocity);
+    free.resize(velocity.size() + state_.stands->size());
+    std::vector<double> moved(free.size());
     for (std::size_t axis = 0; axis < velocity.size(); ++axis) {
       free[axis] *= h;
       moved[axis] = engine_->places()[axis] - places[axis];
@@ -158,8 +163,9 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
   };
   if (!meetings_.empty())
     need_contact();
-  bool meets = contact_ && contact_->may_meet(with_beside(moving.places(), true),
-                                              with_beside(moving.velocity(), false), h);
+  std::vector<double> room, more_room;
+  bool meets = contact_ && contact_->may_meet(with_beside(moving.places(), true, room),
+                                              with_beside(moving.velocity(), false, more_room), h);
   std::vector<double> places, velocity; // where it begins, if that may be needed again
   const CopyOnWrite<std::vector<double>> stands = state_.stands;
   if (!meetings_.empty() && !meets) {
@@ -167,7 +173,7 @@ SolidDynamic::Pushed SolidDynamic::push(const std::vector<double>& forces,
     velocity.assign(moving.velocity().begin(), moving.velocity().end());
   }
   const auto begin_again = [&] {
-    if (meets || !contact_ || !contact_->may_have_met(with_beside(moving.places(), true)))
+    if (meets || !contact_ || !contact_->may_have_met(with_beside(moving.places(), true, room)))
       return false;
     moving.begin_again(places, velocity, context);
     state_.stands = stands;

@@ -24,13 +24,13 @@ public:
   Standing& operator=(const Standing&) = delete;
   virtual ~Standing() = default;
 
-  /// How they give way under their loads of a time; good until the next one is asked for.
+  /// How they give way under their loads of a time; good until anything of another is asked for.
   /// \param last what pushes them until they are pushed
   virtual std::unique_ptr<Yielding> yielding(double time, std::span<const NodeTouch> last) = 0;
   /// Whether the last one found all that was asked of it. \pre it lives
   virtual bool solved() const = 0;
   /// Nodes that stand where they must.
-  virtual std::map<std::uint32_t, Vec3> displaced(double time) const = 0;
+  virtual std::map<std::uint32_t, Vec3> displaced(double time) = 0;
   /// Whether loads are others at the second time.
   virtual bool changes(double from, double to) const = 0;
 };

@@ -16,7 +16,7 @@ namespace gewebe::simulation {
 class BesideBody final : public Standing {
 public:
   /// Keeps references. \param objects as they are shown
-  BesideBody(World& w, const std::vector<std::size_t>& objects) : w_(w), objects_(objects) {
+  BesideBody(World& w, std::vector<std::size_t> objects) : w_(w), objects_(std::move(objects)) {
     for (const std::size_t index : objects_)
       known_.push_back(w_.now.objects[index].shown.displacement->size());
   }
@@ -40,6 +40,7 @@ public:
       first += count;
       objects.push_back(&object);
     }
+    changes_ = before_ != next_;
     members_.emplace(w_, std::move(objects));
   }
   void end() {
@@ -55,18 +56,12 @@ public:
     return std::make_unique<Kept>(*members_, last, known_);
   }
   bool solved() const override { return members_->solved(); }
-  std::map<std::uint32_t, Vec3> displaced(double time) const override {
-    std::map<std::uint32_t, Vec3> all;
-    std::uint32_t first = 0;
-    for (std::size_t k = 0; k < objects_.size(); ++k) {
-      for (const auto& [node, u] : load(k, time).displacement)
-        all.emplace_hint(all.end(), first + node, u);
-      first += static_cast<std::uint32_t>(w_.now.objects[objects_[k]].model().nodes.size());
-    }
-    return all;
+  std::map<std::uint32_t, Vec3> displaced(double time) override {
+    set_loads(time);
+    return members_->displaced();
   }
   bool changes(double from, double to) const override {
-    return from < to && from < to_ && before_ != next_;
+    return from < to && from < to_ && changes_;
   }
 
 private:
@@ -93,14 +88,11 @@ private:
     std::vector<std::size_t>& known_;
   };
 
-  Load load(std::size_t k, double time) const {
-    const double part = time < to_ ? std::max(0.0, (time - from_) / (to_ - from_)) : 1;
-    return load_between(before_[k], next_[k], part);
-  }
   void set_loads(double time) {
+    const double part = time < to_ ? std::max(0.0, (time - from_) / (to_ - from_)) : 1;
     std::vector<Load> loads;
     for (std::size_t k = 0; k < objects_.size(); ++k)
-      loads.push_back(load(k, time));
+      loads.push_back(load_between(before_[k], next_[k], part));
     members_->set_loads(std::move(loads));
   }
 
@@ -109,6 +101,7 @@ private:
   std::vector<std::size_t> known_;
   double from_ = 0, to_ = 0; ///< of a way
   std::vector<Load> before_, next_;
+  bool changes_ = false;                 ///< whether these differ
   std::optional<StaticMembers> members_; ///< during a way
 };
 
@@ -141,25 +134,13 @@ std::vector<NodeTouch> take_standing(const World& w, Object& object) {
   return touches_of_part(body.moving->standing_touches(), first, first + count);
 }
 
-std::vector<NodeTouch> by_instruments(std::vector<NodeTouch> touches) {
-  std::erase_if(touches, [](const NodeTouch& t) { return t.instrument == other_surface; });
-  return touches;
-}
+} // namespace
 
-/// Its objects and those beside it, and the first node of each in the model of all.
-std::pair<std::vector<std::size_t>, std::vector<std::size_t>> all_of(const World& w,
-                                                                     const Body& body) {
-  std::pair<std::vector<std::size_t>, std::vector<std::size_t>> all;
-  std::size_t first = 0;
-  for (const auto& some : {body.parts, body.beside})
-    for (const std::size_t index : some) {
-      all.first.push_back(index);
-      all.second.push_back(std::exchange(first, first + w.now.objects[index].model().nodes.size()));
-    }
+std::vector<std::size_t> all_of(const Body& body) {
+  std::vector<std::size_t> all = body.parts;
+  all.insert(all.end(), body.beside.begin(), body.beside.end());
   return all;
 }
-
-} // namespace
 
 std::vector<std::size_t> near_beside(const World& w, std::span<const std::size_t> parts) {
   std::vector<std::size_t> reached(parts.begin(), parts.end()), beside;
@@ -181,9 +162,8 @@ std::vector<std::size_t> near_beside(const World& w, std::span<const std::size_t
 void stand_beside(World& w, const std::shared_ptr<Body>& body, std::vector<std::size_t> objects) {
   StandingStart start;
   std::vector<std::size_t> first;
-  std::vector<std::size_t> all = body->parts;
-  all.insert(all.end(), objects.begin(), objects.end());
-  start.model = std::make_shared<const Model>(joined_model(w, all, first));
+  body->beside = objects;
+  start.model = std::make_shared<const Model>(joined_model(w, all_of(*body), first));
   for (std::size_t k = 0; k < objects.size(); ++k) {
     Object& object = w.now.objects[objects[k]];
     shape_in_step(w, object); // that it comes from
@@ -201,8 +181,7 @@ void stand_beside(World& w, const std::shared_ptr<Body>& body, std::vector<std::
   }
   for (const std::size_t index : objects)
     w.now.objects[index].beside = body;
-  body->standing = std::make_shared<BesideBody>(w, objects);
-  body->beside = std::move(objects);
+  body->standing = std::make_shared<BesideBody>(w, std::move(objects));
   body->moving->stand_beside(start);
 }
 
@@ -220,8 +199,12 @@ void leave_body(World& w, Object& object) {
 }
 
 std::vector<SurfaceMeeting> meetings_of(const World& w, const Body& body) {
-  const auto [all, first] = all_of(w, body);
-  return meetings_of(w, all, first);
+  const std::vector<std::size_t> all = all_of(body);
+  std::vector<std::size_t> offset;
+  std::size_t nodes = 0;
+  for (const std::size_t index : all)
+    offset.push_back(std::exchange(nodes, nodes + w.now.objects[index].model().nodes.size()));
+  return meetings_of(w, all, offset);
 }
 
 void wake_by_beside(const World& w, Body& body) {
@@ -255,12 +238,8 @@ void show_standing(World& w, Object& object) {
   shown.shaped = true;
   warn_of_range(w, object);
   if (object.statics->made()) {
-    if (!shown.load->displacement.empty()) { // whatever was asked of it in between
-      Load load = *shown.load;
-      for (const NodeTouch& t : shown.touches)
-        load.force[t.node] += t.force;
-      update_solver(w, object, load);
-    }
+    if (!shown.load->displacement.empty()) // whatever was asked of it in between
+      update_solver(w, object, acting_load(shown));
     shown.forces = static_forces(object);
   }
   end_showing(w, object);

@@ -57,13 +57,6 @@ void warn_inexact(World& w, Object& object) {
 
 namespace {
 
-/// Its objects, and those beside it.
-std::vector<std::size_t> all_of(const Body& body) {
-  std::vector<std::size_t> all = body.parts;
-  all.insert(all.end(), body.beside.begin(), body.beside.end());
-  return all;
-}
-
 /// Whether the instrument touched it in the last step.
 bool touched_by(const World& w, const Body& body, std::size_t instrument) {
   return body.touched && std::ranges::any_of(all_of(body), [&](std::size_t part) {

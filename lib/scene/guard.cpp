@@ -16,13 +16,23 @@ void Body::restore(const Snapshot& was) {
   failure = nullptr;
 }
 
-namespace {
-
 Saved saved_now(const World& w) {
   Saved saved{w.now, {}};
   for (const auto& body : w.now.bodies)
     saved.bodies.push_back(body->snapshot());
   return saved;
+}
+
+namespace {
+
+/// The scene and its bodies.
+void put_back(World& w, Saved&& saved) {
+  w.now = std::move(saved.scene);
+  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
+    w.now.bodies[k]->restore(saved.bodies[k]);
+  for (Object& object : w.now.objects)
+    if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
+      object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
 }
 
 /// As it was, with what it touched.
@@ -43,19 +53,10 @@ Saved save(World& w) {
   return saved_now(w);
 }
 
-Saved save_again(World& w) {
-  return saved_now(w);
-}
-
 void take_back_again(World& w, Saved&& saved) noexcept {
-  w.now = std::move(saved.scene);
-  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
-    w.now.bodies[k]->restore(saved.bodies[k]);
-  for (Object& object : w.now.objects) {
-    if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
-      object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
+  put_back(w, std::move(saved));
+  for (Object& object : w.now.objects)
     restart_contact(object);
-  }
   for (StaticGroup& group : w.now.static_groups)
     group.meeting = nullptr;
 }
@@ -63,14 +64,10 @@ void take_back_again(World& w, Saved&& saved) noexcept {
 /// What is kept to be quick depends on the shapes that were asked of it, so it is renewed where one
 /// of them is taken back.
 void take_back(World& w, Saved&& saved) noexcept {
-  w.now = std::move(saved.scene);
+  put_back(w, std::move(saved));
   w.saved = false;
-  for (std::size_t k = 0; k < saved.bodies.size(); ++k)
-    w.now.bodies[k]->restore(saved.bodies[k]);
   for (std::size_t i = 0; i < w.now.objects.size(); ++i) {
     Object& object = w.now.objects[i];
-    if (object.matter->known && object.shown.displacement->empty()) // read meanwhile
-      object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
     const bool ahead = object.body != nullptr && object.body->ahead && moves_implicitly(object);
     if (!ahead && !object.statics->ahead)
       continue;

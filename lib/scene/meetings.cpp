@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -23,7 +22,7 @@ bool awake(const Object& object) {
   return object.body != nullptr && (object.body->changed || !object.body->moving->resting());
 }
 
-/// What isn't known of an elastostatic one counts as 0: see met_late.
+/// What isn't known of an elastostatic one counts as 0: see mixed_met_late.
 Extent extent_in(World& w, std::size_t index, Extents& extents) {
   return w.now.objects[index].method == Method::ffe ? Extent{shown_box(w, index), 0}
                                                     : extents.of(index);
@@ -134,10 +133,6 @@ Box3 box_of(World& w, std::size_t index) {
 
 } // namespace
 
-bool mixed_may_meet(const World& w) {
-  return std::ranges::any_of(w.now.meetings, [&](const Meeting& m) { return may_be_late(w, m); });
-}
-
 std::map<std::size_t, Box3> note_mixed(World& w) {
   std::map<std::size_t, Box3> all;
   for (const Meeting& m : w.now.meetings)
@@ -150,8 +145,7 @@ std::map<std::size_t, Box3> note_mixed(World& w) {
   return all;
 }
 
-bool met_late(World& w, const std::map<std::size_t, Box3>& before,
-              const std::function<void()>& take_back) {
+std::vector<std::size_t> mixed_met_late(World& w, const std::map<std::size_t, Box3>& before) {
   const auto passed = [&](std::size_t object) {
     Box3 box = before.at(object);
     const Box3 now = box_of(w, object);
@@ -159,16 +153,17 @@ bool met_late(World& w, const std::map<std::size_t, Box3>& before,
     box.add(now.max);
     return box;
   };
-  std::vector<std::size_t> late; // meetings
+  std::vector<std::size_t> late;
   for (std::size_t k = 0; k < w.now.meetings.size(); ++k) {
     const Meeting& m = w.now.meetings[k];
     if (may_be_late(w, m) && before.contains(m.object) && before.contains(m.other) &&
         near(passed(m.object), passed(m.other)))
       late.push_back(k);
   }
-  if (late.empty())
-    return false;
-  take_back();
+  return late;
+}
+
+void join_mixed(World& w, std::span<const std::size_t> late) {
   std::set<std::size_t> objects;
   for (const std::size_t k : late) {
     Meeting& m = w.now.meetings[k];
@@ -176,7 +171,6 @@ bool met_late(World& w, const std::map<std::size_t, Box3>& before,
     objects.insert({m.object, m.other});
   }
   regroup(w, objects);
-  return true;
 }
 
 void end_mixed(World& w) {

@@ -162,6 +162,13 @@ void shape_in_step(World& w, Object& object) {
   shape(w, object);
 }
 
+Load acting_load(const Shown& shown) {
+  Load load = *shown.load;
+  for (const NodeTouch& t : shown.touches)
+    load.force[t.node] += t.force;
+  return load;
+}
+
 std::span<const double> whole_shape(World& w, Object& object) {
   shape(w, object);
   Shown& shown = object.shown;
@@ -169,10 +176,7 @@ std::span<const double> whole_shape(World& w, Object& object) {
     return *shown.displacement;
   if (shown.whole->empty())
     at_object(w, object, [&] {
-      Load load = *shown.load; // and what instruments push with
-      for (const NodeTouch& t : shown.touches)
-        load.force[t.node] += t.force;
-      update_stages(w, object, load);
+      update_stages(w, object, acting_load(shown));
       const std::span<const double> u = static_shape(object);
       require_bounded(object, u);
       shown.whole.replace().assign(u.begin(), u.end());

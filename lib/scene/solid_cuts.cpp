@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -263,16 +264,16 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
   };
   if (!skin_too || model.skin.points.empty())
     return cut_with({});
-  // Where the sheet's lines and the skin's edges meet but for rounding, others lead on.
-  for (const double shift : sheet_shifts) {
+  const auto cut_shifted = [&](double shift) {
+    return cut_with(plane_sheet(model.skin, plane.plane, sheet_cell(model), shift));
+  };
+  for (const double shift : std::span(sheet_shifts).first(sheet_shifts.size() - 1))
     try {
-      return cut_with(plane_sheet(model.skin, plane.plane, sheet_cell(model), shift));
-    } catch (const MeetingOfNoSheets&) {
-      if (shift == sheet_shifts.back())
-        throw;
+      return cut_shifted(shift);
+    } catch (const MeetingOfNoSheets&) { // its lines meet the skin's edges but for rounding:
+      continue;                          // others may not
     }
-  }
-  return std::nullopt;
+  return cut_shifted(sheet_shifts.back());
 }
 
 /// \throw Error where it parts nothing

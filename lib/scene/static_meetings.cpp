@@ -46,15 +46,9 @@ std::vector<std::size_t> near_ones(const World& w, std::size_t object) {
   return all;
 }
 
-std::vector<NodeTouch> by_instruments(std::vector<NodeTouch> touches) {
-  std::erase_if(touches, [](const NodeTouch& t) { return t.instrument == other_surface; });
-  return touches;
-}
-
 /// An object of its own again, as it is shown.
 void leave_group(Object& object) {
-  std::erase_if(object.shown.touches,
-                [](const NodeTouch& t) { return t.instrument == other_surface; });
+  object.shown.touches = by_instruments(std::move(object.shown.touches));
   object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
                                                    object.shown.touches, object.shown.points);
   object.shown.valid = false;
@@ -356,9 +350,7 @@ namespace {
 void show_before(World& w, const StaticsBefore::One& was) {
   Object& object = w.now.objects[was.object];
   const std::size_t count = object.shown.displacement->size();
-  Load load = *was.shown.load;
-  for (const NodeTouch& t : was.shown.touches)
-    load.force[t.node] += t.force;
+  const Load load = acting_load(was.shown);
   std::vector<double> shape(count);
   at_object(w, object, [&] {
     if (load.empty())

@@ -81,6 +81,11 @@ Load load_between(const Load& from, const Load& to, double part) {
   return load;
 }
 
+std::vector<NodeTouch> by_instruments(std::vector<NodeTouch> touches) {
+  std::erase_if(touches, [](const NodeTouch& t) { return t.instrument == other_surface; });
+  return touches;
+}
+
 PointTouch shifted(PointTouch point, std::uint32_t up, std::uint32_t down) {
   for (std::uint32_t& node : point.nodes)
     node = node + up - down;

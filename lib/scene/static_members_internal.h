@@ -25,6 +25,8 @@ Load load_from(Load last, std::span<const double> shape, const Load& next);
 /// Between two that displace the same nodes.
 Load load_between(const Load& from, const Load& to, double part);
 
+/// Without what other surfaces push with.
+std::vector<NodeTouch> by_instruments(std::vector<NodeTouch> touches);
 /// A point of an object, by its numbers in a whole, or back.
 PointTouch shifted(PointTouch point, std::uint32_t up, std::uint32_t down);
 

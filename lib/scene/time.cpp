@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -120,10 +121,6 @@ void show_all(World& w) {
     find_shapes(w, w.now.objects[number]);
 }
 
-} // namespace
-
-namespace {
-
 void advance_once(World& w, double to) {
   require_few_events(w, to);
   Clock& clock = w.now.clock;
@@ -159,16 +156,18 @@ void advance_once(World& w, double to) {
 /// Where an elastostatic object and what moves have come together that were not near, the step is
 /// taken once more with them as one.
 void advance(World& w, double to) {
-  while (mixed_may_meet(w)) {
+  for (;;) {
     const std::map<std::size_t, Box3> before = note_mixed(w);
-    Saved saved = save_again(w);
+    std::optional<Saved> saved;
+    if (!before.empty())
+      saved = saved_now(w);
     advance_once(w, to);
-    if (!met_late(w, before, [&] { take_back_again(w, std::move(saved)); })) {
-      end_mixed(w);
-      return;
-    }
+    const std::vector<std::size_t> late = mixed_met_late(w, before);
+    if (late.empty())
+      break;
+    take_back_again(w, std::move(*saved));
+    join_mixed(w, late);
   }
-  advance_once(w, to);
   end_mixed(w);
 }
 

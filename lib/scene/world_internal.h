@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -42,7 +41,7 @@ struct Saved {
 Saved save(World& w);
 void take_back(World& w, Saved&& saved) noexcept;
 /// For who goes the same way once more, whoever else has saved: what is kept to be quick stays.
-Saved save_again(World& w);
+Saved saved_now(const World& w);
 void take_back_again(World& w, Saved&& saved) noexcept;
 
 /// Does all of the work or, if it throws under guard, nothing.
@@ -150,13 +149,12 @@ void meet(World& w, double to, Extents& extents, bool stay = false);
 bool may_meet(const World& w, const Meeting& m);
 /// One moves, or meets what moves, and the other is elastostatic.
 bool is_mixed(const World& w, const Meeting& m);
-bool mixed_may_meet(const World& w);
 /// Before a step of the scene: where those are that are mixed and not near.
 std::map<std::size_t, Box3> note_mixed(World& w);
-/// Behind it: whether any have come together. They are near then, until end_mixed. \pre the scene
-/// is as it was before the step once `take_back` was called
-bool met_late(World& w, const std::map<std::size_t, Box3>& before,
-              const std::function<void()>& take_back);
+/// Behind it: which meetings are of such as have come together.
+std::vector<std::size_t> mixed_met_late(World& w, const std::map<std::size_t, Box3>& before);
+/// They are near from now on, until end_mixed at least. \pre the scene is as before the step
+void join_mixed(World& w, std::span<const std::size_t> late);
 void end_mixed(World& w);
 void note_extents(const World& w, Extents& extents);
 std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after);
@@ -172,6 +170,8 @@ std::vector<std::size_t> together(const World& w, std::size_t object);
 std::vector<std::size_t> near_beside(const World& w, std::span<const std::size_t> parts);
 /// They stand beside the body from now on, as they are. \pre nothing stands beside it yet
 void stand_beside(World& w, const std::shared_ptr<Body>& body, std::vector<std::size_t> objects);
+/// Its objects, and those beside it: the order of nodes where both are one.
+std::vector<std::size_t> all_of(const Body& body);
 /// It stands beside none any more.
 void leave_body(World& w, Object& object);
 std::vector<SurfaceMeeting> meetings_of(const World& w, const Body& body);
@@ -233,6 +233,8 @@ void shape_in_step(World& w, Object& object);
 /// Of all nodes, those inside a solid too.
 std::span<const double> whole_shape(World& w, Object& object);
 std::span<const double> whole_shape_in_step(World& w, Object& object);
+/// What its shape is of: the load, and what touches it.
+Load acting_load(const Shown& shown);
 /// That which is known: as it is shown, of all nodes if it was asked for. \pre shaped
 std::span<const double> known_shape(const Object& object);
 double displacement_limit(Object& object);

@@ -7,8 +7,11 @@
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
+#include "simulation_scenes.h"
 #include "statics/elastostatic.h"
 #include "touching_blocks.h"
+
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstddef>
@@ -59,6 +62,27 @@ inline double miss_of_balance(const Simulation& s, std::size_t object, Load load
     largest = larger(largest, std::abs(u[k]));
   }
   return miss / largest;
+}
+
+/// What becomes of an elastostatic block under a ball and of one 32 mm above it, which is added so
+/// and pulled down by its lowest nodes.
+inline std::vector<std::vector<double>>
+shapes_far_apart(void (*add_above)(Simulation&, const std::string&, const Model&),
+                 const Vec3& force, bool may_touch) {
+  Simulation s(one_thread(), {});
+  const Model above = hanging(3, 3, 2, {3.7, 4.1, 40});
+  add_static(s, "below", block(5, 5, 2, {}, true));
+  add_above(s, "above", above);
+  if (may_touch)
+    s.apply(SetContact{0, 1, 0.3});
+  s.apply(SetForce{1, nodes_below(above, 41), force});
+  s.apply(SetInstrument{0, ball_of(3), {{9, 9, 12}, {}}, "ball"});
+  for (int k = 0; k < 4; ++k) {
+    s.apply(MoveInstrument{0, Vec3{9, 9, 11.0 - k}, {}, 0.1});
+    s.step(0.1);
+  }
+  EXPECT_GT(s.instrument(0).force.z, 0);
+  return {shape(s, 0), shape(s, 1)};
 }
 
 } // namespace gewebe::test

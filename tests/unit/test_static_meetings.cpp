@@ -108,26 +108,10 @@ TEST(StaticMeetings, FrictionHoldsWhatWouldSlide) {
 }
 
 TEST(StaticMeetings, FarApartNothingIsDifferent) {
-  std::vector<std::vector<double>> shapes;
-  for (const bool may_touch : {false, true}) {
-    Simulation s(one_thread(), {});
-    const Model above = hanging(3, 3, 2, {3.7, 4.1, 40});
-    add_static(s, "below", block(5, 5, 2, {}, true));
-    add_static(s, "above", above);
-    if (may_touch)
-      s.apply(SetContact{0, 1, 0.3});
-    s.apply(SetForce{1, nodes_below(above, 41), {5000, 0, -20000}});
-    s.apply(SetInstrument{0, ball_of(3), {{9, 9, 12}, {}}, "ball"});
-    for (int k = 0; k < 4; ++k) {
-      s.apply(MoveInstrument{0, Vec3{9, 9, 11.0 - k}, {}, 0.1});
-      s.step(0.1);
-    }
-    EXPECT_GT(s.instrument(0).force.z, 0);
-    for (const std::size_t object : {0U, 1U})
-      shapes.push_back(shape(s, object));
-  }
-  EXPECT_EQ(shapes[0], shapes[2]);
-  EXPECT_EQ(shapes[1], shapes[3]);
+  const auto shapes = [](bool may_touch) {
+    return shapes_far_apart(add_static, {5000, 0, -20000}, may_touch);
+  };
+  EXPECT_EQ(shapes(false), shapes(true));
 }
 
 /// What would pass another object in one step is held where it would enter.
