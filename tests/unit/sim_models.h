@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 namespace gewebe::test {
@@ -38,11 +40,15 @@ inline Model two_masses(double mass = 1, double stiffness = 1, double damping = 
   return m;
 }
 
-/// A ball on fixed central nodes, with some nodes held below.
+/// A ball on fixed central nodes, with some nodes held below. Kept: its clusters take their time.
 inline Model organ(int rounds = 2, bool bend = true) {
+  static std::map<std::pair<int, bool>, Model> made;
+  Model& model = made[{rounds, bend}];
+  if (!model.nodes.empty())
+    return model;
   BuildOptions options;
   options.bend = bend;
-  Model model = build_model(ball(rounds, 20, {100, -50, 30}), options, Context{}).model;
+  model = build_model(ball(rounds, 20, {100, -50, 30}), options, Context{}).model;
   for (std::size_t i = 0; i < surface_count(model); ++i)
     if (model.nodes[i].position.z < 14)
       model.nodes[i].fixed = i % 3 == 0 ? fixed_z : fixed_all;
