@@ -189,7 +189,8 @@ void sweep_impulses(MassPoints& points, std::span<const MovingCore> cores,
       };
       const Vec3 before = t.impulse;
       const double old = dot(before, n);
-      push((std::max(0.0, old - (dot(velocity(), n) + allowed[k]) / along) - old) * n);
+      const double now = old - (dot(velocity(), n) + allowed[k]) / along;
+      push(now > 0 ? (now - old) * n : -t.impulse); // all of it, or a rounding is left
       const double friction = cores[t.instrument].placed.friction;
       if (friction > 0) {
         const double most = friction * dot(t.impulse, n);
