@@ -1,5 +1,7 @@
 #include "solid/hyperelastic.h"
 
+#include "base/cpu.h"
+#include "solid/hyperelastic_kernel_internal.h"
 #include "solid/matrix3_internal.h"
 #include "tetrahedra/tet_mesh.h"
 
@@ -130,27 +132,20 @@ Tangent positive_derivative(const Point& q, double d, double least) {
          solver.eigenvectors().transpose();
 }
 
-/// Adds weight ∇aᵀ (d²/dF²) ∇b to the tangent, of pairs a <= b.
-void add_tangent(const Point& q, double d, std::size_t count, HyperelasticResponse& response) {
-  std::array<Vec3, HyperelasticResponse::nodes> by_f, by_cofactor;
-  for (std::size_t a = 0; a < count; ++a) {
-    by_f[a] = product(q.f, q.gradient[a]);
-    by_cofactor[a] = product(q.cofactor, q.gradient[a]);
-  }
-  for (std::size_t a = 0; a < count; ++a)
-    for (std::size_t b = a; b < count; ++b) {
-      const Vec3 turned = product(q.f, cross(q.gradient[a], q.gradient[b])) * d;
-      const double even = q.w.a * dot(q.gradient[a], q.gradient[b]);
-      SolidBlock block{even,     turned.z, -turned.y, -turned.z, even,
-                       turned.x, turned.y, -turned.x, even};
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          block[static_cast<std::size_t>(3 * i + j)] +=
-              q.w.b * by_f[a][i] * by_f[b][j] + q.w.c * by_cofactor[a][i] * by_cofactor[b][j];
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
-          response.tangent[33 * (3 * a + i) + 3 * b + j] += q.weight * block[3 * i + j];
-    }
+void add_tangent(const Point& q, double d, std::size_t count, TangentSums& sums) {
+  static const AddTangent add =
+      best_cpu_level() == CpuLevel::baseline ? &add_tangent_baseline : &add_tangent_avx2;
+  TangentPoint point{.weight = q.weight,
+                     .a = q.w.a,
+                     .b = q.w.b,
+                     .c = q.w.c,
+                     .d = d,
+                     .f = q.f,
+                     .cofactor = q.cofactor};
+  for (std::size_t n = 0; n < count; ++n)
+    for (int i = 0; i < 3; ++i)
+      point.gradient[static_cast<std::size_t>(i)][n] = q.gradient[n][i];
+  add(point, count, sums);
 }
 
 void add_positive_tangent(const Point& q, double d, double least, std::size_t count,
@@ -222,6 +217,9 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
   response.force.fill({});
   if (part != HyperelasticPart::force)
     response.tangent.fill(0);
+  TangentSums sums;
+  if (part == HyperelasticPart::tangent)
+    sums = {};
   std::array<Gradients, 4> slope{}; // of the moments by u
   for (std::size_t n = 0; n < at.size(); ++n) {
     const Point& q = points[n];
@@ -236,7 +234,7 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
     if (part == HyperelasticPart::force)
       continue;
     if (part == HyperelasticPart::tangent)
-      add_tangent(q, d, count, response);
+      add_tangent(q, d, count, sums);
     else
       add_positive_tangent(q, d, 1e-3 * mu, count, response);
     for (std::size_t a = 0; a < count; ++a) {
@@ -247,21 +245,29 @@ void hyperelastic_response(const SolidElement& element, HyperelasticLaw law,
   }
   if (part == HyperelasticPart::force)
     return;
+  if (part == HyperelasticPart::tangent)
+    for (std::size_t k = 0; k < 9; ++k)
+      for (std::size_t a = 0; a < count; ++a)
+        for (std::size_t b = a; b < count; ++b)
+          response.tangent[33 * (3 * a + k / 3) + 3 * b + k % 3] = sums[k][a][b];
 
+  std::array<Gradients, 4> by_volume{};
+  for (std::size_t p = 0; p < 4; ++p)
+    for (std::size_t a = 0; a < count; ++a)
+      by_volume[p][a] = slope[p][a] * (lambda * element.volume);
   for (std::size_t b = 0; b < count; ++b) {
     Vec3 total;
     for (std::size_t p = 0; p < 4; ++p)
       total += slope[p][b];
+    std::array<Vec3, 4> of_pressure; // per displacement of b
+    for (std::size_t p = 0; p < 4; ++p)
+      of_pressure[p] = quadratic ? 20 * (slope[p][b] - total / 5) : total;
     for (std::size_t a = 0; a <= b; ++a)
-      for (std::size_t p = 0; p < 4; ++p) {
-        const Vec3 of_pressure =
-            quadratic ? 20 * (slope[p][b] - total / 5) : total; // per displacement of b
-        for (int i = 0; i < 3; ++i)
-          for (int j = 0; j < 3; ++j)
-            response.tangent[33 * (3 * a + static_cast<std::size_t>(i)) + 3 * b +
-                             static_cast<std::size_t>(j)] +=
-                lambda * element.volume * slope[p][a][i] * of_pressure[j];
-      }
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          for (std::size_t p = 0; p < 4; ++p)
+            response.tangent[33 * (3 * a + i) + 3 * b + j] +=
+                by_volume[p][a][static_cast<int>(i)] * of_pressure[p][static_cast<int>(j)];
   }
   for (std::size_t row = 0; row < 3 * count; ++row)
     for (std::size_t column = 0; column < row; ++column)

@@ -1,9 +1,11 @@
 // Hyperelastic solids: the element by finite differences and by solid/element.h at rest, bodies by
 // analysis: uniaxial stretch, an elastica, a motion made up, order of convergence.
 
+#include "base/cpu.h"
 #include "base/error.h"
 #include "solid/assembly.h"
 #include "solid/hyperelastic.h"
+#include "solid/hyperelastic_kernel_internal.h"
 #include "solid/hyperelastic_statics.h"
 #include "solve/factor.h"
 #include "tests/unit/larger.h"
@@ -92,6 +94,61 @@ Moved moved(bool quadratic, double poisson, double by, bool mirrored = false) {
     m.u[a] = u;
   }
   return m;
+}
+
+/// The same by the formula, in its order.
+double entry_of(const TangentPoint& q, std::size_t m, std::size_t n, std::size_t i, std::size_t j) {
+  const auto gradient = [&](std::size_t k) {
+    return Vec3{q.gradient[0][k], q.gradient[1][k], q.gradient[2][k]};
+  };
+  const auto times = [](const std::array<double, 9>& a, const Vec3& v) {
+    return Vec3{a[0] * v.x + a[1] * v.y + a[2] * v.z, a[3] * v.x + a[4] * v.y + a[5] * v.z,
+                a[6] * v.x + a[7] * v.y + a[8] * v.z};
+  };
+  const Vec3 turned = times(q.f, cross(gradient(m), gradient(n))) * q.d;
+  const double even = q.a * dot(gradient(m), gradient(n));
+  const std::array<double, 9> skew{even,     turned.z, -turned.y, -turned.z, even,
+                                   turned.x, turned.y, -turned.x, even};
+  const int row = static_cast<int>(i), column = static_cast<int>(j);
+  return q.weight *
+         (skew[3 * i + j] +
+          (q.b * times(q.f, gradient(m))[row] * times(q.f, gradient(n))[column] +
+           q.c * times(q.cofactor, gradient(m))[row] * times(q.cofactor, gradient(n))[column]));
+}
+
+TEST(HyperelasticKernel, GivesTheSameBitsAtEveryLevelOfCpu) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::vector<AddTangent> kernels{&add_tangent_baseline};
+  if (best_cpu_level() != CpuLevel::baseline)
+    kernels.push_back(&add_tangent_avx2);
+  for (const std::size_t count : {4U, 11U}) {
+    std::vector<TangentPoint> points(3);
+    for (TangentPoint& q : points) {
+      for (double* const value : {&q.weight, &q.a, &q.b, &q.c, &q.d})
+        *value = any(random);
+      for (std::size_t k = 0; k < 9; ++k) {
+        q.f[k] = any(random);
+        q.cofactor[k] = any(random);
+      }
+      for (auto& axis : q.gradient)
+        for (std::size_t n = 0; n < count; ++n)
+          axis[n] = any(random);
+    }
+    for (const AddTangent kernel : kernels) {
+      TangentSums sums{};
+      for (const TangentPoint& q : points)
+        kernel(q, count, sums);
+      for (std::size_t k = 0; k < 9; ++k)
+        for (std::size_t m = 0; m < count; ++m)
+          for (std::size_t n = m; n < count; ++n) {
+            double sum = 0;
+            for (const TangentPoint& q : points)
+              sum += entry_of(q, m, n, k / 3, k % 3);
+            EXPECT_EQ(sums[k][m][n], sum);
+          }
+    }
+  }
 }
 
 TEST(Hyperelastic, AtRestItIsTheElementOfSmallStrains) {
