@@ -15,7 +15,7 @@ namespace gewebe::simulation {
 /// Those beside a body, on its way.
 class BesideBody final : public Standing {
 public:
-  /// Keeps references. \param objects as they are shown
+  /// Keeps a reference to the scene. \param objects as they are shown
   BesideBody(World& w, std::vector<std::size_t> objects) : w_(w), objects_(std::move(objects)) {
     for (const std::size_t index : objects_)
       known_.push_back(w_.now.objects[index].shown.displacement->size());

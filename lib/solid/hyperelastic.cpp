@@ -132,6 +132,8 @@ Tangent positive_derivative(const Point& q, double d, double least) {
          solver.eigenvectors().transpose();
 }
 
+static_assert(tangent_nodes == HyperelasticResponse::nodes);
+
 void add_tangent(const Point& q, double d, std::size_t count, TangentSums& sums) {
   static const AddTangent add =
       best_cpu_level() == CpuLevel::baseline ? &add_tangent_baseline : &add_tangent_avx2;
