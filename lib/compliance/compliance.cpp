@@ -211,15 +211,19 @@ bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int sha
                      [&](std::uint32_t node) { return cache_.resident(node); });
 }
 
+const CompressedColumns* Compliance::compressed_for(std::span<const std::uint32_t> nodes) const {
+  return !nodes.empty() && compressed(nodes.front()) && columns_pay(nodes) ? compressed_ : nullptr;
+}
+
 void Compliance::add(std::span<const NodeVector> forces, double allowed, std::span<double> u) {
   if (forces.empty())
     return;
   const std::vector<std::uint32_t> nodes = nodes_of(forces);
+  if (const CompressedColumns* const columns = compressed_for(nodes); columns != nullptr) {
+    columns->add(forces, context_, u);
+    return;
+  }
   if (columns_pay(nodes)) {
-    if (compressed_ != nullptr && compressed(nodes.front())) {
-      compressed_->add(forces, context_, u);
-      return;
-    }
     need(nodes);
     cache_.add(forces, allowed, context_, u);
     return;

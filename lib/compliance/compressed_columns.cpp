@@ -112,17 +112,20 @@ std::vector<std::uint8_t> bytes_of(const Crosses& chunk) {
 
 CompressedColumns::CompressedColumns(CompressedLayout layout, std::size_t nodes, ChunkReader reader)
     : layout_(std::move(layout)), node_count_(nodes), reader_(std::move(reader)),
-      cluster_(layout_.clusters.node.size()), place_(cluster_.size()), at_(layout_.count.size()),
-      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns) {
+      place_(layout_.clusters.node.size()), at_(layout_.count.size()),
+      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns),
+      most_(layout_.count.size()) {
+  std::vector<std::uint32_t> cluster(place_.size());
   for (std::size_t a = 0; a < layout_.clusters.size(); ++a) {
     const auto members = layout_.clusters.nodes(a);
     for (std::size_t k = 0; k < members.size(); ++k) {
-      cluster_[members[k]] = static_cast<std::uint32_t>(a);
+      cluster[members[k]] = static_cast<std::uint32_t>(a);
       place_[members[k]] = static_cast<std::uint32_t>(k);
     }
     if (a < layout_.with_columns)
       nodes_.insert(nodes_.end(), members.begin(), members.end());
   }
+  cluster_ = std::make_shared<const std::vector<std::uint32_t>>(std::move(cluster));
   std::sort(nodes_.begin(), nodes_.end());
   for (std::size_t a = 0; a < layout_.with_columns; ++a) {
     ChunkNumbers before;
@@ -157,7 +160,10 @@ const Crosses& CompressedColumns::chunk(std::size_t index) const {
     if (!std::isfinite(scale))
       throw Error("compressed columns have a scale that is not finite");
   ++chunks_read_;
-  return kept.emplace(std::move(made));
+  kept.emplace(std::move(made));
+  for (std::size_t b = index; b < layout_.clusters.size(); ++b)
+    most_[first_block(layout_, index) + b - index] = largest_entry(view(index, b));
+  return *kept;
 }
 
 void CompressedColumns::read_all() const {
@@ -180,7 +186,7 @@ std::array<std::array<double, 3>, 3> CompressedColumns::block(std::uint32_t node
   const bool turned = is_before(other, node);
   const std::uint32_t first = turned ? other : node, second = turned ? node : other;
   std::array<double, 9> sum{};
-  add_entries(view(cluster_[first], cluster_[second]), 3 * std::size_t{place_[first]},
+  add_entries(view(of(first), of(second)), 3 * std::size_t{place_[first]},
               3 * std::size_t{place_[second]}, 3, sum.data());
   std::array<std::array<double, 3>, 3> block{};
   for (std::size_t r = 0; r < 3; ++r)
@@ -196,35 +202,23 @@ double CompressedColumns::entry(std::uint32_t node, int axis, std::size_t row) c
   const bool turned = is_before(other, node);
   const std::uint32_t first = turned ? other : node, second = turned ? node : other;
   double sum = 0;
-  add_entries(view(cluster_[first], cluster_[second]), turned ? its : own, turned ? own : its, 1,
-              &sum);
+  add_entries(view(of(first), of(second)), turned ? its : own, turned ? own : its, 1, &sum);
   return sum;
 }
 
 void CompressedColumns::add(std::span<const NodeVector> forces, const Context& context,
                             std::span<double> u) const {
-  std::map<std::uint32_t, std::vector<CrossLoad>> loads; // by cluster
+  const std::vector<ClusterLoad> loads = loads_of(forces);
   double work = 0;
-  for (const NodeVector& f : forces)
-    for (int a = 0; a < 3; ++a)
-      if (f.value[a] != 0)
-        loads[cluster_[f.node]].push_back(
-            {3 * std::size_t{place_[f.node]} + static_cast<std::size_t>(a), f.value[a]});
-  for (const auto& entry : loads) {
-    work += row_numbers_[entry.first];
-    for (std::size_t a = 0; a <= entry.first; ++a)
-      (void)chunk(a); // none is loaded below, where threads read them
-  }
+  for (const ClusterLoad& own : loads)
+    work += row_numbers_[own.cluster];
   Context some = context;
   some.progress = nullptr;
   if (!(work >= static_cast<double>(costs::worth_threads)))
     some.threads = 1;
   parallel_blocks(some, layout_.clusters.size(), 1, [&](std::size_t b, std::size_t) {
+    const std::vector<double> sum = sum_at(b, loads, some.cpu);
     const auto members = layout_.clusters.nodes(b);
-    std::vector<double> sum(3 * members.size());
-    for (const auto& [a, load] : loads)
-      add_product(view(std::min<std::size_t>(a, b), std::max<std::size_t>(a, b)), a < b, load,
-                  some.cpu, sum);
     for (std::size_t k = 0; k < members.size(); ++k) {
       double* const to = u.data() + 3 * std::size_t{members[k]};
       const double* const more = sum.data() + 3 * k;
@@ -233,6 +227,46 @@ void CompressedColumns::add(std::span<const NodeVector> forces, const Context& c
       to[2] += more[2];
     }
   });
+}
+
+std::vector<ClusterLoad> CompressedColumns::loads_of(std::span<const NodeVector> forces) const {
+  std::map<std::size_t, std::vector<CrossLoad>> loads; // by cluster
+  for (const NodeVector& f : forces)
+    for (int a = 0; a < 3; ++a)
+      if (f.value[a] != 0)
+        loads[of(f.node)].push_back(
+            {3 * std::size_t{place_[f.node]} + static_cast<std::size_t>(a), f.value[a]});
+  std::vector<ClusterLoad> all;
+  for (auto& [cluster, load] : loads) {
+    all.push_back({cluster, std::move(load)});
+    for (std::size_t a = 0; a <= cluster; ++a)
+      (void)chunk(a); // none is loaded by sums, where threads read them
+  }
+  return all;
+}
+
+std::vector<double> CompressedColumns::sum_at(std::size_t cluster,
+                                              std::span<const ClusterLoad> loads,
+                                              CpuLevel cpu) const {
+  std::vector<double> sum(3 * layout_.clusters.nodes(cluster).size());
+  for (const auto& [a, load] : loads)
+    add_product(view(std::min(a, cluster), std::max(a, cluster)), a < cluster, load, cpu, sum);
+  return sum;
+}
+
+std::vector<double> CompressedColumns::most(std::span<const ClusterLoad> loads) const {
+  constexpr double rounding = 1 + 1e-9;
+  std::vector<double> all(layout_.clusters.size());
+  for (const auto& [a, load] : loads) {
+    double size = 0;
+    for (const CrossLoad& f : load)
+      size += rounding * std::abs(f.value);
+    for (std::size_t b = 0; b < all.size(); ++b) {
+      const std::size_t low = std::min(a, b), high = std::max(a, b);
+      all[b] += size * most_[first_block(layout_, low) + high - low];
+    }
+  }
+  return all;
 }
 
 void CompressedColumns::read(std::size_t k, std::span<double> out) const {
@@ -250,7 +284,7 @@ void CompressedColumns::read(std::size_t k, std::span<double> out) const {
 double CompressedColumns::numbers(std::span<const std::uint32_t> nodes) const {
   std::vector<std::uint32_t> touched;
   for (const std::uint32_t node : nodes)
-    touched.push_back(cluster_[node]);
+    touched.push_back(of(node));
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   double sum = 0;

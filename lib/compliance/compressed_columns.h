@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -41,6 +42,12 @@ std::vector<std::uint64_t> chunk_sizes(const CompressedLayout& layout);
 /// A chunk as bytes: scales, then int16, then int8, little-endian.
 std::vector<std::uint8_t> bytes_of(const Crosses& chunk);
 
+/// Forces on nodes of one cluster, by the numbers that its blocks have.
+struct ClusterLoad {
+  std::size_t cluster = 0;
+  std::vector<CrossLoad> load;
+};
+
 /// Asked for the bytes of a chunk once at most.
 using ChunkReader = std::function<std::vector<std::uint8_t>(std::size_t chunk)>;
 
@@ -52,7 +59,7 @@ public:
 
   const CompressedLayout& layout() const noexcept { return layout_; }
   std::size_t node_count() const override { return node_count_; }
-  std::size_t row_nodes() const override { return cluster_.size(); }
+  std::size_t row_nodes() const override { return place_.size(); }
   const std::vector<std::uint32_t>& nodes() const override { return nodes_; }
   /// Puts a node's columns together. \throw what the reader throws, as all below
   void read(std::size_t k, std::span<double> out) const override;
@@ -60,7 +67,7 @@ public:
   EntryBound bound() const override { return {layout_.relative, layout_.bound}; }
 
   bool has(std::uint32_t node) const {
-    return node < cluster_.size() && cluster_[node] < layout_.with_columns;
+    return node < place_.size() && (*cluster_)[node] < layout_.with_columns;
   }
   /// C between a node that has columns and any other of the first m, [axis][axis of the other];
   /// that of the two in the other order is its transpose, bit by bit.
@@ -70,6 +77,19 @@ public:
   /// u += C f over the first 3 m axes, for forces at nodes that have columns. The same bytes for
   /// any number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
+  // A sum like that cluster by cluster, for who needs few of them.
+  /// Of all nodes that columns have rows for.
+  const std::shared_ptr<const std::vector<std::uint32_t>>& cluster_of_node() const noexcept {
+    return cluster_;
+  }
+  /// The forces of a sum, by ascending clusters; reads what the sum needs.
+  std::vector<ClusterLoad> loads_of(std::span<const NodeVector> forces) const;
+  /// C f at a cluster's nodes in their order, as add() adds it.
+  std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
+                             CpuLevel cpu) const;
+  /// By cluster, what no entry of C f there exceeds, by the largest entries that blocks may have.
+  std::vector<double> most(std::span<const ClusterLoad> loads) const;
+
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
 
@@ -82,9 +102,10 @@ public:
   std::uint64_t chunks_read() const noexcept { return chunks_read_; }
 
 private:
+  std::uint32_t of(std::uint32_t node) const { return (*cluster_)[node]; }
   /// C is taken with the first of two nodes first, so that both orders have the same bits.
   bool is_before(std::uint32_t a, std::uint32_t b) const {
-    return cluster_[a] < cluster_[b] || (cluster_[a] == cluster_[b] && place_[a] < place_[b]);
+    return of(a) < of(b) || (of(a) == of(b) && place_[a] < place_[b]);
   }
   const Crosses& chunk(std::size_t index) const;
   CrossView view(std::size_t chunk, std::size_t cluster) const;
@@ -95,11 +116,13 @@ private:
   CompressedLayout layout_;
   std::size_t node_count_;
   ChunkReader reader_;
-  std::vector<std::uint32_t> nodes_;           ///< that have columns
-  std::vector<std::uint32_t> cluster_, place_; ///< of a node, and where in that
-  std::vector<BlockPlace> at_;                 ///< of each block in its chunk
-  std::vector<double> row_numbers_;            ///< of a cluster's blocks with all others
+  std::vector<std::uint32_t> nodes_;                          ///< that have columns
+  std::shared_ptr<const std::vector<std::uint32_t>> cluster_; ///< of a node
+  std::vector<std::uint32_t> place_;                          ///< of a node in its cluster
+  std::vector<BlockPlace> at_;                                ///< of each block in its chunk
+  std::vector<double> row_numbers_; ///< of a cluster's blocks with all others
   mutable std::vector<std::optional<Crosses>> chunks_;
+  mutable std::vector<double> most_; ///< by block: that no entry exceeds, of chunks that are read
   mutable std::uint64_t chunks_read_ = 0;
 };
 

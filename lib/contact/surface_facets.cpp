@@ -35,6 +35,11 @@ std::vector<std::uint32_t> loose_nodes(const Model& model) {
   return loose;
 }
 
+Box3 grown(const Box3& box, double by) {
+  const Vec3 far{by, by, by};
+  return {box.min - far, box.max + far};
+}
+
 struct Two {
   __m128d value;
 };
@@ -122,6 +127,7 @@ SurfaceFacets::SurfaceFacets(const Model& model) {
   for_corners([&](std::uint32_t node, std::uint32_t k) { of_node_[next[node]++] = k; });
   set_shape(model, {});
   rest_ = boxes_;
+  rest_box_ = box_;
 }
 
 Box3 SurfaceFacets::box_of(const Model& model, std::span<const double> displacement,
@@ -167,6 +173,63 @@ void SurfaceFacets::set_shape_near(const Model& model, std::span<const double> d
     box_.add(box.min);
     box_.add(box.max);
   }
+}
+
+/// Which groups the nodes of each block are of.
+void SurfaceFacets::group_blocks(const NodeReach& reach) {
+  if (group_ == reach.group)
+    return;
+  block_groups_.clear();
+  first_group_.clear();
+  for (std::size_t b = 0; b < boxes_.size(); ++b) {
+    first_group_.push_back(block_groups_.size());
+    std::vector<std::uint32_t> some;
+    for (const std::uint32_t node : nodes_of(b))
+      some.push_back((*reach.group)[node]);
+    std::ranges::sort(some);
+    block_groups_.insert(block_groups_.end(), some.begin(), std::ranges::unique(some).begin());
+  }
+  first_group_.push_back(block_groups_.size());
+  group_ = reach.group;
+}
+
+void SurfaceFacets::set_reach(const NodeReach& reach) {
+  group_blocks(reach);
+  range_.reset();
+  double all = 0;
+  for (std::size_t b = 0; b < boxes_.size(); ++b) {
+    double most = 0;
+    for (std::size_t k = first_group_[b]; k < first_group_[b + 1]; ++k)
+      most = std::max(most, reach.most[block_groups_[k]]);
+    boxes_[b] = grown(rest_[b], most);
+    all = std::max(all, most);
+  }
+  box_ = grown(rest_box_, all);
+}
+
+void SurfaceFacets::add_places(const Model& model, std::span<const double> displacement,
+                               std::span<const std::uint32_t> nodes) {
+  for (const std::uint32_t node : nodes) {
+    const Vec3 at = model.nodes[node].position + vector_at(displacement, node);
+    for (const std::uint32_t piece : at_node(node))
+      boxes_[static_cast<std::size_t>(std::ranges::upper_bound(first_, piece) - first_.begin()) - 1]
+          .add(at);
+    box_.add(at);
+  }
+}
+
+std::vector<std::size_t> SurfaceFacets::blocks_near(std::span<const Box3> places) const {
+  std::vector<std::size_t> blocks;
+  for (std::size_t b = 0; b < boxes_.size(); ++b)
+    if (std::ranges::any_of(places, [&](const Box3& place) { return near(place, boxes_[b]); }))
+      blocks.push_back(b);
+  return blocks;
+}
+
+void SurfaceFacets::set_boxes(const Model& model, std::span<const double> displacement,
+                              std::span<const std::size_t> blocks) {
+  for (const std::size_t b : blocks)
+    boxes_[b] = box_of(model, displacement, b);
 }
 
 } // namespace gewebe

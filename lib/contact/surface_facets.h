@@ -4,11 +4,13 @@
 
 #include "base/vec3.h"
 #include "contact/instrument.h"
+#include "contact/node_reach.h"
 #include "contact/surface_point.h"
 #include "model/model.h"
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -35,6 +37,22 @@ public:
   void set_shape_near(const Model& model, std::span<const double> displacement,
                       std::span<const Box3> places);
 
+  // For whoever knows the shape in part, block by block.
+  /// Boxes that hold all pieces, however they are displaced within this reach.
+  void set_reach(const NodeReach& reach);
+  /// Boxes of pieces at these nodes hold the nodes where they are.
+  void add_places(const Model& model, std::span<const double> displacement,
+                  std::span<const std::uint32_t> nodes);
+  /// Of which pieces may reach into one of these places.
+  std::vector<std::size_t> blocks_near(std::span<const Box3> places) const;
+  std::span<const std::uint32_t> nodes_of(std::size_t block) const {
+    return std::span(nodes_).subspan(first_node_[block],
+                                     first_node_[block + 1] - first_node_[block]);
+  }
+  /// The boxes of these blocks alone; box() stays.
+  void set_boxes(const Model& model, std::span<const double> displacement,
+                 std::span<const std::size_t> blocks);
+
   const Box3& box() const noexcept { return box_; }
   /// range_of the shape, if set_shape_near has had to know it.
   const std::optional<Box3>& range() const noexcept { return range_; }
@@ -59,12 +77,17 @@ public:
 private:
   Box3 box_of(const Model& model, std::span<const double> displacement, std::size_t block) const;
 
+  void group_blocks(const NodeReach& reach);
+
   std::vector<Facet> facets_;
   std::vector<std::size_t> first_; ///< piece of each block, and the end
   std::vector<Box3> boxes_, rest_;
   std::vector<std::uint32_t> nodes_;    ///< of the blocks' pieces, ascending in each
   std::vector<std::size_t> first_node_; ///< of each block, and the end
-  Box3 box_;
+  std::shared_ptr<const std::vector<std::uint32_t>> group_; ///< of nodes, that the next are of
+  std::vector<std::uint32_t> block_groups_;                 ///< ascending in each block
+  std::vector<std::size_t> first_group_;                    ///< of each block, and the end
+  Box3 box_, rest_box_;
   std::optional<Box3> range_;
   std::vector<std::uint32_t> of_node_;
   std::vector<std::size_t> first_of_node_;

@@ -57,6 +57,10 @@ void announce(World& w, const Change& change) {
 }
 
 void apply(World& w, const Change& change) {
+  if (!std::holds_alternative<MoveInstrument>(change))
+    for (Object& object : w.now.objects) // who looks at a shape finds all of it
+      if (object.shown.part)
+        shape_in_step(w, object);
   std::visit(
       [&]<class Kind>(const Kind& c) {
         Rule<Kind>::check(w, c);

@@ -2,6 +2,7 @@
 
 #include "base/vector_at.h"
 #include "scene/world_internal.h"
+#include "statics/elastostatic_yielding.h"
 #include "statics/two_step_contact.h"
 #include "statics/warped_contact.h"
 
@@ -273,7 +274,8 @@ void settle_led(World& w, std::span<Object* const> objects) {
 }
 
 /// An elastostatic object's shape behind all the ways that the instruments took since it was shown.
-void follow_instruments(World& w, Object& object) {
+/// \param part null: all of it; else what was known of the last one becomes what is known of it
+void follow_instruments(World& w, Object& object, PartShown* part) {
   object.statics->ahead = true;
   need_contact(object);
   const std::array<Object*, 1> objects{&object};
@@ -285,6 +287,9 @@ void follow_instruments(World& w, Object& object) {
   const Load& load = *object.shown.load;
   std::vector<double>& shape = object.shown.displacement.write();
   const bool changed = !object.shown.touches.empty() || acted_anew(object);
+  ElastostaticYielding single([&]() -> Elastostatic& { return solver_of(w, object); }, load);
+  if (part != nullptr && !part->part.known.empty())
+    single.set_before(part->under);
   for (const ShortWay& way : short_ways(w, objects)) {
     const bool last = changed && way.last;
     if (object.warp) {
@@ -300,11 +305,13 @@ void follow_instruments(World& w, Object& object) {
       object.contact->update(both, load.displacement, way.instruments, shape, last);
       solved = solved && both.solved();
     } else {
-      object.contact->update([&]() -> Elastostatic& { return solver_of(w, object); }, load,
-                             way.instruments, shape, last);
+      object.contact->update(single, load.displacement, way.instruments, shape, last,
+                             part != nullptr ? &part->part : nullptr);
     }
     solved = solved && object.contact->solved();
   }
+  if (part != nullptr)
+    part->under = single.acting();
   w.now.counts.touches.add(object.contact->take_counts());
   object.shown.touches = object.contact->touches();
   object.shown.points = object.contact->points();

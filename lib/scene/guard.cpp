@@ -38,8 +38,9 @@ void put_back(World& w, Saved&& saved) {
 /// As it was, with what it touched.
 void restart_contact(Object& object) {
   if (object.contact)
-    object.contact = std::make_shared<StaticContact>(object.model(), *object.shown.displacement,
-                                                     object.shown.touches, object.shown.points);
+    object.contact = std::make_shared<StaticContact>(
+        object.model(), *object.shown.displacement, object.shown.touches, object.shown.points,
+        object.shown.part ? object.shown.part->part : PartOfShape{});
 }
 
 } // namespace

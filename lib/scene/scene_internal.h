@@ -135,6 +135,12 @@ struct DeferredShape {
   std::vector<std::shared_ptr<const Moves>> moves; // since, one cut each
 };
 
+/// A shape that nobody has asked for, as far as instruments looked at it.
+struct PartShown {
+  PartOfShape part;
+  std::shared_ptr<const Load> under; ///< all that acts
+};
+
 /// The picture of an object.
 struct Shown {
   /// Of all nodes, or of the first ones if a solid's solver has rows for its surface alone; and of
@@ -146,7 +152,8 @@ struct Shown {
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
   std::shared_ptr<const DeferredShape>
-      deferred{}; // what the displacement is, where it is not shaped
+      deferred{};                          // what the displacement is, where it is not shaped
+  std::shared_ptr<const PartShown> part{}; ///< what of the displacement is known, where that is
   CopyOnWrite<Load> load{};
   double time = 0;
   bool posed = false;        // what is shown is a shape of ffe

@@ -95,7 +95,7 @@ struct ObjectFacts {
   const std::string& name;
   Method method = Method::ela;
   bool known = false;                    ///< its model was needed so far
-  bool shaped = false;                   ///< and displacement() costs nothing, changes nothing
+  bool shaped = false;                   ///< and displacement() costs little, changes nothing
   bool awake = false;                    ///< elastodynamic, and not at rest
   bool staged = false;                   ///< that of its second stage is known
   bool warp = false;                     ///< with large rotations

@@ -269,7 +269,7 @@ void take_touches(World& w, double duration);
 void gather_impulses(World& w, Body& body);
 bool touched_anew(World& w, Object& object);
 bool passed_by_instruments(const World& w, const Box3& box, bool first);
-void follow_instruments(World& w, Object& object);
+void follow_instruments(World& w, Object& object, PartShown* part);
 /// Instruments over a short part of their ways since the scene was shown.
 struct ShortWay {
   std::vector<std::optional<MovedInstrument>> instruments;

@@ -40,6 +40,7 @@ struct Elastostatic::State {
   std::vector<double> u;     // of the rows that sums have
   std::vector<double> whole; // over all axes, where these are more
   bool shape_known = true, whole_known = false;
+  bool counted = false; // among the shapes, as one of which a part is known
 
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
@@ -149,11 +150,22 @@ struct Elastostatic::State {
     if (shape_known)
       return;
     make_shape(options.tolerance);
-    ++counts.shapes;
+    counts.shapes += counted ? 0 : 1;
     require_finite(u);
     if (options.measure_error)
       measure();
     shape_known = true;
+  }
+
+  std::optional<NodeReach> reach() {
+    if (shape_known || options.tolerance > 0 || options.measure_error || !load.displacement.empty())
+      return std::nullopt;
+    std::optional<NodeReach> reach = answer.reach(load);
+    if (!reach || !std::ranges::all_of(reach->most, [](double d) { return std::isfinite(d); }))
+      return std::nullopt;
+    counts.shapes += counted ? 0 : 1;
+    counted = true;
+    return reach;
   }
 
   /// How far the shape is from another one at its rows, over the largest entry of that.
@@ -210,7 +222,7 @@ struct Elastostatic::State {
       ++counts.unchanged;
       return;
     }
-    shape_known = whole_known = false;
+    shape_known = whole_known = counted = false;
     std::vector<NodeVector> before = std::move(forces);
     forces.clear();
     try {
@@ -365,6 +377,15 @@ std::span<const double> Elastostatic::displacement() {
 std::span<const double> Elastostatic::surface_displacement() {
   state_->need_shape();
   return state_->u;
+}
+
+std::optional<NodeReach> Elastostatic::surface_reach() {
+  return state_->reach();
+}
+
+void Elastostatic::copy_surface(const Load& load, std::span<const std::uint32_t> nodes,
+                                std::span<double> shape) {
+  state_->answer.copy_rows(load, nodes, shape);
 }
 
 const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {

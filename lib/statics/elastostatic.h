@@ -17,12 +17,14 @@
 
 #include "base/context.h"
 #include "contact/load.h"
+#include "contact/node_reach.h"
 #include "model/model.h"
 
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -105,6 +107,15 @@ public:
   /// Where m is n the same as displacement(); else it doesn't depend on whether that was asked for.
   /// \throw as displacement
   std::span<const double> surface_displacement();
+
+  /// Bounds of surface_displacement() where some rows of it take less than all; none where all of
+  /// it is known or takes no more, or where errors are measured.
+  std::optional<NodeReach> surface_reach();
+  /// Rows of what surface_displacement() would be behind update(load), to their places in `shape`,
+  /// to the bit. The load of the last update stays. \pre nothing is displaced by the load, and its
+  /// shape is finite; the nodes are among those of the surface
+  void copy_surface(const Load& load, std::span<const std::uint32_t> nodes,
+                    std::span<double> shape);
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;

@@ -63,6 +63,22 @@ bool short_ways(std::span<const std::optional<MovedInstrument>> instruments) {
   });
 }
 
+std::vector<Box3> boxes_of(std::span<const std::optional<PlacedInstrument>> instruments) {
+  std::vector<Box3> boxes;
+  for (const auto& instrument : instruments)
+    if (instrument)
+      boxes.push_back(instrument->box());
+  return boxes;
+}
+
+/// These nodes, where they are not known yet.
+void know(Yielding& object, Yielding::Moment moment, std::vector<std::uint32_t> nodes,
+          std::vector<double>& shape, std::vector<std::uint8_t>& known) {
+  std::erase_if(
+      nodes, [&](std::uint32_t node) { return std::exchange(known[node], std::uint8_t{1}) != 0; });
+  object.copy_shape(nodes, shape, moment);
+}
+
 /// What pushed these nodes to where they were, and how that goes on.
 void set_last(std::span<const PointTouch> points, const ContactNodes& all, ContactTurns& turns) {
   turns.guess = all.was;
@@ -129,10 +145,23 @@ std::size_t parts_of_way(std::span<const MovedInstrument> instruments, std::size
 }
 
 StaticContact::StaticContact(const Model& model, std::span<const double> shape,
-                             std::vector<NodeTouch> touches, std::vector<PointTouch> points)
+                             std::vector<NodeTouch> touches, std::vector<PointTouch> points,
+                             const PartOfShape& part)
     : model_(model), facets_(model), inward_(inward_directions(model)),
       touches_(std::move(touches)), points_(std::move(points)) {
-  facets_.set_shape(model, shape);
+  if (part.known.empty())
+    facets_.set_shape(model, shape);
+  else
+    set_part(shape, part);
+}
+
+void StaticContact::set_part(std::span<const double> shape, const PartOfShape& part) {
+  facets_.set_reach(part.reach);
+  std::vector<std::uint32_t> known;
+  for (std::uint32_t node = 0; node < part.known.size(); ++node)
+    if (part.known[node] != 0)
+      known.push_back(node);
+  facets_.add_places(model_, shape, known);
 }
 
 /// Nodes of pieces deeper in an instrument than `depth` of its radius join `inside`, which stays
@@ -156,6 +185,12 @@ void StaticContact::find(const Placed& placed, const std::map<std::uint32_t, Vec
                                         rest(f[2]) + vector_at(shape, f[2])};
       if (beside(corners, box, outside * instrument.radius))
         return;
+      const bool joins =
+          !std::ranges::all_of(f, held) && !std::ranges::all_of(f, [&](std::uint32_t node) {
+            return held(node) || std::ranges::binary_search(inside, node);
+          });
+      if (!joins && std::ranges::none_of(f, held)) // whose place is told by others
+        return;
       const double d = distance_of(instrument, f, corners) - instrument.radius;
       if (!(d < -depth * instrument.radius))
         return;
@@ -163,11 +198,7 @@ void StaticContact::find(const Placed& placed, const std::map<std::uint32_t, Vec
         if (!stuck_ && held(node) && !displaced.contains(node) &&
             instrument.distance(rest(node) + vector_at(shape, node)) < -deep * instrument.radius)
           stuck_ = NodeTouch{node, k, {}};
-      if (std::ranges::all_of(f, held))
-        return;
-      if (!std::ranges::all_of(f, [&](std::uint32_t node) {
-            return held(node) || std::ranges::binary_search(inside, node);
-          }))
+      if (joins)
         found.emplace_back(d / instrument.radius, number);
     });
   }
@@ -313,9 +344,58 @@ bool StaticContact::solve_all(Yielding& object, std::span<const std::uint32_t> n
   return false;
 }
 
+/// Of the surface, some of them repeatedly.
+std::vector<std::uint32_t> StaticContact::nodes_of(std::span<const std::size_t> blocks) const {
+  std::vector<std::uint32_t> nodes;
+  for (const std::size_t block : blocks)
+    nodes.insert(nodes.end(), facets_.nodes_of(block).begin(), facets_.nodes_of(block).end());
+  return nodes;
+}
+
+/// The shape as the contacts have it, whatever is left out of the rest of it.
+void StaticContact::place(std::span<const std::uint32_t> nodes, std::span<const Vec3> at) {
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    for (int a = 0; a < 3; ++a)
+      next_[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
+}
+
+void StaticContact::take_whole(Yielding& object, std::span<const std::uint32_t> nodes,
+                               std::span<const Vec3> at, std::span<const Box3> places) {
+  const std::span<const double> u = object.shape();
+  next_.assign(u.begin(), u.end());
+  next_part_.known.clear();
+  place(nodes, at);
+  if (touches_.empty())
+    facets_.set_shape(model_, next_);
+  else // whose box nobody asks for
+    facets_.set_shape_near(model_, next_, places);
+}
+
+/// Near these places alone. \return whether that is possible
+bool StaticContact::take_part(Yielding& object, std::span<const std::uint32_t> nodes,
+                              std::span<const Vec3> at, std::span<const Box3> places) {
+  std::optional<NodeReach> reach;
+  if (!touches_.empty())
+    reach = object.reach();
+  if (!reach)
+    return false;
+  next_part_.reach = std::move(*reach);
+  next_part_.known.assign(next_part_.reach.group->size(), 0);
+  next_.resize(3 * next_part_.known.size());
+  place(nodes, at);
+  for (const std::uint32_t node : nodes)
+    next_part_.known[node] = 1;
+  facets_.set_reach(next_part_.reach);
+  facets_.add_places(model_, next_, nodes); // which may be wherever they were put
+  const std::vector<std::size_t> near = facets_.blocks_near(places);
+  know(object, Yielding::Moment::now, nodes_of(near), next_, next_part_.known);
+  facets_.set_boxes(model_, next_, near);
+  return true;
+}
+
 void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>& displaced,
                            std::span<const std::optional<MovedInstrument>> instruments,
-                           std::vector<double>& shape, bool last) {
+                           std::vector<double>& shape, bool last, PartOfShape* part) {
   Placed placed;
   for (const auto& i : instruments)
     placed.push_back(i ? std::optional(PlacedInstrument(i->shape, i->now)) : std::nullopt);
@@ -329,6 +409,12 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     if (nodes.empty() || nodes.back() != t.node)
       nodes.push_back(t.node);
   stuck_.reset();
+  const bool in_part = part != nullptr && !part->known.empty();
+  if (in_part) {
+    object.keep_shape();
+    know(object, Yielding::Moment::kept, nodes_of(facets_.blocks_near(boxes_of(placed))), shape,
+         part->known);
+  }
   find(placed, displaced, shape, 0, nodes);
   if (nodes.empty() && !last && gave_.empty())
     return;
@@ -343,31 +429,23 @@ void StaticContact::update(Yielding& object, const std::map<std::uint32_t, Vec3>
     const bool agreed =
         solve_all(object, nodes, displaced, placed, instruments, shape, pushed, vain_pairs, at);
     solved_ = solved_ && agreed;
-    const std::span<const double> u = object.shape();
-    next_.assign(u.begin(), u.end());
-    // As the contacts have it, whatever is left out of the rest of the shape.
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-      for (int a = 0; a < 3; ++a)
-        next_[axis_of(nodes[k], a)] = (at[k] - rest(nodes[k]))[a];
     const std::size_t known = nodes.size();
     Placed there = placed;
     for (std::size_t k = 0; k < gave_.size(); ++k)
       if (there[k])
         there[k]->a += gave_[k];
-    if (touches_.empty()) {
-      facets_.set_shape(model_, next_);
-    } else { // whose box nobody asks for
-      std::vector<Box3> places;
-      for (const auto& instrument : there)
-        if (instrument)
-          places.push_back(instrument->box());
-      facets_.set_shape_near(model_, next_, places);
-    }
+    const std::vector<Box3> places = boxes_of(there);
+    if (part == nullptr || !take_part(object, nodes, at, places))
+      take_whole(object, nodes, at, places);
     find(there, displaced, next_, outside, nodes);
     if (nodes.size() == known) {
       shape.swap(next_);
+      if (part != nullptr)
+        std::swap(*part, next_part_);
       return;
     }
+    if (in_part) // where they were
+      know(object, Yielding::Moment::kept, nodes, shape, part->known);
   }
 }
 

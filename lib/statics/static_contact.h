@@ -12,6 +12,7 @@
 
 #include "contact/instrument.h"
 #include "contact/load.h"
+#include "contact/node_reach.h"
 #include "contact/surface_facets.h"
 #include "contact/surface_parts.h"
 #include "model/model.h"
@@ -94,6 +95,20 @@ public:
   /// The shape under them: displacements of all nodes, or of the first ones, all of the surface
   /// among them.
   virtual std::span<const double> shape() = 0;
+  /// Bounds of it, where some nodes take less than all; else none.
+  virtual std::optional<NodeReach> reach() { return std::nullopt; }
+  /// The shape as it is now is one that copy_shape tells of, until this is called again.
+  virtual void keep_shape() {}
+  enum class Moment { kept, now };
+  /// That shape at some nodes, to their places in one of all. \pre reach() told bounds of it
+  virtual void copy_shape(std::span<const std::uint32_t> /*nodes*/, std::span<double> /*shape*/,
+                          Moment /*moment*/) {}
+};
+
+/// What is known of a shape of which not all is.
+struct PartOfShape {
+  std::vector<std::uint8_t> known{}; ///< by node; empty: all are
+  NodeReach reach{};                 ///< of what is not
 };
 
 class StaticContact {
@@ -101,15 +116,18 @@ public:
   /// Keeps a reference to the model. \param shape the present one
   /// \param touches what is touched in it, by ascending node and instrument \param points of these
   StaticContact(const Model& model, std::span<const double> shape,
-                std::vector<NodeTouch> touches = {}, std::vector<PointTouch> points = {});
+                std::vector<NodeTouch> touches = {}, std::vector<PointTouch> points = {},
+                const PartOfShape& part = {});
 
   /// Takes the object's shape on to that with the instruments where they are now; `shape` (as
   /// Yielding has it) is the last one before and the new one after. An absent instrument is no
   /// element. Where more of the way is to come (not `last`) and nothing is touched, nothing is
-  /// done. \param displaced nodes that stand where they must   \throw as the object
+  /// done. \param displaced nodes that stand where they must \param part null: all of the shape is
+  /// wanted; else what is known of it, of the new one those nodes that are looked at if that is
+  /// enough, with the same forces and places to the bit   \throw as the object
   void update(Yielding& object, const std::map<std::uint32_t, Vec3>& displaced,
               std::span<const std::optional<MovedInstrument>> instruments,
-              std::vector<double>& shape, bool last = true);
+              std::vector<double>& shape, bool last = true, PartOfShape* part = nullptr);
   /// Of an elastostatic object, asked for when needed, under `load`. \pre as Elastostatic::update
   void update(const std::function<Elastostatic&()>& solver, const Load& load,
               std::span<const std::optional<MovedInstrument>> instruments,
@@ -140,6 +158,13 @@ public:
 
 private:
   using Placed = std::vector<std::optional<PlacedInstrument>>;
+  void set_part(std::span<const double> shape, const PartOfShape& part);
+  std::vector<std::uint32_t> nodes_of(std::span<const std::size_t> blocks) const;
+  void place(std::span<const std::uint32_t> nodes, std::span<const Vec3> at);
+  bool take_part(Yielding& object, std::span<const std::uint32_t> nodes, std::span<const Vec3> at,
+                 std::span<const Box3> places);
+  void take_whole(Yielding& object, std::span<const std::uint32_t> nodes, std::span<const Vec3> at,
+                  std::span<const Box3> places);
   void find(const Placed& placed, const std::map<std::uint32_t, Vec3>& displaced,
             std::span<const double> shape, double depth, std::vector<std::uint32_t>& inside);
   ContactNodes around(std::span<const std::uint32_t> nodes,
@@ -161,6 +186,7 @@ private:
   std::optional<NodeTouch> stuck_;
   bool solved_ = true;
   std::vector<double> next_; ///< the shape that is found, in the memory of the last but one
+  PartOfShape next_part_;    ///< what is known of it
   TouchCounts counts_;
 };
 

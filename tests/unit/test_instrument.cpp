@@ -1,9 +1,12 @@
 #include "contact/instrument.h"
 #include "contact/surface_point.h"
 
+#include "base/vector_at.h"
 #include "contact/instrument_surface.h"
 #include "contact/load.h"
+#include "contact/node_reach.h"
 #include "contact/surface_facets.h"
+#include "larger.h"
 #include "sim_models.h"
 
 #include <algorithm>
@@ -11,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <gtest/gtest.h>
+#include <memory>
 #include <set>
 #include <vector>
 
@@ -165,6 +169,56 @@ TEST(SurfaceFacets, NearPlacesFindWhatTheWholeShapeFinds) {
     EXPECT_LE(near_places.box().min[a], whole.box().min[a]);
     EXPECT_GE(near_places.box().max[a], whole.box().max[a]);
   }
+}
+
+// Of a shape that is known near some places alone: there it finds what is there, elsewhere it may
+// find more, but never less.
+TEST(SurfaceFacets, BoundsFindWhatTheWholeShapeFinds) {
+  const Model model = test::organ(3);
+  SurfaceFacets whole(model), bounded(model);
+  std::vector<double> u(3 * model.nodes.size());
+  auto group = std::make_shared<std::vector<std::uint32_t>>();
+  NodeReach reach{group, std::vector<double>(5)};
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    group->push_back(i / 7 % 5);
+    for (int a = 0; a < 3; ++a) {
+      double& d = u[axis_of(i, a)];
+      d = (1 + group->back()) * std::sin(static_cast<double>(3 * i) + a);
+      double& most = reach.most[group->back()];
+      most = test::larger(most, std::abs(d));
+    }
+  }
+  const std::uint32_t far = 40; // further than all bounds
+  u[axis_of(far, 2)] = 50;
+  const auto box_at = [&](std::size_t i) {
+    const Vec3 c = model.nodes[i].position + vector_at(u, i);
+    return Box3{c - Vec3{3, 3, 3}, c + Vec3{3, 3, 3}};
+  };
+  whole.set_shape(model, u);
+  bounded.set_reach(reach);
+  bounded.add_places(model, u, std::vector<std::uint32_t>{far});
+  const std::vector<Box3> places{box_at(2), box_at(100)};
+  const std::vector<std::size_t> near = bounded.blocks_near(places);
+  EXPECT_FALSE(near.empty());
+  bounded.set_boxes(model, u, near);
+  const auto found = [](const SurfaceFacets& facets, const Box3& box) {
+    std::vector<std::uint32_t> pieces;
+    facets.visit_near(box, [&](std::uint32_t piece) { pieces.push_back(piece); });
+    return pieces;
+  };
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < surface_count(model); ++i) {
+    const auto all = found(whole, box_at(i)), some = found(bounded, box_at(i));
+    EXPECT_FALSE(all.empty());
+    EXPECT_TRUE(std::ranges::includes(some, all)) << i;
+    more += some.size() - all.size();
+  }
+  EXPECT_GT(more, 0U);
+  for (const Box3& place : places)
+    EXPECT_EQ(found(bounded, place), found(whole, place));
+  for (const std::size_t block : near)
+    for (const std::uint32_t node : bounded.nodes_of(block))
+      EXPECT_LT(node, surface_count(model));
 }
 
 TEST(SurfaceFacets, FindAllNodesInABox) {

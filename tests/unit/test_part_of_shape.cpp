@@ -1,0 +1,208 @@
+// Shapes that instruments look at in part, as nobody else asks for them.
+
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "compliance/column_compression.h"
+#include "compliance/compliance_columns.h"
+#include "compliance/compliance_source.h"
+#include "scene/simulation.h"
+#include "sim_models.h"
+#include "solid/model_stiffness.h"
+#include "solve/condition.h"
+#include "solve/factor.h"
+#include "statics/elastostatic.h"
+#include "statics/elastostatic_yielding.h"
+#include "statics/static_contact.h"
+#include "stiffness_models.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using test::organ;
+
+/// Of the organ, a ball of radius 20.
+const Vec3 middle{100, -50, 30};
+
+/// An organ of which all nodes of the surface have compressed columns.
+struct StoredOrgan {
+  Model model = organ(4);
+  StiffnessMatrix k = stiffness_matrix(model);
+  CompressedMade made;
+  bool broken = false; ///< the file
+
+  StoredOrgan() {
+    const Factor factor(k, {});
+    std::vector<Vec3> positions;
+    std::vector<std::uint32_t> nodes;
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+      positions.push_back(model.nodes[i].position);
+      if (i < surface_count(model))
+        nodes.push_back(i);
+    }
+    made = compress_columns(positions, nodes, 1e-5,
+                            [&](std::span<const std::uint32_t> of, ColumnSink& sink) {
+                              return compliance_columns(k, factor, stiffness_norm(k), of, {}, sink,
+                                                        positions.size());
+                            },
+                            {});
+  }
+  void join(Simulation& s) const {
+    ObjectSource source;
+    source.model = [this] { return model; };
+    source.stiffness = [this](const Model&) { return stiffness(); };
+    s.add_object("organ", std::move(source), Method::ffe);
+  }
+  std::shared_ptr<ComplianceSource> stiffness() const {
+    const auto read = [this](std::size_t chunk) {
+      if (broken)
+        throw Error("a chunk can't be read");
+      return made.chunks[chunk];
+    };
+    return compliance_of_store(
+        {std::make_unique<CompressedColumns>(made.layout, model.nodes.size(), read),
+         [this] { return Factor(k, Context{}); }});
+  }
+};
+
+Context of_threads(int threads) {
+  Context context;
+  context.threads = threads;
+  return context;
+}
+
+/// Over the organ by steps as wide as five of its radii, at which it looks at once.
+TEST(PartOfShape, IsThatOfTheWholeOneWhereverItIsLookedAt) {
+  const StoredOrgan organ;
+  Elastostatic one(organ.model, organ.stiffness(), of_threads(1), {}),
+      other(organ.model, organ.stiffness(), of_threads(1), {});
+  std::vector<double> whole(3 * organ.model.nodes.size()), some(whole);
+  StaticContact all(organ.model, whole);
+  std::optional<StaticContact> near;
+  near.emplace(organ.model, some);
+  const Load none;
+  ElastostaticYielding whole_object([&]() -> Elastostatic& { return one; }, none);
+  PartOfShape part;
+  auto under = std::make_shared<const Load>();
+  const InstrumentShape shape{1.5, {}, 0};
+  Pose before{middle + Vec3{0, 0, 26}, {}};
+  std::size_t unknown = 0, known = 0;
+  for (int step = 0; step < 40; ++step) {
+    const double a = (step % 4 == 0 ? 0.35 : 0.02) * step;
+    const double high = step % 8 == 4 ? 19 - 0.25 * step : 20.8;
+    const Pose now{middle + high * Vec3{std::sin(a), 0.1, std::cos(a)}, {}};
+    const std::array moved{std::optional(MovedInstrument{shape, before, now})};
+    before = now;
+    all.update(whole_object, {}, moved, whole);
+    ElastostaticYielding object([&]() -> Elastostatic& { return other; }, none);
+    object.set_before(under);
+    if (step % 8 == 4) // goes on from what is known
+      near.emplace(organ.model, some, std::vector(near->touches()), std::vector(near->points()),
+                   part);
+    near->update(object, {}, moved, some, true, &part);
+    under = object.acting();
+    EXPECT_EQ(near->touches(), all.touches()) << step;
+    ASSERT_EQ(some.size(), whole.size());
+    for (std::uint32_t i = 0; i < part.known.size(); ++i) {
+      known += part.known[i];
+      unknown += 1 - part.known[i];
+      if (part.known[i] != 0) {
+        EXPECT_EQ(vector_at(some, i), vector_at(whole, i)) << i;
+      } else {
+        for (int axis = 0; axis < 3; ++axis) { // who reads it finds out
+          EXPECT_LE(std::abs(whole[axis_of(i, axis)]), part.reach.most[(*part.reach.group)[i]]);
+          some[axis_of(i, axis)] = std::numeric_limits<double>::quiet_NaN();
+        }
+      }
+    }
+  }
+  EXPECT_GT(known, 0);
+  EXPECT_GT(unknown, 2 * known);
+}
+
+/// Two spheres over the organ, with forces that change in between. \param ask of what is asked in
+/// each step
+std::vector<double> told_on_the_way(const StoredOrgan& organ, int threads, int ask) {
+  Simulation s(of_threads(threads), {.guard = true});
+  organ.join(s);
+  s.apply(SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{0, 0, 26}, {}}, "probe"});
+  s.apply(SetInstrument{1, {1, {}, 0}, {middle + Vec3{0, 25, 0}, {}}, "other"});
+  std::vector<double> all;
+  for (int step = 0; step < 60; ++step) {
+    const double a = step < 25 ? 0.02 * step : 0.23 * step; // to where nothing was looked at
+    const double deep = step == 0 ? 3 : step % 20 == 19 ? -1 : 0.6 + 0.3 * std::sin(a);
+    s.apply(
+        MoveInstrument{0, middle + (21.5 - deep) * Vec3{std::sin(a), 0.1, std::cos(a)}, {}, 0.001});
+    s.apply(MoveInstrument{1, middle + Vec3{0.3 * a, 20.5, 0.2}, {}, 0.001});
+    if (step == 33)
+      s.apply(SetForce{0, {10}, {3, 0, 0}, 0});
+    if (step == 44)
+      s.apply(SetGravity{{0, 0, -1000}});
+    s.step(0.001);
+    for (const NodeVector& f : s.contact_forces(0))
+      all.insert(all.end(), {static_cast<double>(f.node), f.value.x, f.value.y, f.value.z});
+    if (ask == 1 || (ask == 2 && step % 7 == 3))
+      (void)s.surface_displacement(0);
+    EXPECT_TRUE(s.object(0).shaped);
+  }
+  const std::span<const double> u = s.displacement(0);
+  all.insert(all.end(), u.begin(), u.end());
+  return all;
+}
+
+TEST(PartOfShape, WhoeverAsksForAShapeForcesAndShapesAreTheSame) {
+  const StoredOrgan organ;
+  const std::vector<double> always = told_on_the_way(organ, 1, 1);
+  ASSERT_GT(always.size(), 3 * organ.model.nodes.size() + 60);
+  for (const int threads : {1, 2})
+    for (const int ask : {0, 2}) {
+      const std::vector<double> told = told_on_the_way(organ, threads, ask);
+      ASSERT_EQ(told.size(), always.size());
+      EXPECT_EQ(std::memcmp(told.data(), always.data(), told.size() * sizeof(double)), 0);
+    }
+}
+
+// What fails behind steps whose shape nobody asked for leaves them as they were.
+TEST(PartOfShape, AStepThatFailsLeavesItAsItWas) {
+  StoredOrgan organ;
+  std::vector<std::vector<double>> told;
+  for (const bool fails : {false, true}) {
+    Simulation s(of_threads(1), {.guard = true});
+    organ.join(s);
+    s.apply(SetInstrument{0, {1.5, {}, 0}, {middle + Vec3{-26, 0, 0}, {}}, "probe"});
+    std::vector<double>& all = told.emplace_back();
+    for (int step = 0; step < 20; ++step) {
+      const double deep = step == 0 ? 3 : 0.8;
+      s.apply(MoveInstrument{0,
+                             middle + (21.5 - deep) *
+                                          Vec3{-std::cos(0.15 * step), std::sin(0.15 * step), 0},
+                             {},
+                             0.001});
+      s.step(0.001);
+      for (const NodeVector& f : s.contact_forces(0))
+        all.insert(all.end(), {f.value.x, f.value.y, f.value.z});
+      if (fails && step % 3 == 2 && step < 12) { // where its columns are not known yet
+        organ.broken = true;
+        s.apply(MoveInstrument{0, middle + Vec3{20, 0, 0}, {}, 0.001});
+        EXPECT_THROW(s.step(0.001), Error);
+        organ.broken = false;
+      }
+    }
+    const std::span<const double> u = s.displacement(0);
+    all.insert(all.end(), u.begin(), u.end());
+  }
+  EXPECT_EQ(told[0], told[1]);
+}
+
+} // namespace
+} // namespace gewebe
