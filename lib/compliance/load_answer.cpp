@@ -161,6 +161,16 @@ std::optional<NodeReach> LoadAnswer::reach(const Load& load) {
   if (!weight_.empty())
     for (double& most : reach.most)
       most += weight_most_;
+  // Where forces act, by the answer itself: single entries are largest there, their sum isn't.
+  for (const ClusterLoad& own : part_->loads) {
+    know(own.cluster);
+    double most = 0;
+    for (const std::uint32_t node : part_->columns->layout().clusters.nodes(own.cluster))
+      for (std::size_t a = 0; a < 3; ++a)
+        most = std::max(most, std::abs(answer_[3 * std::size_t{node} + a]));
+    double& bound = reach.most[own.cluster];
+    bound = most <= bound ? most : bound;
+  }
   return reach;
 }
 
