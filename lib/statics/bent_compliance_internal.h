@@ -6,17 +6,24 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace gewebe {
+
+/// How forces turn with places.
+struct Turning {
+  std::vector<Eigen::Index> rows; ///< on which they do, ascending
+  Eigen::MatrixXd h;              ///< H of these rows and columns alone
+};
 
 class BentCompliance {
 public:
   using Compliance = Eigen::Map<const Eigen::MatrixXd>;
 
-  /// \param w W, which must live on \param rows on which forces turn, ascending \param h H of these
-  /// rows and columns alone   \pre h has as many rows and columns
-  BentCompliance(const Compliance& w, std::vector<Eigen::Index> rows, Eigen::MatrixXd h);
+  /// \param w W, which must live   \pre H has as many rows and columns as there are rows
+  BentCompliance(const Compliance& w, Turning turning);
 
   /// (1 - W H)⁻¹ of its columns, in place.
   void apply(Eigen::MatrixXd& columns) const;
@@ -24,10 +31,18 @@ public:
   Eigen::VectorXd turning(const Eigen::VectorXd& x) const;
 
 private:
+  void solve(Eigen::MatrixXd& columns) const;
+
   Compliance w_;
-  std::vector<Eigen::Index> rows_, others_; ///< on which forces turn, and do not
-  Eigen::MatrixXd h_, spread_;              ///< H, and rows of W H on which they don't turn
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  Turning turning_;
+  std::vector<Eigen::Index> others_; ///< rows on which forces do not turn
+  Eigen::MatrixXd spread_;           ///< W H there
+  Eigen::MatrixXd lu_;               ///< 1 - W H where they turn, factored
+  std::vector<std::uint32_t> swapped_;
+  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> large_; ///< in place of both, of many rows
 };
+
+/// W v, for which a v that is 0 costs nothing.
+Eigen::VectorXd times(const BentCompliance::Compliance& w, const Eigen::VectorXd& v);
 
 } // namespace gewebe

@@ -48,6 +48,36 @@ bool near(double between, double own, double other) {
   return !(between <= far_apart * far_apart * std::sqrt(own * other));
 }
 
+/// Of the blocks of W on and above the diagonal: sums of their numbers' squares. \param of_node
+/// block of each node
+MatrixXd squares_of(std::span<const std::uint32_t> of_node, std::uint32_t count,
+                    const BentCompliance::Compliance& w) {
+  std::vector<std::vector<Index>> rows(count);
+  for (std::size_t i = 0; i < of_node.size(); ++i)
+    for (Index a = 0; a < 3; ++a)
+      rows[of_node[i]].push_back(3 * static_cast<Index>(i) + a);
+  const std::size_t most = std::ranges::max(rows, {}, &std::vector<Index>::size).size();
+  MatrixXd square = MatrixXd::Zero(count, count);
+  // A column of each block in turn: one sum needn't wait for the other.
+  for (std::size_t k = 0; k < most; ++k)
+    for (std::uint32_t to = 0; to < count; ++to) {
+      if (k >= rows[to].size())
+        continue;
+      const double* const column = w.col(rows[to][k]).data();
+      for (std::uint32_t from = 0; from <= to; ++from) {
+        double sum = square(from, to);
+        for (const Index r : rows[from])
+          sum += column[r] * column[r];
+        square(from, to) = sum;
+      }
+    }
+  return square;
+}
+
+BentCompliance::Compliance map_of(const MatrixXd& w) {
+  return {w.data(), w.rows(), w.cols()};
+}
+
 } // namespace
 
 ContactParts parts_of(const ContactNodes& nodes, const BentCompliance::Compliance& w) {
@@ -60,11 +90,7 @@ ContactParts parts_of(const ContactNodes& nodes, const BentCompliance::Complianc
           linked.join(i, j);
   std::uint32_t count = linked.number(parts.of_node);
   if (count > 1) {
-    MatrixXd square = MatrixXd::Zero(count, count); // of the blocks of W
-    for (Index c = 0; c < w.cols(); ++c)
-      for (Index r = 0; r < w.rows(); ++r)
-        square(parts.of_node[static_cast<std::size_t>(r / 3)],
-               parts.of_node[static_cast<std::size_t>(c / 3)]) += w(r, c) * w(r, c);
+    const MatrixXd square = squares_of(parts.of_node, count, w);
     Sets together(count);
     for (std::uint32_t a = 0; a < count; ++a)
       for (std::uint32_t b = a + 1; b < count; ++b)
@@ -85,47 +111,41 @@ ContactParts parts_of(const ContactNodes& nodes, const BentCompliance::Complianc
   return parts;
 }
 
-BentParts::BentParts(const BentCompliance::Compliance& w, std::vector<Index> rows, MatrixXd h)
-    : w_(w) {
-  bent_.emplace_back(w, std::move(rows), std::move(h));
+BentParts::BentParts(const BentCompliance::Compliance& w, std::vector<Turning> turning,
+                     const ContactParts* parts)
+    : w_(w), parts_(parts) {
+  bent_.reserve(turning.size());
+  for (std::size_t p = 0; p < turning.size(); ++p)
+    bent_.emplace_back(parts != nullptr ? map_of(parts->compliance[p]) : w, std::move(turning[p]));
 }
 
-BentParts::BentParts(const BentCompliance::Compliance& w, const std::vector<Index>& rows,
-                     const MatrixXd& h, const ContactParts& parts)
-    : w_(w), parts_(&parts) {
-  bent_.reserve(parts.size());
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    std::vector<Index> own, from; // rows of the part on which forces turn: there, and in h
-    for (Index k = 0; k < std::ssize(rows); ++k) {
-      const Index row = rows[static_cast<std::size_t>(k)];
-      if (parts.of_node[static_cast<std::size_t>(row / 3)] != p)
-        continue;
-      own.push_back(std::ranges::lower_bound(parts.rows[p], row) - parts.rows[p].begin());
-      from.push_back(k);
-    }
-    const MatrixXd& some = parts.compliance[p];
-    bent_.emplace_back(BentCompliance::Compliance(some.data(), some.rows(), some.cols()),
-                       std::move(own), h(from, from));
-  }
-}
-
-VectorXd BentParts::without(const VectorXd& free, const VectorXd& held, const VectorXd& at,
-                            const VectorXd& pushed) const {
+BentStart BentParts::start(const VectorXd& free, const VectorXd& held, const VectorXd& at) const {
+  BentStart start{free, {}};
   if (parts_ == nullptr) {
-    MatrixXd all = free;
-    all += w_ * (held - bent_[0].turning(at));
+    start.free += times(w_, held - bent_[0].turning(at));
+    return start;
+  }
+  if (!held.isZero(0))
+    start.free += times(w_, held);
+  start.turns.resize(at.size());
+  for (std::size_t p = 0; p < bent_.size(); ++p)
+    start.turns(parts_->rows[p]) =
+        times(map_of(parts_->compliance[p]), bent_[p].turning(at(parts_->rows[p])));
+  return start;
+}
+
+VectorXd BentParts::without(const BentStart& start, const VectorXd& pushed) const {
+  if (parts_ == nullptr) {
+    MatrixXd all = start.free;
     bent_[0].apply(all);
     return all;
   }
-  VectorXd all = free;
-  if (!held.isZero(0))
-    all += w_ * held;
-  const VectorXd moved = w_ * pushed; // by all pushes
+  VectorXd all = start.free;
+  const VectorXd moved = times(w_, pushed); // by all pushes
   for (std::size_t p = 0; p < bent_.size(); ++p) {
     const std::vector<Index>& rows = parts_->rows[p];
-    const MatrixXd& own = parts_->compliance[p];
-    const VectorXd far = moved(rows) - own * pushed(rows);
-    MatrixXd some = all(rows) + far - own * bent_[p].turning(at(rows));
+    const VectorXd far = moved(rows) - times(map_of(parts_->compliance[p]), pushed(rows));
+    MatrixXd some = all(rows) + far - start.turns(rows);
     bent_[p].apply(some);
     all(rows) = some.col(0) - far;
   }

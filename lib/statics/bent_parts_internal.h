@@ -34,19 +34,25 @@ struct ContactParts {
 /// each moving node
 ContactParts parts_of(const ContactNodes& nodes, const BentCompliance::Compliance& w);
 
+/// Where the nodes would be but for what the last pushes are.
+struct BentStart {
+  Eigen::VectorXd free;  ///< under forces that act whatever the pushes are
+  Eigen::VectorXd turns; ///< of it in parts: how far the forces' turning has moved them by now
+};
+
 class BentParts {
 public:
-  /// All in one. \param w, rows, h as BentCompliance has them
-  BentParts(const BentCompliance::Compliance& w, std::vector<Eigen::Index> rows, Eigen::MatrixXd h);
-  /// \param parts, which must live, of which no H joins two
-  BentParts(const BentCompliance::Compliance& w, const std::vector<Eigen::Index>& rows,
-            const Eigen::MatrixXd& h, const ContactParts& parts);
+  /// \param w, turning as BentCompliance has them: of each part, whose rows are those of the part;
+  /// of all in one without parts. \param parts must live
+  BentParts(const BentCompliance::Compliance& w, std::vector<Turning> turning,
+            const ContactParts* parts = nullptr);
 
   bool in_parts() const { return parts_ != nullptr; }
-  /// Where the nodes are without pushes. \param held forces that act whatever the pushes are
-  /// \param pushed the last pushes on the nodes
-  Eigen::VectorXd without(const Eigen::VectorXd& free, const Eigen::VectorXd& held,
-                          const Eigen::VectorXd& at, const Eigen::VectorXd& pushed) const;
+  /// \param held forces that act whatever the pushes are \param at the last places
+  BentStart start(const Eigen::VectorXd& free, const Eigen::VectorXd& held,
+                  const Eigen::VectorXd& at) const;
+  /// Where the nodes are without pushes. \param pushed the last pushes on the nodes
+  Eigen::VectorXd without(const BentStart& start, const Eigen::VectorXd& pushed) const;
   /// How pushes move the nodes, from columns of W: in place. \param node of each `width` columns
   /// one of those that are pushed
   void apply(Eigen::MatrixXd& columns, std::span<const std::uint32_t> node,

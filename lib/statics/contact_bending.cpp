@@ -27,29 +27,17 @@ public:
 
   BentParts all(const Bend& how, const ContactParts* apart, VectorXd& held) const {
     held = VectorXd::Zero(scene_.rows());
-    std::vector<Index> rows;
-    for (const std::uint32_t i : active_)
-      if (pushes(i))
-        for (const std::uint32_t node : pairs_[i].piece)
-          if (node < scene_.nodes.moving)
-            for (Index a = 0; a < 3; ++a)
-              rows.push_back(3 * static_cast<Index>(node) + a);
-    std::ranges::sort(rows);
-    rows.erase(std::ranges::unique(rows).begin(), rows.end());
-    const auto count = static_cast<Index>(rows.size());
-    MatrixXd h = MatrixXd::Zero(count, count);
-    const auto row_of = [&](std::uint32_t node) {
-      return std::ranges::lower_bound(rows, 3 * static_cast<Index>(node)) - rows.begin();
-    };
+    std::vector<Turning> turning(apart != nullptr ? apart->size() : 1);
+    const std::vector<Index> row_of = rows_that_turn(apart, turning);
     for (const std::uint32_t i : active_) {
       if (!pushes(i))
         continue;
       const TouchPair& p = pairs_[i];
-      std::optional<Eigen::Matrix<double, 9, 9>> own = bending_of(p);
+      std::optional<Matrix9> own = bending_of(p);
       if (!own)
         continue;
       if (how.loose < 1) {
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> parts(*own);
+        const Eigen::SelfAdjointEigenSolver<Matrix9> parts(*own);
         const Eigen::Matrix<double, 9, 1> all =
             parts.eigenvalues().cwiseMin(0.0) + how.loose * parts.eigenvalues().cwiseMax(0.0);
         *own = parts.eigenvectors() * all.asDiagonal() * parts.eigenvectors().transpose();
@@ -60,18 +48,47 @@ public:
       for (std::size_t from = 0; from < 3; ++from)
         for (std::size_t to = 0; to < 3; ++to)
           if (p.piece[from] < scene_.nodes.moving && p.piece[to] < scene_.nodes.moving)
-            h.block<3, 3>(row_of(p.piece[to]), row_of(p.piece[from])) +=
+            turning[part_of(apart, p.piece[to])].h.block<3, 3>(row_of[p.piece[to]],
+                                                               row_of[p.piece[from]]) +=
                 own->block<3, 3>(3 * static_cast<Index>(to), 3 * static_cast<Index>(from));
     }
-    if (apart != nullptr)
-      return {scene_.w, rows, h, *apart};
-    return {scene_.w, std::move(rows), std::move(h)};
+    return {scene_.w, std::move(turning), apart};
   }
 
 private:
+  static std::size_t part_of(const ContactParts* apart, std::size_t node) {
+    return apart != nullptr ? apart->of_node[node] : 0;
+  }
+
+  /// Sets the rows of each part, with an H of 0. \return where each moving node that is pushed has
+  /// its first one in it
+  std::vector<Index> rows_that_turn(const ContactParts* apart,
+                                    std::vector<Turning>& turning) const {
+    std::vector<Index> row_of(scene_.nodes.moving, -1);
+    for (const std::uint32_t i : active_)
+      if (pushes(i))
+        for (const std::uint32_t node : pairs_[i].piece)
+          if (node < scene_.nodes.moving)
+            row_of[node] = 0;
+    std::vector<Index> before(turning.size(), 0); // nodes of the part
+    for (std::size_t node = 0; node < row_of.size(); ++node) {
+      const std::size_t part = part_of(apart, node);
+      const Index own = before[part]++;
+      if (row_of[node] < 0)
+        continue;
+      std::vector<Index>& rows = turning[part].rows;
+      row_of[node] = std::ssize(rows);
+      for (Index a = 0; a < 3; ++a)
+        rows.push_back(3 * own + a);
+    }
+    for (Turning& part : turning)
+      part.h = MatrixXd::Zero(std::ssize(part.rows), std::ssize(part.rows));
+    return row_of;
+  }
+
   /// Springs that hold a pair's point where its contact wants it: along the normal, and where it
   /// sticks along the surface.
-  void hold(const TouchPair& p, double by, Eigen::Matrix<double, 9, 9>& h, VectorXd& held) const {
+  void hold(const TouchPair& p, double by, Matrix9& h, VectorXd& held) const {
     const Vec3 n = p.normal;
     Eigen::Matrix3d own = Eigen::Matrix3d::Zero(); // compliance of the point
     for (std::size_t c = 0; c < 3; ++c)
@@ -106,7 +123,7 @@ private:
   bool pushes(std::uint32_t pair) const { return dot(pairs_[pair].force, pairs_[pair].normal) > 0; }
 
   /// Second derivatives of a pair's distance by its corners' places, 0 for repeated ones.
-  std::optional<Eigen::Matrix<double, 9, 9>> bending_of(const TouchPair& p) const {
+  std::optional<Matrix9> bending_of(const TouchPair& p) const {
     const PlacedInstrument& instrument = *scene_.placed[p.instrument];
     const int count = corner_count(p.piece);
     if (p.part.kind == CorePart::Kind::corner) {
@@ -118,7 +135,7 @@ private:
         return own;
     }
     const double by = 1e-6 * instrument.radius;
-    Eigen::Matrix<double, 9, 9> all = Eigen::Matrix<double, 9, 9>::Zero();
+    Matrix9 all = Matrix9::Zero();
     for (int c = 0; c < count; ++c)
       for (int a = 0; a < 3; ++a)
         for (const double side : {-by, by}) {

@@ -38,7 +38,8 @@ public:
   std::optional<LookedContacts> solve(std::span<const Vec3> at, const BentParts& bent,
                                       const VectorXd& held, bool careful) {
     const VectorXd free = scene_.rows_of(scene_.free), last = scene_.rows_of(at);
-    VectorXd base = bent.without(free, held, last, pushed());
+    const BentStart start = bent.start(free, held, last);
+    VectorXd base = bent.without(start, pushed());
     LookedContacts looked;
     looked.columns.resize(scene_.rows(), 0);
     looked.x = base;
@@ -54,7 +55,7 @@ public:
     // In parts, once more with what far forces turn by now: most of what each of them left.
     for (bool left = bent.in_parts(); !more.empty() || (left && !looked.pairs.empty());) {
       if (more.empty()) {
-        base = bent.without(free, held, last, pushed());
+        base = bent.without(start, pushed());
         left = false;
       } else {
         look_at(more, bent, looked);

@@ -470,7 +470,7 @@ private:
     }
     if (!looked) {
       held = VectorXd::Zero(scene_.rows());
-      bent.emplace(scene_.w, std::vector<Index>{}, MatrixXd{});
+      bent.emplace(scene_.w, std::vector<Turning>(1));
       solve_with(false);
     }
     if (!looked)

@@ -41,19 +41,26 @@ struct TwoPatches {
     h.bottomLeftCorner(count / 2, count / 2).setZero();
   }
   BentCompliance::Compliance map() const { return {w.data(), w.rows(), w.cols()}; }
+  std::vector<Turning> whole() const { return {{turning, h}}; }
+  std::vector<Turning> apart() const {
+    const auto half = std::ssize(turning) / 2;
+    const std::vector<Index> own(turning.begin(), turning.begin() + half);
+    return {{own, h.topLeftCorner(half, half)}, {own, h.bottomRightCorner(half, half)}};
+  }
   MatrixXd matrix(Index rows, Index columns) {
     std::uniform_real_distribution<double> in(-1, 1);
     return MatrixXd::NullaryExpr(rows, columns, [&] { return in(random); });
   }
   VectorXd vector() { return matrix(w.rows(), 1); }
   /// Where the nodes are under pushes.
-  VectorXd under(const BentParts& bent, const VectorXd& without, const VectorXd& pushes) const {
+  VectorXd under(const BentParts& bent, const BentStart& start, const VectorXd& last,
+                 const VectorXd& pushes) const {
     MatrixXd columns = w;
     std::vector<std::uint32_t> node;
     for (std::uint32_t i = 0; i < nodes.moving; ++i)
       node.push_back(i);
     bent.apply(columns, node, 3);
-    return without + columns * pushes;
+    return bent.without(start, last) + columns * pushes;
   }
 };
 
@@ -73,12 +80,12 @@ TEST(BentParts, AreTheWholeWhereNoneMovesTheOther) {
   TwoPatches patches(0);
   const ContactParts parts = parts_of(patches.nodes, patches.map());
   ASSERT_EQ(parts.size(), 2U);
-  const BentParts whole(patches.map(), patches.turning, patches.h),
-      apart(patches.map(), patches.turning, patches.h, parts);
+  const BentParts whole(patches.map(), patches.whole()),
+      apart(patches.map(), patches.apart(), &parts);
   const VectorXd free = patches.vector(), held = patches.vector(), at = patches.vector(),
                  last = patches.vector(), pushes = patches.vector();
-  const VectorXd one = patches.under(whole, whole.without(free, held, at, last), pushes),
-                 two = patches.under(apart, apart.without(free, held, at, last), pushes);
+  const VectorXd one = patches.under(whole, whole.start(free, held, at), last, pushes),
+                 two = patches.under(apart, apart.start(free, held, at), last, pushes);
   EXPECT_LT((one - two).norm(), 1e-12 * one.norm());
   EXPECT_LT((whole.turning(at) - apart.turning(at)).norm(), 1e-12 * at.norm());
 }
@@ -87,11 +94,11 @@ TEST(BentParts, ComeToRestWhereForcesPutTheNodes) {
   TwoPatches patches(0.2); // what is left out is not little
   ContactParts parts = parts_of(patches.nodes, patches.map());
   ASSERT_EQ(parts.size(), 2U);
-  const BentParts apart(patches.map(), patches.turning, patches.h, parts);
+  const BentParts apart(patches.map(), patches.apart(), &parts);
   const VectorXd free = patches.vector(), pushes = patches.vector(),
                  none = VectorXd::Zero(free.size());
   const VectorXd at = free + patches.w * pushes;
-  const VectorXd again = patches.under(apart, apart.without(free, none, at, pushes), pushes);
+  const VectorXd again = patches.under(apart, apart.start(free, none, at), pushes, pushes);
   EXPECT_LT((again - at).norm(), 1e-12 * at.norm());
 }
 
@@ -100,12 +107,12 @@ TEST(BentParts, LeaveLessOfWhatIsFartherAway) {
     TwoPatches patches(between);
     const ContactParts parts = parts_of(patches.nodes, patches.map());
     EXPECT_EQ(parts.size(), 2U);
-    const BentParts whole(patches.map(), patches.turning, patches.h),
-        apart(patches.map(), patches.turning, patches.h, parts);
+    const BentParts whole(patches.map(), patches.whole()),
+        apart(patches.map(), patches.apart(), &parts);
     const VectorXd free = patches.vector(), none = VectorXd::Zero(free.size()),
                    at = patches.vector(), last = patches.vector(), pushes = patches.vector();
-    return (patches.under(whole, whole.without(free, none, at, last), pushes) -
-            patches.under(apart, apart.without(free, none, at, last), pushes))
+    return (patches.under(whole, whole.start(free, none, at), last, pushes) -
+            patches.under(apart, apart.start(free, none, at), last, pushes))
         .norm();
   };
   EXPECT_GT(miss(0.1), 1e-4);

@@ -1,0 +1,7 @@
+#include "statics/bent_kernel_body_internal.h"
+
+namespace gewebe {
+
+const BentKernel bent_kernel_baseline{&factor, &solve, &multiply};
+
+} // namespace gewebe
