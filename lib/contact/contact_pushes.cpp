@@ -23,31 +23,51 @@ using Eigen::VectorXd;
 
 constexpr int max_inner = 60; ///< steps along the centre
 
+using Square = Eigen::Map<const MatrixXd>;
+using Column = Eigen::Map<const VectorXd>;
+
 /// λ >= 0, g = b + A λ >= 0, λ g = 0. \param on in: a guess of where λ > 0
-std::optional<VectorXd> pivot(const MatrixXd& a, const VectorXd& b, std::vector<bool> on) {
+std::optional<VectorXd> pivot(const Square& a, const Column& b, std::vector<char> on) {
   const Index count = b.size();
   const double slack = 1e-14 * b.cwiseAbs().maxCoeff();
-  VectorXd lambda = VectorXd::Zero(count);
+  VectorXd lambda = VectorXd::Zero(count), g(count), part;
+  MatrixXd within;
+  std::vector<Index> set;
+  set.reserve(on.size());
   Index best = count + 1;
   int patience = 3;
+  const auto is_wrong = [&](Index i) {
+    return on[static_cast<std::size_t>(i)] != 0 ? lambda[i] < 0 : g[i] < -slack;
+  };
   for (Index round = 0; round < 10 * count + 100; ++round) {
-    std::vector<Index> set;
+    set.clear();
     for (Index i = 0; i < count; ++i)
-      if (on[static_cast<std::size_t>(i)])
+      if (on[static_cast<std::size_t>(i)] != 0)
         set.push_back(i);
     lambda.setZero();
     if (!set.empty()) {
-      const MatrixXd within = a(set, set);
-      const Eigen::LLT<MatrixXd> factor(within);
+      const auto size = std::ssize(set);
+      within.resize(size, size);
+      part.resize(size);
+      for (Index c = 0; c < size; ++c) {
+        const double* const from = a.col(set[static_cast<std::size_t>(c)]).data();
+        double* const to = within.col(c).data();
+        for (std::size_t r = 0; r < set.size(); ++r)
+          to[r] = from[set[r]];
+        part[c] = -b[set[static_cast<std::size_t>(c)]];
+      }
+      const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(within); // in place
       if (factor.info() != Eigen::Success)
         return std::nullopt;
-      const VectorXd rhs = -b(set), part = factor.solve(rhs);
-      lambda(set) = part;
+      factor.solveInPlace(part);
+      for (Index c = 0; c < size; ++c)
+        lambda[set[static_cast<std::size_t>(c)]] = part[c];
     }
-    const VectorXd g = b + a * lambda;
+    g.noalias() = a * lambda;
+    g += b;
     Index wrong = 0, last = -1;
     for (Index i = 0; i < count; ++i)
-      if (on[static_cast<std::size_t>(i)] ? lambda[i] < 0 : g[i] < -slack) {
+      if (is_wrong(i)) {
         ++wrong;
         last = i;
       }
@@ -62,16 +82,14 @@ std::optional<VectorXd> pivot(const MatrixXd& a, const VectorXd& b, std::vector<
     } else {
       --patience;
     }
-    for (Index i = 0; i < count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if ((patience > 0 || i == last) && (on[k] ? lambda[i] < 0 : g[i] < -slack))
-        on[k] = !on[k];
-    }
+    for (Index i = 0; i < count; ++i)
+      if (auto& own = on[static_cast<std::size_t>(i)]; (patience > 0 || i == last) && is_wrong(i))
+        own = own != 0 ? 0 : 1;
   }
   return std::nullopt;
 }
 
-double residual_of(const MatrixXd& a, const VectorXd& b, const VectorXd& lambda) {
+double residual_of(const Square& a, const Column& b, const VectorXd& lambda) {
   const VectorXd g = b + a * lambda;
   double scale = 0, miss = 0;
   for (Index i = 0; i < b.size(); ++i) {
@@ -93,16 +111,12 @@ PushForces solve_pushes(std::span<const double> compliance, std::span<const doub
     result.solved = true;
     return result;
   }
-  const MatrixXd a = Eigen::Map<const MatrixXd>(compliance.data(), count, count);
-  const VectorXd b = Eigen::Map<const VectorXd>(gap.data(), count);
-  std::vector<bool> on;
-  for (const double push : start)
-    on.push_back(push > 0);
-  if (std::ranges::none_of(on, [](bool o) { return o; })) {
-    on.clear();
-    for (Index i = 0; i < count; ++i)
-      on.push_back(b[i] < 0);
-  }
+  const Square a(compliance.data(), count, count);
+  const Column b(gap.data(), count);
+  std::vector<char> on(gap.size(), 0);
+  std::ranges::transform(start, on.begin(), [](double push) { return push > 0 ? 1 : 0; });
+  if (std::ranges::none_of(on, [](char o) { return o != 0; }))
+    std::ranges::transform(gap, on.begin(), [](double of) { return of < 0 ? 1 : 0; });
   VectorXd lambda = VectorXd::Zero(count);
   result.residual = HUGE_VAL;
   const auto take = [&](VectorXd&& some) {

@@ -17,34 +17,34 @@ bool is_small(Index rows) {
   return static_cast<std::size_t>(rows) < bent_kernel_rows;
 }
 
-/// Columns of a matrix times numbers. Where few of these are not 0, the others cost nothing.
-class ColumnsBy {
-public:
-  explicit ColumnsBy(const BentCompliance::Compliance& w)
-      : w_(w), sum_(column_sum<double>(best_cpu_level())) {
-    columns_.reserve(static_cast<std::size_t>(w.cols()));
-    factors_.reserve(static_cast<std::size_t>(w.cols()));
+/// W H, of columns of W alone.
+MatrixXd spread_of(const BentCompliance::Compliance& w, const Turning& turning) {
+  const auto count = std::ssize(turning.rows);
+  // Instruments apart from each other share no rows: most of H is 0.
+  if (is_small(count)) {
+    MatrixXd all(w.rows(), count);
+    bent_kernel(best_cpu_level())
+        .spread(w.data(), static_cast<std::size_t>(w.rows()), turning.rows.data(),
+                turning.rows.size(), turning.h.data(), all.data());
+    return all;
   }
-  void add(Index column, double factor) {
-    if (factor == 0)
-      return;
-    columns_.push_back(w_.col(column).data());
-    factors_.push_back(factor);
+  const ColumnSum<double> sum = column_sum<double>(best_cpu_level());
+  MatrixXd all = MatrixXd::Zero(w.rows(), count);
+  std::vector<const double*> columns;
+  std::vector<double> factors;
+  for (Index c = 0; c < count; ++c) {
+    columns.clear();
+    factors.clear();
+    for (Index r = 0; r < count; ++r)
+      if (const double factor = turning.h(r, c); factor != 0) {
+        columns.push_back(w.col(turning.rows[static_cast<std::size_t>(r)]).data());
+        factors.push_back(factor);
+      }
+    sum(columns.data(), factors.data(), columns.size(), all.col(c).data(), 0,
+        static_cast<std::size_t>(w.rows()));
   }
-  /// Adds what was added since the last time.
-  void sum(VectorXd& to) {
-    sum_(columns_.data(), factors_.data(), columns_.size(), to.data(), 0,
-         static_cast<std::size_t>(to.size()));
-    columns_.clear();
-    factors_.clear();
-  }
-
-private:
-  const BentCompliance::Compliance& w_;
-  ColumnSum<double> sum_;
-  std::vector<const double*> columns_;
-  std::vector<double> factors_;
-};
+  return all;
+}
 
 } // namespace
 
@@ -60,30 +60,33 @@ BentCompliance::BentCompliance(const Compliance& w, Turning turning)
       ++next;
     else
       others_.push_back(r);
-  lu_.resize(count, count);
-  spread_.resize(std::ssize(others_), count);
-  // Instruments apart from each other share no rows: most of H is 0.
-  ColumnsBy columns(w_);
-  VectorXd sum(w_.rows());
-  for (Index c = 0; c < count; ++c) {
-    const double* const by = turning_.h.col(c).data();
-    for (Index r = 0; r < count; ++r)
-      columns.add(rows[static_cast<std::size_t>(r)], by[r]);
-    sum.setZero();
-    columns.sum(sum);
-    double* const own = lu_.col(c).data();
-    for (Index r = 0; r < count; ++r)
-      own[r] = (r == c ? 1.0 : 0.0) - sum[rows[static_cast<std::size_t>(r)]];
-    double* const spread = spread_.col(c).data();
-    for (Index r = 0; r < spread_.rows(); ++r)
-      spread[r] = sum[others_[static_cast<std::size_t>(r)]];
-  }
+  lu_ = spread_of(w_, turning_);
+  if (others_.empty())
+    lu_ = MatrixXd::Identity(count, count) - lu_;
+  else
+    split();
   if (!is_small(count)) {
     large_.emplace(lu_);
     return;
   }
   swapped_.resize(rows.size());
   bent_kernel(best_cpu_level()).factor(lu_.data(), rows.size(), swapped_.data());
+}
+
+/// From W H what to solve, and what to spread.
+void BentCompliance::split() {
+  const std::vector<Index>& rows = turning_.rows;
+  const MatrixXd all = std::exchange(lu_, MatrixXd(std::ssize(rows), std::ssize(rows)));
+  spread_.resize(std::ssize(others_), all.cols());
+  for (Index c = 0; c < all.cols(); ++c) {
+    const double* const from = all.col(c).data();
+    double* const own = lu_.col(c).data();
+    for (std::size_t r = 0; r < rows.size(); ++r)
+      own[r] = (static_cast<Index>(r) == c ? 1.0 : 0.0) - from[rows[r]];
+    double* const spread = spread_.col(c).data();
+    for (std::size_t r = 0; r < others_.size(); ++r)
+      spread[r] = from[others_[r]];
+  }
 }
 
 void BentCompliance::solve(MatrixXd& columns) const {
@@ -102,44 +105,55 @@ void BentCompliance::apply(MatrixXd& columns) const {
   if (others_.empty())
     return solve(columns);
   MatrixXd bent(std::ssize(rows), columns.cols());
-  for (Index c = 0; c < columns.cols(); ++c)
-    for (Index r = 0; r < bent.rows(); ++r)
-      bent(r, c) = columns(rows[static_cast<std::size_t>(r)], c);
+  for (Index c = 0; c < columns.cols(); ++c) {
+    const double* const from = columns.col(c).data();
+    double* const to = bent.col(c).data();
+    for (std::size_t r = 0; r < rows.size(); ++r)
+      to[r] = from[rows[r]];
+  }
   solve(bent);
   MatrixXd spread(spread_.rows(), bent.cols());
   if (large_)
-    spread = spread_ * bent;
+    spread.noalias() = spread_ * bent;
   else
     bent_kernel(best_cpu_level())
         .multiply(spread_.data(), others_.size(), rows.size(), bent.data(),
                   static_cast<std::size_t>(bent.cols()), spread.data());
   for (Index c = 0; c < columns.cols(); ++c) {
-    for (Index r = 0; r < bent.rows(); ++r)
-      columns(rows[static_cast<std::size_t>(r)], c) = bent(r, c);
-    for (Index r = 0; r < spread.rows(); ++r)
-      columns(others_[static_cast<std::size_t>(r)], c) += spread(r, c);
+    double* const to = columns.col(c).data();
+    const double* from = bent.col(c).data();
+    for (const Index row : rows)
+      to[row] = *from++;
+    from = spread.col(c).data();
+    for (const Index row : others_)
+      to[row] += *from++;
   }
 }
 
 VectorXd BentCompliance::turning(const VectorXd& x) const {
   const std::vector<Index>& rows = turning_.rows;
+  const Compliance h(turning_.h.data(), turning_.h.rows(), turning_.h.cols());
+  if (others_.empty() && !rows.empty())
+    return times(h, x);
   VectorXd all = VectorXd::Zero(x.size());
   if (rows.empty())
     return all;
-  const Compliance h(turning_.h.data(), turning_.h.rows(), turning_.h.cols());
-  const VectorXd some = x(rows), forces = times(h, some);
-  all(rows) = forces;
+  VectorXd some(std::ssize(rows));
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    some[static_cast<Index>(r)] = x[rows[r]];
+  some = times(h, some);
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    all[rows[r]] = some[static_cast<Index>(r)];
   return all;
 }
 
 VectorXd times(const BentCompliance::Compliance& w, const VectorXd& v) {
   if (!is_small(w.cols()))
     return w * v; // whose sums are of blocks
-  ColumnsBy columns(w);
-  for (Index c = 0; c < w.cols(); ++c)
-    columns.add(c, v[c]);
-  VectorXd all = VectorXd::Zero(w.rows());
-  columns.sum(all);
+  VectorXd all(w.rows());
+  bent_kernel(best_cpu_level())
+      .times(w.data(), static_cast<std::size_t>(w.rows()), static_cast<std::size_t>(w.cols()),
+             v.data(), all.data());
   return all;
 }
 

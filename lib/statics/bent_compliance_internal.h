@@ -31,6 +31,7 @@ public:
   Eigen::VectorXd turning(const Eigen::VectorXd& x) const;
 
 private:
+  void split();
   void solve(Eigen::MatrixXd& columns) const;
 
   Compliance w_;

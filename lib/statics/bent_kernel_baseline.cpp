@@ -2,6 +2,6 @@
 
 namespace gewebe {
 
-const BentKernel bent_kernel_baseline{&factor, &solve, &multiply};
+const BentKernel bent_kernel_baseline{&factor, &solve, &multiply, &spread, &times, &push};
 
 } // namespace gewebe

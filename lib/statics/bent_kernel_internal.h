@@ -28,6 +28,18 @@ struct BentKernel {
   /// \pre depth < bent_kernel_rows
   void (*multiply)(const double* a, std::size_t rows, std::size_t depth, const double* b,
                    std::size_t columns, double* to);
+  /// to = W H, of columns of W alone: rows that are 0 in all three columns of a node cost nothing.
+  /// \param w of `rows` rows \param turning which n of its columns \param h n² numbers
+  /// \pre n < bent_kernel_rows
+  void (*spread)(const double* w, std::size_t rows, const std::ptrdiff_t* turning, std::size_t n,
+                 const double* h, double* to);
+  /// to = W v, of columns whose v is not 0. \pre columns < bent_kernel_rows
+  void (*times)(const double* w, std::size_t rows, std::size_t columns, const double* v,
+                double* to);
+  /// to = Σ weight_c W_c n: where a force along n moves what it pushes by its weights at up to
+  /// three nodes. \param w the three columns of each node, the first \param along n
+  void (*push)(const double* const* w, const double* weight, std::size_t count, std::size_t rows,
+               const double* along, double* to);
 };
 
 extern const BentKernel bent_kernel_baseline, bent_kernel_avx2;

@@ -74,6 +74,18 @@ MatrixXd squares_of(std::span<const std::uint32_t> of_node, std::uint32_t count,
   return square;
 }
 
+VectorXd part_of(const VectorXd& all, std::span<const Index> rows) {
+  VectorXd some(std::ssize(rows));
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    some[static_cast<Index>(k)] = all[rows[k]];
+  return some;
+}
+
+void set_part(VectorXd& all, std::span<const Index> rows, const VectorXd& some) {
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    all[rows[k]] = some[static_cast<Index>(k)];
+}
+
 BentCompliance::Compliance map_of(const MatrixXd& w) {
   return {w.data(), w.rows(), w.cols()};
 }
@@ -105,9 +117,18 @@ ContactParts parts_of(const ContactNodes& nodes, const BentCompliance::Complianc
   for (std::size_t i = 0; i < nodes.moving; ++i)
     for (Index a = 0; a < 3; ++a)
       parts.rows[parts.of_node[i]].push_back(3 * static_cast<Index>(i) + a);
-  if (count > 1)
-    for (const std::vector<Index>& rows : parts.rows)
-      parts.compliance.emplace_back(w(rows, rows));
+  if (count < 2)
+    return parts;
+  parts.compliance.reserve(count);
+  for (const std::vector<Index>& rows : parts.rows) {
+    MatrixXd& own = parts.compliance.emplace_back(std::ssize(rows), std::ssize(rows));
+    for (std::size_t c = 0; c < rows.size(); ++c) {
+      const double* const from = w.col(rows[c]).data();
+      double* const to = own.col(static_cast<Index>(c)).data();
+      for (std::size_t r = 0; r < rows.size(); ++r)
+        to[r] = from[rows[r]];
+    }
+  }
   return parts;
 }
 
@@ -128,9 +149,10 @@ BentStart BentParts::start(const VectorXd& free, const VectorXd& held, const Vec
   if (!held.isZero(0))
     start.free += times(w_, held);
   start.turns.resize(at.size());
-  for (std::size_t p = 0; p < bent_.size(); ++p)
-    start.turns(parts_->rows[p]) =
-        times(map_of(parts_->compliance[p]), bent_[p].turning(at(parts_->rows[p])));
+  for (std::size_t p = 0; p < bent_.size(); ++p) {
+    const VectorXd forces = bent_[p].turning(part_of(at, parts_->rows[p]));
+    set_part(start.turns, parts_->rows[p], times(map_of(parts_->compliance[p]), forces));
+  }
   return start;
 }
 
@@ -142,12 +164,19 @@ VectorXd BentParts::without(const BentStart& start, const VectorXd& pushed) cons
   }
   VectorXd all = start.free;
   const VectorXd moved = times(w_, pushed); // by all pushes
+  MatrixXd some;
   for (std::size_t p = 0; p < bent_.size(); ++p) {
     const std::vector<Index>& rows = parts_->rows[p];
-    const VectorXd far = moved(rows) - times(map_of(parts_->compliance[p]), pushed(rows));
-    MatrixXd some = all(rows) + far - start.turns(rows);
+    VectorXd far = times(map_of(parts_->compliance[p]), part_of(pushed, rows));
+    some.resize(far.size(), 1);
+    for (Index k = 0; k < far.size(); ++k) {
+      const Index row = rows[static_cast<std::size_t>(k)];
+      far[k] = moved[row] - far[k];
+      some(k, 0) = all[row] + far[k] - start.turns[row];
+    }
     bent_[p].apply(some);
-    all(rows) = some.col(0) - far;
+    for (Index k = 0; k < far.size(); ++k)
+      all[rows[static_cast<std::size_t>(k)]] = some(k, 0) - far[k];
   }
   return all;
 }
@@ -155,16 +184,30 @@ VectorXd BentParts::without(const BentStart& start, const VectorXd& pushed) cons
 void BentParts::apply(MatrixXd& columns, std::span<const std::uint32_t> node, Index width) const {
   if (parts_ == nullptr)
     return bent_[0].apply(columns);
+  std::vector<Index> own; // columns
+  MatrixXd some;
   for (std::size_t p = 0; p < bent_.size(); ++p) {
-    std::vector<Index> own;
+    own.clear();
     for (std::size_t k = 0; k < node.size(); ++k)
       for (Index a = 0; a < width && parts_->of_node[node[k]] == p; ++a)
         own.push_back(width * static_cast<Index>(k) + a);
     if (own.empty())
       continue;
-    MatrixXd some = columns(parts_->rows[p], own);
+    const std::vector<Index>& rows = parts_->rows[p];
+    some.resize(std::ssize(rows), std::ssize(own));
+    for (Index c = 0; c < some.cols(); ++c) {
+      const double* const from = columns.col(own[static_cast<std::size_t>(c)]).data();
+      double* const to = some.col(c).data();
+      for (std::size_t r = 0; r < rows.size(); ++r)
+        to[r] = from[rows[r]];
+    }
     bent_[p].apply(some);
-    columns(parts_->rows[p], own) = some;
+    for (Index c = 0; c < some.cols(); ++c) {
+      const double* const from = some.col(c).data();
+      double* const to = columns.col(own[static_cast<std::size_t>(c)]).data();
+      for (std::size_t r = 0; r < rows.size(); ++r)
+        to[rows[r]] = from[r];
+    }
   }
 }
 
@@ -173,7 +216,7 @@ VectorXd BentParts::turning(const VectorXd& x) const {
     return bent_[0].turning(x);
   VectorXd all(x.size());
   for (std::size_t p = 0; p < bent_.size(); ++p)
-    all(parts_->rows[p]) = bent_[p].turning(x(parts_->rows[p]));
+    set_part(all, parts_->rows[p], bent_[p].turning(part_of(x, parts_->rows[p])));
   return all;
 }
 

@@ -199,7 +199,8 @@ std::optional<Matrix9> bending_from_point(const SurfacePoint& found,
       return std::nullopt;
     Eigen::Matrix2d inverse;
     inverse << c / det, -b / det, -b / det, a / det;
-    h -= mixed * inverse * mixed.transpose();
+    const Eigen::Matrix<double, 9, 2> turned = mixed * inverse;
+    h -= turned.lazyProduct(mixed.transpose()); // which is too small to be packed
   }
   return h / found.distance;
 }

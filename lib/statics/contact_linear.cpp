@@ -1,15 +1,18 @@
 // The linear problem of a turn: the forces of the pairs that push, or would be inside.
 
-#include "base/vector_at.h"
+#include "base/cpu.h"
 #include "contact/contact_solver.h"
+#include "statics/bent_kernel_internal.h"
 #include "statics/contact_scene_internal.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -61,8 +64,10 @@ public:
         look_at(more, bent, looked);
         if (!looked.columns.allFinite())
           return std::nullopt;
-        compliance = at_points(looked.pairs, looked.columns);
-        compliance = (0.5 * (compliance + compliance.transpose())).eval();
+        compliance = at_points(points_, looked.columns);
+        for (Index c = 0; c < compliance.cols(); ++c)
+          for (Index r = 0; r < c; ++r)
+            compliance(r, c) = compliance(c, r) = 0.5 * (compliance(r, c) + compliance(c, r));
         if (careful && !stable(looked, compliance))
           return std::nullopt;
       }
@@ -81,24 +86,45 @@ private:
     return Eigen::Vector3d(p.normal.x, p.normal.y, p.normal.z);
   }
 
-  /// Rows of the points of pairs, along their directions.
-  MatrixXd at_points(std::span<const std::uint32_t> pairs, const MatrixXd& rows) const {
-    MatrixXd all(width() * static_cast<Index>(pairs.size()), rows.cols());
-    const auto length = static_cast<std::size_t>(rows.rows());
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-      const TouchPair& p = pairs_[pairs[k]];
-      for (Index column = 0; column < rows.cols(); ++column) {
-        const double* const from = rows.col(column).data();
-        double* const to = all.col(column).data() + width() * static_cast<Index>(k);
-        Vec3 own;
-        for (std::size_t c = 0; c < 3; ++c)
-          if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
-            own += p.point.weights[c] * vector_at({from, length}, p.piece[c]);
-        if (rough_)
-          for (int a = 0; a < 3; ++a)
-            to[a] = own[a];
-        else
-          to[0] = dot(p.normal, own);
+  /// What a pair's point moves with, of what gives way.
+  struct Point {
+    std::array<Index, 3> row{}; ///< of a corner's node, the first
+    std::array<double, 3> weight{};
+    std::size_t count = 0;
+    Vec3 normal;
+
+    Vec3 of(const double* rows) const {
+      Vec3 sum;
+      for (std::size_t c = 0; c < count; ++c)
+        sum += weight[c] * Vec3{rows[row[c]], rows[row[c] + 1], rows[row[c] + 2]};
+      return sum;
+    }
+  };
+  Point point(const TouchPair& p) const {
+    Point all;
+    all.normal = p.normal;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving) {
+        all.row[all.count] = 3 * static_cast<Index>(p.piece[c]);
+        all.weight[all.count++] = p.point.weights[c];
+      }
+    return all;
+  }
+
+  /// Rows of points, along their directions.
+  MatrixXd at_points(std::span<const Point> points, const MatrixXd& rows) const {
+    MatrixXd all(width() * std::ssize(points), rows.cols());
+    for (Index column = 0; column < rows.cols(); ++column) {
+      const double* const from = rows.col(column).data();
+      double* to = all.col(column).data();
+      for (const Point& point : points) {
+        const Vec3 own = point.of(from);
+        if (!rough_) {
+          *to++ = dot(point.normal, own);
+          continue;
+        }
+        for (int a = 0; a < 3; ++a)
+          *to++ = own[a];
       }
     }
     return all;
@@ -116,29 +142,47 @@ private:
     return all;
   }
 
+  /// Columns of W Bᵀ of a pair's point.
+  void set_columns(const Point& point, Eigen::Ref<MatrixXd> to) const {
+    std::array<const double*, 3> w{};
+    for (std::size_t c = 0; c < point.count; ++c)
+      w[c] = scene_.w.col(point.row[c]).data();
+    for (Index a = 0; a < width(); ++a) {
+      const Vec3& n = point.normal;
+      const std::array<double, 3> along =
+          rough_ ? std::array{a == 0 ? 1.0 : 0.0, a == 1 ? 1.0 : 0.0, a == 2 ? 1.0 : 0.0}
+                 : std::array{n.x, n.y, n.z};
+      kernel_.push(w.data(), point.weight.data(), point.count,
+                   static_cast<std::size_t>(scene_.rows()), along.data(), to.col(a).data());
+    }
+  }
+
   /// Pairs join those that are looked at.
   void look_at(std::span<const std::uint32_t> pairs, const BentParts& bent,
-               LookedContacts& looked) const {
-    MatrixXd more = MatrixXd::Zero(scene_.rows(), width() * static_cast<Index>(pairs.size()));
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-      const TouchPair& p = pairs_[pairs[k]];
-      const auto along = directions(p);
-      for (std::size_t c = 0; c < 3; ++c)
-        if (p.point.weights[c] > 0 && p.piece[c] < scene_.nodes.moving)
-          more.middleCols(width() * static_cast<Index>(k), width()) +=
-              p.point.weights[c] * scene_.w.middleCols(3 * static_cast<Index>(p.piece[c]), 3) *
-              along;
-    }
+               LookedContacts& looked) {
+    MatrixXd more(scene_.rows(), width() * std::ssize(pairs));
     const Index before = looked.columns.cols();
-    const VectorXd own = at_points(pairs, more).diagonal();
-    std::vector<std::uint32_t> pushed;
-    for (const std::uint32_t i : pairs)
-      pushed.push_back(*std::ranges::min_element(pairs_[i].piece));
-    bent.apply(more, pushed, width());
     looked.straight.conservativeResize(before + more.cols(), 1);
-    looked.straight.bottomRows(more.cols()) = own;
-    looked.columns.conservativeResize(scene_.rows(), before + more.cols());
-    looked.columns.rightCols(more.cols()) = more;
+    std::vector<std::uint32_t> pushed;
+    pushed.reserve(pairs.size());
+    for (Index column = 0; const std::uint32_t i : pairs) {
+      const TouchPair& p = pairs_[i];
+      points_.push_back(point(p));
+      set_columns(points_.back(), more.middleCols(column, width()));
+      for (Index a = 0; a < width(); ++a, ++column) {
+        const Vec3 own = points_.back().of(more.col(column).data());
+        looked.straight(before + column, 0) =
+            rough_ ? own[static_cast<int>(a)] : dot(p.normal, own);
+      }
+      pushed.push_back(*std::ranges::min_element(p.piece));
+    }
+    bent.apply(more, pushed, width());
+    if (before == 0) {
+      looked.columns = std::move(more);
+    } else {
+      looked.columns.conservativeResize(scene_.rows(), before + more.cols());
+      looked.columns.rightCols(more.cols()) = more;
+    }
     looked.pairs.insert(looked.pairs.end(), pairs.begin(), pairs.end());
   }
 
@@ -157,7 +201,7 @@ private:
               normal_of(looked, i).dot(compliance.block<3, 3>(3 * i, 3 * j) * normal_of(looked, j));
     }
     normal.diagonal().array() += 1e-10 * normal.diagonal().cwiseAbs().maxCoeff();
-    return Eigen::LLT<MatrixXd>(normal).info() == Eigen::Success;
+    return Eigen::LLT<Eigen::Ref<MatrixXd>>(normal).info() == Eigen::Success;
   }
 
   /// The forces of these pairs, whatever the others say. \param base where the nodes are without
@@ -179,8 +223,9 @@ private:
         continue;
       }
       const Vec3 here = point_of(p, without);
-      contacts.push_back({k, p.normal, dot(p.normal, here - p.point.core) - instrument.radius,
-                          here - carried(way.before, way.now, point_of(p, scene_.nodes.was)),
+      const Vec3 slip =
+          rough_ ? here - carried(way.before, way.now, point_of(p, scene_.nodes.was)) : Vec3{};
+      contacts.push_back({k, p.normal, dot(p.normal, here - p.point.core) - instrument.radius, slip,
                           instrument.friction});
       guess.push_back(p.force);
     }
@@ -201,9 +246,11 @@ private:
         gap.push_back(contacts[i].gap);
         start.push_back(dot(guess[i], contacts[i].normal));
       }
-      const MatrixXd some = compliance(rows, rows);
+      const bool whole = std::ssize(rows) == compliance.rows();
+      const MatrixXd some = whole ? MatrixXd{} : MatrixXd(compliance(rows, rows));
+      const MatrixXd& of = whole ? compliance : some;
       const PushForces found =
-          solve_pushes({some.data(), static_cast<std::size_t>(some.size())}, gap, start);
+          solve_pushes({of.data(), static_cast<std::size_t>(of.size())}, gap, start);
       looked.exact = found.solved;
       for (std::size_t i = 0; i < rows.size(); ++i)
         looked.forces[rows[i]] = found.push[i];
@@ -214,10 +261,13 @@ private:
           directions(p) * looked.forces.segment(width() * static_cast<Index>(k), width());
       p.force = {force[0], force[1], force[2]};
     }
-    looked.x = base + looked.columns * looked.forces;
+    const MatrixXd& columns = looked.columns;
+    looked.x = base + times({columns.data(), columns.rows(), columns.cols()}, looked.forces);
   }
   /// The pairs that nobody looked at whose points are in their instruments, the deepest first.
   std::vector<std::uint32_t> overlooked(const LookedContacts& looked) const {
+    if (looked.pairs.size() == active_.size())
+      return {};
     const std::vector<Vec3> at = looked.x.size() > 0
                                      ? scene_.places_of(looked.x)
                                      : std::vector<Vec3>(scene_.free.begin(), scene_.free.end());
@@ -252,6 +302,8 @@ private:
   std::optional<TouchPair>& stuck_;
   double largest_;
   bool rough_; ///< anything rubs
+  const BentKernel& kernel_ = bent_kernel(best_cpu_level());
+  std::vector<Point> points_; ///< of those that are looked at
 };
 
 } // namespace

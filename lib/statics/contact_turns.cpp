@@ -1,5 +1,7 @@
 #include "statics/contact_scene_internal.h"
 
+#include "base/vector_at.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
@@ -26,6 +28,7 @@ constexpr double outside = 1e-9; ///< of the radius: so deep is not inside
 constexpr double nearly = 0.03;  ///< from where on each turn comes nearer
 constexpr double slow = 0.1;     ///< to come nearer by: in parts no longer, then
 constexpr double short_way = 0.1, most_way = 8;
+constexpr double spare_side = 1e-6; ///< of where it is
 constexpr int max_turns = 100;
 constexpr int max_vain = 3; ///< turns whose forces were not found
 constexpr int max_sweeps = 200;
@@ -135,12 +138,18 @@ private:
   /// Whether a core goes through a piece: no pair leads it out again.
   bool pierced(std::span<const Vec3> at) const {
     for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
-      for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p)
+      for (std::size_t p = 0; has_inside(k) && p < scene_.nodes.pieces.size(); ++p)
         if (const Facet& piece = scene_.nodes.pieces[p];
             scene_.nodes.meet(k, p) && corner_count(piece) == 3 &&
             goes_through(*scene_.placed[k], corners_of(piece, at)))
           return true;
     return false;
+  }
+
+  /// Whether its core is more than a point.
+  bool has_inside(std::size_t instrument) const {
+    const auto& placed = scene_.placed[instrument];
+    return placed && (placed->core || placed->ab != Vec3{});
   }
 
   /// Whatever the forces are, nothing stays inside: the nodes around move alike.
@@ -223,11 +232,37 @@ private:
   /// Pairs of every piece with whatever it is in.
   bool join(std::span<const Vec3> at, double depth) {
     bool joined = false;
-    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k)
-      for (std::size_t p = 0; scene_.placed[k] && p < scene_.nodes.pieces.size(); ++p)
-        if (scene_.nodes.meet(k, p))
-          joined = join(k, scene_.nodes.pieces[p], at, depth) == Joined::fresh || joined;
+    for (std::uint32_t k = 0; k < scene_.placed.size(); ++k) {
+      if (!scene_.placed[k])
+        continue;
+      find_sides(*scene_.placed[k], at);
+      for (std::size_t p = 0; p < scene_.nodes.pieces.size(); ++p) {
+        const Facet& piece = scene_.nodes.pieces[p];
+        if ((sides_[piece[0]] & sides_[piece[1]] & sides_[piece[2]]) == 0 &&
+            scene_.nodes.meet(k, p))
+          joined = join(k, piece, at, depth) == Joined::fresh || joined;
+      }
+    }
     return joined;
+  }
+  /// The sides of an instrument's box that each node is surely beyond, as bits: a piece whose nodes
+  /// share one is not in it.
+  void find_sides(const PlacedInstrument& instrument, std::span<const Vec3> at) {
+    Box3 box = instrument.box();
+    const Vec3 most{std::max(std::abs(box.min.x), std::abs(box.max.x)),
+                    std::max(std::abs(box.min.y), std::abs(box.max.y)),
+                    std::max(std::abs(box.min.z), std::abs(box.max.z))};
+    const double spare =
+        spare_side * std::max({instrument.radius, most.x, most.y, most.z}); // of rounding
+    box.min -= {spare, spare, spare};
+    box.max += {spare, spare, spare};
+    sides_.resize(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const Vec3& x = at[i];
+      sides_[i] = static_cast<std::uint8_t>(
+          (x.x < box.min.x ? 1 : 0) | (x.x > box.max.x ? 2 : 0) | (x.y < box.min.y ? 4 : 0) |
+          (x.y > box.max.y ? 8 : 0) | (x.z < box.min.z ? 16 : 0) | (x.z > box.max.z ? 32 : 0));
+    }
   }
 
   enum class Joined { none, known, fresh };
@@ -523,6 +558,7 @@ private:
   std::vector<Vec3> at_;              ///< before a turn
   VectorXd forces_, next_forces_;     ///< on the nodes, as the places mean before and behind a turn
   std::vector<std::uint32_t> active_; ///< pairs
+  std::vector<std::uint8_t> sides_;   ///< by node
 };
 
 } // namespace
@@ -539,15 +575,15 @@ Vec3 point_of(const TouchPair& p, std::span<const Vec3> at) {
 std::vector<Vec3> ContactScene::places_of(const VectorXd& x) const {
   std::vector<Vec3> all(free.begin(), free.end());
   for (std::size_t k = 0; k < nodes.moving; ++k)
-    for (int a = 0; a < 3; ++a)
-      all[k][a] = x[static_cast<Index>(3 * k) + a];
+    all[k] = vector_at({x.data(), static_cast<std::size_t>(x.size())}, k);
   return all;
 }
 
 VectorXd ContactScene::rows_of(std::span<const Vec3> places) const {
   VectorXd all(rows());
-  for (Index r = 0; r < rows(); ++r)
-    all[r] = places[static_cast<std::size_t>(r / 3)][static_cast<int>(r % 3)];
+  for (std::size_t k = 0; k < nodes.moving; ++k)
+    for (int a = 0; a < 3; ++a)
+      all[3 * static_cast<Index>(k) + a] = places[k][a];
   return all;
 }
 
@@ -555,17 +591,19 @@ void take_turns(const DelassusOperator& delassus, const ContactNodes& nodes,
                 std::span<const Vec3> free, std::span<const std::optional<PlacedInstrument>> placed,
                 std::span<const std::optional<MovedInstrument>> moved, ContactTurns& turns) {
   const auto run = [&] { Turns(delassus, nodes, free, placed, moved, turns).run(); };
-  const ContactTurns before = turns;
+  if (turns.last.empty() || !turns.at.empty())
+    return run();
+  ContactTurns before = turns;
   run();
-  if (before.last.empty() || !before.at.empty() || (turns.solved && turns.change <= same_place))
+  if (turns.solved && turns.change <= same_place)
     return;
   // Friction that begins with the last forces may end between two points: without them, then.
-  const ContactTurns found = std::exchange(turns, before);
+  ContactTurns found = std::exchange(turns, std::move(before));
   turns.last.clear();
   run();
   const int taken = turns.turns + found.turns;
   if (found.solved && !(turns.solved && turns.change <= found.change))
-    turns = found;
+    turns = std::move(found);
   turns.turns = taken;
 }
 
