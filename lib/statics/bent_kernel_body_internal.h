@@ -11,16 +11,17 @@
 namespace gewebe {
 namespace {
 
-constexpr std::size_t panel = 8;          ///< columns that are eliminated one by one
-constexpr std::size_t one_panel = 16;     ///< so many rows are one
-constexpr std::size_t small_panel = 4;    ///< unknowns that are solved one by one
-constexpr std::size_t least_blocks = 20;  ///< rows, depth and columns of a product by blocks
-constexpr std::size_t least_in_turns = 8; ///< depth from where on such a product has two sums
+inline constexpr std::size_t panel = 8;         ///< columns that are eliminated one by one
+inline constexpr std::size_t one_panel = 16;    ///< so many rows are one
+inline constexpr std::size_t small_panel = 4;   ///< unknowns that are solved one by one
+inline constexpr std::size_t least_blocks = 20; ///< rows, depth and columns of a product by blocks
+inline constexpr std::size_t least_in_turns =
+    8; ///< depth from where on such a product has two sums
 
 using Lanes = long long __attribute__((vector_size(32), aligned(8), may_alias));
 
 /// Four lanes from here, of which the last `count` are on, or off.
-const Lanes& lanes(std::size_t count, bool on) {
+inline const Lanes& lanes(std::size_t count, bool on) {
   static constexpr long long all[12]{0, 0, 0, 0, -1, -1, -1, -1, 0, 0, 0, 0};
   return *reinterpret_cast<const Lanes*>(all + (on ? count : 4 + count));
 }
@@ -31,7 +32,7 @@ inline void keep(Four& v, const Lanes& those) {
 
 /// Σ A_k x_k of `Depth` columns, of four rows.
 template <std::size_t Depth>
-inline void sum_of(const double* a, std::size_t stride, const double* x, Four& sum) {
+void sum_of(const double* a, std::size_t stride, const double* x, Four& sum) {
   sum = four(a) * x[0];
   for (std::size_t k = 1; k < Depth; ++k)
     sum += four(a + k * stride) * x[k];
@@ -39,8 +40,8 @@ inline void sum_of(const double* a, std::size_t stride, const double* x, Four& s
 
 /// to -= A x. Rows that are no four are done with those before them. \pre there are four rows up to
 /// the last
-void subtract_below(const double* a, std::size_t stride, const double* x, double* to,
-                    std::size_t rows) {
+inline void subtract_below(const double* a, std::size_t stride, const double* x, double* to,
+                           std::size_t rows) {
   Four sum;
   std::size_t r = 0;
   for (; r + 4 <= rows; r += 4) {
@@ -55,8 +56,8 @@ void subtract_below(const double* a, std::size_t stride, const double* x, double
 }
 
 /// The same, with those behind them. \pre there are four rows from the first on
-void subtract_above(const double* a, std::size_t stride, const double* x, double* to,
-                    std::size_t rows) {
+inline void subtract_above(const double* a, std::size_t stride, const double* x, double* to,
+                           std::size_t rows) {
   Four sum;
   const std::size_t first = rows & 3;
   for (std::size_t r = first; r < rows; r += 4) {
@@ -72,12 +73,13 @@ void subtract_above(const double* a, std::size_t stride, const double* x, double
 
 /// Whether a product sums a row's even and odd numbers each for themselves: behind the last four
 /// rows, of two that are left, in columns by four.
-bool in_turns(std::size_t rows, std::size_t depth, std::size_t columns) {
+inline bool in_turns(std::size_t rows, std::size_t depth, std::size_t columns) {
   return (rows & 2) != 0 && depth >= least_in_turns && rows + depth + columns >= least_blocks;
 }
 
 /// Σ a_k x_k of a row, even and odd ones of whole eights each for themselves.
-double sum_in_turns(const double* a, std::size_t stride, const double* x, std::size_t depth) {
+inline double sum_in_turns(const double* a, std::size_t stride, const double* x,
+                           std::size_t depth) {
   const std::size_t even = depth & ~std::size_t{7};
   double first = 0, second = 0;
   for (std::size_t k = 0; k < even; k += 2) {
@@ -91,8 +93,8 @@ double sum_in_turns(const double* a, std::size_t stride, const double* x, std::s
 }
 
 /// L U of `columns` columns of a matrix.
-void factor_panel(double* a, std::size_t stride, std::size_t rows, std::size_t columns,
-                  std::uint32_t* swapped) {
+inline void factor_panel(double* a, std::size_t stride, std::size_t rows, std::size_t columns,
+                         std::uint32_t* swapped) {
   for (std::size_t k = 0; k < std::min(rows, columns); ++k) {
     double* const own = a + k * stride;
     std::size_t pivot = k;
@@ -141,8 +143,8 @@ struct Triangle {
 };
 
 /// L⁻¹ of columns, in place. \param l of unit diagonal
-void solve_lower(const double* l, std::size_t stride, std::size_t n, double* columns,
-                 std::size_t column_stride, std::size_t count) {
+inline void solve_lower(const double* l, std::size_t stride, std::size_t n, double* columns,
+                        std::size_t column_stride, std::size_t count) {
   std::size_t k = 0;
   for (; k + small_panel <= n; k += small_panel) {
     const std::size_t next = k + small_panel;
@@ -167,7 +169,7 @@ void solve_lower(const double* l, std::size_t stride, std::size_t n, double* col
 }
 
 /// U⁻¹ of columns, in place.
-void solve_upper(const double* u, std::size_t n, double* columns, std::size_t count) {
+inline void solve_upper(const double* u, std::size_t n, double* columns, std::size_t count) {
   std::size_t end = n;
   for (; end >= small_panel; end -= small_panel) {
     const std::size_t begin = end - small_panel;
@@ -202,8 +204,8 @@ void solve_upper(const double* u, std::size_t n, double* columns, std::size_t co
 }
 
 /// What a panel's columns leave of those behind it: to -= A B. \param rows as many as columns
-void subtract_panel(const double* a, const double* b, double* to, std::size_t stride,
-                    std::size_t rows) {
+inline void subtract_panel(const double* a, const double* b, double* to, std::size_t stride,
+                           std::size_t rows) {
   const std::size_t fours = rows & ~std::size_t{3}, left = rows - fours;
   const std::size_t two = in_turns(rows, panel, rows) ? fours : 0; // columns in which a row has
   for (std::size_t c = 0; c < rows; ++c, b += stride, to += stride) {
@@ -236,7 +238,7 @@ void subtract_panel(const double* a, const double* b, double* to, std::size_t st
   }
 }
 
-void factor(double* a, std::size_t n, std::uint32_t* swapped) {
+inline void factor(double* a, std::size_t n, std::uint32_t* swapped) {
   if (n <= one_panel)
     return factor_panel(a, n, n, n, swapped);
   for (std::size_t k = 0; k < n; k += panel) {
@@ -260,8 +262,8 @@ void factor(double* a, std::size_t n, std::uint32_t* swapped) {
   }
 }
 
-void solve(const double* lu, const std::uint32_t* swapped, std::size_t n, double* columns,
-           std::size_t count) {
+inline void solve(const double* lu, const std::uint32_t* swapped, std::size_t n, double* columns,
+                  std::size_t count) {
   for (std::size_t c = 0; c < count; ++c)
     for (std::size_t k = 0; k < n; ++k)
       std::swap(columns[c * n + k], columns[c * n + swapped[k]]);
@@ -307,8 +309,8 @@ void multiply_columns(const double* const* a, std::size_t rows, std::size_t dept
   }
 }
 
-void multiply(const double* a, std::size_t rows, std::size_t depth, const double* b,
-              std::size_t columns, double* to) {
+inline void multiply(const double* a, std::size_t rows, std::size_t depth, const double* b,
+                     std::size_t columns, double* to) {
   const double* from[bent_kernel_rows];
   for (std::size_t k = 0; k < depth; ++k)
     from[k] = a + k * rows;
@@ -341,8 +343,8 @@ void spread_columns(const double* w, std::size_t rows, const std::ptrdiff_t* tur
   multiply_columns<Count>(from, rows, depth, by, bent_kernel_rows, to);
 }
 
-void spread(const double* w, std::size_t rows, const std::ptrdiff_t* turning, std::size_t n,
-            const double* h, double* to) {
+inline void spread(const double* w, std::size_t rows, const std::ptrdiff_t* turning, std::size_t n,
+                   const double* h, double* to) {
   std::size_t c = 0;
   for (; c + 3 <= n; c += 3)
     spread_columns<3>(w, rows, turning, n, h + c * n, to + c * rows);
@@ -350,7 +352,8 @@ void spread(const double* w, std::size_t rows, const std::ptrdiff_t* turning, st
     spread_columns<1>(w, rows, turning, n, h + c * n, to + c * rows);
 }
 
-void times(const double* w, std::size_t rows, std::size_t columns, const double* v, double* to) {
+inline void times(const double* w, std::size_t rows, std::size_t columns, const double* v,
+                  double* to) {
   const double* from[bent_kernel_rows];
   double by[bent_kernel_rows];
   std::size_t depth = 0;
@@ -386,8 +389,8 @@ void push_corners(const double* const* w, const double* weight, std::size_t rows
   }
 }
 
-void push(const double* const* w, const double* weight, std::size_t count, std::size_t rows,
-          const double* along, double* to) {
+inline void push(const double* const* w, const double* weight, std::size_t count, std::size_t rows,
+                 const double* along, double* to) {
   if (count == 3)
     return push_corners<3>(w, weight, rows, along, to);
   if (count == 2)
