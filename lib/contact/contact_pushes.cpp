@@ -26,8 +26,12 @@ constexpr int max_inner = 60; ///< steps along the centre
 using Square = Eigen::Map<const MatrixXd>;
 using Column = Eigen::Map<const VectorXd>;
 
+struct Pushes {
+  VectorXd lambda, g; ///< pushes, and the gaps under them
+};
+
 /// λ >= 0, g = b + A λ >= 0, λ g = 0. \param on in: a guess of where λ > 0
-std::optional<VectorXd> pivot(const Square& a, const Column& b, std::vector<char> on) {
+std::optional<Pushes> pivot(const Square& a, const Column& b, std::vector<char> on) {
   const Index count = b.size();
   const double slack = 1e-14 * b.cwiseAbs().maxCoeff();
   VectorXd lambda = VectorXd::Zero(count), g(count), part;
@@ -72,7 +76,7 @@ std::optional<VectorXd> pivot(const Square& a, const Column& b, std::vector<char
         last = i;
       }
     if (wrong == 0)
-      return lambda;
+      return Pushes{std::move(lambda), std::move(g)};
     if (!lambda.allFinite())
       return std::nullopt;
     // All that are wrong change sides while that helps, else the last one (which must end).
@@ -89,10 +93,9 @@ std::optional<VectorXd> pivot(const Square& a, const Column& b, std::vector<char
   return std::nullopt;
 }
 
-double residual_of(const Square& a, const Column& b, const VectorXd& lambda) {
-  const VectorXd g = b + a * lambda;
+double residual_of(const Square& a, const VectorXd& lambda, const VectorXd& g) {
   double scale = 0, miss = 0;
-  for (Index i = 0; i < b.size(); ++i) {
+  for (Index i = 0; i < lambda.size(); ++i) {
     const double push = std::max(0.0, lambda[i] - g[i] / a(i, i));
     const double here = std::abs(lambda[i] - push);
     scale = std::max({scale, std::abs(lambda[i]), push});
@@ -119,19 +122,19 @@ PushForces solve_pushes(std::span<const double> compliance, std::span<const doub
     std::ranges::transform(gap, on.begin(), [](double of) { return of < 0 ? 1 : 0; });
   VectorXd lambda = VectorXd::Zero(count);
   result.residual = HUGE_VAL;
-  const auto take = [&](VectorXd&& some) {
-    const double residual = residual_of(a, b, some);
+  const auto take = [&](VectorXd&& some, const VectorXd& g) {
+    const double residual = residual_of(a, some, g);
     if (!(residual < result.residual))
       return;
     lambda = std::move(some);
     result.residual = residual;
   };
-  if (std::optional<VectorXd> found = pivot(a, b, std::move(on)))
-    take(std::move(*found));
+  if (std::optional<Pushes> found = pivot(a, b, std::move(on)))
+    take(std::move(found->lambda), found->g);
   if (!(result.residual <= contact_solver_tolerance)) {
     const std::vector<double> smooth(gap.size());
     follow_contact_centre(a, b, smooth, max_inner, [&](const VectorXd& some) {
-      take(VectorXd(some));
+      take(VectorXd(some), b + a * some);
       return result.residual <= 0.1 * contact_solver_tolerance;
     });
   }

@@ -61,10 +61,13 @@ BentCompliance::BentCompliance(const Compliance& w, Turning turning)
     else
       others_.push_back(r);
   lu_ = spread_of(w_, turning_);
-  if (others_.empty())
-    lu_ = MatrixXd::Identity(count, count) - lu_;
-  else
+  if (others_.empty()) {
+    const VectorXd diagonal = VectorXd::Ones(count) - lu_.diagonal();
+    lu_ = MatrixXd::Zero(count, count) - lu_; // faster than from 1
+    lu_.diagonal() = diagonal;
+  } else {
     split();
+  }
   if (!is_small(count)) {
     large_.emplace(lu_);
     return;

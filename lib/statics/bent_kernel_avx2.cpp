@@ -2,6 +2,6 @@
 
 namespace gewebe {
 
-const BentKernel bent_kernel_avx2{&factor, &solve, &multiply, &spread, &times, &push};
+const BentKernel bent_kernel_avx2{&factor, &solve, &multiply, &spread, &times, &push, &read};
 
 } // namespace gewebe

@@ -365,6 +365,44 @@ inline void times(const double* w, std::size_t rows, std::size_t columns, const 
   multiply_columns<1>(from, rows, depth, by, 0, to);
 }
 
+/// `Count` corners of read.
+template <std::size_t Count>
+void read_corners(const double* const* x, const double* weight, std::size_t columns,
+                  const double* along, double* to) {
+  std::size_t c = 0;
+  for (; c + 4 <= columns; c += 4) {
+    Four all = {};
+    for (std::size_t a = 0; a < 3; ++a) {
+      Four sum = four(x[0] + a * columns + c) * weight[0];
+      for (std::size_t k = 1; k < Count; ++k)
+        sum += four(x[k] + a * columns + c) * weight[k];
+      all += sum * along[a];
+    }
+    four(to + c) = all;
+  }
+  for (; c < columns; ++c) {
+    double all = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      double sum = x[0][a * columns + c] * weight[0];
+      for (std::size_t k = 1; k < Count; ++k)
+        sum += x[k][a * columns + c] * weight[k];
+      all += sum * along[a];
+    }
+    to[c] = all;
+  }
+}
+
+inline void read(const double* const* x, const double* weight, std::size_t count,
+                 std::size_t columns, const double* along, double* to) {
+  if (count == 3)
+    return read_corners<3>(x, weight, columns, along, to);
+  if (count == 2)
+    return read_corners<2>(x, weight, columns, along, to);
+  if (count == 1)
+    return read_corners<1>(x, weight, columns, along, to);
+  std::fill(to, to + columns, 0.0);
+}
+
 /// `Count` corners of push.
 template <std::size_t Count>
 void push_corners(const double* const* w, const double* weight, std::size_t rows,

@@ -40,6 +40,11 @@ struct BentKernel {
   /// three nodes. \param w the three columns of each node, the first \param along n
   void (*push)(const double* const* w, const double* weight, std::size_t count, std::size_t rows,
                const double* along, double* to);
+  /// to = n·Σ weight_c x_c: how far a point of up to three nodes is moved along n, in so many
+  /// cases. \param x how far each node is along the first axis, behind it along the others: of each
+  /// case
+  void (*read)(const double* const* x, const double* weight, std::size_t count, std::size_t cases,
+               const double* along, double* to);
 };
 
 extern const BentKernel bent_kernel_baseline, bent_kernel_avx2;

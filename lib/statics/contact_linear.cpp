@@ -62,12 +62,10 @@ public:
         left = false;
       } else {
         look_at(more, bent, looked);
-        if (!looked.columns.allFinite())
+        // Finite numbers less themselves are 0, others are not.
+        if (!((looked.columns - looked.columns).sum() == 0))
           return std::nullopt;
-        compliance = at_points(points_, looked.columns);
-        for (Index c = 0; c < compliance.cols(); ++c)
-          for (Index r = 0; r < c; ++r)
-            compliance(r, c) = compliance(c, r) = 0.5 * (compliance(r, c) + compliance(c, r));
+        compliance = compliance_of(looked);
         if (careful && !stable(looked, compliance))
           return std::nullopt;
       }
@@ -111,22 +109,34 @@ private:
     return all;
   }
 
-  /// Rows of points, along their directions.
-  MatrixXd at_points(std::span<const Point> points, const MatrixXd& rows) const {
-    MatrixXd all(width() * std::ssize(points), rows.cols());
-    for (Index column = 0; column < rows.cols(); ++column) {
-      const double* const from = rows.col(column).data();
-      double* to = all.col(column).data();
-      for (const Point& point : points) {
-        const Vec3 own = point.of(from);
-        if (!rough_) {
-          *to++ = dot(point.normal, own);
-          continue;
+  /// How the forces of the pairs that are looked at move their points, along their directions; made
+  /// symmetric.
+  MatrixXd compliance_of(const LookedContacts& looked) const {
+    MatrixXd all(looked.columns.cols(), looked.columns.cols());
+    if (rough_) {
+      for (Index column = 0; column < all.cols(); ++column) {
+        double* to = all.col(column).data();
+        for (const Point& point : points_) {
+          const Vec3 own = point.of(looked.columns.col(column).data());
+          for (int a = 0; a < 3; ++a)
+            *to++ = own[a];
         }
-        for (int a = 0; a < 3; ++a)
-          *to++ = own[a];
+      }
+    } else {
+      const MatrixXd by_force = looked.columns.transpose();
+      for (Index k = 0; k < all.cols(); ++k) {
+        const Point& point = points_[static_cast<std::size_t>(k)];
+        std::array<const double*, 3> x{};
+        for (std::size_t c = 0; c < point.count; ++c)
+          x[c] = by_force.col(point.row[c]).data();
+        const std::array<double, 3> along{point.normal.x, point.normal.y, point.normal.z};
+        kernel_.read(x.data(), point.weight.data(), point.count,
+                     static_cast<std::size_t>(all.rows()), along.data(), all.col(k).data());
       }
     }
+    for (Index c = 0; c < all.cols(); ++c)
+      for (Index r = 0; r < c; ++r)
+        all(r, c) = all(c, r) = 0.5 * (all(r, c) + all(c, r));
     return all;
   }
 
