@@ -76,6 +76,29 @@ TEST_F(BentKernels, GiveTheSameBitsOnEachLevel) {
   }
 }
 
+TEST_F(BentKernels, MoveNodesByAForceAndReadItsPoint) {
+  for (const BentKernel* kernel : {&bent_kernel_baseline, &bent_kernel(best_cpu_level())})
+    for (std::size_t corners = 0; corners < 4; ++corners)
+      for (const Index rows : {3, 9, 12, 30}) {
+        const MatrixXd w = matrix(rows, 9), weight = matrix(3, 1), n = matrix(3, 1);
+        std::vector<const double*> first;
+        VectorXd moved = VectorXd::Zero(rows), read = moved;
+        for (Index c = 0; c < static_cast<Index>(corners); ++c) {
+          const MatrixXd own = w.middleCols(3 * c, 3) * n;
+          first.push_back(w.col(3 * c).data());
+          moved += weight(c) * own;
+        }
+        VectorXd to(rows);
+        kernel->push(first.data(), weight.data(), corners, static_cast<std::size_t>(rows), n.data(),
+                     to.data());
+        EXPECT_LT((to - moved).norm(), 1e-14) << corners;
+        // What moves the nodes so is what a point of them is moved by.
+        kernel->read(first.data(), weight.data(), corners, static_cast<std::size_t>(rows), n.data(),
+                     read.data());
+        EXPECT_LT((read - moved).norm(), 1e-14) << corners;
+      }
+}
+
 /// x = (1 - W H)⁻¹ b, on few rows and on so many that the system is Eigen's.
 TEST_F(BentKernels, AreThoseOfACompliance) {
   for (const Index count : {6, 30, 127, 128, 140}) {
