@@ -22,7 +22,7 @@ namespace {
 
 struct Arguments {
   std::string scene = "-";
-  bool serve = false, acknowledge = false, binary = false, verify = false;
+  bool serve = false, acknowledge = false, awake = false, binary = false, verify = false;
   std::optional<double> rate;
   double tolerance = 0;
   std::string listen, shapes, events, record, latencies;
@@ -41,7 +41,7 @@ void work(cli::Run& run, const Arguments& in) {
                      "and without -q beside -o");
   const auto shared = // there when the first client comes
       in.shapes.empty() ? nullptr : std::make_unique<SharedShapes>(in.shapes);
-  SceneAnswers answers(spoken, in.binary, in.listen, {.warn = warn});
+  SceneAnswers answers(spoken, in.binary, in.listen, {.awake = in.awake, .warn = warn});
   std::optional<EventLog> events;
   if (!in.events.empty())
     events.emplace(in.events, run.output_options(false));
@@ -116,6 +116,7 @@ int main(int argc, char** argv) {
   p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
   p.option("--listen", in.listen, "PATH", "with --serve, a socket for clients, one at a time");
   p.option("--shapes-in", in.shapes, "FILE", "with --serve, where others map all shapes");
+  p.flag("--busy-wait", in.awake, "with --serve, wait for lines without sleep");
   p.flag("--binary", in.binary, "answer in binary frames of float32");
   p.option("--events", in.events, "FILE", "who touched what when, as CSV");
   p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
@@ -129,6 +130,7 @@ int main(int argc, char** argv) {
   p.check([&] {
     for (const auto& [given, option] : {std::pair{in.acknowledge, "--ack"},
                                         {!in.listen.empty(), "--listen"},
+                                        {in.awake, "--busy-wait"},
                                         {!in.shapes.empty(), "--shapes-in"}})
       if (given && !in.serve)
         throw UsageError(std::string(option) + " without --serve, expected both");

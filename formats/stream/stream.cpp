@@ -16,6 +16,7 @@
 #include <istream>
 #include <optional>
 #include <ostream>
+#include <poll.h>
 #include <streambuf>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -233,6 +234,12 @@ std::istream& Input::stream() {
   if (!state_->stream)
     state_->stream = std::make_unique<std::istream>(state_.get());
   return *state_->stream;
+}
+
+void Input::wait_awake() const {
+  pollfd own{state_->fd, POLLIN, 0};
+  while (::poll(&own, 1, 0) == 0) {
+  }
 }
 
 // ---- Output

@@ -47,6 +47,9 @@ public:
   InputBytes read_all_pages(std::uint64_t max_bytes = UINT64_MAX);
   /// A std::istream over what is left; a read error sets badbit.
   std::istream& stream();
+  /// Waits without sleep for bytes of a pipe or terminal, or its end: a processor that stays awake
+  /// has the first of them sooner.
+  void wait_awake() const;
 
 private:
   struct State;

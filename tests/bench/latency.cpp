@@ -3,25 +3,28 @@
 // wholly anew in every step of 1 ms, so that what is touched changes all the time. Forces and
 // instruments are answered through a pipe; who asks does so by the clock, once a millisecond.
 //
-//   bench_latency [SECONDS] [spheres=N] [depth=EDGES] [fifo] [store] [to=FOLDER]
+//   bench_latency [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [to=FOLDER]
 //
-// fifo: both programs have real-time priority, where that is permitted. store: the net's columns
-// are stored before, compressed within 1e-4, so that what is touched first costs no more than the
-// rest. Where FOLDER is named, latency.csv there becomes the histogram and latency.svg
-// its picture, work.csv and work.svg those of the processor's time, memory.csv what ffe-run had in
-// memory, by the second, and memory.svg its picture.
+// awake: ffe-run waits for lines without sleep (--busy-wait). fifo: both programs have real-time
+// priority, where that is permitted; with awake, where such programs may take all of a processor's
+// time (kernel.sched_rt_runtime_us is -1). store: the net's columns are stored before, compressed
+// within 1e-4, so that what is touched first costs no more than the rest. Where FOLDER is named,
+// latency.csv there becomes the histogram and latency.svg its picture, work.csv and work.svg those
+// of the processor's time, memory.csv what ffe-run had in memory, by the second, and memory.svg its
+// picture.
 //
 // Ten minutes with some 20 contacts that change, on a machine that does nothing else:
 //
-//   build/release/bench_latency 600 spheres=3 store to=build/latency
-//   build/release/bench_latency 600 spheres=3 store fifo to=build/latency-real-time
+//   build/release/bench_latency 600 spheres=3 store awake to=build/latency
+//   build/release/bench_latency 600 spheres=3 store awake fifo to=build/latency-real-time
 //
 // Writes CSV to standard output: stage, program, nodes, contacts (nodes with a force, in the mean),
 // answers, what half, 99 % and 99.9 % of all did not exceed and the largest, a figure and its unit.
 // "latency" counts from writing the lines until the answer is there; "work" is the processor's time
-// of ffe-run between two answers, which other programs disturb less. "faults" and "switches" count
-// pages that ffe-run had to wait for while it answered, and how often its processor was taken away:
-// who compares "latency" with "work" by them knows whether the machine or the program was late.
+// of ffe-run between two answers, which other programs disturb less; with awake its waiting is
+// among it. "faults" and "switches" count pages that ffe-run had to wait for while it answered, and
+// how often its processor was taken away: who compares "latency" with "work" by them knows whether
+// the machine or the program was late.
 
 #include "formats/model/ela.h"
 #include "model/build.h"
@@ -61,7 +64,7 @@ constexpr double radius_in_edges = 2; // of an instrument
 struct Wanted {
   double seconds = 10, depth = 0.5;
   std::size_t spheres = 5;
-  bool fifo = false, store = false;
+  bool awake = false, fifo = false, store = false;
   std::string folder;
 };
 
@@ -76,6 +79,8 @@ Wanted wanted(int argc, char** argv) {
       w.depth = std::strtod(behind("depth=").c_str(), nullptr);
     else if (word.starts_with("to="))
       w.folder = std::filesystem::absolute(behind("to=")).string();
+    else if (word == "awake")
+      w.awake = true;
     else if (word == "fifo" || word == "store")
       (word == "fifo" ? w.fifo : w.store) = true;
     else
@@ -83,7 +88,7 @@ Wanted wanted(int argc, char** argv) {
   }
   if (!(w.seconds > 0) || w.spheres == 0 || !(w.depth > 0))
     Served::fail(
-        "latency: expected [SECONDS] [spheres=N] [depth=EDGES] [fifo] [store] [to=FOLDER]");
+        "latency: expected [SECONDS] [spheres=N] [depth=EDGES] [awake] [fifo] [store] [to=FOLDER]");
   return w;
 }
 
@@ -253,6 +258,8 @@ int main(int argc, char** argv) {
   std::string program = std::to_string(w.spheres) + " spheres";
   if (w.store)
     program += " stored";
+  if (w.awake)
+    program += " awake";
   if (w.fifo) {
     sched_param priority{};
     priority.sched_priority = 50;
@@ -262,7 +269,7 @@ int main(int argc, char** argv) {
   }
   Run run;
   {
-    const Served served(tools, folder);
+    const Served served(tools, folder, 1, w.awake);
     run = drive(served, w, test::mean_edge(model));
   }
   std::puts("stage,program,nodes,contacts,answers,p50_ms,p99_ms,p999_ms,largest_ms,figure,unit");

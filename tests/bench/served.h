@@ -31,7 +31,7 @@ public:
     std::exit(EXIT_FAILURE);
   }
 
-  Served(const std::string& tools, const std::string& folder, int threads = 1) {
+  Served(const std::string& tools, const std::string& folder, int threads = 1, bool awake = false) {
     std::array<int, 2> to{}, from{};
     if (pipe(to.data()) != 0 || pipe(from.data()) != 0)
       fail("no pipe");
@@ -44,6 +44,8 @@ public:
     const std::string program = tools + "/ffe-run";
     std::vector<std::string> words{program,  "--serve", "-q", "-j" + std::to_string(threads),
                                    "--rate", "60"};
+    if (awake)
+      words.emplace_back("--busy-wait");
     std::vector<char*> arguments;
     for (std::string& word : words)
       arguments.push_back(word.data());

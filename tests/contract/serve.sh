@@ -325,3 +325,56 @@ test_each_line_is_acknowledged_and_questions_change_nothing() {
   expect_failure 2 ffe-run ffe-run --ack in.scene
   rm organ.ela in.scene asked.* calm.* asked calm steps
 }
+
+test_who_waits_awake_answers_the_same() {
+  need ffe-run exp2ela python3
+  organ
+  printf '%s\n' 'object o organ.ela' 'displace o 6 0 0 0.01' 'step 0.01' 'step 0.01' end >in
+  ffe-run --serve <in >asleep
+  # shellcheck disable=SC2002 # a pipe, whose end comes
+  cat in | ffe-run --serve --busy-wait | cmp - asleep
+  expect_failure 2 ffe-run ffe-run --busy-wait in
+  # Its processor is never at rest, by a pipe or a socket; without it is.
+  python3 - <<'EOF'
+import os, socket, subprocess, sys, time
+def spent(run):
+    with open(f'/proc/{run.pid}/stat') as file:
+        words = file.read().rsplit(')', 1)[1].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf('SC_CLK_TCK')
+def waits(words, awake, path=None):
+    run = subprocess.Popen(['ffe-run', '--serve', *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        client = None
+        if path:
+            client = socket.socket(socket.AF_UNIX)
+            while True:
+                try:
+                    client.connect(path)
+                    break
+                except OSError:
+                    time.sleep(0.01)
+            client.recv(4096)  # it is let in
+        else:
+            run.stdin.write(b'object o organ.ela\nobjects\n')
+            run.stdin.flush()
+            run.stdout.readline()
+        before, start = spent(run), time.monotonic()
+        while time.monotonic() - start < (60 if awake else 1) and spent(run) - before < 0.3:
+            time.sleep(0.05)
+        if (spent(run) - before >= 0.3) != awake:
+            sys.exit(f'{words}: {spent(run) - before} s of its processor')
+        if client:
+            client.sendall(b'object o organ.ela\nend\n')
+            client.close()
+        else:
+            run.stdin.close()
+        if run.wait(20) != 0:
+            sys.exit(f'{words}: status {run.returncode}')
+    finally:
+        run.kill()
+waits([], False)
+waits(['--busy-wait'], True)
+waits(['--listen', 'door'], False, 'door')
+waits(['--listen', 'door', '--busy-wait'], True, 'door')
+EOF
+}

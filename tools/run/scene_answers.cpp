@@ -8,7 +8,8 @@
 namespace gewebe {
 
 SceneAnswers::SceneAnswers(bool spoken, bool binary, const std::string& listen,
-                           SceneClientsOptions options) {
+                           SceneClientsOptions options)
+    : awake_(options.awake) {
   options.binary = binary;
   if (!listen.empty())
     clients_.emplace(listen, std::move(options));
@@ -18,7 +19,7 @@ SceneAnswers::SceneAnswers(bool spoken, bool binary, const std::string& listen,
 
 void SceneAnswers::run(Input* input, SceneRun& scene) {
   if (input != nullptr)
-    run_lines(*input, scene);
+    run_lines(*input, scene, awake_);
   if (clients_)
     clients_->serve(scene);
   clients_.reset(); // nobody shall come any more

@@ -28,6 +28,7 @@ public:
   void commit();
 
 private:
+  bool awake_;
   std::optional<SceneClients> clients_;
   std::optional<Output> spoken_;
 };

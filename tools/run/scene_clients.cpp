@@ -16,6 +16,13 @@ namespace {
 
 constexpr std::size_t block = 1U << 16U;
 
+/// Waits for one of them, as long as it takes. \return true
+bool wait_awake(std::array<pollfd, 2>& who) {
+  while (::poll(who.data(), who.size(), 0) == 0) {
+  }
+  return true;
+}
+
 /// Waits for one of them. \return false where it took longer
 bool wait_for(std::array<pollfd, 2>& who, double seconds) {
   const int limit = seconds < 0 ? -1 : static_cast<int>(seconds * 1000) + 1;
@@ -51,7 +58,8 @@ void SceneClients::wait() {
   const short client =
       static_cast<short>((leaving_ ? 0 : POLLIN) | (unread_.empty() ? 0 : POLLOUT));
   std::array<pollfd, 2> who{pollfd{client_.get(), client, 0}, others()};
-  if (!wait_for(who, leaving_ ? options_.patience : -1))
+  const bool awake = options_.awake && client_ && !leaving_;
+  if (!(awake ? wait_awake(who) : wait_for(who, leaving_ ? options_.patience : -1)))
     return drop("read nothing more for " + number_text(options_.patience) + " s");
   if (client_ && !unread_.empty() && send_some(client_, unread_) == Transfer::over)
     drop("");

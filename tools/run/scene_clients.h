@@ -19,6 +19,7 @@ namespace gewebe {
 struct SceneClientsOptions {
   bool binary = false;                ///< what is said beside the answers, too
   std::size_t most_unread = 1U << 24; ///< bytes of answers that wait for a client to read
+  bool awake = false;                 ///< wait without sleep
   double patience = 10;               ///< s that a client with more of them may read nothing
   std::function<void(const std::string&)> warn{};
 };

@@ -42,12 +42,14 @@ void SceneLines::drop() {
   size_ = 0;
 }
 
-void run_lines(Input& input, SceneRun& run) {
+void run_lines(Input& input, SceneRun& run, bool awake) {
   // The stream's buffer hands out what has come so far and waits only for more.
   std::streambuf& bytes = *input.stream().rdbuf();
   SceneLines lines(run);
   while (!run.ended()) {
     const bool waits = bytes.in_avail() <= 0;
+    if (waits && awake)
+      input.wait_awake();
     const auto c = bytes.sbumpc();
     if (waits && run.latency() != nullptr)
       run.latency()->line_arrived();

@@ -28,8 +28,9 @@ private:
 };
 
 /// Feeds every line of the input, up to one that ends it, to the run as soon as it is there.
-/// \throw Error as the run, and for a line of over 1 GiB
-void run_lines(Input& input, SceneRun& run);
+/// \param awake wait for lines as Input::wait_awake   \throw Error as the run, and for a line of
+/// over 1 GiB
+void run_lines(Input& input, SceneRun& run, bool awake = false);
 /// The same, then finishes it.
 void run_scene(Input& input, SceneRun& run);
 
