@@ -283,7 +283,7 @@ int main(int argc, char** argv) {
                 latency ? "answers too late" : "MB that memory grew in the last nine tenths");
     if (!w.folder.empty())
       keep(w.folder, latency ? "latency" : "work", times,
-           (latency ? "Answers of ffe-run at 1 kHz, " : "Processor's time of an answer, ") +
+           (latency ? "Answers at 1 kHz, " : "Processor's time of an answer, ") +
                program + ", " + processor());
   }
   for (const bool faults : {true, false})
