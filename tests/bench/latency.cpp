@@ -283,8 +283,8 @@ int main(int argc, char** argv) {
                 latency ? "answers too late" : "MB that memory grew in the last nine tenths");
     if (!w.folder.empty())
       keep(w.folder, latency ? "latency" : "work", times,
-           (latency ? "Answers at 1 kHz, " : "Processor's time of an answer, ") +
-               program + ", " + processor());
+           (latency ? "Answers at 1 kHz, " : "Processor's time of an answer, ") + program + ", " +
+               processor());
   }
   for (const bool faults : {true, false})
     std::printf("%s,%s,%zu,%.1f,%zu,,,,,%.4g,%s\n", faults ? "faults" : "switches", program.c_str(),
