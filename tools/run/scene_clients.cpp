@@ -7,6 +7,7 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <poll.h>
 #include <utility>
 
@@ -16,16 +17,9 @@ namespace {
 
 constexpr std::size_t block = 1U << 16U;
 
-/// Waits for one of them, as long as it takes. \return true
-bool wait_awake(std::array<pollfd, 2>& who) {
-  while (::poll(who.data(), who.size(), 0) == 0) {
-  }
-  return true;
-}
-
 /// Waits for one of them. \return false where it took longer
 bool wait_for(std::array<pollfd, 2>& who, double seconds) {
-  const int limit = seconds < 0 ? -1 : static_cast<int>(seconds * 1000) + 1;
+  const int limit = seconds < 0 ? -1 : static_cast<int>(std::ceil(seconds * 1000));
   return ::poll(who.data(), who.size(), limit) != 0; // an interruption is no end of patience
 }
 
@@ -58,8 +52,10 @@ void SceneClients::wait() {
   const short client =
       static_cast<short>((leaving_ ? 0 : POLLIN) | (unread_.empty() ? 0 : POLLOUT));
   std::array<pollfd, 2> who{pollfd{client_.get(), client, 0}, others()};
-  const bool awake = options_.awake && client_ && !leaving_;
-  if (!(awake ? wait_awake(who) : wait_for(who, leaving_ ? options_.patience : -1)))
+  if (options_.awake && client_ && !leaving_)
+    while (!wait_for(who, 0)) {
+    }
+  else if (!wait_for(who, leaving_ ? options_.patience : -1))
     return drop("read nothing more for " + number_text(options_.patience) + " s");
   if (client_ && !unread_.empty() && send_some(client_, unread_) == Transfer::over)
     drop("");
