@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "compliance/panel_columns.h"
 #include "solve/condition.h"
 
 #include <algorithm>
@@ -41,8 +42,8 @@ double weight(std::size_t c) {
 class Columns {
 public:
   Columns(const StiffnessMatrix& matrix, const Factor& factor, double norm,
-          std::span<const std::uint32_t> nodes, std::size_t row_nodes)
-      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes),
+          std::span<const std::uint32_t> nodes, CpuLevel cpu, std::size_t row_nodes)
+      : matrix_(matrix), factor_(factor), norm_(norm), nodes_(nodes), cpu_(cpu),
         rows_(rows_of(matrix, row_nodes)), place_(matrix.order()) {
     const std::span<const std::int64_t> permutation = factor.view().permutation;
     for (std::size_t k = 0; k < place_.size(); ++k)
@@ -71,19 +72,18 @@ public:
     out.load.assign(n, 0.0);
     for (std::size_t c = 0; c < asked.size(); ++c)
       out.load[static_cast<std::size_t>(row_of(nodes[asked[c] / 3], asked[c] % 3))] = weight(c);
-    for (std::size_t r = 0; r < n; ++r) { // one pass over x, whose order is that of elimination
-      const double* const x = out.x.data() + static_cast<std::size_t>(place_[r]) * width;
-      const auto axis = static_cast<std::size_t>(matrix_.axis_of_row[r]);
-      double sum = 0;
-      for (std::size_t c = 0; c < asked.size(); ++c)
-        sum += weight(c) * x[c];
-      out.sum[r] = sum;
-      if (axis >= axes)
-        continue; // checked, not kept
-      double* const to = out.columns.data() + axis;
-      for (std::size_t c = 0; c < asked.size(); ++c)
-        to[asked[c] * axes] = x[c];
+    std::vector<double*> to;
+    std::vector<double> weights;
+    for (std::size_t c = 0; c < asked.size(); ++c) {
+      to.push_back(out.columns.data() + asked[c] * axes);
+      weights.push_back(weight(c));
     }
+    take_panel(cpu_)({.x = out.x.data(),
+                      .width = width,
+                      .place = place_,
+                      .at = matrix_.axis_of_row,
+                      .end = static_cast<std::int64_t>(axes)},
+                     to, weights.data(), out.sum.data());
     out.residual = backward_error(matrix_, norm_, out.sum, out.load);
   }
 
@@ -112,6 +112,7 @@ private:
   const Factor& factor_;
   double norm_;
   std::span<const std::uint32_t> nodes_;
+  CpuLevel cpu_;
   std::size_t rows_;                ///< 3 m
   std::vector<std::int64_t> place_; ///< of a row in the order of elimination
 };
@@ -134,7 +135,7 @@ double compliance_columns(const StiffnessMatrix& matrix, const Factor& factor, d
                  compliance_columns_bytes(matrix, nodes.size(), context, row_nodes) +
                      8 * static_cast<double>(factor.entries()),
                  "the factor with a block of columns");
-  const Columns columns(matrix, factor, norm, nodes, row_nodes);
+  const Columns columns(matrix, factor, norm, nodes, context.cpu, row_nodes);
   const std::size_t wave = wave_blocks(nodes.size(), context);
   Context quiet = context;
   quiet.progress = nullptr;

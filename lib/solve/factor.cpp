@@ -318,18 +318,47 @@ FactorData Factor::data() const {
       copy(v.super), copy(v.pi),        copy(v.px),     copy(v.s),           copy(v.x)};
 }
 
-void Factor::solve_panel(std::vector<double>& x, std::size_t width) const {
-  const FactorView v = view();
-  const SupernodalArrays l{v.super.size() - 1, v.super.data(), v.pi.data(),
-                           v.px.data(),        v.s.data(),     v.x.data()};
-  std::vector<double> work(static_cast<std::size_t>(v.max_row_size) * width);
-  solve_supernodal(state_->cpu)(l, x.data(), width, work.data());
+namespace {
+
+SupernodalArrays arrays_of(const FactorView& v) {
+  return {v.super.size() - 1, v.super.data(), v.pi.data(), v.px.data(), v.s.data(), v.x.data()};
 }
 
+std::size_t supernode_of(const FactorView& v, std::int64_t column) {
+  return static_cast<std::size_t>(std::upper_bound(v.super.begin(), v.super.end(), column) -
+                                  v.super.begin() - 1);
+}
+
+/// The supernodes that units at these places reach in the first half of a solve, ascending.
+std::vector<std::uint32_t> reached_from(const FactorView& v, std::span<const std::int64_t> places) {
+  std::vector<bool> reached(v.super.size() - 1);
+  for (const std::int64_t place : places)
+    reached[supernode_of(v, place)] = true;
+  std::vector<std::uint32_t> all;
+  for (std::size_t k = 0; k < reached.size(); ++k) {
+    if (!reached[k])
+      continue;
+    all.push_back(static_cast<std::uint32_t>(k));
+    const std::span<const std::int64_t> rows = v.s.subspan(
+        static_cast<std::size_t>(v.pi[k]), static_cast<std::size_t>(v.pi[k + 1] - v.pi[k]));
+    std::int64_t known = v.super[k + 1]; // rows ascend: those before it are of a supernode that is
+    for (const std::int64_t row : rows)
+      if (row >= known) {
+        const std::size_t above = supernode_of(v, row);
+        reached[above] = true;
+        known = v.super[above + 1];
+      }
+  }
+  return all;
+}
+
+} // namespace
+
 void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t columns) const {
-  const std::span<const std::int64_t> permutation = view().permutation;
+  const FactorView l = view();
+  const std::span<const std::int64_t> permutation = l.permutation;
   const std::size_t n = order();
-  std::vector<double> x;
+  std::vector<double> x, work;
   for (std::size_t first = 0; first < columns;) {
     const std::size_t count = std::min(max_units, columns - first), width = solve_width(count);
     x.assign(n * width, 0.0);
@@ -338,7 +367,8 @@ void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t c
       for (std::size_t j = 0; j < count; ++j)
         x[k * width + j] = from[j * n] + 0.0; // leaves no -0, whose sign zeros skipped would lose
     }
-    solve_panel(x, width);
+    work.resize(static_cast<std::size_t>(l.max_row_size) * width);
+    solve_supernodal(state_->cpu)(arrays_of(l), x.data(), width, work.data());
     for (std::size_t k = 0; k < n; ++k) {
       double* const to = u.data() + first * n + static_cast<std::size_t>(permutation[k]);
       for (std::size_t j = 0; j < count; ++j)
@@ -350,11 +380,17 @@ void Factor::solve(std::span<const double> f, std::span<double> u, std::size_t c
 
 std::size_t Factor::solve_units(std::span<const std::int64_t> places,
                                 std::vector<double>& x) const {
+  const FactorView l = view();
   const std::size_t width = solve_width(std::max<std::size_t>(places.size(), 1));
-  x.assign(order() * width, 0.0);
+  x.resize(order() * width);
+  const std::vector<std::uint32_t> reached = reached_from(l, places);
+  for (const std::uint32_t k : reached)
+    std::fill(x.begin() + static_cast<std::ptrdiff_t>(width) * l.super[k],
+              x.begin() + static_cast<std::ptrdiff_t>(width) * l.super[k + std::size_t{1}], 0.0);
   for (std::size_t c = 0; c < places.size(); ++c)
     x[static_cast<std::size_t>(places[c]) * width + c] = 1;
-  solve_panel(x, width);
+  std::vector<double> work(static_cast<std::size_t>(l.max_row_size) * width);
+  solve_reached(state_->cpu)(arrays_of(l), reached, x.data(), width, work.data());
   return width;
 }
 

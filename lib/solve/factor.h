@@ -88,8 +88,6 @@ public:
 
 private:
   struct State;
-  /// x = L⁻ᵀ L⁻¹ x for `width` vectors side by side, in the order of elimination.
-  void solve_panel(std::vector<double>& x, std::size_t width) const;
   std::unique_ptr<State> state_;
 };
 

@@ -12,4 +12,9 @@ void forward_supernodal_avx2(const SupernodalArrays& l, std::span<const std::uin
   forward_any(l, supernodes, x, vectors, work);
 }
 
+void solve_reached_avx2(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                        double* x, std::size_t vectors, double* work) {
+  reached_any(l, reached, x, vectors, work);
+}
+
 } // namespace gewebe

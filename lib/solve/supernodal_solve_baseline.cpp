@@ -13,4 +13,9 @@ void forward_supernodal_baseline(const SupernodalArrays& l,
   forward_any(l, supernodes, x, vectors, work);
 }
 
+void solve_reached_baseline(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                            double* x, std::size_t vectors, double* work) {
+  reached_any(l, reached, x, vectors, work);
+}
+
 } // namespace gewebe

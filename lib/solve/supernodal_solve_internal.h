@@ -46,6 +46,11 @@ using SupernodalForward = void (*)(const SupernodalArrays& l,
                                    std::span<const std::uint32_t> supernodes, double* x,
                                    std::size_t vectors, double* work);
 
+/// Both halves, of right-hand sides that reach no other supernodes than these in the first one,
+/// ascending. Rows of others need not be set.
+using SolveReached = void (*)(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                              double* x, std::size_t vectors, double* work);
+
 void solve_supernodal_baseline(const SupernodalArrays& l, double* x, std::size_t vectors,
                                double* work);
 void solve_supernodal_avx2(const SupernodalArrays& l, double* x, std::size_t vectors, double* work);
@@ -60,6 +65,13 @@ void forward_supernodal_avx2(const SupernodalArrays& l, std::span<const std::uin
 void forward_supernodal_avx512(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,
                                double* x, std::size_t vectors, double* work);
 
+void solve_reached_baseline(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                            double* x, std::size_t vectors, double* work);
+void solve_reached_avx2(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                        double* x, std::size_t vectors, double* work);
+void solve_reached_avx512(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                          double* x, std::size_t vectors, double* work);
+
 inline SupernodalSolve solve_supernodal(CpuLevel cpu) {
   return cpu == CpuLevel::baseline ? solve_supernodal_baseline
          : cpu == CpuLevel::avx2   ? solve_supernodal_avx2
@@ -69,6 +81,12 @@ inline SupernodalForward forward_supernodal(CpuLevel cpu) {
   return cpu == CpuLevel::baseline ? forward_supernodal_baseline
          : cpu == CpuLevel::avx2   ? forward_supernodal_avx2
                                    : forward_supernodal_avx512;
+}
+
+inline SolveReached solve_reached(CpuLevel cpu) {
+  return cpu == CpuLevel::baseline ? solve_reached_baseline
+         : cpu == CpuLevel::avx2   ? solve_reached_avx2
+                                   : solve_reached_avx512;
 }
 
 } // namespace gewebe

@@ -48,6 +48,14 @@ struct Wide {
   using Stored = Unaligned;
 };
 
+/// Three registers of right-hand sides: a number of L that is there serves all of them.
+struct Broad {
+  static constexpr std::size_t width = 3 * lanes, registers = 3, rows = lanes == 8 ? 8 : 4,
+                               columns = 64;
+  using Value = Lanes;
+  using Stored = Unaligned;
+};
+
 template <class Of>
 struct Row {
   typename Of::Value part[Of::registers];
@@ -260,7 +268,21 @@ void forward_far(const Supernode& n, double* own, double* x, std::size_t stride)
   }
 }
 
-/// \pre at most 64 panels   \param work as SupernodalSolve has it
+/// Where something is known to arrive. \pre at most 64 panels \param work as SupernodalSolve has it
+template <class Of>
+void forward_reached(const Supernode& n, double* x, std::size_t stride, double* work) {
+  double* const own = x + n.first * stride;
+  fetch(n);
+  if constexpr (Of::width == 1)
+    forward_single(n, own, x, work);
+  else if (n.far)
+    forward_far<Of>(n, own, x, stride);
+  else
+    for (std::size_t v = 0; v < stride; v += Of::width)
+      forward_near<Of>(n, own + v, x + v, stride);
+}
+
+/// \pre, \param as forward_reached has them
 template <class Of>
 void forward(const Supernode& n, double* x, std::size_t stride, double* work) {
   double* const own = x + n.first * stride;
@@ -282,13 +304,18 @@ void forward(const Supernode& n, double* x, std::size_t stride, double* work) {
   }
 }
 
-/// N own columns from `c` on, once all behind them are solved; `below` are the rows below.
+/// N own columns from `c` on, once all behind them are solved; `below` are the rows below. What
+/// begins with zeros need not be set.
 template <class Of, bool Far, std::size_t N>
 void backward_own(const Supernode& n, std::size_t c, const double* below, double* x,
-                  std::size_t stride) {
+                  std::size_t stride, bool zeros) {
   Row<Of> sum[N];
-  for (std::size_t i = 0; i < N; ++i)
-    sum[i].load(x + (c + i) * stride);
+  if (zeros)
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i] = {};
+  else
+    for (std::size_t i = 0; i < N; ++i)
+      sum[i].load(x + (c + i) * stride);
   const double* const l = n.l + c * n.rows;
   const auto lose = [&](std::size_t row, const double* values) {
     Row<Of> xr;
@@ -315,7 +342,7 @@ void backward_own(const Supernode& n, std::size_t c, const double* below, double
 
 /// The rows below stand in `work` meanwhile, panel by panel.
 template <class Of>
-void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
+void backward(const Supernode& n, double* x, std::size_t stride, double* work, bool zeros) {
   fetch(n);
   for (std::size_t v = 0; v < stride; v += Of::width)
     for (std::size_t r = 0; r < n.below; ++r) {
@@ -329,7 +356,7 @@ void backward(const Supernode& n, double* x, std::size_t stride, double* work) {
       constexpr std::size_t count = decltype(run)::value;
       for (std::size_t v = begin; v < end; v += Of::width)
         backward_own<Of, Far, count>(n, n.columns - done - count, work + v * n.below, own + v,
-                                     stride);
+                                     stride, zeros);
     });
   };
   if (n.far) // what comes from afar is used for all of them
@@ -352,7 +379,19 @@ void solve(const SupernodalArrays& l, double* x, std::size_t stride, double* wor
   for (std::size_t k = 0; k < l.supernodes; ++k)
     forward<Of>(supernode(l, k), x, stride, work);
   for (std::size_t k = l.supernodes; k-- > 0;)
-    backward<Of>(supernode(l, k), x, stride, work);
+    backward<Of>(supernode(l, k), x, stride, work, false);
+}
+
+template <class Of>
+void solve_reached(const SupernodalArrays& l, std::span<const std::uint32_t> reached, double* x,
+                   std::size_t stride, double* work) {
+  for (const std::uint32_t k : reached)
+    forward_reached<Of>(supernode(l, k), x, stride, work);
+  for (std::size_t k = l.supernodes, left = reached.size(); k-- > 0;) {
+    const bool zeros = left == 0 || reached[left - 1] != k;
+    backward<Of>(supernode(l, k), x, stride, work, zeros);
+    left -= zeros ? 0 : 1;
+  }
 }
 
 inline void solve_any(const SupernodalArrays& l, double* x, std::size_t vectors, double* work) {
@@ -360,8 +399,22 @@ inline void solve_any(const SupernodalArrays& l, double* x, std::size_t vectors,
     solve<Single>(l, x, 1, work);
   else if (vectors == 4)
     solve<Narrow>(l, x, 4, work);
+  else if (vectors % Broad::width == 0)
+    solve<Broad>(l, x, vectors, work);
   else
     solve<Wide>(l, x, vectors, work);
+}
+
+inline void reached_any(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
+                        double* x, std::size_t vectors, double* work) {
+  if (vectors == 1)
+    solve_reached<Single>(l, reached, x, 1, work);
+  else if (vectors == 4)
+    solve_reached<Narrow>(l, reached, x, 4, work);
+  else if (vectors % Broad::width == 0)
+    solve_reached<Broad>(l, reached, x, vectors, work);
+  else
+    solve_reached<Wide>(l, reached, x, vectors, work);
 }
 
 inline void forward_any(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,

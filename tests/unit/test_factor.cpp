@@ -395,6 +395,27 @@ TEST(Factor, ComesApartAndTogether) {
   EXPECT_EQ(again.entries(), factor.entries());
 }
 
+TEST(Factor, OfAFileMayReachRowsThatItsParentDoesNot) { // no factorisation makes such a one
+  FactorData d;
+  d.order = 3;
+  d.max_row_size = 2;
+  d.permutation = {0, 1, 2};
+  d.column_count = {3, 1, 1};
+  d.super = {0, 1, 2, 3};
+  d.pi = {0, 3, 4, 5};
+  d.px = d.pi;
+  d.s = {0, 1, 2, 1, 2};
+  d.x = {2, 3, 5, 1, 1};
+  const Factor factor(d);
+  const std::array<std::int64_t, 1> place{0};
+  std::vector<double> x(3, NAN);
+  ASSERT_EQ(factor.solve_units(place, x), 1u);
+  std::vector<double> f{1, 0, 0}, u(3);
+  factor.solve(f, u);
+  EXPECT_EQ(x, u);
+  EXPECT_EQ(u, (std::vector<double>{8.75, -1.5, -2.5}));
+}
+
 TEST(Factor, RefusesArraysThatContradictThemselves) {
   const FactorData good = Factor(stiffness_matrix(model_of(ball(1))), {}).data();
   EXPECT_NO_THROW(Factor{good});
@@ -493,6 +514,34 @@ TEST(ComplianceColumns, AreWhatSolvingForUnitForcesGives) {
           std::memcmp(u.data(), sink.kept[node].data() + a * u.size(), 8 * u.size()) != 0 ? 1 : 0;
     }
   EXPECT_EQ(different, 0u);
+}
+
+TEST(ComplianceColumns, AreTheSameOnAnyProcessorAndWithFewerRows) {
+  const Model model = model_of(ball(3));
+  const StiffnessMatrix k = stiffness_matrix(model);
+  const double norm = stiffness_norm(k);
+  const auto nodes = every(model.nodes.size(), 3);
+  KeptColumns all;
+  (void)compliance_columns(k, Factor(k, {}), norm, nodes, {}, all);
+  for (const CpuLevel level : {CpuLevel::baseline, CpuLevel::avx2}) {
+    if (level > best_cpu_level())
+      continue;
+    Context context;
+    context.cpu = level;
+    KeptColumns kept;
+    (void)compliance_columns(k, Factor(k, context), norm, nodes, context, kept);
+    EXPECT_EQ(kept.kept, all.kept);
+  }
+  for (const std::size_t rows : {1u, 10u, 101u}) { // blocks of rows that end anywhere
+    KeptColumns kept;
+    (void)compliance_columns(k, Factor(k, {}), norm, nodes, {}, kept, rows);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t a = 0; a < 3; ++a)
+        ASSERT_EQ(0, std::memcmp(kept.kept[i].data() + a * 3 * rows,
+                                 all.kept[i].data() + a * 3 * model.nodes.size(),
+                                 3 * rows * sizeof(double)))
+            << rows << ' ' << nodes[i];
+  }
 }
 
 TEST(ComplianceColumns, StopsWhereTheSinkFailsOrMemoryIsShort) {
