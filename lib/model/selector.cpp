@@ -302,6 +302,30 @@ private:
 
 using Flags = std::vector<std::uint8_t>;
 
+NodeRanges load_ranges(const std::string& name, const LoadNodeList& load) {
+  if (!load)
+    throw Error("@" + name + ": no files can be read here, expected node numbers");
+  return parse_node_list(load(name), name);
+}
+
+void require_nodes(const NodeRanges& ranges, std::size_t nodes) {
+  for (const auto& [first, last] : ranges)
+    if (last >= nodes)
+      throw Error("node " + std::to_string(last) + " does not exist, expected 0 to " +
+                  std::to_string(nodes - 1));
+}
+
+/// Ranges may overlap.
+std::vector<std::uint32_t> nodes_of(NodeRanges ranges) {
+  std::ranges::sort(ranges);
+  std::vector<std::uint32_t> nodes;
+  for (const auto& [first, last] : ranges)
+    for (std::size_t node = nodes.empty() ? first : std::max(first, nodes.back() + 1); node <= last;
+         ++node)
+      nodes.push_back(static_cast<std::uint32_t>(node));
+  return nodes;
+}
+
 /// What evaluation needs to know of a model, found out once and only where asked for.
 class Evaluator {
 public:
@@ -316,13 +340,10 @@ public:
         scope_ = model.nodes.size();
       if (step.op == Op::inside)
         scope_ = std::max(scope_, body_);
-      for (const auto& [first, last] : ranges_.back()) {
-        if (last >= model.nodes.size())
-          throw Error("node " + std::to_string(last) + " does not exist, expected 0 to " +
-                      std::to_string(model.nodes.size() - 1));
+      require_nodes(ranges_.back(), model.nodes.size());
+      for (const auto& [first, last] : ranges_.back())
         if (last >= scope_)
           scope_ = last < body_ ? body_ : model.nodes.size();
-      }
     }
   }
 
@@ -356,12 +377,6 @@ public:
   }
 
 private:
-  static NodeRanges load_ranges(const std::string& name, const LoadNodeList& load) {
-    if (!load)
-      throw Error("@" + name + ": no files can be read here, expected node numbers");
-    return parse_node_list(load(name), name);
-  }
-
   template <class Test>
   Flags where(Test&& test) const {
     Flags flags(scope_);
@@ -512,13 +527,25 @@ std::string nearest_to(const Model& model, const Selector& selector) {
          place_text(box.max);
 }
 
+/// Numbers alone are found without a look at the model: who drives a scene names a node in each
+/// line.
+std::vector<std::uint32_t> selected_of(const Model& model, const Selector& selector,
+                                       const LoadNodeList& load, SelectorScope scope) {
+  const Selector::Step& first = selector.steps.front();
+  if (selector.steps.size() > 1 || (first.op != Op::nodes && first.op != Op::file))
+    return Evaluator(model, selector, load, scope).run(selector);
+  NodeRanges ranges = first.op == Op::file ? load_ranges(first.file_name, load) : first.ranges;
+  require_nodes(ranges, model.nodes.size());
+  return nodes_of(std::move(ranges));
+}
+
 } // namespace
 
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
                                         const LoadNodeList& load, SelectorScope scope) {
   std::vector<std::uint32_t> selected;
   try {
-    selected = Evaluator(model, selector, load, scope).run(selector);
+    selected = selected_of(model, selector, load, scope);
   } catch (const Error& error) {
     if (!error.place().empty())
       throw;

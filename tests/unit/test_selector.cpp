@@ -88,6 +88,15 @@ TEST(Selector, CentralNodesOnlyWhereNamed) {
   EXPECT_EQ(select("all and not surface"), range(26, 32));
 }
 
+TEST(Selector, NumbersAloneAreWhatTheyAreInAnExpression) {
+  EXPECT_EQ(select("8-9,3,3-5,4,32,0-1,8"), (Nodes{0, 1, 3, 4, 5, 8, 9, 32}));
+  for (const std::string numbers :
+       {"8-9,3,3-5,4,32,0-1,8", "0", "0-32", "32,31,0", "5-7,6,7-8", "1-1,2"})
+    EXPECT_EQ(select(numbers), select("not not (" + numbers + ")")) << numbers;
+  EXPECT_EQ(complaint([] { select("3,33"); }),
+            "selector '3,33': node 33 does not exist, expected 0 to 32");
+}
+
 TEST(Selector, PrecedenceIsNotAndOr) {
   // or binds weakest: a or b and c is a or (b and c).
   EXPECT_EQ(select("19 or y<1 and x<1"), (Nodes{0, 19}));
