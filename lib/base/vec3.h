@@ -60,11 +60,10 @@ struct Box3 {
   Vec3 max{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
 
   bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
+  /// Numbers that are none are left out, as std::fmin does, whose call would cost the most here.
   void add(const Vec3& p) {
-    for (int a = 0; a < 3; ++a) {
-      min[a] = std::fmin(min[a], p[a]);
-      max[a] = std::fmax(max[a], p[a]);
-    }
+    min = {p.x <= min.x ? p.x : min.x, p.y <= min.y ? p.y : min.y, p.z <= min.z ? p.z : min.z};
+    max = {p.x >= max.x ? p.x : max.x, p.y >= max.y ? p.y : max.y, p.z >= max.z ? p.z : max.z};
   }
   Vec3 size() const { return empty() ? Vec3{} : max - min; }
   double longest_side() const { return std::fmax(size().x, std::fmax(size().y, size().z)); }
