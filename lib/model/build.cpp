@@ -38,6 +38,19 @@ struct Surface {
   EdgeTable edges;
 };
 
+/// Of how many of [0, count) it is true.
+template <class Test>
+std::size_t counted(const Context& context, std::size_t count, const Test& test) {
+  std::atomic<std::size_t> all = 0;
+  parallel_blocks(context, count, 1 << 15, [&](std::size_t begin, std::size_t end) {
+    std::size_t some = 0;
+    for (std::size_t n = begin; n < end; ++n)
+      some += test(n) ? 1 : 0;
+    all += some;
+  });
+  return all;
+}
+
 /// Do two faces have the same corners? Then they have them at each of their edges.
 bool any_twice(const Surface& s, const Context& context) {
   std::atomic<bool> found = false;
@@ -103,11 +116,10 @@ Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Cont
     s.face_of_triangle.resize(kept);
     s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
   }
-  for (std::size_t e = 0; e < s.edges.size(); ++e) {
-    const std::size_t faces = s.edges.around(e).size();
-    report.boundary_edges += faces == 1 ? 1 : 0;
-    report.nonmanifold_edges += faces > 2 ? 1 : 0;
-  }
+  report.boundary_edges = counted(context, s.edges.size(),
+                                  [&](std::size_t e) { return s.edges.around(e).size() == 1; });
+  report.nonmanifold_edges =
+      counted(context, s.edges.size(), [&](std::size_t e) { return s.edges.around(e).size() > 2; });
   return s;
 }
 
@@ -164,6 +176,8 @@ private:
   }
 
   void surface_nodes() {
+    constexpr std::size_t more = 1024; // central nodes, which mostly are as few
+    model_.nodes.reserve(surface_.point_of_node.size() + more);
     model_.nodes.resize(surface_.point_of_node.size());
     area_.resize(model_.nodes.size());
     tension_.resize(model_.nodes.size());
@@ -246,12 +260,13 @@ private:
           springs[e] = spring(i, j, SpringKind::edge, edge_stiffness(e));
       }
     });
-    const auto kept =
-        std::remove_if(springs.begin(), springs.end(), [](const Spring& s) { return s.i == s.j; });
-    report_.zero_length_edges = static_cast<std::size_t>(springs.end() - kept);
-    springs.erase(kept, springs.end());
-    for (const Spring& s : springs)
-      report_.slack_springs += s.stiffness == 0 ? 1 : 0;
+    const auto has_no_length = [](const Spring& s) { return s.i == s.j; };
+    report_.zero_length_edges =
+        counted(context_, springs.size(), [&](std::size_t e) { return has_no_length(springs[e]); });
+    if (report_.zero_length_edges > 0)
+      std::erase_if(springs, has_no_length);
+    report_.slack_springs =
+        counted(context_, springs.size(), [&](std::size_t e) { return springs[e].stiffness == 0; });
   }
 
   void bending_springs() {
