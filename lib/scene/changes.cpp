@@ -67,7 +67,8 @@ void apply(World& w, const Change& change) {
         Rule<Kind>::require(w, c);
         const auto work = [&] {
           Rule<Kind>::enter(w, c);
-          note_poses(w); // the end of the ways so far
+          if constexpr (Rule<Kind>::is_moment)
+            note_poses(w); // the end of the ways so far
           Rule<Kind>::apply(w, c);
         };
         if constexpr (Rule<Kind>::may_fail)
@@ -228,7 +229,7 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
 void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
-  renew(object);
+  begin_anew(w, c.object);
   object.warped = nullptr;
   touch(object);
 }

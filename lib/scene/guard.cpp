@@ -72,12 +72,17 @@ void take_back(World& w, Saved&& saved) noexcept {
     const bool ahead = object.body != nullptr && object.body->ahead && moves_implicitly(object);
     if (!ahead && !object.statics->ahead)
       continue;
-    renew(object);
-    restart_contact(object);
+    begin_anew(w, i);
     w.renewed.push_back(i);
-    if (StaticGroup* const group = static_group_of(w, i))
-      group->meeting = nullptr; // it is made anew from what is shown
   }
+}
+
+void begin_anew(World& w, std::size_t number) {
+  Object& object = w.now.objects[number];
+  renew(object);
+  restart_contact(object);
+  if (StaticGroup* const group = static_group_of(w, number))
+    group->meeting = nullptr; // it is made anew from what is shown
 }
 
 } // namespace gewebe::simulation

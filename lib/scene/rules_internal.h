@@ -22,6 +22,8 @@ struct Plain {
   static void require(World&, const Kind&) {}
   /// Behind the checks it may fail still, and is taken back then.
   static constexpr bool may_fail = false;
+  /// It is a moment that instruments' ways go through.
+  static constexpr bool is_moment = true;
   /// What it is about will come apart: so that the first cut costs no more than others.
   static void announce(World&, const Kind&) {}
   static constexpr bool announces_behind = true; // when it has taken effect too
@@ -74,6 +76,7 @@ struct Rule<Emit> : Plain<Emit> {
 };
 template <>
 struct Rule<Renew> : Plain<Renew> {
+  static constexpr bool is_moment = false; // a record has it where nothing took effect
   static void apply(World& w, const Renew& c);
   static void log(const World&, const Renew&, ChangeRow& row) { row.what = "renew"; }
 };

@@ -107,6 +107,9 @@ void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSourc
 void update_solver(World& w, Object& object, const Load& load);
 /// Forgets what is kept to be quick.
 void renew(Object& object);
+/// What taking back does to an object whose shapes were asked of meanwhile, and Renew, which stands
+/// for it in a record: renew, and contact from what is shown alone.
+void begin_anew(World& w, std::size_t number);
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);

@@ -352,6 +352,16 @@ TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
        {"object b sheet method=ela", "object c tube store=tube method=ffe", "at 0.012 restore b",
         "force c 21-48 35350 -33940 15980", "step 0.005", "at every 0.0015 two-step c 9399",
         "step 0.0025", "force c 22,17 -14320 -1268 28030", "step 0.005", "step 0"}},
+      {"an instrument that comes behind a failed step",
+       {"object a ball integration=auto bulk=2425000", "object b tube store=tube method=ffe",
+        "emit shapes",
+        "instrument q capsule 14.7 -3.0990678118654746 10.982067811865475 17.856 "
+        "-8.704067811865475 3.251067811865475 7.216000000000001",
+        "step 0",
+        "at every 0.001 instrument k blade 102.83797730844432 -34.86978873692684 "
+        "22.354040331483525 66.83797730844432 -54.25978873692684 3.7640403314835247",
+        "at 0.003 method a ffe", "step 0.005",
+        "instrument p sphere 6.712 101.02 -42.32486437626905 42.720135623730954", "step 0"}},
       {"what a failed step emits",
        {"object o two", "at 0.05 emit instruments", "at 0.06 force o 0 1e308 0 0", "step 0.1",
         "step 0.01"}}};
