@@ -16,7 +16,7 @@ struct Names {
   const LoadNodeList& lists;
 
   std::vector<std::uint32_t> nodes(std::size_t object, const Selector& selector) const {
-    return select_nodes(simulation.model(object), selector, lists);
+    return select_nodes(simulation.model(object), simulation.node_counts(object), selector, lists);
   }
 
   template <class Kind>
@@ -56,7 +56,8 @@ struct Names {
     if (auto* const plane = std::get_if<PlaneToCut>(&c.what)) {
       if (said.nodes)
         plane->nodes = // those inside a solid too
-            select_nodes(simulation.model(c.object), *said.nodes, lists, SelectorScope::body);
+            select_nodes(simulation.model(c.object), simulation.node_counts(c.object), *said.nodes,
+                         lists, SelectorScope::body);
       return;
     }
     auto& springs = std::get<SpringsToCut>(c.what);

@@ -35,8 +35,9 @@ std::string told_nodes(const Simulation& simulation, const QueryCommand& query) 
 
 std::string told_selection(const Simulation& simulation, const QueryCommand& query,
                            const LoadNodeList& lists) {
-  const Model& model = simulation.model(find_object(simulation, query.object));
-  const std::vector<std::uint32_t> nodes = select_nodes(model, query.nodes.value(), lists);
+  const std::size_t object = find_object(simulation, query.object);
+  const std::vector<std::uint32_t> nodes = select_nodes(
+      simulation.model(object), simulation.node_counts(object), query.nodes.value(), lists);
   std::string text = "select " + query.object + " " + std::to_string(nodes.size()) + "\n";
   for (const std::uint32_t node : nodes)
     text += std::to_string(node) + '\n';

@@ -142,11 +142,15 @@ std::size_t loose_count(const Model& model, std::size_t bodies) {
 
 } // namespace
 
-std::size_t surface_count(const Model& model) {
+NodeCounts node_counts(const Model& model) {
   const std::size_t bodies = body_count(model);
   if (model.tetrahedra.empty())
-    return bodies;
-  return std::max(corner_count(model), loose_count(model, bodies));
+    return {bodies, bodies};
+  return {std::max(corner_count(model), loose_count(model, bodies)), bodies};
+}
+
+std::size_t surface_count(const Model& model) {
+  return node_counts(model).surface;
 }
 
 std::size_t spring_count(const Model& model, SpringKind kind) {

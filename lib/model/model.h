@@ -129,6 +129,12 @@ std::size_t body_count(const Model& model);
 /// S. \pre the invariants hold
 std::size_t surface_count(const Model& model);
 
+/// Both, for who asks again and again.
+struct NodeCounts {
+  std::size_t surface = 0, body = 0;
+};
+NodeCounts node_counts(const Model& model);
+
 /// Springs of one kind. \pre the invariants hold
 std::size_t spring_count(const Model& model, SpringKind kind);
 

@@ -329,9 +329,9 @@ std::vector<std::uint32_t> nodes_of(NodeRanges ranges) {
 /// What evaluation needs to know of a model, found out once and only where asked for.
 class Evaluator {
 public:
-  Evaluator(const Model& model, const Selector& selector, const LoadNodeList& load,
-            SelectorScope scope)
-      : model_(model), surface_(surface_count(model)), body_(body_count(model)),
+  Evaluator(const Model& model, const NodeCounts& counts, const Selector& selector,
+            const LoadNodeList& load, SelectorScope scope)
+      : model_(model), surface_(counts.surface), body_(counts.body),
         scope_(scope == SelectorScope::body ? body_ : surface_) {
     ranges_.reserve(selector.steps.size());
     for (const Selector::Step& step : selector.steps) {
@@ -506,14 +506,14 @@ std::string place_text(const Vec3& p) {
 }
 
 /// What a near: that misses may have meant: the node next to its point, and where the model is.
-std::string nearest_to(const Model& model, const Selector& selector) {
+std::string nearest_to(const Model& model, std::size_t surface, const Selector& selector) {
   const auto near = std::ranges::find(selector.steps, Selector::Op::near, &Selector::Step::op);
-  if (near == selector.steps.end() || surface_count(model) == 0)
+  if (near == selector.steps.end() || surface == 0)
     return "";
   const Vec3 point{near->numbers[0], near->numbers[1], near->numbers[2]};
   std::size_t best = 0;
   Box3 box;
-  for (std::size_t i = 0; i < surface_count(model); ++i) {
+  for (std::size_t i = 0; i < surface; ++i) {
     const Vec3& p = model.nodes[i].position;
     box.add(p);
     if (norm(p - point) < norm(model.nodes[best].position - point))
@@ -527,14 +527,16 @@ std::string nearest_to(const Model& model, const Selector& selector) {
          place_text(box.max);
 }
 
-/// Numbers alone are found without a look at the model: who drives a scene names a node in each
-/// line.
-std::vector<std::uint32_t> selected_of(const Model& model, const Selector& selector,
-                                       const LoadNodeList& load, SelectorScope scope) {
-  const Selector::Step& first = selector.steps.front();
-  if (selector.steps.size() > 1 || (first.op != Op::nodes && first.op != Op::file))
-    return Evaluator(model, selector, load, scope).run(selector);
-  NodeRanges ranges = first.op == Op::file ? load_ranges(first.file_name, load) : first.ranges;
+bool has_numbers_alone(const Selector& selector) {
+  const Op first = selector.steps.front().op;
+  return selector.steps.size() == 1 && (first == Op::nodes || first == Op::file);
+}
+
+/// Without a look at the model: who drives a scene names a node in each line.
+std::vector<std::uint32_t> numbered_nodes(const Model& model, const Selector& selector,
+                                          const LoadNodeList& load) {
+  const Selector::Step& only = selector.steps.front();
+  NodeRanges ranges = only.op == Op::file ? load_ranges(only.file_name, load) : only.ranges;
   require_nodes(ranges, model.nodes.size());
   return nodes_of(std::move(ranges));
 }
@@ -543,9 +545,18 @@ std::vector<std::uint32_t> selected_of(const Model& model, const Selector& selec
 
 std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& selector,
                                         const LoadNodeList& load, SelectorScope scope) {
+  const NodeCounts counts = has_numbers_alone(selector) ? NodeCounts{} : node_counts(model);
+  return select_nodes(model, counts, selector, load, scope);
+}
+
+std::vector<std::uint32_t> select_nodes(const Model& model, const NodeCounts& counts,
+                                        const Selector& selector, const LoadNodeList& load,
+                                        SelectorScope scope) {
   std::vector<std::uint32_t> selected;
   try {
-    selected = selected_of(model, selector, load, scope);
+    selected = has_numbers_alone(selector)
+                   ? numbered_nodes(model, selector, load)
+                   : Evaluator(model, counts, selector, load, scope).run(selector);
   } catch (const Error& error) {
     if (!error.place().empty())
       throw;
@@ -553,7 +564,7 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& sele
   }
   if (selected.empty())
     throw Error("selector " + quote(selector.text) + " selects no node, expected at least one" +
-                nearest_to(model, selector));
+                nearest_to(model, counts.surface, selector));
   return selected;
 }
 

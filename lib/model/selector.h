@@ -77,6 +77,12 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const Selector& sele
                                         const LoadNodeList& load = nullptr,
                                         SelectorScope scope = SelectorScope::surface);
 
+/// The same where the counts of this model are known.
+std::vector<std::uint32_t> select_nodes(const Model& model, const NodeCounts& counts,
+                                        const Selector& selector,
+                                        const LoadNodeList& load = nullptr,
+                                        SelectorScope scope = SelectorScope::surface);
+
 /// Numbers and ranges (7-9), separated by blanks, commas or line ends; `#` starts a comment.
 /// \throw Error, place "NAME:LINE"
 NodeRanges parse_node_list(std::string_view text, const std::string& name);

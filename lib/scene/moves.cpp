@@ -40,7 +40,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.matter->model = std::move(model);
   next.matter->known = true;
   next.matter->size = 0;
-  next.matter->surface = 0;
+  next.matter->counts.reset();
   if (is_solid(old))
     next.matter->shortest_edge = 0; // else it stays: a cut of a net makes none shorter
   next.statics = std::make_shared<Statics>();

@@ -70,10 +70,10 @@ struct Matter {
   SolidChoice solid;                                                    // how a solid moves
   std::shared_ptr<const Model> model = std::make_shared<const Model>(); // empty until it is known
   bool known = false;
-  double shortest_edge = 0; // mm; 0: not yet known
-  double size = 0;          // mm, longest side of the box at rest; 0: not yet known
-  std::optional<Box3> box;  // of the surface at rest, see shown_box
-  std::size_t surface = 0;  // nodes that have all of the surface; 0: not yet known
+  double shortest_edge = 0;         // mm; 0: not yet known
+  double size = 0;                  // mm, longest side of the box at rest; 0: not yet known
+  std::optional<Box3> box;          // of the surface at rest, see shown_box
+  std::optional<NodeCounts> counts; // of the model, once asked for
   Told told;
 };
 

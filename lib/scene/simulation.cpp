@@ -232,10 +232,15 @@ std::size_t Simulation::surface_nodes(std::size_t object) const {
   const Model& now = model(object);
   if (now.tetrahedra.empty())
     return now.nodes.size();
-  std::size_t& surface = world_->now.objects[object].matter->surface;
-  if (surface == 0)
-    surface = surface_count(now);
-  return surface;
+  return node_counts(object).surface;
+}
+
+const NodeCounts& Simulation::node_counts(std::size_t object) const {
+  const Model& now = model(object);
+  std::optional<NodeCounts>& counts = world_->now.objects[object].matter->counts;
+  if (!counts)
+    counts = gewebe::node_counts(now);
+  return *counts;
 }
 
 const std::vector<NodeVector>& Simulation::contact_forces(std::size_t object) const {

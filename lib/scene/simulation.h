@@ -220,6 +220,8 @@ public:
   std::span<const double> surface_displacement(std::size_t object) const;
   /// surface_count of its model where that has tetrahedra, else all nodes.
   std::size_t surface_nodes(std::size_t object) const;
+  /// Of its model, counted once.
+  const NodeCounts& node_counts(std::size_t object) const;
   const std::vector<NodeVector>& contact_forces(std::size_t object) const;
 
   /// From now on shapes are made within each step, as SimulationOptions::shapes asks for, so that

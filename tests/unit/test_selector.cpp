@@ -97,6 +97,16 @@ TEST(Selector, NumbersAloneAreWhatTheyAreInAnExpression) {
             "selector '3,33': node 33 does not exist, expected 0 to 32");
 }
 
+TEST(Selector, CountsThatAreKnownAreNotCounted) {
+  const NodeCounts counts = node_counts(model());
+  EXPECT_EQ(counts.surface, 26U);
+  EXPECT_EQ(counts.body, 26U);
+  for (const char* const text : {"surface", "central", "near:1.2,1.1,0,1", "not z<5", "7"})
+    EXPECT_EQ(select_nodes(model(), counts, parse_selector(text)), select(text)) << text;
+  EXPECT_EQ(select_nodes(model(), {.surface = 5, .body = 26}, parse_selector("surface")),
+            range(0, 4)); // it is they that are taken
+}
+
 TEST(Selector, PrecedenceIsNotAndOr) {
   // or binds weakest: a or b and c is a or (b and c).
   EXPECT_EQ(select("19 or y<1 and x<1"), (Nodes{0, 19}));
