@@ -102,14 +102,16 @@ class Run:
 
     def __init__(self, programs, build, command, threads, work):
         env = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}", T=str(threads), B=build)
-        with tempfile.TemporaryFile() as out:
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as said:
             begin = time.perf_counter()
-            process = subprocess.Popen(["/bin/bash", "-c", command], cwd=work, env=env, stdout=out)
+            process = subprocess.Popen(["/bin/bash", "-c", command], cwd=work, env=env, stdout=out, stderr=said)
             _, status, usage = os.wait4(process.pid, 0)
             self.time = 1e3 * (time.perf_counter() - begin)
             process.returncode = os.waitstatus_to_exitcode(status)
             if process.returncode != 0:
-                raise SystemExit(f"two_builds: {programs}: {command}: status {process.returncode}")
+                said.seek(0)
+                told = said.read().decode(errors="replace")
+                raise SystemExit(f"{told}two_builds: {programs}: {command}: status {process.returncode}")
             self.processor = 1e3 * (usage.ru_utime + usage.ru_stime)
             self.memory = usage.ru_maxrss / 1024
             out.seek(0)
