@@ -219,6 +219,18 @@ def non_negative(a, f, start):
     return x
 
 
+def beyond_least_pushes(a, f, normals, friction):
+    """As beyond_cones, at most, by the least pushes without a thought of cones, brought into them. Where pushes are
+    few there is no choice, and they are what was told; the search below comes near to them but slowly."""
+    pushes = np.linalg.lstsq(a, f, rcond=1e-13)[0].reshape(-1, 3)
+    for push, normal in zip(pushes, normals):
+        along = max(0.0, push @ normal)
+        side = push - (push @ normal) * normal
+        length = np.linalg.norm(side)
+        push[:] = along * normal + (min(1.0, friction * along / length) * side if length > 0 else 0)
+    return np.linalg.norm(f - a @ pushes.ravel())
+
+
 def beyond_cones(nodes, force, supports, weights, normals, friction):
     """The least |force - sum of pushes|, over |force|: each push is within the cone about its normal, at a point with
     these weights of its supporting nodes. Directions within the cones join where they serve most."""
@@ -236,6 +248,14 @@ def beyond_cones(nodes, force, supports, weights, normals, friction):
                 one[rows[node]] += w * direction
         one = one.ravel()
         return one / np.linalg.norm(one)
+
+    pushes = np.zeros((3 * len(nodes), 3 * len(supports)))
+    for c, (support, weight) in enumerate(zip(supports, weights)):
+        for node, w in zip(support, weight):
+            pushes[3 * rows[node] : 3 * rows[node] + 3, 3 * c : 3 * c + 3] += w * np.eye(3)
+    least = beyond_least_pushes(pushes, f, normals, friction)
+    if least < 1e-8:
+        return least
 
     columns, x, left = np.zeros((3 * len(nodes), 0)), np.zeros(0), f
     last = np.inf
@@ -262,7 +282,7 @@ def beyond_cones(nodes, force, supports, weights, normals, friction):
         if now < (1e-5 if friction else 1e-8) or (now > 0.98 * last and len(best) < 2):
             break
         last = now
-    return np.linalg.norm(left)
+    return min(least, np.linalg.norm(left))
 
 
 # --- Models and answers -----------------------------------------------------------------------------------------------
