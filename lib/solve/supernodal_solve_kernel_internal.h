@@ -394,27 +394,26 @@ void solve_reached(const SupernodalArrays& l, std::span<const std::uint32_t> rea
   }
 }
 
-inline void solve_any(const SupernodalArrays& l, double* x, std::size_t vectors, double* work) {
+/// Calls work(Of) for whole solves of so many right-hand sides side by side.
+template <class Work>
+void by_width(std::size_t vectors, const Work& work) {
   if (vectors == 1)
-    solve<Single>(l, x, 1, work);
+    work(Single{});
   else if (vectors == 4)
-    solve<Narrow>(l, x, 4, work);
+    work(Narrow{});
   else if (vectors % Broad::width == 0)
-    solve<Broad>(l, x, vectors, work);
+    work(Broad{});
   else
-    solve<Wide>(l, x, vectors, work);
+    work(Wide{});
+}
+
+inline void solve_any(const SupernodalArrays& l, double* x, std::size_t vectors, double* work) {
+  by_width(vectors, [&]<class Of>(Of) { solve<Of>(l, x, vectors, work); });
 }
 
 inline void reached_any(const SupernodalArrays& l, std::span<const std::uint32_t> reached,
                         double* x, std::size_t vectors, double* work) {
-  if (vectors == 1)
-    solve_reached<Single>(l, reached, x, 1, work);
-  else if (vectors == 4)
-    solve_reached<Narrow>(l, reached, x, 4, work);
-  else if (vectors % Broad::width == 0)
-    solve_reached<Broad>(l, reached, x, vectors, work);
-  else
-    solve_reached<Wide>(l, reached, x, vectors, work);
+  by_width(vectors, [&]<class Of>(Of) { solve_reached<Of>(l, reached, x, vectors, work); });
 }
 
 inline void forward_any(const SupernodalArrays& l, std::span<const std::uint32_t> supernodes,

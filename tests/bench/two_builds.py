@@ -53,23 +53,22 @@ def particles(count, reach, side):
 
 def prepare(builds, data, work):
     """The inputs of all cases; stores and what names them for each build, for their format has changed."""
-    after = builds[1]
 
-    def make(name, command):
+    def make(name, command, programs=builds[1]):
         if not (work / name).exists():
-            subprocess.run(f"PATH={after}:$PATH; {command}", shell=True, cwd=work, check=True, executable="/bin/bash")
+            env = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}", DATA=str(data))
+            subprocess.run(["/bin/bash", "-c", command], cwd=work, env=env, check=True)
 
     (work / "few").write_text(particles(1000, 40, 300))
     (work / "near").write_text(particles(20000, 6, 300))
     (work / "wide").write_text(particles(20000, 12, 300))
-    make("band.vdb", f"voxelize --dim 660 -o band.vdb {data}/sofa_liver_smooth.obj")
-    make("gyroid.vdb", "metaball2vol --voxel 1 few -o gyroid.vdb")
+    make("band.vdb", 'voxelize --dim 660 -o band.vdb "$DATA/sofa_liver_smooth.obj"')
     make("band.ply", "mc-opt band.vdb -o band.ply")
-    make("colon.ela", f"exp2ela -q {data}/gca90_large_intestine_20k.stl -o colon.ela")
-    make("organ.ply", f"mc-opt --epsilon 0.15 <(voxelize --dim 140 {data}/sofa_liver_smooth.obj) -o organ.ply")
+    make("colon.ela", 'exp2ela -q "$DATA/gca90_large_intestine_20k.stl" -o colon.ela')
+    make("organ.ply", 'voxelize --dim 140 "$DATA/sofa_liver_smooth.obj" | mc-opt -o organ.ply')
     (work / "springs.scene").write_text(SCENE_SPRINGS)
     for build, programs in zip(NAMES, builds):
-        make(f"colon.{build}.h5", f"{programs}/ffe-precompute -q colon.ela -o colon.{build}.h5")
+        make(f"colon.{build}.h5", f"ffe-precompute -q colon.ela -o colon.{build}.h5", programs)
         (work / f"forces.{build}.scene").write_text(forces(build))
 
 
@@ -84,7 +83,8 @@ CASES = [
     ("surface, snapped, statistics", "mc-opt -j$T -q band.vdb -o out.ply --stats=stats", "out.ply"),
     ("model of springs", "exp2ela -j$T -q band.ply > /dev/null", None),
     ("model of springs, its text", "exp2ela -j$T -q colon.ela -o out.ela", "out.ela"),
-    ("factor and columns", "ffe-precompute -j$T -q colon.ela -o out.h5", None),
+    ("factor", "ffe-precompute -j$T -q colon.ela -o out.h5", None),
+    ("factor and columns of 256 nodes", "ffe-precompute -j$T -q --columns 0-255 colon.ela -o out.h5", None),
     ("30 contacts, 300 shapes", "ffe-run -j$T -q forces.$B.scene", "-"),
     ("springs, 0.5 s", "ffe-run -j$T -q springs.scene", "-"),
     ("frame without OpenGL", "emboss-render --backend cpu -j$T $(test $B = before || echo --plain) -q organ.ply -o out.png", "out.png"),
