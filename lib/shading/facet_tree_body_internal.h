@@ -18,10 +18,8 @@ inline unsigned bits_of(const FourBits& mask) {
 #ifdef __AVX__
   return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<const __m256d&>(mask)));
 #else
-  unsigned bits = 0;
-  for (unsigned k = 0; k < 4; ++k)
-    bits |= (mask[k] != 0 ? 1U : 0U) << k;
-  return bits;
+  return (mask[0] != 0 ? 1U : 0U) | (mask[1] != 0 ? 2U : 0U) | (mask[2] != 0 ? 4U : 0U) |
+         (mask[3] != 0 ? 8U : 0U);
 #endif
 }
 
