@@ -260,7 +260,8 @@ validate: $(VALIDATE) | $(FIRST)
 	@$(VALIDATE) '$(PAGE)' $(S)
 
 # What report FZKA 7190 claims, measured here: a page a claim in the folder REPORT.
-# PAGE=NAME makes that page alone, QUICK=1 small ones without benchmarks.
+# PAGE=NAME makes that page alone, QUICK=1 small ones without benchmarks; BEFORE=FOLDER has another commit's programs,
+# which one page compares with these.
 REPORT ?= $(BUILD)/report
 REPORT_BENCH := antialias break_even csg density ela factor geometry latency render solid_motion_peers stiffness stuffing_cgal \
   surface_quality_cgal voxelize work_error
@@ -384,7 +385,7 @@ help:
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
 	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
-	@echo '  report         what report FZKA 7190 claims beside what is measured here; REPORT=FOLDER for the pages, PAGE=NAME, QUICK=1'
+	@echo '  report         what report FZKA 7190 claims beside what is measured here; REPORT=FOLDER for the pages, PAGE=NAME, QUICK=1, BEFORE=FOLDER'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'
 	@echo '  wheel          for Python, in build/CONFIG/wheel: programs with their libraries and the module gewebe, tried in a venv'

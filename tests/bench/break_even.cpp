@@ -4,15 +4,17 @@
 // A cycle is 1/60 s of simulated time with all shapes at its end: elastodynamic objects, kept
 // moving, take the steps that are safe for them, elastostatic ones are evaluated once, and every
 // contact's displacement is another one each cycle, none moving as its neighbour. Then the report's
-// own count: a cycle is one integration step. Last the same shape from both: time to within 1e-3 of
-// the linearised equilibrium, in the elastodynamic method's favour the first time that it comes
-// so near.
+// own count: a cycle is one integration step. Then such cycles that end with the forces of all
+// contacts and no shape, as a hand feels them between two pictures. Last the same shape from both:
+// time to within 1e-3 of the linearised equilibrium, in the elastodynamic method's favour the first
+// time that it comes so near.
 //
 // One thread, and the time that its processor worked. Writes CSV to standard output: stage ("… over
 // …": what stands in the third column), program, size, contacts, threads, median, fastest and
 // slowest time in ms, a figure and its unit; and to standard error what follows from it.
 
 #include "base/error.h"
+#include "compliance/column_compression.h"
 #include "compliance/compliance_columns.h"
 #include "compliance/compliance_source.h"
 #include "dynamics/solid_dynamic.h"
@@ -147,7 +149,8 @@ double share(const Scene& scene, const std::vector<bool>& still) {
 /// Free nodes of the surface, the nearest to the first of them first.
 std::vector<std::uint32_t> patch(const Model& model) {
   std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < surface_count(model); ++i)
+  const std::size_t surface = surface_count(model);
+  for (std::uint32_t i = 0; i < surface; ++i)
     if (model.nodes[i].fixed == fixed_none)
       nodes.push_back(i);
   const Vec3 middle = model.nodes[nodes[nodes.size() / 2]].position;
@@ -161,7 +164,8 @@ std::vector<std::uint32_t> patch(const Model& model) {
 /// A store of one object, with columns of some nodes.
 class Stored {
 public:
-  Stored(const Model& model, std::vector<std::uint32_t> nodes, bool single) {
+  enum class Kept { float64, float32, compressed };
+  Stored(const Model& model, std::vector<std::uint32_t> nodes, Kept kept) {
     std::ranges::sort(nodes);
     const Context context = with_threads(0);
     {
@@ -178,11 +182,25 @@ public:
       facts.order = matrix.order();
       facts.norm = check.norm;
       facts.condition = check.condition;
-      facts.single = single;
+      facts.single = kept == Kept::float32;
+      facts.compressed = kept == Kept::compressed ? 1e-6 : 0;
       const auto missing = writer.begin(facts, matrix, factor, nodes);
-      const double residual =
-          compliance_columns(matrix, factor, check.norm, missing, context, writer);
-      (void)writer.end(std::max(check.residual, residual));
+      const auto columns_of = [&](std::span<const std::uint32_t> some, ColumnSink& sink) {
+        return compliance_columns(matrix, factor, check.norm, some, context, sink);
+      };
+      double residual = 0;
+      if (kept == Kept::compressed) {
+        std::vector<Vec3> positions;
+        for (const Node& node : model.nodes)
+          positions.push_back(node.position);
+        const CompressedMade made =
+            compress_columns(positions, nodes, facts.compressed, columns_of, context);
+        writer.write_compressed(made);
+        residual = made.residual;
+      } else {
+        residual = columns_of(missing, writer);
+      }
+      (void)writer.end(test::larger(check.residual, residual));
       writer.close();
       output.commit();
     }
@@ -207,6 +225,14 @@ struct Variant {
   const char* name = "";
   const Stored* store = nullptr;
   double tolerance = 0;
+};
+
+/// Simulated time, and what stands at its end: all shapes, or forces of contacts alone.
+struct Cycle {
+  double duration = 0;
+  bool shapes = true;
+  int burst = 1; ///< so many in a row are measured
+  const char* name = "";
 };
 
 /// The scene; organs with `left_out` are not in it at all.
@@ -243,12 +269,17 @@ public:
   }
 
   /// Milliseconds of one.
-  double cycle(std::size_t contacts, double duration) {
+  double cycle(std::size_t contacts, const Cycle& kind) {
     return processor_milliseconds([&] {
       for (std::size_t k = 0; k < contacts; ++k) {
         simulation_.apply(SetDisplacement{touched_, {nodes_[k]}, amplitude_ * any()});
       }
-      simulation_.step(duration);
+      simulation_.step(kind.duration);
+      if (!kind.shapes) {
+        for (const NodeVector& force : simulation_.contact_forces(touched_))
+          sum_ += force.value.x;
+        return;
+      }
       for (std::size_t i = 0; i < simulation_.object_count(); ++i)
         sum_ += simulation_.displacement(i)[0];
     });
@@ -291,11 +322,11 @@ void without_load(const Scene& scene) {
       still[k] = true;
     Running with(scene, still, none, {}), without(scene, still, still, {});
     std::vector<double> a, b;
-    (void)with.cycle(0, frame);
-    (void)without.cycle(0, frame);
+    (void)with.cycle(0, {frame});
+    (void)without.cycle(0, {frame});
     for (int run = 0; run < 5; ++run) { // by turns, for the machine's own pace changes
-      a.push_back(with.cycle(0, frame));
-      b.push_back(without.cycle(0, frame));
+      a.push_back(with.cycle(0, {frame}));
+      b.push_back(without.cycle(0, {frame}));
     }
     const Times t = times_of(a), rest = times_of(b);
     last = 1e3 / t.median;
@@ -331,9 +362,8 @@ double crossing(const std::vector<std::size_t>& contacts, const std::vector<doub
 }
 
 void with_contacts(const Scene& scene, const std::vector<Variant>& variants,
-                   const std::vector<std::size_t>& contacts, double duration, int burst,
-                   const std::string& what) {
-  const std::string stage = scene.name + "; " + what + " over contacts";
+                   const std::vector<std::size_t>& contacts, const Cycle& kind) {
+  const std::string what = kind.name, stage = scene.name + "; " + what + " over contacts";
   const std::vector<bool> none(scene.organs.size(), false), still = hybrid(scene);
   std::vector<const char*> names{"elastodynamics alone"};
   std::vector<std::unique_ptr<Running>> scenes;
@@ -347,10 +377,10 @@ void with_contacts(const Scene& scene, const std::vector<Variant>& variants,
     std::vector<std::vector<double>> times(scenes.size());
     for (int round = 0; round < 3; ++round) // by turns, for the machine's own pace changes
       for (std::size_t k = 0; k < scenes.size(); ++k) {
-        if (round == 0 || burst > 1)
-          (void)scenes[k]->cycle(m, duration); // what it needs comes to memory, or to the caches
-        for (int run = 0; run < burst; ++run)
-          times[k].push_back(scenes[k]->cycle(m, duration));
+        if (round == 0 || kind.burst > 1)
+          (void)scenes[k]->cycle(m, kind); // what it needs comes to memory, or to the caches
+        for (int run = 0; run < kind.burst; ++run)
+          times[k].push_back(scenes[k]->cycle(m, kind));
       }
     for (std::size_t k = 0; k < scenes.size(); ++k) {
       const Times t = times_of(times[k]);
@@ -536,14 +566,19 @@ void figure_4_9(const Scene& scene, const std::vector<std::size_t>& contacts) {
   const Model& touched = scene.organs[scene.touched].model;
   std::vector<std::uint32_t> nodes = patch(touched);
   nodes.resize(std::min(nodes.size(), max_contacts));
-  const Stored wide(touched, nodes, false), narrow(touched, nodes, true);
+  const Stored wide(touched, nodes, Stored::Kept::float64),
+      narrow(touched, nodes, Stored::Kept::float32),
+      compressed(touched, nodes, Stored::Kept::compressed);
   const std::vector<Variant> variants{{"hybrid float64", &wide, 0},
                                       {"hybrid float64 tolerance 1e-3", &wide, 1e-3},
                                       {"hybrid float32", &narrow, 0},
-                                      {"hybrid float32 tolerance 1e-3", &narrow, 1e-3}};
+                                      {"hybrid float32 tolerance 1e-3", &narrow, 1e-3},
+                                      {"hybrid compressed 1e-6", &compressed, 0}};
   without_load(scene);
-  with_contacts(scene, variants, contacts, frame, 1, "cycles of 1/60 s");
-  with_contacts(scene, variants, contacts, min_step(scene), 7, "cycles of one step");
+  const double step = min_step(scene);
+  with_contacts(scene, variants, contacts, {frame, true, 1, "cycles of 1/60 s"});
+  with_contacts(scene, variants, contacts, {step, true, 7, "cycles of one step"});
+  with_contacts(scene, variants, contacts, {step, false, 7, "cycles of one step, forces alone"});
   if (scene.name == "made organs") {
     equal_error(scene.organs[scene.touched], wide);
     linearisation(scene.organs[scene.touched]);

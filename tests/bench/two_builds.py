@@ -35,6 +35,13 @@ run 0.5 every 0.1
 """
 
 
+SCENE_MANY_SPRINGS = """object large large.ela method=ela
+gravity 0 0 -9810
+emit forces
+run 0.02
+"""
+
+
 def forces(build):
     """A scene of 30 nodes that are displaced anew at each of 300 steps, as contacts would."""
     rng = random.Random(30)
@@ -66,11 +73,16 @@ def prepare(builds, data, work):
     make("band.ply", "mc-opt band.vdb -o band.ply")
     make("colon.ela", 'exp2ela -q "$DATA/gca90_large_intestine_20k.stl" -o colon.ela')
     make("organ.ply", 'voxelize --dim 140 "$DATA/sofa_liver_smooth.obj" | mc-opt -o organ.ply')
+    make("million.ply", 'voxelize --dim 450 "$DATA/sofa_liver_smooth.obj" | mc-opt -o million.ply')
+    make("large.ela", 'voxelize --dim 200 "$DATA/sofa_liver_smooth.obj" | mc-opt | exp2ela -q -o large.ela')
     (work / "springs.scene").write_text(SCENE_SPRINGS)
+    (work / "many.scene").write_text(SCENE_MANY_SPRINGS)
     for build, programs in zip(NAMES, builds):
         make(f"colon.{build}.h5", f"ffe-precompute -q colon.ela -o colon.{build}.h5", programs)
         (work / f"forces.{build}.scene").write_text(forces(build))
 
+
+FRAMES = "emboss-render --backend cpu -j$T $(test $B = before || echo --plain) -q --texture noise --structure noise --to rgb"
 
 # Case, what it runs ($T threads), what of it is compared: a file, or - for what it writes.
 CASES = [
@@ -87,7 +99,10 @@ CASES = [
     ("factor and columns of 256 nodes", "ffe-precompute -j$T -q --columns 0-255 colon.ela -o out.h5", None),
     ("30 contacts, 300 shapes", "ffe-run -j$T -q forces.$B.scene", "-"),
     ("springs, 0.5 s", "ffe-run -j$T -q springs.scene", "-"),
+    ("springs, 0.02 s of many", "ffe-run -j$T -q many.scene", "-"),
     ("frame without OpenGL", "emboss-render --backend cpu -j$T $(test $B = before || echo --plain) -q organ.ply -o out.png", "out.png"),
+    ("60 frames of 96,000 triangles", f"{FRAMES} --turn 60 organ.ply -o out.rgb", "out.rgb"),
+    ("10 frames of a million triangles", f"{FRAMES} --turn 10 million.ply -o out.rgb", "out.rgb"),
     ("start: metaball2vol", "metaball2vol --version >/dev/null", None),
     ("start: mc-opt", "mc-opt --version >/dev/null", None),
     ("start: exp2ela", "exp2ela --version >/dev/null", None),

@@ -4,8 +4,8 @@
   report.py FOLDER [--build FOLDER] [--page NAME] [--quick]
 
 Each page has the report's numbers beside ours, with its pictures; README.md there lists all. Benchmarks write their CSV
-beside. $GEWEBE_SHARED is the folder of real data (else ../shared), $PYTHON a Python with peers. --quick: small sizes and
-no benchmarks, to see that it works. What can't be shown here says "skipped" and why. Ends with status 1 where a page fails.
+beside. $GEWEBE_SHARED is the folder of real data (else ../shared), $PYTHON a Python with peers, $BEFORE a folder of the
+programs of another commit. --quick: small sizes and no benchmarks, to see that it works. What can't be shown here says "skipped" and why. Ends with status 1 where a page fails.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import pathlib
 import sys
 import time
 
+import changes
 import deformation
 import machine
 import modelling
@@ -38,6 +39,7 @@ PAGES = [
     ("latency", "A thousand answers a second", "Beyond the report: who feels the forces", deformation.latency),
     *work.PAGES,
     *ratios.PAGES,
+    *changes.PAGES,
     ("validation", "Elements judged by theory, benchmarks and an experiment", "Beyond the report: is it right?", work.validation),
 ]
 
