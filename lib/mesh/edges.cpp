@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "mesh/face_ranges.h"
 
 #include <algorithm>
 #include <string>
@@ -13,10 +14,11 @@ namespace {
 
 constexpr std::size_t max_triangles = (std::size_t{1} << 31) / 3;
 
-/// Calls visit(low, side) for the sides of all faces, by face.
+/// Calls visit(low, side) for the sides of faces [begin, end), by face.
 template <class Visit>
-void for_each_side(std::span<const Triangle> triangles, Visit&& visit) {
-  for (std::size_t f = 0; f < triangles.size(); ++f) {
+void for_each_side(std::span<const Triangle> triangles, std::size_t begin, std::size_t end,
+                   const Visit& visit) {
+  for (std::size_t f = begin; f < end; ++f) {
     const auto [a, b, c] = triangles[f];
     if (has_equal_corners(triangles[f]))
       continue;
@@ -27,34 +29,54 @@ void for_each_side(std::span<const Triangle> triangles, Visit&& visit) {
   }
 }
 
+Context without_progress(const Context& context) {
+  Context quiet = context;
+  quiet.progress = nullptr;
+  return quiet;
+}
+
+Context one_thread() {
+  Context context;
+  context.threads = 1;
+  return context;
+}
+
 } // namespace
 
-EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles) : first_(points + 1) {
-  fill(triangles);
-  sort_buckets(0, points);
-}
+EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles)
+    : EdgeSides(points, triangles, one_thread()) {}
 
 EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles,
                      const Context& context)
     : first_(points + 1) {
-  fill(triangles);
-  Context quiet = context;
-  quiet.progress = nullptr;
-  parallel_blocks(quiet, points, 8192,
-                  [&](std::size_t begin, std::size_t end) { sort_buckets(begin, end); });
-}
-
-void EdgeSides::fill(std::span<const Triangle> triangles) {
   if (triangles.size() > max_triangles)
     throw Error(std::to_string(triangles.size()) + " triangles, expected at most " +
                 std::to_string(max_triangles));
-  for_each_side(triangles, [&](std::uint32_t low, const EdgeSide&) { ++first_[low + 1]; });
+  const Context quiet = without_progress(context);
+  const FaceRanges ranges(triangles, points, quiet);
+  const auto each_range = [&](const auto& body) {
+    parallel_blocks(quiet, points, ranges.grain(), body);
+  };
+  const auto each_side = [&](std::size_t begin, std::size_t end, const auto& visit) {
+    ranges.for_each_block(begin, end, [&](std::size_t first, std::size_t stop, bool whole) {
+      for_each_side(triangles, first, stop, [&](std::uint32_t low, const EdgeSide& side) {
+        if (whole || (low >= begin && low < end))
+          visit(low, side);
+      });
+    });
+  };
+  each_range([&](std::size_t begin, std::size_t end) {
+    each_side(begin, end, [&](std::uint32_t low, const EdgeSide&) { ++first_[low + 1]; });
+  });
   for (std::size_t p = 1; p < first_.size(); ++p)
     first_[p] += first_[p - 1];
   sides_.resize(first_.back());
-  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for_each_side(triangles,
-                [&](std::uint32_t low, const EdgeSide& side) { sides_[next[low]++] = side; });
+  each_range([&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> next(&first_[begin], &first_[end]);
+    each_side(begin, end,
+              [&](std::uint32_t low, const EdgeSide& side) { sides_[next[low - begin]++] = side; });
+    sort_buckets(begin, end);
+  });
 }
 
 void EdgeSides::sort_buckets(std::size_t begin, std::size_t end) {
@@ -77,30 +99,44 @@ void EdgeSides::sort_buckets(std::size_t begin, std::size_t end) {
 
 namespace {
 
-EdgeTable table_of(const EdgeSides& sides) {
-  EdgeTable table;
-  table.ends.reserve(sides.size() / 2 + sides.size() / 8);
-  table.first.reserve(table.ends.capacity() + 1);
-  table.corners.reserve(sides.size());
-  sides.for_each_edge([&](std::uint32_t low, std::span<const EdgeSide> edge) {
-    table.ends.push_back({low, edge[0].high()});
-    table.first.push_back(static_cast<std::uint32_t>(table.corners.size()));
-    for (const EdgeSide& side : edge)
-      table.corners.push_back(side.corner());
+EdgeTable table_of(const EdgeSides& sides, const Context& context) {
+  constexpr std::size_t grain = 8192;
+  const Context quiet = without_progress(context);
+  const std::size_t points = sides.points();
+  std::vector<std::size_t> first((points + grain - 1) / grain + 1); // edge of each block
+  parallel_blocks(quiet, points, grain, [&](std::size_t begin, std::size_t end) {
+    std::size_t edges = 0;
+    sides.for_each_edge(begin, end, [&](std::uint32_t, std::span<const EdgeSide>) { ++edges; });
+    first[begin / grain + 1] = edges;
   });
-  table.first.push_back(static_cast<std::uint32_t>(table.corners.size()));
+  for (std::size_t block = 1; block < first.size(); ++block)
+    first[block] += first[block - 1];
+  EdgeTable table;
+  table.ends.resize(first.back());
+  table.first.resize(first.back() + 1);
+  table.corners.resize(sides.size());
+  parallel_blocks(quiet, points, grain, [&](std::size_t begin, std::size_t end) {
+    std::size_t edge = first[begin / grain], corner = sides.size_before(begin);
+    sides.for_each_edge(begin, end, [&](std::uint32_t low, std::span<const EdgeSide> faces) {
+      table.ends[edge] = {low, faces[0].high()};
+      table.first[edge++] = static_cast<std::uint32_t>(corner);
+      for (const EdgeSide& side : faces)
+        table.corners[corner++] = side.corner();
+    });
+  });
+  table.first.back() = static_cast<std::uint32_t>(sides.size());
   return table;
 }
 
 } // namespace
 
 EdgeTable edge_table(std::span<const Triangle> triangles, std::size_t point_count) {
-  return table_of(EdgeSides(point_count, triangles));
+  return edge_table(triangles, point_count, one_thread());
 }
 
 EdgeTable edge_table(std::span<const Triangle> triangles, std::size_t point_count,
                      const Context& context) {
-  return table_of(EdgeSides(point_count, triangles, context));
+  return table_of(EdgeSides(point_count, triangles, context), context);
 }
 
 std::size_t EdgeTable::find(const std::array<std::uint32_t, 2>& wanted) const {

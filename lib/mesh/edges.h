@@ -68,7 +68,7 @@ inline int surplus(std::span<const EdgeSide> edge) {
 /// bucket of n sides is sorted in n log n).
 class EdgeSides {
 public:
-  /// The sort is that of context.threads; without a context of one thread.
+  /// On context.threads; without a context on one.
   /// \pre corners are below `points`   \throw Error if there are more than 2^31 / 3 triangles
   EdgeSides(std::size_t points, std::span<const Triangle> triangles);
   EdgeSides(std::size_t points, std::span<const Triangle> triangles, const Context& context);
@@ -76,7 +76,12 @@ public:
   /// Calls visit(low, std::span<const EdgeSide>) for each edge.
   template <class Visit>
   void for_each_edge(Visit&& visit) const {
-    for (std::size_t low = 0; low + 1 < first_.size(); ++low)
+    for_each_edge(0, points(), visit);
+  }
+  /// For those whose smaller ends are in [begin_point, end_point).
+  template <class Visit>
+  void for_each_edge(std::size_t begin_point, std::size_t end_point, Visit&& visit) const {
+    for (std::size_t low = begin_point; low < end_point; ++low)
       for (std::uint32_t begin = first_[low], stop = first_[low + 1]; begin < stop;) {
         std::uint32_t end = begin + 1;
         while (end < stop && sides_[end].high() == sides_[begin].high())
@@ -87,9 +92,11 @@ public:
   }
   /// Of all edges.
   std::size_t size() const { return sides_.size(); }
+  /// Of the edges whose smaller ends are before a point.
+  std::size_t size_before(std::size_t point) const { return first_[point]; }
+  std::size_t points() const { return first_.size() - 1; }
 
 private:
-  void fill(std::span<const Triangle> triangles);
   void sort_buckets(std::size_t begin, std::size_t end);
 
   std::vector<std::uint32_t> first_; ///< by low

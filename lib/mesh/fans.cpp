@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
+#include "mesh/face_ranges.h"
 
 #include <algorithm>
 #include <bit>
@@ -18,40 +19,6 @@ namespace gewebe {
 namespace {
 
 constexpr std::size_t grain = 8192;
-/// Points that a block of triangles has corners among.
-struct Reach {
-  std::uint32_t low = UINT32_MAX, high = 0;
-  bool meets(std::size_t begin, std::size_t end) const { return high >= begin && low < end; }
-};
-
-std::vector<Reach> reach_of_blocks(std::span<const Triangle> triangles, const Context& context) {
-  std::vector<Reach> reach((triangles.size() + grain - 1) / grain);
-  parallel_blocks(context, triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
-    Reach r;
-    for (const Triangle& t : triangles.subspan(begin, end - begin))
-      for (const std::uint32_t corner : t) {
-        r.low = std::min(r.low, corner);
-        r.high = std::max(r.high, corner);
-      }
-    reach[begin / grain] = r;
-  });
-  return reach;
-}
-
-/// How many points are looked at together: so few that what meets there stays in cache, if the
-/// blocks of triangles are not looked at too often for that.
-std::size_t range_of_points(std::size_t points, const std::vector<Reach>& reach) {
-  std::size_t range = 4 * grain;
-  for (; range * 16 < points; range *= 2) {
-    std::size_t visits = 0;
-    for (const Reach& r : reach)
-      visits += r.high / range - r.low / range + 1;
-    if (visits <= 3 * reach.size())
-      break;
-  }
-  return range;
-}
-
 /// A face at a point, by its other corners in the order of the face.
 struct FanFace {
   std::uint32_t next, previous;
@@ -61,17 +28,13 @@ struct FanFace {
 class Fans {
 public:
   /// Of points [begin, end).
-  Fans(std::span<const Triangle> triangles, const std::vector<Reach>& reach, std::size_t begin,
+  Fans(std::span<const Triangle> triangles, const FaceRanges& ranges, std::size_t begin,
        std::size_t end)
       : begin_(begin), first_(end - begin + 2) {
-    const auto each = [&](auto&& use) {
-      for (std::size_t block = 0; block < reach.size(); ++block) {
-        if (!reach[block].meets(begin, end))
-          continue;
-        const bool whole = reach[block].low >= begin && reach[block].high < end;
+    const auto each = [&](const auto& use) {
+      ranges.for_each_block(begin, end, [&](std::size_t first, std::size_t stop, bool whole) {
         const auto within = [&](std::uint32_t p) { return whole || (p >= begin && p < end); };
-        const std::size_t stop = std::min(triangles.size(), (block + 1) * grain);
-        for (std::size_t f = block * grain; f < stop; ++f) {
+        for (std::size_t f = first; f < stop; ++f) {
           const auto [a, b, c] = triangles[f];
           if (has_equal_corners(triangles[f]))
             continue;
@@ -82,7 +45,7 @@ public:
           if (within(c))
             use(c - begin, a, b);
         }
-      }
+      });
     };
     each([&](std::size_t p, std::uint32_t, std::uint32_t) { ++first_[p + 2]; });
     for (std::size_t p = 2; p < first_.size(); ++p)
@@ -302,23 +265,22 @@ FanFigures examine_fans(const TriangleMesh& mesh, const Context& context) {
     throw Error(std::to_string(mesh.triangles.size()) + " triangles, expected at most " +
                 std::to_string(max_triangles));
   const std::size_t points = mesh.points.size();
-  const std::vector<Reach> reach = reach_of_blocks(mesh.triangles, context);
+  const FaceRanges ranges(mesh.triangles, points, context);
   std::vector<FanFigures> parts((points + grain - 1) / grain);
   FanFigures sum;
   sum.lengths.resize(parts.size());
   sum.joined_to.resize(points);
-  parallel_blocks(
-      context, points, range_of_points(points, reach), [&](std::size_t first, std::size_t last) {
-        const Fans fans(mesh.triangles, reach, first, last);
-        for (std::size_t begin = first; begin < last; begin += grain) {
-          const std::size_t end = std::min(last, begin + grain);
-          Examiner examiner(mesh.points, fans.count(begin, end));
-          for (std::size_t p = begin; p < end; ++p)
-            sum.joined_to[p] = examiner.point(static_cast<std::uint32_t>(p), fans.at(p));
-          sum.lengths[begin / grain] = examiner.lengths();
-          parts[begin / grain] = std::move(examiner.figures_);
-        }
-      });
+  parallel_blocks(context, points, ranges.grain(), [&](std::size_t first, std::size_t last) {
+    const Fans fans(mesh.triangles, ranges, first, last);
+    for (std::size_t begin = first; begin < last; begin += grain) {
+      const std::size_t end = std::min(last, begin + grain);
+      Examiner examiner(mesh.points, fans.count(begin, end));
+      for (std::size_t p = begin; p < end; ++p)
+        sum.joined_to[p] = examiner.point(static_cast<std::uint32_t>(p), fans.at(p));
+      sum.lengths[begin / grain] = examiner.lengths();
+      parts[begin / grain] = std::move(examiner.figures_);
+    }
+  });
   sum.edge_min = HUGE_VAL;
   for (const FanFigures& part : parts)
     add(sum, part);

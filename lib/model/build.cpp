@@ -4,8 +4,9 @@
 #include "base/number_text.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
-#include "mesh/repeated_faces.h"
+#include "mesh/face_ranges.h"
 #include "model/check.h"
+#include "model/usable_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -21,7 +22,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr std::uint32_t unused = UINT32_MAX;
+constexpr std::size_t grain = 8192;
 constexpr double lightest_node = 1e-3; // of the mean mass; lighter ones would rule the time step
 constexpr double nodes_of_reference = 1000; // the net in which a central spring has F of an edge's
 const double regular_net = std::sqrt(3.0) / 2; // ΣA / l² of equilateral triangles
@@ -29,14 +30,6 @@ constexpr std::size_t enough_samples = 8192;   // of a surface, for the places o
 constexpr double tiny = 1e-12;
 constexpr double same_place =
     1e-9; // of a cluster's reach: a node there has no direction to its center
-
-/// The triangles that are used, with corners renumbered to the points that are used.
-struct Surface {
-  std::vector<std::uint32_t> point_of_node; ///< ascending
-  std::vector<Triangle> triangles;
-  std::vector<std::uint32_t> face_of_triangle; ///< in the mesh
-  EdgeTable edges;
-};
 
 /// Of how many of [0, count) it is true.
 template <class Test>
@@ -51,78 +44,6 @@ std::size_t counted(const Context& context, std::size_t count, const Test& test)
   return all;
 }
 
-/// Do two faces have the same corners? Then they have them at each of their edges.
-bool any_twice(const Surface& s, const Context& context) {
-  std::atomic<bool> found = false;
-  parallel_blocks(context, s.edges.size(), 1 << 15, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> opposite;
-    for (std::size_t e = begin; e < end; ++e) {
-      const std::span<const std::uint32_t> around = s.edges.around(e);
-      if (around.size() < 2)
-        continue;
-      opposite.clear();
-      for (const std::uint32_t corner : around)
-        opposite.push_back(s.triangles[corner / 3][corner % 3]);
-      std::ranges::sort(opposite);
-      if (std::ranges::adjacent_find(opposite) != opposite.end())
-        found = true;
-    }
-  });
-  return found;
-}
-
-Surface usable_surface(const TriangleMesh& mesh, BuildReport& report, const Context& context) {
-  Surface s;
-  s.triangles.reserve(mesh.triangles.size());
-  s.face_of_triangle.reserve(mesh.triangles.size());
-  std::vector<std::uint32_t> node_of_point(mesh.points.size(), unused);
-  for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    const Triangle& t = mesh.triangles[f];
-    if (has_equal_corners(t)) {
-      ++report.degenerate_faces;
-      continue;
-    }
-    s.triangles.push_back(t);
-    s.face_of_triangle.push_back(f);
-    for (const std::uint32_t p : t)
-      node_of_point[p] = 0;
-  }
-  if (s.triangles.empty())
-    throw Error("no triangle, expected a surface");
-  for (std::uint32_t p = 0; p < mesh.points.size(); ++p) {
-    if (node_of_point[p] == unused) {
-      ++report.isolated_points;
-      continue;
-    }
-    node_of_point[p] = static_cast<std::uint32_t>(s.point_of_node.size());
-    s.point_of_node.push_back(p);
-  }
-  for (Triangle& t : s.triangles)
-    for (std::uint32_t& corner : t)
-      corner = node_of_point[corner];
-  s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
-  if (any_twice(s, context)) {
-    const std::vector<bool> twice =
-        repeated_faces(s.point_of_node.size(), s.triangles, SameFace::corners);
-    report.duplicate_faces = static_cast<std::size_t>(std::count(twice.begin(), twice.end(), true));
-    std::size_t kept = 0;
-    for (std::size_t t = 0; t < s.triangles.size(); ++t) {
-      if (twice[t])
-        continue;
-      s.triangles[kept] = s.triangles[t];
-      s.face_of_triangle[kept++] = s.face_of_triangle[t];
-    }
-    s.triangles.resize(kept);
-    s.face_of_triangle.resize(kept);
-    s.edges = edge_table(s.triangles, s.point_of_node.size(), context);
-  }
-  report.boundary_edges = counted(context, s.edges.size(),
-                                  [&](std::size_t e) { return s.edges.around(e).size() == 1; });
-  report.nonmanifold_edges =
-      counted(context, s.edges.size(), [&](std::size_t e) { return s.edges.around(e).size() > 2; });
-  return s;
-}
-
 class Builder {
 public:
   Builder(const TriangleMesh& mesh, const BuildOptions& options, const Context& context)
@@ -131,7 +52,7 @@ public:
   }
 
   BuiltModel build() {
-    surface_ = usable_surface(mesh_, report_, context_);
+    use(usable_surface(mesh_, context_));
     model_.materials = options_.material.materials;
     if (model_.materials.empty())
       throw Error("no material, expected at least one");
@@ -155,6 +76,19 @@ public:
   }
 
 private:
+  void use(UsableSurface surface) {
+    surface_ = std::move(surface);
+    report_.degenerate_faces = surface_.degenerate_faces;
+    report_.duplicate_faces = surface_.duplicate_faces;
+    report_.isolated_points = surface_.isolated_points;
+    const auto faces_in = [this](std::size_t edge) { return surface_.edges.around(edge).size(); };
+    const std::size_t edges = surface_.edges.size();
+    report_.boundary_edges =
+        counted(context_, edges, [&](std::size_t e) { return faces_in(e) == 1; });
+    report_.nonmanifold_edges =
+        counted(context_, edges, [&](std::size_t e) { return faces_in(e) > 2; });
+  }
+
   const Material& material(std::int32_t index) const {
     return model_.materials[static_cast<std::size_t>(index)];
   }
@@ -163,7 +97,7 @@ private:
     const std::size_t count = surface_.triangles.size();
     area_vector_.resize(count);
     material_.resize(count);
-    parallel_blocks(context_, count, 8192, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(context_, count, grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t) {
         const Vec3 &a = point(surface_.triangles[t][0]), &b = point(surface_.triangles[t][1]),
                    &c = point(surface_.triangles[t][2]);
@@ -181,39 +115,59 @@ private:
     model_.nodes.resize(surface_.point_of_node.size());
     area_.resize(model_.nodes.size());
     tension_.resize(model_.nodes.size());
-    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
-      model_.nodes[i].position = point(i);
-      model_.nodes[i].material = -1;
-    }
-    double total = 0;
-    for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
-      const Material& m = material(material_[t]);
-      const double area = norm(area_vector_[t]) / 3;
-      const double share = m.density * m.thickness * area;
-      const double tension =
-          area * options_.stiffness.value_or(regular_net * m.young * m.thickness);
-      total += 3 * share;
-      for (const std::uint32_t corner : surface_.triangles[t]) {
-        area_[corner] += area;
-        tension_[corner] += tension;
-        Node& n = model_.nodes[corner];
-        n.mass += share;
-        if (n.material < 0)
-          n.material = material_[t]; // of its first triangle
+    const std::size_t triangles = surface_.triangles.size();
+    std::vector<double> share(triangles); // of a triangle's mass, by corner
+    parallel_blocks(context_, triangles, grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        const Material& m = material(material_[t]);
+        share[t] = m.density * m.thickness * (norm(area_vector_[t]) / 3);
       }
-    }
+    });
+    const FaceRanges ranges(surface_.triangles, model_.nodes.size(), context_);
+    parallel_blocks(
+        context_, model_.nodes.size(), ranges.grain(), [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) {
+            model_.nodes[i].position = point(static_cast<std::uint32_t>(i));
+            model_.nodes[i].material = -1;
+          }
+          ranges.for_each_block(begin, end, [&](std::size_t first, std::size_t stop, bool whole) {
+            for (std::size_t t = first; t < stop; ++t)
+              share_out(t, share[t], whole ? 0 : begin, whole ? SIZE_MAX : end);
+          });
+        });
+    double total = 0;
+    for (const double one : share)
+      total += 3 * one;
     if (!options_.mass && !(total > 0 && std::isfinite(total)))
       throw Error(total == 0 ? "the surface has no area, expected some"
                              : "the surface's mass is not finite, expected smaller coordinates");
     const double floor = lightest_node * total / static_cast<double>(model_.nodes.size());
-    for (Node& n : model_.nodes) {
-      if (options_.mass) {
-        n.mass = *options_.mass;
-      } else if (n.mass < floor) {
-        n.mass = floor;
-        ++report_.light_nodes;
+    report_.light_nodes =
+        options_.mass ? 0 : counted(context_, model_.nodes.size(), [&](std::size_t i) {
+          return model_.nodes[i].mass < floor;
+        });
+    parallel_blocks(context_, model_.nodes.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (Node& n : std::span(model_.nodes).subspan(begin, end - begin)) {
+        n.mass = options_.mass ? *options_.mass : n.mass < floor ? floor : n.mass;
+        n.drag = options_.drag_rate * n.mass;
       }
-      n.drag = options_.drag_rate * n.mass;
+    });
+  }
+
+  /// Gives the corners of a triangle that are among nodes [begin, end) what they have of it.
+  void share_out(std::size_t triangle, double mass, std::size_t begin, std::size_t end) {
+    const Material& m = material(material_[triangle]);
+    const double area = norm(area_vector_[triangle]) / 3;
+    const double tension = area * options_.stiffness.value_or(regular_net * m.young * m.thickness);
+    for (const std::uint32_t corner : surface_.triangles[triangle]) {
+      if (corner < begin || corner >= end)
+        continue;
+      area_[corner] += area;
+      tension_[corner] += tension;
+      Node& n = model_.nodes[corner];
+      n.mass += mass;
+      if (n.material < 0)
+        n.material = material_[triangle]; // of its first triangle
     }
   }
 
@@ -252,7 +206,7 @@ private:
     springs.reserve((options_.bend ? 2 : 1) * edges.size() +
                     (options_.centrals > 0 ? model_.nodes.size() : 0));
     springs.resize(edges.size());
-    parallel_blocks(context_, edges.size(), 8192, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(context_, edges.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t e = begin; e < end; ++e) {
         const auto [i, j] = edges.ends[e];
         const Vec3 d = point(j) - point(i);
@@ -412,7 +366,7 @@ private:
   void central_springs(const std::vector<double>& stiffness, const std::vector<double>& reach) {
     const std::size_t before = model_.springs.size();
     model_.springs.resize(before + reach.size());
-    parallel_blocks(context_, reach.size(), 8192, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(context_, reach.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const auto center = static_cast<std::uint32_t>(model_.nodes[i].central);
         const Vec3 d = model_.nodes[center].position - model_.nodes[i].position;
@@ -456,7 +410,7 @@ private:
   const TriangleMesh& mesh_;
   const BuildOptions& options_;
   Context context_;
-  Surface surface_;
+  UsableSurface surface_;
   std::vector<Vec3> area_vector_;      ///< per triangle, mm²
   std::vector<std::int32_t> material_; ///< per triangle
   std::vector<double> area_;           ///< per node, mm²: a third of its faces
