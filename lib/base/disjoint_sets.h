@@ -24,6 +24,8 @@ public:
   }
   /// True if a and b were in different sets.
   bool join(std::uint32_t a, std::uint32_t b) {
+    if (parent_[a] == parent_[b])
+      return false;
     const std::uint32_t x = find(a), y = find(b);
     if (x == y)
       return false;

@@ -1,6 +1,7 @@
 #include "mesh/edges.h"
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "mesh/face_ranges.h"
 
@@ -70,6 +71,7 @@ EdgeSides::EdgeSides(std::size_t points, std::span<const Triangle> triangles,
   });
   for (std::size_t p = 1; p < first_.size(); ++p)
     first_[p] += first_[p - 1];
+  reserve_touched(quiet, sides_, first_.back());
   sides_.resize(first_.back());
   each_range([&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> next(&first_[begin], &first_[end]);
@@ -112,6 +114,9 @@ EdgeTable table_of(const EdgeSides& sides, const Context& context) {
   for (std::size_t block = 1; block < first.size(); ++block)
     first[block] += first[block - 1];
   EdgeTable table;
+  reserve_touched(quiet, table.ends, first.back());
+  reserve_touched(quiet, table.first, first.back() + 1);
+  reserve_touched(quiet, table.corners, sides.size());
   table.ends.resize(first.back());
   table.first.resize(first.back() + 1);
   table.corners.resize(sides.size());

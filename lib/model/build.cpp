@@ -1,6 +1,7 @@
 #include "model/build.h"
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
@@ -111,7 +112,7 @@ private:
 
   void surface_nodes() {
     constexpr std::size_t more = 1024; // central nodes, which mostly are as few
-    model_.nodes.reserve(surface_.point_of_node.size() + more);
+    reserve_touched(context_, model_.nodes, surface_.point_of_node.size() + more);
     model_.nodes.resize(surface_.point_of_node.size());
     area_.resize(model_.nodes.size());
     tension_.resize(model_.nodes.size());
@@ -205,6 +206,9 @@ private:
     std::vector<Spring>& springs = model_.springs;
     springs.reserve((options_.bend ? 2 : 1) * edges.size() +
                     (options_.centrals > 0 ? model_.nodes.size() : 0));
+    touch_pages(context_, springs.data(),
+                (edges.size() + (options_.centrals > 0 ? model_.nodes.size() : 0)) *
+                    sizeof(Spring));
     springs.resize(edges.size());
     parallel_blocks(context_, edges.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t e = begin; e < end; ++e) {
@@ -283,6 +287,7 @@ private:
     for (std::size_t c = 0; c < parts.count; ++c) {
       const std::span<const std::uint32_t> nodes{member.data() + first[c], first[c + 1] - first[c]};
       std::vector<Vec3> points;
+      points.reserve(nodes.size());
       for (const std::uint32_t i : nodes) {
         points.push_back(model_.nodes[i].position);
         // Springs of F times an edge spring's at each node would hold a fine net more firmly than a
@@ -290,11 +295,12 @@ private:
         if (area[c] > 0)
           stiffness[i] = options_.central_factor * nodes_of_reference * (tension_[i] / area[c]);
       }
-      if (samples[c].points.empty())
-        for (const std::uint32_t i : nodes) {
-          samples[c].points.push_back(model_.nodes[i].position);
+      if (samples[c].points.empty()) {
+        samples[c].points = points;
+        samples[c].weights.reserve(nodes.size());
+        for (const std::uint32_t i : nodes)
           samples[c].weights.push_back(area[c] > 0 ? std::max(area_[i], tiny * area[c]) : 1);
-        }
+      }
       // A center with a single node would coincide with it, hence two nodes per center at least.
       const std::size_t max = std::max<std::size_t>(1, points.size() / 2);
       const std::size_t wanted =

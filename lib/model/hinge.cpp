@@ -48,11 +48,13 @@ std::vector<Hinged> hinged_components(const Model& model) {
   const Components parts = components(model);
   const std::size_t surface = body_count(model);
   std::vector<Held> held(parts.count);
+  std::vector<std::size_t> held_nodes;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     Held& h = held[parts.of_node[i]];
     h.nodes += i < surface ? 1 : 0;
     if (model.nodes[i].fixed == fixed_none)
       continue;
+    held_nodes.push_back(i);
     h.central = h.central || i >= surface;
     h.mean += model.nodes[i].position;
     ++h.held;
@@ -64,7 +66,7 @@ std::vector<Hinged> hinged_components(const Model& model) {
     Held& h = held[parts.of_node[i]];
     h.size = std::fmax(h.size, norm(model.nodes[i].position - h.mean));
   }
-  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+  for (const std::size_t i : held_nodes) {
     Held& h = held[parts.of_node[i]];
     if (!h.central || !(h.size > 0))
       continue;

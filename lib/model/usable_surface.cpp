@@ -1,6 +1,7 @@
 #include "model/usable_surface.h"
 
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "mesh/repeated_faces.h"
 
@@ -81,6 +82,7 @@ UsableSurface usable_surface(const TriangleMesh& mesh, const Context& context) {
   s.degenerate_faces = mesh.triangles.size() - s.face_of_triangle.size();
   if (s.face_of_triangle.empty())
     throw Error("no triangle, expected a surface");
+  reserve_touched(context, s.triangles, s.face_of_triangle.size());
   s.triangles.resize(s.face_of_triangle.size());
   std::vector<std::uint32_t> node_of_point(mesh.points.size(), unused);
   parallel_blocks(context, s.triangles.size(), grain, [&](std::size_t begin, std::size_t end) {

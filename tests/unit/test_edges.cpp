@@ -82,7 +82,7 @@ void expect_equal(const EdgeSides& sides, const std::map<Ends, std::vector<SideO
 TEST(Edges, SidesAndTableEqualAMap) {
   std::mt19937 random(7);
   for (int round = 0; round < 23; ++round) {
-    const std::uint32_t points = round < 20 ? 15 : 20000;
+    const std::uint32_t points = round < 20 ? 15 : 70000; // more than one range
     const std::vector<Triangle> triangles =
         round == 0 ? std::vector<Triangle>()
                    : random_triangles(random, round < 20 ? 60 : 9000, points);
