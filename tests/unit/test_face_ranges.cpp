@@ -63,6 +63,22 @@ TEST(FaceRanges, BlocksHoldAllFacesOfARange) {
   }
 }
 
+TEST(FaceRanges, AFaceIsOfTheRangesOfItsFirstAndLastPoint) {
+  const std::vector<Triangle> none;
+  const auto border = static_cast<std::uint32_t>(FaceRanges(none, 0, on(1)).grain());
+  const std::vector<Triangle> one{{border - 1, border, border - 1}};
+  const FaceRanges ranges(one, 2 * border, on(1));
+  ASSERT_EQ(ranges.grain(), border);
+  for (const std::size_t begin : {std::size_t{0}, std::size_t{border}}) {
+    std::size_t blocks = 0;
+    ranges.for_each_block(begin, begin + border, [&](std::size_t, std::size_t, bool whole) {
+      EXPECT_FALSE(whole);
+      ++blocks;
+    });
+    EXPECT_EQ(blocks, 1U);
+  }
+}
+
 TEST(FaceRanges, PointsInDisorderAreLookedAtInFewRanges) {
   constexpr std::uint32_t points = 2000000;
   std::mt19937 random(1);
