@@ -44,7 +44,8 @@ void report(const char* stage, const char* program, std::size_t nodes, std::size
   std::fflush(stdout);
 }
 
-/// GFLOP/s of BLAS at 512 x 512 x 512, one thread.
+/// GFLOP/s of BLAS at 512 x 512 x 512, one thread: of its fastest run, since it stands for what the
+/// machine can do.
 double product_rate() {
   const int n = 512;
   const double one = 1, zero = 0;
@@ -52,7 +53,7 @@ double product_rate() {
   std::vector<double> a(entries, 0.5), b(entries, 0.25), c(entries);
   const Times times = measure(
       [&] { dgemm_("N", "N", &n, &n, &n, &one, a.data(), &n, b.data(), &n, &zero, c.data(), &n); });
-  const double rate = 2.0 * n * n * n / times.median * 1e-6;
+  const double rate = 2.0 * n * n * n / times.fastest * 1e-6;
   report("matrix product", "BLAS", 0, n, 1, times, rate, "GFLOP/s");
   return rate;
 }

@@ -81,6 +81,17 @@ END
   report pages --build build --page ratios >log 2>&1 || fail "$(<log)"
   grep -q '^| factor of a net, 1 thread | CHOLMOD, 1 thread | 4 |$' pages/ratios.md || fail 'another ratio' "$(<pages/ratios.md)"
   grep -q "^| factor of a net | BLAS's matrix product | 0.0864 |$" pages/ratios.md || fail 'another fraction' "$(<pages/ratios.md)"
+  # So is the page of another commit's programs, where their times stand beside it.
+  cat >pages/two_builds.csv <<'END'
+case,threads,before_ms,after_ms,times,before_processor_ms,after_processor_ms,before_MB,after_MB,result
+"columns, 256",1,10.0,5.0,2.000,9,4,100,50,equal
+"columns, 256",2,8.0,4.0,2.000,9,4,100,50,1.3e-13
+"start",1,3.0,4.0,0.750,3,4,10,10,
+END
+  report pages --build build --page changes >log 2>&1 || fail "$(<log)"
+  grep -q '^| columns, 256 | 2 | 8 | 4 | 2 | 9 | 4 | 100 | 50 | differs by 1.3e-13 |$' pages/changes.md || fail 'another case' "$(<pages/changes.md)"
+  grep -q '^| cases that take less time than before | – | 2 of 3 |$' pages/changes.md || fail 'another count' "$(<pages/changes.md)"
+  grep -q '^| results that are the same bytes | – | 1 of 2 |$' pages/changes.md || fail 'another count of results' "$(<pages/changes.md)"
   # A page that can't be made fails the whole; one that nobody knows is refused.
   printf '#!/bin/bash\nexit 3\n' >build/bench_factor
   local status=0

@@ -20,11 +20,11 @@ def measured(w, page):
         command = [w.python, w.root / "tests/bench/two_builds.py", before, w.build, "--data", w.data, "--work", w.folder]
         done = subprocess.run(command, cwd=w.root, env=w.environment, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise RuntimeError(f"two_builds.py: {(done.stderr.strip().splitlines() or ['no word'])[-1]}")
+            raise RuntimeError(" ".join(done.stderr.split()[-60:]) or "two_builds.py says nothing")
         path.write_text(done.stdout)
     if not path.exists():
         raise Skipped("BEFORE names no folder of another commit's programs")
-    return rows_of(path.read_text())
+    return [{**row, "case": row["case"].strip('"')} for row in rows_of(path.read_text())]
 
 
 def changes(w, page):

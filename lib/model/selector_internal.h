@@ -1,0 +1,12 @@
+#pragma once
+// What parsing and evaluation of selectors share.
+
+#include <string>
+#include <string_view>
+
+namespace gewebe {
+
+/// A selector, or a part of one, as messages have it: in quotes, on one line, not too long.
+std::string quoted_selector(std::string_view text);
+
+} // namespace gewebe
