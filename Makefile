@@ -248,10 +248,10 @@ stress: $(STRESS) $(TOOLS) | $(FIRST)
 	@for program in $(STRESS) $(STRESS_SCRIPTS); do echo "$$program"; \
 	  PATH='$(abspath $(BUILD))':"$$PATH" $$program || exit 1; done
 
-# Each program writes CSV; gnuplot, where there is one, draws it.
+# Each program writes CSV, which ends with the machine and the versions of what took part; gnuplot, where there is one, draws it.
 bench: $(BENCH) $(TOOLS) | $(FIRST)
 	@test -n '$(BENCH)' || { echo 'bench: tests/bench has no programs yet' >&2; exit 1; }
-	@for program in $(BENCH); do $$program > $$program.csv.part && mv $$program.csv.part $$program.csv && \
+	@for program in $(BENCH); do { $$program && python3 tests/report/machine.py '$(BUILD)'; } > $$program.csv.part && mv $$program.csv.part $$program.csv && \
 	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
 
 # PAGE says where the page goes: examples/validate holds one. S=WORD makes the section of that name alone.

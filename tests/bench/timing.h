@@ -42,7 +42,7 @@ inline double processor_milliseconds(const std::function<void()>& work) {
   return now() - start;
 }
 
-inline Times measure(const std::function<void()>& work, int runs = 5) {
+inline Times measure(const std::function<void()>& work, int runs = 7) {
   std::vector<double> times;
   for (int run = 0; run < runs; ++run)
     times.push_back(milliseconds(work));

@@ -21,7 +21,7 @@ def measured(w, page):
         done = subprocess.run(command, cwd=w.root, env=w.environment, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(" ".join(done.stderr.split()[-60:]) or "two_builds.py says nothing")
-        path.write_text(done.stdout)
+        w.keep_rows("two_builds", done.stdout)
     if not path.exists():
         raise Skipped("BEFORE names no folder of another commit's programs")
     return [{**row, "case": row["case"].strip('"')} for row in rows_of(path.read_text())]

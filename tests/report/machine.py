@@ -1,4 +1,9 @@
-"""The machine, the programs and libraries of a measurement, by name and version."""
+"""The machine, the programs and libraries of a measurement, by name and version.
+
+  machine.py BUILD
+
+writes them as lines "# name: value", which end the CSV of a benchmark. BUILD is the folder of its programs.
+"""
 
 import datetime
 import json
@@ -7,6 +12,7 @@ import pathlib
 import platform
 import re
 import subprocess
+import sys
 
 # Peers and libraries that benchmarks are linked with, by their Debian packages.
 PACKAGES = {
@@ -105,3 +111,13 @@ def describe(build):
         ("Gewebe", ", ".join(told[:1]) or "unknown"),
         ("kernels", next((line.split(": ", 1)[1] for line in told if line.startswith("kernels: ")), "unknown")),
     ]
+
+
+def lines(build, python):
+    """Of all that a measurement depends on."""
+    rows = [*describe(pathlib.Path(build)), *versions(python), ("measured", today())]
+    return "".join(f"# {name}: {value}\n" for name, value in rows)
+
+
+if __name__ == "__main__":
+    print(lines(sys.argv[1], os.environ.get("PYTHON") or sys.executable), end="")

@@ -9,7 +9,7 @@ from workshop import rows_of
 # Stage, its CSV, the row's stage, ours, peers, threads of ours and of theirs (0: all that there are).
 BESIDE = [
     ("particles to mesh", "density", "particles to mesh", "metaball2vol | mc-opt", ("splashsurf",), (1, 2)),
-    ("mesh to voxels, 512³", "voxelize", "voxelize 512", "voxelize: grid", ("Embree rays", "VTK stencil"), (1,)),
+    ("mesh to voxels, 512³", "voxelize", "voxelize 512", "voxelize: grid", ("Embree rays", "Embree packets of 16", "VTK stencil"), (1,)),
     ("mesh to voxels, 256³", "voxelize", "voxelize 256", "voxelize: grid", ("OpenVDB meshToLevelSet",), (0,)),
     ("volume added to a large one", "csg", "add", "gewebe", ("openvdb", "openvdb_moved"), (2,)),
     ("isosurface, band of a ball", "geometry", "surface", "marching cubes", ("OpenVDB volumeToMesh",), (0,)),

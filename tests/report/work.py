@@ -78,7 +78,7 @@ def voxels(w, page):
             curves.setdefault(name, []).append((float(r["stage"].split()[-1]), r["median_ms"]))
         page.svg("time", plot.curves("A colon of 80,000 triangles becomes voxels", "voxels along an edge", "median time, ms", list(curves.items())), "time")
     for stage in stages:
-        beside(page, rows, f"{stage}³", stage, "voxelize: grid", ("Embree rays", "VTK stencil", "OpenVDB meshToLevelSet"))
+        beside(page, rows, f"{stage}³", stage, "voxelize: grid", ("Embree rays", "Embree packets of 8", "Embree packets of 16", "VTK stencil", "OpenVDB meshToLevelSet"))
 
 
 def surface(w, page):

@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import tempfile
 
+import machine
 from page import Skipped
 
 
@@ -84,13 +85,17 @@ class Workshop:
         done = subprocess.run([path, *words], cwd=self.root, env=self.environment, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"bench_{program}: {(done.stderr.strip().splitlines() or ['no word'])[-1]}")
-        (self.keep / f"{program}.csv").write_text(done.stdout)
+        self.keep_rows(program, done.stdout)
         return rows_of(done.stdout), done.stderr
+
+    def keep_rows(self, name, content):
+        """A CSV beside the pages, with what it was measured on behind it."""
+        (self.keep / f"{name}.csv").write_text(content + machine.lines(self.build, self.python))
 
 
 def rows_of(content):
     """A CSV as dictionaries, what is a number as such. The first column may hold commas: the name of a stage does."""
-    lines = [line.split(",") for line in content.splitlines() if line]
+    lines = [line.split(",") for line in content.splitlines() if line and not line.startswith("#")]
     head, rows = lines[0], []
     for cells in lines[1:]:
         more = len(cells) - len(head)
