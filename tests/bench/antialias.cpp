@@ -36,7 +36,7 @@ using namespace gewebe::timing;
 
 namespace {
 
-constexpr int dim = 128, report_samples = 6, runs = 5;
+constexpr int dim = 128, report_samples = 6, runs = 7;
 
 const Context one_thread = [] {
   Context context;

@@ -26,7 +26,7 @@ using gewebe::test::sphere_mesh;
 
 namespace {
 
-constexpr int runs = 5;
+constexpr int runs = 7;
 
 /// Times `work(prepare())`; preparing doesn't count, nor does the end of what work returns.
 template <class Prepare, class Work>
@@ -130,7 +130,7 @@ void bench(const char* name, CsgOperation operation, const Tool& tool, const Gri
     report(name, "gewebe_shared", leaves, others, threads, measure(share, combine), 0);
     ours = combine(share());
   }
-  openvdb::FloatGrid::Ptr theirs;
+  std::pair<openvdb::FloatGrid::Ptr, openvdb::FloatGrid::Ptr> theirs; // freed between the runs
   const auto copies = [&] {
     const auto copy = [](const Grid& grid) {
       return openvdb::FloatGrid::create(std::make_shared<FloatTree>(*grid.native()->tree));
@@ -139,13 +139,23 @@ void bench(const char* name, CsgOperation operation, const Tool& tool, const Gri
   };
   const auto apply = [&](auto pair) {
     tool(*pair.first, *pair.second);
-    theirs = pair.first;
+    theirs = std::move(pair);
     return 0;
   };
-  const Times with_copy = measure([] { return 0; }, [&](int) { return apply(copies()); });
-  report(name, "openvdb", leaves, others, 2, with_copy, differences(ours, theirs->tree()));
-  const Times without = measure(copies, apply);
-  report(name, "openvdb_moved", leaves, others, 2, without, differences(ours, theirs->tree()));
+  const auto free_last = [&] {
+    theirs = {};
+    return 0;
+  };
+  const Times with_copy = measure(free_last, [&](int) { return apply(copies()); });
+  report(name, "openvdb", leaves, others, 2, with_copy, differences(ours, theirs.first->tree()));
+  const Times without = measure(
+      [&] {
+        theirs = {};
+        return copies();
+      },
+      apply);
+  report(name, "openvdb_moved", leaves, others, 2, without,
+         differences(ours, theirs.first->tree()));
 }
 
 } // namespace

@@ -32,7 +32,7 @@ using namespace gewebe::timing;
 
 namespace {
 
-constexpr int runs = 5;
+constexpr int runs = 7;
 
 void report(const char* stage, const char* program, double voxel, double size, int threads,
             const Times& times, double figure, const char* measure) {

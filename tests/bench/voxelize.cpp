@@ -36,7 +36,7 @@ using namespace gewebe::timing;
 
 namespace {
 
-constexpr int runs = 5;
+constexpr int runs = 7;
 
 /// What `work` adds at most to the process, MiB: asked of a child, which ends before it frees
 /// anything.
