@@ -107,3 +107,27 @@ test_pages_of_the_repository_are_whole() {
   pages_are_whole "$GEWEBE_ROOT/examples/report" >said || fail "$(<said)"
   ! grep -q 'Made by .QUICK=1' "$GEWEBE_ROOT/examples/report/README.md" || fail 'the pages are small ones'
 }
+
+# What `make bench` draws: names of stages may hold commas, what a logarithm has not is left out, a CSV without such columns has no
+# picture and is no fault.
+test_plot_of_known_rows() {
+  mkdir bin
+  printf '#!/bin/bash\ncat >gnuplot.in\n' >bin/gnuplot
+  chmod +x bin/gnuplot
+  cat >some.csv <<'END'
+stage,program,rows,columns,threads,fastest_ms,median_ms,figure,unit
+net, factor,ours,300,0,1,9,10,5,GFLOP/s
+net, factor,theirs,300,0,2,4,5,6,GFLOP/s
+no error,ours,300,0,1,9,10,0,mm
+no number,ours,300,0,1,9,10,nan,mm
+zero over size,ours,300,0,1,9,10,0,mm
+# processor: one
+END
+  PATH="$PWD/bin:$PATH" "$GEWEBE_ROOT/scripts/plot" some.csv >said 2>&1 || fail "status $?" "$(<said)"
+  [[ $(<said) == some.svg && $(grep -c '^plot ' gnuplot.in) == 2 ]] || fail 'other panels' "$(<said)" "$(<gnuplot.in)"
+  grep -q "^set title 'net, factor'; set ylabel 'GFLOP/s'$" gnuplot.in || fail 'another stage' "$(<gnuplot.in)"
+  grep -q "using 5:6 with linespoints title 'theirs, 2 threads'$" gnuplot.in || fail 'another program' "$(<gnuplot.in)"
+  printf 'operation,program,leaves\nadd,ours,3\n' >other.csv
+  PATH="$PWD/bin:$PATH" "$GEWEBE_ROOT/scripts/plot" other.csv >said 2>&1 || fail "status $?" "$(<said)"
+  grep -q 'other.csv has nothing to draw' said || fail "$(<said)"
+}
