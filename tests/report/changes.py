@@ -1,10 +1,11 @@
 """What changed since another commit: its programs beside these, case by case, in turns."""
 
 import os
-import pathlib
+import re
 import statistics
 import subprocess
 
+import machine
 import plot
 from page import Skipped
 from workshop import rows_of
@@ -21,10 +22,15 @@ def measured(w, page):
         done = subprocess.run(command, cwd=w.root, env=w.environment, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(" ".join(done.stderr.split()[-60:]) or "two_builds.py says nothing")
-        w.keep_rows("two_builds", done.stdout)
+        commit = machine.output("git", "-C", before, "rev-parse", "--short=10", "HEAD") or "unknown"
+        w.keep_rows("two_builds", f"{done.stdout}# before: commit {commit}\n")
     if not path.exists():
         raise Skipped("BEFORE names no folder of another commit's programs")
-    return [{**row, "case": row["case"].strip('"')} for row in rows_of(path.read_text())]
+    content = path.read_text()
+    told = dict(re.findall(r"^# (.*?): (.*)$", content, re.M))
+    where = ", ".join(f"{key}: {told[key]}" for key in ("measured", "processor", "cores", "before", "Gewebe") if key in told)
+    page.note = f"Measured as the pages of work say, when and where two_builds.csv tells ({where or 'nothing'})."
+    return [{**row, "case": row["case"].strip('"')} for row in rows_of(content)]
 
 
 def changes(w, page):
