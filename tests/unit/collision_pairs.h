@@ -1,0 +1,36 @@
+#pragma once
+// Random pairs of primitives for tests of distances and of continuous collision detection.
+
+#include "base/vec3.h"
+
+#include <array>
+#include <cstddef>
+#include <random>
+
+namespace gewebe::test {
+
+inline Vec3 random_point(std::mt19937& random, double size) {
+  std::uniform_real_distribution<double> side(-size, size);
+  const double x = side(random), y = side(random);
+  return {x, y, side(random)};
+}
+
+/// Vertices of a pair: in general position, on a coarse lattice (coplanar, parallel, equal ones),
+/// or nearly flat.
+template <std::size_t n>
+std::array<Vec3, n> random_pair(std::mt19937& random) {
+  std::array<Vec3, n> x;
+  const unsigned kind = random() % 4;
+  for (Vec3& p : x) {
+    p = random_point(random, 2);
+    if (kind == 1)
+      p = {std::round(p.x), std::round(p.y), std::round(p.z)};
+    if (kind == 2)
+      p.z *= 1e-6;
+    if (kind == 3)
+      p.y = std::round(p.y) + 1e-9 * p.z;
+  }
+  return x;
+}
+
+} // namespace gewebe::test
