@@ -2,9 +2,12 @@
 // Random pairs of primitives for tests of distances and of continuous collision detection.
 
 #include "base/vec3.h"
+#include "mesh/exact_predicates.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <random>
 
 namespace gewebe::test {
@@ -31,6 +34,18 @@ std::array<Vec3, n> random_pair(std::mt19937& random) {
       p.y = std::round(p.y) + 1e-9 * p.z;
   }
   return x;
+}
+
+/// Whether the segment p q and the triangle have a point in common, exactly; false where the
+/// segment lies in the plane.
+inline bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+  std::uint64_t tests = 0;
+  const int sp = side_sign(a, b, c, p, tests), sq = side_sign(a, b, c, q, tests);
+  if (sp * sq > 0 || (sp == 0 && sq == 0))
+    return false;
+  const int ab = side_sign(p, q, a, b, tests), bc = side_sign(p, q, b, c, tests),
+            ca = side_sign(p, q, c, a, tests);
+  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
 } // namespace gewebe::test

@@ -131,6 +131,30 @@ TEST(Barrier, GradientAndHessianAreThoseOfDifferences) {
     EXPECT_GT(kinds[count], 5);
 }
 
+/// A case of round numbers, with pairs of all kinds, and what ipc-toolkit 1.6.1 (ipctk) has for it;
+/// tests/validate/collision.cpp compares many more.
+TEST(Barrier, EnergyIsThatOfIpcToolkit) {
+  CollisionSurface surface = test::two_sheets(3, 0.14, 0, 0.02, 0);
+  surface.radius.assign(surface.size(), 0.02);
+  std::vector<Vec3> x = surface.rest;
+  for (std::size_t k = 0; k < x.size(); ++k)
+    x[k] += 0.005 * Vec3{static_cast<double>(k * 7 % 11), static_cast<double>(k * 5 % 13),
+                         static_cast<double>(k * 3 % 7)};
+  const ContactPairs pairs = pairs_of(surface, x, 0.2);
+  std::vector<Vec3> gradient(x.size());
+  const double energy = add_barrier_gradient(pairs, x, 3, gradient);
+  int mollified = 0;
+  for (const ContactPair& pair : pairs.pairs)
+    mollified += pair.eps_x > 0;
+  EXPECT_EQ(pairs.pairs.size(), 63U);
+  EXPECT_EQ(mollified, 2);
+  EXPECT_NEAR(energy, 0.3441118566738675, 1e-12);
+  EXPECT_NEAR(gradient[4].x, -0.00640291593037821, 1e-12);
+  EXPECT_NEAR(gradient[4].y, 0.2694199217124332, 1e-12);
+  EXPECT_NEAR(gradient[4].z, 2.3757185059069226, 1e-12);
+  EXPECT_NEAR(smallest_gap(pairs, x), 0.08391697799029041 - 0.04, 1e-14);
+}
+
 TEST(Barrier, ProjectionOfASemidefiniteHessianIsTheSame) {
   const CollisionSurface surface = test::two_sheets(4, 0.1, 0.03, 0.5, 5);
   const ContactPairs pairs = pairs_of(surface, surface.rest, 0.2);

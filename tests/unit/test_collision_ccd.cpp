@@ -3,17 +3,16 @@
 #include "collision/distance.h"
 #include "collision_pairs.h"
 #include "larger.h"
-#include "mesh/exact_predicates.h"
 
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <gtest/gtest.h>
 #include <random>
 
 namespace gewebe::collision {
 namespace {
 
+using test::passes;
 using test::random_pair;
 using test::random_point;
 
@@ -24,18 +23,6 @@ std::array<Vec3, n> between(const std::array<Vec3, n>& x0, const std::array<Vec3
   for (std::size_t k = 0; k < n; ++k)
     x[k] = x0[k] + t * (x1[k] - x0[k]);
   return x;
-}
-
-/// Whether the segment p q and the triangle have a point in common, exactly; false where the
-/// segment lies in the plane.
-bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
-  std::uint64_t tests = 0;
-  const int sp = side_sign(a, b, c, p, tests), sq = side_sign(a, b, c, q, tests);
-  if (sp * sq > 0 || (sp == 0 && sq == 0))
-    return false;
-  const int ab = side_sign(p, q, a, b, tests), bc = side_sign(p, q, b, c, tests),
-            ca = side_sign(p, q, c, a, tests);
-  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
 TEST(CollisionCcd, PointNeverPassesATriangleAtRest) {
