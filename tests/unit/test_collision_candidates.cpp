@@ -4,8 +4,10 @@
 #include "base/larger.h"
 #include "collision/bvh.h"
 #include "collision/distance.h"
+#include "collision/edge_triangle.h"
 #include "collision_pairs.h"
 #include "collision_scene.h"
+#include "rational_distance.h"
 
 #include <algorithm>
 #include <array>
@@ -281,6 +283,76 @@ TEST(Candidates, AStepNeverEndsInAnIntersection) {
         }
   }
   EXPECT_GT(cut, 30);
+}
+
+TEST(Intersections, EdgeMeetsTriangleExactly) {
+  std::mt19937 random(8);
+  int meets = 0, coplanar = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const bool lattice = k % 2 == 0;
+    std::array<Vec3, 5> x;
+    for (Vec3& p : x) {
+      p = random_point(random, 2);
+      if (lattice)
+        p = {std::round(p.x), std::round(p.y), k % 4 == 0 ? 0 : std::round(p.z)};
+    }
+    std::array<test::Vector, 5> e;
+    for (std::size_t i = 0; i < 5; ++i)
+      e[i] = test::exact(x[i]);
+    const test::Vector n = test::cross(test::minus(e[3], e[2]), test::minus(e[4], e[2]));
+    if (test::squared(n) == 0) {
+      EXPECT_FALSE(edge_meets_triangle(x[0], x[1], x[2], x[3], x[4]));
+      continue;
+    }
+    // No distance from its ends, none from the sides, or a point within.
+    bool expected = test::of_triangle({e[0], e[2], e[3], e[4]}) == 0 ||
+                    test::of_triangle({e[1], e[2], e[3], e[4]}) == 0 ||
+                    test::of_edges({e[0], e[1], e[2], e[3]}) == 0 ||
+                    test::of_edges({e[0], e[1], e[3], e[4]}) == 0 ||
+                    test::of_edges({e[0], e[1], e[4], e[2]}) == 0;
+    const test::Number hp = test::dot(test::minus(e[0], e[2]), n),
+                       hq = test::dot(test::minus(e[1], e[2]), n);
+    coplanar += hp == 0 && hq == 0;
+    if (sgn(hp) * sgn(hq) < 0) {
+      const test::Number t = hp / (hp - hq);
+      const test::Vector at = test::along(e[0], t, test::minus(e[1], e[0]));
+      expected = expected || test::of_triangle({at, e[2], e[3], e[4]}) == 0;
+    }
+    EXPECT_EQ(edge_meets_triangle(x[0], x[1], x[2], x[3], x[4]), expected) << k;
+    meets += expected;
+  }
+  EXPECT_GT(meets, 300);
+  EXPECT_GT(coplanar, 150);
+}
+
+TEST(Intersections, AreThoseOfABruteSearch) {
+  for (unsigned seed = 1; seed < 6; ++seed) {
+    const CollisionSurface surface = test::two_sheets(8, 0.02, 0.05, 0.2, seed);
+    std::mt19937 random(seed);
+    std::vector<Vec3> x = surface.rest;
+    for (Vec3& p : x)
+      p += random_point(random, seed == 5 ? 0 : 0.2);
+    AllowedPairs allowed = all_but_self(4);
+    allowed.set(0, 0, 1);
+    std::vector<Intersection> expected;
+    for (std::uint32_t e = 0; e < surface.edges.size(); ++e)
+      for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+        const auto [p, q] = surface.edges[e];
+        const auto [a, b, c] = surface.triangles[t];
+        if (allowed.at(surface.owner[p], surface.owner[a]) != 0 && surface.owner[p] < 2 &&
+            std::set<std::uint32_t>{p, q, a, b, c}.size() == 5 &&
+            edge_meets_triangle(x[p], x[q], x[a], x[b], x[c]))
+          expected.push_back({e, t});
+      }
+    std::vector<Intersection> found =
+        BroadPhase(surface).find_intersections(surface, x, allowed, 10000);
+    std::sort(found.begin(), found.end(), [](const Intersection& a, const Intersection& b) {
+      return std::pair(a.edge, a.triangle) < std::pair(b.edge, b.triangle);
+    });
+    EXPECT_EQ(found, expected);
+    EXPECT_GT(expected.size(), 10U);
+    EXPECT_EQ(BroadPhase(surface).find_intersections(surface, x, allowed, 3).size(), 3U);
+  }
 }
 
 } // namespace
