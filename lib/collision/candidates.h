@@ -83,6 +83,9 @@ private:
   std::vector<std::array<std::uint32_t, 2>> pairs_; ///< of find_pairs
 };
 
+/// Vertices of all candidates, ascending, each once.
+std::vector<std::uint32_t> vertices_of(const Candidates& candidates);
+
 /// Largest step in [0, 1] along which all candidates keep their separation.
 /// \param separation  d_min is added to the sum of the pair's radii
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
