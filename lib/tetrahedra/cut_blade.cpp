@@ -1,6 +1,6 @@
 #include "base/error.h"
+#include "base/exact_predicates.h"
 #include "mesh/edges.h"
-#include "mesh/exact_predicates.h"
 #include "tetrahedra/cut_blade_internal.h"
 
 #include <algorithm>
