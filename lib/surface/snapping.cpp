@@ -3,14 +3,16 @@
 #include "base/error.h"
 #include "base/huge_pages.h"
 #include "base/parallel.h"
+#include "surface/flat_faces_internal.h"
 #include "surface/snap_collapse_internal.h"
 #include "surface/snap_lattice_internal.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
-#include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,12 +20,6 @@
 
 namespace gewebe {
 namespace {
-
-bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 u = b - a, v = c - a, w = c - b;
-  const double longest = std::max({dot(u, u), dot(v, v), dot(w, w)});
-  return !(norm(cross(u, v)) > 1e-12 * longest);
-}
 
 /// A quick test. \pre enough is the square of what the area may be at least, for sides of 1
 bool has_much_area(const Vec3& a, const Vec3& b, const Vec3& c, double enough) {
@@ -65,7 +61,17 @@ public:
     count(result.mesh);
     write_points(result.mesh.points);
     write_triangles(result.mesh.points, result.mesh.triangles);
-    result.report.zero_area = count_without_area();
+    std::vector<std::uint32_t> flat = find_without_area();
+    if (at_corners_) {
+      flat = flip_flat_faces(result.mesh, std::move(flat));
+      move_back(result.mesh, flat);
+      std::erase_if(flat, [&](std::uint32_t n) {
+        const auto& [a, b, c] = result.mesh.triangles[n];
+        const std::vector<Vec3>& points = result.mesh.points;
+        return !has_no_area(points[a], points[b], points[c], world_tolerance);
+      });
+    }
+    result.report.zero_area = flat.size();
   }
 
 private:
@@ -76,9 +82,10 @@ private:
     std::uint32_t block = 0;
     std::uint8_t word = 0, bit = 0;
   };
-  /// A face with hardly an area: the block of its cell, and which of its faces that was.
+  /// A face with hardly an area: the block of its cell, which of its faces that was, and its number
+  /// in the mesh.
   struct SmallFace {
-    std::uint32_t block = 0, face = 0;
+    std::uint32_t block = 0, face = 0, triangle = 0;
   };
   /// Of the places of a block's edges: the point's new number, and bit 32 where a face of it may
   /// have no area.
@@ -88,7 +95,8 @@ private:
   void write_points(std::vector<Vec3>& points);
   void note_points(std::size_t n, PlaceNumbers& numbers) const;
   void write_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles);
-  std::uint64_t count_without_area();
+  std::vector<std::uint32_t> find_without_area();
+  void move_back(TriangleMesh& mesh, std::span<const std::uint32_t> flat) const;
   PointRef point_at(std::size_t n, unsigned place) const;
   std::array<PointRef, 3> corners_of(const SmallFace& face) const;
   Vec3 position(const PointRef& ref) const;
@@ -246,8 +254,9 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
       for (std::size_t p = 0; p < faces->picked_count; ++p) {
         const Triangle& t = faces->made[faces->picked[p]];
         if (!has_much_area(points[t[0]], points[t[1]], points[t[2]], enough))
-          small_[begin / blocks_at_once].push_back(
-              {static_cast<std::uint32_t>(n), faces->picked_from[p]});
+          small_[begin / blocks_at_once].push_back({static_cast<std::uint32_t>(n),
+                                                    faces->picked_from[p],
+                                                    first_triangle_[n] + faces->picked[p]});
       }
     }
   });
@@ -294,19 +303,20 @@ Vec3 SnappedMesh::position(const PointRef& ref) const {
   return index_position(crossing);
 }
 
-std::uint64_t SnappedMesh::count_without_area() {
+/// Faces without area, ascending, judged in index space.
+std::vector<std::uint32_t> SnappedMesh::find_without_area() {
   bool none = true;
   for (const auto& part : small_)
     none = none && part.empty();
   if (none)
-    return 0;
+    return {};
   std::vector<std::pair<std::uint32_t, Vec3>> merged; // by their new number
   for (const auto& part : merges_.places)
     for (const SnapMerges::Place& place : part)
       merged.emplace_back(merges_.target[place.point], place.position);
   const auto by_number = [](const auto& a, const auto& b) { return a.first < b.first; };
   std::ranges::sort(merged, by_number);
-  std::vector<std::uint64_t> counts(small_.size());
+  std::vector<std::vector<std::uint32_t>> flat(small_.size());
   parallel_blocks(context_, small_.size(), 1, [&](std::size_t part, std::size_t) {
     for (const SmallFace& face : small_[part]) {
       const std::array<PointRef, 3> refs = corners_of(face);
@@ -319,10 +329,49 @@ std::uint64_t SnappedMesh::count_without_area() {
         const auto found = std::ranges::lower_bound(merged, std::pair(number, Vec3{}), by_number);
         p.at(a) = found != merged.end() && found->first == number ? found->second : position(ref);
       }
-      counts[part] += has_no_area(p[0], p[1], p[2]) ? 1 : 0;
+      if (has_no_area(p[0], p[1], p[2]))
+        flat[part].push_back(face.triangle);
     }
   });
-  return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  std::vector<std::uint32_t> all;
+  for (const auto& part : flat)
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+/// Puts the points of faces that are still flat at the mean of their crossings (Place::mean) in
+/// place of a corner.
+void SnappedMesh::move_back(TriangleMesh& mesh, std::span<const std::uint32_t> flat) const {
+  struct Mean {
+    Vec3 sum;
+    double weights = 0;
+  };
+  std::map<std::uint32_t, Mean> means;
+  for (const std::uint32_t n : flat)
+    for (const std::uint32_t corner : mesh.triangles[n])
+      means[corner] = {};
+  if (means.empty())
+    return;
+  for (std::size_t n = 0; n < surface_.blocks.size(); ++n) {
+    const SurfaceBlock& block = *surface_.blocks[n];
+    for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+      const BlockEdge edge = surface_.edges[p];
+      const bool merged = (lattice_.snaps(n).merged.at(edge.word()) >> edge.bit() & 1) != 0;
+      const auto mean = means.find(merges_.target[merged ? merges_.target[p] : p]);
+      if (mean == means.end())
+        continue;
+      const double along = surface_.fractions[p], weight = 1 - 1.5 * std::min(along, 1 - along);
+      const EdgeCrossing crossing{{block.origin[0] + static_cast<int>(edge.i()),
+                                   block.origin[1] + static_cast<int>(edge.j()),
+                                   block.origin[2] + static_cast<int>(edge.k())},
+                                  static_cast<std::int32_t>(edge.axis()),
+                                  along};
+      mean->second.sum += index_position(crossing) * weight;
+      mean->second.weights += weight;
+    }
+  }
+  for (const auto& [point, mean] : means)
+    mesh.points[point] = world_position(transform_.m, mean.sum / mean.weights);
 }
 
 } // namespace

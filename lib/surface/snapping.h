@@ -46,9 +46,10 @@ struct SnapResult {
 ///    Euler number and components, without equal faces or faces with equal corners.
 ///
 /// What the link condition refuses stays as it is, for example the last tetrahedron of a component
-/// that lies in one cluster. With Place::corner such points coincide in space, and flat faces
-/// between corners in one line have no area: these are counted. Place::mean moves only merged
-/// points, Place::corner every point of a cluster (but no point of a fin on its own).
+/// that lies in one cluster. Place::mean moves only merged points, Place::corner every point of a
+/// cluster (but no point of a fin on its own). With Place::corner faces between corners in one line
+/// have no area: their longest edge is flipped (flip_flat_faces), and the points of faces that no
+/// flip helps, for they coincide, go where Place::mean has them. What is still flat is counted.
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
 /// What is snapped is surface.lattice as marching_cubes or marching_cubes_to_snap made it; the mesh

@@ -17,14 +17,18 @@ namespace {
 struct BandLeaf {
   std::array<double, leaf_voxels> squared;
   std::array<std::uint32_t, leaf_voxels> triangle;
+  // By the winding rule alone:
+  std::array<std::uint64_t, 8> several{}; ///< bits: triangles of several patches are near
+  std::vector<std::uint32_t> near;        ///< triangles that are near voxels of the leaf
 };
 
 /// Leaves of the band of one slab, in ascending order.
 using BandLeaves = std::map<LeafPlace, std::unique_ptr<BandLeaf>>;
 
-/// Offers triangle n to all voxels of the slab nearer to it than `reach`.
-void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, double reach,
-           BandLeaves& leaves) {
+/// Offers triangle n to all voxels of the slab nearer to it than `reach`. \param faces  null unless
+/// the rule is that of the winding number
+void offer(const SlabbedMesh& mesh, const OrientedFaces* faces, std::uint32_t n,
+           std::int32_t first_row, double reach, BandLeaves& leaves) {
   const Triangle& t = mesh.triangles[n];
   const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
   Int3 low{}, high{}; // of voxels, whose centres are at the index and a half
@@ -44,6 +48,11 @@ void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, dou
   for (std::int32_t j_leaf = low[1] >> 3; j_leaf <= high[1] >> 3; ++j_leaf)
     for (std::int32_t k_leaf = low[2] >> 3; k_leaf <= high[2] >> 3; ++k_leaf) {
       BandLeaf* leaf = nullptr;
+      const auto other_patch = [&](std::size_t v) {
+        return faces != nullptr && faces->patch[n] != OrientedFaces::none &&
+               leaf->squared[v] < HUGE_VAL && faces->patch[leaf->triangle[v]] != faces->patch[n] &&
+               (leaf->several[v >> 6] >> (v & 63) & 1) == 0;
+      };
       const std::int32_t j_end = std::min(high[1], 8 * j_leaf + 7);
       const std::int32_t k_end = std::min(high[2], 8 * k_leaf + 7);
       for (std::int32_t i = low[0]; i <= high[0]; ++i)
@@ -54,7 +63,8 @@ void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, dou
             if (!(to_plane * to_plane < limit))
               continue;
             const auto v = static_cast<std::size_t>(leaf_offset({i, j, k}));
-            if (leaf != nullptr && to_plane * to_plane > leaf->squared[v] * (1 + 1e-9))
+            if (leaf != nullptr && to_plane * to_plane > leaf->squared[v] * (1 + 1e-9) &&
+                !other_patch(v))
               continue;
             const Vec3 offset = p - nearest_on_triangle(p, a, b, c).point;
             const double squared = dot(offset, offset);
@@ -67,7 +77,11 @@ void offer(const SlabbedMesh& mesh, std::uint32_t n, std::int32_t first_row, dou
                 slot->squared.fill(HUGE_VAL);
               }
               leaf = slot.get();
+              if (faces != nullptr)
+                leaf->near.push_back(n);
             }
+            if (other_patch(v))
+              leaf->several[v >> 6] |= std::uint64_t{1} << (v & 63);
             if (squared < leaf->squared[v]) {
               leaf->squared[v] = squared;
               leaf->triangle[v] = n;
@@ -102,6 +116,56 @@ private:
   std::vector<Int3> small_, large_;
 };
 
+/// Winding numbers of the voxels of a scan by the winding rule.
+class Windings {
+public:
+  explicit Windings(const InsideScan& scan) : runs_(scan.windings) {}
+  /// Of a leaf where others than 0 and 1 occur; null elsewhere.
+  const WindingRun* of(const Int3& origin) const {
+    const auto next = std::ranges::upper_bound(runs_, origin, {}, &WindingRun::origin);
+    if (next == runs_.begin())
+      return nullptr;
+    const WindingRun& run = *(next - 1);
+    const bool within =
+        run.origin[0] == origin[0] && run.origin[1] == origin[1] && origin[2] < run.k_end;
+    return within ? &run : nullptr;
+  }
+
+private:
+  std::span<const WindingRun> runs_;
+};
+
+/// What the values of all voxels are made from.
+struct RampSource {
+  const SlabbedMesh& mesh;
+  const OrientedFaces* faces; ///< null unless the rule is that of the winding number
+  double half_width;
+  const RampDistances& distances;
+
+  /// Distance of voxel v at p, inside or not; winding is not 0 inside.
+  double distance(const BandLeaf& band, std::size_t v, const Vec3& p, int winding) const;
+};
+
+double RampSource::distance(const BandLeaf& band, std::size_t v, const Vec3& p, int winding) const {
+  const std::uint32_t nearest = band.triangle[v];
+  // Outside, the face nearest to p always belongs to the boundary: no other is in between.
+  if (faces == nullptr || winding == 0)
+    return distances.to_triangle(mesh, p, nearest);
+  const auto is_behind = [&](const Triangle& t) {
+    const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+    return dot(cross(b - a, c - a), p - a) < 0;
+  };
+  if (winding == 1 && (band.several[v >> 6] >> (v & 63) & 1) == 0 &&
+      faces->patch[nearest] != OrientedFaces::none && is_behind(faces->triangles[nearest]))
+    return distances.to_triangle(mesh, p, nearest);
+  const std::optional<BoundaryPoint> found =
+      nearest_boundary(mesh.points, *faces, p, winding, band.near, half_width);
+  if (!found)
+    return half_width;
+  return found->other == OrientedFaces::none ? distances.to_triangle(mesh, p, found->triangle)
+                                             : distances.to_curve(mesh, p, *found);
+}
+
 struct RampLeaf {
   Int3 origin{};
   std::array<float, leaf_voxels> values{};
@@ -112,9 +176,9 @@ struct RampSlab {
   std::uint64_t band_voxels = 0;
 };
 
-RampLeaf ramp_leaf(const SlabbedMesh& mesh, const BandLeaf* band, const Int3& origin,
-                   const std::array<std::uint64_t, 8>& inside, double half_width,
-                   const RampDistance& distance, std::uint64_t& band_voxels) {
+RampLeaf ramp_leaf(const RampSource& source, const BandLeaf* band, const Int3& origin,
+                   const std::array<std::uint64_t, 8>& inside, const WindingRun* windings,
+                   std::uint64_t& band_voxels) {
   RampLeaf leaf;
   leaf.origin = origin;
   for (std::size_t v = 0; v < leaf_voxels; ++v) {
@@ -124,7 +188,9 @@ RampLeaf ramp_leaf(const SlabbedMesh& mesh, const BandLeaf* band, const Int3& or
       const auto n = static_cast<std::int32_t>(v);
       const Vec3 p{origin[0] + (n >> 6) + 0.5, origin[1] + (n >> 3 & 7) + 0.5,
                    origin[2] + (n & 7) + 0.5};
-      const double ramp = std::fmin(0.5, distance(mesh, p, band->triangle[v]) / (2 * half_width));
+      const int winding = !in ? 0 : windings != nullptr ? windings->winding[v] : 1;
+      const double ramp =
+          std::fmin(0.5, source.distance(*band, v, p, winding) / (2 * source.half_width));
       value = in ? 0.5 + ramp : 0.5 - ramp;
       ++band_voxels;
     }
@@ -170,10 +236,13 @@ std::uint64_t add_tiles(const InsideScan& scan, const std::vector<Int3>& taken,
 
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
                   const VoxelizeOptions& options, double half_width,
-                  const std::function<RampDistance(const SlabbedMesh&)>& prepare,
+                  const std::function<RampDistances(const SlabbedMesh&)>& prepare,
                   CoverageReport& report) {
   report = {};
-  const InsideScan scan = scan_inside(context, mesh, transform, options, &report.mesh);
+  const bool winding = options.rule == VoxelRule::winding;
+  VoxelizeOptions scanned = options;
+  scanned.keep_windings = winding;
+  const InsideScan scan = scan_inside(context, mesh, transform, scanned, &report.mesh);
   // The band is wider than the surface's leaves by half_width on both sides.
   require_memory(context, 3 * coverage_bytes(mesh, transform), "the voxelized mesh");
   SlabbedMesh slabbed;
@@ -184,24 +253,32 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
   close_or_refuse(context, mesh, transform, refused ? options.on_open : OpenMesh::skip,
                   slabbed.points, slabbed.triangles, holes);
   sort_into_slabs(context, slabbed, half_width);
-  const RampDistance distance = prepare(slabbed);
+  const RampDistances distances = prepare(slabbed);
+  OrientedFaces faces;
+  if (winding) {
+    const bool closed = slabbed.triangles.size() > mesh.triangles.size();
+    faces = orient_faces(slabbed.points, slabbed.triangles,
+                         {mesh.part.data(), closed ? 0 : mesh.part.size()});
+  }
+  const RampSource source{slabbed, winding ? &faces : nullptr, half_width, distances};
 
   const InsideBits bits(scan);
+  const Windings windings(scan);
   std::vector<RampSlab> slabs(slabbed.slab_begin.size() - 1);
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       const std::int32_t row = (slabbed.first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
       BandLeaves band;
       for (std::size_t n = slabbed.slab_begin[s]; n < slabbed.slab_begin[s + 1]; ++n)
-        offer(slabbed, slabbed.members[n], row, half_width, band);
+        offer(slabbed, source.faces, slabbed.members[n], row, half_width, band);
       // Mixed leaves lie in the band; only rays that were left empty can make others.
       for (auto at = std::ranges::lower_bound(scan.origins, Int3{row, INT32_MIN, INT32_MIN});
            at != scan.origins.end() && (*at)[0] == row; ++at)
         band.try_emplace({(*at)[1] >> 3, (*at)[2] >> 3});
       for (const auto& [place, leaf] : band) {
         const Int3 origin{row, 8 * place.j, 8 * place.k};
-        slabs[s].leaves.push_back(ramp_leaf(slabbed, leaf.get(), origin, bits.of(origin),
-                                            half_width, distance, slabs[s].band_voxels));
+        slabs[s].leaves.push_back(ramp_leaf(source, leaf.get(), origin, bits.of(origin),
+                                            windings.of(origin), slabs[s].band_voxels));
       }
     }
   });

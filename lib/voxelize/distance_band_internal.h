@@ -2,6 +2,7 @@
 // The nearest triangle of each voxel near a surface. Internal to the voxelizer.
 
 #include "mesh/nearest_point.h"
+#include "voxelize/buried_faces_internal.h"
 #include "voxelize/coverage_internal.h"
 
 #include <functional>
@@ -13,12 +14,23 @@ namespace gewebe {
 using RampDistance =
     std::function<double(const SlabbedMesh& mesh, const Vec3& p, std::uint32_t triangle)>;
 
+/// The same where the nearest point of the boundary lies on the curve in which two triangles pass
+/// through each other.
+using RampDistanceToCurve =
+    std::function<double(const SlabbedMesh& mesh, const Vec3& p, const BoundaryPoint& nearest)>;
+
+struct RampDistances {
+  RampDistance to_triangle;
+  RampDistanceToCurve to_curve;
+};
+
 /// Value ½ ∓ d/(2 half_width) in the band of voxels whose centre is nearer than half_width to the
 /// surface, 0 or 1 elsewhere. `prepare` sees the mesh (index space moved by ½, holes closed where
-/// asked) and gives the function for d. \pre options.samples == 1
+/// asked) and gives the functions for d. By the winding rule voxels inside take the distance to the
+/// boundary of the solid (nearest_boundary). \pre options.samples == 1
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
                   const VoxelizeOptions& options, double half_width,
-                  const std::function<RampDistance(const SlabbedMesh&)>& prepare,
+                  const std::function<RampDistances(const SlabbedMesh&)>& prepare,
                   CoverageReport& report);
 
 } // namespace gewebe

@@ -7,9 +7,11 @@
 // which gives the sign too. Unlike coverage.h neither keeps the volume of bent surfaces, thin walls
 // or edges; but their values change evenly across the surface, so that its normals come out right.
 //
-// The distance is that to the faces, whatever the rule: near a hole, where winding numbers and
-// depth buffers close the solid without a face, voxels are 0 or 1, and at faces inside a solid that
-// overlaps another values fall to ½, not below. An open mesh is refused under parity alone.
+// By the winding rule the distance of a voxel inside is that to the boundary of the solid
+// (buried_faces_internal.h): faces with the inside on both sides, where solids overlap or touch, do
+// not count. By depth buffers it is that to all faces, and at faces inside values fall to ½, not
+// below. Near a hole, where both rules close the solid without a face, voxels are 0 or 1. An open
+// mesh is refused under parity alone.
 
 #include "voxelize/coverage.h"
 

@@ -142,7 +142,7 @@ InsideScan count_samples(const Context& context, const InsideScan& fine, int sam
   for (const TileView& tile : fine.tiles)
     include(tile.origin[0], tile.dim);
   if (low >= high)
-    return {samples, {}, {}, {}, {}};
+    return {samples, {}, {}, {}, {}, {}};
   std::vector<Slab<CountLeaf>> slabs(static_cast<std::size_t>(high - low));
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t s = first; s < last; ++s) {

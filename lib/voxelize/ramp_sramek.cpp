@@ -72,11 +72,16 @@ Grid sramek_density(const Context& context, const TriangleMesh& mesh,
                     const GridTransform& transform, OpenMesh on_open, CoverageReport* report,
                     VoxelRule rule) {
   CoverageReport local;
-  const auto oriented = [](const SlabbedMesh& m) -> RampDistance {
-    return [around = std::make_shared<const Surroundings>(m)](
-               const SlabbedMesh& same, const Vec3& p, std::uint32_t triangle) {
-      return oriented_distance(*around, same, p, triangle);
-    };
+  const auto oriented = [](const SlabbedMesh& m) -> RampDistances {
+    const auto around = std::make_shared<const Surroundings>(m);
+    return {[around](const SlabbedMesh& same, const Vec3& p, std::uint32_t triangle) {
+              return oriented_distance(*around, same, p, triangle);
+            },
+            [around](const SlabbedMesh&, const Vec3& p, const BoundaryPoint& nearest) {
+              const Vec3 offset = p - nearest.point;
+              return std::fmax(std::fabs(dot(offset, around->normals[nearest.triangle])),
+                               std::fabs(dot(offset, around->normals[nearest.other])));
+            }};
   };
   return ramp_density(context, mesh, transform, {rule, 1, on_open}, sramek_half_width, oriented,
                       report != nullptr ? *report : local);

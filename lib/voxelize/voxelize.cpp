@@ -180,7 +180,8 @@ InsideScan scan_inside(const Context& context, const TriangleMesh& mesh,
     // Cones that fill holes belong to no part, so with them edges alone connect.
     const std::span<const std::int32_t> part(mesh.part.data(),
                                              closed.empty() ? mesh.part.size() : 0);
-    return counted(winding_scan(context, index.points, samples.triangles, part, r));
+    return counted(winding_scan(context, index.points, samples.triangles, part,
+                                options.keep_windings && options.samples == 1, r));
   }
   if (options.rule == VoxelRule::zbuffer)
     return counted(depth_buffer_scan(context, samples, r));

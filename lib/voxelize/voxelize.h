@@ -37,6 +37,7 @@ struct VoxelizeOptions {
   /// i - ½ + (2a+1)/(2N), a = 0 … N-1, along each axis of the voxel. 1 … 64.
   int samples = 1;
   OpenMesh on_open = OpenMesh::refuse;
+  bool keep_windings = false; ///< rule winding, samples == 1: also InsideScan::windings
 };
 
 /// What the scan did.
@@ -54,6 +55,13 @@ struct VoxelizeReport {
   std::uint64_t samples_summed = 0; ///< near holes, where solid angles were added up
 };
 
+/// Winding numbers of leaves one above the other along k, equal in all of them.
+struct WindingRun {
+  Int3 origin{};          ///< of the lowest
+  std::int32_t k_end = 0; ///< voxels, exclusive
+  std::array<std::int16_t, leaf_voxels> winding{};
+};
+
 /// The samples inside, kept as bits or counts: only what the surface touches is stored voxel by
 /// voxel.
 struct InsideScan {
@@ -64,6 +72,9 @@ struct InsideScan {
   std::vector<std::array<std::uint32_t, leaf_voxels>>
       counts;                  ///< per leaf, if samples > 1: of samples³
   std::vector<TileView> tiles; ///< wholly inside, dim 8 or 128, value 1
+  /// Where winding numbers other than 0 and 1 occur, ascending by origin; elsewhere they are the
+  /// bits. Near a hole they are rounded, 0 outside.
+  std::vector<WindingRun> windings;
 };
 
 /// Bytes that `voxelize` will need at most for meshes of ordinary shape: from the surface's area in

@@ -119,9 +119,31 @@ void decide(const SolidAngleTree& cones, const CountLeaf& leaf, const Int3& orig
            next, bits, summed);
 }
 
-/// Sums the flips of a slab up along k. `near` are its leaves near the cones.
+/// Keeps the winding numbers of leaves from `from` up to leaf k_end, if others than 0 and 1 occur
+/// inside.
+void keep(const CountLeaf& leaf, const BitLeaf& bits, std::int32_t slab_i, LeafKey from,
+          std::int32_t k_end, std::vector<WindingRun>& runs) {
+  WindingRun run;
+  bool others = false;
+  for (std::size_t v = 0; v < leaf_voxels; ++v) {
+    if ((bits.word[v / 64] >> (v % 64) & 1) == 0)
+      continue;
+    const auto whole = static_cast<std::int32_t>(leaf.count[v]);
+    run.winding[v] = static_cast<std::int16_t>(whole == 0 ? 1 : std::clamp(whole, -32767, 32767));
+    others |= run.winding[v] != 1;
+  }
+  if (!others)
+    return;
+  run.origin = {slab_i * leaf_dim, from.j * leaf_dim, from.k * leaf_dim};
+  run.k_end = k_end * leaf_dim;
+  runs.push_back(run);
+}
+
+/// Sums the flips of a slab up along k. `near` are its leaves near the cones. \param runs  if not
+/// null, gets the winding numbers
 Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<const Int3> near,
-                        const SolidAngleTree& cones, Counters& counters) {
+                        const SolidAngleTree& cones, std::vector<WindingRun>* runs,
+                        Counters& counters) {
   for (const Int3& leaf : near)
     (void)map.at({leaf[1], leaf[2]});
   std::vector<std::uint32_t> order(map.keys.size());
@@ -139,17 +161,20 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
       CountLeaf gap;
       gap.integrate(carry);
       slab.put(bits_of(gap), {key.j, last.k + 1}, key.k, full);
+      if (runs != nullptr)
+        keep(gap, bits_of(gap), slab_i, {key.j, last.k + 1}, key.k, *runs);
     }
     CountLeaf& leaf = map.leaves[order[n]];
     leaf.integrate(carry); // 0 again past the last leaf: every ray leaves as often as it enters
-    if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k})) {
-      BitLeaf bits;
+    BitLeaf bits;
+    if (std::binary_search(near.begin(), near.end(), Int3{slab_i, key.j, key.k}))
       decide(cones, leaf, {slab_i * leaf_dim, key.j * leaf_dim, key.k * leaf_dim}, {0, 0, 0},
              leaf_dim, bits, counters.summed);
-      slab.put(bits, key, key.k + 1, full);
-    } else {
-      slab.put(bits_of(leaf), key, key.k + 1, full);
-    }
+    else
+      bits = bits_of(leaf);
+    slab.put(bits, key, key.k + 1, full);
+    if (runs != nullptr)
+      keep(leaf, bits, slab_i, key, key.k + 1, *runs);
   }
   return slab;
 }
@@ -158,7 +183,7 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
 
 InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
                         std::span<const Triangle> triangles, std::span<const std::int32_t> part,
-                        VoxelizeReport& report) {
+                        bool keep_windings, VoxelizeReport& report) {
   const OrientedSurface surface = orient_surface(points, triangles, part);
   report.parts = surface.parts;
   report.parts_turned = surface.parts_turned;
@@ -209,6 +234,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
       slabs_range.end > 0 ? (slabs_range.end + each - 1) / each : -(-slabs_range.end / each)};
   const auto count = static_cast<std::size_t>(range.end - range.begin);
   std::vector<Slab<BitLeaf>> slabs(count * static_cast<std::size_t>(each));
+  std::vector<std::vector<WindingRun>> windings(slabs.size());
   std::vector<Counters> counters(count);
   parallel_blocks(context, count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -232,9 +258,10 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
               near.begin(), near.end(), i,
               [](const Int3& leaf, std::int32_t slab) { return leaf[0] < slab; });
         };
-        slabs[n * static_cast<std::size_t>(each) + static_cast<std::size_t>(s)] =
-            integrate(maps[static_cast<std::size_t>(s)], slab_i,
-                      {of_slab(slab_i), of_slab(slab_i + 1)}, cones, counters[n]);
+        const std::size_t at = n * static_cast<std::size_t>(each) + static_cast<std::size_t>(s);
+        slabs[at] = integrate(maps[static_cast<std::size_t>(s)], slab_i,
+                              {of_slab(slab_i), of_slab(slab_i + 1)}, cones,
+                              keep_windings ? &windings[at] : nullptr, counters[n]);
       }
     }
   });
@@ -243,7 +270,10 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
     report.exact_tests += c.exact_tests;
     report.samples_summed += c.summed;
   }
-  return join_slabs(slabs, range.begin * each);
+  InsideScan scan = join_slabs(slabs, range.begin * each);
+  for (const std::vector<WindingRun>& runs : windings)
+    scan.windings.insert(scan.windings.end(), runs.begin(), runs.end());
+  return scan;
 }
 
 } // namespace gewebe

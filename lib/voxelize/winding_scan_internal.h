@@ -15,9 +15,10 @@ namespace gewebe {
 
 /// `points` gets the tips of the cones. Ties are decided as by the parity rule. Adds to the report
 /// what orientation found, triangles_skipped, crossings, exact_tests, and samples_summed.
+/// \param keep_windings  fills InsideScan::windings
 /// \pre points as SampleMesh wants them; part as orient_surface takes it
 InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
                         std::span<const Triangle> triangles, std::span<const std::int32_t> part,
-                        VoxelizeReport& report);
+                        bool keep_windings, VoxelizeReport& report);
 
 } // namespace gewebe

@@ -245,6 +245,106 @@ TEST(DistanceRamp, OtherRulesGiveTheSign) {
   EXPECT_EQ(GridAccessor(hollow).value({3, 0, 0}), 0.0f); // parity leaves the common part out
 }
 
+/// Points of the boundary of a union of boxes: a fine lattice on each face, less what lies strictly
+/// within a box or on the wall between two that touch.
+std::vector<Vec3> boundary_samples(const std::vector<std::array<Vec3, 2>>& boxes) {
+  constexpr int steps = 80;
+  const auto solid = [&](const Vec3& p) {
+    return std::ranges::any_of(boxes, [&](const std::array<Vec3, 2>& box) {
+      bool in = true;
+      for (int a = 0; a < 3; ++a)
+        in = in && p[a] > box[0][a] && p[a] < box[1][a];
+      return in;
+    });
+  };
+  std::vector<Vec3> samples;
+  for (const auto& [low, high] : boxes)
+    for (int axis = 0; axis < 3; ++axis)
+      for (const bool upper : {false, true}) {
+        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+        for (int m = 0; m <= steps; ++m)
+          for (int n = 0; n <= steps; ++n) {
+            Vec3 p, out;
+            p[axis] = upper ? high[axis] : low[axis];
+            p[b] = low[b] + m * (high[b] - low[b]) / steps;
+            p[c] = low[c] + n * (high[c] - low[c]) / steps;
+            out = p;
+            out[axis] += upper ? 1e-4 : -1e-4;
+            if (!solid(p) && !solid(out))
+              samples.push_back(p);
+          }
+      }
+  return samples;
+}
+
+TEST(DistanceRamp, FacesInsideTheWindingSolidDoNotCount) {
+  using Boxes = std::vector<std::array<Vec3, 2>>;
+  const Boxes overlap{{Vec3{-5.3, -4.2, -3.1}, Vec3{1.4, 2.2, 3.3}},
+                      {Vec3{-1.6, -1.3, -5.2}, Vec3{5.2, 5.1, 1.7}}};
+  const Boxes touching{{Vec3{-5.3, -3.2, -3.1}, Vec3{0.4, 3.2, 3.3}},
+                       {Vec3{0.4, -1.6, -1.3}, Vec3{5.2, 5.3, 3.3}}};
+  const Boxes within{{Vec3{-5.3, -4.2, -4.1}, Vec3{5.4, 4.2, 4.3}},
+                     {Vec3{-4.7, -3.6, -2.2}, Vec3{4.9, 3.9, 3.8}}};
+  const Boxes thin{{Vec3{-5.3, -3.2, -3.1}, Vec3{0.45, 3.2, 3.3}},
+                   {Vec3{0.1, -3.9, -3.8}, Vec3{5.2, 3.3, 3.4}}};
+  for (const Boxes& boxes : {overlap, touching, within, thin}) {
+    TriangleMesh mesh;
+    for (const auto& [low, high] : boxes)
+      append(mesh, box_mesh(low, high));
+    const std::vector<Vec3> boundary = boundary_samples(boxes);
+    const Grid grid =
+        jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
+    const Grid sharp =
+        sramek_density(with(1), mesh, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
+    GridAccessor value(grid), sramek(sharp);
+    for (std::int32_t i = -7; i <= 7; ++i)
+      for (std::int32_t j = -7; j <= 7; ++j)
+        for (std::int32_t k = -7; k <= 7; ++k) {
+          const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
+          double squared = 1e9;
+          for (const Vec3& q : boundary)
+            squared = test::smaller(squared, dot(p - q, p - q));
+          const bool in = at(value, {i, j, k}) > 0.5;
+          const double distance = std::sqrt(squared);
+          EXPECT_NEAR(at(value, {i, j, k}), ramp(in ? -distance : distance, jones_half_width), 0.04)
+              << i << ' ' << j << ' ' << k;
+          if (in) {
+            EXPECT_GE(at(sramek, {i, j, k}), 0.5 + std::fmin(0.5, distance / 6.3) - 0.04)
+                << i << ' ' << j << ' ' << k; // planes may be nearer by a factor of sqrt(3)
+          }
+        }
+  }
+  // Faces of many small triangles, one way as another round.
+  TriangleMesh two = sphere_mesh(4, 8, {0.3, 0, 0});
+  append(two, sphere_mesh(3, 8, {6.3, 0, 0}));
+  std::swap(two.triangles[7][1], two.triangles[7][2]);
+  for (std::size_t n = two.triangles.size() / 2; n < two.triangles.size(); ++n)
+    std::swap(two.triangles[n][1], two.triangles[n][2]);
+  const Grid one =
+      jones_density(with(1), two, unit_lattice, OpenMesh::refuse, nullptr, VoxelRule::winding);
+  GridAccessor value(one);
+  for (std::int32_t i = -10; i <= 16; ++i)
+    for (std::int32_t j = -9; j <= 9; ++j)
+      for (std::int32_t k = -9; k <= 9; ++k) {
+        const Vec3 p{1.0 * i, 1.0 * j, 1.0 * k};
+        const Vec3 c[2] = {{0.3, 0, 0}, {6.3, 0, 0}};
+        const double a = 8 - norm(p - c[0]), b = 8 - norm(p - c[1]);
+        if (std::fabs(std::fmax(a, b)) < 0.1)
+          continue; // the spheres are polyhedra
+        double inside = std::fmax(a, b);
+        if (inside > 0) { // to the circle in which they meet, or to a sphere outside the other
+          inside = std::hypot(p.x - 3.3, std::sqrt(64.0 - 9) - std::hypot(p.y, p.z));
+          for (const int n : {0, 1}) {
+            const Vec3 q = c[n] + (p - c[n]) * (8 / norm(p - c[n]));
+            if (norm(q - c[1 - n]) > 8)
+              inside = test::smaller(inside, n == 0 ? a : b);
+          }
+        }
+        EXPECT_NEAR(at(value, {i, j, k}), ramp(-inside, jones_half_width), 0.09)
+            << i << ' ' << j << ' ' << k;
+      }
+}
+
 TEST(DistanceRamp, SameBytesForAnyThreads) {
   const TriangleMesh mesh = sphere_mesh(3, 40, {0.3, 0.1, 0.2});
   EXPECT_EQ(jones_density(with(1), mesh, unit_lattice, OpenMesh::refuse).digest(),

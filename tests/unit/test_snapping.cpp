@@ -33,7 +33,13 @@ void check_scene(const Grid& grid, const std::string& name) {
     EXPECT_EQ(result.report.points_before, before.points);
     EXPECT_EQ(result.report.triangles_before, before.triangles);
     EXPECT_EQ(result.report.zero_area, after.zero_area_faces);
-    EXPECT_EQ(snap({}, surface, {epsilon, Place::corner}).mesh.triangles, result.mesh.triangles);
+    // With points in corners more faces are flat; what edges can be flipped takes them away.
+    const SnapResult corner = snap({}, surface, {epsilon, Place::corner});
+    EXPECT_TRUE(keeps_topology(before, examine_mesh(corner.mesh)))
+        << name << ", corner " << epsilon;
+    EXPECT_EQ(corner.mesh.triangles.size(), result.mesh.triangles.size());
+    EXPECT_LE(corner.report.zero_area, result.report.zero_area + 1)
+        << name << ", corner " << epsilon;
   }
 }
 
@@ -192,8 +198,30 @@ TEST(Snapping, TinyComponentsSurvive) {
   EXPECT_EQ(result.mesh.points.size(), 4U);
   EXPECT_EQ(result.mesh.triangles.size(), 4U);
   EXPECT_EQ(result.report.refused, 6U);
-  EXPECT_EQ(result.report.zero_area, 4U);
+  EXPECT_EQ(result.report.zero_area, 0U); // not all in the corner: each at its own crossing
+  EXPECT_EQ(examine_mesh(result.mesh).zero_area_faces, 0U);
   EXPECT_EQ(result.report.corners, 1U);
+}
+
+TEST(Snapping, CornerLeavesNoFlatFaces) {
+  // Three corners of the lattice in one line made faces without area (report, section 3.1.4).
+  std::uint64_t without_flips = 0;
+  for (const double epsilon : {0.15, 0.25, 0.5})
+    for (std::uint32_t seed = 0; seed < 6; ++seed) {
+      const IsoSurface surface = marching_cubes({}, metaballs(48, seed));
+      const MeshReport before = examine_mesh(surface.mesh);
+      const SnapResult result = snap({}, surface, {epsilon, Place::corner});
+      const MeshReport after = examine_mesh(result.mesh);
+      EXPECT_EQ(after.zero_area_faces, 0U) << epsilon << ' ' << seed;
+      EXPECT_EQ(result.report.zero_area, 0U);
+      EXPECT_TRUE(keeps_topology(before, after));
+      EXPECT_NEAR(signed_volume(result.mesh), signed_volume(surface.mesh),
+                  0.05 * signed_volume(surface.mesh));
+      TriangleMesh unflipped = result.mesh; // the faces are those of Place::mean
+      unflipped.triangles = snap({}, surface, {epsilon, Place::mean}).mesh.triangles;
+      without_flips += examine_mesh(unflipped).zero_area_faces;
+    }
+  EXPECT_GT(without_flips, 20U);
 }
 
 TEST(Snapping, EmptySurface) {
