@@ -98,7 +98,7 @@ struct PlaneHeight {
 
 /// Calls `emit(i, j, k)` for each ray (i, j) with row_begin <= i < row_end that crosses the
 /// triangle; k is the first sample beyond it. Each edge is rounded to rays by itself, so triangles
-/// that share it agree. \pre coordinates as in mesh/exact_predicates.h, magnitudes below 2^30
+/// that share it agree. \pre coordinates as in base/exact_predicates.h, magnitudes below 2^30
 template <class Emit>
 void cross_triangle(const Vec3& corner0, const Vec3& corner1, const Vec3& corner2,
                     std::int32_t row_begin, std::int32_t row_end, TieOrder ties,
