@@ -73,6 +73,7 @@ VALIDATE_SRC := $(wildcard tests/validate/*.cpp)
 PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
+STRESS_PYTHON := tests/stress/frames
 SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
@@ -245,7 +246,7 @@ golden-update: $(TOOLS) $(PLUGIN) | $(FIRST)
 
 stress: $(STRESS) $(TOOLS) | $(FIRST)
 	@test -n '$(STRESS)' || { echo 'stress: tests/stress has no programs yet' >&2; exit 1; }
-	@for program in $(STRESS) $(STRESS_SCRIPTS); do echo "$$program"; \
+	@for program in $(STRESS) $(STRESS_SCRIPTS) $(STRESS_PYTHON); do echo "$$program"; \
 	  PATH='$(abspath $(BUILD))':"$$PATH" $$program || exit 1; done
 
 # Each program writes CSV, which ends with the machine and the versions of what took part; gnuplot, where there is one, draws it.

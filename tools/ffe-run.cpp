@@ -1,7 +1,10 @@
 // ffe-run: scene -> replies, shapes, forces.
 
+#include "formats/results/partial_result.h"
 #include "formats/results/shared_shapes.h"
+#include "formats/stream/removal.h"
 #include "tools/run/event_log.h"
+#include "tools/run/failed_run.h"
 #include "tools/run/result_choice.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_answers.h"
@@ -23,13 +26,16 @@ namespace {
 struct Arguments {
   std::string scene = "-";
   bool serve = false, acknowledge = false, awake = false, binary = false, verify = false;
+  bool no_partial = false;
   std::optional<double> rate;
   double tolerance = 0;
-  std::string listen, shapes, events, record, latencies;
+  std::string listen, shapes, events, record, latencies, recover;
   ResultChoice result;
 };
 
 void work(cli::Run& run, const Arguments& in) {
+  if (!in.recover.empty())
+    return report_recovered(run, recover_result(in.recover));
   const Kind kind = in.result.kind(run);
   const auto warn = [&](const std::string& text) { run.warn(text); };
   const std::unique_ptr<ResultWriter> result = in.result.open(run, kind);
@@ -75,29 +81,32 @@ void work(cli::Run& run, const Arguments& in) {
   options.gone = [&] { return answers.unheard(); };
   if (answers.any())
     options.reply = [&](std::string_view bytes) { answers.write(bytes); };
-  SceneRun scene(input ? name : in.listen, run.context(), options);
-  const auto keep_logs = [&] {
-    if (events)
-      events->commit();
-    if (record)
-      record->commit();
-    latency.commit();
-  };
+  Context context = run.context();
+  context.cancelled = [] { return deferred_signal() != 0; };
+  SceneRun scene(input ? name : in.listen, context, options);
+  RunLogs logs(events ? &*events : nullptr, record ? &*record : nullptr, latency);
+  ResultWriter* const kept = in.no_partial ? nullptr : result.get();
+  if (kept != nullptr || logs.any())
+    defer_signals();
+  if (kept != nullptr)
+    kept->outlive_signals();
+  logs.outlive_signals();
   try {
     run.timed("run", [&] {
       answers.run(input ? &*input : nullptr, scene);
       scene.finish();
     });
-  } catch (const Error&) {
-    keep_logs(); // they tell how it came to this
-    throw;
+    run.timed("write", [&] {
+      if (result)
+        result->commit();
+      answers.commit();
+    });
+  } catch (const Error& error) {
+    (void)logs.commit(); // they tell how it came to this
+    throw ending_of_failed_run(error, kept, scene.simulation().time());
   }
-  run.timed("write", [&] {
-    if (result)
-      result->commit();
-    answers.commit();
-    keep_logs();
-  });
+  if (const std::optional<Error> error = run.timed("write", [&] { return logs.commit(); }))
+    throw Error(*error);
   if (run.stats_wanted())
     report_scene(run, scene, latency, {in.rate.value_or(0), options.measure_error});
   if (in.verify)
@@ -126,6 +135,8 @@ int main(int argc, char** argv) {
   p.flag("--verify", in.verify, "fail unless every shape is as exact as it should be");
   p.option("--rate", in.rate, "HZ", "steps a second that are wanted").positive();
   p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
+  p.flag("--no-partial", in.no_partial, "keep no frames of a run that fails or is interrupted");
+  p.option("--recover", in.recover, "FILE", "keep the frames that a killed run has left of FILE");
   p.operand("SCENE", in.scene, "the scene");
   p.check([&] {
     for (const auto& [given, option] : {std::pair{in.acknowledge, "--ack"},
@@ -136,5 +147,8 @@ int main(int argc, char** argv) {
         throw UsageError(std::string(option) + " without --serve, expected both");
     in.result.check(p);
   });
-  return p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
+  const int status = p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
+  if (deferred_signal() != 0)
+    end_by_deferred_signal();
+  return status;
 }

@@ -119,8 +119,8 @@ void InstrumentSets::show(Series& to, const FrameInstrument& of, std::uint64_t f
     }
     hdf5::Dataset places = group.create_growing("points", hdf5::Number::float32, {points, 3},
                                                 65536 / (12 * points) + 1);
-    to.surfaces.push_back({of.shape, frame, frame, points, made.triangles.size(), std::move(places),
-                           std::move(made.points)});
+    to.surfaces.push_back(
+        {of.shape, frame, frame, points, std::move(places), std::move(made.points)});
   }
   Surface& surface = to.surfaces.back();
   std::vector<float> places;
@@ -148,32 +148,6 @@ void InstrumentSets::add_frame(hdf5::Group& root, std::uint64_t frame,
     append(series_[k], instruments[k]);
     show(series_[k], instruments[k], frame);
   }
-}
-
-std::string InstrumentSets::grids(const XdmfText& xdmf, std::uint64_t frame,
-                                  std::uint64_t frames) const {
-  std::string text;
-  for (const Series& series : series_)
-    for (std::size_t k = 0; k < series.surfaces.size(); ++k) {
-      const Surface& surface = series.surfaces[k];
-      if (frame < surface.first || frame >= surface.end)
-        continue;
-      const std::string group = "/instruments/" + series.name,
-                        shown = group + "/surfaces/" + std::to_string(k + 1);
-      const auto number = [&](const char* name, const char* type, const char* dimensions) {
-        return xdmf.attribute(name, type, "Grid",
-                              xdmf.row(group + "/" + name, frame - series.first,
-                                       frames - series.first, dimensions, 8));
-      };
-      text += "<Grid Name=\"instrument " + series.name + "\" GridType=\"Uniform\">\n" +
-              xdmf.topology("Triangle", shown + "/triangles", surface.triangles, 3) +
-              "<Geometry GeometryType=\"XYZ\">\n" +
-              xdmf.row(shown + "/points", frame - surface.first, surface.end - surface.first,
-                       std::to_string(surface.points) + " 3") +
-              "</Geometry>\n" + number("force", "Vector", "3") + number("torque", "Vector", "3") +
-              "</Grid>\n";
-    }
-  return text;
 }
 
 } // namespace gewebe

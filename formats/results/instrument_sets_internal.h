@@ -1,9 +1,8 @@
 #pragma once
-// The group of instruments in results as HDF5, as it grows, and their grids for XDMF.
+// The group of instruments in results as HDF5, as it grows.
 
 #include "contact/instrument.h"
 #include "formats/results/results_writer.h"
-#include "formats/results/xdmf_internal.h"
 #include "formats/store/hdf5_internal.h"
 
 #include <cstdint>
@@ -21,15 +20,12 @@ public:
   void add_frame(hdf5::Group& root, std::uint64_t frame,
                  std::span<const FrameInstrument> instruments);
 
-  /// The grids of those that are there in a frame. \param frames there are
-  std::string grids(const XdmfText& xdmf, std::uint64_t frame, std::uint64_t frames) const;
-
 private:
   /// Triangles at their places in some frames, one after the other.
   struct Surface {
     InstrumentShape shape;
     std::uint64_t first = 0, end = 0; ///< frames
-    std::uint64_t points = 0, triangles = 0;
+    std::uint64_t points = 0;
     hdf5::Dataset places;
     std::vector<Vec3> own; ///< in the instrument's coordinates
   };

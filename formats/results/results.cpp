@@ -1,6 +1,7 @@
 #include "formats/results/results.h"
 
 #include "base/error.h"
+#include "formats/results/result_groups_internal.h"
 #include "formats/store/hdf5_internal.h"
 #include "solid/skin.h"
 
@@ -22,18 +23,6 @@ hdf5::File open_checked(const std::string& path) {
   if (version != 1)
     throw Error(path, "is of version " + std::to_string(version) + ", expected 1");
   return file;
-}
-
-/// Of objects, or instruments.
-std::vector<std::string> object_names(const hdf5::Group& objects) {
-  std::vector<std::pair<std::uint32_t, std::string>> ordered;
-  for (const std::string& name : objects.groups())
-    ordered.emplace_back(objects.group(name).number<std::uint32_t>("order"), name);
-  std::sort(ordered.begin(), ordered.end());
-  std::vector<std::string> names;
-  for (auto& [order, name] : ordered)
-    names.push_back(std::move(name));
-  return names;
 }
 
 /// Rows of an array n × 3.
@@ -80,7 +69,7 @@ hdf5::Group object_group(const std::string& path, const hdf5::Group& objects,
   if (objects.has(object))
     return objects.group(object);
   std::string list;
-  for (const std::string& name : object_names(objects))
+  for (const std::string& name : ordered_names(objects))
     list += (list.empty() ? "" : ", ") + name;
   throw Error(path, "there is no object '" + object + "', expected " +
                         (list.empty() ? "one, but there is none" : "one of " + list));
@@ -293,9 +282,9 @@ ResultIndex read_result_index(const std::string& path) {
   ResultIndex index;
   index.times.resize(time.rows());
   time.read_rows(0, std::span<double>(index.times));
-  index.objects = object_names(file.root().group("objects"));
+  index.objects = ordered_names(file.root().group("objects"));
   if (file.root().has("instruments"))
-    index.instruments = object_names(file.root().group("instruments"));
+    index.instruments = ordered_names(file.root().group("instruments"));
   return index;
 }
 
@@ -309,7 +298,7 @@ std::vector<ResultInstrument> read_result_instruments(const std::string& path, s
   if (!file.root().has("instruments"))
     return found;
   const hdf5::Group all = file.root().group("instruments");
-  for (const std::string& name : object_names(all)) {
+  for (const std::string& name : ordered_names(all)) {
     const hdf5::Group group = all.group(name);
     const auto first = group.number<std::uint64_t>("first_frame");
     if (frame < first)

@@ -41,7 +41,6 @@ public:
       else
         write_obj(mesh, sink);
     });
-    output.commit();
   }
 
 private:
@@ -82,7 +81,7 @@ private:
 class ShapeWriter final : public ResultWriter {
 public:
   ShapeWriter(Kind kind, const std::string& path, const Output::Options& options)
-      : kind_(kind), options_(options), pattern_(series_in(path)) {
+      : kind_(kind), path_(path), options_(options), pattern_(series_in(path)) {
     if (!pattern_)
       last_.emplace(path, options);
   }
@@ -92,25 +91,41 @@ public:
                      std::span<const std::uint32_t> /*origin*/) override {
     shapes_.change(object, model);
   }
-  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
+  void add_frame(double time, std::span<const FrameObject> objects) override {
     shapes_.set(objects);
-    if (!pattern_)
-      return;
-    Output output(pattern_->name(frame_++), options_);
-    shapes_.write(kind_, output);
+    if (pattern_) {
+      Output output(pattern_->name(frames_), options_);
+      shapes_.write(kind_, output);
+      output.commit();
+    }
+    ++frames_;
+    time_ = time;
   }
   void commit() override {
-    if (last_)
-      shapes_.write(kind_, *last_);
+    if (!last_)
+      return;
+    shapes_.write(kind_, *last_);
+    last_->commit();
+  }
+  std::optional<KeptResult> keep_partial(const std::string& /*why*/) override {
+    if (pattern_)
+      return series_kept(path_, frames_, time_);
+    if (frames_ < 2 || !last_->has_temporary())
+      return std::nullopt;
+    last_->start_over();
+    shapes_.write(kind_, *last_);
+    return KeptResult{"the shape", time_, false, "", last_->commit_partial()};
   }
 
 private:
   Kind kind_;
+  std::string path_;
   Output::Options options_;
   std::optional<SeriesName> pattern_; ///< of a series, else
   std::optional<Output> last_;
   Shapes shapes_;
-  std::uint64_t frame_ = 0;
+  std::uint64_t frames_ = 0;
+  double time_ = 0;
 };
 
 } // namespace

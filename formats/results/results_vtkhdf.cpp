@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "formats/results/grid_internal.h"
+#include "formats/results/partial_result.h"
 #include "formats/store/hdf5_internal.h"
 
 #include <algorithm>
@@ -20,11 +21,28 @@ namespace gewebe {
 
 namespace {
 
+/// A list of numbers that grows.
+class List {
+public:
+  List(hdf5::Group& group, const std::string& name, const hdf5::Shape& row = {})
+      : values_(group.create_growing(name, hdf5::Number::int64, row, 512)) {}
+  void append(std::int64_t value) { values_.append(std::span<const std::int64_t>(&value, 1)); }
+
+private:
+  hdf5::Dataset values_;
+};
+
 /// An array that grows, and where each frame begins in it.
 class Track {
 public:
+  Track(hdf5::Group& group, hdf5::Group& steps, const std::string& name, hdf5::Number type,
+        std::size_t components)
+      : Track(group, name, type, components) {
+    begin_.emplace(steps, name);
+  }
+  /// Of the grids, which begin where their part does.
   Track(hdf5::Group& group, const std::string& name, hdf5::Number type, std::size_t components)
-      : name_(name), components_(components),
+      : components_(components),
         values_(group.create_growing(name, type,
                                      components > 1 ? hdf5::Shape{components} : hdf5::Shape{},
                                      65536 / (components * hdf5::size_of(type)))) {}
@@ -36,16 +54,14 @@ public:
     values_.append(std::span<const T>(values));
     rows_ += static_cast<std::int64_t>(values.size() / components_);
   }
-  void begin_frame(std::int64_t row) { begin_.push_back(row); }
+  void begin_frame(std::int64_t row) { begin_->append(row); }
   std::int64_t rows() const noexcept { return rows_; }
-  void write_begins(hdf5::Group& steps) const { steps.write(name_, begin_); }
 
 private:
-  std::string name_;
   std::size_t components_;
   hdf5::Dataset values_;
   std::int64_t rows_ = 0;
-  std::vector<std::int64_t> begin_;
+  std::optional<List> begin_;
 };
 
 class VtkHdfWriter final : public ResultWriter {
@@ -53,7 +69,7 @@ public:
   VtkHdfWriter(const std::string& path, const Output::Options& options)
       : output_(path, with_sync(options)) {
     in_place([&] {
-      file_.emplace(hdf5::File::create(output_.temporary()));
+      file_.emplace(hdf5::File::create_with_checkpoints(output_.temporary()));
       root_.emplace(file_->root().create_group("VTKHDF"));
       const std::array<std::int64_t, 2> version{2, 0};
       root_->set("Version", std::span<const std::int64_t>(version));
@@ -64,9 +80,23 @@ public:
       types_.emplace(*root_, "Types", hdf5::Number::uint8, 1);
       of_points_.emplace(root_->create_group("PointData"));
       of_cells_.emplace(root_->create_group("CellData"));
-      displacement_.emplace(*of_points_, "displacement", hdf5::Number::float64, 3);
-      material_.emplace(*of_cells_, "material", hdf5::Number::int32, 1);
-      object_.emplace(*of_cells_, "object", hdf5::Number::int32, 1);
+      steps_.emplace(root_->create_group("Steps"));
+      point_steps_.emplace(steps_->create_group("PointDataOffsets"));
+      cell_steps_.emplace(steps_->create_group("CellDataOffsets"));
+      displacement_.emplace(*of_points_, *point_steps_, "displacement", hdf5::Number::float64, 3);
+      material_.emplace(*of_cells_, *cell_steps_, "material", hdf5::Number::int32, 1);
+      object_.emplace(*of_cells_, *cell_steps_, "object", hdf5::Number::int32, 1);
+      for (std::optional<List>* const list : {&point_count_, &cell_count_, &node_count_})
+        list->emplace(*root_, list == &point_count_  ? "NumberOfPoints"
+                              : list == &cell_count_ ? "NumberOfCells"
+                                                     : "NumberOfConnectivityIds");
+      steps_->set("NSteps", std::int64_t{0});
+      times_.emplace(steps_->create_growing("Values", hdf5::Number::float64, {}, 512));
+      part_.emplace(*steps_, "PartOffsets");
+      part_count_.emplace(*steps_, "NumberOfParts");
+      first_point_.emplace(*steps_, "PointOffsets");
+      first_cell_.emplace(*steps_, "CellOffsets", hdf5::Shape{1});
+      first_node_.emplace(*steps_, "ConnectivityIdOffsets", hdf5::Shape{1});
     });
   }
 
@@ -91,56 +121,41 @@ public:
         begin_part();
       if (fields_.empty() && grid::have_fields(shapes_.all()))
         begin_fields();
-      times_.push_back(time);
-      part_.push_back(static_cast<std::int64_t>(parts_.size()) - 1);
+      const Part& part = parts_.back();
+      times_->append(std::span<const double>(&time, 1));
+      part_->append(static_cast<std::int64_t>(parts_.size()) - 1);
+      part_count_->append(1);
+      first_point_->append(part.first_point);
+      first_cell_->append(part.first_cell);
+      first_node_->append(part.first_node);
       displacement_->begin_frame(displacement_->rows());
       displacement_->append(grid::displacements(shapes_.all()));
-      material_->begin_frame(parts_.back().first_cell);
-      object_->begin_frame(parts_.back().first_cell);
+      material_->begin_frame(part.first_cell);
+      object_->begin_frame(part.first_cell);
       for (auto& [field, track] : fields_) {
         track.begin_frame(track.rows());
         track.append(grid::values_of(shapes_.all(), field));
       }
+      ++frames_;
+      last_part_ = parts_.size() - 1;
+      steps_->replace("NSteps", static_cast<std::int64_t>(frames_));
+      file_->checkpoint();
     });
   }
 
   void commit() override {
-    in_place([&] {
-      const auto of_parts = [&](std::int64_t Part::*what) {
-        std::vector<std::int64_t> values;
-        for (const Part& part : parts_)
-          values.push_back(part.*what);
-        return values;
-      };
-      root_->write("NumberOfPoints", of_parts(&Part::points));
-      root_->write("NumberOfCells", of_parts(&Part::cells));
-      root_->write("NumberOfConnectivityIds", of_parts(&Part::nodes));
-      hdf5::Group steps = root_->create_group("Steps");
-      const std::uint64_t frames = times_.size();
-      const auto of_frames = [&](const char* name, std::int64_t Part::*what,
-                                 const hdf5::Shape& shape) {
-        std::vector<std::int64_t> values;
-        for (const std::int64_t part : part_)
-          values.push_back(parts_[static_cast<std::size_t>(part)].*what);
-        steps.write(name, std::span<const std::int64_t>(values), shape);
-      };
-      steps.set("NSteps", static_cast<std::int64_t>(frames));
-      steps.write("Values", times_);
-      steps.write("PartOffsets", part_);
-      steps.write("NumberOfParts", std::vector<std::int64_t>(frames, 1));
-      of_frames("PointOffsets", &Part::first_point, {frames});
-      of_frames("CellOffsets", &Part::first_cell, {frames, 1});
-      of_frames("ConnectivityIdOffsets", &Part::first_node, {frames, 1});
-      hdf5::Group of_points = steps.create_group("PointDataOffsets"),
-                  of_cells = steps.create_group("CellDataOffsets");
-      displacement_->write_begins(of_points);
-      material_->write_begins(of_cells);
-      object_->write_begins(of_cells);
-      for (const auto& [field, track] : fields_)
-        track.write_begins(field.of_cells ? of_cells : of_points);
-      file_->close();
-    });
+    in_place([&] { file_->close(); });
     output_.commit();
+  }
+
+  void outlive_signals() override { output_.outlive_signals(); }
+
+  std::optional<KeptResult> keep_partial(const std::string& why) override {
+    if (frames_ < 2)
+      return std::nullopt;
+    file_->abandon();
+    const PartialFrames there = mark_partial(output_.temporary(), why);
+    return KeptResult{frames_text(there.frames), there.time, true, "", output_.commit_partial()};
   }
 
 private:
@@ -172,6 +187,9 @@ private:
                       static_cast<std::int64_t>(all.types.size()),
                       static_cast<std::int64_t>(all.nodes.size()), points_->rows(), types_->rows(),
                       nodes_->rows()});
+    point_count_->append(parts_.back().points);
+    cell_count_->append(parts_.back().cells);
+    node_count_->append(parts_.back().nodes);
     points_->append(all.points);
     nodes_->append(all.nodes);
     std::vector<std::int64_t> ends{0}; // of each part anew
@@ -185,18 +203,19 @@ private:
   /// Frames that have none yet share rows without a number.
   void begin_fields() {
     std::int64_t points = 0, cells = 0;
-    for (const std::int64_t part : part_) {
-      points = std::max(points, parts_[static_cast<std::size_t>(part)].points);
-      cells = std::max(cells, parts_[static_cast<std::size_t>(part)].cells);
+    for (std::size_t part = 0; frames_ > 0 && part <= last_part_; ++part) {
+      points = std::max(points, parts_[part].points);
+      cells = std::max(cells, parts_[part].cells);
     }
     for (const auto& some : {grid::node_fields, grid::cell_fields})
       for (const grid::Field& field : some) {
-        Track track(field.of_cells ? *of_cells_ : *of_points_, field.name, hdf5::Number::float64,
-                    field.components());
+        Track track(field.of_cells ? *of_cells_ : *of_points_,
+                    field.of_cells ? *cell_steps_ : *point_steps_, field.name,
+                    hdf5::Number::float64, field.components());
         const auto rows = static_cast<std::size_t>(field.of_cells ? cells : points);
         track.append(std::vector<double>(rows * field.components(),
                                          std::numeric_limits<double>::quiet_NaN()));
-        for (std::size_t frame = 0; frame < times_.size(); ++frame)
+        for (std::uint64_t frame = 0; frame < frames_; ++frame)
           track.begin_frame(0);
         fields_.emplace_back(field, std::move(track));
       }
@@ -204,14 +223,17 @@ private:
 
   Output output_;
   std::optional<hdf5::File> file_;
-  std::optional<hdf5::Group> root_, of_points_, of_cells_;
+  std::optional<hdf5::Group> root_, of_points_, of_cells_, steps_, point_steps_, cell_steps_;
   std::optional<Track> points_, nodes_, ends_, types_, displacement_, material_, object_;
+  std::optional<List> point_count_, cell_count_, node_count_; ///< of parts
+  std::optional<hdf5::Dataset> times_;
+  std::optional<List> part_, part_count_, first_point_, first_cell_, first_node_; ///< of frames
   std::vector<std::pair<grid::Field, Track>> fields_;
   grid::Shapes shapes_;
   bool changed_ = false; ///< since the last part
   std::vector<Part> parts_;
-  std::vector<double> times_;
-  std::vector<std::int64_t> part_; ///< of each frame
+  std::uint64_t frames_ = 0;
+  std::size_t last_part_ = 0; ///< of the last frame
 };
 
 } // namespace

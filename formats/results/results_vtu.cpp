@@ -41,7 +41,7 @@ private:
 class VtuWriter final : public ResultWriter {
 public:
   VtuWriter(const std::string& path, const Output::Options& options)
-      : options_(options), series_(series_in(path)) {
+      : path_(path), options_(options), series_(series_in(path)) {
     options_.binary = true;
     if (!series_)
       last_.emplace(path, options_);
@@ -58,14 +58,27 @@ public:
   void add_frame(double time, std::span<const FrameObject> objects) override {
     time_ = time;
     shapes_.set(objects);
-    if (!series_)
-      return;
-    Output output(series_->name(frame_++), options_);
-    write(output);
+    if (series_) {
+      Output output(series_->name(frames_), options_);
+      write(output);
+      output.commit();
+    }
+    ++frames_;
   }
   void commit() override {
-    if (last_)
-      write(*last_);
+    if (!last_)
+      return;
+    write(*last_);
+    last_->commit();
+  }
+  std::optional<KeptResult> keep_partial(const std::string& /*why*/) override {
+    if (series_)
+      return series_kept(path_, frames_, time_);
+    if (frames_ < 2 || !last_->has_temporary())
+      return std::nullopt;
+    last_->start_over();
+    write(*last_);
+    return KeptResult{"the shape", time_, false, "", last_->commit_partial()};
   }
 
 private:
@@ -101,15 +114,15 @@ private:
     output.write(text);
     output.write(arrays.bytes());
     output.write("\n</AppendedData>\n</VTKFile>\n");
-    output.commit();
   }
 
+  std::string path_;
   Output::Options options_;
   std::optional<SeriesName> series_; ///< else
   std::optional<Output> last_;
   grid::Shapes shapes_;
   double time_ = 0;
-  std::uint64_t frame_ = 0;
+  std::uint64_t frames_ = 0;
 };
 
 } // namespace

@@ -3,11 +3,13 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "formats/results/instrument_sets_internal.h"
+#include "formats/results/partial_result.h"
 #include "formats/results/results_mesh.h"
 #include "formats/results/results_vtkhdf.h"
 #include "formats/results/results_vtu.h"
 #include "formats/results/xdmf_internal.h"
 #include "formats/store/hdf5_internal.h"
+#include "formats/stream/file_names.h"
 #include "solid/skin.h"
 
 #include <algorithm>
@@ -20,12 +22,6 @@ namespace gewebe {
 namespace {
 
 // ---- HDF5 and XDMF
-
-std::string xdmf_path(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/') + 1; // 0 if there is none
-  const std::size_t dot = path.find_last_of('.');
-  return (dot == std::string::npos || dot <= slash ? path : path.substr(0, dot)) + ".xdmf";
-}
 
 std::string base_name(const std::string& path) {
   return path.substr(path.find_last_of('/') + 1);
@@ -94,12 +90,11 @@ private:
 
 class Hdf5Result final : public ResultWriter {
 public:
-  Hdf5Result(const std::string& path, Output::Options options)
-      : output_(path, with_sync(options)), xdmf_text_(base_name(path)) {
+  Hdf5Result(const std::string& path, Output::Options options) : output_(path, with_sync(options)) {
     (void)output_.temporary(); // refuses what is no file, before anything is made beside it
     xdmf_.emplace(xdmf_path(path), text(options));
     in_place([&] {
-      file_.emplace(hdf5::File::create(output_.temporary()));
+      file_.emplace(hdf5::File::create_with_checkpoints(output_.temporary()));
       hdf5::Group& root = file_->root();
       root.set("format", "gewebe_results");
       root.set("version", std::uint32_t{1});
@@ -111,15 +106,20 @@ public:
 
   void add_object(const std::string& name, const Model& model) override {
     in_place([&] {
-      Object& object = begin(name, model, 0);
+      Object& object = begin(name, model);
       const std::vector<float> rest(3 * model.nodes.size());
       for (std::uint64_t f = 0; f < frames_; ++f)
         object.displacement.append(std::span<const float>(rest));
     });
   }
 
+  void outlive_signals() override {
+    output_.outlive_signals();
+    xdmf_->outlive_signals();
+  }
+
   void add_part(const std::string& name, const Model& model) override {
-    in_place([&] { begin(name, model, frames_).group.set("first_frame", frames_); });
+    in_place([&] { begin(name, model).group.set("first_frame", frames_); });
   }
 
   void change_object(std::size_t index, const Model& model,
@@ -128,7 +128,7 @@ public:
       Object& object = objects_.at(index);
       if (!object.cuts)
         object.cuts.emplace(object.group.create_group("cuts"));
-      const std::string number = std::to_string(object.shapes.size());
+      const std::string number = std::to_string(object.shapes);
       hdf5::Group cut = object.cuts->create_group(number);
       cut.set("first_frame", frames_);
       std::vector<std::uint32_t> from(origin.begin(), origin.end());
@@ -138,8 +138,7 @@ public:
       }
       cut.write("origin", from);
       object.displacement = add_shape(cut, model);
-      object.shapes.push_back(
-          shape_of(model, "/objects/" + object.name + "/cuts/" + number, frames_));
+      ++object.shapes;
       object.fields.reset();
       object.shape_group = std::move(cut);
     });
@@ -147,12 +146,13 @@ public:
 
   void set_instruments(std::span<const FrameInstrument> instruments) override {
     in_place([&] { instruments_.add_frame(file_->root(), frames_, instruments); });
+    for (const FrameInstrument& instrument : instruments)
+      xdmf_bytes_ += xdmf_bytes(output_.name(), std::string(instrument.name), false);
   }
 
   void add_frame(double time, std::span<const FrameObject> objects) override {
     in_place([&] {
       time_->append(std::span<const double>(&time, 1));
-      times_.push_back(time);
       for (std::size_t i = 0; i < objects.size(); ++i) {
         Object& to = objects_.at(i);
         const std::vector<float> u = in_single(objects[i].displacement, "a displacement", " mm");
@@ -162,10 +162,10 @@ public:
             hdf5::Group& group = to.shape_group ? *to.shape_group : to.group;
             to.fields.emplace(group.create_group("fields"), fields->node_stress.size(),
                               fields->element_stress.size(), frames_);
-            to.shapes.back().fields = frames_;
           }
           to.fields->append(*fields);
         }
+        xdmf_bytes_ += xdmf_bytes(output_.name(), to.name, objects[i].fields != nullptr);
         const std::span<const NodeVector> forces = objects[i].forces;
         if (forces.empty())
           continue;
@@ -180,44 +180,48 @@ public:
         to.node.append(std::span<const std::uint32_t>(node));
         to.force.append(std::span<const double>(force));
       }
-      ++frames_;
     });
+    reserve_companion();
+    in_place([&] { file_->checkpoint(); });
+    ++frames_;
   }
 
   void commit() override {
     in_place([&] { file_->close(); });
+    write_companion(output_.name());
+    xdmf_->prepare(); // so that nothing is renamed unless all is written
     output_.commit();
-    write_xdmf();
     xdmf_->commit();
   }
 
-private:
-  /// Elements and displacements of an object in some frames.
-  struct Shape {
-    std::string path;
-    std::uint64_t first = 0; ///< frame
-    std::uint64_t nodes = 0, triangles = 0, tetrahedra = 0;
-    bool quadratic = false;
-    std::optional<std::uint64_t> fields = std::nullopt; ///< the first frame with some
-  };
-  static Shape shape_of(const Model& model, const std::string& path, std::uint64_t first) {
-    return {path,
-            first,
-            model.nodes.size(),
-            model.triangles.size(),
-            model.tetrahedra.size(),
-            !model.middles.empty()};
+  std::optional<KeptResult> keep_partial(const std::string& why) override {
+    if (frames_ < 2)
+      return std::nullopt;
+    forget();
+    const PartialFrames there = mark_partial(output_.temporary(), why);
+    KeptResult kept{frames_text(there.frames), there.time, true, "", ""};
+    try {
+      xdmf_->start_over();
+      write_companion(partial_name(output_.name()));
+      (void)xdmf_->commit_partial();
+    } catch (const Error& error) {
+      kept.left_out = error.place() + ": " + error.what();
+    }
+    kept.file = output_.commit_partial();
+    return kept;
   }
+
+private:
   struct Object {
     std::string name;
     hdf5::Group group;
     hdf5::Dataset displacement, frame, node, force;
-    std::vector<Shape> shapes;
+    std::uint64_t shapes = 1;                     ///< that it had, one after the other
     std::optional<hdf5::Group> cuts, shape_group; ///< and, of one that was cut, of its last shape
     std::optional<FieldSets> fields;
   };
 
-  Object& begin(const std::string& name, const Model& model, std::uint64_t first) {
+  Object& begin(const std::string& name, const Model& model) {
     hdf5::Group group = groups_->create_group(name);
     group.set("order", static_cast<std::uint32_t>(objects_.size()));
     group.set("model", model.name);
@@ -230,15 +234,8 @@ private:
     hdf5::Dataset frame = forces.create_growing("frame", hdf5::Number::uint64, {}, 512);
     hdf5::Dataset node = forces.create_growing("node", hdf5::Number::uint32, {}, 512);
     hdf5::Dataset force = forces.create_growing("force", hdf5::Number::float64, {3}, 512);
-    objects_.push_back({name,
-                        std::move(group),
-                        std::move(displacement),
-                        std::move(frame),
-                        std::move(node),
-                        std::move(force),
-                        {shape_of(model, "/objects/" + name, first)},
-                        std::nullopt,
-                        std::nullopt,
+    objects_.push_back({name, std::move(group), std::move(displacement), std::move(frame),
+                        std::move(node), std::move(force), 1, std::nullopt, std::nullopt,
                         std::nullopt});
     return objects_.back();
   }
@@ -326,80 +323,50 @@ private:
     }
   }
 
-  void write_xdmf() {
-    xdmf_->write("<?xml version=\"1.0\" ?>\n<Xdmf Version=\"2.0\">\n<Domain>\n"
-                 "<Grid Name=\"run\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
-    for (std::uint64_t f = 0; f < frames_; ++f) {
-      xdmf_->write("<Grid Name=\"scene\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
-                   "<Time Value=\"" +
-                   number_text(times_[f]) + "\"/>\n");
-      for (const Object& object : objects_)
-        if (object.shapes.front().first <= f)
-          xdmf_->write(grid(object, f));
-      xdmf_->write(instruments_.grids(xdmf_text_, f, frames_));
-      xdmf_->write("</Grid>\n");
-    }
-    xdmf_->write("</Grid>\n</Domain>\n</Xdmf>\n");
+  /// \param result the name that the HDF5 file is going to have
+  void write_companion(const std::string& result) {
+    in_place([&] {
+      const hdf5::File file = hdf5::File::open_own(output_.temporary());
+      write_xdmf(file, base_name(result), [&](std::string_view text) { xdmf_->write(text); });
+    });
   }
 
-  std::string grid(const Object& object, std::uint64_t frame) {
-    std::size_t which = 0;
-    while (which + 1 < object.shapes.size() && object.shapes[which + 1].first <= frame)
-      ++which;
-    const Shape& shape = object.shapes[which];
-    const std::uint64_t end =
-        which + 1 < object.shapes.size() ? object.shapes[which + 1].first : frames_;
-    const std::string& group = shape.path;
-    const std::string n = std::to_string(shape.nodes);
-    std::string text = "<Grid Name=\"" + object.name + "\" GridType=\"Uniform\">\n";
-    if (shape.tetrahedra > 0) { // nodes are in VTK's order, which is that of its reader
-      text +=
-          xdmf_text_.topology(shape.quadratic ? "Tetrahedron_10" : "Tetrahedron",
-                              group + "/tetrahedra", shape.tetrahedra, shape.quadratic ? 10 : 4);
-      text += "<Attribute Name=\"material\" AttributeType=\"Scalar\" Center=\"Cell\">\n" +
-              xdmf_text_.array(group + "/tetrahedron_material", std::to_string(shape.tetrahedra),
-                               R"(NumberType="Int" Precision="4")") +
-              "</Attribute>\n";
-    } else if (shape.triangles > 0) {
-      text += xdmf_text_.topology("Triangle", group + "/triangles", shape.triangles, 3);
-    } else {
-      text += "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"" + n + "\"/>\n";
+  /// So that this frame can be shown, even on a full disk.
+  void reserve_companion() {
+    constexpr std::uint64_t step = 65536;
+    xdmf_bytes_ += 400;
+    if (xdmf_bytes_ <= xdmf_reserved_)
+      return;
+    xdmf_->reserve(xdmf_bytes_);
+    xdmf_reserved_ = xdmf_bytes_;
+    try {
+      xdmf_->reserve(xdmf_bytes_ + step);
+      xdmf_reserved_ += step;
+    } catch (const Error&) {
+      return; // enough for this frame
     }
-    text += "<Geometry GeometryType=\"XYZ\">\n" +
-            xdmf_text_.array(group + "/points", n + " 3", R"(NumberType="Float" Precision="8")") +
-            "</Geometry>\n" +
-            xdmf_text_.attribute("displacement", "Vector", "Node",
-                                 xdmf_text_.row(group + "/displacement", frame - shape.first,
-                                                end - shape.first, n + " 3"));
-    if (shape.fields && frame >= *shape.fields) {
-      const auto field = [&](const char* name, const char* set, bool tensor, bool of_nodes) {
-        const std::string count = of_nodes ? n : std::to_string(shape.tetrahedra);
-        text += xdmf_text_.attribute(
-            name, tensor ? "Tensor6" : "Scalar", of_nodes ? "Node" : "Cell",
-            xdmf_text_.row(group + "/fields/" + set, frame - *shape.fields, end - *shape.fields,
-                           tensor ? count + " 6" : count));
-      };
-      field("stress", "stress", true, true);
-      field("strain", "strain", true, true);
-      field("von_mises", "von_mises", false, true);
-      field("element_stress", "element_stress", true, false);
-      field("element_strain", "element_strain", true, false);
-      field("element_von_mises", "element_von_mises", false, false);
-    }
-    text += "</Grid>\n";
-    return text;
+  }
+
+  /// The file as its last frame left it, and nothing in memory.
+  void forget() {
+    objects_.clear();
+    instruments_ = InstrumentSets();
+    groups_.reset();
+    time_.reset();
+    if (file_)
+      file_->abandon();
+    file_.reset();
   }
 
   Output output_;
   std::optional<Output> xdmf_;
-  XdmfText xdmf_text_;
   std::optional<hdf5::File> file_;
   std::optional<hdf5::Dataset> time_;
   std::optional<hdf5::Group> groups_;
   std::vector<Object> objects_;
   InstrumentSets instruments_;
-  std::vector<double> times_;
   std::uint64_t frames_ = 0;
+  std::uint64_t xdmf_bytes_ = 0, xdmf_reserved_ = 0; ///< of the text so far, at most
 };
 
 // ---- forces
@@ -418,17 +385,31 @@ public:
 
   void add_frame(double time, std::span<const FrameObject> objects) override {
     const std::string start = number_text(time) + ",";
+    std::string rows;
     for (std::size_t i = 0; i < objects.size(); ++i)
       for (const NodeVector& f : objects[i].forces)
-        output_.write(start + names_[i] + "," + std::to_string(f.node) + "," +
-                      number_text(f.value.x) + "," + number_text(f.value.y) + "," +
-                      number_text(f.value.z) + "\n");
+        rows += start + names_[i] + "," + std::to_string(f.node) + "," + number_text(f.value.x) +
+                "," + number_text(f.value.y) + "," + number_text(f.value.z) + "\n";
+    output_.append_whole(rows);
+    ++frames_;
+    time_ = time;
   }
 
   void commit() override { output_.commit(); }
 
+  void outlive_signals() override { output_.outlive_signals(); }
+
+  std::optional<KeptResult> keep_partial(const std::string& /*why*/) override {
+    if (frames_ < 2 || !output_.has_temporary())
+      return std::nullopt;
+    return KeptResult{"forces of " + frames_text(frames_), time_, true, "",
+                      output_.commit_partial()};
+  }
+
 private:
   Output output_;
+  std::uint64_t frames_ = 0;
+  double time_ = 0;
   std::vector<std::string> names_;
 };
 

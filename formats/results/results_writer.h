@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -37,6 +38,18 @@ struct FrameInstrument {
   Vec3 force, torque;      ///< of all objects on it, 1e-6 N, and 1e-9 N m about its place
   std::uint64_t nodes = 0; ///< that it touches or grasps
 };
+
+/// What a run that failed has left of its result.
+struct KeptResult {
+  std::string what;        ///< "26 frames", "the shape"
+  double time = 0;         ///< s, of the last frame
+  bool all_frames = false; ///< or that of the last one alone
+  std::string left_out;    ///< why a file beside it could not be written; empty: it is there
+  std::string file;        ///< its name
+};
+
+/// "1 frame", "26 frames".
+std::string frames_text(std::uint64_t frames);
 
 class ResultWriter {
 public:
@@ -64,6 +77,13 @@ public:
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
   /// Nothing appears without it, but for the files of a series. \throw Error
   virtual void commit() = 0;
+  /// From now on a signal or a crash leaves what is on the disk, see partial_result.h.
+  virtual void outlive_signals() {}
+  /// In place of `commit`, where the run or `commit` failed: the frames that were added stay, in a
+  /// file whose name says that it isn't all (partial_name). Nothing but the frame at rest, or no
+  /// file: nothing is kept. \param why is told in the file
+  /// \throw Error if they can't be kept
+  virtual std::optional<KeptResult> keep_partial(const std::string& why) = 0;
 };
 
 /// The kinds that there are: h5, ply, obj, vtu, vtkhdf, csv.

@@ -31,4 +31,10 @@ std::optional<SeriesName> series_in(const std::string& path) {
   return pattern;
 }
 
+std::optional<KeptResult> series_kept(const std::string& path, std::uint64_t frames, double time) {
+  if (frames < 2)
+    return std::nullopt;
+  return KeptResult{frames_text(frames), time, true, "", path};
+}
+
 } // namespace gewebe

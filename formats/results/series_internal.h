@@ -1,6 +1,8 @@
 #pragma once
 // Names of series: one file for each frame.
 
+#include "formats/results/results_writer.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -19,5 +21,8 @@ struct SeriesName {
 /// Nothing where the path holds no '%'.
 /// \throw UsageError for anything but one %d, %0Nd in the file's name
 std::optional<SeriesName> series_in(const std::string& path);
+
+/// The files of a failed run, which are there already. \param path with its pattern
+std::optional<KeptResult> series_kept(const std::string& path, std::uint64_t frames, double time);
 
 } // namespace gewebe

@@ -1,30 +1,24 @@
 #pragma once
-// Pieces of an XDMF file that refers to arrays of an HDF5 file beside it.
+// The XDMF file beside a result as HDF5: what its frames hold, by the names of its arrays.
+
+#include "formats/store/hdf5_internal.h"
 
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <string_view>
 
 namespace gewebe {
 
-class XdmfText {
-public:
-  /// \param file the HDF5 file's name, without folder
-  explicit XdmfText(const std::string& file);
+/// \param name the HDF5 file's name, without folder, to which the text refers
+/// \throw Error if the file is no result, or what `write` throws
+void write_xdmf(const hdf5::File& result, const std::string& name,
+                const std::function<void(std::string_view)>& write);
 
-  /// A whole array; `type` has its attributes NumberType and Precision.
-  std::string array(const std::string& path, const std::string& dimensions, const char* type) const;
-  /// One of the `count` rows of an array of floats of `bytes` bytes; its shape is `dimensions`, one
-  /// or two numbers.
-  std::string row(const std::string& path, std::uint64_t row, std::uint64_t count,
-                  const std::string& dimensions, int bytes = 4) const;
-  /// The same as an attribute. `type` is "Vector", say, `center` "Node", "Cell" or "Grid".
-  std::string attribute(const char* name, const char* type, const char* center,
-                        const std::string& row) const;
-  std::string topology(const char* type, const std::string& path, std::uint64_t count,
-                       std::uint64_t nodes) const;
+/// Its path beside a result: PATH with the suffix .xdmf.
+std::string xdmf_path(const std::string& path);
 
-private:
-  std::string file_; ///< with what XML wants quoted
-};
+/// Bytes that the text has at most for one frame of one object or instrument.
+std::uint64_t xdmf_bytes(const std::string& file, const std::string& object, bool fields);
 
 } // namespace gewebe

@@ -1,6 +1,7 @@
 #include "formats/store/hdf5_internal.h"
 
 #include "base/error.h"
+#include "formats/store/checkpoint_driver_internal.h"
 #include "formats/stream/file_names.h"
 
 #define H5_USE_110_API // later versions keep its names
@@ -228,6 +229,12 @@ void Object::set_numbers(const std::string& name, Number type, const void* value
   const Handle attribute(H5Acreate2(handle_.id(), name.c_str(), file_type(type), space.id(),
                                     H5P_DEFAULT, H5P_DEFAULT));
   if (attribute.id() < 0 || H5Awrite(attribute.id(), memory_type(type), values) < 0)
+    fail_write("attribute " + name + " cannot be written");
+}
+
+void Object::replace_number(const std::string& name, Number type, const void* value) {
+  const Handle attribute(H5Aopen(handle_.id(), name.c_str(), H5P_DEFAULT));
+  if (attribute.id() < 0 || H5Awrite(attribute.id(), memory_type(type), value) < 0)
     fail_write("attribute " + name + " cannot be written");
 }
 
@@ -545,6 +552,25 @@ File File::create(const std::string& path, const std::string& name) {
   return create(path, name.empty() ? path : name, access());
 }
 
+File File::create_with_checkpoints(const std::string& path) {
+  silence();
+  Handle how = access();
+  if (!use_checkpoints(how.id()))
+    throw Error(path, "cannot be made as an HDF5 file");
+  return create(path, path, std::move(how));
+}
+
+File File::reopen_checkpoint(const std::string& path) {
+  silence();
+  if (const int error = restore_checkpoint(path); error != 0)
+    throw Error(path, std::string("cannot be restored: ") + std::strerror(error));
+  const Handle how = access();
+  Handle handle(use_checkpoints(how.id()) ? H5Fopen(path.c_str(), H5F_ACC_RDWR, how.id()) : -1);
+  if (handle.id() < 0)
+    throw Error(path, "holds nothing that was finished" + system_reason());
+  return {std::move(handle), std::make_shared<FileState>(FileState{.path = path, .writing = true})};
+}
+
 File File::create_by_link(const std::string& link, const std::string& name) {
   silence();
   Handle how = access();
@@ -587,30 +613,39 @@ void check_superblock(const std::string& name, const Superblock& head, std::size
                           std::to_string(end));
 }
 
+Error open_error(const std::string& path) {
+  return {path, std::string("cannot open: ") + std::strerror(errno)};
+}
+
+/// With the system's reason, such as too many open files; without one the file itself is damaged.
 [[noreturn]] void fail_open(const std::string& path) {
-  (void)H5Eclear2(H5E_DEFAULT);
-  throw Error(path, "is damaged: it cannot be opened as an HDF5 file");
+  const std::string reason = system_reason();
+  throw Error(path, reason.empty() || reason == ": Success"
+                        ? "is damaged: it cannot be opened as an HDF5 file"
+                        : "cannot open" + reason);
 }
 
 } // namespace
 
 File File::open(const std::string& path) {
-  silence();
-  const auto system_error = [&] {
-    return Error(path, std::string("cannot open: ") + std::strerror(errno));
-  };
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0)
-    throw system_error();
+    throw open_error(path);
   if (S_ISDIR(info.st_mode))
     throw Error(path, "is a directory, expected a file");
   if (!S_ISREG(info.st_mode))
     throw Error(path, "is no regular file, expected one, since HDF5 is not read forwards");
   note_read(path);
+  return open_own(path);
+}
+
+File File::open_own(const std::string& path) {
+  silence();
   const auto close = [](std::FILE* file) { (void)std::fclose(file); };
   const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-  if (file == nullptr)
-    throw system_error();
+  struct stat info {};
+  if (file == nullptr || ::fstat(::fileno(file.get()), &info) != 0)
+    throw open_error(path);
   if (info.st_size == 0)
     throw Error(path, "is empty");
   Superblock head{};
@@ -649,6 +684,30 @@ File::~File() {
   // What wasn't closed in writing is given up: see FileState.
   if (file_->gone() || file_->writing)
     (void)handle_.release();
+  file_->closed = true;
+}
+
+void File::checkpoint() {
+  if (!file_->failed && H5Fflush(handle_.id(), H5F_SCOPE_LOCAL) >= 0) {
+    const int error = make_checkpoint(handle_.id());
+    if (error == 0)
+      return;
+    file_->failed = true;
+    throw Error(file_->path, std::string("cannot write: ") + std::strerror(error));
+  }
+  const std::string reason = file_->failed ? file_->reason : system_reason();
+  file_->failed = true;
+  throw Error(file_->path, "cannot write" + reason);
+}
+
+void File::abandon() noexcept {
+  if (file_->closed)
+    return;
+  discard_writes(handle_.id());
+  root_.reset();
+  const std::int64_t id = handle_.release();
+  if (!file_->failed)
+    (void)H5Fclose(id);
   file_->closed = true;
 }
 

@@ -102,6 +102,12 @@ public:
   void set(const std::string& name, T value) {
     set_numbers(name, number_of<T>(), &value, nullptr);
   }
+  /// Another value of an attribute that is there.
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  void replace(const std::string& name, T value) {
+    replace_number(name, number_of<T>(), &value);
+  }
   template <class T>
   void set(const std::string& name, std::span<const T> values) {
     const std::uint64_t count = values.size();
@@ -128,6 +134,7 @@ protected:
       : handle_(std::move(handle)), file_(std::move(file)), name_(std::move(name)) {}
   void set_numbers(const std::string& name, Number type, const void* values,
                    const std::uint64_t* count);
+  void replace_number(const std::string& name, Number type, const void* value);
   void get_numbers(const std::string& name, Number type, void* values, std::size_t count) const;
 
   /// The same of a write, with what the system said.
@@ -237,10 +244,18 @@ class File {
 public:
   /// Empties or makes it. `name` is what messages call it, the path itself if empty.
   static File create(const std::string& path, const std::string& name = "");
+  /// The same with a driver that keeps the state of the last `checkpoint`, whatever ends the
+  /// program or fails.
+  static File create_with_checkpoints(const std::string& path);
+  /// Opens such a file as its last checkpoint left it, for changes. \throw Error too if there was
+  /// none
+  static File reopen_checkpoint(const std::string& path);
   /// The same for a file without a name, by a link of /proc to it.
   static File create_by_link(const std::string& link, const std::string& name);
   /// For reading. \throw Error too if it is missing, a folder, empty, no HDF5 or cut off
   static File open(const std::string& path);
+  /// The same for a file that this program has made and closed.
+  static File open_own(const std::string& path);
   /// A file that stands in memory; `name` is what messages call it.
   static File open_image(std::span<const std::uint8_t> bytes, const std::string& name);
 
@@ -255,6 +270,11 @@ public:
   /// Writes what is still in memory, and closes everything in it: no group or dataset may be used
   /// afterwards. Without it what is lost is lost in silence. \throw Error
   void close();
+  /// What was written so far stays, whatever comes. \pre made with checkpoints
+  /// \throw Error; the file is as the last checkpoint left it
+  void checkpoint();
+  /// Closes it as the last checkpoint left it. \pre made with checkpoints
+  void abandon() noexcept;
 
 private:
   File(Handle handle, std::shared_ptr<FileState> file);

@@ -157,6 +157,17 @@ void FileUse::end() noexcept {
   number_ = 0;
 }
 
+std::string partial_name(const std::string& path) {
+  const std::size_t base = path.find_last_of('/') + 1; // 0 if there is none
+  std::size_t dot = path.find_last_of('.');
+  if (dot == std::string::npos || dot <= base)
+    return path + ".partial";
+  if (const std::size_t packed = path.find_last_of('.', dot - 1);
+      path.substr(dot) == ".gz" && packed != std::string::npos && packed > base)
+    dot = packed; // .nii.gz
+  return path.substr(0, dot) + ".partial" + path.substr(dot);
+}
+
 bool leaves_folder(std::string_view path) {
   if (path.starts_with('/'))
     return true;

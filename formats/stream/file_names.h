@@ -47,6 +47,10 @@ private:
 /// Where `path` leads through symbolic links, whether or not the last one's target is there.
 std::string follow_links(std::string path);
 
+/// The name beside `path` for a result that a failed run could not finish: run.partial.h5 for
+/// run.h5.
+std::string partial_name(const std::string& path);
+
 /// Whether `path`, found in a file and meant from that file's folder, may lead out of it: absolute,
 /// or with `..` in it.
 bool leaves_folder(std::string_view path);

@@ -1,5 +1,6 @@
 #include "formats/stream/removal.h"
 
+#include "base/error.h"
 #include "formats/stream/program_start.h"
 #include "formats/stream/stream.h"
 
@@ -8,7 +9,9 @@
 #include <climits>
 #include <csignal>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace gewebe {
@@ -22,7 +25,18 @@ struct Slot {
 };
 std::array<Slot, 8> slots;
 
+std::atomic<bool> deferring{false};
+std::atomic<int> deferred{0};
+std::array<int, 2> wake{-1, -1}; // a pipe
+
 extern "C" void gewebe_remove_temporaries(int signal_number) {
+  int none = 0;
+  if (deferring.load() && signal_number != SIGQUIT &&
+      deferred.compare_exchange_strong(none, signal_number)) {
+    const char byte = 0;
+    (void)!::write(wake[1], &byte, 1);
+    return;
+  }
   remove_temporaries();
   (void)std::signal(signal_number, SIG_DFL);
   (void)std::raise(signal_number);
@@ -45,6 +59,32 @@ int remember_removal(const std::string& path) {
 void forget_removal(int number) noexcept {
   if (number >= 0)
     slots[static_cast<std::size_t>(number)].used.store(false);
+}
+
+void defer_signals() {
+  if (wake[0] < 0 && ::pipe2(wake.data(), O_CLOEXEC | O_NONBLOCK) != 0)
+    return; // signals end the program, as before
+  deferring.store(true);
+}
+
+int deferred_signal() noexcept {
+  return deferred.load();
+}
+
+void check_deferred_signal() {
+  if (deferred_signal() != 0)
+    throw Cancelled();
+}
+
+int deferred_signal_descriptor() noexcept {
+  return wake[0];
+}
+
+void end_by_deferred_signal() {
+  const int number = deferred_signal();
+  (void)std::signal(number, SIG_DFL);
+  (void)std::raise(number);
+  std::_Exit(128 + number);
 }
 
 SignalsWait::SignalsWait() {

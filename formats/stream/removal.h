@@ -11,6 +11,18 @@ int remember_removal(const std::string& path);
 /// -1 is nothing.
 void forget_removal(int number) noexcept;
 
+/// From now on the first of these signals (SIGQUIT apart) is only noted, so that the program can
+/// keep what it has computed. A second one ends it at once.
+void defer_signals();
+/// The noted signal; 0: none.
+int deferred_signal() noexcept;
+/// \throw Cancelled if a signal was noted
+void check_deferred_signal();
+/// A descriptor for poll(2), readable once a signal is noted; -1 before `defer_signals`.
+int deferred_signal_descriptor() noexcept;
+/// Ends the program by the noted signal. \pre there is one
+[[noreturn]] void end_by_deferred_signal();
+
 /// While it lives all signals of this thread wait: what is made and remembered under it is not left
 /// behind.
 class SignalsWait {

@@ -74,10 +74,21 @@ struct Input::State final : std::streambuf {
       (void)::close(fd);
   }
 
+  /// Where signals are deferred, waits so that one of them ends the wait. \throw Cancelled
+  void wait_for_signal_or_bytes() const {
+    const int signals = deferred_signal_descriptor();
+    if (signals < 0)
+      return;
+    std::array<pollfd, 2> either{pollfd{fd, POLLIN, 0}, pollfd{signals, POLLIN, 0}};
+    (void)::poll(either.data(), either.size(), -1);
+    check_deferred_signal();
+  }
+
   /// So many bytes at most; 0 at the end.
   std::size_t read_some(char* to, std::size_t most) const {
     ssize_t count = 0;
     do {
+      wait_for_signal_or_bytes();
       count = ::read(fd, to, most);
     } while (count < 0 && errno == EINTR);
     if (count < 0)
@@ -238,14 +249,14 @@ std::istream& Input::stream() {
 
 void Input::wait_awake() const {
   pollfd own{state_->fd, POLLIN, 0};
-  while (::poll(&own, 1, 0) == 0) {
-  }
+  while (::poll(&own, 1, 0) == 0)
+    check_deferred_signal();
 }
 
 // ---- Output
 
 struct Output::State final : std::streambuf {
-  State() { setp(buffer.data(), buffer.data() + buffer.size()); }
+  State() { drop_buffer(); }
   ~State() override {
     if (fd > 1)
       (void)::close(fd);
@@ -280,19 +291,21 @@ struct Output::State final : std::streambuf {
     const std::size_t slash = target.find_last_of('/');
     const std::string folder = slash == std::string::npos ? "" : target.substr(0, slash + 1);
     const std::string base = slash == std::string::npos ? target : target.substr(slash + 1);
-    std::string path =
-        options.part ? target + ".part" : folder + "." + base.substr(0, 200) + ".XXXXXX";
+    const bool part = options.part || !options.log.empty();
+    std::string path = part ? target + ".part" : folder + "." + base.substr(0, 200) + ".XXXXXX";
     // Until the name is remembered, so that no signal can leave the file behind.
     std::optional<SignalsWait> wait(std::in_place);
-    fd = options.part ? open_part(path) : ::mkostemp(path.data(), O_CLOEXEC);
+    fd = part ? open_part(path) : ::mkostemp(path.data(), O_CLOEXEC);
     int error = errno;
-    if (fd >= 0 && options.part && !lock_part(path)) {
+    if (fd >= 0 && part && !lock_part(path)) {
       error = EBUSY; // of another program, so it must not be removed
       (void)::close(fd);
       fd = -1;
     }
     if (fd >= 0) {
       temporary = path;
+      if (found && !options.log.empty())
+        found = ::ftruncate(fd, 0) != 0;
       kept = found;
       slot = found ? -1 : remember_removal(path);
     }
@@ -320,7 +333,7 @@ struct Output::State final : std::streambuf {
     if (there < 0)
       return -1;
     if (::fstat(there, &info) != 0 || !S_ISREG(info.st_mode) || info.st_nlink > 1 ||
-        info.st_uid != ::geteuid()) {
+        info.st_uid != ::geteuid() || (info.st_size > 0 && !begins_as_log(there))) {
       (void)::close(there);
       errno = EEXIST;
       return -1;
@@ -329,24 +342,54 @@ struct Output::State final : std::streambuf {
     return there;
   }
 
+  /// True where it need not.
+  bool begins_as_log(int there) const {
+    std::string start(options.log.size(), '\0');
+    return ::pread(there, start.data(), start.size(), 0) == static_cast<ssize_t>(start.size()) &&
+           start == options.log;
+  }
+
   void write_all(const char* data, std::size_t size) {
     if (fd < 0)
       open_direct();
     while (size > 0) {
       const ssize_t count = ::write(fd, data, size);
       if (count < 0) {
-        if (errno == EINTR)
+        if (errno == EINTR) {
+          check_deferred_signal(); // the reader may never come back
           continue;
+        }
         fail("cannot write");
       }
       data += count;
       size -= static_cast<std::size_t>(count);
+      written += static_cast<std::uint64_t>(count);
     }
   }
 
+  /// At a place of the temporary file.
+  void write_at(std::uint64_t at, const char* data, std::size_t size) const {
+    while (size > 0) {
+      const ssize_t count = ::pwrite(fd, data, size, static_cast<off_t>(at));
+      if (count < 0) {
+        if (errno == EINTR)
+          continue;
+        const int error = errno;
+        (void)::ftruncate(fd, static_cast<off_t>(written));
+        errno = error;
+        fail("cannot write");
+      }
+      data += count;
+      at += static_cast<std::uint64_t>(count);
+      size -= static_cast<std::size_t>(count);
+    }
+  }
+
+  void drop_buffer() { setp(buffer.data(), buffer.data() + buffer.size()); }
+
   void flush_buffer() {
     const std::size_t size = static_cast<std::size_t>(pptr() - pbase());
-    setp(buffer.data(), buffer.data() + buffer.size());
+    drop_buffer();
     if (size > 0)
       write_all(buffer.data(), size);
   }
@@ -380,9 +423,11 @@ struct Output::State final : std::streambuf {
   std::string name, target, temporary;
   Options options;
   int fd = -1, slot = -1;
+  std::uint64_t written = 0; ///< bytes, those in the buffer not counted
   mode_t mode = 0;
   bool existed = false, kept = false, prepared = false;
-  bool found = false; ///< the part held something
+  bool found = false;    ///< the part held something
+  bool reserved = false; ///< blocks behind its end
   FileUse use;
   std::vector<char> buffer = std::vector<char>(buffer_bytes);
   std::unique_ptr<std::ostream> stream;
@@ -463,6 +508,68 @@ bool Output::part() const {
   return state_->options.part && !state_->temporary.empty();
 }
 
+void Output::outlive_signals() {
+  State& state = *state_;
+  if (state.temporary.empty() || state.fd < 0)
+    return;
+  (void)::flock(state.fd, LOCK_EX | LOCK_NB); // tells --recover that it isn't left behind
+  forget_removal(state.slot);
+  state.slot = -1;
+}
+
+void Output::append_whole(std::string_view bytes) {
+  State& state = *state_;
+  if (state.temporary.empty()) {
+    write(bytes);
+    return;
+  }
+  state.flush_buffer();
+  if (bytes.empty())
+    return;
+  state.write_at(state.written + 1, bytes.data() + 1, bytes.size() - 1);
+  state.write_at(state.written, bytes.data(), 1);
+  state.written += bytes.size();
+  if (::lseek(state.fd, static_cast<off_t>(state.written), SEEK_SET) < 0)
+    state.fail("cannot write");
+}
+
+void Output::reserve(std::uint64_t bytes) {
+  State& state = *state_;
+  if (state.temporary.empty() || bytes == 0)
+    return;
+  state.reserved = true;
+  while (::fallocate(state.fd, FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) != 0)
+    if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG)
+      state.fail("cannot write");
+    else if (errno != EINTR)
+      return; // this file system can't say
+}
+
+void Output::start_over() {
+  State& state = *state_;
+  state.drop_buffer();
+  if (state.fd < 0) // closed by `prepare`
+    state.fd = ::open(state.temporary.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
+  if (state.fd < 0 || ::lseek(state.fd, 0, SEEK_SET) != 0 || ::ftruncate(state.fd, 0) != 0)
+    state.fail("cannot write");
+  state.prepared = false;
+  state.written = 0;
+}
+
+bool Output::has_temporary() const {
+  return !state_->temporary.empty();
+}
+
+std::string Output::commit_partial() {
+  State& state = *state_;
+  state.use = FileUse();
+  state.target = partial_name(state.target);
+  state.name = state.target;
+  state.options.keep_unchanged = false;
+  commit();
+  return state.name;
+}
+
 void Output::prepare() {
   State& state = *state_;
   if (state.prepared)
@@ -473,6 +580,8 @@ void Output::prepare() {
   if (!state.temporary.empty()) {
     if (state.found && ::fchmod(state.fd, state.mode) != 0)
       state.fail("cannot set the mode");
+    if (state.reserved && ::ftruncate(state.fd, static_cast<off_t>(state.written)) != 0)
+      state.fail("cannot write");
     if (state.options.sync && ::fsync(state.fd) != 0)
       state.fail("cannot write");
   }

@@ -71,6 +71,9 @@ public:
     bool sync = false;  ///< fsync before the rename
     bool part = false;  ///< the temporary file is FILE.part, may be kept, and is taken up again
     bool binary = true; ///< refuse a terminal
+    /// If not empty, the temporary file is FILE.part, too; one that an earlier run left, which
+    /// begins with these bytes, is overwritten.
+    std::string log{};
   };
   /// \throw Error (place = name) if the folder is not writable or the path is a directory;
   /// UsageError if binary output would go to a terminal
@@ -92,11 +95,28 @@ public:
   /// one that stays.
   void keep_part(bool keep = true);
   bool part() const;
+  /// From now on a signal or a crash leaves the temporary file, which is locked (flock) as long as
+  /// the program runs; the destructor removes it as before.
+  void outlive_signals();
+  /// Writes bytes that are in the temporary file whole or not at all, whatever ends the program;
+  /// until then the byte at their beginning is 0. To a pipe or a device as `write`.
+  /// \pre the bytes hold no 0
+  /// \throw Error; what stands before them is kept
+  void append_whole(std::string_view bytes);
+  /// Blocks of the disk for a file of so many bytes. \throw Error if it has none left
+  void reserve(std::uint64_t bytes);
+  /// Drops all that was written to the temporary file. \pre there is one
+  void start_over();
   /// Flushes, checks, closes, renames. \throw Error
   void commit();
   /// All of it but the rename, for files that belong together: `commit` then has no more to write.
   /// \throw Error
   void prepare();
+  /// `commit` under the name partial_name(target), since the result isn't all there.
+  /// \return that name. \pre there is a temporary file \throw Error
+  std::string commit_partial();
+  /// Whether a temporary file takes the bytes, so that `commit_partial` can keep them.
+  bool has_temporary() const;
 
 private:
   struct State;

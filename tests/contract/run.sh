@@ -77,7 +77,7 @@ test_a_wrong_line_ends_the_run_and_leaves_no_result() {
     'object x organ.ela store=none.h5' 'force organ z>9 0 0 1' 'run 0 every 1' 'at 0 step' '"'; do
     printf '%s\n' 'object organ organ.ela' 'step' "$line" 'step' >in.scene
     echo old >out.h5
-    expect_failure 1 ffe-run ffe-run in.scene -o out.h5 >answers
+    expect_failure 1 ffe-run ffe-run --no-partial in.scene -o out.h5 >answers
     [[ $(<out.h5) == old ]] || fail "a result in spite of: $line"
     [[ $(grep -c '^step ' answers) == 1 ]] || fail "not one answer before: $line" "$(<answers)"
     [[ $(ffe-run in.scene 2>&1 >answers || true) == 'ffe-run: in.scene:3: '* ]] || fail "the line is not named: $line"
@@ -135,14 +135,14 @@ test_answers_and_results_go_where_they_should() {
   rm fifo answers out.csv quiet.csv out.obj pull.scene organ.ela
 }
 
-test_an_interrupt_leaves_neither_file() {
+test_an_interrupt_leaves_neither_file_without_partial() {
   need ffe-run exp2ela
   organ
   local signal status pid
   for signal in INT TERM HUP; do
     mkdir folder
     mkfifo lines
-    env --default-signal=INT ffe-run lines -o folder/run.h5 >answers 2>stderr.txt &
+    env --default-signal=INT ffe-run --no-partial lines -o folder/run.h5 >answers 2>stderr.txt &
     pid=$!
     { echo 'object o organ.ela'; echo 'step'; sleep 30; } >lines &
     local holder=$!

@@ -43,6 +43,16 @@ std::string csv(double time, const ChangeRow& row) {
   return line + "\n";
 }
 
+constexpr std::string_view columns =
+    "time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text,end_x,end_y,end_z,turn_w,"
+    "turn_x,turn_y,turn_z,force_x,force_y,force_z,torque_x,torque_y,torque_z,touched,hand_x,hand_y,"
+    "hand_z\n";
+
+Output::Options as_log(Output::Options options) {
+  options.log = columns;
+  return options;
+}
+
 } // namespace
 
 std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator) {
@@ -62,10 +72,8 @@ std::string node_ranges(const std::vector<std::uint32_t>& nodes, char separator)
 }
 
 EventLog::EventLog(const std::string& path, const Output::Options& options)
-    : output_(path, options) {
-  output_.write("time,what,object,nodes,x,y,z,value,duration,other,other_nodes,text,end_x,end_y,"
-                "end_z,turn_w,turn_x,turn_y,turn_z,force_x,force_y,force_z,torque_x,torque_y,"
-                "torque_z,touched,hand_x,hand_y,hand_z\n");
+    : output_(path, as_log(options)) {
+  output_.write(columns);
 }
 
 void EventLog::object(double time, const std::string& name, const std::string& model,
@@ -123,9 +131,11 @@ void EventLog::message(double time, const char* what, std::string_view text) {
 }
 
 void EventLog::keep() {
+  std::string text;
   for (const std::string& row : rows_)
-    output_.write(row);
+    text += row;
   rows_.clear();
+  output_.append_whole(text);
 }
 
 void EventLog::commit() {

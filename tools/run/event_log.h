@@ -33,6 +33,8 @@ public:
   /// What was told since the last keep or drop happened, or did not.
   void keep();
   void drop() { rows_.clear(); }
+  /// From now on a signal or a crash leaves what was kept, see Output.
+  void outlive_signals() { output_.outlive_signals(); }
   /// The file appears. \throw Error
   void commit();
 

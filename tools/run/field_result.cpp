@@ -5,6 +5,8 @@
 #include "formats/volume/nifti_field.h"
 #include "tetrahedra/lattice_field.h"
 
+#include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -49,7 +51,9 @@ public:
     solids_.at(object) = solid_of(names_.at(object), model);
   }
 
-  void add_frame(double /*time*/, std::span<const FrameObject> objects) override {
+  void add_frame(double time, std::span<const FrameObject> objects) override {
+    ++frames_;
+    time_ = time;
     for (std::size_t n = 0; n < objects.size(); ++n) {
       const std::span<const double> from = objects[n].displacement;
       std::vector<Vec3>& to = solids_.at(n).displacement;
@@ -60,9 +64,24 @@ public:
   }
 
   void commit() override {
+    write();
+    output_.commit();
+  }
+
+  std::optional<KeptResult> keep_partial(const std::string& /*why*/) override {
+    if (frames_ < 2 || !output_.has_temporary())
+      return std::nullopt;
+    output_.start_over();
+    context_.cancelled = nullptr; // by what has ended the run
+    write();
+    return KeptResult{"the field", time_, false, "", output_.commit_partial()};
+  }
+
+private:
+  void write() {
     const PlaceLattice lattice = voxel_centres(size_, transform_);
     LatticeField field(lattice.places());
-    for (Solid& solid : solids_) {
+    for (Solid solid : solids_) {
       solid.displacement.resize(solid.mesh.points.size()); // it came behind the last frame
       if (!options_.at_rest)
         for (std::size_t p = 0; p < solid.mesh.points.size(); ++p) {
@@ -75,10 +94,8 @@ public:
                       options_.at_rest ? "gewebe: displacement from rest, LPS mm"
                                        : "gewebe: displacement back to rest, LPS mm",
                       gzip_, [&](std::string_view bytes) { output_.write(bytes); });
-    output_.commit();
   }
 
-private:
   static Solid solid_of(const std::string& name, const Model& model) {
     if (model.tetrahedra.empty())
       throw Error(name, "has no tetrahedra, expected solids alone for a displacement field");
@@ -99,6 +116,8 @@ private:
   GridTransform transform_;
   std::vector<Solid> solids_;
   std::vector<std::string> names_;
+  std::uint64_t frames_ = 0;
+  double time_ = 0;
 };
 
 } // namespace

@@ -3,6 +3,7 @@
 #include "base/number_text.h"
 #include "formats/scene/frames_binary.h"
 #include "formats/scene/scene_answer.h"
+#include "formats/stream/removal.h"
 #include "tools/run/step_latency.h"
 
 #include <array>
@@ -17,10 +18,13 @@ namespace {
 
 constexpr std::size_t block = 1U << 16U;
 
-/// Waits for one of them. \return false where it took longer
-bool wait_for(std::array<pollfd, 2>& who, double seconds) {
+/// Waits for one of them. \return false where it took longer \throw Cancelled on a signal
+bool wait_for(const std::array<pollfd, 2>& who, double seconds) {
   const int limit = seconds < 0 ? -1 : static_cast<int>(std::ceil(seconds * 1000));
-  return ::poll(who.data(), who.size(), limit) != 0; // an interruption is no end of patience
+  std::array<pollfd, 3> all{who[0], who[1], pollfd{deferred_signal_descriptor(), POLLIN, 0}};
+  const bool any = ::poll(all.data(), all.size(), limit) != 0;
+  check_deferred_signal();
+  return any; // an interruption is no end of patience
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 // One command of a scene that runs.
 
 #include "formats/scene/scene_changes.h"
+#include "formats/stream/removal.h"
 #include "tools/run/event_log.h"
 #include "tools/run/scene_state_internal.h"
 
@@ -32,6 +33,7 @@ auto of_object(const LinePlace& line, Work&& work) {
 
 template <class Step>
 void SceneRun::State::go_on(Step&& step) {
+  check_deferred_signal();
   require_object();
   const std::size_t objects = simulation.object_count(); // before parts come off
   if (result)

@@ -30,8 +30,10 @@ std::size_t StepLatency::bin(double seconds) {
 }
 
 void StepLatency::log_to(const std::string& path, const Output::Options& options) {
-  log_.emplace(path, options);
-  log_->write("step,time,latency\n");
+  Output::Options log = options;
+  log.log = "step,time,latency\n";
+  log_.emplace(path, log);
+  log_->write(log.log);
 }
 
 void StepLatency::answered(std::uint64_t step, double time) {
@@ -44,7 +46,13 @@ void StepLatency::answered(std::uint64_t step, double time) {
   sum_ += latency;
   missed_ += latency * rate_ > 1 ? 1 : 0;
   if (log_)
-    log_->write(std::to_string(step) + "," + number_text(time) + "," + number_text(latency) + "\n");
+    log_->append_whole(std::to_string(step) + "," + number_text(time) + "," + number_text(latency) +
+                       "\n");
+}
+
+void StepLatency::outlive_signals() {
+  if (log_)
+    log_->outlive_signals();
 }
 
 void StepLatency::commit() {

@@ -22,6 +22,9 @@ public:
   void line_arrived() { arrived_ = now(); }
   /// The answer to this step, at this time of the scene, has left.
   void answered(std::uint64_t step, double time);
+  bool logs() const noexcept { return log_.has_value(); }
+  /// From now on a signal or a crash leaves the log, see Output.
+  void outlive_signals();
   /// The log appears, if there is one. \throw Error
   void commit();
 

@@ -1,0 +1,67 @@
+// HDF5 files whose state at the last checkpoint survives, and names of partial results.
+
+#include "base/error.h"
+#include "formats/store/hdf5_internal.h"
+#include "formats/stream/file_names.h"
+#include "tests/unit/scratch.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+std::uint64_t rows_after_restoring(const std::string& path, bool& refused) {
+  refused = false;
+  try {
+    hdf5::File file = hdf5::File::reopen_checkpoint(path);
+    const std::uint64_t rows = file.root().dataset("rows", hdf5::Number::float64).rows();
+    file.root().set("partial", "why");
+    file.close();
+    EXPECT_TRUE(hdf5::File::open_own(path).root().has_attribute("partial"));
+    return rows;
+  } catch (const Error&) {
+    refused = true;
+    return 0;
+  }
+}
+
+TEST(Checkpoints, WhatIsNotInACheckpointIsNotInTheFile) {
+  const ScratchFile file(".h5"), copy(".h5");
+  const auto copied = [&] {
+    std::filesystem::copy_file(file.path(), copy.path(),
+                               std::filesystem::copy_options::overwrite_existing);
+    bool refused = false;
+    const std::uint64_t rows = rows_after_restoring(copy.path(), refused);
+    return refused ? -1 : static_cast<int>(rows);
+  };
+  hdf5::File made = hdf5::File::create_with_checkpoints(file.path());
+  hdf5::Dataset rows = made.root().create_growing("rows", hdf5::Number::float64, {}, 8);
+  EXPECT_EQ(copied(), -1); // as of a run that was killed now
+  const std::vector<double> some(100, 1.5);
+  for (int k = 1; k <= 20; ++k) {
+    rows.append(std::span<const double>(some));
+    hdf5::Group group = made.root().create_group("group" + std::to_string(k));
+    EXPECT_EQ(copied(), k == 1 ? -1 : 100 * (k - 1)) << k;
+    made.checkpoint();
+    EXPECT_EQ(copied(), 100 * k) << k;
+  }
+  rows.append(std::span<const double>(some));
+  made.abandon();
+  bool refused = true;
+  EXPECT_EQ(rows_after_restoring(file.path(), refused), 2000U);
+}
+
+TEST(Checkpoints, PartialNamesKeepTheSuffix) {
+  EXPECT_EQ(partial_name("run.h5"), "run.partial.h5");
+  EXPECT_EQ(partial_name("a.b/run"), "a.b/run.partial");
+  EXPECT_EQ(partial_name("a/warp.nii.gz"), "a/warp.partial.nii.gz");
+  EXPECT_EQ(partial_name(".gz"), ".gz.partial");
+}
+
+} // namespace
+} // namespace gewebe

@@ -1,0 +1,67 @@
+#include "tools/run/failed_run.h"
+
+#include "base/number_text.h"
+#include "formats/stream/removal.h"
+
+#include <string>
+
+namespace gewebe {
+
+bool RunLogs::any() const {
+  return events_ != nullptr || record_ != nullptr || latency_.logs();
+}
+
+void RunLogs::outlive_signals() {
+  if (events_ != nullptr)
+    events_->outlive_signals();
+  latency_.outlive_signals(); // a record always does
+}
+
+std::optional<Error> RunLogs::commit() {
+  std::optional<Error> first;
+  const auto each = [&](const auto& work) {
+    try {
+      work();
+    } catch (const Error& error) {
+      if (!first)
+        first = error;
+    }
+  };
+  if (events_ != nullptr)
+    each([&] { events_->commit(); });
+  if (record_ != nullptr)
+    each([&] { record_->commit(); });
+  each([&] { latency_.commit(); });
+  return first;
+}
+
+Error ending_of_failed_run(const Error& error, ResultWriter* result, double time) {
+  const bool interrupted = deferred_signal() != 0;
+  std::string kept, left_out;
+  if (result != nullptr)
+    try {
+      if (const auto some = result->keep_partial(interrupted ? "interrupted" : error.what())) {
+        time = some->time;
+        kept = some->what;
+        if (!interrupted)
+          kept += (some->all_frames ? " up to " : " at ") + number_text(time) + " s";
+        kept += " kept in " + some->file;
+        if (!some->left_out.empty())
+          kept += " (without " + some->left_out + ")";
+      }
+    } catch (const Error& failure) {
+      kept = "the frames could not be kept: " +
+             (failure.place().empty() ? "" : failure.place() + ": ") + failure.what();
+    }
+  if (!interrupted)
+    return {error.place(), error.what() + (kept.empty() ? "" : "; " + kept)};
+  return Error("interrupted at " + number_text(time) + " s" + (kept.empty() ? "" : ": " + kept));
+}
+
+void report_recovered(cli::Run& run, const KeptResult& kept) {
+  run.say(kept.what + " up to " + number_text(kept.time) + " s kept in " + kept.file);
+  run.stats().set("recovered", kept.file);
+  run.stats().set("time", kept.time);
+}
+
+} // namespace gewebe
