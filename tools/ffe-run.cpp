@@ -76,7 +76,7 @@ void work(cli::Run& run, const Arguments& in) {
   options.latency = &latency;
   options.shared = shared.get();
   options.measure = run.stats_wanted();
-  options.measure_error = in.verify || (run.stats_wanted() && !in.rate);
+  options.measure_error = in.verify;
   options.tolerance = in.tolerance;
   options.gone = [&] { return answers.unheard(); };
   if (answers.any())

@@ -81,9 +81,11 @@ public:
   virtual void outlive_signals() {}
   /// In place of `commit`, where the run or `commit` failed: the frames that were added stay, in a
   /// file whose name says that it isn't all (partial_name). Nothing but the frame at rest, or no
-  /// file: nothing is kept. \param why is told in the file
+  /// file: nothing is kept. The file tells why
   /// \throw Error if they can't be kept
-  virtual std::optional<KeptResult> keep_partial(const std::string& why) = 0;
+  virtual std::optional<KeptResult> keep_partial(const std::string& /*why*/) {
+    return std::nullopt;
+  }
 };
 
 /// The kinds that there are: h5, ply, obj, vtu, vtkhdf, csv.

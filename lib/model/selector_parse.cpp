@@ -25,11 +25,15 @@ bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
 
+/// At most `longest` bytes, and what is missing of the last UTF-8 character.
 std::string printable(std::string_view text, std::size_t longest) {
+  std::size_t end = std::min(longest, text.size());
+  while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80)
+    ++end;
   std::string result;
-  for (const char c : text.substr(0, longest))
+  for (const char c : text.substr(0, end))
     result += static_cast<unsigned char>(c) >= 0x20 && c != 0x7f ? c : '?';
-  return text.size() > longest ? result + "…" : result;
+  return text.size() > end ? result + "…" : result;
 }
 
 struct Shape {
@@ -169,8 +173,16 @@ private:
       return comparison();
     if (at_ == text_.size())
       fail("nothing there, expected a selector");
-    fail(word.empty() ? "'" + printable(text_.substr(at_, 1), 1) + "' starts no selector"
+    fail(word.empty() ? "'" + first_character() + "' starts no selector"
                       : quoted_selector(word) + " is no selector, see gewebe_selector(7)");
+  }
+
+  /// What stands here, whole where it takes several bytes.
+  std::string first_character() const {
+    std::size_t end = at_ + 1;
+    while (end < text_.size() && (static_cast<unsigned char>(text_[end]) & 0xc0U) == 0x80)
+      ++end;
+    return printable(text_.substr(at_, end - at_), end - at_);
   }
 
   /// An atom ends at a blank, a parenthesis or the end.

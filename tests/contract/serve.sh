@@ -378,3 +378,14 @@ waits(['--listen', 'door'], False, 'door')
 waits(['--listen', 'door', '--busy-wait'], True, 'door')
 EOF
 }
+
+test_answers_are_valid_utf8() {
+  need ffe-run exp2ela
+  cube | exp2ela --format off -o organ.ela
+  { printf 'object a organ.ela\nselect a \xc3\xbcber\nselect a \xff\xc3\nb\xe2\x82\nselect a '; printf 'x\xc3\xbc%.0s' {1..60}; echo; } >in.scene
+  ffe-run --serve in.scene >answers 2>/dev/null || true
+  [[ $(grep -c '^error ' answers) == 4 ]] || fail "$(<answers)"
+  iconv -f UTF-8 -t UTF-8 answers >/dev/null || fail 'not valid UTF-8:' "$(<answers)"
+  grep -q "'ü" answers || fail 'a character is cut' "$(<answers)"
+  rm organ.ela in.scene answers
+}

@@ -31,8 +31,9 @@ std::uint64_t rows_after_restoring(const std::string& path, bool& refused) {
 }
 
 TEST(Checkpoints, WhatIsNotInACheckpointIsNotInTheFile) {
-  const ScratchFile file(".h5"), copy(".h5");
+  const ScratchFile file(".h5");
   const auto copied = [&] {
+    const ScratchFile copy(".h5"); // a new one each time
     std::filesystem::copy_file(file.path(), copy.path(),
                                std::filesystem::copy_options::overwrite_existing);
     bool refused = false;
