@@ -389,3 +389,21 @@ test_answers_are_valid_utf8() {
   grep -q "'ü" answers || fail 'a character is cut' "$(<answers)"
   rm organ.ela in.scene answers
 }
+
+test_a_pipe_is_no_node_list() {
+  need ffe-run exp2ela
+  cube | exp2ela --format off -o organ.ela
+  mkfifo fifo
+  printf '%s\n' 'object a organ.ela' 'force a @fifo 0 0 1' >in.scene
+  ffe-run in.scene 2>stderr.txt & # never waits for who writes into it
+  local pid=$! status=0
+  for _ in {1..100}; do
+    kill -0 "$pid" 2>/dev/null || break
+    sleep 0.1
+  done
+  ! kill "$pid" 2>/dev/null || fail 'it waits for the pipe'
+  wait "$pid" || status=$?
+  ((status == 1)) || fail "status $status"
+  [[ $(<stderr.txt) == 'ffe-run: in.scene:2: fifo: is no regular file, expected one' ]] || fail "$(<stderr.txt)"
+  rm fifo organ.ela in.scene stderr.txt
+}

@@ -93,7 +93,10 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
     };
   };
   files.node_list = [resolve](const std::string& name) {
-    return list_text(Input(resolve(name), false));
+    const std::string path = resolve(name);
+    if (!S_ISREG(facts_of(path).st_mode)) // a pipe that nobody writes would be waited for
+      throw Error(path, "is no regular file, expected one");
+    return list_text(Input(path, false));
   };
   files.instrument = [resolve](const std::string& name, InstrumentShape shape) {
     const std::string path = resolve(name);
