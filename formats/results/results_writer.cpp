@@ -90,7 +90,8 @@ private:
 
 class Hdf5Result final : public ResultWriter {
 public:
-  Hdf5Result(const std::string& path, Output::Options options) : output_(path, with_sync(options)) {
+  Hdf5Result(const std::string& path, const Output::Options& options)
+      : output_(path, with_sync(options)) {
     (void)output_.temporary(); // refuses what is no file, before anything is made beside it
     xdmf_.emplace(xdmf_path(path), text(options));
     in_place([&] {
