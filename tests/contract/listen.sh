@@ -274,6 +274,36 @@ c.ask("object o organ.ela", "step", "end")'
   rm -r ./*
 }
 
+# Between bind and listen a client would be refused: the path appears when the socket listens.
+test_a_socket_that_is_there_listens() {
+  prepare
+  has_strace || skip 'no strace that may trace'
+  strace -f -o /dev/null -e trace=listen -e inject=listen:delay_enter=1000000 ffe-run --serve --ack --listen sock 2>stderr.txt &
+  server=$!
+  trap 'kill -KILL "$server" 2>/dev/null || true' EXIT
+  python3 -c 'from client import *
+for _ in range(6000):
+    if os.path.exists("sock"): break
+    time.sleep(0.005)
+driven().ask("object o organ.ela", "step", "end")' || fail 'a client is refused' "$(<stderr.txt)"
+  ended 0
+  [[ $(echo sock*) == 'sock*' ]] || fail 'left behind:' "$(echo sock*)"
+  # A name as long as a name may be.
+  local long
+  long=$(printf '%0107d' 0)
+  ffe-run --serve --ack --listen "$long" 2>stderr.txt &
+  server=$!
+  python3 - "$long" <<'P' || fail 'a client of a long name is refused' "$(<stderr.txt)"
+from client import *
+for _ in range(6000):
+    try: driven(sys.argv[1]).ask("object o organ.ela", "step", "end")
+    except (FileNotFoundError, ConnectionRefusedError): time.sleep(0.005); continue
+    break
+P
+  ended 0
+  rm -r ./*
+}
+
 test_a_client_that_dies_harms_nobody() {
   prepare
   listen --record run.scene -o run.h5

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <pwd.h>
@@ -55,6 +56,13 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
     fail(path, "nobody listens there, but it cannot be removed");
 }
 
+/// Renames a file and replaces none, where the file system can do that.
+bool rename_to_new(const std::string& from, const std::string& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0)
+    return true;
+  return (errno == EINVAL || errno == ENOSYS) && ::rename(from.c_str(), to.c_str()) == 0;
+}
+
 /// One that can be had at any time but must not be used for anything.
 Descriptor spare_descriptor() {
   return Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
@@ -75,25 +83,31 @@ LocalListener::LocalListener(const std::string& path) : path_(path), spare_(spar
   const sockaddr_un address = address_of(path);
   const Descriptor lock = lock_folder_of(path);
   remove_stale(path, address);
+  // Clients that find the path must be able to connect, so the socket listens under another name
+  // first. A name that is too long for that is bound at once.
+  const bool long_name = path.size() + 1 >= sizeof address.sun_path;
+  const std::string first = long_name ? path : path + "~";
+  const sockaddr_un first_address = address_of(first);
+  remove_stale(first, first_address);
   socket_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   // Linux gives the path the mode of the socket, so that it is never open to others.
   if (!socket_ || ::fchmod(socket_.get(), 0600) != 0)
     fail(path, "cannot make a socket");
-  {
-    const SignalsWait wait;
-    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-      fail(path, "cannot listen there");
-    removal_ = remember_removal(path);
-  }
+  const SignalsWait wait;
+  if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&first_address),
+             sizeof first_address) != 0)
+    fail(path, "cannot listen there");
   struct stat info {};
-  const bool seen = ::lstat(path.c_str(), &info) == 0;
+  const bool seen = ::lstat(first.c_str(), &info) == 0;
   device_ = info.st_dev;
   file_ = info.st_ino;
-  if (seen && (info.st_mode & 0077U) == 0 && ::listen(socket_.get(), waiting_clients) == 0)
+  if (seen && (info.st_mode & 0077U) == 0 && ::listen(socket_.get(), waiting_clients) == 0 &&
+      (long_name || rename_to_new(first, path))) {
+    removal_ = remember_removal(path);
     return;
+  }
   const int error = errno;
-  (void)::unlink(path.c_str());
-  forget_removal(removal_);
+  (void)::unlink(first.c_str());
   errno = error;
   fail(path, "cannot listen there for its owner alone");
 }
