@@ -2,13 +2,14 @@
 
 #include "base/error.h"
 #include "base/rounded_text.h"
+#include "base/student_t.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <boost/math/distributions/students_t.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <string>
 
@@ -154,7 +155,7 @@ SwingFit fit_swing(std::span<const double> times, std::span<const double> values
   const double freedom = static_cast<double>(count - 5);
   const Eigen::Matrix<double, 5, 5> covariance =
       sum / freedom * normal.ldlt().solve(Eigen::Matrix<double, 5, 5>::Identity());
-  const double t = boost::math::quantile(boost::math::students_t(freedom), 0.975);
+  const double t = student_t_quantile(0.025, static_cast<std::uint64_t>(count - 5));
   const double wide = t * std::sqrt(covariance(4, 4)) / two_pi;
   fit.frequency_interval = {fit.frequency - wide, fit.frequency + wide};
   // of Z by decay rate and frequency

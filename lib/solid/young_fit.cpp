@@ -2,13 +2,13 @@
 
 #include "base/error.h"
 #include "base/rounded_text.h"
+#include "base/student_t.h"
 #include "solid/solid_place.h"
 #include "solve/factor.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
-#include <boost/math/distributions/students_t.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -177,9 +177,9 @@ public:
       FittedYoung young{wanted_[p], materials_[wanted_[p]].young, {}};
       if (freedom > 0) {
         const auto i = static_cast<Eigen::Index>(p);
-        const boost::math::students_t t(freedom);
         const double width =
-            boost::math::quantile(t, (1 + confidence) / 2) * std::sqrt(variance * inverse(i, i));
+            student_t_quantile((1 - confidence) / 2, data_.size() - wanted_.size()) *
+            std::sqrt(variance * inverse(i, i));
         young.interval = {young.young * std::exp(-width), young.young * std::exp(width)};
       }
       fit_.materials.push_back(young);
@@ -232,9 +232,9 @@ private:
   /// all (Bonferroni).
   void find_outliers(const Eigen::MatrixXd& inverse, double freedom) {
     const double square = residual_.squaredNorm();
-    const boost::math::students_t t(freedom - 1);
-    const double limit = boost::math::quantile(
-        boost::math::complement(t, (1 - confidence) / 2 / static_cast<double>(data_.size())));
+    const double limit =
+        student_t_quantile((1 - confidence) / 2 / static_cast<double>(data_.size()),
+                           data_.size() - wanted_.size() - 1);
     double size = 0;
     for (const Datum& d : data_)
       size = std::max(size, std::abs(d.value));
