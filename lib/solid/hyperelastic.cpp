@@ -15,6 +15,10 @@ namespace gewebe {
 
 namespace {
 
+Eigen::Vector3d eigen(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+
 struct IntegrationPoint {
   std::array<double, 4> at{}; ///< barycentric
   double weight = 0;          ///< of a volume of 1

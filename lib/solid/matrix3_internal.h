@@ -13,8 +13,4 @@ inline Matrix3 matrix(const SolidBlock& block) {
   return Eigen::Map<const Matrix3>(block.data());
 }
 
-inline Eigen::Vector3d eigen(const Vec3& v) {
-  return {v.x, v.y, v.z};
-}
-
 } // namespace gewebe

@@ -29,7 +29,7 @@ std::uint32_t find_interface(const Context& context, const BlockMaterials& mater
                              StuffingBlocks& blocks);
 
 struct InterfacePoint {
-  static constexpr std::uint8_t stays = SurfacePoint::stays;
+  static constexpr std::uint8_t stays = BoundaryLatticePoint::stays;
   static constexpr std::uint32_t none = UINT32_MAX;
 
   std::uint32_t block = 0;

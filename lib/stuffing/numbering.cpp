@@ -11,7 +11,7 @@ constexpr const char* too_many = "the mesh has more than 2^32 - 2 nodes, expecte
 StuffingNodes number_nodes(const Context& context, const StuffingBlocks& blocks,
                            const Grading& grading, const SurfacePoints& surface,
                            const MaterialInterface& interface) {
-  const std::vector<SurfacePoint>& points = surface.points;
+  const std::vector<BoundaryLatticePoint>& points = surface.points;
   StuffingNodes nodes;
   nodes.first.resize(points.size());
   nodes.cuts.resize(points.size());

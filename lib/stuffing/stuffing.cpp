@@ -64,7 +64,7 @@ void write_boundary_points(const StuffingLattice& lattice, const StuffingParts& 
   const StuffingNodes& nodes = parts.nodes;
   std::uint32_t n = block.first_surface;
   for_each_point(block.surface.set(), [&](unsigned word, unsigned bit) {
-    const SurfacePoint& point = parts.surface.points[n];
+    const BoundaryLatticePoint& point = parts.surface.points[n];
     const Vec3 place = bcc::position(point_at(block, word, bit));
     if (nodes.meeting[n] == Meeting::boundary)
       points[nodes.first[n]] =
@@ -87,7 +87,7 @@ void write_inner_points(const StuffingLattice& lattice, const StuffingParts& par
   for_each_point(parts.nodes.inner[b].set(), [&](unsigned word, unsigned bit) {
     Vec3 place = bcc::position(point_at(block, word, bit));
     if (block.surface.contains(word, bit)) {
-      const SurfacePoint& point = parts.surface.points[block.surface_point(word, bit)];
+      const BoundaryLatticePoint& point = parts.surface.points[block.surface_point(word, bit)];
       if (point.warped())
         place += bcc::step(point.warp) * point.cuts[point.warp];
     }

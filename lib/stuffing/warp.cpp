@@ -13,20 +13,20 @@ constexpr std::size_t grain = 1024;
 
 /// Fills in all but cuts and warps.
 void gather(const Context& context, const StuffingBlocks& blocks,
-            std::vector<SurfacePoint>& points) {
+            std::vector<BoundaryLatticePoint>& points) {
   parallel_blocks(context, blocks.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const StuffingBlock& block = blocks[n];
       std::uint32_t next = block.first_surface;
       for_each_point(block.surface.set(), [&](unsigned word, unsigned bit) {
-        SurfacePoint& point = points[next++];
+        BoundaryLatticePoint& point = points[next++];
         point.block = static_cast<std::uint32_t>(n);
         point.word = static_cast<std::uint16_t>(word);
         point.bit = static_cast<std::uint16_t>(bit);
         point.inside = block.in(word, bit);
         for (unsigned d = 0; d < bcc::directions; ++d) {
           const PlaceInBlock there = neighbour(block, word, bit, d);
-          point.neighbours[d] = SurfacePoint::none;
+          point.neighbours[d] = BoundaryLatticePoint::none;
           if (there.block == StuffingBlock::none)
             continue;
           const StuffingBlock& other = blocks[there.block];
@@ -40,11 +40,11 @@ void gather(const Context& context, const StuffingBlocks& blocks,
 
 void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& lattice,
                const StuffingBlocks& blocks, SurfacePoints& surface) {
-  std::vector<SurfacePoint>& points = surface.points;
+  std::vector<BoundaryLatticePoint>& points = surface.points;
   parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
     CutFinder finder(grid, lattice);
     for (std::size_t n = begin; n < end; ++n) {
-      SurfacePoint& point = points[n];
+      BoundaryLatticePoint& point = points[n];
       if (!point.inside)
         continue;
       const Vec3 place = bcc::position(point_at(blocks[point.block], point.word, point.bit));
@@ -59,7 +59,7 @@ void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& 
   // The other ends see the same cuts.
   parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      SurfacePoint& point = points[n];
+      BoundaryLatticePoint& point = points[n];
       for (unsigned d = 0; d < bcc::directions; ++d)
         if (!point.inside && surface.other_side(point, d))
           point.cuts[d] = 1 - points[point.neighbours[d]].cuts[bcc::opposite(d)];
@@ -68,7 +68,7 @@ void find_cuts(const Context& context, const Grid& grid, const StuffingLattice& 
 }
 
 void warp(const Context& context, const StuffingBlocks& blocks, SurfacePoints& surface) {
-  std::vector<SurfacePoint>& points = surface.points;
+  std::vector<BoundaryLatticePoint>& points = surface.points;
   for (unsigned turn = 0; turn < bcc::colours; ++turn)
     parallel_blocks(context, points.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n)
@@ -79,7 +79,7 @@ void warp(const Context& context, const StuffingBlocks& blocks, SurfacePoints& s
 
 /// Takes warps back until no point is pinched. It ends, for without any warp none is.
 void keep_manifold(const Context& context, SurfacePoints& surface) {
-  std::vector<SurfacePoint>& points = surface.points;
+  std::vector<BoundaryLatticePoint>& points = surface.points;
   std::vector<std::uint32_t> asked;
   for (std::size_t n = 0; n < points.size(); ++n)
     if (points[n].warped())
@@ -93,13 +93,13 @@ void keep_manifold(const Context& context, SurfacePoints& surface) {
     std::vector<std::uint32_t> next;
     for (std::size_t n = 0; n < asked.size(); ++n)
       if (pinched[n] != 0) {
-        points[asked[n]].warp = SurfacePoint::stays;
+        points[asked[n]].warp = BoundaryLatticePoint::stays;
         points[asked[n]].refused = true;
       }
     for (std::size_t n = 0; n < asked.size(); ++n)
       if (pinched[n] != 0)
         for (const std::uint32_t neighbour : points[asked[n]].neighbours)
-          if (neighbour != SurfacePoint::none && points[neighbour].warped())
+          if (neighbour != BoundaryLatticePoint::none && points[neighbour].warped())
             next.push_back(neighbour);
     std::sort(next.begin(), next.end());
     next.erase(std::unique(next.begin(), next.end()), next.end());
@@ -109,13 +109,13 @@ void keep_manifold(const Context& context, SurfacePoints& surface) {
 
 } // namespace
 
-LinkSigns SurfacePoints::link_signs(const SurfacePoint& point) const {
+LinkSigns SurfacePoints::link_signs(const BoundaryLatticePoint& point) const {
   LinkSigns signs;
   for (unsigned d = 0; d < bcc::directions; ++d) {
     const std::uint32_t n = point.neighbours[d];
-    if (n != SurfacePoint::none && points[n].warped())
+    if (n != BoundaryLatticePoint::none && points[n].warped())
       continue;
-    const bool in = n == SurfacePoint::none ? point.inside : points[n].inside;
+    const bool in = n == BoundaryLatticePoint::none ? point.inside : points[n].inside;
     (in ? signs.inside : signs.outside) |= 1U << d;
   }
   return signs;
@@ -164,7 +164,7 @@ SurfacePoints warp_lattice(const Context& context, const Grid& grid, const Stuff
   Context quiet = context;
   quiet.progress = nullptr;
   const std::size_t count = blocks.back().first_surface + size(blocks.back().surface.set());
-  require_memory(context, static_cast<double>(count) * sizeof(SurfacePoint),
+  require_memory(context, static_cast<double>(count) * sizeof(BoundaryLatticePoint),
                  "the lattice points beside the surface");
   surface.points.resize(count);
   gather(quiet, blocks, surface.points);

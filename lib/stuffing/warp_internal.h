@@ -15,7 +15,7 @@
 namespace gewebe {
 
 /// A lattice point with an edge to the other side.
-struct SurfacePoint {
+struct BoundaryLatticePoint {
   static constexpr std::uint8_t stays = 0xff;
   static constexpr std::uint32_t none = UINT32_MAX;
 
@@ -38,26 +38,27 @@ struct LinkSigns {
 };
 
 struct SurfacePoints {
-  std::vector<SurfacePoint> points; ///< by block, word, bit
+  std::vector<BoundaryLatticePoint> points; ///< by block, word, bit
 
-  bool other_side(const SurfacePoint& point, unsigned direction) const {
+  bool other_side(const BoundaryLatticePoint& point, unsigned direction) const {
     const std::uint32_t n = point.neighbours[direction];
-    return n != SurfacePoint::none && points[n].inside != point.inside;
+    return n != BoundaryLatticePoint::none && points[n].inside != point.inside;
   }
   /// Is there a cut point on the edge?
-  bool is_cut(const SurfacePoint& point, unsigned direction) const {
+  bool is_cut(const BoundaryLatticePoint& point, unsigned direction) const {
     return !point.warped() && other_side(point, direction) &&
            !points[point.neighbours[direction]].warped();
   }
-  LinkSigns link_signs(const SurfacePoint& point) const;
+  LinkSigns link_signs(const BoundaryLatticePoint& point) const;
 };
 
-/// The direction of the nearest cut of a point that is nearer than alpha, or SurfacePoint::stays.
-/// \param cuts tells which edges are cut: SurfacePoints, MaterialInterface
+/// The direction of the nearest cut of a point that is nearer than alpha, or
+/// BoundaryLatticePoint::stays. \param cuts tells which edges are cut: SurfacePoints,
+/// MaterialInterface
 template <class Cuts, class Point>
 std::uint8_t violated(const Cuts& cuts, const Point& point) {
   double least = HUGE_VAL;
-  std::uint8_t result = SurfacePoint::stays;
+  std::uint8_t result = BoundaryLatticePoint::stays;
   for (unsigned d = 0; d < bcc::directions; ++d) {
     if (!cuts.is_cut(point, d) || !(point.cuts[d] < bcc::alpha(d)))
       continue;
