@@ -364,6 +364,21 @@ void RotationWarp::answer(const WarpLoad& load, WarpState& state,
       keep_pair(*before, round, state.pairs);
     Vector next = round.to;
     mix(state.pairs, round.off, next);
+    // Secant pairs of earlier answers can be stale. If they cancel most of the residual, a small
+    // step is no sign of convergence.
+    const auto own = std::min(state.pairs.size(), static_cast<std::size_t>(state.rounds));
+    if (state.pairs.size() > own) {
+      Vector step = next;
+      for (std::size_t k = 0; k < step.size(); ++k)
+        step[k] -= round.z[k];
+      columns.multiply(part.local(step));
+      columns.multiply(part.holding(step));
+      if (!(2 * largest(step) >= largest(round.off))) {
+        state.pairs.resize(own);
+        next = round.to;
+        mix(state.pairs, round.off, next);
+      }
+    }
 
     const std::size_t known = holds ? rows : corners;
     combine(columns, part.local(next), part.share(next), 0, known, found);
