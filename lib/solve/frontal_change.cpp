@@ -226,7 +226,9 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
                       [&](std::uint32_t x, std::uint32_t y) { return x == placed(y); });
   };
   // A front is as it was only with the children that it had. Where springs went while the tree
-  // stayed, a child may hang elsewhere now though no row of this front has changed since.
+  // stayed, a child may hang elsewhere now though no row of this front has changed since. A child
+  // that is kept has kept its parent, if that is kept too: the parent eliminates the first node of
+  // the child's boundary, which is the same.
   std::vector<std::uint32_t> had_children(before.fronts(), 0), kept_children(tree.fronts(), 0);
   for (const std::uint32_t parent : before.parent)
     if (parent != none)
@@ -248,10 +250,8 @@ std::vector<char> FrontalFactor::State::grow(std::span<const std::uint32_t> orde
     wanted[f] = !kept;
     if (parent == none)
       continue;
-    const bool stays = kept && before.parent[old] != none &&
-                       before.parent[old] == front_of[tree.eliminated(parent)[0]];
-    kept_children[parent] += stays ? 1 : 0;
-    wanted[parent] = static_cast<char>(wanted[parent] | !stays);
+    kept_children[parent] += kept ? 1 : 0;
+    wanted[parent] = static_cast<char>(wanted[parent] | !kept);
   }
   return wanted;
 }

@@ -10,7 +10,8 @@ namespace {
 
 /// Cells that may be part of a larger leaf: nothing of their own, and of the tetrahedra that they
 /// share with the next cells, lies at a point with an edge to the other side or to another
-/// material. Word i, bit 8 j + k.
+/// material. Word i, bit 8 j + k. The centre needs no test of its own: the other end of such an
+/// edge is one of its neighbours, and at the same surface.
 using CellSet = std::array<std::uint64_t, 8>;
 CellSet quiet_cells(const StuffingBlocks& blocks, const StuffingBlock& block) {
   const auto at_surface = [](const StuffingBlock& there, unsigned word) {
@@ -19,7 +20,7 @@ CellSet quiet_cells(const StuffingBlocks& blocks, const StuffingBlock& block) {
   CellSet quiet{};
   for (int i = 0; i < leaf_dim; ++i) {
     const auto centres = static_cast<unsigned>(8 + i);
-    std::uint64_t loud = ~block.inside[centres] | at_surface(block, centres);
+    std::uint64_t loud = ~block.inside[centres];
     for (unsigned d = 0; d < bcc::directions; ++d)
       loud |=
           shifted_word(blocks, block, bcc::kind_after(1, d), i, bcc::place_step(1, d), at_surface);
