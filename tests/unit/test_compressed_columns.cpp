@@ -5,6 +5,7 @@
 #include "compliance/axis_solver.h"
 #include "compliance/column_compression.h"
 #include "compliance/compliance_columns.h"
+#include "compliance/crosses.h"
 #include "cutting/corrected_columns.h"
 #include "made_columns.h"
 #include "solid/assembly.h"
@@ -19,7 +20,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <initializer_list>
@@ -219,8 +222,11 @@ TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
       const auto c = columns->block(node, other);
       for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t b = 0; b < 3; ++b) {
+          EXPECT_EQ(c[a][b], columns->entry(node, static_cast<int>(a), 3 * std::size_t{other} + b));
           if (columns->has(other)) {
             EXPECT_EQ(c[a][b], columns->block(other, node)[b][a]);
+            EXPECT_EQ(c[a][b],
+                      columns->entry(other, static_cast<int>(b), 3 * std::size_t{node} + a));
           }
           if (body.matrix.row_of_axis[3 * node + a] < 0 ||
               body.matrix.row_of_axis[3 * other + b] < 0) {
@@ -309,6 +315,54 @@ TEST(CompressedColumns, ASumClusterByClusterIsTheWholeOneAndWithinItsBounds) {
     }
   }
   EXPECT_LT(bounds, 20 * sizes);
+}
+
+/// The scales of int16 and int8 terms differ by orders of magnitude.
+TEST(Crosses, LargestEntryUsesTheScalesOfEachType) {
+  const std::array<double, 2> scale{1e-9, 1};
+  const std::array<std::int16_t, 2> wide{32767, 32767};
+  const std::array<std::int8_t, 2> narrow{127, -127};
+  CrossView view{1, 1, false, {1, 1}, scale.data(), wide.data(), narrow.data()};
+  double entry = 0;
+  add_entries(view, 0, 0, 1, &entry);
+  EXPECT_LT(entry, -16000);
+  EXPECT_GE(largest_entry(view), std::abs(entry));
+  EXPECT_LE(largest_entry(view), 128 * 128 + 1e-9 * 32768 * 32768);
+  // A triangle's bound is exact where both kinds have their largest number at one place.
+  const std::array<double, 2> of_triangle{8, 0.25};
+  view.symmetric = true;
+  view.scale = of_triangle.data();
+  entry = 0;
+  add_entries(view, 0, 0, 1, &entry);
+  EXPECT_EQ(largest_entry(view), std::abs(of_triangle[0] * 32767) + 0.25 * 127);
+}
+
+TEST(Crosses, LargestEntryBoundsRandomBlocks) {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  for (const bool symmetric : {false, true})
+    for (const double bound : {1e-1, 1e-3, 1e-5}) {
+      std::vector<double> block(12 * 12);
+      for (std::size_t i = 0; i < 12; ++i)
+        for (std::size_t j = 0; j < 12; ++j)
+          block[12 * i + j] = symmetric && j < i ? block[12 * j + i] : normal(random);
+      double most = 0;
+      for (const double x : block)
+        most = test::larger(most, std::abs(x));
+      Crosses crosses;
+      const CrossCount count = append_crosses(block, 12, symmetric, bound, Context{}.cpu, crosses);
+      const CrossView view{12,
+                           12,
+                           symmetric,
+                           count,
+                           crosses.scale.data(),
+                           crosses.wide.data(),
+                           crosses.narrow.data()};
+      EXPECT_GE(largest_entry(view), most - bound) << symmetric << ' ' << bound;
+      if (symmetric) {
+        EXPECT_LE(largest_entry(view), 1.0001 * most + 2 * bound) << bound;
+      }
+    }
 }
 
 /// Nothing is smooth here, so that every direction needs a cross.

@@ -223,8 +223,10 @@ TEST(LabelVolume, InrHasVoxelSizesAlone) {
   EXPECT_EQ(volume.mask.transform.m, (std::array<double, 12>{1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0}));
   EXPECT_TRUE(volume.mask.inside({4, 3, 2}));
   EXPECT_EQ(read(gzipped(inr(u8, raw(voxels<std::uint8_t>())))).voxels, 2U);
-  for (const bool big : {false, true}) {
-    const std::string cpu = big ? "CPU=sun\n" : "CPU=alpha\n";
+  for (const auto& [name, big] :
+       {std::pair("decm", false), std::pair("alpha", false), std::pair("pc", false),
+        std::pair("sun", true), std::pair("sgi", true)}) {
+    const std::string cpu = std::string("CPU=") + name + "\n";
     EXPECT_EQ(grey_volume_from_bytes(
                   inr("TYPE=float\nPIXSIZE=32 bits\n" + cpu, raw(voxels<float>(), big)), "test", {})
                   .volume.values,

@@ -180,6 +180,13 @@ TEST(Occlusion, PointsWithoutNormalOrTriangleAndNoRadius) {
   normals[0] = {};
   m.points.push_back(m.points[1]);
   normals.push_back(normals[1]);
+  const auto without = static_cast<std::ptrdiff_t>(normals.size() / 2);
+  std::vector<Vec3> half = normals; // the second half has none, in the middle of the triangles
+  std::fill(half.begin() + without, half.end(), Vec3{});
+  const std::vector<float> some = openness_of(m, half, 8);
+  EXPECT_TRUE(std::all_of(some.begin() + without, some.end(), [](float o) { return o == 1.0F; }));
+  EXPECT_FALSE(
+      std::all_of(some.begin(), some.begin() + without, [](float o) { return o == 1.0F; }));
   const std::vector<float> found = openness_of(m, normals, 8);
   EXPECT_EQ(found[0], 1.0F);
   EXPECT_EQ(found.back(), 1.0F);

@@ -437,6 +437,43 @@ TEST(SimulationCut, WhatIsTiedStaysTied) {
   EXPECT_THROW(s.apply(SetMethod{1, Method::ffe}), Error);
 }
 
+/// The copy that keeps the number of the node keeps its tie.
+TEST(SimulationCut, ATieFollowsTheMainCopyOfADoubledNode) {
+  const Model organ = soft_organ();
+  Simulation cut(one_thread(), {});
+  cut.add_object("organ", organ, Method::ela);
+  cut.apply(CutObject{0, incision(organ)});
+  ASSERT_EQ(cut.object_count(), 1U);
+  const auto [mothers, places] = [&] {
+    const ObjectFacts facts = cut.object(0);
+    return std::pair(std::vector<std::uint32_t>(facts.first_nodes.begin(), facts.first_nodes.end()),
+                     std::vector<std::uint32_t>(facts.places.begin(), facts.places.end()));
+  }();
+  std::size_t doubled = 0;
+  for (std::uint32_t copy = 0; copy < mothers.size(); ++copy) {
+    const std::uint32_t node = mothers[copy], main = places.empty() ? node : places[node];
+    if (copy == main || doubled == 3)
+      continue;
+    ++doubled;
+    for (const bool other : {false, true}) {
+      Simulation s(one_thread(), {});
+      s.add_object("organ", organ, Method::ela);
+      s.add_object("weight", test::two_masses(1), Method::ela);
+      if (other)
+        s.apply(Attach{1, {0}, 0, {node}, 2000});
+      else
+        s.apply(Attach{0, {node}, 1, {0}, 2000});
+      s.apply(CutObject{0, incision(organ)});
+      s.apply(SetForce{1, {0}, {0, 0, 3000}});
+      s.step(0.03);
+      const std::vector<double> u = shape(s, 0);
+      EXPECT_GT(u[3 * std::size_t{main} + 2], 2 * std::abs(u[3 * std::size_t{copy} + 2])) << node;
+      EXPECT_GT(u[3 * std::size_t{main} + 2], 1e-3);
+    }
+  }
+  EXPECT_GT(doubled, 0U);
+}
+
 TEST(SimulationCut, AShapeThatNobodyAskedForIsThereWhenSomebodyDoes) {
   // Grasped between a cut and the next step, with the shape emitted before or not.
   const auto run = [](bool emitted) {

@@ -181,6 +181,37 @@ TEST_P(SolidCuts, LoadsGripsAndEventsFollow) {
   EXPECT_EQ(s.instrument(0).nodes, 0U);
 }
 
+/// A cut may double tied nodes but not move them, or ties would no longer be at rest.
+TEST_P(SolidCuts, CutsDoNotMoveTiedNodes) {
+  const Model first = bar(GetParam());
+  const auto near = nodes_where(first, [](const Vec3& p) { return std::abs(p.x - 7.8) < 1.5; });
+  const CutObject cut{0, PlaneToCut{{{7.8, 0, 0}, {1, 0.02, 0.01}}, {}}};
+  const auto moved = [&](const Simulation& s) {
+    const std::span<const std::uint32_t> places = s.object(0).places;
+    return std::ranges::count_if(near, [&](std::uint32_t node) {
+      const std::uint32_t now = places.empty() ? node : places[node];
+      return now != CutModel::gone &&
+             !(s.model(0).nodes[now].position == first.nodes[node].position);
+    });
+  };
+  Simulation untied(one_thread(), {});
+  untied.add_object("bar", bar(GetParam()), Method::ela);
+  untied.apply(cut);
+  ASSERT_GT(moved(untied), 0); // else nothing is tested here
+  for (const bool other : {false, true}) {
+    Simulation s(one_thread(), {});
+    s.add_object("a", bar(GetParam()), Method::ela);
+    s.add_object("b", bar(GetParam()), Method::ela);
+    if (other)
+      s.apply(Attach{1, near, 0, near, 100});
+    else
+      s.apply(Attach{0, near, 1, near, 100});
+    s.apply(cut);
+    EXPECT_EQ(moved(s), 0) << other;
+    EXPECT_EQ(s.object_count(), 3U);
+  }
+}
+
 TEST_P(SolidCuts, ABladeCutsInOneStepAndInMany) {
   for (const Method method : {Method::ffe, Method::ela})
     for (const int steps : {1, 7, 40}) {

@@ -205,6 +205,35 @@ TEST(SolidTearLoads, MeansOverALengthDependLessOnTheMesh) {
   EXPECT_NEAR(fine_over, coarse_over, 0.02 * coarse_over);
 }
 
+/// Two layers of different stiffness under the same strain: averages must not mix their stresses.
+TEST(SolidTearLoads, StressAveragesUseOneMaterial) {
+  Model model = pulled_bar(false, 4, true);
+  model.materials[0].young = 20000;
+  model.materials[1].young = 60000;
+  for (std::size_t t = 0; t < model.tetrahedra.size(); ++t) {
+    double z = 0;
+    for (const std::uint32_t corner : model.tetrahedra[t])
+      z += model.nodes[corner].position.z / 4;
+    model.tetrahedron_material[t] = z < side / 2 ? 0 : 1;
+  }
+  std::vector<double> u;
+  for (const Node& node : model.nodes)
+    u.insert(u.end(), {0.01 * node.position.x, 0, 0});
+  for (const double over : {0.0, 1.0, 3.0, 50.0}) {
+    const std::optional<SolidTear> soft =
+        find_tear(model, u, StrainFrames::resting, {true, {100, 900}, over});
+    ASSERT_TRUE(soft.has_value());
+    EXPECT_NEAR(soft->share, 2, 1e-9) << over;
+    EXPECT_EQ(model.tetrahedron_material[soft->tetrahedron], 0) << over;
+    const std::optional<SolidTear> stiff =
+        find_tear(model, u, StrainFrames::resting, {true, {210, 500}, over});
+    ASSERT_TRUE(stiff.has_value());
+    EXPECT_NEAR(stiff->share, 1.2, 1e-9) << over;
+    EXPECT_EQ(model.tetrahedron_material[stiff->tetrahedron], 1) << over;
+    EXPECT_FALSE(find_tear(model, u, StrainFrames::resting, {true, {201, 601}, over}));
+  }
+}
+
 TEST_P(SolidTears, ANotchGoesOnFromItsFront) {
   Simulation s(one_thread(), {});
   s.add_object("bar", pulled_bar(GetParam(), 4, false), Method::ffe);

@@ -11,6 +11,7 @@
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -266,6 +267,41 @@ TEST(SolidAssembly, FieldsOfALinearDisplacementAreThoseOfItsGradient) {
           EXPECT_NEAR(one[k], stress, 1e-13 * (lambda + mu));
     }
   }
+}
+
+/// Gravity strains the bubbles of quadratic elements. A body rotated by R has the strains of an
+/// unrotated body under Rᵀ g, rotated by R.
+TEST(SolidAssembly, StrainsUnderGravityRotateWithTheBody) {
+  TetMesh mesh = test::distorted_box();
+  make_quadratic(mesh);
+  const std::vector<SolidMaterial> material{{2500, 0.45, 1e-3}};
+  const auto elements = solid_elements(mesh, material);
+  const Eigen::Vector3d w(0.5, -1.2, 0.8), g(300, -9810, 4000);
+  const Eigen::Matrix3d r = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
+  std::vector<double> turned;
+  for (const Vec3& p : mesh.points) {
+    const Eigen::Vector3d u = w.cross(Eigen::Vector3d(p.x, p.y, p.z));
+    turned.insert(turned.end(), {u.x(), u.y(), u.z()});
+  }
+  const Eigen::Vector3d back = r.transpose() * g;
+  const auto at_rest = solid_strains(mesh, material, elements, std::vector<double>(turned.size()),
+                                     {back.x(), back.y(), back.z()}),
+             found = solid_strains(mesh, material, elements, turned, {g.x(), g.y(), g.z()},
+                                   StrainFrames::turning);
+  const auto matrix = [](const SymmetricBlock& s) {
+    Eigen::Matrix3d m;
+    m << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+    return m;
+  };
+  double size = 0, worst = 0;
+  for (std::size_t t = 0; t < elements.size(); ++t)
+    for (std::size_t p = 0; p < 4; ++p) {
+      const Eigen::Matrix3d expected = r * matrix(at_rest[t][p]) * r.transpose();
+      size = test::larger(size, expected.norm());
+      worst = test::larger(worst, (matrix(found[t][p]) - expected).norm());
+    }
+  EXPECT_GT(size, 1e-6);
+  EXPECT_LT(worst, 0.02 * size); // the rotation that bubbles add to is the corner's own
 }
 
 TEST(SolidAssembly, VonMisesIsThatOfTensionShearAndPressure) {

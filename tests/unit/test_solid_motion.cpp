@@ -2,12 +2,15 @@
 // back from any shape, and a measured beam's frequency.
 
 #include "solid/hyperelastic_statics.h"
+#include "solid/motion_limit_internal.h"
+#include "solid/motion_volumes_internal.h"
 #include "solid/solid_motion.h"
 #include "solve/factor.h"
 #include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/solid_bodies.h"
 #include "tet_fixtures.h"
+#include "tetrahedra/boundary.h"
 #include "tetrahedra/order.h"
 
 #include <gtest/gtest.h>
@@ -19,6 +22,7 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -322,6 +326,27 @@ TEST_P(SolidMotionOf, HeldNodesAreMovedAndPullTheRest) {
   EXPECT_LT(difference(moving.displacement(), expected), 1e-6);
 }
 
+/// Secants of earlier steps must not influence the steps after set_state().
+TEST_P(SolidMotionOf, SetStateDiscardsTheSecants) {
+  const TetMesh m = mesh();
+  SolidMotion fresh = body(m), used = body(m);
+  std::mt19937 random(5);
+  const Numbers none(3 * m.points.size()), load = random_numbers(none.size(), 3000, random),
+                                           u = random_numbers(none.size(), 0.4, random),
+                                           v = random_numbers(none.size(), 200, random);
+  used.set_load(load);
+  for (int n = 0; n < 6; ++n)
+    (void)used.step(0.01, {});
+  used.set_load(none);
+  for (SolidMotion* moving : {&fresh, &used}) {
+    moving->set_state(u, v);
+    for (int n = 0; n < 3; ++n)
+      (void)moving->step(0.01, {});
+  }
+  EXPECT_EQ(fresh.displacement(), used.displacement());
+  EXPECT_EQ(energy(fresh), energy(used));
+}
+
 INSTANTIATE_TEST_SUITE_P(Laws, SolidMotionOf,
                          testing::Values(Kind{SolidLaw::corotational, false},
                                          Kind{SolidLaw::corotational, true},
@@ -495,6 +520,78 @@ TEST(SolidMotion, ALoadedSiliconeBeamHasItsMeasuredFrequency) {
     beam.hold(axis, [](const Vec3& p) { return p.x == 0; });
   const Numbers load = gravity_load(beam.mesh, beam.materials, beam.elements, {0, 0, -9807.09});
   EXPECT_NEAR(falling_beam(beam, load, 4.37, -17.3, 1.0 / 300, 190).frequency, 4.37, 0.05 * 4.37);
+}
+
+/// The energy is K (V - V₀)²/(2 |V₀|), and the forces are its negative gradient.
+TEST(SolidMotion, ForcesOfEnclosedVolumesAreTheEnergyGradient) {
+  const TriangleMesh cube = boundary(test::box_tetrahedra(1, 1, 1, 3)).mesh;
+  Numbers rest;
+  for (const Vec3& p : cube.points)
+    rest.insert(rest.end(), {p.x, p.y, p.z});
+  constexpr double bulk = 700;
+  MotionVolumes volumes(cube.triangles, rest, bulk);
+  const auto at = [&](const Numbers& places) {
+    Numbers forces(places.size());
+    return std::pair(volumes.evaluate(places, forces), forces);
+  };
+  EXPECT_EQ(at(rest).first, 0);
+  Numbers wider = rest;
+  for (double& x : wider)
+    x *= 1.1;
+  const double more = 27 * (1.331 - 1);
+  EXPECT_NEAR(at(wider).first, bulk * more * more / (2 * 27), 1e-9 * bulk);
+  std::mt19937 random(3);
+  add(wider, 1, random_numbers(rest.size(), 0.2, random));
+  const Numbers forces = at(wider).second;
+  for (std::size_t axis = 0; axis < rest.size(); ++axis) {
+    constexpr double step = 1e-5;
+    Numbers up = wider, down = wider;
+    up[axis] += step;
+    down[axis] -= step;
+    EXPECT_NEAR(forces[axis], (at(down).first - at(up).first) / (2 * step), 1e-6 * largest(forces));
+  }
+}
+
+/// The order in which the limiter reduces speeds.
+TEST(SolidMotion, EnergyLimitTakesDeformationThenRotationThenTranslation) {
+  MotionBody body;
+  const std::vector<Vec3> corners{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
+  for (const Vec3& p : corners) {
+    body.rest.insert(body.rest.end(), {p.x, p.y, p.z});
+    body.masses.push_back(2);
+    body.drag.push_back(0);
+    body.in_elements.push_back(1);
+  }
+  const Numbers none(body.axes());
+  MotionState state{body.rest, none, none, none, std::vector<std::uint8_t>(body.axes())};
+  Numbers moving = none, turning = none, inner = none;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    moving[3 * i + 2] = 3;              // m/2 v² of all: 36
+    turning[3 * i] = -4 * corners[i].y; // about z: 64
+    turning[3 * i + 1] = 4 * corners[i].x;
+    inner[3 * i] = corners[i].x; // outwards along x: 2
+  }
+  const auto speeds = [&](double of_inner, double of_turning, double of_moving) {
+    Numbers all = none;
+    add(all, of_inner, inner);
+    add(all, of_turning, turning);
+    add(all, of_moving, moving);
+    return all;
+  };
+  const auto limited = [&](double most, bool all) {
+    state.velocity = speeds(1, 1, 1);
+    EXPECT_TRUE(limit_energy(body, state, 0, most, 0, all));
+    return state.velocity;
+  };
+  EXPECT_NEAR(motion_energy(body, speeds(1, 1, 1)), 102, 1e-12);
+  EXPECT_LT(difference(limited(101, true), speeds(std::sqrt(0.5), 1, 1)), 1e-12);
+  EXPECT_LT(difference(limited(84, true), speeds(0, 0.5 * std::sqrt(3.0), 1)), 1e-12);
+  EXPECT_NEAR(motion_energy(body, state.velocity), 84, 1e-12);
+  EXPECT_LT(difference(limited(9, true), speeds(0, 0, 0.5)), 1e-12);
+  EXPECT_LT(difference(limited(84, false), speeds(0, 1, 1)), 1e-12);
+  state.velocity = speeds(1, 1, 1);
+  EXPECT_FALSE(limit_energy(body, state, 0, 102, 1e-9, true));
+  EXPECT_EQ(state.velocity, speeds(1, 1, 1));
 }
 
 TEST(SolidMotion, RefusesWhatItCantDo) {

@@ -1,11 +1,16 @@
 #include "base/error.h"
+#include "stuffing/bcc_internal.h"
+#include "stuffing/interface_internal.h"
+#include "stuffing/lattice_internal.h"
 #include "stuffing/stuffing.h"
+#include "stuffing/warp_internal.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/stuffing_checks.h"
 #include "tetrahedra/faces.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <map>
 #include <random>
 
@@ -152,6 +157,45 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
   EXPECT_GT(cuts, 1000U);
   EXPECT_GT(warped, 1000U);
   EXPECT_GT(kept, 1000U);
+}
+
+/// If an interface runs close to the boundary, corners of a tetrahedron move onto both surfaces. A
+/// tetrahedron with four moved corners could have any shape.
+TEST(StuffingInterface, EachTetrahedronKeepsAnUnmovedCorner) {
+  std::size_t refused = 0, beside_both = 0;
+  for (const double depth : {0.2, 0.5, 0.8, 1.1}) {
+    const Grid grid = ball(3, 0.25);
+    const MaterialSource source = in_ball({0.2, -0.2, 0.1}, 3 - 0.6 * depth);
+    const StuffingLattice lattice = stuffing_lattice(grid, {}, 0.6);
+    StuffingBlocks blocks = stuffing_blocks({}, grid, lattice);
+    const SurfacePoints surface = warp_lattice({}, grid, lattice, blocks);
+    const BlockMaterials materials = materials_of({}, lattice, blocks, source);
+    (void)find_interface({}, materials, blocks);
+    const MaterialInterface between =
+        follow_interface({}, lattice, blocks, surface, materials, source);
+    for (const InterfacePoint& point : between.points) {
+      refused += point.refused ? 1 : 0;
+      if (!point.warped())
+        continue;
+      std::array<bool, bcc::directions> moved{};
+      bool beside_boundary = false;
+      for (unsigned d = 0; d < bcc::directions; ++d) {
+        const PlaceInBlock at = neighbour(blocks[point.block], point.word, point.bit, d);
+        const StuffingBlock& there = blocks[at.block];
+        const bool onto_boundary = there.surface.contains(at.word, at.bit) &&
+                                   surface.points[there.surface_point(at.word, at.bit)].warped();
+        moved[d] =
+            onto_boundary || (there.interface.contains(at.word, at.bit) &&
+                              between.points[there.interface_point(at.word, at.bit)].warped());
+        beside_boundary = beside_boundary || onto_boundary;
+      }
+      beside_both += beside_boundary ? 1 : 0;
+      for (const auto& [a, b, c] : bcc::link.faces)
+        EXPECT_FALSE(moved[a] && moved[b] && moved[c]) << depth;
+    }
+  }
+  EXPECT_GT(refused, 10U);
+  EXPECT_GT(beside_both, 10U);
 }
 
 } // namespace

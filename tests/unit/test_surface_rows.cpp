@@ -5,6 +5,7 @@
 #include "compliance/column_compression.h"
 #include "compliance/compliance.h"
 #include "compliance/compliance_columns.h"
+#include "compliance/load_answer.h"
 #include "compliance/verify.h"
 #include "larger.h"
 #include "scene/simulation.h"
@@ -351,6 +352,29 @@ TEST(SurfaceRows, OfCompressedColumnsCostNoSolveUntilTheInsideIsAskedFor) {
   EXPECT_EQ(object.counts().factors, 0U);
   (void)object.displacement();
   EXPECT_EQ(object.counts().solves, 1U);
+}
+
+TEST(SurfaceRows, InnerNodesFollowAChangeOfGravity) {
+  const Model model = box_model();
+  Elastostatic some(model, surface_of(model), {}), all(model, nullptr, {});
+  Compliance compliance(model, surface_of(model), {}, false);
+  LoadAnswer answer(model, compliance);
+  const Places at = places_of(model);
+  const std::vector<std::size_t> rows{3 * std::size_t{at.inner[2]},
+                                      3 * std::size_t{at.inner[2]} + 2,
+                                      3 * std::size_t{at.outer[3]} + 1};
+  Load load;
+  load.force[at.outer[5]] = {0, 3, 1};
+  for (const Vec3& gravity : {Vec3{0, 0, -100}, {50, 0, 0}, {}, {0, 0, -100}}) {
+    load.gravity = gravity;
+    some.update(load);
+    all.update(load);
+    const std::span<const double> expected = all.displacement();
+    expect_near(some.displacement(), expected, 1e-9, "shape");
+    const std::vector<double> found = answer.at(load, rows);
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      EXPECT_NEAR(found[k], expected[rows[k]], 1e-9 * largest(expected));
+  }
 }
 
 TEST(SurfaceRows, CostNoSolveUntilTheInsideIsAskedFor) {

@@ -515,6 +515,41 @@ Vec3 polynomial(const Vec3& p, bool quadratic) {
   return quadratic ? linear + Vec3{p.x * p.y, p.z * p.z - p.x * p.z, p.y * p.y} : linear;
 }
 
+/// All corners of a tetrahedron can lie on a folded blade that follows the faces of the mesh. Such
+/// a tetrahedron must not become a component of its own.
+TEST(TetCut, TetrahedraWithAllCornersOnTheBladeStayAttached) {
+  const TetMesh mesh = box_tetrahedra(2, 2, 2, 0.5);
+  const std::vector<std::vector<Vec3>> folds{{{-0.1, 0.4, -0.5},
+                                              {1.6, -0.4, 0.2},
+                                              {-0.2, 0.8, 0.2},
+                                              {1.5, -0.1, 0.9},
+                                              {-0.4, 0.5, 0.4},
+                                              {1.3, -0.3, 1.1}},
+                                             {{0.2, -0.4, 0.7},
+                                              {1.7, 0.9, 0.8},
+                                              {-0.2, 0.1, 0.7},
+                                              {1.3, 1.4, 0.8},
+                                              {-0.3, 0.1, 1.4},
+                                              {1.3, 1.3, 1.5}},
+                                             {{0.5, -0.7, 0.1},
+                                              {-0.1, 0.9, 1.2},
+                                              {0.6, -0.4, -0.2},
+                                              {0, 1.2, 0.9},
+                                              {0.1, -0.3, -0.7},
+                                              {-0.5, 1.3, 0.3}}};
+  BladeCutOptions options;
+  options.along_faces = true;
+  for (const std::vector<Vec3>& points : folds) {
+    TriangleMesh blade;
+    blade.points = points;
+    blade.triangles = {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}};
+    const TetCut cut = cut_tetrahedra(mesh, blade, options);
+    EXPECT_EQ(fault_of(mesh, cut, options.least_angle), "");
+    EXPECT_EQ(cut.mesh.tetrahedra.size(), mesh.tetrahedra.size());
+    EXPECT_EQ(component_count(cut.mesh), 1U);
+  }
+}
+
 TEST(TetCut, QuadraticSolidsKeepTheirMiddles) {
   std::mt19937 random(12);
   std::uniform_real_distribution<double> reach(0.1, 0.5);

@@ -236,6 +236,14 @@ TEST(TetFile, GmshByHand) {
   EXPECT_EQ(tet_mesh_from_bytes(text, "m", Kind::msh).tetrahedra.size(), 2U);
 }
 
+/// Gmsh writes a negative group for an entity of reversed orientation.
+TEST(TetFile, GmshNegativePhysicalGroups) {
+  const std::string text =
+      replaced(replaced(gmsh2, "3 4 3 7 1 0", "3 4 3 -7 1 0"), "4 4 2 8 2", "4 4 2 -8 2");
+  EXPECT_EQ(complaint(text, Kind::msh), "");
+  EXPECT_EQ(tet_mesh_from_bytes(text, "m", Kind::msh).material, (std::vector<std::int32_t>{7, 8}));
+}
+
 const char* const gmsh4 =
     "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
     "$Entities\n1 0 0 2\n1 0 0 0 0\n4 0 0 0 1 1 1 2 9 8 0\n5 0 0 0 1 1 1 0 0\n$EndEntities\n"
@@ -250,6 +258,10 @@ TEST(TetFile, Gmsh4ByHand) {
   EXPECT_EQ(stats.skipped_elements, 1U);
   EXPECT_EQ(mesh.tetrahedra, (std::vector<Tetrahedron>{{0, 1, 2, 3}, {1, 2, 3, 4}}));
   EXPECT_EQ(mesh.material, (std::vector<std::int32_t>{9, 0}));
+  const std::string turned = replaced(gmsh4, "2 9 8 0", "2 -9 8 0");
+  EXPECT_EQ(complaint(turned, Kind::msh), "");
+  EXPECT_EQ(tet_mesh_from_bytes(turned, "m", Kind::msh).material,
+            (std::vector<std::int32_t>{9, 0}));
 }
 
 TEST(TetFile, GmshBinaryOfVersion2AndTheOtherEndian) {
@@ -379,6 +391,53 @@ TEST(TetFile, VtuHoweverItIsStored) {
     for (std::size_t p = 0; p < mesh.points.size(); ++p) // std::to_string has six digits
       EXPECT_LT(norm(read.points[p] - mesh.points[p]), 2e-6);
   }
+}
+
+/// VTK's header gives 0 for a full last block, meshio's its size. Blocks of 8 bytes divide most of
+/// these arrays.
+TEST(TetFile, VtuWhoseLastBlockIsFull) {
+  for (const bool by_name : {false, true})
+    for (const std::size_t block : {8U, 24U, 1U << 20U}) {
+      const TetMesh mesh = test::odd_tetrahedra(false, true);
+      test::VtkStyle style;
+      style.zlib = true;
+      style.block = block;
+      style.full_by_name = by_name;
+      const std::string bytes = vtu(mesh, style);
+      ASSERT_EQ(complaint(bytes, Kind::vtu), "") << block << by_name;
+      EXPECT_TRUE(same_bytes(tet_mesh_from_bytes(bytes, "m", Kind::vtu), mesh));
+    }
+}
+
+TEST(TetFile, VtuWithSignedBytes) {
+  for (test::VtkStyle style : test::binary_vtk_styles()) {
+    test::VtkWriter out(style, "UnstructuredGrid", "NumberOfPoints='4' NumberOfCells='1'");
+    out.text("<Points>");
+    out.array("Int8", "Points",
+              std::vector<std::int8_t>{-128, 0, 0, 127, -1, 0, 0, 1, 0, 0, 0, 100}, 3);
+    out.text("</Points><Cells>");
+    out.array("Int8", "connectivity", std::vector<std::int8_t>{0, 1, 2, 3});
+    out.array("UInt8", "offsets", std::vector<std::uint8_t>{4});
+    out.array("Int8", "types", std::vector<std::int8_t>{10});
+    out.text("</Cells>");
+    const TetMesh mesh = tet_mesh_from_bytes(out.end(), "m", Kind::vtu);
+    EXPECT_EQ(mesh.points, (std::vector<Vec3>{{-128, 0, 0}, {127, -1, 0}, {0, 1, 0}, {0, 0, 100}}));
+  }
+}
+
+/// meshio stores physical groups of Gmsh and references of Medit under these names.
+TEST(TetFile, VtuReadsMeshioMaterialNames) {
+  const TetMesh mesh = test::odd_tetrahedra(false, true);
+  for (const std::string name : {"gmsh:physical", "medit:ref"}) {
+    test::VtkStyle text;
+    text.text = true;
+    const std::string bytes = replaced(vtu(mesh, text), "'material'", "'" + name + "'");
+    EXPECT_EQ(tet_mesh_from_bytes(bytes, "m", Kind::vtu).material, mesh.material) << name;
+  }
+  test::VtkStyle text;
+  text.text = true;
+  const std::string bytes = replaced(vtu(mesh, text), "'material'", "'other'");
+  EXPECT_TRUE(tet_mesh_from_bytes(bytes, "m", Kind::vtu).material.empty());
 }
 
 // ---- What is broken

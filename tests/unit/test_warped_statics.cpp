@@ -298,6 +298,30 @@ TEST(WarpedStatics, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {
   EXPECT_EQ(one.scene().contact_forces(0), with_error.scene().contact_forces(0));
 }
 
+/// On the surface, everywhere, and in frames that turn.
+std::vector<std::vector<double>> shapes_of(WarpedStatics& warped) {
+  std::vector<std::vector<double>> all;
+  for (const std::span<const double> u :
+       {warped.surface_displacement(), warped.displacement(), warped.local_displacement()})
+    all.emplace_back(u.begin(), u.end());
+  return all;
+}
+
+TEST(WarpedStatics, RestoreInvalidatesCachedShapes) {
+  const Model model = bar();
+  WarpedStatics warped(model, nullptr, test::one_thread());
+  const auto shown = [&](const Vec3& gravity) {
+    Load load;
+    load.gravity = gravity;
+    warped.update(load);
+    return std::pair(warped.answer(), shapes_of(warped));
+  };
+  const auto first = shown({0, 0, -2000}), second = shown({0, 1500, 0});
+  EXPECT_NE(first.second, second.second);
+  warped.restore(first.first);
+  EXPECT_EQ(shapes_of(warped), first.second);
+}
+
 TEST(WarpedStatics, BadInputIsRefusedByName) {
   const auto message = [](auto&& act) {
     try {

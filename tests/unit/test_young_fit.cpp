@@ -5,6 +5,7 @@
 #include "solid/young_fit.h"
 #include "tests/unit/solid_bodies.h"
 
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -165,6 +166,21 @@ TEST(YoungFit, NamesAnOutlier) {
   EXPECT_EQ(fit.outliers[0], "point 4");
 }
 
+/// With few measurements an outlier dominates the variance of all residuals. It is found only
+/// if its own residual is excluded (externally studentised).
+TEST(YoungFit, NamesAnOutlierAmongFew) {
+  const test::Solid truth = bar(30000, 30000);
+  MeasuredCase c = measured(truth, 2000, 0.01);
+  for (Measurement& m : c.measurements) // 7 axes of 7 places
+    m.displacement[0] = m.displacement[1] = std::nullopt;
+  *c.measurements[2].displacement[2] += 0.3;
+  const std::array<std::size_t, 1> first{0};
+  const YoungFit fit =
+      fit_young(truth.mesh, truth.materials, names, first, truth.fixed, std::span(&c, 1));
+  EXPECT_EQ(fit.axes, 7u);
+  EXPECT_EQ(fit.outliers, std::vector<std::string>{"point 2"});
+}
+
 TEST(YoungFit, NamesBadData) {
   const test::Solid s = bar(30000, 30000);
   const MeasuredCase good = measured(s, 2000, 0);
@@ -264,6 +280,49 @@ TEST(SwingFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
       EXPECT_LE(held, 394) << ratio;
     }
   }
+}
+
+/// The interval equals that of a fit with the damping ratio as a parameter. Decay rate and
+/// frequency are correlated if the swing is short and strongly damped.
+TEST(SwingFit, RatioIntervalIncludesTheCovariance) {
+  const double ratio = 0.3, omega = 2 * std::numbers::pi * 2; // undamped, 1/s
+  std::vector<double> t, y;
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal(0, 0.02);
+  const auto swing = [](const Eigen::Matrix<double, 5, 1>& p, double time) {
+    const double damped = p[4] * time;
+    return p[0] + std::exp(-p[3] * p[4] / std::sqrt(1 - p[3] * p[3]) * time) *
+                      (p[1] * std::cos(damped) + p[2] * std::sin(damped));
+  };
+  Eigen::Matrix<double, 5, 1> p;
+  p << 1, 0.4, 2, ratio, omega * std::sqrt(1 - ratio * ratio);
+  for (int k = 0; k < 40; ++k) {
+    t.push_back(0.024 * k);
+    y.push_back(swing(p, t.back()) + normal(random));
+  }
+  const SwingFit fit = fit_swing(t, y);
+  // Gauss and Newton from the truth, by differences: rest, cosine, sine, ratio, frequency.
+  Eigen::Matrix<double, 40, 5> jacobian;
+  Eigen::Matrix<double, 40, 1> left;
+  for (int round = 0; round < 20; ++round) {
+    for (int k = 0; k < 40; ++k) {
+      const double time = t[static_cast<std::size_t>(k)];
+      left[k] = y[static_cast<std::size_t>(k)] - swing(p, time);
+      for (int axis = 0; axis < 5; ++axis) {
+        Eigen::Matrix<double, 5, 1> more = p, less = p;
+        more[axis] += 1e-5;
+        less[axis] -= 1e-5;
+        jacobian(k, axis) = (swing(more, time) - swing(less, time)) / 2e-5;
+      }
+    }
+    p += (jacobian.transpose() * jacobian).ldlt().solve(jacobian.transpose() * left);
+  }
+  EXPECT_NEAR(fit.ratio, p[3], 1e-6);
+  const double variance =
+                   left.squaredNorm() / 35 * (jacobian.transpose() * jacobian).inverse()(3, 3),
+               quantile = 2.0301; // of Student's t with 35 degrees of freedom
+  EXPECT_NEAR((fit.ratio_interval[1] - fit.ratio_interval[0]) / 2, quantile * std::sqrt(variance),
+              1e-3 * quantile * std::sqrt(variance));
 }
 
 TEST(SwingFit, RefusesWhatIsNoSwing) {

@@ -25,6 +25,8 @@ void put(std::string& bytes, T value, bool swap = false) {
 
 struct VtkStyle {
   bool text = false, appended = false, base64 = false, zlib = false, big = false, wide = false;
+  std::size_t block = 100;   ///< of zlib, bytes
+  bool full_by_name = false; ///< a last block that is full has its size in the header, else 0
 };
 
 /// All but text.
@@ -35,7 +37,8 @@ inline std::vector<VtkStyle> binary_vtk_styles() {
       for (const bool zlib : {false, true})
         for (const auto& [appended, coded] :
              {std::pair(false, true), std::pair(true, true), std::pair(true, false)})
-          styles.push_back({false, appended, coded, zlib, big, wide});
+          styles.push_back(
+              {.appended = appended, .base64 = coded, .zlib = zlib, .big = big, .wide = wide});
   return styles;
 }
 
@@ -116,12 +119,13 @@ private:
       size(head, data.size());
       return coded ? base64(head + body) : head + body;
     }
-    constexpr std::size_t block = 100;
+    const std::size_t block = style_.block;
     body.clear();
     const std::size_t blocks = (data.size() + block - 1) / block;
     size(head, blocks);
     size(head, block);
-    size(head, data.size() % block);
+    const std::size_t rest = data.size() % block;
+    size(head, rest == 0 && style_.full_by_name && !data.empty() ? block : rest);
     for (std::size_t n = 0; n < blocks; ++n) {
       const std::string part = data.substr(n * block, block);
       uLongf packed = compressBound(static_cast<uLong>(part.size()));
