@@ -2,6 +2,7 @@
 import itertools
 import math
 import os
+import struct
 import subprocess
 import sys
 import threading
@@ -81,6 +82,15 @@ class Programs(unittest.TestCase):
         with self.assertRaises(ValueError):
             gewebe.run()
 
+    def test_who_is_cut_off_has_not_failed(self):
+        # mc-opt --help reads nothing, so that the program before it ends by SIGPIPE.
+        particles = '\n'.join(f'{x} {y} {z} 1.5' for x, y, z in itertools.product(range(0, 90, 3), repeat=3))
+        outcome = gewebe.run('metaball2vol --voxel 1', 'mc-opt --help', input=particles)
+        self.assertIn(b'mc-opt', outcome.output)
+        # Of several that fail the first one is named.
+        with self.assertRaisesRegex(gewebe.Error, '^metaball2vol: .*nonsense'):
+            gewebe.run('metaball2vol --nonsense', 'mc-opt --rubbish', input=particles)
+
     def test_much_input_and_much_output(self):
         particles = '\n'.join(f'{x} {y} {z} 1.5' for x, y, z in itertools.product(range(0, 150, 3), repeat=3))
         self.assertGreater(len(particles), 1 << 20)
@@ -134,6 +144,36 @@ class Files(unittest.TestCase):
         with self.assertRaises(ValueError):
             gewebe.write_ply('bad.ply', points=points, triangles=[(0, 1, 4)])
 
+    def test_big_endian_meshes(self):
+        mesh = ball()
+        data = mesh.to_bytes()
+        head, _, _ = data.partition(b'end_header\n')
+        rows = [array.astype(array.dtype.newbyteorder('>')).tobytes() for array in mesh.elements.values()]
+        big = gewebe.read_ply(head.replace(b'little', b'big') + b'end_header\n' + b''.join(rows))
+        self.assertEqual(big.points.dtype.byteorder, '>')
+        self.assertTrue((big.points == mesh.points).all() and (big.triangles == mesh.triangles).all())
+        # Ours are little-endian, whatever they came from.
+        self.assertEqual(big.to_bytes(), data)
+
+    def test_columns_that_stand_apart(self):
+        corners = numpy.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], '<i4')
+        points = numpy.array([(0, 0, 0), (10, 0, 0), (0, 10, 0), (0, 0, 10)], float)
+        face = numpy.empty(4, [('vertex_index count', 'u1'), ('vertex_index', '<i4', (3,))])
+        face['vertex_index count'], face['vertex_index'] = 3, corners
+        fields = ([('x', '<f8'), ('quality', '<f4'), ('y', '<f8'), ('z', '<f8')],  # something between them
+                  [('z', '<f8'), ('y', '<f8'), ('x', '<f8')],  # another order
+                  [('x', '<f4'), ('y', '<f8'), ('z', '<f4')],  # different types
+                  [('x', '<f8'), ('y', '<f8'), ('quality', '<f8'), ('z', '<f8')])
+        for kinds in fields:
+            vertex = numpy.zeros(4, kinds)
+            for k, axis in enumerate('xyz'):
+                vertex[axis] = points[:, k]
+            again = gewebe.read_ply(gewebe.Ply({'vertex': vertex, 'face': face}, ['a comment']).to_bytes())
+            self.assertTrue((again.points == points).all(), kinds)
+            self.assertTrue((again.triangles == corners).all(), kinds)
+            self.assertIsNone(again.normals)
+            self.assertEqual(again.comments, ['a comment'])
+
     def test_broken_meshes_are_refused(self):
         data = ball().to_bytes()
         for at in (0, 3, 60, len(data) // 2, len(data) - 1):
@@ -172,6 +212,64 @@ class Files(unittest.TestCase):
         self.assertIn(model.tetrahedra.shape[1], (4, 10))
         self.assertLess(model.tetrahedra.max(), len(model.points))
         self.assertGreater(model.materials[0]['poisson'], 0)
+
+    def test_all_sections_of_a_model(self):
+        text = '''ela_expl 1
+        name "two words"   # a comment
+        materials 2
+        0 "soft gel" 1e-3 5000 1 0.2 0.45
+        1 stone 2e-3 20000 1 0.1 0.3
+        nodes 5
+        0 0 0 1 0.5 xyz -1 0
+        1 0 0 2 0.25 x -1 1
+        0 1 0 3 0.125 - 4 0
+        0 0 1 4 0 yz -1 1
+        9 8 7 5 1 - -1 0
+
+        springs 2
+        0 1 e 100 2 1
+        2 4 c 50 1 1.5
+        triangles 2
+        0 2 1
+        0 1 3
+        texcoords 2
+        0 0 0 1 1 0
+        .5 .25 .125 1 1 1
+        normals 5
+        0 0 1
+        0 1 0
+        1 0 0
+        0 0 1
+        0 0 0
+        tetrahedra 1
+        0 1 2 3 1
+        skin 1
+        .25 .25 .25 0
+        end
+        '''
+        model = gewebe.read_ela(text.encode())
+        self.assertEqual(model.name, 'two words')
+        self.assertEqual(model.materials, [
+            {'name': 'soft gel', 'density': 1e-3, 'young': 5000, 'thickness': 1, 'damping_ratio': 0.2, 'poisson': 0.45},
+            {'name': 'stone', 'density': 2e-3, 'young': 20000, 'thickness': 1, 'damping_ratio': 0.1, 'poisson': 0.3}])
+        self.assertEqual(model.points.tolist(), [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 8, 7]])
+        self.assertEqual(model.mass.tolist(), [1, 2, 3, 4, 5])
+        self.assertEqual(model.drag.tolist(), [0.5, 0.25, 0.125, 0, 1])
+        self.assertEqual(model.fixed.tolist(), [[True] * 3, [True, False, False], [False] * 3, [False, True, True], [False] * 3])
+        self.assertEqual(model.central.tolist(), [-1, -1, 4, -1, -1])
+        self.assertEqual(model.node_material.tolist(), [0, 1, 0, 1, 0])
+        self.assertEqual(model.springs.tolist(), [(0, 1, b'e', 100, 2, 1), (2, 4, b'c', 50, 1, 1.5)])
+        self.assertEqual(model.triangles.tolist(), [[0, 2, 1], [0, 1, 3]])
+        self.assertEqual(model.texcoords[1].tolist(), [.5, .25, .125, 1, 1, 1])
+        self.assertEqual(model.normals[2].tolist(), [1, 0, 0])
+        self.assertEqual(model.tetrahedra.tolist(), [[0, 1, 2, 3]])
+        self.assertEqual(model.tetrahedron_material.tolist(), [1])
+        self.assertEqual(model.skin.tolist(), [[.25, .25, .25, 0]])
+        self.assertIsNone(model.skin_triangles)
+        with self.assertRaisesRegex(gewebe.Error, 'no section'):
+            gewebe.read_ela(text.replace('springs', 'strings').encode())
+        with self.assertRaisesRegex(gewebe.Error, 'ends within its'):
+            gewebe.read_ela(text.replace('skin 1', 'skin 9').encode())
 
     @needs_h5py
     def test_a_store_answers_as_the_run_does(self):
@@ -221,6 +319,37 @@ class Files(unittest.TestCase):
             self.assertNotEqual(len(whole.shape(1)), len(whole.shape(2)))
 
     @needs_h5py
+    def test_cuts_follow_each_other_by_number(self):
+        with h5py.File('cuts.h5', 'w') as file:
+            file.attrs['format'] = 'gewebe_results'
+            file['time'] = numpy.arange(14) / 10
+            for order, name in enumerate(('z', 'a')):
+                body = file.create_group(f'objects/{name}')
+                body.attrs['order'] = order
+                body.attrs['first_frame'] = order
+                for cut in (None, *range(1, 12)) if name == 'z' else (None,):
+                    part = body if cut is None else body.create_group(f'cuts/{cut}')
+                    if cut is not None:
+                        part.attrs['first_frame'] = cut + 1
+                    # Each cut gives one node more.
+                    nodes = 3 + (cut or 0)
+                    part['points'] = numpy.zeros((nodes, 3))
+                    part['displacement'] = numpy.full((14 if cut is None else 13 - cut, nodes, 3), float(cut or 0))
+                    part['triangles'] = numpy.zeros((1, 3), int)
+        with gewebe.Results('cuts.h5') as results:
+            self.assertEqual(list(results), ['z', 'a'])
+            self.assertEqual(len(results), 2)
+            z, a = results['z'], results['a']
+            for frame in range(14):
+                cut = min(max(frame - 1, 0), 11)
+                self.assertEqual(z.points(frame).shape, (3 + cut, 3), frame)
+                self.assertTrue((z.shape(frame) == cut).all(), frame)
+            self.assertTrue((z.shape() == 11).all() and (z.displacement(-12) == 1).all())
+            self.assertIsNone(z.tetrahedra())
+            with self.assertRaisesRegex(IndexError, 'frame -14 of an object that is there from 1 to 13'):
+                a.points(-14)
+
+    @needs_h5py
     def test_stress_of_a_solid(self):
         gewebe.run('metaball2vol --voxel 1', 'mc-opt --tets --cell 6', ['exp2ela', '--fix', 'z<-5', '--name', 's', '-o', 's.ela'],
                    input='0 0 0 20\n')
@@ -248,10 +377,15 @@ class Driving(unittest.TestCase):
             self.assertTrue(numpy.allclose(shape[tip], model.points[tip] + (0, 0, 3), atol=1e-9))
             with self.assertRaisesRegex(gewebe.Error, 'error 5: .*nowhere'):
                 scene.ask('force nowhere 0 0 0 1')
-            # All lines behind one that is refused are carried out.
+            # All lines behind one that is refused are carried out; the first one is named.
             with self.assertRaisesRegex(gewebe.Error, '^error 6: '):
-                scene.ask('nonsense', 'step 0.1')
-            self.assertAlmostEqual(float(scene.ask('sync')[0][1]), 0.2)
+                scene.ask('nonsense', 'force nowhere 0 0 0 1', 'step 0.1')
+            with self.assertRaisesRegex(gewebe.Error, '^error 10: '):
+                scene.ask('sync', 'nonsense')
+            self.assertEqual(scene.ask(), [])
+            said = scene.ask('sync', 'nodes ball', 'sync')
+            self.assertEqual([words[0] for words in said], ['sync', 'nodes', 'sync'])
+            self.assertAlmostEqual(float(said[0][1]), 0.2)
             with self.assertRaises(ValueError):
                 scene.ask('step\nstep')
             folder = scene.folder.name
@@ -279,6 +413,44 @@ class Driving(unittest.TestCase):
         for thread in threads:
             thread.join()
         self.assertEqual(sorted(times), [0.3, 0.7])
+
+    def test_a_frame_that_is_overwritten_is_read_anew(self):
+        def frame(value):
+            name, data = b'ball', numpy.full(3, value)
+            head = struct.pack('<8Q', 0, 0, 0, 0, 1, 0, 0, 0) + struct.pack('<4Q', 96, len(name), 104, 1)
+            return head + name.ljust(8, b'\0') + data.tobytes()
+
+        size = len(frame(0.0))
+        with open('shapes', 'wb') as file:  # frame 4 is there, and frame 6 has begun in its place
+            file.write(b'GWBSHAPE' + struct.pack('<7Q', 1, 6, 4, 64, size, 64 + size, size) + frame(6.0) + frame(5.0))
+        shapes = gewebe.Shapes('shapes')
+        seen = []
+        reader = threading.Thread(target=lambda: seen.append(shapes.last()), daemon=True)
+        reader.start()
+        reader.join(0.2)
+        self.assertEqual(seen, [])
+        with open('shapes', 'r+b') as file:
+            file.seek(24)
+            file.write(struct.pack('<Q', 5))
+        reader.join(60)
+        self.assertEqual(seen[0]['ball'].tolist(), [[5, 5, 5]])
+        # A frame that has begun in the other place is no harm.
+        with open('shapes', 'r+b') as file:
+            file.seek(16)
+            file.write(struct.pack('<2Q', 7, 6))
+        self.assertEqual(shapes.last()['ball'].tolist(), [[6, 6, 6]])
+        # Of a file that grows the new part is seen.
+        with open('shapes', 'r+b') as file:
+            file.seek(0, os.SEEK_END)
+            file.write(frame(7.0))
+            file.seek(16)
+            file.write(struct.pack('<6Q', 7, 7, 64, size, 64 + 2 * size, size))
+        self.assertEqual(shapes.last()['ball'].tolist(), [[7, 7, 7]])
+        shapes.close()
+        with open('no.shapes', 'wb') as file:
+            file.write(b'GWBSHAPE' + struct.pack('<7Q', 2, 0, 0, 0, 0, 0, 0))
+        with self.assertRaisesRegex(gewebe.Error, 'another version'):
+            gewebe.Shapes('no.shapes')
 
     def test_an_exception_ends_the_run(self):
         with self.assertRaises(ZeroDivisionError):
