@@ -162,7 +162,8 @@ class Files(unittest.TestCase):
         face['vertex_index count'], face['vertex_index'] = 3, corners
         fields = ([('x', '<f8'), ('quality', '<f4'), ('y', '<f8'), ('z', '<f8')],  # something between them
                   [('z', '<f8'), ('y', '<f8'), ('x', '<f8')],  # another order
-                  [('x', '<f4'), ('y', '<f8'), ('z', '<f4')],  # different types
+                  [('x', '<f4'), ('y', '<i4'), ('z', '<f4')],  # different types
+                  [('x', '<f4'), ('y', '<f8'), ('z', '<f4')],
                   [('x', '<f8'), ('y', '<f8'), ('quality', '<f8'), ('z', '<f8')])
         for kinds in fields:
             vertex = numpy.zeros(4, kinds)
