@@ -208,19 +208,23 @@ std::vector<Kind> kinds(const Model& model, double size, bool moves) {
                                                         })]
                        .position;
   for (const bool grasps : {false, true})
-    kinds.push_back(
-        {grasps ? "grasp" : "instrument",
-         [=](Simulation& s) {
-           s.step(0.1);
-           const std::size_t ball = s.instrument_count();
-           s.apply(SetInstrument{ball, {4, {}, 0}, {top + Vec3{0, 0, 4.1}, {}}, "ball"});
-           if (grasps)
-             s.apply(Grasp{0, end, ball});
-           s.step(0.1);
-           const Vec3 way = grasps ? Vec3{0.1, 0.4, 0.2} : Vec3{0, 0, -0.6};
-           s.apply(MoveInstrument{ball, top + Vec3{0, 0, 4.1} + way, {}, 0});
-         },
-         [](Simulation& s) { s.apply(Withdraw{s.instrument_count() - 1}); }, 1e-4});
+    kinds.push_back({grasps ? "grasp" : "instrument",
+                     [=](Simulation& s) {
+                       s.step(0.1);
+                       const std::size_t ball = s.instrument_count();
+                       SetInstrument put;
+                       put.instrument = ball;
+                       put.shape.radius = 4;
+                       put.pose.place = top + Vec3{0, 0, 4.1};
+                       put.name = "ball";
+                       s.apply(put);
+                       if (grasps)
+                         s.apply(Grasp{0, end, ball});
+                       s.step(0.1);
+                       const Vec3 way = grasps ? Vec3{0.1, 0.4, 0.2} : Vec3{0, 0, -0.6};
+                       s.apply(MoveInstrument{ball, top + Vec3{0, 0, 4.1} + way, {}, 0});
+                     },
+                     [](Simulation& s) { s.apply(Withdraw{s.instrument_count() - 1}); }, 1e-4});
   for (const double along : {0.5, -0.3}) {
     Kind both = kinds[2];
     both.name += " under gravity of " + std::to_string(along);
