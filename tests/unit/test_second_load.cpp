@@ -140,7 +140,6 @@ std::vector<Law> laws() {
 struct Kind {
   std::string name;
   std::function<void(Simulation&)> set, clear;
-  double tolerance = 0; ///< if above that of the law
 };
 
 Nodes far_end(const Model& model, std::size_t count) {
@@ -199,32 +198,6 @@ std::vector<Kind> kinds(const Model& model, double size, bool moves) {
       inside.push_back(i);
   if (!inside.empty())
     kinds.push_back(force("force_inside", inside, {0, 0, size}));
-  // An instrument arrives at a body at rest, then presses it or takes grasped nodes along.
-  const Vec3 top = model
-                       .nodes[*std::ranges::max_element(all, {},
-                                                        [&](std::uint32_t i) {
-                                                          return model.nodes[i].position.z +
-                                                                 0.01 * model.nodes[i].position.x;
-                                                        })]
-                       .position;
-  for (const bool grasps : {false, true})
-    kinds.push_back({grasps ? "grasp" : "instrument",
-                     [=](Simulation& s) {
-                       s.step(0.1);
-                       const std::size_t ball = s.instrument_count();
-                       SetInstrument put;
-                       put.instrument = ball;
-                       put.shape.radius = 4;
-                       put.pose.place = top + Vec3{0, 0, 4.1};
-                       put.name = "ball";
-                       s.apply(put);
-                       if (grasps)
-                         s.apply(Grasp{0, end, ball});
-                       s.step(0.1);
-                       const Vec3 way = grasps ? Vec3{0.1, 0.4, 0.2} : Vec3{0, 0, -0.6};
-                       s.apply(MoveInstrument{ball, top + Vec3{0, 0, 4.1} + way, {}, 0});
-                     },
-                     [](Simulation& s) { s.apply(Withdraw{s.instrument_count() - 1}); }, 1e-4});
   for (const double along : {0.5, -0.3}) {
     Kind both = kinds[2];
     both.name += " under gravity of " + std::to_string(along);
@@ -318,9 +291,8 @@ TEST_P(SecondLoad, EqualsTheSameLoadOnAFreshObject) {
       second.set(*used);
       go_on(*used, law.moves);
       const Asked found = ask(*used);
-      const double tolerance = test::larger(law.tolerance, second.tolerance);
-      expect_near(found.shape, expected.shape, tolerance, what);
-      expect_near(found.surface, expected.surface, tolerance, what + ", surface");
+      expect_near(found.shape, expected.shape, law.tolerance, what);
+      expect_near(found.surface, expected.surface, law.tolerance, what + ", surface");
       ASSERT_EQ(found.forces.size(), expected.forces.size()) << what;
       double most = 0, size = 0;
       for (std::size_t k = 0; k < found.forces.size(); ++k) {
@@ -328,7 +300,7 @@ TEST_P(SecondLoad, EqualsTheSameLoadOnAFreshObject) {
         most = test::larger(most, norm(found.forces[k].value - expected.forces[k].value));
         size = test::larger(size, norm(expected.forces[k].value));
       }
-      EXPECT_LE(most, 2 * tolerance * size) << what << ", forces";
+      EXPECT_LE(most, 2 * law.tolerance * size) << what << ", forces";
     }
   }
 }
