@@ -14,6 +14,7 @@
 #include "tools/shared/cli.h"
 #include "tools/shared/distrust.h"
 
+#include <csignal>
 #include <memory>
 #include <optional>
 #include <string>
@@ -102,8 +103,13 @@ void work(cli::Run& run, const Arguments& in) {
       answers.commit();
     });
   } catch (const Error& error) {
-    (void)logs.commit(); // they tell how it came to this
-    throw ending_of_failed_run(error, kept, scene.simulation().time());
+    const bool unheard = deferred_signal() == SIGPIPE; // the reader of answers has gone
+    if (!unheard)
+      (void)logs.commit(); // they tell how it came to this
+    const Error ending = ending_of_failed_run(error, kept, scene.simulation().time());
+    if (unheard)
+      end_by_deferred_signal();
+    throw Error(ending);
   }
   if (const std::optional<Error> error = run.timed("write", [&] { return logs.commit(); }))
     throw Error(*error);

@@ -224,6 +224,9 @@ struct Driver : H5FD_t {
   bool reopened = false;   ///< for an attribute
   bool written = false;    ///< since the last checkpoint
   bool discarding = false; ///< what is written
+  /// errno of the first write that failed. HDF5 1.10 crashes where writes fail as it closes, so it
+  /// is told at the next checkpoint.
+  int failure = 0;
 
   /// Below this, changes wait for the checkpoint. Before the first one the superblock alone,
   /// without which the file is none.
@@ -341,6 +344,8 @@ int Driver::write_log(std::uint64_t start, std::uint64_t end) {
 }
 
 int Driver::checkpoint() {
+  if (!discarding && failure != 0)
+    return give_up(failure);
   if (discarding || !written)
     return 0;
   const std::uint64_t start = std::max<std::uint64_t>(committed, eoa);
@@ -469,11 +474,16 @@ static herr_t driver_write(H5FD_t* file, H5FD_mem_t type, hid_t /*how*/, haddr_t
   try {
     Driver& to = driver(file);
     const auto* const bytes = static_cast<const unsigned char*>(from);
-    if (at != 0 || !is_superblock(bytes, size))
-      return report(to.write(type == H5FD_MEM_DRAW, at, size, bytes));
-    Bytes closed(bytes, bytes + size);
-    mark_closed(closed.data());
-    return report(to.write(false, at, size, closed.data()));
+    int error = 0;
+    if (at != 0 || !is_superblock(bytes, size)) {
+      error = to.write(type == H5FD_MEM_DRAW, at, size, bytes);
+    } else {
+      Bytes closed(bytes, bytes + size);
+      mark_closed(closed.data());
+      error = to.write(false, at, size, closed.data());
+    }
+    to.failure = to.failure == 0 ? error : to.failure;
+    return 0;
   } catch (...) {
     return report(ENOMEM);
   }

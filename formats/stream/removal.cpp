@@ -31,8 +31,7 @@ std::array<int, 2> wake{-1, -1}; // a pipe
 
 extern "C" void gewebe_remove_temporaries(int signal_number) {
   int none = 0;
-  if (deferring.load() && signal_number != SIGQUIT &&
-      deferred.compare_exchange_strong(none, signal_number)) {
+  if (deferring.load() && deferred.compare_exchange_strong(none, signal_number)) {
     const char byte = 0;
     (void)!::write(wake[1], &byte, 1);
     return;
