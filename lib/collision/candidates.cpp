@@ -1,0 +1,185 @@
+#include "collision/candidates.h"
+
+#include "base/boxes_meet.h"
+#include "base/larger.h"
+#include "collision/distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <type_traits>
+
+namespace gewebe::collision {
+
+namespace {
+
+template <std::size_t n>
+std::array<Vec3, n> positions(std::span<const Vec3> x, const std::array<std::uint32_t, n>& vertex) {
+  std::array<Vec3, n> y;
+  for (std::size_t k = 0; k < n; ++k)
+    y[k] = x[vertex[k]];
+  return y;
+}
+
+template <std::size_t n>
+ClosestFeature feature_of(const std::array<Vec3, n>& x, std::size_t first) {
+  if constexpr (n == 2)
+    return {DistanceType::point_point, {0, 1, 0, 0}};
+  else if constexpr (n == 3)
+    return point_edge_feature(x);
+  else
+    return first == 1 ? point_triangle_feature(x) : edge_edge_feature(x);
+}
+
+Box3 inflated(Box3 box, double by) {
+  box.min -= Vec3{by, by, by};
+  box.max += Vec3{by, by, by};
+  return box;
+}
+
+} // namespace
+
+BroadPhase::BroadPhase(const CollisionSurface& surface) {
+  for (const std::uint32_t owner : surface.owner)
+    owners_.resize(std::max<std::size_t>(owners_.size(), owner + std::size_t{1}));
+  const auto owner_of = [&](std::uint32_t vertex) -> Owner& {
+    return owners_[surface.owner[vertex]];
+  };
+  for (const std::uint32_t p : surface.points)
+    owner_of(p).points.number.push_back(p);
+  for (const std::uint32_t p : surface.lone_points)
+    owner_of(p).lone_points.number.push_back(p);
+  for (const std::uint32_t e : surface.lone_edges)
+    owner_of(surface.edges[e][0]).lone_edges.number.push_back(e);
+  for (std::uint32_t e = 0; e < surface.edges.size(); ++e)
+    owner_of(surface.edges[e][0]).edges.number.push_back(e);
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t)
+    owner_of(surface.triangles[t][0]).triangles.number.push_back(t);
+}
+
+void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
+                      std::span<const Vec3> x1, double reach, const AllowedPairs& allowed,
+                      Candidates& candidates) {
+  candidates.clear();
+  const auto point = [](std::uint32_t p) { return std::array{p}; };
+  const auto edge = [&](std::uint32_t e) { return surface.edges[e]; };
+  const auto triangle = [&](std::uint32_t t) { return surface.triangles[t]; };
+
+  // Boxes of the swept vertices, each with half of the reach and its radius around it.
+  const auto box_of = [&](const auto& vertices) {
+    Box3 box;
+    for (const std::uint32_t v : vertices) {
+      box.add(x0[v]);
+      box.add(x1[v]);
+    }
+    return inflated(box, 0.5 * reach + surface.radius[vertices[0]]);
+  };
+  for (Owner& owner : owners_) {
+    owner.box = {};
+    for (const std::uint32_t p : owner.points.number) {
+      const Box3 box = box_of(point(p));
+      owner.box.add(box.min);
+      owner.box.add(box.max);
+    }
+    owner.points.current = owner.edges.current = owner.triangles.current =
+        owner.lone_points.current = owner.lone_edges.current = false;
+  }
+  const auto refit = [&](Primitives& primitives, const auto& vertices_of) {
+    if (primitives.current)
+      return;
+    primitives.current = true;
+    primitives.boxes.resize(primitives.number.size());
+    for (std::size_t k = 0; k < primitives.number.size(); ++k)
+      primitives.boxes[k] = box_of(vertices_of(primitives.number[k]));
+    if (primitives.tree.size() != primitives.number.size())
+      primitives.tree = Bvh(primitives.boxes);
+    else
+      primitives.tree.refit(primitives.boxes);
+  };
+
+  const auto add = [&](const auto& first, const auto& second, auto& list) {
+    constexpr std::size_t k = std::tuple_size_v<std::remove_cvref_t<decltype(first)>>;
+    constexpr std::size_t n = k + std::tuple_size_v<std::remove_cvref_t<decltype(second)>>;
+    std::array<std::uint32_t, n> vertices;
+    std::copy(first.begin(), first.end(), vertices.begin());
+    std::copy(second.begin(), second.end(), vertices.begin() + k);
+    bool fixed = true;
+    for (std::size_t i = 0; i < n; ++i)
+      fixed = fixed && surface.is_fixed(vertices[i]);
+    if (fixed)
+      return;
+    for (std::size_t i = 0; i < k; ++i)
+      for (std::size_t j = k; j < n; ++j)
+        if (vertices[i] == vertices[j])
+          return;
+    const auto from = positions(x0, vertices), to = positions(x1, vertices);
+    const double distance = std::sqrt(squared_distance(feature_of(from, k), from));
+    const double most =
+        radius_sum(surface, vertices[0], vertices[n - 1]) + reach + motion_bound(from, to, k);
+    if (!(distance > most)) // NaN stays
+      list.push_back(vertices);
+  };
+  // Of two owners, or of one and itself.
+  const auto meet_all = [&](Primitives& a, const auto& vertices_a, Primitives& b,
+                            const auto& vertices_b, auto& list) {
+    if (a.number.empty() || b.number.empty())
+      return;
+    refit(a, vertices_a);
+    refit(b, vertices_b);
+    pairs_.clear();
+    if (&a == &b)
+      a.tree.for_each_own_pair([&](std::uint32_t i, std::uint32_t j) {
+        pairs_.push_back({a.number[i], a.number[j]});
+      });
+    else
+      a.tree.for_each_pair(b.tree, [&](std::uint32_t i, std::uint32_t j) {
+        pairs_.push_back({a.number[i], b.number[j]});
+      });
+    std::sort(pairs_.begin(), pairs_.end());
+    for (const auto& [i, j] : pairs_)
+      add(vertices_a(i), vertices_b(j), list);
+  };
+  const std::size_t owners = std::min(owners_.size(), allowed.owners());
+  for (std::size_t i = 0; i < owners; ++i)
+    for (std::size_t j = i; j < owners; ++j) {
+      Owner &a = owners_[i], &b = owners_[j];
+      if (!allowed.at(i, j) || !meet(a.box, b.box))
+        continue;
+      meet_all(a.points, point, b.triangles, triangle, candidates.point_triangle);
+      if (i != j)
+        meet_all(b.points, point, a.triangles, triangle, candidates.point_triangle);
+      meet_all(a.edges, edge, b.edges, edge, candidates.edge_edge);
+      meet_all(a.lone_points, point, b.lone_edges, edge, candidates.point_edge);
+      if (i != j)
+        meet_all(b.lone_points, point, a.lone_edges, edge, candidates.point_edge);
+      meet_all(a.lone_points, point, b.lone_points, point, candidates.point_point);
+    }
+}
+
+double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
+                           std::span<const Vec3> x0, std::span<const Vec3> x1,
+                           const Separation& separation) {
+  double step = 1;
+  const auto shorten = [&](const auto& list, auto&& step_of) {
+    for (const auto& vertices : list) {
+      Separation of_pair = separation;
+      of_pair.d_min += radius_sum(surface, vertices.front(), vertices.back());
+      step = smaller(step, step_of(positions(x0, vertices), positions(x1, vertices), of_pair));
+    }
+  };
+  shorten(candidates.point_point, [&](const auto& a, const auto& b, const Separation& s) {
+    return point_point_step(a, b, s, step);
+  });
+  shorten(candidates.point_edge, [&](const auto& a, const auto& b, const Separation& s) {
+    return point_edge_step(a, b, s, step);
+  });
+  shorten(candidates.edge_edge, [&](const auto& a, const auto& b, const Separation& s) {
+    return edge_edge_step(a, b, s, step);
+  });
+  shorten(candidates.point_triangle, [&](const auto& a, const auto& b, const Separation& s) {
+    return point_triangle_step(a, b, s, step);
+  });
+  return step;
+}
+
+} // namespace gewebe::collision

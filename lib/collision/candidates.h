@@ -1,0 +1,77 @@
+#pragma once
+// Broad phase: pairs of primitives that may come close on the way from x0 to x1.
+
+#include "base/vec3.h"
+#include "collision/bvh.h"
+#include "collision/ccd.h"
+#include "collision/surface.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe::collision {
+
+/// Pairs by their vertices. Points of an edge and edges of triangles are covered by the pairs of
+/// edges, so that points meet edges and points only where neither is part of anything larger.
+struct Candidates {
+  std::vector<std::array<std::uint32_t, 2>> point_point;    ///< p < q
+  std::vector<std::array<std::uint32_t, 3>> point_edge;     ///< p, e0, e1
+  std::vector<std::array<std::uint32_t, 4>> edge_edge;      ///< a0, a1, b0, b1
+  std::vector<std::array<std::uint32_t, 4>> point_triangle; ///< p, t0, t1, t2
+
+  std::size_t size() const noexcept {
+    return point_point.size() + point_edge.size() + edge_edge.size() + point_triangle.size();
+  }
+  void clear() {
+    point_point.clear();
+    point_edge.clear();
+    edge_edge.clear();
+    point_triangle.clear();
+  }
+};
+
+/// Hierarchies over the primitives of each owner. Lives as long as the topology of the surface.
+class BroadPhase {
+public:
+  /// \pre complete_surface(surface)
+  explicit BroadPhase(const CollisionSurface& surface);
+
+  /// Finds pairs of owners that may meet, without a vertex in common and not fixed as a whole,
+  /// whose distance at x0 exceeds d_min + reach by no more than their relative motion to x1.
+  /// \param surface  the one of the constructor
+  /// \param reach  mm
+  /// \param candidates  overwritten; keeps its memory. Order: by pairs of owners, then by number
+  void find(const CollisionSurface& surface, std::span<const Vec3> x0, std::span<const Vec3> x1,
+            double reach, const AllowedPairs& allowed, Candidates& candidates);
+
+private:
+  struct Primitives {
+    std::vector<std::uint32_t> number; ///< ascending
+    std::vector<Box3> boxes;
+    Bvh tree;
+    bool current = false; ///< tree of these x0, x1
+  };
+  struct Owner {
+    Primitives points, edges, triangles, lone_points, lone_edges;
+    Box3 box;
+  };
+  std::vector<Owner> owners_;
+  std::vector<std::array<std::uint32_t, 2>> pairs_;
+};
+
+/// Largest step in [0, 1] along which all candidates keep their separation.
+/// \param separation  d_min is added to the sum of the pair's radii
+double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
+                           std::span<const Vec3> x0, std::span<const Vec3> x1,
+                           const Separation& separation);
+
+/// d_min of a pair: the sum of both radii.
+inline double radius_sum(const CollisionSurface& surface, std::uint32_t first,
+                         std::uint32_t second) {
+  return surface.radius[first] + surface.radius[second];
+}
+
+} // namespace gewebe::collision

@@ -1,0 +1,153 @@
+#include "collision/ccd.h"
+
+#include "base/larger.h"
+#include "collision/distance.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace gewebe::collision {
+
+namespace {
+
+// Error of a distance as a multiple of the largest coordinate.
+constexpr double rounding = 128 * std::numeric_limits<double>::epsilon();
+// Progress of an iteration, as a share of the whole step, that is not worth another one.
+constexpr double enough = 1e-3;
+
+double largest_coordinate(std::span<const Vec3> x) {
+  double largest = 0;
+  for (const Vec3& p : x)
+    for (int axis = 0; axis < 3; ++axis)
+      largest = larger(largest, std::abs(p[axis]));
+  return largest;
+}
+
+/// Two primitives and a plane between them, on their way.
+template <std::size_t n>
+class Advancement {
+public:
+  Advancement(std::span<const Vec3, n> x0, std::span<const Vec3, n> x1, std::size_t first,
+              double d_min)
+      : first_(first), x0_(x0) {
+    const double size = larger(largest_coordinate(x0), largest_coordinate(x1));
+    offset_ = d_min + rounding * size;
+    finite_ = std::isfinite(offset_);
+    for (std::size_t k = 0; k < n; ++k)
+      way_[k] = x1[k] - x0[k];
+  }
+
+  bool finite() const { return finite_; }
+
+  /// Goes to t; the gap there is at least the result. Any plane bounds the distance from below, so
+  /// that the bound holds even where the features were misjudged.
+  template <class Feature>
+  double go_to(double t, Feature&& closest_feature) {
+    for (std::size_t k = 0; k < n; ++k)
+      x_[k] = x0_[k] + t * way_[k];
+    const std::span<const Vec3, n> x(x_);
+    const ClosestFeature feature = closest_feature(x);
+    const ClosestPoints closest = closest_points(feature, x);
+    // Zero between equal points, where no plane is between them and the gap is not positive.
+    const double length = std::sqrt(closest.squared_distance);
+    // Towards the first primitive; the features may come in the other order.
+    const double sign = feature.vertex[0] < first_ ? 1 : -1;
+    const Vec3 normal = length > 0 ? closest.difference * (sign / length) : Vec3{};
+    for (std::size_t k = 0; k < n; ++k) {
+      height_[k] = dot(normal, x_[k] - x_[0]);
+      speed_[k] = dot(normal, way_[k]);
+    }
+    double lower = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < first_; ++i)
+      for (std::size_t j = first_; j < n; ++j)
+        lower = smaller(lower, height_[i] - height_[j]);
+    return lower - offset_;
+  }
+
+  /// From here on, how long this plane shows that the gap stays no less than `kept`.
+  double time_until(double kept) const {
+    double time = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < first_; ++i)
+      for (std::size_t j = first_; j < n; ++j) {
+        const double closing = speed_[j] - speed_[i];
+        const double more = height_[i] - height_[j] - offset_ - kept;
+        if (!(more >= 0))
+          return 0;
+        if (closing > 0)
+          time = smaller(time, more / closing);
+      }
+    return time;
+  }
+
+private:
+  std::size_t first_;
+  std::span<const Vec3, n> x0_;
+  double offset_ = 0;
+  bool finite_ = false;
+  std::array<Vec3, n> way_, x_;
+  std::array<double, n> height_{}, speed_{}; ///< along the normal
+};
+
+template <std::size_t n, class Feature>
+double step_of(std::span<const Vec3, n> x0, std::span<const Vec3, n> x1, std::size_t first,
+               const Separation& separation, double t_max, Feature&& closest_feature) {
+  Advancement<n> pair(x0, x1, first, separation.d_min);
+  if (!pair.finite())
+    return 0;
+  const double gap = pair.go_to(0, closest_feature);
+  if (!(gap > 0))
+    return 0;
+  const double kept = smaller(separation.share * gap, separation.most);
+  // Newton's method from below: each plane shows how long its gap lasts.
+  double t = 0;
+  for (int iteration = 1;; ++iteration) {
+    const double safe = pair.time_until(kept);
+    if (t + safe >= t_max)
+      return t_max;
+    t += safe;
+    if (iteration >= separation.iterations || safe <= enough * t)
+      return t;
+    pair.go_to(t, closest_feature);
+  }
+}
+
+} // namespace
+
+double point_point_step(std::span<const Vec3, 2> x0, std::span<const Vec3, 2> x1,
+                        const Separation& separation, double t_max) {
+  return step_of(x0, x1, 1, separation, t_max, [](std::span<const Vec3, 2>) {
+    return ClosestFeature{DistanceType::point_point, {0, 1, 0, 0}};
+  });
+}
+
+double point_edge_step(std::span<const Vec3, 3> x0, std::span<const Vec3, 3> x1,
+                       const Separation& separation, double t_max) {
+  return step_of(x0, x1, 1, separation, t_max, point_edge_feature);
+}
+
+double point_triangle_step(std::span<const Vec3, 4> x0, std::span<const Vec3, 4> x1,
+                           const Separation& separation, double t_max) {
+  return step_of(x0, x1, 1, separation, t_max, point_triangle_feature);
+}
+
+double edge_edge_step(std::span<const Vec3, 4> x0, std::span<const Vec3, 4> x1,
+                      const Separation& separation, double t_max) {
+  return step_of(x0, x1, 2, separation, t_max, edge_edge_feature);
+}
+
+double motion_bound(std::span<const Vec3> x0, std::span<const Vec3> x1, std::size_t first) {
+  Vec3 mean;
+  for (std::size_t k = 0; k < x0.size(); ++k)
+    mean += x1[k] - x0[k];
+  mean *= 1 / static_cast<double>(x0.size());
+  double of_first = 0, of_second = 0;
+  for (std::size_t k = 0; k < x0.size(); ++k) {
+    const double way = norm(x1[k] - x0[k] - mean);
+    double& most = k < first ? of_first : of_second;
+    most = larger(most, way);
+  }
+  return of_first + of_second;
+}
+
+} // namespace gewebe::collision

@@ -1,0 +1,46 @@
+#pragma once
+// Active contact pairs: what of the candidates is closer than d_hat, reduced to closest features,
+// each once with a weight (NormalCollisions of ipc-toolkit with collision set type IPC).
+
+#include "base/vec3.h"
+#include "collision/candidates.h"
+#include "collision/distance.h"
+#include "collision/surface.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe::contact {
+
+/// Pair of features. Nearly parallel edges stay a pair of edges, whose barrier is mollified; all
+/// others are the closest features themselves, so that `feature` lists all vertices in order.
+struct ContactPair {
+  collision::ClosestFeature feature; ///< in terms of `vertex`
+  std::uint8_t count = 0;            ///< vertices: 2 to 4
+  std::array<std::uint32_t, 4> vertex{};
+  double weight = 1; ///< number of candidates that reduce to this pair
+  double d_min = 0;  ///< sum of both radii, mm
+  double eps_x = 0;  ///< threshold of the mollifier; 0: edges are not nearly parallel
+};
+
+struct ContactPairs {
+  std::vector<ContactPair> pairs; ///< ascending by number and list of vertices
+  double d_hat = 0;               ///< mm
+};
+
+/// Pairs closer than their d_min + d_hat at x. \param result  overwritten; keeps its memory
+void find_active_pairs(const collision::CollisionSurface& surface,
+                       const collision::Candidates& candidates, std::span<const Vec3> x,
+                       double d_hat, ContactPairs& result);
+
+/// Copies the positions of a pair's vertices.
+inline std::span<const Vec3> positions_of(const ContactPair& pair, std::span<const Vec3> x,
+                                          std::array<Vec3, 4>& copy) {
+  for (std::size_t k = 0; k < pair.count; ++k)
+    copy[k] = x[pair.vertex[k]];
+  return std::span<const Vec3>(copy).first(pair.count);
+}
+
+} // namespace gewebe::contact

@@ -1,0 +1,142 @@
+#include "contact/friction.h"
+
+#include "base/perpendicular.h"
+
+#include <cmath>
+#include <cstddef>
+
+namespace gewebe::contact {
+
+namespace {
+
+using Plane = std::array<double, 2>;
+
+/// Displacement of a pair along its tangents.
+Plane slip(const FrictionPair& pair, std::span<const Vec3> x, std::span<const Vec3> x_start) {
+  Vec3 relative;
+  for (std::size_t k = 0; k < pair.count; ++k)
+    relative += pair.weight[k] * (x[pair.vertex[k]] - x_start[pair.vertex[k]]);
+  return {dot(pair.tangent[0], relative), dot(pair.tangent[1], relative)};
+}
+
+double length(const Plane& u) {
+  return std::sqrt(u[0] * u[0] + u[1] * u[1]);
+}
+
+double pair_gradient(const FrictionPair& pair, std::span<const Vec3> x,
+                     std::span<const Vec3> x_start, double e, std::array<Vec3, 4>& gradient) {
+  const Plane u = slip(pair, x, x_start);
+  const FrictionValue f = smooth_friction(length(u), e);
+  const Vec3 along =
+      (pair.limit * f.first_over_u) * (u[0] * pair.tangent[0] + u[1] * pair.tangent[1]);
+  gradient = {};
+  for (std::size_t k = 0; k < pair.count; ++k)
+    gradient[k] = pair.weight[k] * along;
+  return pair.limit * f.value;
+}
+
+} // namespace
+
+void lag_friction(const collision::CollisionSurface& surface, const ContactPairs& pairs,
+                  std::span<const Vec3> x, double kappa, const FrictionTable& friction,
+                  std::vector<FrictionPair>& result) {
+  result.clear();
+  std::array<Vec3, 4> copy;
+  for (const ContactPair& pair : pairs.pairs) {
+    // Owners of both sides: the last vertex is always of the second one.
+    const std::uint32_t a = surface.owner[pair.vertex[0]],
+                        b = surface.owner[pair.vertex[pair.count - std::size_t{1}]];
+    const double mu = friction.at(a, b);
+    if (!(mu > 0) || pair.eps_x > 0)
+      continue;
+    const collision::ClosestPoints closest =
+        collision::closest_points(pair.feature, positions_of(pair, x, copy));
+    const double distance = std::sqrt(closest.squared_distance);
+    if (!(distance > 0))
+      continue;
+    FrictionPair lagged;
+    lagged.count = pair.count;
+    lagged.vertex = pair.vertex;
+    lagged.weight = closest.weight;
+    lagged.normal = closest.difference / distance;
+    const Vec3 across = some_perpendicular(lagged.normal);
+    lagged.tangent[0] = across / norm(across);
+    lagged.tangent[1] = cross(lagged.normal, lagged.tangent[0]);
+    const BarrierValue value = barrier(closest.squared_distance - pair.d_min * pair.d_min,
+                                       barrier_range(pairs.d_hat, pair.d_min));
+    lagged.normal_force = -kappa * pair.weight * value.first * 2 * distance;
+    lagged.limit = mu * lagged.normal_force;
+    if (lagged.limit > 0 && std::isfinite(lagged.limit))
+      result.push_back(lagged);
+  }
+}
+
+FrictionValue smooth_friction(double u, double e) {
+  if (u >= e)
+    return {u, 1 / u, -1 / (u * u * u)};
+  const double part = u / e;
+  // f0' / u = (2 - u/e) / e; its derivative by u is -1 / e^2
+  return {u * part * (1 - part / 3) + e / 3, (2 - part) / e, u > 0 ? -1 / (e * e * u) : 0};
+}
+
+double friction_energy(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                       std::span<const Vec3> x_start, double e) {
+  double energy = 0;
+  for (const FrictionPair& pair : pairs)
+    energy += pair.limit * smooth_friction(length(slip(pair, x, x_start)), e).value;
+  return energy;
+}
+
+double add_friction_gradient(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                             std::span<const Vec3> x_start, double e, std::span<Vec3> gradient) {
+  double energy = 0;
+  std::array<Vec3, 4> part;
+  for (const FrictionPair& pair : pairs) {
+    energy += pair_gradient(pair, x, x_start, e, part);
+    for (std::size_t k = 0; k < pair.count; ++k)
+      gradient[pair.vertex[k]] += part[k];
+  }
+  return energy;
+}
+
+void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                     std::span<const Vec3> x_start, double e,
+                     std::vector<std::array<Vec3, 4>>& forces) {
+  forces.resize(pairs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    pair_gradient(pairs[k], x, x_start, e, forces[k]);
+    for (Vec3& force : forces[k])
+      force = -force;
+  }
+}
+
+void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                      std::span<const Vec3> x_start, double e, std::vector<HessianBlock>& blocks) {
+  blocks.resize(pairs.size());
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const FrictionPair& pair = pairs[p];
+    HessianBlock& block = blocks[p];
+    block.count = pair.count;
+    block.vertex = pair.vertex;
+    const Plane u = slip(pair, x, x_start);
+    const FrictionValue f = smooth_friction(length(u), e);
+    // limit T (f0'/u 1 + second u u^T) T^T. Eigenvalues f0'/u across u and f0'' along it, 2/e -
+    // 2u/e^2 or 0: never negative.
+    std::array<double, 3> m{f.first_over_u + f.second * u[0] * u[0], f.second * u[0] * u[1],
+                            f.first_over_u + f.second * u[1] * u[1]};
+    std::array<std::array<double, 3>, 3> h{};
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double s = pair.tangent[0][i], t = pair.tangent[1][i];
+        const double v = pair.tangent[0][j], w = pair.tangent[1][j];
+        h[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
+            pair.limit * (m[0] * (s * v) + m[1] * (s * w + t * v) + m[2] * (t * w));
+      }
+    const std::size_t n = 3 * std::size_t{pair.count};
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j)
+        block.entry[i * n + j] = pair.weight[i / 3] * pair.weight[j / 3] * h[i % 3][j % 3];
+  }
+}
+
+} // namespace gewebe::contact

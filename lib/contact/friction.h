@@ -1,0 +1,64 @@
+#pragma once
+// Lagged, smoothed Coulomb friction (Li et al., Incremental Potential Contact, ACM TOG 39(4), 2020,
+// section 5): the energy of a pair is mu lambda f0(|u|), where lambda, the tangent plane and the
+// closest points are those of an earlier position, and u is the tangential displacement since the
+// start of the step. f0'(u) = 2 u/e - (u/e)^2 for u < e, else 1. Lengths in mm.
+
+#include "base/vec3.h"
+#include "collision/surface.h"
+#include "contact/barrier.h"
+#include "contact/contact_pairs.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace gewebe::contact {
+
+/// Friction coefficients by owners.
+using FrictionTable = collision::OwnerTable<double>;
+
+/// What friction of a pair is lagged to.
+struct FrictionPair {
+  std::uint8_t count = 0; ///< vertices: 2 to 4
+  std::array<std::uint32_t, 4> vertex{};
+  std::array<double, 4> weight{}; ///< relative displacement = sum of weight times displacement
+  std::array<Vec3, 2> tangent;    ///< orthonormal
+  Vec3 normal;                    ///< unit, towards the vertices of positive weight
+  double normal_force = 0;        ///< lambda with the pair's weight
+  double limit = 0;               ///< mu times normal_force
+};
+
+/// Friction pairs of the active pairs at x. Left out: pairs without friction, and nearly parallel
+/// edges, whose closest points jump.
+/// \param friction  by owners of the surface
+/// \param result  overwritten; keeps its memory
+void lag_friction(const collision::CollisionSurface& surface, const ContactPairs& pairs,
+                  std::span<const Vec3> x, double kappa, const FrictionTable& friction,
+                  std::vector<FrictionPair>& result);
+
+/// f0, f0' / u and (f0'' - f0' / u) / u^2 at u, for e > 0.
+struct FrictionValue {
+  double value = 0, first_over_u = 0, second = 0;
+};
+FrictionValue smooth_friction(double u, double e);
+
+/// Energy of friction for displacements x - x_start; e: eps_v times the time step, or eps_u.
+double friction_energy(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                       std::span<const Vec3> x_start, double e);
+
+/// Adds the gradient, pair by pair. \return the energy
+double add_friction_gradient(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                             std::span<const Vec3> x_start, double e, std::span<Vec3> gradient);
+
+/// Friction force of each pair on its vertices: minus the gradient; 0 beyond their number.
+void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                     std::span<const Vec3> x_start, double e,
+                     std::vector<std::array<Vec3, 4>>& forces);
+
+/// Blocks of the Hessian, which is positive semidefinite. \param blocks  overwritten
+void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
+                      std::span<const Vec3> x_start, double e, std::vector<HessianBlock>& blocks);
+
+} // namespace gewebe::contact
