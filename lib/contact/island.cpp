@@ -1,5 +1,6 @@
 #include "contact/island.h"
 
+#include "collision/bvh.h"
 #include "contact/convex_core.h"
 
 #include <algorithm>
@@ -27,6 +28,18 @@ double median_edge(const collision::CollisionSurface& surface) {
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::ranges::nth_element(lengths, middle);
   return *middle;
+}
+
+/// Whether the segment pq passes the inside of a triangle; touching is no passing.
+bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const auto volume = [](const Vec3& u, const Vec3& v, const Vec3& s, const Vec3& t) {
+    return dot(cross(v - u, s - u), t - u);
+  };
+  const double up = volume(a, b, c, p), uq = volume(a, b, c, q);
+  if (!(up * uq < 0))
+    return false;
+  const double ab = volume(p, q, a, b), bc = volume(p, q, b, c), ca = volume(p, q, c, a);
+  return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
 }
 
 } // namespace
@@ -68,19 +81,16 @@ BodySurface instrument_surface(const InstrumentShape& shape) {
   return surface;
 }
 
-IslandMotion::IslandMotion(std::span<const MemberSurface> members,
+IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
                            const collision::OwnerTable<double>& friction,
                            const Parameters& parameters)
-    : members_(members.begin(), members.end()), parameters_(parameters),
-      island_(std::make_unique<Island>()) {
+    : parameters_(parameters), island_(std::make_unique<Island>()) {
   Island& island = *island_;
   collision::CollisionSurface& all = island.surface;
-  const std::size_t count = members_.size();
-  island.allowed = collision::AllowedPairs(count, 0);
-  island.friction = collision::OwnerTable<double>(count, 0);
   double smallest_radius = std::numeric_limits<double>::infinity();
-  for (std::size_t m = 0; m < count; ++m) {
-    const BodySurface& own = *members_[m].surface;
+  std::uint32_t pieces = 0;
+  for (const BodySurface* const one : surfaces) {
+    const BodySurface& own = *one;
     const auto first = static_cast<std::uint32_t>(all.rest.size());
     island.table.first.push_back(first);
     all.rest.insert(all.rest.end(), own.rest.begin(), own.rest.end());
@@ -93,19 +103,24 @@ IslandMotion::IslandMotion(std::span<const MemberSurface> members,
       all.edges.push_back({a + first, b + first});
     for (const std::uint32_t p : own.points)
       all.points.push_back(p + first);
-    all.owner.resize(all.rest.size(), static_cast<std::uint32_t>(m));
+    for (std::size_t v = 0; v < own.rest.size(); ++v)
+      all.owner.push_back(pieces + (own.piece.empty() ? 0 : own.piece[v]));
+    pieces += own.pieces;
     all.radius.resize(all.rest.size(), own.radius);
     all.fixed.insert(all.fixed.end(), own.fixed.begin(), own.fixed.end());
     all.fixed.resize(all.rest.size(), 0);
     if (own.radius > 0)
       smallest_radius = std::min(smallest_radius, own.radius);
+  }
+  island.table.first.push_back(static_cast<std::uint32_t>(all.rest.size()));
+  island.allowed = collision::AllowedPairs(pieces, 0);
+  island.friction = collision::OwnerTable<double>(pieces, 0);
+  for (std::size_t m = 0; m < pieces; ++m)
     for (std::size_t n = 0; n <= m; ++n)
       if (friction.at(m, n) >= 0) {
         island.allowed.set(m, n, 1);
         island.friction.set(m, n, friction.at(m, n));
       }
-  }
-  island.table.first.push_back(static_cast<std::uint32_t>(all.rest.size()));
   collision::complete_surface(all);
   island.edge = median_edge(all);
   if (!(island.edge > 0))
@@ -129,37 +144,69 @@ StepReport IslandMotion::take_report() {
   return std::exchange(report_, {});
 }
 
-void IslandMotion::step(double from, double to, const Context& context) {
+void IslandMotion::step(Members members, double from, double to, const Context& context) {
   BodyTable& table = island_->table;
   table.bodies.clear();
-  for (const MemberSurface& m : members_)
-    table.bodies.push_back(&m.member->begin(from, to, context));
+  for (IslandMember* const member : members)
+    table.bodies.push_back(&member->begin(from, to, context));
   report_.add(solver_->solve({to - from, parameters_}, context));
-  std::vector<std::vector<IslandMember::Force>> forces(members_.size());
-  for (const ContactForce& f : solver_->forces()) {
-    const std::uint32_t owner = island_->surface.owner[f.vertex];
-    forces[owner].push_back({f.vertex - table.first[owner], f.from, f.normal + f.friction});
+  std::vector<std::vector<IslandMember::Force>> forces(members.size());
+  std::size_t body = 0;
+  for (const ContactForce& f : solver_->forces()) { // by ascending vertex
+    while (f.vertex >= table.first[body + 1])
+      ++body;
+    forces[body].push_back({f.vertex - table.first[body], f.from, f.normal + f.friction});
   }
-  for (std::size_t m = 0; m < members_.size(); ++m)
-    members_[m].member->end(forces[m], context);
+  for (std::size_t m = 0; m < members.size(); ++m)
+    members[m]->end(forces[m], to - from, context);
 }
 
-void IslandMotion::advance_parts(double from, double to, int halvings, const Context& context) {
+void IslandMotion::advance_parts(Members members, double from, double to, int halvings,
+                                 const Context& context) {
   try {
-    step(from, to, context);
+    step(members, from, to, context);
     return;
   } catch (const NotSolved&) {
     if (halvings == 0 || !(to > from))
       throw;
   }
-  ++halvings_;
+  ++report_.halvings;
   const double middle = from + (to - from) / 2;
-  advance_parts(from, middle, halvings - 1, context);
-  advance_parts(middle, to, halvings - 1, context);
+  advance_parts(members, from, middle, halvings - 1, context);
+  advance_parts(members, middle, to, halvings - 1, context);
 }
 
-void IslandMotion::advance(double from, double to, const Context& context) {
-  advance_parts(from, to, max_halvings, context);
+void IslandMotion::advance(Members members, double from, double to, const Context& context) {
+  advance_parts(members, from, to, max_halvings, context);
+}
+
+std::optional<std::array<std::uint32_t, 5>>
+IslandMotion::find_intersection(std::span<const Vec3> x) const {
+  const collision::CollisionSurface& surface = island_->surface;
+  std::vector<Box3> boxes;
+  for (const auto& t : surface.triangles) {
+    Box3& box = boxes.emplace_back();
+    for (const std::uint32_t v : t)
+      box.add(x[v]);
+  }
+  const collision::Bvh tree(boxes);
+  std::optional<std::array<std::uint32_t, 5>> found;
+  for (const auto& [a, b] : surface.edges) {
+    Box3 box;
+    box.add(x[a]);
+    box.add(x[b]);
+    tree.for_each_overlapping(box, [&](std::uint32_t number) {
+      const auto& t = surface.triangles[number];
+      if (found || island_->allowed.at(surface.owner[a], surface.owner[t[0]]) == 0 ||
+          std::ranges::any_of(t, [&](std::uint32_t v) { return v == a || v == b; }))
+        return;
+      if (passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]]))
+        found = {a, b, t[0], t[1], t[2]};
+    });
+    if (found)
+      break;
+  }
+  return found;
 }
 
 } // namespace gewebe::contact

@@ -12,7 +12,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,6 +27,9 @@ struct BodySurface {
   std::vector<std::array<std::uint32_t, 2>> edges; ///< beside those of triangles
   std::vector<std::uint32_t> points;               ///< beside those of edges
   std::vector<std::uint8_t> fixed;                 ///< by vertex: 1 if it never moves
+  /// By vertex: which of the surface's pieces it is of, for who may meet; empty: all of the first.
+  std::vector<std::uint32_t> piece;
+  std::uint32_t pieces = 1;
   double radius = 0;                               ///< the surface lies so far outside, mm
 };
 
@@ -49,49 +54,49 @@ public:
   /// \param from, to  times, s; both the same: at rest
   /// \return valid until the end of the step
   virtual ContactBody& begin(double from, double to, const Context& context) = 0;
-  /// Ends the step with these forces on the member's vertices. \param from  by members
   struct Force {
-    std::uint32_t vertex = 0;
-    std::uint32_t from = 0;
+    std::uint32_t vertex = 0; ///< of the member
+    std::uint32_t from = 0;   ///< piece of the island
     Vec3 force;
   };
-  virtual void end(std::span<const Force> forces, const Context& context) = 0;
-};
-
-/// What a member is in an island.
-struct MemberSurface {
-  IslandMember* member = nullptr;
-  const BodySurface* surface = nullptr;
+  /// Ends the step of `h` s with these forces on the member's vertices, by ascending vertex.
+  virtual void end(std::span<const Force> forces, double h, const Context& context) = 0;
 };
 
 class IslandMotion {
 public:
-  /// \param members  outlive this, with their surfaces
-  /// \param friction  Coulomb's coefficient of two members; < 0: they do not touch
-  IslandMotion(std::span<const MemberSurface> members, const collision::OwnerTable<double>& friction,
-               const Parameters& parameters = {});
+  /// \param surfaces  of the members; their pieces are numbered one behind the other
+  /// \param friction  Coulomb's coefficient of two pieces; < 0: they do not touch
+  IslandMotion(std::span<const BodySurface* const> surfaces,
+               const collision::OwnerTable<double>& friction, const Parameters& parameters = {});
   ~IslandMotion();
 
-  /// Steps from one time to the other, in halves where contact is not solved.
+  /// Steps from one time to the other, in halves where contact is not solved. \param members  one
+  /// for each surface
   /// \throw NotSolved where the shortest step is not solved either: nothing has been ended since
   /// the last step that was; the caller rolls back
-  void advance(double from, double to, const Context& context);
+  void advance(std::span<IslandMember* const> members, double from, double to,
+               const Context& context);
+
+  /// Positions of all vertices as members stand at `from`, and which edges pass triangles there:
+  /// the vertices of the first such pair, or nothing.
+  std::optional<std::array<std::uint32_t, 5>> find_intersection(std::span<const Vec3> x) const;
+  const Island& island() const noexcept { return *island_; }
 
   /// What has been done since the last call.
   StepReport take_report();
-  std::uint64_t halvings() const noexcept { return halvings_; }
   double activation_distance() const noexcept;
 
 private:
-  void step(double from, double to, const Context& context);
-  void advance_parts(double from, double to, int halvings, const Context& context);
+  using Members = std::span<IslandMember* const>;
+  void step(Members members, double from, double to, const Context& context);
+  void advance_parts(Members members, double from, double to, int halvings,
+                     const Context& context);
 
-  std::vector<MemberSurface> members_;
   Parameters parameters_;
   std::unique_ptr<Island> island_;
   std::unique_ptr<StepSolver> solver_;
   StepReport report_;
-  std::uint64_t halvings_ = 0;
 };
 
 } // namespace gewebe::contact

@@ -37,6 +37,9 @@ void StepReport::add(const StepReport& more) {
   lags += more.lags;
   searches += more.searches;
   cuts += more.cuts;
+  steps += more.steps;
+  halvings += more.halvings;
+  most_iterations = std::max(most_iterations, more.most_iterations);
   pairs = std::max(pairs, more.pairs);
   vertices = std::max(vertices, more.vertices);
   gap = std::min(gap, more.gap);
@@ -277,7 +280,6 @@ void StepSolver::Work::move_bodies(const CondensedSystem& system) {
 StepReport StepSolver::Work::run() {
   const Parameters& p = options_.parameters;
   const BodyTable& table = island_.table;
-  report_.gap = std::numeric_limits<double>::infinity();
   const bool linear =
       std::ranges::all_of(table.bodies, [](const ContactBody* b) { return b->is_linear(); });
   std::vector<Vec3> to(count_), start(count_), round_begin;
@@ -367,7 +369,9 @@ StepReport StepSolver::Work::run() {
   }
   find_pairs(at_);
   report_.pairs = pairs_.pairs.size();
-  report_.gap = smallest_gap(pairs_, at_);
+  report_.gap = std::min(report_.gap, smallest_gap(pairs_, at_));
+  report_.steps = 1;
+  report_.most_iterations = report_.iterations;
   return report_;
 }
 

@@ -17,7 +17,7 @@ contact::ContactBody& BodyMotion::begin_contact_step(double /*from*/, double /*t
                                                      const Context& /*context*/) {
   refuse();
 }
-void BodyMotion::end_contact_step(std::span<const contact::VertexForce> /*forces*/,
+void BodyMotion::end_contact_step(std::span<const contact::VertexForce> /*forces*/, bool /*still*/,
                                   const Context& /*context*/) {
   refuse();
 }

@@ -93,7 +93,8 @@ public:
   /// \return valid until the step ends \pre has_contact_steps(), to > from \throw as advance
   virtual contact::ContactBody& begin_contact_step(double from, double to, const Context& context);
   /// Ends it. \param forces  contact forces on vertices, by ascending vertex
-  virtual void end_contact_step(std::span<const contact::VertexForce> forces,
+  /// \param still  velocities stay as they were, and so does the time
+  virtual void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                                 const Context& context);
   /// A step without contact came behind steps with it.
   virtual void clear_contact() {}

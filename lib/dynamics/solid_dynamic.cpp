@@ -382,7 +382,7 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
   return *body_;
 }
 
-void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces,
+void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                                     const Context& context) {
   SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
@@ -394,6 +394,12 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   ++counts_.steps;
   counts_.rounds += static_cast<std::uint64_t>(took.rounds);
   counts_.factors += static_cast<std::uint64_t>(took.factorisations);
+  if (still) {
+    const std::vector<double> places(moving.places().begin(), moving.places().end());
+    moving.restore(places, *state_.velocity, context);
+    take_over();
+    return;
+  }
   settle(before, to_, forces.empty() ? 0 : rest_in_contact * size_, context);
   take_over();
   state_.time = to_;

@@ -57,7 +57,7 @@ public:
   const contact::ModelSurface& collision_surface() override;
   contact::ContactBody& begin_contact_step(double from, double to,
                                            const Context& context) override;
-  void end_contact_step(std::span<const contact::VertexForce> forces,
+  void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                         const Context& context) override;
   void clear_contact() override;
 
