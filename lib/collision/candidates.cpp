@@ -3,6 +3,7 @@
 #include "base/boxes_meet.h"
 #include "base/larger.h"
 #include "collision/distance.h"
+#include "collision/edge_triangle.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,6 +58,47 @@ BroadPhase::BroadPhase(const CollisionSurface& surface) {
     owner_of(surface.triangles[t][0]).triangles.number.push_back(t);
 }
 
+template <class BoxOf>
+void BroadPhase::set_boxes(const BoxOf& box_of) {
+  for (Owner& owner : owners_) {
+    owner.box = {};
+    for (const std::uint32_t p : owner.points.number) {
+      const Box3 box = box_of(std::array{p});
+      owner.box.add(box.min);
+      owner.box.add(box.max);
+    }
+    for (Primitives* primitives :
+         {&owner.points, &owner.edges, &owner.triangles, &owner.lone_points, &owner.lone_edges})
+      primitives->current = false;
+  }
+}
+
+template <class BoxOf, class VerticesOf>
+void BroadPhase::refit(Primitives& primitives, const BoxOf& box_of, const VerticesOf& vertices_of) {
+  if (primitives.current)
+    return;
+  primitives.current = true;
+  primitives.boxes.resize(primitives.number.size());
+  for (std::size_t k = 0; k < primitives.number.size(); ++k)
+    primitives.boxes[k] = box_of(vertices_of(primitives.number[k]));
+  if (primitives.tree.size() != primitives.number.size())
+    primitives.tree = Bvh(primitives.boxes);
+  else
+    primitives.tree.refit(primitives.boxes);
+}
+
+void BroadPhase::find_pairs(const Primitives& a, const Primitives& b) {
+  pairs_.clear();
+  const auto add = [&](std::uint32_t i, std::uint32_t j) {
+    pairs_.push_back({a.number[i], b.number[j]});
+  };
+  if (&a == &b)
+    a.tree.for_each_own_pair(add);
+  else
+    a.tree.for_each_pair(b.tree, add);
+  std::sort(pairs_.begin(), pairs_.end());
+}
+
 void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
                       std::span<const Vec3> x1, double reach, const AllowedPairs& allowed,
                       Candidates& candidates) {
@@ -64,7 +106,6 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
   const auto point = [](std::uint32_t p) { return std::array{p}; };
   const auto edge = [&](std::uint32_t e) { return surface.edges[e]; };
   const auto triangle = [&](std::uint32_t t) { return surface.triangles[t]; };
-
   // Boxes of the swept vertices, each with half of the reach and its radius around it.
   const auto box_of = [&](const auto& vertices) {
     Box3 box;
@@ -74,28 +115,7 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
     }
     return inflated(box, 0.5 * reach + surface.radius[vertices[0]]);
   };
-  for (Owner& owner : owners_) {
-    owner.box = {};
-    for (const std::uint32_t p : owner.points.number) {
-      const Box3 box = box_of(point(p));
-      owner.box.add(box.min);
-      owner.box.add(box.max);
-    }
-    owner.points.current = owner.edges.current = owner.triangles.current =
-        owner.lone_points.current = owner.lone_edges.current = false;
-  }
-  const auto refit = [&](Primitives& primitives, const auto& vertices_of) {
-    if (primitives.current)
-      return;
-    primitives.current = true;
-    primitives.boxes.resize(primitives.number.size());
-    for (std::size_t k = 0; k < primitives.number.size(); ++k)
-      primitives.boxes[k] = box_of(vertices_of(primitives.number[k]));
-    if (primitives.tree.size() != primitives.number.size())
-      primitives.tree = Bvh(primitives.boxes);
-    else
-      primitives.tree.refit(primitives.boxes);
-  };
+  set_boxes(box_of);
 
   const auto add = [&](const auto& first, const auto& second, auto& list) {
     constexpr std::size_t k = std::tuple_size_v<std::remove_cvref_t<decltype(first)>>;
@@ -124,18 +144,9 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
                             const auto& vertices_b, auto& list) {
     if (a.number.empty() || b.number.empty())
       return;
-    refit(a, vertices_a);
-    refit(b, vertices_b);
-    pairs_.clear();
-    if (&a == &b)
-      a.tree.for_each_own_pair([&](std::uint32_t i, std::uint32_t j) {
-        pairs_.push_back({a.number[i], a.number[j]});
-      });
-    else
-      a.tree.for_each_pair(b.tree, [&](std::uint32_t i, std::uint32_t j) {
-        pairs_.push_back({a.number[i], b.number[j]});
-      });
-    std::sort(pairs_.begin(), pairs_.end());
+    refit(a, box_of, vertices_a);
+    refit(b, box_of, vertices_b);
+    find_pairs(a, b);
     for (const auto& [i, j] : pairs_)
       add(vertices_a(i), vertices_b(j), list);
   };
@@ -154,6 +165,50 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
         meet_all(b.lone_points, point, a.lone_edges, edge, candidates.point_edge);
       meet_all(a.lone_points, point, b.lone_points, point, candidates.point_point);
     }
+}
+
+std::vector<Intersection> BroadPhase::find_intersections(const CollisionSurface& surface,
+                                                         std::span<const Vec3> x,
+                                                         const AllowedPairs& allowed,
+                                                         std::size_t most) {
+  const auto edge = [&](std::uint32_t e) { return surface.edges[e]; };
+  const auto triangle = [&](std::uint32_t t) { return surface.triangles[t]; };
+  const auto box_of = [&](const auto& vertices) {
+    Box3 box;
+    for (const std::uint32_t v : vertices)
+      box.add(x[v]);
+    return box;
+  };
+  set_boxes(box_of);
+  std::vector<Intersection> found;
+  const auto meet_all = [&](Primitives& edges, Primitives& triangles) {
+    if (edges.number.empty() || triangles.number.empty())
+      return;
+    refit(edges, box_of, edge);
+    refit(triangles, box_of, triangle);
+    find_pairs(edges, triangles);
+    for (const auto& [e, t] : pairs_) {
+      const auto [p, q] = edge(e);
+      const auto [a, b, c] = triangle(t);
+      if (found.size() >= most)
+        return;
+      if (p == a || p == b || p == c || q == a || q == b || q == c || surface.radius[p] > 0 ||
+          surface.radius[a] > 0)
+        continue;
+      if (edge_meets_triangle(x[p], x[q], x[a], x[b], x[c]))
+        found.push_back({e, t});
+    }
+  };
+  const std::size_t owners = std::min(owners_.size(), allowed.owners());
+  for (std::size_t i = 0; i < owners; ++i)
+    for (std::size_t j = i; j < owners; ++j) {
+      if (!allowed.at(i, j) || !meet(owners_[i].box, owners_[j].box))
+        continue;
+      meet_all(owners_[i].edges, owners_[j].triangles);
+      if (i != j)
+        meet_all(owners_[j].edges, owners_[i].triangles);
+    }
+  return found;
 }
 
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,

@@ -33,6 +33,12 @@ struct Candidates {
   }
 };
 
+/// Numbers of an edge and a triangle of the surface.
+struct Intersection {
+  std::uint32_t edge = 0, triangle = 0;
+  bool operator==(const Intersection&) const = default;
+};
+
 /// Hierarchies over the primitives of each owner. Lives as long as the topology of the surface.
 class BroadPhase {
 public:
@@ -47,6 +53,13 @@ public:
   void find(const CollisionSurface& surface, std::span<const Vec3> x0, std::span<const Vec3> x1,
             double reach, const AllowedPairs& allowed, Candidates& candidates);
 
+  /// Edges that meet triangles at x, of owners that may meet, without a vertex in common: exact,
+  /// and points in common count. Primitives with a radius are no part of it. \param most  stops
+  /// after that many
+  std::vector<Intersection> find_intersections(const CollisionSurface& surface,
+                                               std::span<const Vec3> x, const AllowedPairs& allowed,
+                                               std::size_t most);
+
 private:
   struct Primitives {
     std::vector<std::uint32_t> number; ///< ascending
@@ -58,8 +71,16 @@ private:
     Primitives points, edges, triangles, lone_points, lone_edges;
     Box3 box;
   };
+  /// Boxes of all vertices of an owner; trees are refitted when they are asked for.
+  template <class BoxOf>
+  void set_boxes(const BoxOf& box_of);
+  template <class BoxOf, class VerticesOf>
+  void refit(Primitives& primitives, const BoxOf& box_of, const VerticesOf& vertices_of);
+  /// Numbers of the primitives of both whose boxes meet, ascending.
+  void find_pairs(const Primitives& a, const Primitives& b);
+
   std::vector<Owner> owners_;
-  std::vector<std::array<std::uint32_t, 2>> pairs_;
+  std::vector<std::array<std::uint32_t, 2>> pairs_; ///< of find_pairs
 };
 
 /// Largest step in [0, 1] along which all candidates keep their separation.

@@ -3,6 +3,7 @@
 #include "base/larger.h"
 #include "collision/distance.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -39,6 +40,22 @@ public:
   }
 
   bool finite() const { return finite_; }
+
+  /// Whether a plane across an axis shows that the gap is no less than `gap` all the way.
+  bool keeps_apart(double gap) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+      for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t side = k < first_ ? 0 : 1;
+        const double from = x0_[k][axis], to = from + way_[k][axis];
+        low[side] = std::min({low[side], from, to});
+        high[side] = std::max({high[side], from, to});
+      }
+      if (low[0] - high[1] >= gap + offset_ || low[1] - high[0] >= gap + offset_)
+        return true;
+    }
+    return false;
+  }
 
   /// Goes to t; the gap there is at least the result. Any plane bounds the distance from below, so
   /// that the bound holds even where the features were misjudged.
@@ -95,6 +112,8 @@ double step_of(std::span<const Vec3, n> x0, std::span<const Vec3, n> x1, std::si
   Advancement<n> pair(x0, x1, first, separation.d_min);
   if (!pair.finite())
     return 0;
+  if (pair.keeps_apart(separation.most))
+    return t_max;
   const double gap = pair.go_to(0, closest_feature);
   if (!(gap > 0))
     return 0;

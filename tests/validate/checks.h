@@ -86,6 +86,7 @@ Section constant_strain();
 Section manufactured();
 Section benchmarks();
 Section hertz();
+Section contact_potentials();
 Section sliding();
 Section passivity();
 Section hand();

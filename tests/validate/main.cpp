@@ -20,17 +20,19 @@
 
 int main(int count, char** words) {
   using namespace gewebe::validate;
-  const std::array<std::pair<std::string, Section (*)()>, 11> all{{{"patch", constant_strain},
-                                                                   {"order", manufactured},
-                                                                   {"benchmarks", benchmarks},
-                                                                   {"contact", hertz},
-                                                                   {"sliding", sliding},
-                                                                   {"passivity", passivity},
-                                                                   {"hand", hand},
-                                                                   {"peers", peers},
-                                                                   {"beam", silicone},
-                                                                   {"swing", swings},
-                                                                   {"organs", organs}}};
+  const std::array<std::pair<std::string, Section (*)()>, 12> all{
+      {{"patch", constant_strain},
+       {"order", manufactured},
+       {"benchmarks", benchmarks},
+       {"contact", hertz},
+       {"potentials", contact_potentials},
+       {"sliding", sliding},
+       {"passivity", passivity},
+       {"hand", hand},
+       {"peers", peers},
+       {"beam", silicone},
+       {"swing", swings},
+       {"organs", organs}}};
   if (count < 2) {
     (void)std::fputs("usage: validate FOLDER [SECTION…]\n", stderr);
     return 2;

@@ -1,0 +1,155 @@
+#include "contact/friction.h"
+
+#include "collision/candidates.h"
+#include "collision_pairs.h"
+#include "collision_scene.h"
+#include "larger.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <gtest/gtest.h>
+#include <random>
+#include <vector>
+
+namespace gewebe::contact {
+namespace {
+
+struct Lagged {
+  collision::CollisionSurface surface;
+  ContactPairs contact;
+  std::vector<FrictionPair> pairs;
+};
+
+Lagged lagged(double mu, unsigned seed) {
+  Lagged all;
+  all.surface = test::two_sheets(5, 0.1, 0.03, 0.5, seed);
+  collision::AllowedPairs allowed(4, 1);
+  for (std::size_t k = 0; k < 4; ++k)
+    allowed.set(k, k, 0);
+  const std::vector<Vec3>& x = all.surface.rest;
+  collision::Candidates candidates;
+  collision::BroadPhase(all.surface).find(all.surface, x, x, 0.2, allowed, candidates);
+  find_active_pairs(all.surface, candidates, x, 0.2, all.contact);
+  lag_friction(all.surface, all.contact, x, 2, FrictionTable(4, mu), all.pairs);
+  return all;
+}
+
+std::vector<Vec3> displaced(const std::vector<Vec3>& x, double by, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<Vec3> y = x;
+  for (Vec3& p : y)
+    p += test::random_point(random, by);
+  return y;
+}
+
+TEST(Friction, SmoothFunctionAndItsDerivatives) {
+  const double e = 0.3, h = 1e-6;
+  const auto first = [&](double u) { return smooth_friction(u, e).first_over_u * u; };
+  for (const double u : {1e-4, 0.05, 0.15, 0.29, 0.31, 2.0}) {
+    const FrictionValue f = smooth_friction(u, e);
+    EXPECT_NEAR(first(u), u < e ? 2 * u / e - u / e * u / e : 1, 1e-14);
+    EXPECT_NEAR((smooth_friction(u + h, e).value - smooth_friction(u - h, e).value) / (2 * h),
+                first(u), 1e-8);
+    const double second = (first(u + h) - first(u - h)) / (2 * h);
+    EXPECT_NEAR(f.second * u * u, second - f.first_over_u, 1e-7);
+  }
+  EXPECT_EQ(smooth_friction(e, e).value, e);
+  EXPECT_DOUBLE_EQ(smooth_friction(0, e).value, e / 3);
+  EXPECT_DOUBLE_EQ(smooth_friction(std::nextafter(e, 0), e).value, e);
+}
+
+TEST(Friction, GradientAndHessianAreThoseOfDifferences) {
+  for (const double by : {0.001, 0.02, 0.5}) {
+    const Lagged all = lagged(0.7, 1);
+    ASSERT_GT(all.pairs.size(), 30U);
+    const std::vector<Vec3>& start = all.surface.rest;
+    std::vector<Vec3> x = displaced(start, by, 2);
+    for (const FrictionPair& pair : all.pairs) {
+      const std::span<const FrictionPair> one(&pair, 1);
+      const double e = 0.02, h = 1e-6 * by;
+      std::vector<Vec3> g(x.size()), up(x.size()), down(x.size());
+      EXPECT_EQ(add_friction_gradient(one, x, start, e, g), friction_energy(one, x, start, e));
+      std::vector<HessianBlock> blocks;
+      friction_hessian(one, x, start, e, blocks);
+      const std::size_t n = 3 * std::size_t{pair.count};
+      double scale = 0;
+      for (std::size_t k = 0; k < n * n; ++k)
+        scale = test::larger(scale, std::abs(blocks[0].entry[k]));
+      for (std::size_t i = 0; i < n; ++i) {
+        double& at = x[pair.vertex[i / 3]][static_cast<int>(i % 3)];
+        const double old = at;
+        std::fill(up.begin(), up.end(), Vec3{});
+        std::fill(down.begin(), down.end(), Vec3{});
+        at = old + h;
+        const double above = add_friction_gradient(one, x, start, e, up);
+        at = old - h;
+        const double below = add_friction_gradient(one, x, start, e, down);
+        at = old;
+        EXPECT_NEAR(g[pair.vertex[i / 3]][static_cast<int>(i % 3)], (above - below) / (2 * h),
+                    1e-6 * pair.limit);
+        for (std::size_t j = 0; j < n; ++j) {
+          const int axis = static_cast<int>(j % 3);
+          EXPECT_NEAR(blocks[0].entry[i * n + j],
+                      (up[pair.vertex[j / 3]][axis] - down[pair.vertex[j / 3]][axis]) / (2 * h),
+                      2e-5 * scale);
+        }
+      }
+      std::mt19937 random(3);
+      for (int k = 0; k < 5; ++k) {
+        double form = 0;
+        std::array<double, 12> v{};
+        for (double& c : v)
+          c = test::random_point(random, 1).x;
+        for (std::size_t i = 0; i < n; ++i)
+          for (std::size_t j = 0; j < n; ++j)
+            form += v[i] * blocks[0].entry[i * n + j] * v[j];
+        EXPECT_GE(form, -1e-12 * scale);
+      }
+    }
+  }
+}
+
+TEST(Friction, ForcesSumToZeroOpposeTheSlipAndKeepTheCone) {
+  const Lagged all = lagged(0.4, 5);
+  const std::vector<Vec3>& start = all.surface.rest;
+  const std::vector<Vec3> x = displaced(start, 0.1, 6);
+  std::vector<std::array<Vec3, 4>> forces;
+  friction_forces(all.pairs, x, start, 0.02, forces);
+  for (std::size_t k = 0; k < forces.size(); ++k) {
+    const FrictionPair& pair = all.pairs[k];
+    Vec3 sum, first, relative;
+    for (std::size_t i = 0; i < pair.count; ++i) {
+      sum += forces[k][i];
+      if (pair.weight[i] > 0)
+        first += forces[k][i];
+      relative += pair.weight[i] * (x[pair.vertex[i]] - start[pair.vertex[i]]);
+    }
+    EXPECT_LE(norm(sum), 1e-14 * pair.limit);
+    EXPECT_LE(norm(first), pair.limit * (1 + 1e-12));
+    EXPECT_LE(dot(first, relative), 0);
+    EXPECT_NEAR(dot(first, pair.normal), 0, 1e-12 * pair.limit);
+    EXPECT_NEAR(pair.limit, 0.4 * pair.normal_force, 1e-14 * pair.limit);
+  }
+}
+
+TEST(Friction, NormalForceIsTheBarriers) {
+  const Lagged all = lagged(1, 7);
+  std::vector<std::array<Vec3, 4>> forces;
+  barrier_forces(all.contact, all.surface.rest, 2, forces);
+  std::size_t at = 0;
+  for (const FrictionPair& pair : all.pairs) {
+    while (all.contact.pairs[at].vertex != pair.vertex || all.contact.pairs[at].eps_x > 0)
+      ++at;
+    for (std::size_t i = 0; i < pair.count; ++i)
+      EXPECT_LE(norm(forces[at][i] - pair.normal_force * pair.weight[i] * pair.normal),
+                1e-12 * pair.normal_force);
+  }
+}
+
+TEST(Friction, NoneWithoutACoefficient) {
+  EXPECT_TRUE(lagged(0, 1).pairs.empty());
+}
+
+} // namespace
+} // namespace gewebe::contact
