@@ -1,10 +1,13 @@
 #include "contact/condensed_system.h"
 
+#include "base/error.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
+#include <list>
 #include <utility>
 
 namespace gewebe::contact {
@@ -29,14 +32,16 @@ struct ActiveNode {
   std::array<std::int32_t, 3> unknown{-1, -1, -1};
 };
 
+constexpr std::size_t most_inverses = 32;
+
 /// What belongs to one body.
 struct Part {
   std::vector<std::uint32_t> nodes;         ///< ascending vertices
   std::vector<std::uint32_t> rows;          ///< their vertices in the body
-  std::vector<std::uint32_t> active;        ///< active nodes, in the order they came
+  std::vector<std::uint32_t> active;        ///< active nodes, by ascending node
   std::vector<std::vector<Block3>> columns; ///< by active node: W(row, it)
   std::vector<Index> unknowns;              ///< of the system
-  MatrixXd inverse;                         ///< W_aa^-1 over them
+  MatrixXd inverse;                         ///< W_aa^-1 over them, in the world's frame
   VectorXd start;                           ///< W_aa^-1 R0_a
 };
 
@@ -45,15 +50,34 @@ Vec3 times(const Block3& b, const Vec3& v) {
           b[6] * v.x + b[7] * v.y + b[8] * v.z};
 }
 
+Vec3 times_transposed(const Block3& b, const Vec3& v) {
+  return {b[0] * v.x + b[3] * v.y + b[6] * v.z, b[1] * v.x + b[4] * v.y + b[7] * v.z,
+          b[2] * v.x + b[5] * v.y + b[8] * v.z};
+}
+
 } // namespace
+
+struct InverseCache::State {
+  struct Inverse {
+    std::uint64_t id = 0;
+    std::vector<std::uint32_t> key; ///< axes of vertices
+    MatrixXd inverse;               ///< in the vertices' frames
+  };
+  std::list<Inverse> inverses; ///< last used first
+};
+
+InverseCache::InverseCache() : state_(std::make_unique<State>()) {}
+InverseCache::~InverseCache() = default;
 
 struct CondensedSystem::State {
   const BodyTable& table;
   double ridge;
+  InverseCache& cache;
   std::vector<std::uint32_t> vertices;
   std::vector<std::uint32_t> node_of; ///< by place of a vertex
   std::vector<std::uint32_t> place_of_vertex;
   std::vector<Node> nodes;
+  std::vector<Block3> frames; ///< by node
   std::vector<Part> parts;
   std::vector<ActiveNode> active;
   std::vector<Vec3> start;    ///< R0 by place
@@ -69,7 +93,8 @@ struct CondensedSystem::State {
   // Of energy(): quadratic in c, F and q.
   double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
 
-  State(const BodyTable& of, double with_ridge) : table(of), ridge(with_ridge) {}
+  State(const BodyTable& of, double with_ridge, InverseCache& with_cache)
+      : table(of), ridge(with_ridge), cache(with_cache) {}
 
   std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
   Index matrix_order = 0;
@@ -100,6 +125,8 @@ struct CondensedSystem::State {
       part.nodes.push_back(node);
       part.rows.push_back(vertex - table.first[body]);
     }
+    for (const Node& node : nodes)
+      frames.push_back(table.bodies[node.body]->frame(node.vertex));
     pushed.resize(nodes.size());
     response.resize(nodes.size());
     step.resize(vertices.size());
@@ -110,7 +137,7 @@ struct CondensedSystem::State {
     return start[place_of_vertex[table.first[n.body] + n.vertex]];
   }
 
-  /// Factors of a body's W_aa, behind new columns.
+  /// Inverse of a body's W_aa, behind new columns.
   void renew(Part& part) {
     const auto count = static_cast<Index>(part.active.size());
     double largest = 0;
@@ -119,7 +146,7 @@ struct CondensedSystem::State {
       for (std::size_t a = 0; a < 3; ++a)
         largest = std::max(largest, own[4 * a]);
     }
-    std::vector<std::pair<Index, int>> axes; // active node of the part, axis
+    Axes axes;
     for (Index k = 0; k < count; ++k) {
       ActiveNode& node = active[part.active[static_cast<std::size_t>(k)]];
       for (int a = 0; a < 3; ++a) {
@@ -132,14 +159,38 @@ struct CondensedSystem::State {
       }
     }
     const auto order = static_cast<Index>(axes.size());
-    MatrixXd w(order, order);
     part.unknowns.clear();
     VectorXd r0(order);
     for (Index j = 0; j < order; ++j) {
       const auto [kj, aj] = axes[static_cast<std::size_t>(j)];
-      const std::uint32_t active_node = part.active[static_cast<std::size_t>(kj)];
-      part.unknowns.push_back(active[active_node].unknown[static_cast<std::size_t>(aj)]);
-      r0[j] = start_of(active[active_node].node)[aj];
+      const ActiveNode& node = active[part.active[static_cast<std::size_t>(kj)]];
+      part.unknowns.push_back(node.unknown[static_cast<std::size_t>(aj)]);
+      r0[j] = start_of(node.node)[aj];
+    }
+    part.inverse = turned(part, axes, inverse_of(part, axes, largest));
+    part.start = part.inverse * r0;
+  }
+
+  using Axes = std::vector<std::pair<Index, int>>; ///< active node of the part, axis
+
+  /// W_aa^-1 in the vertices' frames.
+  const MatrixXd& inverse_of(const Part& part, const Axes& axes, double largest) {
+    InverseCache::State& all = *cache.state_;
+    const std::uint64_t id = table.bodies[nodes[part.nodes[0]].body]->matrix_id();
+    std::vector<std::uint32_t> key;
+    for (const auto& [k, a] : axes)
+      key.push_back(3 * nodes[active[part.active[static_cast<std::size_t>(k)]].node].vertex +
+                    static_cast<std::uint32_t>(a));
+    if (id != 0)
+      for (auto one = all.inverses.begin(); one != all.inverses.end(); ++one)
+        if (one->id == id && one->key == key) {
+          all.inverses.splice(all.inverses.begin(), all.inverses, one);
+          return one->inverse;
+        }
+    const auto order = static_cast<Index>(axes.size());
+    MatrixXd w(order, order);
+    for (Index j = 0; j < order; ++j) {
+      const auto [kj, aj] = axes[static_cast<std::size_t>(j)];
       for (Index i = 0; i < order; ++i) {
         const auto [ki, ai] = axes[static_cast<std::size_t>(i)];
         w(i, j) = block(part, ki, kj)[static_cast<std::size_t>(3 * ai + aj)];
@@ -152,13 +203,46 @@ struct CondensedSystem::State {
       shifted.diagonal().array() += shift;
       const Eigen::LLT<MatrixXd> factor(shifted);
       if (factor.info() == Eigen::Success) {
-        part.inverse = factor.solve(MatrixXd::Identity(order, order));
-        part.inverse = (0.5 * (part.inverse + part.inverse.transpose())).eval();
+        w = factor.solve(MatrixXd::Identity(order, order));
+        w = (0.5 * (w + w.transpose())).eval();
         break;
       }
       shift = shift > 0 ? 10 * shift : ridge * largest;
+      if (!std::isfinite(shift) || !(shift <= largest))
+        throw Error("contact: the compliance of a body is not positive");
     }
-    part.start = part.inverse * r0;
+    all.inverses.push_front({id, std::move(key), std::move(w)});
+    if (all.inverses.size() > most_inverses)
+      all.inverses.pop_back();
+    return all.inverses.front().inverse;
+  }
+
+  /// From the vertices' frames into the world's.
+  MatrixXd turned(const Part& part, const Axes& axes, const MatrixXd& inverse) const {
+    const ContactBody& body = *table.bodies[nodes[part.nodes[0]].body];
+    const std::size_t count = part.active.size();
+    std::vector<Index> first(count, -1); // unknown of a node with all three axes
+    bool turns = false;
+    std::vector<Eigen::Matrix3d> frame(count, Eigen::Matrix3d::Identity());
+    for (std::size_t n = 0; n < axes.size(); ++n)
+      if (axes[n].second == 0 && n + 2 < axes.size() && axes[n + 2].first == axes[n].first)
+        first[static_cast<std::size_t>(axes[n].first)] = static_cast<Index>(n);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Block3 of = body.frame(nodes[active[part.active[k]].node].vertex);
+      frame[k] = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(of.data());
+      turns = turns || (first[k] >= 0 && frame[k] != Eigen::Matrix3d::Identity());
+    }
+    MatrixXd result = inverse;
+    if (!turns)
+      return result;
+    for (std::size_t k = 0; k < count; ++k)
+      if (first[k] >= 0)
+        result.middleRows<3>(first[k]) = (frame[k] * result.middleRows<3>(first[k])).eval();
+    for (std::size_t k = 0; k < count; ++k)
+      if (first[k] >= 0)
+        result.middleCols<3>(first[k]) =
+            (result.middleCols<3>(first[k]) * frame[k].transpose()).eval();
+    return result;
   }
 
   /// W(active node i, active node j) of a part.
@@ -170,23 +254,29 @@ struct CondensedSystem::State {
   /// W v at all nodes, v by active node.
   void respond(const std::vector<Vec3>& v, std::vector<Vec3>& to) const {
     std::ranges::fill(to, Vec3{});
-    for (const Part& part : parts)
+    for (const Part& part : parts) {
+      if (part.active.empty())
+        continue;
       for (std::size_t k = 0; k < part.active.size(); ++k) {
-        const Vec3& f = v[part.active[k]];
-        if (f == Vec3{})
+        const ActiveNode& node = active[part.active[k]];
+        if (v[part.active[k]] == Vec3{})
           continue;
+        const Vec3 f = times_transposed(frames[node.node], v[part.active[k]]);
         const std::vector<Block3>& column = part.columns[k];
         for (std::size_t row = 0; row < part.nodes.size(); ++row)
           to[part.nodes[row]] += times(column[row], f);
       }
+      for (const std::uint32_t node : part.nodes)
+        to[node] = times(frames[node], to[node]);
+    }
   }
 };
 
 CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                                  std::span<const Vec3> start,
                                  std::span<const std::vector<VertexForce>> forces, double energy,
-                                 double ridge)
-    : state_(std::make_unique<State>(table, ridge)) {
+                                 double ridge, InverseCache& cache)
+    : state_(std::make_unique<State>(table, ridge, cache)) {
   State& s = *state_;
   s.penalty = energy;
   s.vertices = std::move(vertices);
@@ -227,9 +317,13 @@ void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
     n.active = static_cast<std::uint32_t>(s.active.size());
     s.active.push_back({node, {-1, -1, -1}});
     Part& part = s.parts[n.body];
-    part.active.push_back(n.active);
-    part.columns.emplace_back(part.rows.size());
-    s.table.bodies[n.body]->compliance(n.vertex, part.rows, part.columns.back());
+    const auto place = std::ranges::lower_bound(
+        part.active, node, {}, [&](std::uint32_t k) { return s.active[k].node; });
+    const auto column = part.columns.begin() + (place - part.active.begin());
+    std::vector<Block3> blocks(part.rows.size());
+    s.table.bodies[n.body]->compliance(n.vertex, part.rows, blocks);
+    part.columns.insert(column, std::move(blocks));
+    part.active.insert(place, n.active);
     changed[n.body] = 1;
   }
   for (std::size_t b = 0; b < s.parts.size(); ++b)

@@ -31,6 +31,18 @@ struct BodyTable {
   std::uint32_t vertex_count() const { return first.empty() ? 0 : first.back(); }
 };
 
+/// Inverses of W_aa, by matrix and vertices: they serve from step to step where contact stays.
+class InverseCache {
+public:
+  InverseCache();
+  ~InverseCache();
+
+private:
+  friend class CondensedSystem;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
 class CondensedSystem {
 public:
   /// \param vertices  that may take part, ascending \param start  R0 of all vertices
@@ -38,7 +50,7 @@ public:
   /// \param energy  R0^T A R0 of all bodies \param ridge  see Parameters \pre the bodies are linearised; they outlive this
   CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                   std::span<const Vec3> start, std::span<const std::vector<VertexForce>> forces,
-                  double energy, double ridge);
+                  double energy, double ridge, InverseCache& cache);
   ~CondensedSystem();
   CondensedSystem(const CondensedSystem&) = delete;
   CondensedSystem& operator=(const CondensedSystem&) = delete;

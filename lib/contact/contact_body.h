@@ -49,10 +49,16 @@ public:
   virtual double linearise(std::span<const VertexForce> forces, std::span<Vec3> step) = 0;
   /// Contact forces at the end of the last step, by ascending vertex.
   virtual std::vector<VertexForce> last_forces() const { return {}; }
-  /// Compliance between `vertex` and each vertex of `rows`: W(row, vertex), mm per 1e-6 N. Zero
-  /// along axes that cannot move. \pre linearised
+  /// Compliance between `vertex` and each vertex of `rows` in their frames:
+  /// W(row, vertex) = frame(row) block frame(vertex)^T, mm per 1e-6 N. Zero along axes that cannot
+  /// move. \pre linearised
   virtual void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                           std::span<Block3> blocks) = 0;
+  /// Rotation of a vertex's frame, the identity by default. A vertex with an axis that cannot move
+  /// has no other.
+  virtual Block3 frame(std::uint32_t /*vertex*/) const { return {1, 0, 0, 0, 1, 0, 0, 0, 1}; }
+  /// Bodies with the same number (but 0), see base/unique_number.h, have the same compliance() of the same vertices.
+  virtual std::uint64_t matrix_id() const { return 0; }
   /// Moves to x_free + A^-1 S^T f, less `share` of `step`. \param forces  f by ascending vertex
   virtual void move(double share, std::span<const VertexForce> forces) = 0;
 

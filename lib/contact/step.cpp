@@ -49,9 +49,9 @@ void StepReport::add(const StepReport& more) {
 /// The contact energy of a step, and what its minimisation needs.
 class StepSolver::Work {
 public:
-  Work(const Island& island, collision::BroadPhase& broad_phase, const StepOptions& options,
-       const Context& context)
-      : island_(island), broad_phase_(broad_phase), options_(options), context_(context),
+  Work(const Island& island, collision::BroadPhase& broad_phase, InverseCache& inverses,
+       const StepOptions& options, const Context& context)
+      : island_(island), broad_phase_(broad_phase), inverses_(inverses), options_(options), context_(context),
         count_(island.table.vertex_count()), begin_(count_), at_(count_), way_(count_),
         trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
         stick_(options.h > 0 ? options.parameters.stick_speed * options.h
@@ -90,6 +90,7 @@ private:
 
   const Island& island_;
   collision::BroadPhase& broad_phase_;
+  InverseCache& inverses_;
   const StepOptions& options_;
   const Context& context_;
   std::size_t count_;
@@ -310,7 +311,7 @@ StepReport StepSolver::Work::run() {
         if (round == 0 && attempt == 0)
           lag();
       }
-      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge);
+      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_);
       bool converged = vertices_.empty();
       int iteration = 0, lags = 0;
       if (vertices_.empty())
@@ -407,7 +408,7 @@ std::vector<ContactForce> StepSolver::Work::forces() {
 StepSolver::StepSolver(const Island& island) : island_(island), broad_phase_(island.surface) {}
 
 StepReport StepSolver::solve(const StepOptions& options, const Context& context) {
-  Work work(island_, broad_phase_, options, context);
+  Work work(island_, broad_phase_, inverses_, options, context);
   const StepReport report = work.run();
   forces_ = work.forces();
   return report;

@@ -85,6 +85,7 @@ private:
   class Work;
   const Island& island_;
   collision::BroadPhase broad_phase_;
+  InverseCache inverses_;
   std::vector<ContactForce> forces_;
 };
 

@@ -11,24 +11,6 @@ namespace gewebe {
 
 using contact::Block3, contact::VertexForce;
 
-namespace {
-
-/// a b c^T
-Block3 turned(const Block3& a, const Block3& b, const Block3& c) {
-  Block3 ab{}, abc{};
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      for (std::size_t k = 0; k < 3; ++k)
-        ab[3 * i + j] += a[3 * i + k] * b[3 * k + j];
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      for (std::size_t k = 0; k < 3; ++k)
-        abc[3 * i + j] += ab[3 * i + k] * c[3 * j + k];
-  return abc;
-}
-
-} // namespace
-
 void SolidContactBody::begin(double h, std::vector<VertexForce> last, double typical_force,
                              const Context& context) {
   h_ = h;
@@ -81,12 +63,8 @@ void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uin
           kept.push_back(whole[column * axes_ + 3 * std::size_t{node} + a]);
     found = columns_.emplace(vertex, std::move(kept)).first;
   }
-  const Block3 own = motion_.frame_of(vertices_[vertex]);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    Block3 block;
-    std::copy_n(found->second.begin() + std::ptrdiff_t{9} * rows[k], 9, block.begin());
-    blocks[k] = turned(motion_.frame_of(vertices_[rows[k]]), block, own);
-  }
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    std::copy_n(found->second.begin() + std::ptrdiff_t{9} * rows[k], 9, blocks[k].begin());
 }
 
 void SolidContactBody::move(double share, std::span<const VertexForce> forces) {

@@ -34,6 +34,10 @@ public:
   std::vector<contact::VertexForce> last_forces() const override { return last_; }
   void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                   std::span<contact::Block3> blocks) override;
+  contact::Block3 frame(std::uint32_t vertex) const override {
+    return motion_.frame_of(vertices_[vertex]);
+  }
+  std::uint64_t matrix_id() const override { return motion_.matrix_version(); }
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }

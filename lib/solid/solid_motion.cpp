@@ -1,6 +1,7 @@
 #include "solid/solid_motion.h"
 
 #include "base/error.h"
+#include "base/unique_number.h"
 #include "solid/assembly_internal.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
@@ -294,7 +295,7 @@ void SolidMotion::begin_step(double h, const Context& context) {
   }
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
   if (made > 0)
-    ++s.matrix_version;
+    s.matrix_version = unique_number();
   s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
@@ -309,25 +310,21 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
     return;
   }
   State::Open& open = *s.open;
-  const double h = open.objective.step();
   open.base = open.found.at;
   MotionPoint point;
   point.at = open.base;
-  if (open.fresh) {
-    add(point.at, h, s.now.velocity);
-    if (s.last_step == h)
-      s.forecast.add_to(point.at, h * h, context);
-  }
+  if (open.fresh)
+    add(point.at, open.objective.step(), s.now.velocity);
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] != 0)
       point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
   open.objective.evaluate(point, context, true);
   if (s.quick.wants_tangent() && s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
-    ++s.matrix_version;
+    s.matrix_version = unique_number();
   s.quick.turn(s.energy, context);
   s.quick.fill(s.energy.volumes(), context);
   if (!s.energy.volumes().empty())
-    ++s.matrix_version;
+    s.matrix_version = unique_number();
   Numbers direction = point.gradient;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] == 0)
@@ -364,7 +361,7 @@ void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
 }
 
 std::uint64_t SolidMotion::matrix_version() const noexcept {
-  return state_->recovery.on() ? state_->recovery.soft().matrix_version() + (std::uint64_t{1} << 63)
+  return state_->recovery.on() ? state_->recovery.soft().matrix_version()
                                : state_->matrix_version;
 }
 

@@ -1,6 +1,7 @@
 #include "statics/elastostatic.h"
 
 #include "base/error.h"
+#include "base/unique_number.h"
 #include "base/vector_at.h"
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
@@ -30,6 +31,8 @@ struct Elastostatic::State {
   ForcesAt block;
   HeldContacts held;
   bool by_block = false; // how the present load is met
+  std::uint64_t id = 0;  // of the compliance with these nodes held
+  std::vector<std::uint32_t> id_of;
 
   // The last load, its contact forces, and its shape, where that was asked for.
   Load load;
@@ -250,6 +253,15 @@ struct Elastostatic::State {
 
   // ---- contact
 
+  std::uint64_t compliance_id(const Load& now) {
+    std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+    if (id == 0 || nodes != id_of) {
+      id = unique_number();
+      id_of = std::move(nodes);
+    }
+    return id;
+  }
+
   void compliance_blocks(const Load& now, std::uint32_t node, std::span<const std::uint32_t> rows,
                          std::span<std::array<double, 9>> blocks) {
     if (!now.displacement.empty())
@@ -325,6 +337,10 @@ void Elastostatic::compliance_blocks(const Load& load, std::uint32_t node,
                                      std::span<const std::uint32_t> rows,
                                      std::span<std::array<double, 9>> blocks) {
   state_->compliance_blocks(load, node, rows, blocks);
+}
+
+std::uint64_t Elastostatic::compliance_id(const Load& load) {
+  return state_->compliance_id(load);
 }
 
 DelassusOperator Elastostatic::delassus_operator(const Load& load,

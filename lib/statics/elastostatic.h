@@ -116,6 +116,8 @@ public:
   void compliance_blocks(const Load& load, std::uint32_t node, std::span<const std::uint32_t> rows,
                          std::span<std::array<double, 9>> blocks);
 
+  /// Number of the matrix that compliance_blocks has for this load, see base/unique_number.h.
+  std::uint64_t compliance_id(const Load& load);
   /// \pre as update; the load displaces nothing; nodes ascending \throw as compliance_blocks
   DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
 

@@ -73,6 +73,7 @@ public:
   ElastostaticContactBody(StaticContactState state, std::function<Elastostatic&()> solver)
       : StaticContactBody(std::move(state)), solver_(std::move(solver)) {}
   bool is_linear() const override { return true; }
+  std::uint64_t matrix_id() const override { return solver_().compliance_id(load()); }
 
 private:
   std::span<const double> shape_under(const Load& load) override;
