@@ -255,9 +255,15 @@ bench: $(BENCH) $(TOOLS) | $(FIRST)
 	  cat $$program.csv && scripts/plot $$program.csv || exit 1; done
 
 # PAGE says where the page goes: examples/validate holds one. S=WORD makes the section of that name alone.
+# S=textbook runs textbook scenes of contact instead, by the programs alone: QUICK=1 a minute's worth of them, ONLY=NAME one scene.
 validate: PAGE ?= $(BUILD)/validation
+ifeq ($(S),textbook)
+validate: $(TOOLS) $(PLUGIN) | $(FIRST)
+	@python3 tests/validate/textbook.py --build '$(BUILD)' --page '$(PAGE)/textbook' $(if $(QUICK),--quick) $(if $(ONLY),--only '$(ONLY)') -j $(or $(JOBS),1)
+else
 validate: $(VALIDATE) | $(FIRST)
 	@$(VALIDATE) '$(PAGE)' $(S)
+endif
 
 # What report FZKA 7190 claims, measured here: a page a claim in the folder REPORT.
 # PAGE=NAME makes that page alone, QUICK=1 small ones without benchmarks; BEFORE=FOLDER has another commit's programs,
@@ -384,7 +390,7 @@ help:
 	@echo '  golden-update  write tests/golden/expected anew and say what changed (T=NAME only that case)'
 	@echo '  stress         run the programs of tests/stress'
 	@echo '  bench          measure time against error'
-	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page'
+	@echo '  validate       judge the finite elements by theory, benchmarks, peers, an experiment; PAGE=FOLDER for the page, S=textbook scenes of contact'
 	@echo '  report         what report FZKA 7190 claims beside what is measured here; REPORT=FOLDER for the pages, PAGE=NAME, QUICK=1, BEFORE=FOLDER'
 	@echo '  html           the manual as linked pages in build/CONFIG/html, by mandoc'
 	@echo '  deb            packages for Debian 12 of the last commit in build/CONFIG/deb, seen by lintian'

@@ -37,6 +37,15 @@ public:
     for_each_where([&](const Box3& other) { return meet(box, other); }, visit);
   }
 
+  /// Whether an item whose box has a point in common with this one passes the test.
+  template <class Test>
+  bool any_overlapping(const Box3& box, Test&& test) const {
+    bool found = false;
+    for_each_where([&](const Box3& other) { return !found && meet(box, other); },
+                   [&](std::uint32_t item) { found = found || test(item); });
+    return found;
+  }
+
   /// Calls visit(item) where may_hold(box) is true for the item's box and those around it: for
   /// rays, planes, spheres.
   template <class MayHold, class Visit>

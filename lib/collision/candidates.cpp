@@ -211,6 +211,21 @@ std::vector<Intersection> BroadPhase::find_intersections(const CollisionSurface&
   return found;
 }
 
+std::vector<std::uint32_t> vertices_of(const Candidates& candidates) {
+  std::vector<std::uint32_t> vertices;
+  const auto add = [&](const auto& list) {
+    for (const auto& pair : list)
+      vertices.insert(vertices.end(), pair.begin(), pair.end());
+  };
+  add(candidates.point_point);
+  add(candidates.point_edge);
+  add(candidates.edge_edge);
+  add(candidates.point_triangle);
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
+}
+
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
                            std::span<const Vec3> x0, std::span<const Vec3> x1,
                            const Separation& separation) {

@@ -49,6 +49,7 @@ public:
   /// whose distance at x0 exceeds d_min + reach by no more than their relative motion to x1.
   /// \param surface  the one of the constructor
   /// \param reach  mm
+  /// \param allowed  owners beyond the table meet nothing
   /// \param candidates  overwritten; keeps its memory. Order: by pairs of owners, then by number
   void find(const CollisionSurface& surface, std::span<const Vec3> x0, std::span<const Vec3> x1,
             double reach, const AllowedPairs& allowed, Candidates& candidates);
@@ -82,6 +83,9 @@ private:
   std::vector<Owner> owners_;
   std::vector<std::array<std::uint32_t, 2>> pairs_; ///< of find_pairs
 };
+
+/// Vertices of all candidates, ascending, each once.
+std::vector<std::uint32_t> vertices_of(const Candidates& candidates);
 
 /// Largest step in [0, 1] along which all candidates keep their separation.
 /// \param separation  d_min is added to the sum of the pair's radii

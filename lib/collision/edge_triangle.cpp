@@ -1,6 +1,6 @@
 #include "collision/edge_triangle.h"
 
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 
 #include <array>
 #include <cmath>

@@ -2,6 +2,7 @@
 
 #include "base/larger.h"
 #include "base/logarithm.h"
+#include "base/perpendicular.h"
 
 #include <cmath>
 #include <cstddef>
@@ -95,40 +96,78 @@ void diagonalize(Square& a, Square& v, std::size_t n) {
   }
 }
 
-/// Sets negative eigenvalues of a pair's Hessian to 0. Translations of all vertices are
-/// eigenvectors of 0, so that what remains is of order 3 (count - 1). \param h  dense, of order 3
-/// count
-void project_to_psd(std::span<double> h, std::size_t count) {
-  // Orthonormal to translations (Helmert's matrix): row k has 1 / sqrt(k (k + 1)) k times, then -k
-  // times that.
-  std::array<std::array<double, 4>, 3> basis{};
+/// Orthonormal vectors, row by row, that span what a pair's Hessian acts on.
+struct Basis {
+  std::array<std::array<double, 12>, 9> row{};
+  std::size_t size = 0;
+};
+
+/// Relative motions of the vertices. Without a mollifier only those along the normal and, across
+/// it, the one by the weights: motions across the normal whose weighted sum is 0 do not change the
+/// distance to second order.
+Basis basis_of(const ContactPair& pair, const ClosestPoints& closest) {
+  // Rows of Helmert's matrix, orthonormal to translations: k + 1 equal entries, then a negative
+  // one.
+  std::array<std::array<double, 4>, 3> relative{};
+  const std::size_t count = pair.count;
   for (std::size_t k = 0; k + 1 < count; ++k) {
     const double terms = static_cast<double>(k + 1), entry = 1 / std::sqrt(terms * (terms + 1));
     for (std::size_t i = 0; i <= k; ++i)
-      basis[k][i] = entry;
-    basis[k][k + 1] = -terms * entry;
+      relative[k][i] = entry;
+    relative[k][k + 1] = -terms * entry;
   }
-  const std::size_t n = 3 * (count - 1), order = 3 * count;
+  Basis basis;
+  const auto add = [&](const std::array<double, 4>& by_vertex, const Vec3& direction) {
+    std::array<double, 12>& row = basis.row[basis.size++];
+    for (std::size_t i = 0; i < 3 * count; ++i)
+      row[i] = by_vertex[i / 3] * direction[static_cast<int>(i % 3)];
+  };
+  const double distance = std::sqrt(closest.squared_distance);
+  if (pair.eps_x > 0 || !(distance > 0)) {
+    for (std::size_t k = 0; k + 1 < count; ++k)
+      for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}})
+        add(relative[k], axis);
+    return basis;
+  }
+  const Vec3 normal = closest.difference / distance;
+  for (std::size_t k = 0; k + 1 < count; ++k)
+    add(relative[k], normal);
+  double square = 0;
+  for (const double w : closest.weight)
+    square += w * w;
+  std::array<double, 4> weight = closest.weight;
+  for (double& w : weight)
+    w /= std::sqrt(square);
+  Vec3 across = some_perpendicular(normal);
+  across = across / norm(across);
+  add(weight, across);
+  add(weight, cross(normal, across));
+  return basis;
+}
+
+/// Sets negative eigenvalues of a pair's Hessian to 0. \param h  dense, order x order
+void project_to_psd(std::span<double> h, std::size_t order, const Basis& basis) {
+  const std::size_t n = basis.size;
   Square a{}, v{};
-  std::array<std::array<double, 12>, 9> half{}; // basis^T times h
-  for (std::size_t i = 0; i < n; ++i)
+  for (std::size_t i = 0; i < n; ++i) {
+    std::array<double, 12> image{}; // h times the row
     for (std::size_t j = 0; j < order; ++j)
-      for (std::size_t k = 0; k < count; ++k)
-        half[i][j] += basis[i / 3][k] * h[(3 * k + i % 3) * order + j];
-  for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t k = 0; k < order; ++k)
+        image[j] += h[j * order + k] * basis.row[i][k];
     for (std::size_t j = 0; j <= i; ++j) {
-      for (std::size_t k = 0; k < count; ++k)
-        a[i][j] += half[i][3 * k + j % 3] * basis[j / 3][k];
+      for (std::size_t k = 0; k < order; ++k)
+        a[i][j] += image[k] * basis.row[j][k];
       a[j][i] = a[i][j];
     }
+  }
   diagonalize(a, v, n);
   for (std::size_t e = 0; e < n; ++e) {
     if (!(a[e][e] < 0))
       continue;
     std::array<double, 12> vector{};
     for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t k = 0; k < count; ++k)
-        vector[3 * k + i % 3] += basis[i / 3][k] * v[i][e];
+      for (std::size_t k = 0; k < order; ++k)
+        vector[k] += basis.row[i][k] * v[i][e];
     for (std::size_t i = 0; i < order; ++i)
       for (std::size_t j = 0; j < order; ++j)
         h[i * order + j] -= a[e][e] * (vector[i] * vector[j]);
@@ -174,7 +213,7 @@ void pair_hessian(const ContactPair& pair, std::span<const Vec3> x, double d_hat
       entry *= scale;
     }
   if (mode == HessianMode::projected)
-    project_to_psd(h, pair.count);
+    project_to_psd(h, n, basis_of(pair, e.closest));
 }
 
 } // namespace

@@ -1,13 +1,14 @@
 #include "mesh/self_intersections.h"
 
+#include "base/exact_predicates.h"
 #include "base/parallel.h"
-#include "mesh/exact_predicates.h"
+#include "collision/bvh.h"
+#include "collision/edge_triangle.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <vector>
 
 namespace gewebe {
@@ -35,42 +36,9 @@ int open_axis(const Corners& t) {
   return -1;
 }
 
-/// Of a point in the plane of the triangle: is it in it, its border included?
-bool holds(const Corners& t, const Vec3& p, int axis) {
-  const int a = turn(t[0], t[1], p, axis), b = turn(t[1], t[2], p, axis),
-            c = turn(t[2], t[0], p, axis);
-  return !((a > 0 || b > 0 || c > 0) && (a < 0 || b < 0 || c < 0));
-}
-
-/// Do two segments of one plane meet, ends included?
-bool segments_meet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, int axis) {
-  const int ap = turn(p, q, a, axis), bp = turn(p, q, b, axis);
-  const int pa = turn(a, b, p, axis), qa = turn(a, b, q, axis);
-  if (ap * bp > 0 || pa * qa > 0)
-    return false;
-  if (ap != 0 || bp != 0 || pa != 0 || qa != 0)
-    return true;
-  // On one line: their boxes must meet.
-  for (int c = 0; c < 3; ++c)
-    if (std::fmax(p[c], q[c]) < std::fmin(a[c], b[c]) ||
-        std::fmax(a[c], b[c]) < std::fmin(p[c], q[c]))
-      return false;
-  return true;
-}
-
 /// Does the segment meet the triangle, borders and ends included? \pre the triangle has area
 bool segment_meets(const Corners& t, const Vec3& p, const Vec3& q) {
-  const int of_p = side(t, p), of_q = side(t, q);
-  if (of_p * of_q > 0)
-    return false;
-  if (of_p == 0 && of_q == 0) {
-    const int axis = open_axis(t);
-    return holds(t, p, axis) || holds(t, q, axis) || segments_meet(p, q, t[0], t[1], axis) ||
-           segments_meet(p, q, t[1], t[2], axis) || segments_meet(p, q, t[2], t[0], axis);
-  }
-  const int a = side({p, q, t[0]}, t[1]), b = side({p, q, t[1]}, t[2]),
-            c = side({p, q, t[2]}, t[0]);
-  return !((a > 0 || b > 0 || c > 0) && (a < 0 || b < 0 || c < 0));
+  return collision::edge_meets_triangle(p, q, t[0], t[1], t[2]);
 }
 
 class Tester {
@@ -134,81 +102,6 @@ private:
   std::vector<Vec3> points_;
 };
 
-bool boxes_meet(const Box3& a, const Box3& b) {
-  for (int n = 0; n < 3; ++n)
-    if (a.max[n] < b.min[n] || b.max[n] < a.min[n])
-      return false;
-  return true;
-}
-
-/// A tree of boxes over faces: node n has the children 2n + 1 and 2n + 2, and a span of the order.
-class BoxTree {
-public:
-  explicit BoxTree(std::vector<Box3> boxes) : boxes_(std::move(boxes)), order_(boxes_.size()) {
-    std::iota(order_.begin(), order_.end(), 0U);
-    build(0, 0, order_.size());
-  }
-
-  /// Calls visit(g) for each face g > f whose box meets that of f.
-  template <class Visit>
-  void for_later(std::uint32_t f, const Visit& visit) const {
-    descend(0, f, visit);
-  }
-
-private:
-  struct Node {
-    Box3 box;
-    std::size_t begin = 0, end = 0;
-    std::uint32_t last = 0; // largest face number
-  };
-  static constexpr std::size_t few = 4;
-
-  void build(std::size_t n, std::size_t begin, std::size_t end) {
-    if (nodes_.size() <= n)
-      nodes_.resize(n + 1);
-    Node node;
-    node.begin = begin;
-    node.end = end;
-    for (std::size_t m = begin; m < end; ++m) {
-      node.box.add(boxes_[order_[m]].min);
-      node.box.add(boxes_[order_[m]].max);
-      node.last = std::max(node.last, order_[m]);
-    }
-    nodes_[n] = node;
-    if (end - begin <= few)
-      return;
-    const Vec3 size = node.box.size();
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const std::size_t middle = begin + (end - begin) / 2;
-    const auto center = [&](std::uint32_t f) { return boxes_[f].min[axis] + boxes_[f].max[axis]; };
-    std::nth_element(order_.begin() + static_cast<std::ptrdiff_t>(begin),
-                     order_.begin() + static_cast<std::ptrdiff_t>(middle),
-                     order_.begin() + static_cast<std::ptrdiff_t>(end),
-                     [&](std::uint32_t a, std::uint32_t b) { return center(a) < center(b); });
-    build(2 * n + 1, begin, middle);
-    build(2 * n + 2, middle, end);
-  }
-
-  template <class Visit>
-  void descend(std::size_t n, std::uint32_t f, const Visit& visit) const {
-    const Node& node = nodes_[n];
-    if (node.last <= f || !boxes_meet(node.box, boxes_[f]))
-      return;
-    if (node.end - node.begin > few) {
-      descend(2 * n + 1, f, visit);
-      descend(2 * n + 2, f, visit);
-      return;
-    }
-    for (std::size_t m = node.begin; m < node.end; ++m)
-      if (order_[m] > f && boxes_meet(boxes_[order_[m]], boxes_[f]))
-        visit(order_[m]);
-  }
-
-  std::vector<Box3> boxes_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;
-};
-
 } // namespace
 
 SelfIntersections self_intersections(const Context& context, const TriangleMesh& mesh) {
@@ -229,7 +122,7 @@ SelfIntersections self_intersections(const Context& context, const TriangleMesh&
     degenerate[f] = tester.degenerate(f) ? 1 : 0;
     result.degenerate_faces += degenerate[f];
   }
-  const BoxTree tree(std::move(boxes));
+  const collision::Bvh tree(boxes);
   constexpr std::size_t grain = 2048;
   struct Block {
     std::uint64_t tested = 0;
@@ -240,8 +133,8 @@ SelfIntersections self_intersections(const Context& context, const TriangleMesh&
     Block& block = blocks[begin / grain];
     for (std::size_t f = begin; f < end; ++f)
       if (degenerate[f] == 0)
-        tree.for_later(static_cast<std::uint32_t>(f), [&](std::uint32_t g) {
-          if (degenerate[g] != 0)
+        tree.for_each_overlapping(boxes[f], [&](std::uint32_t g) {
+          if (g <= f || degenerate[g] != 0)
             return;
           ++block.tested;
           if (tester.meet(f, g))

@@ -1,8 +1,9 @@
 #include "solid/skin_crossing_internal.h"
 
-#include "base/boxes_meet.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "collision/bvh.h"
+#include "collision/inside.h"
 
 #include <algorithm>
 #include <array>
@@ -16,51 +17,9 @@ namespace {
 
 constexpr double whole = 0.01; // how far a closed surface's winding number is from an integer
 
-/// Boxes round triangles that follow one another, for sheets have neighbours there.
-class Boxes {
-public:
-  explicit Boxes(const TriangleMesh& mesh) {
-    while (width_ < mesh.triangles.size())
-      width_ *= 2;
-    boxes_.resize(2 * width_);
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-      boxes_[width_ + t] = box_of(mesh.points, mesh.triangles[t]);
-    for (std::size_t n = width_; n-- > 1;)
-      for (std::size_t child = 2 * n; child < 2 * n + 2; ++child)
-        if (boxes_[child].min.x <= boxes_[child].max.x) {
-          boxes_[n].add(boxes_[child].min);
-          boxes_[n].add(boxes_[child].max);
-        }
-  }
-
-  bool meets(const Box3& box, std::size_t node = 1) const {
-    if (!meet(boxes_[node], box))
-      return false;
-    return node >= width_ || meets(box, 2 * node) || meets(box, 2 * node + 1);
-  }
-
-private:
-  std::size_t width_ = 1;
-  std::vector<Box3> boxes_;
-};
-
 using Key = std::array<double, 3>;
 Key key_of(const Vec3& p) {
   return {p.x, p.y, p.z};
-}
-
-/// How often the closed surface winds round a point: 1 inside, 0 outside (van Oosterom and
-/// Strackee 1983).
-double winding_number(std::span<const Vec3> points, std::span<const Triangle> triangles,
-                      const Vec3& at) {
-  double sum = 0;
-  for (const Triangle& t : triangles) {
-    const Vec3 a = points[t[0]] - at, b = points[t[1]] - at, c = points[t[2]] - at;
-    const double la = norm(a), lb = norm(b), lc = norm(c);
-    sum += std::atan2(dot(a, cross(b, c)),
-                      la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-  }
-  return sum / (2 * M_PI);
 }
 
 class Crosser {
@@ -90,9 +49,13 @@ private:
   // ---- What is near
 
   void find_local() {
-    const Boxes boxes(sheet_.surface);
+    std::vector<Box3> boxes;
+    for (const Triangle& t : sheet_.surface.triangles)
+      boxes.push_back(box_of(sheet_.surface.points, t));
+    const collision::Bvh tree(boxes);
+    const auto any = [](std::uint32_t) { return true; };
     for (std::uint32_t t = 0; t < skin_.triangles.size(); ++t)
-      if (shell_[t] == cut_ && boxes.meets(box_of(skin_.points, skin_.triangles[t])))
+      if (shell_[t] == cut_ && tree.any_overlapping(box_of(skin_.points, skin_.triangles[t]), any))
         x_.local.push_back(t);
   }
 
@@ -203,7 +166,7 @@ private:
       box.add(middle);
       if (!meet(box, skin_box))
         continue;
-      const double winds = winding_number(x_.places, shell, middle);
+      const double winds = collision::winding_number(shell, x_.places, middle);
       if (!(std::abs(winds - std::round(winds)) < whole))
         throw Error(not_closed);
       holds[s] = std::abs(winds) > 0.5;
@@ -450,7 +413,7 @@ std::vector<std::uint32_t> shells_of(const Skin& skin) {
       round = 0;
       for (const auto& [other, of] : parts)
         if (other != one)
-          round += winding_number(skin.points, of, at);
+          round += collision::winding_number(of, skin.points, at);
       if (std::abs(round - std::round(round)) < whole)
         break;
     }

@@ -1,6 +1,6 @@
 #include "base/error.h"
+#include "base/exact_predicates.h"
 #include "mesh/edges.h"
-#include "mesh/exact_predicates.h"
 #include "tetrahedra/cut_blade_internal.h"
 
 #include <algorithm>
@@ -52,11 +52,6 @@ Vec3 predicate_point(const Vec3& p) {
 
 } // namespace
 
-bool boxes_meet(const Box3& a, const Box3& b) {
-  return a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y &&
-         a.min.z <= b.max.z && b.min.z <= a.max.z;
-}
-
 Blade::Blade(const TriangleMesh& surface) {
   check_mesh(surface);
   for (const Vec3& p : surface.points) {
@@ -87,43 +82,15 @@ Blade::Blade(const TriangleMesh& surface) {
           for (Side& side : leaves_[sides.front().face()].sides)
             side.border = side.border || (side.low == low && side.high == high);
       });
-  while (width_ < leaves_.size())
-    width_ *= 2;
-  boxes_.resize(2 * width_);
+  std::vector<Box3> boxes(leaves_.size());
   for (std::size_t n = 0; n < leaves_.size(); ++n)
     for (const std::uint32_t corner : leaves_[n].corners)
-      boxes_[width_ + n].add(points_[corner]);
-  for (std::size_t n = width_ - 1; n > 0; --n)
-    for (const Box3& child : {boxes_[2 * n], boxes_[2 * n + 1]})
-      if (!child.empty()) {
-        boxes_[n].add(child.min);
-        boxes_[n].add(child.max);
-      }
-}
-
-/// Visits the triangles whose boxes meet the box until one answers true.
-template <class Visit>
-bool Blade::visit_leaves(const Box3& box, Visit&& visit) const {
-  std::array<std::size_t, 64> open{};
-  std::size_t count = 0;
-  open[count++] = 1;
-  while (count > 0) {
-    const std::size_t n = open[--count];
-    if (!boxes_meet(boxes_[n], box))
-      continue;
-    if (n >= width_) {
-      if (visit(leaves_[n - width_]))
-        return true;
-      continue;
-    }
-    open[count++] = 2 * n + 1;
-    open[count++] = 2 * n;
-  }
-  return false;
+      boxes[n].add(points_[corner]);
+  tree_ = collision::Bvh(boxes);
 }
 
 bool Blade::meets(const Box3& box) const {
-  return visit_leaves(box, [](const Leaf&) { return true; });
+  return tree_.any_overlapping(box, [](std::uint32_t) { return true; });
 }
 
 /// Triangles of a sheet are passed once where they meet, for ties are broken as if all that is cut
@@ -160,12 +127,11 @@ BladeCrossing Blade::crossing(const Vec3& from, const Vec3& to) const {
   box.add(q);
   std::vector<Pass> passes;
   BladeCrossing crossing;
-  visit_leaves(box, [&](const Leaf& leaf) {
-    if (const std::optional<Pass> found = pass(leaf, p, q)) {
+  tree_.for_each_overlapping(box, [&](std::uint32_t leaf) {
+    if (const std::optional<Pass> found = pass(leaves_[leaf], p, q)) {
       passes.push_back(*found);
       crossing.direction += found->direction;
     }
-    return false;
   });
   crossing.passes = passes.size();
   if (passes.empty())

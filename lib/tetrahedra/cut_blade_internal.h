@@ -3,6 +3,7 @@
 
 #include "base/mesh.h"
 #include "base/vec3.h"
+#include "collision/bvh.h"
 
 #include <array>
 #include <cstddef>
@@ -25,7 +26,7 @@ public:
   explicit Blade(const TriangleMesh& surface);
 
   /// Of all of it; empty without triangles.
-  const Box3& box() const { return boxes_[1]; }
+  const Box3& box() const { return tree_.box(); }
 
   /// May the surface come into the box? (By boxes of its triangles.)
   bool meets(const Box3& box) const;
@@ -48,16 +49,10 @@ private:
     int direction = 0;
   };
   std::optional<Pass> pass(const Leaf& leaf, const Vec3& p, const Vec3& q) const;
-  template <class Visit>
-  bool visit_leaves(const Box3& box, Visit&& visit) const;
 
   std::vector<Vec3> points_;
   std::vector<Leaf> leaves_;
-  std::size_t width_ = 1;   // leaves that the tree has room for, a power of two
-  std::vector<Box3> boxes_; // node 1 is the root, n has children 2 n and 2 n + 1
+  collision::Bvh tree_; // of the leaves
 };
-
-/// Box of both, inclusive.
-bool boxes_meet(const Box3& a, const Box3& b);
 
 } // namespace gewebe

@@ -1,7 +1,7 @@
 #include "tetrahedra/cut_region_internal.h"
 
 #include "base/error.h"
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 // samples along them, as J. Amanatides, Ray Tracing with Cones, 1984, weighs area in the plane.
 
 #include "base/error.h"
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 #include "voxelize/coverage_internal.h"
 #include "voxelize/ray_crossings_internal.h"
 #include "voxelize/voxelize_internal.h"

@@ -2,7 +2,7 @@
 // Based on: H. Edelsbrunner, E. P. Mücke, Simulation of Simplicity, 1990 (here the query points
 // move, not the mesh, so three infinitesimals do for all of them).
 
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 
 namespace gewebe {
 

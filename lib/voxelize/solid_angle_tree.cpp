@@ -3,8 +3,8 @@
 // Generalized Winding Numbers, 2013; G. Barill et al., Fast Winding Numbers for Soups and Clouds,
 // 2018; A. van Oosterom, J. Strackee, The Solid Angle of a Plane Triangle, 1983.
 
+#include "base/exact_predicates.h"
 #include "mesh/edges.h"
-#include "mesh/exact_predicates.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,9 +1,9 @@
 #include "voxelize/voxelize.h"
 
 #include "base/error.h"
+#include "base/exact_predicates.h"
 #include "base/parallel.h"
 #include "mesh/border.h"
-#include "mesh/exact_predicates.h"
 #include "voxelize/depth_buffers_internal.h"
 #include "voxelize/inside_scan_internal.h"
 #include "voxelize/parity_scan_internal.h"

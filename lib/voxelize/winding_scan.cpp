@@ -3,8 +3,8 @@
 // Generalized Winding Numbers, 2013.
 
 #include "base/error.h"
+#include "base/exact_predicates.h"
 #include "base/parallel.h"
-#include "mesh/exact_predicates.h"
 #include "mesh/oriented_surface.h"
 #include "voxelize/inside_scan_internal.h"
 #include "voxelize/solid_angle_tree_internal.h"

@@ -1,5 +1,5 @@
 # The test tools themselves: a wrong golden case fails, whatever it is that is wrong.
-# shellcheck shell=bash disable=SC2016 # the cases hold $ of their own
+# shellcheck shell=bash disable=SC2016,SC1003 # the cases hold $ and \ of their own
 
 golden() { # CASE LINE [EXPECTED CONTENT]: its status
   mkdir -p golden/in golden/expected
@@ -24,10 +24,14 @@ test_right_cases_pass() {
   must_pass 'e | 1 | x: no | echo "x: no" >&2; exit 1'
   must_pass 'f | 2 | x: * [y] | echo "x: no [y]" >&2; exit 2'
   must_pass 'g | 0 | text | echo hello | cat > out.ply; cat out.ply' hello
+  # A command in lines of its own.
+  must_pass $'h | 0 | text | \\\n  echo hello > out.ply\n  for k in 1; do\n    cat out.ply\n  done' hello
 }
 
 test_wrong_cases_fail() {
   must_fail 'standard output differs' 'a | 0 | text | echo goodbye' hello
+  must_fail 'standard output differs' $'a | 0 | text | \\\n  echo hello\n  echo goodbye' hello
+  must_fail 'expected NAME' $'a | 0 | text | \\\n  echo hello\n\n  echo goodbye' hello
   must_fail 'does not exist' 'b | 0 | none | echo goodbye'
   must_fail 'wrote to standard output' 'c | 0 | - | echo goodbye'
   must_fail 'status 3, expected 0' 'd | 0 | - | exit 3'
@@ -64,12 +68,14 @@ test_update_writes_what_changed() {
   mkdir -p golden/in golden/expected
   echo old >golden/expected/text
   printf '%s\n' '# head' 'a | 0 | text | echo new | cat' 'b | 0 | digest:0 | echo "{\"digest\":\"00ff\"}" >&2' \
-    'c | 1 | x: old | echo "x: new" >&2; exit 1' 'd | 1 | x: * | echo "x: free" >&2; exit 1' >golden/cases
+    'c | 1 | x: old | echo "x: new" >&2; exit 1' 'd | 1 | x: * | echo "x: free" >&2; exit 1' \
+    'l | 0 | digest:0 | \' '  true' '  echo "{\"digest\":\"00ff\"}" >&2' >golden/cases
   update() { GOLDEN=$PWD/golden "$GEWEBE_ROOT/tests/golden/run" update --config "$(basename "$BUILD")"; }
   update >said.txt || fail 'update failed' "$(<said.txt)"
   [[ $(<golden/expected/text) == new ]] || fail 'expected/text was not written'
   grep -qxF 'b | 0 | digest:00ff | echo "{\"digest\":\"00ff\"}" >&2' golden/cases || fail 'the digest was not written'
   grep -qxF 'c | 1 | x: new | echo "x: new" >&2; exit 1' golden/cases || fail 'the message was not written'
+  tail -3 golden/cases | cmp - <(printf '%s\n' 'l | 0 | digest:00ff | \' '  true' '  echo "{\"digest\":\"00ff\"}" >&2') || fail 'a case of several lines was not kept'
   grep -qxF 'd | 1 | x: * | echo "x: free" >&2; exit 1' golden/cases || fail 'a pattern that holds was changed'
   [[ $(head -1 golden/cases) == '# head' ]] || fail 'the head was lost'
   [[ $(wc -l <said.txt) -ge 3 ]] || fail 'update did not say what changed:' "$(<said.txt)"

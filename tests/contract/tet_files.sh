@@ -3,6 +3,7 @@
 
 # Our files: linear.* and quadratic.* in this folder; what is in other/ becomes other/NAME.node and .ele.
 tet_files() {
+  [[ -x $BUILD/unit ]] || skip "$BUILD/unit is not built"
   GEWEBE_TET_FILES=$PWD "$BUILD/unit" --gtest_filter=TetFile.ForOtherPrograms >log || fail "$(<log)"
 }
 

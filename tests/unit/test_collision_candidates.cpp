@@ -5,6 +5,7 @@
 #include "collision/bvh.h"
 #include "collision/distance.h"
 #include "collision/edge_triangle.h"
+#include "collision/inside.h"
 #include "collision_pairs.h"
 #include "collision_scene.h"
 #include "rational_distance.h"
@@ -218,6 +219,13 @@ TEST(Candidates, HoldAllPairsThatComeCloseOnTheWay) {
           EXPECT_TRUE(triangles.contains(v));
         }
       }
+    const std::vector<std::uint32_t> vertices = vertices_of(candidates);
+    std::set<std::uint32_t> all;
+    for (const auto& pair : candidates.edge_edge)
+      all.insert(pair.begin(), pair.end());
+    for (const auto& pair : candidates.point_triangle)
+      all.insert(pair.begin(), pair.end());
+    EXPECT_TRUE(std::equal(all.begin(), all.end(), vertices.begin(), vertices.end()));
     EXPECT_GT(close, seed == 3 ? 5U : 100U);
     EXPECT_LT(candidates.size(), 30 * close);
   }
@@ -352,6 +360,30 @@ TEST(Intersections, AreThoseOfABruteSearch) {
     EXPECT_EQ(found, expected);
     EXPECT_GT(expected.size(), 10U);
     EXPECT_EQ(BroadPhase(surface).find_intersections(surface, x, allowed, 3).size(), 3U);
+  }
+}
+
+TEST(Inside, WindingNumberOfAClosedSurface) {
+  // An octahedron, and a smaller one within it that faces inwards.
+  std::vector<Vec3> x;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const double r : {1.0, -0.5}) {
+    const std::uint32_t at = static_cast<std::uint32_t>(x.size());
+    const double size = std::abs(r);
+    x.insert(
+        x.end(),
+        {{size, 0, 0}, {-size, 0, 0}, {0, size, 0}, {0, -size, 0}, {0, 0, size}, {0, 0, -size}});
+    for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      const std::uint32_t a = at + octant % 2, b = at + 2 + octant / 2 % 2, c = at + 4 + octant / 4;
+      const bool outward = dot(x[a], cross(x[b], x[c])) > 0;
+      triangles.push_back(outward == (r > 0) ? std::array{a, b, c} : std::array{a, c, b});
+    }
+  }
+  std::mt19937 random(9);
+  for (int k = 0; k < 1000; ++k) {
+    const Vec3 p = random_point(random, 1.2);
+    const double size = std::abs(p.x) + std::abs(p.y) + std::abs(p.z);
+    EXPECT_NEAR(winding_number(triangles, x, p), size < 1 && size > 0.5 ? 1 : 0, 1e-12);
   }
 }
 

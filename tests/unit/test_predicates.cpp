@@ -1,6 +1,6 @@
 // The exact predicates against rational arithmetic.
 
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // The rules winding and zbuffer against brute-force statements of them.
 
 #include "base/error.h"
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 #include "mesh/oriented_surface.h"
 #include "mesh_fixtures.h"
 #include "tests/unit/larger.h"

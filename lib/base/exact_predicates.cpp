@@ -1,4 +1,4 @@
-#include "mesh/exact_predicates.h"
+#include "base/exact_predicates.h"
 // Based on: J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 // Predicates, 1997 (expansions: sections 2.4 to 2.6, filters: section 4).
 
