@@ -1,8 +1,8 @@
 #include "contact/condensed_system.h"
 
 #include "base/error.h"
+#include "solve/dense_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -87,14 +87,16 @@ struct CondensedSystem::State {
   std::vector<Vec3> response; ///< W q by node
   std::vector<Vec3> step;     ///< by place
   double c = 1, penalty = 0;
+  CpuLevel cpu;
+  DenseCholesky cholesky;
   MatrixXd hessian, matrix;
   VectorXd carried; ///< H_af p_f of immovable vertices
   VectorXd p, rhs;
   // Of energy(): quadratic in c, F and q.
   double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
 
-  State(const BodyTable& of, double with_ridge, InverseCache& with_cache)
-      : table(of), ridge(with_ridge), cache(with_cache) {}
+  State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
+      : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
 
   std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
   Index matrix_order = 0;
@@ -201,10 +203,10 @@ struct CondensedSystem::State {
     for (;;) {
       MatrixXd shifted = w;
       shifted.diagonal().array() += shift;
-      const Eigen::LLT<MatrixXd> factor(shifted);
-      if (factor.info() == Eigen::Success) {
-        w = factor.solve(MatrixXd::Identity(order, order));
-        w = (0.5 * (w + w.transpose())).eval();
+      if (invert({shifted.data(), static_cast<std::size_t>(shifted.size())},
+                 static_cast<std::size_t>(order), cpu) &&
+          shifted.allFinite()) {
+        w = std::move(shifted);
         break;
       }
       shift = shift > 0 ? 10 * shift : ridge * largest;
@@ -275,8 +277,8 @@ struct CondensedSystem::State {
 CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                                  std::span<const Vec3> start,
                                  std::span<const std::vector<VertexForce>> forces, double energy,
-                                 double ridge, InverseCache& cache)
-    : state_(std::make_unique<State>(table, ridge, cache)) {
+                                 double ridge, InverseCache& cache, CpuLevel cpu)
+    : state_(std::make_unique<State>(table, ridge, cache, cpu)) {
   State& s = *state_;
   s.penalty = energy;
   s.vertices = std::move(vertices);
@@ -399,10 +401,11 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient) {
         s.rhs[u] -= s.force[s.nodes[active.node].active][a];
   s.p.setZero(order);
   if (order > 0) {
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(s.matrix);
-    if (factor.info() != Eigen::Success)
+    if (!s.cholesky.factor({s.matrix.data(), static_cast<std::size_t>(s.matrix.size())},
+                           static_cast<std::size_t>(order), s.cpu))
       return false;
-    s.p = factor.solve(s.rhs);
+    s.p = s.rhs;
+    s.cholesky.solve({s.p.data(), static_cast<std::size_t>(order)});
   }
   // q = -(F + c W^-1 R0 + W^-1 p)
   for (const Part& part : s.parts) {

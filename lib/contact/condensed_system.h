@@ -11,6 +11,7 @@
 // after a full step) and forces F, which become the contact forces: -g_a. They start as those of
 // the last step, F_0; R0 is x - x_free - W F_0 at the start. Vertices that cannot move (W = 0) are carried to their targets by c alone.
 
+#include "base/cpu.h"
 #include "base/vec3.h"
 #include "contact/contact_body.h"
 
@@ -50,7 +51,7 @@ public:
   /// \param energy  R0^T A R0 of all bodies \param ridge  see Parameters \pre the bodies are linearised; they outlive this
   CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                   std::span<const Vec3> start, std::span<const std::vector<VertexForce>> forces,
-                  double energy, double ridge, InverseCache& cache);
+                  double energy, double ridge, InverseCache& cache, CpuLevel cpu);
   ~CondensedSystem();
   CondensedSystem(const CondensedSystem&) = delete;
   CondensedSystem& operator=(const CondensedSystem&) = delete;

@@ -311,7 +311,7 @@ StepReport StepSolver::Work::run() {
         if (round == 0 && attempt == 0)
           lag();
       }
-      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_);
+      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
       bool converged = vertices_.empty();
       int iteration = 0, lags = 0;
       if (vertices_.empty())
