@@ -465,6 +465,10 @@ void CondensedSystem::require_descent(double contact_slope) {
     s.penalty += (total + descent) / (s.c * s.c);
 }
 
+void CondensedSystem::raise_penalty() {
+  state_->penalty *= 10;
+}
+
 void CondensedSystem::advance(double part) {
   State& s = *state_;
   s.c = part < 1 ? (1 - part) * s.c : 0;

@@ -82,6 +82,8 @@ public:
   double share() const; ///< c
   /// Weight of 1/2 c^2 in energy(): rises until `slope() + contact_slope` is a descent.
   void require_descent(double contact_slope);
+  /// Ten times that weight: no part of the step was accepted.
+  void raise_penalty();
   /// Forces F on the vertices of a body.
   std::vector<VertexForce> forces(std::size_t body) const;
 

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <utility>
 
@@ -168,8 +166,7 @@ void IslandMotion::advance_parts(Members members, double from, double to, int ha
   try {
     step(members, from, to, context);
     return;
-  } catch (const NotSolved& e) {
-    if (getenv("DBG")) std::fprintf(stderr, "NOT SOLVED %g-%g: %s\n", from, to, e.what());
+  } catch (const NotSolved&) {
     if (halvings == 0 || !(to > from))
       throw;
   }

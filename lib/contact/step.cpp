@@ -6,8 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <map>
 #include <utility>
@@ -20,6 +18,8 @@ namespace {
 constexpr double barrier_at_half = 4.33;
 constexpr double armijo = 1e-4;
 constexpr int max_halvings = 40;
+/// Halvings of a step behind which the way of prescribed vertices gets more weight.
+constexpr int halvings_until_raised = 4;
 /// Decrement below which an energy cannot be told from rounding.
 constexpr double rounding = 1e-13;
 
@@ -99,7 +99,7 @@ private:
   std::vector<Vec3> way_;   ///< x_free - x of the round
   std::vector<Vec3> trial_, gradient_, friction_before_;
   double d_hat_, stick_, margin_;
-  double kappa_ = 0;
+  double kappa_ = 0, typical_force_ = 0;
   bool rough_ = false; ///< some pairs have friction
   collision::Candidates candidates_;
   std::vector<std::uint32_t> vertices_; ///< of candidates, and those with forces
@@ -126,6 +126,7 @@ void StepSolver::Work::set_stiffness() {
       force = std::min(force, typical);
   if (!std::isfinite(force))
     force = 1;
+  typical_force_ = force;
   kappa_ = force / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
 }
 
@@ -246,20 +247,26 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   const double limit = p.step_tolerance * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
   converged = length <= limit;
   system.require_descent(contact_slope);
-  const double slope = system.slope() + contact_slope;
+  double slope = system.slope() + contact_slope;
   const double free =
       collision::collision_free_step(island_.surface, candidates_, at_, trial_,
                                      {0, p.kept_gap, d_hat_, 1000});
   const std::vector<Vec3> target = trial_;
   double part = free;
   report_.cuts += free < 1 ? 1 : 0;
-  const double here = system.energy(0) + before;
+  double here = system.energy(0) + before;
   for (int k = 0; k < max_halvings; ++k, part /= 2) {
+    if (k > 0 && k % halvings_until_raised == 0 && system.share() > 0) {
+      // Surfaces that only now come into contact have no slope yet.
+      system.raise_penalty();
+      slope = system.slope() + contact_slope;
+      here = system.energy(0) + before;
+      part = free;
+    }
     for (const std::uint32_t v : vertices)
       trial_[v] = part < 1 ? at_[v] + part * (target[v] - at_[v]) : target[v];
     const double there = system.energy(part) + energy_at(trial_);
     const double unsure = rounding * (std::abs(here) + std::abs(before));
-    if (getenv("DBG")) std::fprintf(stderr, "it %d unk %zu pairs %zu len %.3g c %.3g free %.3g part %.3g here %.17g there %.17g slope %.3g cs %.3g sys0 %.6g bar %.6g\n", iteration, system.unknowns(), pairs_.pairs.size(), length, system.share(), free, part, here, there, slope, contact_slope, system.energy(0), before);
     if (there <= here + armijo * part * std::min(slope, 0.0) + unsure) {
       system.advance(part);
       at_.swap(trial_);
@@ -303,6 +310,11 @@ StepReport StepSolver::Work::run() {
     }
     if (round == 0)
       set_stiffness();
+    // Work of a typical force on the way: what prescribed vertices may cost at first.
+    double longest = 0;
+    for (const Vec3& way : way_)
+      longest = std::max(longest, norm(way));
+    energy += typical_force_ * longest;
     round_begin = at_;
     for (int attempt = 0;; ++attempt) {
       if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
@@ -348,7 +360,7 @@ StepReport StepSolver::Work::run() {
         break;
       // Some went where nobody looked: perhaps nothing was there.
       std::swap(at_, round_begin);
-      search(trial_, d_hat_);
+      search(trial_, d_hat_ + margin);
       const double free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
                                                          {0, 0, d_hat_, 1000});
       std::swap(at_, round_begin);

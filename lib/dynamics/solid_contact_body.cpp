@@ -35,6 +35,7 @@ void SolidContactBody::spread(std::span<const VertexForce> forces) {
 
 double SolidContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
   spread(forces);
+  linearised_ = forces_;
   step_.resize(axes_);
   motion_.linearise_step(step_, forces_, context_);
   if (motion_.matrix_version() != version_) {
@@ -68,11 +69,11 @@ void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uin
 }
 
 void SolidContactBody::move(double share, std::span<const VertexForce> forces) {
-  std::vector<double> before = forces_;
   spread(forces);
+  std::vector<double> change = forces_;
   for (std::size_t axis = 0; axis < axes_; ++axis)
-    before[axis] = forces_[axis] - before[axis];
-  motion_.move_iterate(share, before, context_);
+    change[axis] -= linearised_[axis];
+  motion_.move_iterate(share, change, context_);
 }
 
 } // namespace gewebe

@@ -51,7 +51,8 @@ private:
   Context context_;
   double h_ = 0, typical_force_ = 0;
   std::vector<contact::VertexForce> last_;
-  std::vector<double> step_, forces_, way_;
+  std::vector<double> step_, forces_;
+  std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n
   std::uint64_t version_ = 0;
   /// By vertex: its unit responses at all vertices in their frames, three columns of 3 numbers.
   std::map<std::uint32_t, std::vector<double>> columns_;
