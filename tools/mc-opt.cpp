@@ -4,6 +4,7 @@
 #include "tools/mesh/mesh_arguments.h"
 #include "tools/mesh/mesh_work.h"
 #include "tools/shared/cli.h"
+#include "tools/shared/space_option.h"
 
 using namespace gewebe;
 
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
       .positive();
   program
       .option("--grade", arguments.grade, "G",
-              "with --tets: cells double inwards up to G times, the boundary stays (default 0)")
+              "with --tets: cells double inwards up to G times, the boundary stays")
       .range(0, stuffing_grade_max);
   program.option("--materials", arguments.materials, "LABELS|VDB[,VDB...]",
                  "with --tets: material by the label of a label volume; or 1, 2 … where a volume's "
@@ -58,6 +59,7 @@ int main(int argc, char** argv) {
       .one_of({"stair", "follow"});
   program.option("--label", arguments.labels, "L[-M][,L...]",
                  "with --materials LABELS: these labels alone, each tetrahedron the nearest");
+  declare_space(program, arguments.space);
   program.output_kinds(writable_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");
   program.check([&] { check(arguments); });

@@ -10,8 +10,19 @@ namespace {
 
 constexpr int lines_instead = 4; ///< N of lines:N where exact cannot be
 
-/// What is wrong with the mesh, "" if nothing.
-std::string defects_of(const VoxelizeReport& mesh, const VoxelizeOptions& options) {
+} // namespace
+
+VoxelRule voxel_rule_from_text(const std::string& text) {
+  return text == "winding"   ? VoxelRule::winding
+         : text == "zbuffer" ? VoxelRule::zbuffer
+                             : VoxelRule::parity;
+}
+
+OpenMesh open_mesh_from_text(const std::string& text) {
+  return text == "error" ? OpenMesh::refuse : text == "warn" ? OpenMesh::skip : OpenMesh::fill;
+}
+
+std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& options) {
   std::string text;
   const auto add = [&](std::uint64_t count, const char* one, const char* many) {
     if (count > 0)
@@ -30,8 +41,6 @@ std::string defects_of(const VoxelizeReport& mesh, const VoxelizeOptions& option
   add(mesh.triangles_duplicate, "duplicate triangle left out", "duplicate triangles left out");
   return text.empty() ? text : (open ? "the mesh is open: " : "the mesh had ") + text;
 }
-
-} // namespace
 
 AntialiasChoice antialias_from_text(const std::string& text) {
   if (text == "exact")
@@ -89,7 +98,7 @@ Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& me
     return run.timed("grid", [&] { return grid_from_scan(context, scan, transform); });
   };
   Grid grid = at(place, volume);
-  std::string warning = defects_of(report.mesh, options);
+  std::string warning = mesh_defects(report.mesh, options);
   if (!instead.empty())
     warning += (warning.empty() ? "" : "; ") + instead;
   if (!warning.empty())

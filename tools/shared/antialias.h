@@ -19,6 +19,13 @@ struct AntialiasChoice {
 /// \throw UsageError
 AntialiasChoice antialias_from_text(const std::string& text);
 
+/// --rule and --on-open. \pre one of their words
+VoxelRule voxel_rule_from_text(const std::string& text);
+OpenMesh open_mesh_from_text(const std::string& text);
+
+/// What is wrong with a mesh that was voxelized, for a warning; "" if nothing.
+std::string mesh_defects(const VoxelizeReport& mesh, const VoxelizeOptions& options);
+
 /// The volume. Where `exact` cannot be, lines:4 take its place and `instead` says so and why; warns
 /// about open meshes. Errors name `place`.
 Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& mesh,

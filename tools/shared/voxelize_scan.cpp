@@ -5,6 +5,7 @@
 #include "formats/volume/volume_file.h"
 #include "labels/grey_density.h"
 #include "tools/shared/report.h"
+#include "tools/shared/space_option.h"
 
 #include <charconv>
 #include <cmath>
@@ -18,7 +19,8 @@ double threshold_of(std::string_view word, const std::string& text) {
   double value = 0;
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
-    throw UsageError("--threshold: '" + text + "', expected numbers, as LOW, LOW,HIGH or ,HIGH");
+    throw UsageError("--threshold: '" + text +
+                     "', expected numbers, as LOW, LOW,HIGH, \"LOW,\" or ,HIGH");
   return value;
 }
 
@@ -30,8 +32,10 @@ Thresholds thresholds_from_text(const std::string& text) {
   const std::string_view low = std::string_view(text).substr(0, comma);
   if (!low.empty() || comma == std::string::npos)
     t.low = threshold_of(low, text);
-  if (comma != std::string::npos)
-    t.high = threshold_of(std::string_view(text).substr(comma + 1), text);
+  const std::string_view high =
+      comma == std::string::npos ? "" : std::string_view(text).substr(comma + 1);
+  if (!high.empty() || (comma != std::string::npos && low.empty()))
+    t.high = threshold_of(high, text);
   if (!(t.low < t.high))
     throw UsageError("--threshold: '" + text + "', expected the smaller number first");
   return t;
@@ -49,9 +53,14 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
                    std::optional<double> voxel, const VolumeOutput& to) {
   Output output = open_volume(run);
   Input input(path);
-  const GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
+  GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
   for (const std::string& warning : scan.warnings)
     run.warn(warning);
+  VolumeOutput result = to;
+  if (result.space == Space::lps)
+    scan.volume.transform = other_space(scan.volume.transform);
+  else
+    result.space = Space::ras; // as read
   GreyDensityReport report;
   const Grid grid = run.timed("density", [&] {
     return at(input.name(), [&] {
@@ -62,7 +71,7 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
   if (report.missing > 0)
     run.warn(input.name() + ": " + std::to_string(report.missing) +
              " voxels have no value (NaN) and count as outside");
-  write(run, output, grid, to);
+  write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("format", scan.format);
