@@ -3,6 +3,7 @@
 #include "formats/mesh/mesh_file.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/space_option.h"
+#include "tools/shared/transform_option.h"
 #include "tools/shared/voxelize_labels.h"
 #include "tools/shared/voxelize_mesh.h"
 #include "tools/shared/voxelize_scan.h"
@@ -19,7 +20,7 @@ struct Arguments {
 /// What says how a mesh is read and filled.
 void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
   for (const std::string name :
-       {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format"})
+       {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format", "--transform"})
     if (p.given(name))
       throw UsageError(asked + ": " + name + " is for meshes, expected no " + name);
 }
@@ -75,6 +76,7 @@ int main(int argc, char** argv) {
   p.option("--weld", a.mesh.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
   declare_space(p, a.space);
+  declare_transform(p, a.mesh.transform);
   declare(p, a.mesh.output);
   p.input_kinds(readable_mesh_kinds());
   p.operand("MESH", a.mesh.name, "the mesh");

@@ -210,7 +210,7 @@ void Program::declare_common() {
   State& s = *state_;
   option("-o,--output", s.output, "FILE", "where the result goes, - is standard output");
   option("-j,--threads", s.threads, "N", "threads, 0 = all").range(0, 4096);
-  flag("-q,--quiet", s.quiet, "no warnings");
+  flag("-q,--quiet", s.quiet, "no warnings but of results that cannot be trusted");
   flag("-v,--verbose", s.verbose, "say what is done");
   option("--progress", s.progress, "WHEN", "progress bar: auto, always, never")
       .one_of({"auto", "always", "never"});

@@ -7,6 +7,7 @@
 #include "tools/shared/mesh_size.h"
 #include "tools/shared/report.h"
 #include "tools/shared/space_option.h"
+#include "tools/shared/transform_option.h"
 #include "volume/lattice.h"
 
 #include <cmath>
@@ -63,6 +64,8 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
   read.max_memory = run.context().max_memory;
   read.drop_unused = true; // so that they don't count for --dim
   TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
+  if (!a.transform.empty())
+    at(input.name(), [&] { apply(transform_from_text(a.transform), mesh); });
   VolumeOutput to = a.output;
   Space of_lattice = to.space;
   const GridTransform transform = lattice(a, input, mesh, run.context(), of_lattice);
