@@ -1,8 +1,8 @@
 #include "voxelize/buried_faces_internal.h"
 
 #include "base/disjoint_sets.h"
+#include "base/exact_predicates.h"
 #include "mesh/edges.h"
-#include "mesh/exact_predicates.h"
 #include "mesh/nearest_point.h"
 #include "mesh/oriented_surface.h"
 

@@ -54,7 +54,7 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   const PreparedVolume prepared = prepare(run, arguments, input);
   run.timed("materials", [&] { materials.read(run); });
   const StuffingOptions options{prepared.isovalue, arguments.cell,
-                                static_cast<unsigned>(arguments.grade), materials.source(),
+                                static_cast<unsigned>(arguments.grade), materials.source(prepared.grid, prepared.isovalue),
                                 arguments.interface == "follow"};
   StuffingReport report;
   TetMesh mesh = at(input.name(), [&] {
