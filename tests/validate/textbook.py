@@ -22,8 +22,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "report"))
 
 import plot
-from scene_runs import (GRAVITY, Failure, Scene, add, ball, box, cross, distance_to_segment, dot, grid, has_intersections, mapped, norm, obj,
-                           plate, scale, sheet, sub, surfaces, total, tube, turned, words_of)
+from scene_runs import (GRAVITY, Failure, Scene, add, ball, box, cross, distance_to_segment, dot, grid, intersect, mapped, norm, obj,
+                           plate, scale, sheet, sub, total, tube, turned, words_of)
 
 EPS_V = 0.1  # mm/s: sliding speed below which smoothed friction creeps
 ROUNDING = 1e-12  # sum of the forces of a closed system over the sum of their lengths
@@ -141,21 +141,12 @@ class Case:
         shaped = [f for f in frames if f.shapes]
         every = max(1, len(shaped) // self.checked_frames)
         changed, met, near_tool = {}, [], math.inf
-        touching = {frozenset(p) for p in s.pairs}
         for k, frame in enumerate(shaped):
             changed.update(frame.triangles)
             if k % every and k != len(shaped) - 1:
                 continue
-            if touching:
-                names = list(frame.shapes)
-                root = lambda n: n.split(".")[0]
-                pair = lambda i, j: frozenset((root(names[i]), root(names[j]) if root(names[i]) != root(names[j]) or
-                                               frozenset((root(names[i]), "self")) not in touching else "self")) in touching
-                known = {n: m for n, m in s.models.items()}
-                points, triangles, owner = surfaces(known, frame.shapes, changed)
-                table = {(i, j): pair(i, j) for i in range(len(names)) for j in range(len(names))}
-                if has_intersections(points, triangles, owner, lambda i, j: table[i, j]):
-                    met.append(frame.time)
+            if s.pairs and intersect(s.models, frame, changed, s.pairs):
+                met.append(frame.time)
             for name, radius, axis in self.tools:
                 if name in frame.instruments:
                     p = frame.instruments[name][0]
@@ -163,7 +154,7 @@ class Case:
                     for object_name, shape in frame.shapes.items():
                         t = changed.get(object_name) or s.models[object_name].triangles
                         near_tool = min(near_tool, distance_to_segment(p, q, shape, t) / radius)
-        if touching:
+        if s.pairs:
             yield at_most("answers with surfaces that intersect", len(met), 0)
         if near_tool < math.inf:
             yield at_least("least distance from the tool's axis over its radius", near_tool, 0.999, theory=1.0)
