@@ -410,14 +410,27 @@ def edges_of(triangles):
 def surfaces(models, shapes, changed):
     """One mesh of all objects: points, triangles, and the object of each point."""
     points, triangles, owner = [], [], []
-    for k, (name, shape) in enumerate(shapes.items()):
-        if not (name in changed or name in models):
-            continue
+    known = [(name, shape) for name, shape in shapes.items() if name in changed or name in models]
+    for k, (name, shape) in enumerate(known):
         base = len(points)
         points += shape
         owner += [k] * len(shape)
         triangles += [tuple(n + base for n in t) for t in (changed.get(name) or models[name].triangles)]
     return points, triangles, owner
+
+
+def who_touches(names, pairs):
+    """Table (i, j) -> whether contact was asked for; parts NAME.1 touch as NAME does, and each other as NAME touches itself."""
+    roots, asked = [n.split(".")[0] for n in names], {frozenset(p) for p in pairs}
+    wanted = lambda i, j: frozenset((roots[i], roots[j]) if roots[i] != roots[j] else (roots[i], "self"))
+    return {(i, j): wanted(i, j) in asked for i in range(len(names)) for j in range(len(names))}
+
+
+def intersect(models, frame, changed, pairs):
+    """Whether surfaces of an answer intersect that are to touch each other. `changed`: triangles of objects, as told so far."""
+    points, triangles, owner = surfaces(models, frame.shapes, changed)
+    table = who_touches([n for n in frame.shapes if n in changed or n in models], pairs)
+    return has_intersections(points, triangles, owner, lambda i, j: table[i, j])
 
 
 try:

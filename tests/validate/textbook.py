@@ -22,8 +22,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "report"))
 
 import plot
-from scene_runs import (GRAVITY, Failure, Scene, add, ball, box, cross, distance_to_segment, dot, grid, has_intersections, mapped, norm, obj,
-                           plate, scale, sheet, sub, surfaces, total, tube, turned, words_of)
+from scene_runs import (GRAVITY, Failure, Scene, add, ball, box, cross, distance_to_segment, dot, grid, intersect, mapped, norm, obj,
+                           plate, scale, sheet, sub, total, tube, turned, words_of)
 
 EPS_V = 0.1  # mm/s: sliding speed below which smoothed friction creeps
 ROUNDING = 1e-12  # sum of the forces of a closed system over the sum of their lengths
@@ -141,21 +141,12 @@ class Case:
         shaped = [f for f in frames if f.shapes]
         every = max(1, len(shaped) // self.checked_frames)
         changed, met, near_tool = {}, [], math.inf
-        touching = {frozenset(p) for p in s.pairs}
         for k, frame in enumerate(shaped):
             changed.update(frame.triangles)
             if k % every and k != len(shaped) - 1:
                 continue
-            if touching:
-                names = list(frame.shapes)
-                root = lambda n: n.split(".")[0]
-                pair = lambda i, j: frozenset((root(names[i]), root(names[j]) if root(names[i]) != root(names[j]) or
-                                               frozenset((root(names[i]), "self")) not in touching else "self")) in touching
-                known = {n: m for n, m in s.models.items()}
-                points, triangles, owner = surfaces(known, frame.shapes, changed)
-                table = {(i, j): pair(i, j) for i in range(len(names)) for j in range(len(names))}
-                if has_intersections(points, triangles, owner, lambda i, j: table[i, j]):
-                    met.append(frame.time)
+            if s.pairs and intersect(s.models, frame, changed, s.pairs):
+                met.append(frame.time)
             for name, radius, axis in self.tools:
                 if name in frame.instruments:
                     p = frame.instruments[name][0]
@@ -163,7 +154,7 @@ class Case:
                     for object_name, shape in frame.shapes.items():
                         t = changed.get(object_name) or s.models[object_name].triangles
                         near_tool = min(near_tool, distance_to_segment(p, q, shape, t) / radius)
-        if touching:
+        if s.pairs:
             yield at_most("answers with surfaces that intersect", len(met), 0)
         if near_tool < math.inf:
             yield at_least("least distance from the tool's axis over its radius", near_tool, 0.999, theory=1.0)
@@ -904,7 +895,11 @@ class Wedge(Case):
 
 
 class House(Case):
-    """Two posts and a lintel at rest: each post bears half of the lintel."""
+    """Two posts and a lintel at rest.
+
+    A post bears the share of the lintel that moments about the middle of the other post's pressure give. Where these middles
+    lie is not determined by statics (the lintel bends, and meshes are not symmetric), so they are taken from the told forces.
+    """
 
     name, source = "house", "statics"
     mu = 0.5
@@ -929,10 +924,17 @@ class House(Case):
     def judge(self, s, frames):
         window = [f for f in frames if f.time > 0.7]
         lintel, post = (s.models[n].weight * GRAVITY for n in ("lintel", "left"))
+        place, borne, middle = [0.0, 0.0], [0.0, 0.0], 0.0
+        for k in range(2):
+            of = [(f.shapes["lintel"][n][0], f.forces["lintel"][n][2]) for f in window for n in self.halves[k] if n in f.forces["lintel"]]
+            borne[k] = math.fsum(z for _, z in of) / len(window)
+            place[k] = math.fsum(x * z for x, z in of) / math.fsum(z for _, z in of)
+        middle = mean(s.models["lintel"].centre(f.shapes["lintel"])[0] for f in window)
         for k, name in enumerate(("left", "right")):
-            yield near(f"force of the {name} post on the lintel over half its weight",
-                       mean(self.force(f, "lintel", self.halves[k])[2] for f in window) / (lintel / 2), 1, 0.005)
-            yield near(f"force under the {name} post over half of all", mean(self.force(f, name, self.faces[2 * k][1])[2] for f in window) / (lintel / 2 + post), 1, 0.005)
+            share = abs(place[1 - k] - middle) / abs(place[1] - place[0])
+            yield near(f"force of the {name} post on the lintel over its share", borne[k] / (share * lintel), 1, 0.005)
+            low = mean(self.force(f, name, self.faces[2 * k][1])[2] for f in window)
+            yield near(f"force under the {name} post over its weight and share", low / (share * lintel + post), 1, 0.005)
         yield at_most("drift in 0.1 s", max(norm(sub(s.models[n].centre(window[-1].shapes[n]), s.models[n].centre(window[0].shapes[n])))
                                         for n in ("left", "right", "lintel")), 2 * EPS_V * 0.1, "mm")
 
