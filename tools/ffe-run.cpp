@@ -14,7 +14,6 @@
 #include "tools/shared/cli.h"
 #include "tools/shared/distrust.h"
 
-#include <csignal>
 #include <memory>
 #include <optional>
 #include <string>
@@ -87,11 +86,7 @@ void work(cli::Run& run, const Arguments& in) {
   SceneRun scene(input ? name : in.listen, context, options);
   RunLogs logs(events ? &*events : nullptr, record ? &*record : nullptr, latency);
   ResultWriter* const kept = in.no_partial ? nullptr : result.get();
-  if (kept != nullptr || logs.any())
-    defer_signals();
-  if (kept != nullptr)
-    kept->outlive_signals();
-  logs.outlive_signals();
+  outlive_failures(kept, logs);
   try {
     run.timed("run", [&] {
       answers.run(input ? &*input : nullptr, scene);
@@ -103,13 +98,7 @@ void work(cli::Run& run, const Arguments& in) {
       answers.commit();
     });
   } catch (const Error& error) {
-    const bool unheard = deferred_signal() == SIGPIPE; // the reader of answers has gone
-    if (!unheard)
-      (void)logs.commit(); // they tell how it came to this
-    const Error ending = ending_of_failed_run(error, kept, scene.simulation().time());
-    if (unheard)
-      end_by_deferred_signal();
-    throw Error(ending);
+    end_failed_run(error, kept, logs, scene.simulation().time());
   }
   if (const std::optional<Error> error = run.timed("write", [&] { return logs.commit(); }))
     throw Error(*error);

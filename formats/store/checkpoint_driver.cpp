@@ -159,7 +159,7 @@ bool is_superblock(const unsigned char* bytes, std::size_t size) {
          (bytes[8] == 2 || bytes[8] == 3);
 }
 
-/// Nobody has the file open, says this superblock.
+/// This superblock has no mark of an open file.
 void mark_closed(unsigned char* superblock) {
   constexpr std::size_t flags_at = 11, sum_at = superblock_size - 4;
   superblock[flags_at] = 0;

@@ -197,6 +197,19 @@ test_stored_stiffness_gives_the_same_shape() {
   rm organ.ela other.ela pull.scene other.scene ./*.h5 ./*.json ./*.txt
 }
 
+test_stats_compute_no_residuals() {
+  need ffe-run exp2ela
+  pull method=ffe
+  ffe-run pull.scene >plain.txt
+  ffe-run --stats=stats.json pull.scene >stats.txt
+  ffe-run --verify --stats=verified.json pull.scene >verified.txt
+  cmp plain.txt stats.txt
+  cmp plain.txt verified.txt
+  ! grep -q '"backward_error"' stats.json || fail 'a residual without --verify' "$(<stats.json)"
+  grep -q '"backward_error"' verified.json || fail 'no residual with --verify' "$(<verified.json)"
+  rm organ.ela pull.scene ./*.txt ./*.json
+}
+
 test_h5py_reads_results() {
   local python
   need ffe-run exp2ela

@@ -3,6 +3,7 @@
 #include "base/number_text.h"
 #include "formats/stream/removal.h"
 
+#include <csignal>
 #include <string>
 
 namespace gewebe {
@@ -35,7 +36,10 @@ std::optional<Error> RunLogs::commit() {
   return first;
 }
 
-Error ending_of_failed_run(const Error& error, ResultWriter* result, double time) {
+namespace {
+
+/// Keeps the frames. \return what is to be said of it
+Error ending_of(const Error& error, ResultWriter* result, double time) {
   const bool interrupted = deferred_signal() != 0;
   std::string kept, left_out;
   if (result != nullptr)
@@ -56,6 +60,26 @@ Error ending_of_failed_run(const Error& error, ResultWriter* result, double time
   if (!interrupted)
     return {error.place(), error.what() + (kept.empty() ? "" : "; " + kept)};
   return Error("interrupted at " + number_text(time) + " s" + (kept.empty() ? "" : ": " + kept));
+}
+
+} // namespace
+
+void outlive_failures(ResultWriter* result, RunLogs& logs) {
+  if (result != nullptr || logs.any())
+    defer_signals();
+  if (result != nullptr)
+    result->outlive_signals();
+  logs.outlive_signals();
+}
+
+void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs, double time) {
+  const bool unheard = deferred_signal() == SIGPIPE;
+  if (!unheard)
+    (void)logs.commit(); // they tell how it came to this
+  const Error ending = ending_of(error, result, time);
+  if (unheard)
+    end_by_deferred_signal();
+  throw Error(ending);
 }
 
 void report_recovered(cli::Run& run, const KeptResult& kept) {

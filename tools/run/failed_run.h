@@ -31,9 +31,16 @@ private:
   StepLatency& latency_;
 };
 
-/// Keeps the frames, if `result` is there, and says so behind the error that ended the run, or
-/// behind "interrupted" where a signal did. \param time of the scene
-Error ending_of_failed_run(const Error& error, ResultWriter* result, double time);
+/// From now on a signal ends the run at its next check, so that frames and logs can be kept.
+/// \param result  null: no frames are to be kept
+void outlive_failures(ResultWriter* result, RunLogs& logs);
+
+/// Keeps logs and, if `result` is there, frames. The error's message, or "interrupted" behind a
+/// signal, is completed by what was kept. Where the reader of answers has gone (SIGPIPE), the
+/// program ends by the signal without a message, and logs stay FILE.part.
+/// \param time  of the scene, s
+[[noreturn]] void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs,
+                                 double time);
 
 /// Tells with -v and in --stats what `recover_result` found.
 void report_recovered(cli::Run& run, const KeptResult& kept);
