@@ -13,8 +13,8 @@ struct PartialFrames {
   double time = 0; ///< s, of the last one
 };
 
-/// Puts a result of kind h5 or vtkhdf, which no program has open, back to its last whole frame and sets
-/// its attribute `partial` (where the disk has room for it). \throw Error if it holds no frame
+/// Puts a result of kind h5 or vtkhdf, which no program has open, back to its last whole frame and
+/// sets its attribute `partial` (where the disk has room for it). \throw Error if it holds no frame
 PartialFrames mark_partial(const std::string& path, const std::string& why);
 
 /// Finds what a killed run has left of the result `path`: the newest temporary file beside it that
