@@ -94,6 +94,10 @@ void work(cli::Run& run, cli::RenderArguments a) {
   }
   if (reading.kind == Kind::hdf5)
     take_field(run, a, input, a.frames.empty() ? std::vector{reading.frame.value_or(-1)} : frames);
+  if (frames.size() > 1 && !many && run.output() != "-" && to == Kind::png)
+    throw UsageError(run.output() + ": " + std::to_string(frames.size()) +
+                     " pictures for one file, expected %d or %04d in its name, --to rgb, or "
+                     "-o - for a stream");
   cli::Pictures pictures(run, a);
   Digest digest;
   Image picture;

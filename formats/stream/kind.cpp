@@ -37,8 +37,8 @@ constexpr std::array<std::pair<Kind, std::string_view>, 24> names{{
     {Kind::vtkhdf, "vtkhdf"},
 }};
 
-/// The suffix of a path that names a kind, though none of ours: a letter, then up to four letters
-/// and digits. Empty for what people call files whose kind is said elsewhere.
+/// The suffix of a path that names a kind, though none of ours: up to five letters and digits, not
+/// digits alone, which number files. Empty for what people call files whose kind is said elsewhere.
 std::string_view foreign_suffix(std::string_view path) {
   const std::size_t slash = path.find_last_of('/') + 1; // 0 if there is none
   const std::size_t dot = path.find_last_of('.');
@@ -48,7 +48,7 @@ std::string_view foreign_suffix(std::string_view path) {
   const auto is = [](int (*test)(int)) {
     return [test](char c) { return test(static_cast<unsigned char>(c)) != 0; };
   };
-  if (suffix.empty() || suffix.size() > 5 || !is(std::isalpha)(suffix[0]) ||
+  if (suffix.size() > 5 || !std::ranges::any_of(suffix, is(std::isalpha)) ||
       !std::ranges::all_of(suffix, is(std::isalnum)))
     return {};
   constexpr std::array<std::string_view, 10> plain{"tmp", "part", "new", "old", "bak",

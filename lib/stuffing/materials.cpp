@@ -22,8 +22,28 @@ Vec3 centroid(const TetMesh& mesh, std::size_t t) {
   return (mesh.points[a] + mesh.points[b] + mesh.points[c] + mesh.points[d]) / 4;
 }
 
+Vec3 centre_of(const LabelRuns& labels, const Int3& v) {
+  return labels.transform.to_world(
+      {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])});
+}
+
+/// Do the centres of a voxel and its six neighbours lie in the solid? Never without one.
+bool is_within(const LabelRuns& labels, const MaterialAt& solid, const Int3& v) {
+  if (!solid || solid(centre_of(labels, v)) == 0)
+    return false;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const std::int32_t step : {-1, 1}) {
+      Int3 next = v;
+      next[axis] += step;
+      if (solid(centre_of(labels, next)) == 0)
+        return false;
+    }
+  return true;
+}
+
 /// As label_source says. \pre transform is invertible
-std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t reach) {
+std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t reach,
+                      const MaterialAt& solid) {
   const Vec3 index = labels.transform.to_index(place);
   Int3 voxel{};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -33,20 +53,17 @@ std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t r
     voxel[a] = static_cast<std::int32_t>(x);
   }
   std::int32_t nearest = labels.at(voxel);
-  if (nearest != 0)
+  if (nearest != 0 || reach == 0 || is_within(labels, solid, voxel))
     return nearest;
   double least = HUGE_VAL;
   for (std::int32_t k = voxel[2] - reach; k <= voxel[2] + reach; ++k)
     for (std::int32_t j = voxel[1] - reach; j <= voxel[1] + reach; ++j)
       for (std::int32_t i = voxel[0] - reach; i <= voxel[0] + reach; ++i) {
         const std::int32_t label = labels.at({i, j, k});
-        if (label == 0)
+        if (label == 0 && !solid)
           continue;
-        const Vec3 apart =
-            labels.transform.to_world(
-                {static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}) -
-            place;
-        if (dot(apart, apart) < least) {
+        const Vec3 apart = centre_of(labels, {i, j, k}) - place;
+        if (dot(apart, apart) < least && (label != 0 || is_within(labels, solid, {i, j, k}))) {
           least = dot(apart, apart);
           nearest = label;
         }
@@ -56,23 +73,29 @@ std::int32_t label_at(const LabelRuns& labels, const Vec3& place, std::int32_t r
 
 } // namespace
 
-MaterialSource inside_source(const Grid& volume) {
+MaterialSource inside_source(const Grid& volume, std::optional<double> isovalue) {
   check_transform(volume.info().transform);
-  return [&volume]() -> MaterialAt {
+  const bool level_set = volume.info().level_set;
+  const double limit = isovalue.value_or(level_set ? 0 : volume.info().isovalue);
+  return [&volume, level_set, limit]() -> MaterialAt {
     const auto field = std::make_shared<Field>(volume);
-    return [field, info = volume.info()](const Vec3& place) -> std::int32_t {
-      const double value = field->value(info.transform.to_index(place));
+    return [field, level_set, limit,
+            transform = volume.info().transform](const Vec3& place) -> std::int32_t {
+      const double value = field->value(transform.to_index(place));
       if (!std::isfinite(value))
         throw Error("a value is not finite, expected numbers where the tetrahedra are");
-      return info.level_set ? value < 0 : value > info.isovalue;
+      return level_set ? value < limit : value > limit;
     };
   };
 }
 
-MaterialSource label_source(const LabelRuns& labels, std::int32_t reach) {
+MaterialSource label_source(const LabelRuns& labels, std::int32_t reach,
+                            const MaterialSource& solid) {
   check_transform(labels.transform);
-  return [&labels, reach]() -> MaterialAt {
-    return [&labels, reach](const Vec3& place) { return label_at(labels, place, reach); };
+  return [&labels, reach, solid]() -> MaterialAt {
+    return [&labels, reach, within = solid ? solid() : MaterialAt()](const Vec3& place) {
+      return label_at(labels, place, reach, within);
+    };
   };
 }
 

@@ -241,7 +241,19 @@ test_a_suffix_of_nobody_is_wrong_use() {
     sample "$tool"
     expect_failure 2 "$tool" "${words[@]}" -o out.jpg
     expect_failure 2 "$tool" "${words[@]}" -o out.mp4
-    [[ ! -e out.jpg && ! -e out.mp4 ]] || fail "$tool wrote it"
+    expect_failure 2 "$tool" "${words[@]}" -o out.3mf
+    [[ ! -e out.jpg && ! -e out.mp4 && ! -e out.3mf ]] || fail "$tool wrote it"
+  done
+}
+
+# Digits alone number files.
+test_a_number_is_no_suffix() {
+  local tool
+  for tool in $(programs); do
+    sample "$tool"
+    "${words[@]}" -o out.001 >/dev/null || fail "$tool refuses it"
+    [[ -e out.001 ]] || fail "$tool didn't write it"
+    rm out.001
   done
 }
 

@@ -415,6 +415,42 @@ TEST(Stuffing, MaterialsOfTheNearestLabel) {
   }
 }
 
+TEST(Stuffing, UnlabelledTissueIsNoBackground) {
+  // Labels of a ball with a core that has none; the smooth ball cuts the stairs of its voxels.
+  const double radius = 6, core = 3, size = 0.5;
+  GridTransform lattice = uniform_transform(size);
+  lattice.m[3] = lattice.m[7] = lattice.m[11] = -8;
+  const Vec3 center{0.13, -0.21, 0.07};
+  const LabelRuns labels = labels_of({33, 33, 33}, lattice, [&](int i, int j, int k) {
+    const Vec3 p = lattice.to_world({1.0 * i, 1.0 * j, 1.0 * k});
+    const double apart = norm(p - center);
+    return apart > radius || apart < core ? 0 : p.x < 0 ? 1 : 2;
+  });
+  const Grid solid = ball(radius, 0.25, center);
+  TetMesh mesh = stuffed(solid, {{}, 0.4});
+  const auto zeros = [&](double from, double to) {
+    int count = 0;
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+      const double apart = norm(centroid_of(mesh, t) - center);
+      count += apart >= from && apart < to && mesh.material[t] == 0;
+    }
+    return count;
+  };
+  const double diagonal = std::sqrt(3.0) * size;
+  set_materials({}, label_source(labels), mesh);
+  EXPECT_GT(zeros(core + diagonal, HUGE_VAL), 100);
+  const int in_core = zeros(0, core + diagonal);
+  set_materials({}, label_source(labels, 3, inside_source(solid)), mesh);
+  EXPECT_EQ(zeros(core + diagonal, HUGE_VAL), 0);
+  EXPECT_EQ(zeros(0, core + diagonal), in_core);
+  // Without the solid the core is background, too, where labels are near.
+  set_materials({}, label_source(labels, 3), mesh);
+  EXPECT_LT(zeros(0, core + diagonal), in_core);
+  // An isovalue of its own takes the core out of the solid.
+  set_materials({}, label_source(labels, 3, inside_source(solid, -10)), mesh);
+  EXPECT_LT(zeros(0, core + diagonal), in_core);
+}
+
 TEST(Stuffing, EmptyAndTiles) {
   EXPECT_TRUE(stuffed(sample(GridInfo{}, {0, 0, 0}, {7, 7, 7}, [](int, int, int) {
                 return 0.2;

@@ -12,8 +12,8 @@
 namespace gewebe {
 namespace {
 
-/// With --label: how many voxels away from a tetrahedron its label may be. The smooth surface of
-/// labels lies within a voxel of them, a coarse cell's edge some more.
+/// How many voxels away from a tetrahedron its label may be. The smooth surface of labels lies
+/// within a voxel of them, a coarse cell's edge some more.
 constexpr std::int32_t label_reach = 3;
 
 } // namespace
@@ -43,12 +43,14 @@ void MaterialVolumes::read(cli::Run& run) {
       volumes.push_back(read_volume(input, run.context()));
 }
 
-MaterialSource MaterialVolumes::source() const {
+MaterialSource MaterialVolumes::source(const Grid& solid, double isovalue) const {
   if (inputs.empty())
     return {};
   if (is_labels)
-    return at(inputs.front().name(),
-              [&] { return label_source(labels, wanted.empty() ? 0 : label_reach); });
+    return at(inputs.front().name(), [&] {
+      return wanted.empty() ? label_source(labels, label_reach, inside_source(solid, isovalue))
+                            : label_source(labels, label_reach);
+    });
   std::vector<MaterialSource> sources;
   for (std::size_t n = 0; n < volumes.size(); ++n)
     sources.push_back(at(inputs[n].name(), [&] { return inside_source(volumes[n]); }));

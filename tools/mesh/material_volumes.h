@@ -18,8 +18,8 @@ struct MaterialVolumes {
   /// \throw UsageError, Error if they don't go together
   explicit MaterialVolumes(const MeshArguments& arguments);
   void read(cli::Run& run);
-  /// Nothing where there are none. \pre read
-  MaterialSource source() const;
+  /// Nothing where there are none. \pre read; `solid`, which is meshed at `isovalue`, outlives it
+  MaterialSource source(const Grid& solid, double isovalue) const;
 
   std::vector<Input> inputs;
   bool is_labels = false;

@@ -44,8 +44,9 @@ struct RenderArguments {
   std::string surface = "-";
   RenderLayer base, detail, reflection, structure;
   std::map<std::int32_t, RenderMaterial> materials;
-  SurfaceMaterial common;     ///< colours; its textures are read later
-  bool tissue_colors = false; ///< what has neither colour nor texture has that of its material
+  SurfaceMaterial common;      ///< colours; its textures are read later
+  bool field_material = false; ///< --field material: the colours of materials, asked for
+  bool tissue_colors = false;  ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
   std::optional<double> wet, wet_roughness; ///< the film on all
   std::optional<double> occlusion_radius;   ///< mm

@@ -5,13 +5,17 @@
 #include "tools/render/result_surfaces.h"
 
 #include <array>
+#include <string>
 #include <vector>
 
 namespace gewebe::cli {
 
 void declare_field(Program& p, RenderArguments& a) {
-  p.option("--field", a.reading.field, "NAME", "of a result: colours by a value at its nodes")
-      .one_of(result_field_names());
+  std::vector<std::string> names = result_field_names();
+  names.emplace_back("material");
+  p.option("--field", a.reading.field, "NAME",
+           "colours by material, or of a result by a value at its nodes")
+      .one_of(names);
 }
 
 void complete_field(RenderArguments& a) {
@@ -24,7 +28,14 @@ void complete_field(RenderArguments& a) {
   if (a.style == "wireframe" || a.words.color)
     throw UsageError("--field with --style wireframe or --color, which have colours of their own, "
                      "expected one of them");
-  a.drawing.texcoords = true;
+  if (a.reading.field != "material") {
+    a.drawing.texcoords = true;
+    return;
+  }
+  if (a.words.plain || !a.volume.ramp.empty() || !a.volume.range.empty())
+    throw UsageError("--field material with --plain, --ramp or --range, expected none of them");
+  a.field_material = true; // what is drawn without textures
+  a.reading.field.clear();
 }
 
 void take_field(Run& run, RenderArguments& a, const Input& input,

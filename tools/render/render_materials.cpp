@@ -94,7 +94,11 @@ void add_instrument_material(SurfaceMaterial& common, const RenderArguments& a,
 
 namespace {
 
-Vec3 color_of(const Surface& surface, std::size_t material) {
+using Colors = std::map<std::int32_t, Vec3>;
+
+Vec3 color_of(const Colors& colors, const Surface& surface, std::size_t material) {
+  if (const auto found = colors.find(static_cast<std::int32_t>(material)); found != colors.end())
+    return found->second;
   return tissue_color(material < surface.materials.size() ? surface.materials[material] : "",
                       material);
 }
@@ -110,17 +114,20 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
                            SurfaceMaterial& common, DrawingOptions& drawing) {
   if (!a.tissue_colors || surfaces.empty())
     return;
+  for (const Surface& surface : surfaces)
+    of_surfaces_.push_back(tissue_colors(surface.mesh, surface.materials));
   if (!a.materials.empty()) { // as they are numbered there
+    const auto color = [&](std::size_t surface, std::size_t material) {
+      return color_of(of_surfaces_[surface], surfaces[surface], material);
+    };
     if (takes_tissue_color(common))
-      common.color = color_of(surfaces.front(), 0);
+      common.color = color(0, 0);
     auto own = common.others.begin();
     for (const auto& [number, material] : a.materials) {
       const auto n = static_cast<std::size_t>(number);
       const bool object = a.words.by == "object" && n < surfaces.size() && !surfaces[n].instrument;
       if (!material.color && takes_tissue_color(*own))
-        own->color = object                 ? color_of(surfaces[n], 0)
-                     : a.words.by == "part" ? common.color
-                                            : color_of(surfaces.front(), n);
+        own->color = object ? color(n, 0) : a.words.by == "part" ? common.color : color(0, n);
       ++own;
     }
     return;
@@ -128,7 +135,8 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
   if (!takes_tissue_color(common))
     return;
   renumbers_ = true;
-  for (const Surface& surface : surfaces) {
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    const Surface& surface = surfaces[s];
     if (surface.instrument)
       continue;
     std::vector<std::int32_t> numbers = surface.mesh.material;
@@ -138,7 +146,7 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
     const auto [first, last] = std::ranges::unique(numbers);
     numbers.erase(first, last);
     for (const std::int32_t number : numbers) {
-      const Vec3 color = color_of(surface, static_cast<std::size_t>(number));
+      const Vec3 color = color_of(of_surfaces_[s], surface, static_cast<std::size_t>(number));
       if (std::ranges::find(colors_, color) == colors_.end())
         colors_.push_back(color);
     }
@@ -158,13 +166,15 @@ TissueColors::TissueColors(const RenderArguments& a, const std::vector<Surface>&
 void TissueColors::number_materials(std::vector<Surface>& surfaces) const {
   if (!renumbers_ || colors_.size() < 2)
     return;
-  for (Surface& surface : surfaces) {
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    Surface& surface = surfaces[s];
     if (surface.instrument)
       continue;
     surface.mesh.material.resize(surface.mesh.triangles.size());
     for (std::int32_t& number : surface.mesh.material) {
-      const auto found =
-          std::ranges::find(colors_, color_of(surface, static_cast<std::size_t>(number)));
+      const Vec3 color = color_of(s < of_surfaces_.size() ? of_surfaces_[s] : Colors{}, surface,
+                                  static_cast<std::size_t>(number));
+      const auto found = std::ranges::find(colors_, color);
       number = found == colors_.end() ? 0 : static_cast<std::int32_t>(found - colors_.begin());
     }
   }

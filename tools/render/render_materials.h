@@ -4,6 +4,8 @@
 #include "shading/drawing.h"
 #include "tools/render/render_arguments.h"
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -44,7 +46,8 @@ public:
 
 private:
   bool renumbers_ = false;
-  std::vector<Vec3> colors_; ///< of the groups
+  std::vector<std::map<std::int32_t, Vec3>> of_surfaces_; ///< of the first surfaces' materials
+  std::vector<Vec3> colors_;                              ///< of the groups
 };
 
 } // namespace gewebe::cli

@@ -108,7 +108,7 @@ void check_kind(const RenderArguments& a, const Input& input, Kind kind) {
                         : "--slice, --maximum, --translucent, --ramp or --range for no volume, "
                           "expected none of "
                           "them (--ramp and --range with --field too)");
-  refuse(field, input, "--field for a volume, expected --ramp alone");
+  refuse(field || a.field_material, input, "--field for a volume, expected --ramp alone");
   refuse(a.drawing.texcoords || a.drawing.sphere || !a.materials.empty(), input,
          "a texture for a volume, expected --ramp or none");
   refuse(a.style != "textured" || !a.compare.empty() || a.words.backend == "gl" ||

@@ -8,6 +8,7 @@
 #include "solid/skin.h"
 #include "solid/solid_model.h"
 #include "tetrahedra/check.h"
+#include "tetrahedra/components.h"
 
 #include <cmath>
 #include <cstdint>
@@ -80,9 +81,30 @@ void skin(Run& run, const std::string& name, const TriangleMesh& mesh, double ce
   if (made.dropped_triangles > 0)
     run.warn(name + ": " + std::to_string(made.dropped_triangles) +
              " faces with two equal corners are left out of the skin");
-  if (!(made.farthest <= cell))
+  const double size = bounding_box(mesh).longest_side();
+  const double allowed = std::fmin(cell / 4, 0.02 * size);
+  if (!(made.farthest <= allowed)) {
+    // Where the surface is smooth, its distance from the tetrahedra falls with the square of the
+    // cell; what is thinner than a cell is lost until cells are as small.
+    const double helps = cell * std::fmax(0.25, std::fmin(0.75, allowed / made.farthest));
     run.warn(name + ": the surface lies up to " + rounded_text(made.farthest) +
-             " mm outside the tetrahedra, where it follows them poorly, expected a smaller --cell");
+             " mm outside the tetrahedra, where it follows them poorly, expected --cell " +
+             rounded_text(helps) + " or smaller in place of " + rounded_text(cell));
+  }
+}
+
+/// Loose pieces move away from each other unless each is held.
+void warn_of_pieces(Run& run, const std::string& name, const TetMesh& mesh) {
+  const std::uint64_t pieces = component_count(mesh);
+  run.stats().set("pieces", pieces);
+  if (pieces < 2)
+    return;
+  TetMesh largest = mesh;
+  const TetComponentReport report = keep_components(largest, {.largest = 1});
+  run.warn(name + ": the tetrahedra form " + std::to_string(pieces) +
+           " pieces that nothing connects, with " + std::to_string(report.dropped_tetrahedra) +
+           " tetrahedra beside the largest one, expected one piece: a smaller --cell, or a surface "
+           "without loose parts (mc-opt --components largest)");
 }
 
 constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
@@ -150,6 +172,7 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
       material = static_cast<std::size_t>(material) < parts.size()
                      ? parts[static_cast<std::size_t>(material)]
                      : unnamed;
+    warn_of_pieces(run, name, tets);
     Model model = model_of(run, std::move(tets), a);
     if (!a.no_skin)
       skin(run, name, mesh, cell, a.build.material, model);
