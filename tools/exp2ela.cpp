@@ -3,6 +3,7 @@
 #include "formats/mesh/mesh_file.h"
 #include "formats/model/ela.h"
 #include "formats/tetrahedra/tet_file.h"
+#include "model/build.h"
 #include "model/figures.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/mesh_size.h"
@@ -46,6 +47,11 @@ void fix(Model& model, const ModelArguments& a) {
 Model source(cli::Run& run, const ModelArguments& a) {
   if (a.matrix) {
     require_parts(a.build.material, {});
+    const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
+    require_memory(run.context(),
+                   nodes * static_cast<double>(sizeof(Vec3) + 2 * sizeof(Triangle)) +
+                       (a.solid ? 0 : model_bytes(nodes, 2 * nodes, a.build.bend)),
+                   "the primitive");
     return cli::model_of_surface(run, a.primitive, primitive_mesh(*a.matrix), a);
   }
   Input input(a.mesh);
@@ -62,7 +68,10 @@ Model source(cli::Run& run, const ModelArguments& a) {
     return cli::solid_source(run, input, from, a);
   refuse(!a.solid && (a.values.poisson || a.order != 2),
          "the input is a surface, expected --solid beside --poisson and --order");
-  const MeshReadOptions options{from, a.unit, weld_from_name(a.weld)};
+  const MeshReadOptions options{.kind = from,
+                                .unit = a.unit,
+                                .weld = weld_from_name(a.weld),
+                                .max_memory = run.context().max_memory};
   TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options); });
   at(input.name(), [&] { require_parts(a.build.material, mesh.part); });
   if (a.unit.empty())

@@ -72,23 +72,43 @@ fs::path here() {
   become((here() / tool).string(), std::move(words));
 }
 
-/// The file of a manual page: NAME, gewebe-NAME or gewebe_NAME.
-std::optional<std::string> page_file(const std::string& name) {
-  std::error_code failure;
-  for (const std::string& whole : {name, "gewebe-" + name, "gewebe_" + name})
-    for (const char* section : {"1", "5", "7"})
-      for (const char* packed : {"", ".gz"}) {
-        const fs::path path = here() / "../share/man" / (std::string("man") + section) /
-                              (whole + "." + section + packed);
-        if (fs::exists(path, failure))
-          return path.lexically_normal().string();
-      }
-  return std::nullopt;
-}
-
 bool is_tool(std::string_view name) {
   return std::ranges::find(tools, name, &Tool::name) != tools.end();
 }
+
+/// The file of a manual page: NAME, gewebe-NAME or gewebe_NAME; where the programs are installed.
+/// What is no program's page is also looked for in the tree that they are built in.
+std::optional<std::string> page_file(const std::string& name) {
+  std::error_code failure;
+  for (const std::string& whole : {name, "gewebe-" + name, "gewebe_" + name})
+    for (const std::string section : {"1", "5", "7"}) {
+      const std::string file = whole + "." + section;
+      const fs::path folder = here() / "../share/man" / ("man" + section);
+      for (const fs::path& path :
+           {folder / file, folder / (file + ".gz"), here() / "../../man" / file})
+        if (fs::exists(path, failure) && (path.parent_path() == folder || !is_tool(name)))
+          return path.lexically_normal().string();
+    }
+  return std::nullopt;
+}
+
+/// What a word that names no program is done by.
+struct Task {
+  std::string_view word, how;
+};
+constexpr std::array tasks{
+    Task{"convert", "exp2ela --to KIND writes a mesh or a model in another format"},
+    Task{"mesh", "mc-opt makes a mesh of a volume"},
+    Task{"tets", "mc-opt --tets and exp2ela --solid make tetrahedra"},
+    Task{"volume", "voxelize and metaball2vol make volumes"},
+    Task{"segment", "voxelize --label and --threshold make volumes of scans"},
+    Task{"model", "exp2ela makes a model of a mesh"},
+    Task{"simulate", "ffe-run simulates"},
+    Task{"run", "ffe-run simulates"},
+    Task{"render", "emboss-render draws"},
+    Task{"view", "emboss-render draws"},
+    Task{"draw", "emboss-render draws"},
+};
 
 void write_text(const std::string& text) {
   Output output("-", {.binary = false});
@@ -126,6 +146,9 @@ void work(const std::vector<std::string>& words) {
     throw UsageError("expected a program, see gewebe --list");
   if (word == "help" && words.size() == 3)
     return show_help(words[2]);
+  if (const auto* const task = std::ranges::find(tasks, word, &Task::word); task != tasks.end())
+    throw UsageError("no program '" + word + "', but " + std::string(task->how) +
+                     ", see gewebe --list");
   if (words.size() > 2)
     throw UsageError("unexpected '" + words[2] + "' after " + word + ", see gewebe --help");
   if (word == "-h" || word == "--help" || word == "help")

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
       .positive();
   program
       .option("--grade", arguments.grade, "G",
-              "with --tets: cells double inwards up to G times, the boundary stays (default 0)")
+              "with --tets: cells double inwards up to G times, the boundary stays")
       .range(0, stuffing_grade_max);
   program.option("--materials", arguments.materials, "LABELS|VDB[,VDB...]",
                  "with --tets: material by the label of a label volume; or 1, 2 … where a volume's "

@@ -2,6 +2,7 @@
 
 #include "formats/mesh/mesh_file.h"
 #include "tools/shared/cli.h"
+#include "tools/shared/filling_rule.h"
 #include "tools/shared/voxelize_labels.h"
 #include "tools/shared/voxelize_mesh.h"
 #include "tools/shared/voxelize_scan.h"
@@ -14,12 +15,6 @@ struct Arguments {
   MeshToVoxelize mesh;
   std::string on_open = "error", rule = "parity", labels, threshold;
 };
-
-VoxelRule rule_from_text(const std::string& text) {
-  return text == "winding"   ? VoxelRule::winding
-         : text == "zbuffer" ? VoxelRule::zbuffer
-                             : VoxelRule::parity;
-}
 
 /// What says how a mesh is read and filled.
 void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
@@ -42,15 +37,13 @@ void complete(const cli::Program& p, Arguments& a) {
   if (int{a.mesh.voxel.has_value()} + int{a.mesh.dim.has_value()} + int{!a.mesh.like.empty()} != 1)
     throw UsageError("expected exactly one of --voxel, --dim and --like");
   cli::check_one_pipe({a.mesh.name, a.mesh.like});
-  a.mesh.options.rule = rule_from_text(a.rule);
+  a.mesh.options.rule = voxel_rule_from_text(a.rule);
   a.mesh.choice = antialias_from_text(a.mesh.antialias);
   if (a.mesh.options.rule != VoxelRule::parity &&
       (a.mesh.choice.filter == Antialias::exact || a.mesh.choice.filter == Antialias::lines))
     throw UsageError("--antialias " + a.mesh.antialias +
                      " goes with --rule parity, not with --rule " + a.rule);
-  a.mesh.options.on_open = a.on_open == "error"  ? OpenMesh::refuse
-                           : a.on_open == "warn" ? OpenMesh::skip
-                                                 : OpenMesh::fill;
+  a.mesh.options.on_open = open_mesh_from_text(a.on_open);
 }
 
 } // namespace

@@ -65,11 +65,13 @@ const Format& format_of(Kind kind) {
 // The name under which assimp knows the input.
 constexpr std::string_view input_stem = "gewebe-input.";
 
+constexpr const char* out_of_memory = "out of memory";
+
 std::string one_line(std::string text) {
   // Of exceptions that assimp turns into texts.
   for (const char* const words : {"std::bad_alloc", "max_size()", "vector::", "basic_string::"})
     if (text.find(words) != std::string::npos)
-      text = "out of memory";
+      text = out_of_memory;
   for (char& c : text)
     if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) > 126)
       c = ' ';
@@ -493,6 +495,95 @@ ChildLimits limits_for(std::uint64_t bytes) {
   return limits;
 }
 
+// ---- what is wrong where assimp only runs out of memory
+
+// The words of a text, with their lines.
+class Words {
+public:
+  Words(std::string_view text, std::size_t line) : text_(text), line_(line) {}
+  std::size_t line() const { return line_; }
+  // Empty at the end.
+  std::string_view next() {
+    while (at_ < text_.size() && is_space(text_[at_]))
+      line_ += text_[at_++] == '\n';
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && !is_space(text_[at_]))
+      ++at_;
+    return text_.substr(begin, at_ - begin);
+  }
+
+private:
+  static bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
+  std::string_view text_;
+  std::size_t at_ = 0, line_;
+};
+
+std::string quoted(std::string_view word) {
+  return "'" + std::string(word.substr(0, 40)) + (word.size() > 40 ? "...'" : "'");
+}
+
+bool is_number(std::string_view word) {
+  if (word.starts_with('+'))
+    word.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return end == word.data() + word.size() && error != std::errc::invalid_argument;
+}
+
+// The first count of an OFF file that its bytes cannot hold.
+std::string fault_of_off(std::string_view bytes) {
+  Words words(bytes, 1);
+  std::string_view word = words.next();
+  if (!word.empty() && !is_number(word)) // OFF, COFF, STOFF, ...
+    word = words.next();
+  for (const char* const what : {"points", "faces"}) {
+    double count = 0;
+    (void)std::from_chars(word.data(), word.data() + word.size(), count);
+    if (count > static_cast<double>(bytes.size()) / 2)
+      return "line " + std::to_string(words.line()) + ": " + quoted(word) + " " + what +
+             " in a file of " + std::to_string(bytes.size()) + " bytes";
+    word = words.next();
+  }
+  return "";
+}
+
+// The first word in a Collada file's lists of numbers that is none.
+std::string fault_of_collada(std::string_view bytes) {
+  std::size_t line = 1, counted = 0;
+  for (std::size_t at = 0; (at = bytes.find('<', at)) != std::string_view::npos;) {
+    const std::size_t name_end = bytes.find_first_of(" \t\r\n>", ++at);
+    const std::size_t open = bytes.find('>', at);
+    if (open == std::string_view::npos)
+      break;
+    const std::string_view name = bytes.substr(at, name_end - at);
+    if (name != "p" && name != "vcount" && name != "float_array")
+      continue;
+    line += static_cast<std::size_t>(
+        std::count(bytes.begin() + static_cast<std::ptrdiff_t>(counted),
+                   bytes.begin() + static_cast<std::ptrdiff_t>(open), '\n'));
+    counted = open;
+    Words words(bytes.substr(open + 1, bytes.find('<', open) - open - 1), line);
+    for (std::string_view word = words.next(); !word.empty(); word = words.next())
+      if (!is_number(word))
+        return "line " + std::to_string(words.line()) + ": " + quoted(word) + " in <" +
+               std::string(name) + ">, expected a number";
+  }
+  return "";
+}
+
+// What is wrong with an input that needs more memory than limits_for gives, which no valid file of
+// its size does.
+std::string fault_of_size(const AssimpSource& source) {
+  std::string fault;
+  if (source.kind == Kind::off)
+    fault = fault_of_off(source.bytes);
+  if (source.kind == Kind::dae)
+    fault = fault_of_collada(source.bytes);
+  return fault.empty() ? "a count or an index in it goes far beyond its " +
+                             std::to_string(source.bytes.size()) + " bytes"
+                       : fault;
+}
+
 // ---- mesh to scene
 
 // The triangles of one part and material.
@@ -639,6 +730,20 @@ std::string export_scene(const TriangleMesh& mesh, Kind kind) {
 
 } // namespace
 
+double collada_metres(std::string_view bytes) {
+  const std::size_t asset = bytes.find("<asset");
+  const std::size_t unit = bytes.find("<unit", asset == std::string_view::npos ? 0 : asset);
+  if (asset == std::string_view::npos || unit == std::string_view::npos)
+    return 1;
+  const std::string_view tag = bytes.substr(unit, bytes.find('>', unit) - unit);
+  const std::size_t name = tag.find("meter=");
+  if (name == std::string_view::npos || name + 8 > tag.size())
+    return 1;
+  double metres = 0;
+  (void)std::from_chars(tag.data() + name + 7, tag.data() + tag.size(), metres);
+  return metres > 0 && std::isfinite(metres) ? metres : 1;
+}
+
 TriangleMesh read_by_assimp(const AssimpSource& source, AssimpStats* stats) {
   const std::string shown = format_of(source.kind).shown;
   try {
@@ -651,8 +756,11 @@ TriangleMesh read_by_assimp(const AssimpSource& source, AssimpStats* stats) {
         limits_for(source.bytes.size()));
     return from_wire(wire, stats);
   } catch (const Error& error) {
-    throw Error("not readable as " + shown + ": " + one_line(error.what()) + ", expected a valid " +
-                shown + " file");
+    std::string fault = one_line(error.what());
+    if (fault == out_of_memory && has_room_for_child(limits_for(source.bytes.size())))
+      fault = one_line(fault_of_size(source));
+    throw Error("not readable as " + shown + ": " + fault + ", expected a valid " + shown +
+                " file");
   }
 }
 

@@ -34,6 +34,9 @@ struct AssimpStats {
 /// calls "up". \throw Error "not readable as OBJ: …, expected …"; also if there is no triangle
 TriangleMesh read_by_assimp(const AssimpSource& source, AssimpStats* stats = nullptr);
 
+/// Metres that a Collada file says its unit is: `meter` of <unit> in <asset>, else 1.
+double collada_metres(std::string_view bytes);
+
 /// The bytes of the mesh, given in mm, as GLB (metres), 3DS (mm) or Collada (mm, its unit stated),
 /// in single precision, without time, host or author. One node for each part, one mesh for each
 /// material in it; 3DS meshes are split where they pass 65,535 points. \pre check_mesh(mesh) passes

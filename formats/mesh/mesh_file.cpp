@@ -12,8 +12,12 @@
 namespace gewebe {
 namespace {
 
-bool states_its_unit(Kind kind) {
-  return kind == Kind::gltf || kind == Kind::glb || kind == Kind::dae;
+/// Millimetres that the file says its numbers are in; the readers of these formats have scaled by
+/// them. 1 for formats that state no unit.
+double stated_unit(Kind kind, std::string_view bytes) {
+  if (kind == Kind::gltf || kind == Kind::glb)
+    return 1000; // metres, by the specification
+  return kind == Kind::dae ? 1000 * collada_metres(bytes) : 1;
 }
 
 bool has_tetrahedra(Kind kind) {
@@ -40,13 +44,8 @@ void check_readable(const Input& input, const MeshReadOptions& options) {
                                                                        : " is no mesh")) +
                                   ", expected one of " + kind_list(readable_mesh_kinds()) +
                                   " by content, suffix or --format");
-  if (!options.unit.empty()) {
+  if (!options.unit.empty())
     millimetres_per(options.unit);
-    if (states_its_unit(options.kind))
-      throw UsageError(input.name(), "--unit " + options.unit + " for " +
-                                         std::string(kind_name(options.kind)) +
-                                         ", which states its own unit, expected no --unit");
-  }
 }
 
 // Where side files lie; "" for a pipe.
@@ -59,12 +58,8 @@ std::string folder_of(const std::string& name) {
   return slash == 0 ? "/" : name.substr(0, slash);
 }
 
-double scale_of(const MeshReadOptions& options) {
-  return options.unit.empty() ? 1 : millimetres_per(options.unit);
-}
-
-TriangleMesh read_unwelded(Input& input, const MeshReadOptions& options, MeshReadStats& stats) {
-  const std::string bytes = input.read_all();
+TriangleMesh read_unwelded(const std::string& bytes, const Input& input,
+                           const MeshReadOptions& options, MeshReadStats& stats) {
   if (options.kind == Kind::ply) {
     PlyStats counts;
     TriangleMesh mesh = read_ply(bytes, input.name(), &counts);
@@ -163,8 +158,10 @@ TriangleMesh read_mesh(Input& input, const MeshReadOptions& options, MeshReadSta
   check_readable(input, options);
   return at(input.name(), [&] {
     MeshReadStats counts;
-    TriangleMesh mesh = read_unwelded(input, options, counts);
-    scale_points(mesh.points, scale_of(options));
+    const std::string bytes = input.read_all(options.max_memory);
+    TriangleMesh mesh = read_unwelded(bytes, input, options, counts);
+    if (!options.unit.empty())
+      scale_points(mesh.points, millimetres_per(options.unit) / stated_unit(options.kind, bytes));
     WeldOptions welding;
     welding.mode = options.weld.value_or(options.kind == Kind::ply ? Weld::none : Weld::borders);
     welding.drop_unused = options.drop_unused;

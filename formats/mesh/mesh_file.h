@@ -37,7 +37,8 @@ struct MeshReadOptions {
   std::string unit;          ///< of the coordinates; "": mm, or what glTF, GLB and Collada state
   std::optional<Weld>
       weld; ///< nothing: Weld::none for PLY, whose indices count; Weld::borders else
-  bool drop_unused = false; ///< remove points that no triangle uses
+  bool drop_unused = false;              ///< remove points that no triangle uses
+  std::uint64_t max_memory = UINT64_MAX; ///< a larger input is refused
 };
 
 struct MeshReadStats {
@@ -52,7 +53,7 @@ struct MeshReadStats {
 /// The mesh of `input`, converted to mm and welded; triangles with two equal corners are removed.
 /// Side files (.mtl, .bin) are looked for in the folder of the input's path, unless it is a pipe. A
 /// mesh without triangle comes from PLY alone. \throw Error with place; UsageError if the kind is
-/// not readable (naming --format) or if a unit is given for glTF, GLB or Collada
+/// not readable (naming --format)
 TriangleMesh read_mesh(Input& input, const MeshReadOptions& options,
                        MeshReadStats* stats = nullptr);
 

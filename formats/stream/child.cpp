@@ -98,7 +98,7 @@ void set_limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
   ::setrlimit(what, &limit);
 }
 
-[[maybe_unused]] std::uint64_t address_space_in_use() {
+std::uint64_t address_space_in_use() {
   std::uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
@@ -200,6 +200,13 @@ std::string how_it_ended(int status, const ChildLimits& limits) {
 }
 
 } // namespace
+
+bool has_room_for_child(const ChildLimits& limits) {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_AS, &limit);
+  return limit.rlim_cur == RLIM_INFINITY ||
+         limit.rlim_cur >= address_space_in_use() + limits.memory;
+}
 
 std::string run_in_child(const std::function<std::string()>& work, const ChildLimits& limits) {
   int ends[2];

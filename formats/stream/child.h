@@ -13,6 +13,9 @@ struct ChildLimits {
   double seconds = 60;       ///< time by the clock, for a child that sleeps
 };
 
+/// Whether a child gets all of limits.memory: false where this process has a smaller RLIMIT_AS.
+bool has_room_for_child(const ChildLimits& limits);
+
 /// Forks, runs `work` in the child and returns its bytes. The child has default signals, no core
 /// file, /dev/null as standard input, output and error, no other open file, and dies with its
 /// parent. \pre no other thread of this process holds a lock that `work` needs (glibc's malloc

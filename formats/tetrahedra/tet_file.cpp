@@ -41,10 +41,10 @@ TetgenFiles tetgen_names(const std::string& name) {
   return names;
 }
 
-TetMesh read_tetgen(Input& input) {
+TetMesh read_tetgen(Input& input, std::uint64_t max_memory) {
   const TetgenFiles names = tetgen_names(input.name());
   Input beside(names.node == input.name() ? names.ele : names.node, false);
-  TetgenFiles bytes{input.read_all(), beside.read_all()};
+  TetgenFiles bytes{input.read_all(max_memory), beside.read_all(max_memory)};
   if (names.node != input.name())
     std::swap(bytes.node, bytes.ele);
   return tet_mesh_from_tetgen(bytes, names);
@@ -129,9 +129,10 @@ TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats*
   TetReadStats counts;
   TetMesh mesh;
   if (options.kind == Kind::tetgen)
-    mesh = read_tetgen(input);
+    mesh = read_tetgen(input, options.max_memory);
   else
-    mesh = tet_mesh_from_bytes(input.read_all(), input.name(), options.kind, &counts);
+    mesh = tet_mesh_from_bytes(input.read_all(options.max_memory), input.name(), options.kind,
+                               &counts);
   at(input.name(), [&] { scale_points(mesh.points, options.scale); });
   if (options.drop_unused)
     counts.dropped_points = drop_unused_points(mesh);

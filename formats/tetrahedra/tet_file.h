@@ -23,9 +23,10 @@ const std::vector<Kind>& writable_tet_kinds();
 bool holds_tetrahedra(std::string_view peeked, Kind kind);
 
 struct TetReadOptions {
-  Kind kind = Kind::unknown; ///< of input_kind()
-  double scale = 1;          ///< millimetres per unit of the coordinates
-  bool drop_unused = false;  ///< remove points that no tetrahedron uses
+  Kind kind = Kind::unknown;             ///< of input_kind()
+  double scale = 1;                      ///< millimetres per unit of the coordinates
+  bool drop_unused = false;              ///< remove points that no tetrahedron uses
+  std::uint64_t max_memory = UINT64_MAX; ///< a larger input is refused
 };
 
 struct TetReadStats {

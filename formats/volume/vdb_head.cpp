@@ -13,7 +13,8 @@ namespace {
 
 class Reader {
 public:
-  Reader(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+  Reader(std::string_view bytes, const std::string& name, std::size_t position = 0)
+      : bytes_(bytes), name_(name), position_(position) {}
 
   [[noreturn]] void fail(const std::string& what) const {
     throw Error(name_, "byte " + std::to_string(position_) + ": " + what);
@@ -44,8 +45,20 @@ public:
 private:
   std::string_view bytes_;
   const std::string& name_;
-  std::size_t position_ = 0;
+  std::size_t position_;
 };
+
+/// Descriptor, compression, metadata and the kind of transform of a grid.
+void check_grid(Reader& reader) {
+  (void)reader.string("a grid name");
+  (void)reader.string("a grid type");
+  (void)reader.string("an instance name");
+  (void)reader.take(24, "grid offsets");
+  (void)reader.take(4, "a compression flag");
+  reader.metadata();
+  if (reader.string("a kind of transform") == "NonlinearFrustumMap") // holds another such string
+    reader.fail("the grid has a frustum transform, expected an affine one");
+}
 
 } // namespace
 
@@ -64,12 +77,12 @@ void check_vdb_head(std::string_view bytes, const std::string& name) {
   const auto grids = reader.number<std::int32_t>("a grid count");
   if (grids < 1)
     reader.fail("no grid, expected a float grid");
-  (void)reader.string("a grid name");
-  (void)reader.string("a grid type");
-  (void)reader.string("an instance name");
-  (void)reader.take(24, "grid offsets");
-  (void)reader.take(4, "a compression flag");
-  reader.metadata();
+  check_grid(reader);
+}
+
+void check_vdb_grid(std::string_view bytes, std::size_t position, const std::string& name) {
+  Reader reader(bytes, name, position);
+  check_grid(reader);
 }
 
 } // namespace gewebe

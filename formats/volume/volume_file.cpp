@@ -3,9 +3,12 @@
 #include "base/digest.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "formats/stream/kind.h"
+#include "formats/volume/label_volume.h"
 #include "volume/grid_internal.h"
 
 #include <openvdb/io/Archive.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/util/logging.h>
@@ -19,6 +22,7 @@
 #include <iostream>
 #include <istream>
 #include <mutex>
+#include <optional>
 #include <ostream>
 #include <sstream>
 #include <streambuf>
@@ -42,6 +46,9 @@ void initialize_openvdb() {
   std::call_once(once, [] {
     openvdb::logging::setLevel(openvdb::logging::Level::Fatal);
     openvdb::initialize();
+    // Tells where leaves stand, for readers that load on demand. Its lengths need a check, and
+    // nothing here asks for it: as metadata of an unknown type it is passed over.
+    openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
   });
 }
 
@@ -208,10 +215,12 @@ std::size_t leaf_bytes(const MemoryBuffer& buffer, std::string_view bytes, Packi
   return size;
 }
 
-/// A grid whose leaves are read in parallel, with all their values in one block of memory.
+/// A grid whose leaves are read in parallel, with all their values in one block of memory. Without
+/// a packing OpenVDB reads them.
 class ReadGrid final : public openvdb::FloatGrid {
 public:
-  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage, Packing packing)
+  ReadGrid(const Context& context, const std::shared_ptr<LeafStorage>& storage,
+           std::optional<Packing> packing)
       : openvdb::FloatGrid(make_tree(0, storage)), context_(without_progress(context)),
         storage_(storage), packing_(packing) {}
 
@@ -219,15 +228,21 @@ public:
     std::vector<FloatLeaf*> leaves;
     leaves.reserve(tree().leafCount());
     tree().getNodes(leaves);
-    require_memory(context_, static_cast<double>(leaves.size()) * leaf_voxels * sizeof(float),
-                   "the volume");
+    double bytes = static_cast<double>(leaves.size()) * leaf_voxels * sizeof(float);
+    for (const ZeroPages& pages : storage_->pages) // of grids before it
+      bytes += static_cast<double>(pages.size());
+    require_memory(context_, bytes, "the volume");
+    if (!packing_) {
+      openvdb::FloatGrid::readBuffers(stream);
+      return;
+    }
     auto& buffer = dynamic_cast<MemoryBuffer&>(*stream.rdbuf());
     std::vector<std::string_view> parts; // one for each block of leaves
     std::size_t done = 0;
     for (std::size_t n = 0; n < leaves.size(); ++n) {
       if (n % leaves_at_once == 0)
         parts.push_back(buffer.rest().substr(done, 0));
-      const std::size_t size = leaf_bytes(buffer, buffer.rest().substr(done), packing_);
+      const std::size_t size = leaf_bytes(buffer, buffer.rest().substr(done), *packing_);
       done += size;
       parts.back() = {parts.back().data(), parts.back().size() + size};
     }
@@ -254,15 +269,17 @@ public:
 private:
   Context context_;
   std::shared_ptr<LeafStorage> storage_;
-  Packing packing_;
+  std::optional<Packing> packing_;
 };
 
-/// A stream with one float grid, the usual case. What else there may be is left to OpenVDB.
+/// Reads the float grids of a stream and passes over the others. Each length that OpenVDB would
+/// believe is compared with the bytes that are there.
 class ReadArchive final : public openvdb::io::Archive {
 public:
-  /// The grid, or null if this is another kind of stream.
-  std::shared_ptr<ReadGrid> read(std::istream& stream, const Context& context,
-                                 const std::shared_ptr<LeafStorage>& storage) {
+  openvdb::GridPtrVec read(MemoryBuffer& buffer, const Context& context,
+                           const std::shared_ptr<LeafStorage>& storage, StreamWay way) {
+    std::istream stream(&buffer);
+    stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
     readHeader(stream);
     auto metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(stream, metadata, /*transfer=*/false);
@@ -271,23 +288,66 @@ public:
     setDataCompression(stream);
     openvdb::MetaMap ignored;
     ignored.readMeta(stream);
-    if (readGridCount(stream) != 1)
-      return nullptr;
-    openvdb::io::GridDescriptor descriptor;
-    (void)descriptor.read(stream);
-    if (descriptor.gridType() != openvdb::FloatGrid::gridType() || descriptor.isInstance() ||
-        descriptor.saveFloatAsHalf())
-      return nullptr;
-    const auto position = stream.tellg();
+    openvdb::GridPtrVec grids;
+    NamedGridMap named;
+    for (std::int32_t left = readGridCount(stream); left > 0; --left) {
+      check_vdb_grid(buffer.all(), position(stream), buffer.name());
+      openvdb::io::GridDescriptor descriptor;
+      openvdb::GridBase::Ptr grid = descriptor.read(stream);
+      const bool is_float = descriptor.gridType() == openvdb::FloatGrid::gridType();
+      if (!is_float && inputHasGridOffsets()) {
+        const std::int64_t end = descriptor.getEndPos();
+        if (end <= static_cast<std::int64_t>(position(stream)))
+          throw Error(buffer.name(), "byte " + std::to_string(position(stream)) +
+                                         ": the grid ends before it begins");
+        stream.seekg(end);
+        continue;
+      }
+      if (!is_float)
+        refuse_lengths(descriptor, buffer.name());
+      else {
+        grid = std::make_shared<ReadGrid>(context, storage, packing_ahead(stream, way));
+        grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
+      }
+      readGrid(grid, descriptor, stream);
+      if (descriptor.isInstance()) {
+        if (named.find(descriptor.instanceParentName()) == named.end())
+          throw Error(buffer.name(), "a grid shares the tree of one that is not there");
+        connectInstance(descriptor, named);
+      }
+      named[descriptor.uniqueName()] = grid;
+      grids.push_back(grid);
+    }
+    return grids;
+  }
+
+private:
+  static std::size_t position(std::istream& stream) {
+    return static_cast<std::size_t>(static_cast<std::streamoff>(stream.tellg()));
+  }
+
+  /// Trees of points and of strings hold lengths of their own.
+  static void refuse_lengths(const openvdb::io::GridDescriptor& descriptor,
+                             const std::string& name) {
+    const std::string& type = descriptor.gridType();
+    if (type.find("ptdata") != std::string::npos || type.find("string") != std::string::npos)
+      throw Error(name, "a grid of type " + type +
+                            " cannot be passed over in a stream, expected grids of numbers");
+  }
+
+  /// How the leaves of the grid that follows are packed, if this file's reader can unpack them.
+  static std::optional<Packing> packing_ahead(std::istream& stream, StreamWay way) {
+    if (way != StreamWay::parallel)
+      return std::nullopt;
+    const auto begin = stream.tellg();
     readGridCompression(stream);
     const std::uint32_t flags = openvdb::io::getDataCompression(stream);
-    if (flags != flags_of(Packing::blosc) && flags != flags_of(Packing::none))
-      return nullptr;
-    stream.seekg(position);
-    auto grid = std::make_shared<ReadGrid>(
-        context, storage, flags == flags_of(Packing::none) ? Packing::none : Packing::blosc);
-    readGrid(grid, descriptor, stream);
-    return grid;
+    stream.seekg(begin);
+    if (flags == flags_of(Packing::blosc))
+      return Packing::blosc;
+    if (flags == flags_of(Packing::none))
+      return Packing::none;
+    return std::nullopt;
   }
 };
 
@@ -481,23 +541,10 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
 Grid parse_volume(std::string_view bytes, const std::string& name, const Context& context,
                   StreamWay way) {
   MemoryBuffer buffer(bytes, name);
-  std::istream stream(&buffer);
-  stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
   const auto storage = std::make_shared<LeafStorage>();
-  openvdb::FloatGrid::Ptr native;
-  if (way == StreamWay::parallel)
-    native = ReadArchive().read(stream, context, storage);
-  openvdb::FloatTree::Ptr tree;
-  if (native) {
-    tree = native->treePtr();
-  } else {
-    MemoryBuffer again(bytes, name);
-    std::istream whole(&again);
-    whole.exceptions(stream.exceptions());
-    openvdb::io::Stream archive(whole, /*delayLoad=*/false);
-    native = choose_grid(*archive.getGrids(), name);
-    tree = adopt_tree(native->treePtr(), storage);
-  }
+  openvdb::FloatGrid::Ptr native =
+      choose_grid(ReadArchive().read(buffer, context, storage, way), name);
+  openvdb::FloatTree::Ptr tree = native->treePtr();
   GridInfo info;
   info.transform = transform_of(native->transform(), name);
   info.background = native->background();
@@ -529,6 +576,25 @@ std::string fault_of(std::string_view remark) {
   return "is damaged or of a kind that this program does not read";
 }
 
+/// What other programs make volumes of is named, with the program.
+void refuse_other_kinds(std::string_view bytes, const std::string& name) {
+  const std::string_view first = bytes.substr(0, 4096);
+  if (is_label_volume(first))
+    throw Error(name, "is a label volume or a scan, expected an OpenVDB volume: voxelize --label L "
+                      "or --threshold LOW makes one of it");
+  switch (kind_from_magic(first)) {
+  case Kind::ply:
+  case Kind::glb:
+  case Kind::vtp:
+    throw Error(name, "is a mesh, expected an OpenVDB volume: voxelize makes one of it");
+  case Kind::ela:
+    throw Error(name, "is a model, expected an OpenVDB volume: exp2ela --to ply writes its "
+                      "surface, voxelize makes a volume of that");
+  default:
+    break;
+  }
+}
+
 } // namespace
 
 Grid read_volume(Input& input, const Context& context) {
@@ -542,6 +608,7 @@ Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Co
 Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
                        StreamWay way) {
   initialize_openvdb();
+  refuse_other_kinds(bytes, name);
   check_vdb_head(bytes, name);
   Remarks remarks;
   try {

@@ -28,8 +28,11 @@ void write_volume(Output& output, const Grid& grid, const Context& context,
                   Packing packing = Packing::blosc);
 
 /// What the head of an OpenVDB stream says, checked without OpenVDB: it believes every size it
-/// reads. Walks magic, version, file metadata and the first grid's descriptor and metadata. \throw
-/// Error (place = name, "byte N: …") if that much is not there or not sane
+/// reads. Walks magic, version, file metadata and the first grid's descriptor, metadata and kind of
+/// transform. \throw Error (place = name, "byte N: …") if that much is not there or not sane
 void check_vdb_head(std::string_view bytes, const std::string& name);
+
+/// The same for a grid whose descriptor begins at `position`.
+void check_vdb_grid(std::string_view bytes, std::size_t position, const std::string& name);
 
 } // namespace gewebe

@@ -7,6 +7,7 @@
 #include "base/mesh.h"
 #include "shading/volume_view.h"
 #include "tetrahedra/tet_mesh.h"
+#include "voxelize/voxelize.h"
 
 #include <cstdint>
 #include <string>
@@ -25,10 +26,12 @@ struct SurfaceFilling {
   unsigned grade = 0;         ///< as in StuffingOptions
   /// Parts of the mesh that are bodies of their own, different ones. Each must have triangles.
   std::vector<std::int32_t> parts = {};
+  VoxelRule rule = VoxelRule::parity;
+  OpenMesh on_open = OpenMesh::refuse;
 };
 
-/// Tetrahedra that fill a closed surface: jones_density (voxelize/distance_ramp.h) by parity on
-/// voxels at multiples of `voxel`, then stuff (stuffing/stuffing.h).
+/// Tetrahedra that fill a surface: jones_density (voxelize/distance_ramp.h) on voxels at multiples
+/// of `voxel`, then stuff (stuffing/stuffing.h).
 struct FilledSurface {
   /// Without parts of their own without materials; else a tetrahedron has as material the place in
   /// `parts` of that with the least volume of those that hold it, or their number. Faces follow the
@@ -40,9 +43,11 @@ struct FilledSurface {
     double of_surface = 0, filled = 0;
   };
   std::vector<Volume> volumes;
+  /// What was found in these bodies, in the same order: holes, faces that were turned.
+  std::vector<VoxelizeReport> found;
 };
 /// \throw Error as they, with place `name`, and as above; each part of its own, and the others
-/// together, must be closed
+/// together, must be closed unless `rule` and `on_open` allow holes
 FilledSurface fill_surface(const TriangleMesh& mesh, const std::string& name,
                            const SurfaceFilling& filling, const Context& context);
 

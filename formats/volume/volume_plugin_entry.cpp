@@ -46,15 +46,24 @@ struct Body {
   std::int32_t material = 0;
   double volume = 0;
   Grid density;
+  VoxelizeReport found;
 };
 
 FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
                    const Context& context) {
   std::vector<Body> bodies;
   const auto add = [&](const TriangleMesh& of, std::size_t material) {
-    bodies.push_back({static_cast<std::int32_t>(material), std::abs(signed_volume(of)),
-                      jones_density(context, of, uniform_transform(filling.voxel), OpenMesh::refuse,
-                                    nullptr, VoxelRule::parity)});
+    Body body;
+    body.material = static_cast<std::int32_t>(material);
+    CoverageReport report;
+    body.density = jones_density(context, of, uniform_transform(filling.voxel), filling.on_open,
+                                 &report, filling.rule);
+    body.found = report.mesh;
+    // The signed volume of a surface with holes or turned faces says nothing.
+    body.volume = filling.rule == VoxelRule::parity && report.mesh.boundary_edges == 0
+                      ? std::abs(signed_volume(of))
+                      : report.volume;
+    bodies.push_back(std::move(body));
   };
   for (std::size_t p = 0; p < filling.parts.size(); ++p)
     try {
@@ -68,7 +77,7 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
     add(rest, filling.parts.size());
   StuffingOptions options{.isovalue = {}, .cell = filling.cell, .grade = filling.grade};
   if (filling.parts.empty()) {
-    FilledSurface filled{stuff(context, bodies[0].density, options), {}};
+    FilledSurface filled{stuff(context, bodies[0].density, options), {}, {bodies[0].found}};
     filled.volumes.push_back({bodies[0].volume, volume(filled.mesh)});
     return filled;
   }
@@ -96,8 +105,9 @@ FilledSurface fill(const TriangleMesh& mesh, const SurfaceFilling& filling,
   };
   const Grid all = operands.size() == 1 ? bodies[0].density
                                         : csg(context, CsgOperation::unite, std::move(operands));
-  FilledSurface filled{stuff(context, all, options), {}};
+  FilledSurface filled{stuff(context, all, options), {}, {}};
   for (std::size_t b = 0; b < bodies.size(); ++b) {
+    filled.found.push_back(bodies[b].found);
     TetMesh in = filled.mesh;
     set_materials(context, inside_source(bodies[b].density), in);
     FilledSurface::Volume& told = filled.volumes.emplace_back();

@@ -437,11 +437,15 @@ std::vector<BuildReport::Line> BuildReport::lines() const {
           {"nonmanifold_edges", nonmanifold_edges, nullptr}};
 }
 
+double model_bytes(double points, double triangles, bool bend) {
+  // The model, its edge table, and the springs once more while they are sorted.
+  return 150 * points + (bend ? 420 : 300) * triangles;
+}
+
 BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
                        const Context& context) {
-  // The model, its edge table, and the springs once more while they are sorted.
-  const auto bytes = 150 * static_cast<double>(mesh.points.size()) +
-                     (options.bend ? 420 : 300) * static_cast<double>(mesh.triangles.size());
+  const double bytes = model_bytes(static_cast<double>(mesh.points.size()),
+                                   static_cast<double>(mesh.triangles.size()), options.bend);
   const std::string what = "the model of " + std::to_string(mesh.triangles.size()) + " triangles";
   require_memory(context, bytes, what.c_str());
   return Builder(mesh, options, context).build();

@@ -71,6 +71,9 @@ struct BuiltModel {
 BuiltModel build_model(const TriangleMesh& mesh, const BuildOptions& options,
                        const Context& context);
 
+/// Bytes that build_model needs at its peak.
+double model_bytes(double points, double triangles, bool bend);
+
 /// Places for at most `count` central nodes for these points, and the nearest of them for each
 /// point: seeds by farthest points, the first the one farthest from the mean, then Lloyd's
 /// iteration until nothing changes or for 100 rounds. Seeds as far but for a hundredth of their

@@ -203,26 +203,29 @@ std::string place_text(const Vec3& p) {
   return number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z);
 }
 
-/// What a near: that misses may have meant: the node next to its point, and where the model is.
-std::string nearest_to(const Model& model, std::size_t surface, const Selector& selector) {
-  const auto near = std::ranges::find(selector.steps, Selector::Op::near, &Selector::Step::op);
-  if (near == selector.steps.end() || surface == 0)
+/// Where the model is, for a selector that selects nothing; for one with near: also the node
+/// nearest to its point.
+std::string model_box(const Model& model, std::size_t surface, const Selector& selector) {
+  if (surface == 0)
     return "";
+  Box3 box;
+  for (std::size_t i = 0; i < surface; ++i)
+    box.add(model.nodes[i].position);
+  const std::string where =
+      "the model's box is " + place_text(box.min) + " to " + place_text(box.max);
+  const auto near = std::ranges::find(selector.steps, Selector::Op::near, &Selector::Step::op);
+  if (near == selector.steps.end())
+    return "; " + where;
   const Vec3 point{near->numbers[0], near->numbers[1], near->numbers[2]};
   std::size_t best = 0;
-  Box3 box;
-  for (std::size_t i = 0; i < surface; ++i) {
-    const Vec3& p = model.nodes[i].position;
-    box.add(p);
-    if (norm(p - point) < norm(model.nodes[best].position - point))
+  for (std::size_t i = 1; i < surface; ++i)
+    if (norm(model.nodes[i].position - point) < norm(model.nodes[best].position - point))
       best = i;
-  }
   const Vec3& nearest = model.nodes[best].position;
   std::array<char, 32> distance{};
   (void)std::snprintf(distance.data(), distance.size(), "%.3g", norm(nearest - point));
   return "; the nearest is node " + std::to_string(best) + " at " + place_text(nearest) + ", " +
-         distance.data() + " mm away, the model's box is " + place_text(box.min) + " to " +
-         place_text(box.max);
+         distance.data() + " mm away, " + where;
 }
 
 bool has_numbers_alone(const Selector& selector) {
@@ -263,7 +266,7 @@ std::vector<std::uint32_t> select_nodes(const Model& model, const NodeCounts& co
   if (selected.empty())
     throw Error("selector " + quoted_selector(selector.text) +
                 " selects no node, expected at least one" +
-                nearest_to(model, counts.surface, selector));
+                model_box(model, counts.surface, selector));
   return selected;
 }
 

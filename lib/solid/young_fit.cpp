@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace gewebe {
 
@@ -70,7 +71,7 @@ double mean_square(std::span<const double> values) {
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
-/// A common factor of all moduli with which small strains fit best.
+/// A common factor of all moduli with which small strains fit the measurements.
 double start_factor(const TetMesh& mesh, std::span<const SolidMaterial> materials,
                     std::span<const std::uint8_t> fixed, std::span<const MeasuredCase> cases,
                     std::span<const Datum> data, const Context& context) {
@@ -82,16 +83,32 @@ double start_factor(const TetMesh& mesh, std::span<const SolidMaterial> material
     loads.push_back(c.load);
   const auto u = hyperelastic_response_to(mesh, elements, fixed, rest, loads, {}, context);
   double with = 0, square = 0;
+  std::vector<std::pair<double, double>> ratios; // measured by computed, and their weight
+  const Datum* worst = nullptr;
+  double most_against = 0;
   for (const Datum& d : data) {
     const double p = predicted(d, u[d.of_case]);
     with += p * d.value;
     square += p * p;
+    if (p != 0)
+      ratios.emplace_back(d.value / p, p * p);
+    if (worst == nullptr || p * d.value < most_against) {
+      most_against = p * d.value;
+      worst = &d;
+    }
   }
   if (!(square > 0))
     throw Error("the loads move nothing that is measured, expected a force or gravity");
   if (!(with > 0))
-    throw Error("what is measured goes against the loads, expected displacements along them: look "
-                "at signs and axes");
+    throw Error(*worst->name, "what is measured goes against the loads" +
+                                  std::string(data.size() == 1 ? "" : ", here the most") +
+                                  ", expected displacements along them: look at signs and axes");
+  // The weighted median: one wrong measurement must not make the body as soft as a fluid.
+  std::ranges::sort(ratios);
+  double below = 0;
+  for (const auto& [ratio, weight] : ratios)
+    if (below += weight; 2 * below >= square)
+      return ratio > 0 ? 1 / ratio : square / with;
   return square / with;
 }
 
@@ -191,6 +208,16 @@ public:
 
   int solves() const { return fit_.solves; }
 
+  /// The measurement that the last solve() meets worst, with what it says.
+  std::string worst_measurement() const {
+    Eigen::Index row = 0;
+    if (!(residual_.cwiseAbs().maxCoeff(&row) > 0))
+      return "";
+    const Datum& d = data_[static_cast<std::size_t>(row)];
+    return *d.name + " is farthest from the others: " + rounded_text(d.value) +
+           " mm measured where " + rounded_text(d.value + residual_[row]) + " mm are computed";
+  }
+
 private:
   std::vector<SolidElement> only(std::vector<SolidElement> elements, std::size_t material) const {
     for (std::size_t t = 0; t < elements.size(); ++t) {
@@ -281,16 +308,32 @@ YoungFit fit_young(const TetMesh& mesh, std::span<const SolidMaterial> materials
                 std::to_string(wanted.size()) + " materials, expected as many at least");
   Fit fit(mesh, materials, names, wanted, fixed, cases, data, context);
   fit.scale(start_factor(mesh, materials, fixed, cases, data, context));
-  for (;;) {
-    fit.solve();
-    const double change = fit.improve();
-    if (change <= options.tolerance)
-      return fit.result();
-    if (fit.solves() + static_cast<int>(cases.size()) > options.max_solves)
-      throw Error("the fit did not end in " + std::to_string(fit.solves()) +
-                  " solves: moduli still change by " + rounded_text(100 * change) +
-                  " %, expected measurements of this body under these loads");
-  }
+  // What ends the fit has no place of its own: a wrong measurement is the usual reason.
+  const auto naming_worst = [&](auto&& work) {
+    try {
+      return work();
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      const std::string worst = data.size() > 1 ? fit.worst_measurement() : "";
+      if (worst.empty() || !error.place().empty())
+        throw;
+      throw Error(error.what() + ("; " + worst));
+    }
+  };
+  fit.solve();
+  return naming_worst([&] {
+    for (;;) {
+      const double change = fit.improve();
+      if (change <= options.tolerance)
+        return fit.result();
+      if (fit.solves() + static_cast<int>(cases.size()) > options.max_solves)
+        throw Error("the fit did not end in " + std::to_string(fit.solves()) +
+                    " solves: moduli still change by " + rounded_text(100 * change) +
+                    " %, expected measurements of this body under these loads");
+      fit.solve();
+    }
+  });
 }
 
 } // namespace gewebe

@@ -40,15 +40,12 @@ constexpr openvdb::Index32 borrowed = 1; // Leaf::transientData
 
 struct TreeDeleter {
   std::shared_ptr<LeafStorage> storage;
-  FloatTree::Ptr adopted; // null: the tree was made here
   void operator()(FloatTree* tree) {
     for (auto upper = tree->root().beginChildOn(); upper; ++upper)
       for (auto lower = upper->beginChildOn(); lower; ++lower)
         for (auto leaf = lower->beginChildOn(); leaf; ++leaf)
           give_back(*leaf);
-    if (adopted == nullptr)
-      delete tree;
-    adopted.reset();
+    delete tree;
   }
 };
 
@@ -89,12 +86,7 @@ LeafView view_of(const Leaf& leaf) {
 }
 
 FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage) {
-  return {new FloatTree(background), TreeDeleter{storage, nullptr}};
-}
-
-FloatTree::Ptr adopt_tree(FloatTree::Ptr tree, const std::shared_ptr<LeafStorage>& storage) {
-  FloatTree* const raw = tree.get();
-  return {raw, TreeDeleter{storage, std::move(tree)}};
+  return {new FloatTree(background), TreeDeleter{storage}};
 }
 
 Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage) {
@@ -294,8 +286,30 @@ GridBuilder::GridBuilder(GridInfo info) : state_(std::make_unique<State>(std::mo
 GridBuilder::~GridBuilder() = default;
 GridBuilder::GridBuilder(GridBuilder&&) noexcept = default;
 
+namespace {
+
+/// Refuses leaves that need more memory, with the nodes above them, than the context allows.
+void require_leaves(const Context& context, std::span<const Int3> origins) {
+  constexpr double leaf = leaf_voxels * sizeof(float) + sizeof(Leaf) + sizeof(LeafRef) + 8;
+  constexpr double node = sizeof(FloatTree::RootNodeType::ChildNodeType::ChildNodeType);
+  const auto node_of = [](const Int3& o) { return Int3{o[0] >> 7, o[1] >> 7, o[2] >> 7}; };
+  const double leaves = static_cast<double>(origins.size());
+  if (leaves * (leaf + node) <= static_cast<double>(context.max_memory))
+    return;
+  std::vector<Int3> nodes;
+  for (const Int3& origin : origins)
+    if (nodes.empty() || node_of(origin) != nodes.back())
+      nodes.push_back(node_of(origin));
+  std::ranges::sort(nodes);
+  nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+  require_memory(context, leaves * leaf + static_cast<double>(nodes.size()) * node, "the volume");
+}
+
+} // namespace
+
 std::vector<LeafRef> GridBuilder::add_leaves(const Context& context,
                                              std::span<const Int3> origins) {
+  require_leaves(context, origins);
   state_->threads = context.threads;
   auto* const values = reinterpret_cast<float*>(
       state_->storage->pages.emplace_back(origins.size() * leaf_voxels * sizeof(float)).data());

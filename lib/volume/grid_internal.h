@@ -26,7 +26,7 @@ struct LeafStorage {
 /// Leaves that borrow their values are marked (transientData) and let go of them before the tree
 /// dies, so nothing may delete or steal such a leaf behind its back; copying is safe.
 struct Grid::Native {
-  FloatTree::Ptr tree; ///< from make_tree or adopt_tree
+  FloatTree::Ptr tree; ///< from make_tree
   std::shared_ptr<LeafStorage> storage;
   std::once_flag summary_once;
   ValueSummary summary;
@@ -36,10 +36,8 @@ struct Grid::Native {
 
 /// An empty tree whose leaves may borrow from `storage`, which lives as long as the tree.
 FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage);
-/// The same for a tree of OpenVDB's making. \pre nobody else holds it
-FloatTree::Ptr adopt_tree(FloatTree::Ptr tree, const std::shared_ptr<LeafStorage>& storage);
 
-/// A Grid over a tree that nobody changes any more, from make_tree or adopt_tree with `storage`.
+/// A Grid over a tree that nobody changes any more, from make_tree with `storage`.
 Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage);
 
 using FloatLeaf = FloatTree::LeafNodeType;

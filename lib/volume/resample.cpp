@@ -71,6 +71,8 @@ struct Region {
   float value = 0; // of a tile
 };
 
+constexpr double leaf_bytes = leaf_voxels * sizeof(float) + 200; // of the new grid
+
 struct Plan {
   std::vector<Int3> leaves; // of the new grid, sorted
   std::vector<TileView> tiles;
@@ -110,6 +112,7 @@ public:
     for (const Region& region : regions) {
       if (context_.cancelled && context_.cancelled())
         throw Cancelled();
+      distinct_from_ = plan_.leaves.size();
       if (region.is_tile && region.dim > leaf_dim)
         for_blocks(reach(region), 4096, [&](const Int3& p) { descend(region, p, 4096); });
       else
@@ -210,9 +213,12 @@ private:
   }
 
   void check_size() const {
-    if ((plan_.leaves.size() + plan_.tiles.size()) % (1 << 16) == 0)
-      require_memory(context_, static_cast<double>(plan_.leaves.size()) * sizeof(Int3),
-                     "the list of blocks of the resampled volume");
+    if ((plan_.leaves.size() + plan_.tiles.size()) % (1 << 16) != 0)
+      return;
+    require_memory(context_, static_cast<double>(plan_.leaves.size()) * sizeof(Int3),
+                   "the list of blocks of the resampled volume");
+    require_memory(context_, static_cast<double>(plan_.leaves.size() - distinct_from_) * leaf_bytes,
+                   "the resampled volume");
   }
 
   bool covered_by_tile(const Int3& leaf) const {
@@ -228,6 +234,7 @@ private:
   Vec3 half_width_; // of the tent along the old axes, in old voxels
   Int3 old_min_{INT32_MAX, INT32_MAX, INT32_MAX}, old_max_{INT32_MIN, INT32_MIN, INT32_MIN};
   Plan plan_;
+  std::size_t distinct_from_ = 0; ///< leaves from here on are of one region, thus distinct
 };
 
 /// Old indices first, first + 1, … along an axis with their weights.
@@ -494,8 +501,7 @@ Grid resample(const Context& context, const Grid& grid, const GridTransform& tar
                 "resampled, expected one made without");
   Planner planner(context, grid, target);
   Plan plan = planner.plan(regions_of(grid));
-  require_memory(context,
-                 static_cast<double>(plan.leaves.size()) * (leaf_voxels * sizeof(float) + 200),
+  require_memory(context, static_cast<double>(plan.leaves.size()) * leaf_bytes,
                  "the resampled volume");
 
   GridInfo info = grid.info();

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -32,6 +33,7 @@ struct FullRun {
 };
 
 struct ValueSlab {
+  MemoryShare memory;
   std::vector<LeafPlace> places;
   std::vector<ValueLeaf> leaves;
   std::vector<FullRun> runs;
@@ -131,6 +133,8 @@ private:
     }
     if (std::ranges::all_of(values_.active, [](std::uint64_t word) { return word == 0; }))
       return;
+    const auto count = static_cast<std::uint64_t>(k_end - place.k);
+    slab_.memory.add(count * (sizeof(ValueLeaf) + sizeof(LeafPlace)));
     for (std::int32_t k = place.k; k < k_end; ++k) {
       slab_.places.push_back({place.j, k});
       slab_.leaves.push_back(values_);
@@ -148,11 +152,12 @@ private:
   ValueLeaf values_{};
 };
 
-ValueSlab sum_slab(const DifferenceLeaves& map, SumRule rule) {
+ValueSlab sum_slab(const DifferenceLeaves& map, SumRule rule, MemoryAccount& account) {
   std::vector<std::uint32_t> order(map.places.size());
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::sort(order, {}, [&](std::uint32_t n) { return map.places[n]; });
   ValueSlab slab;
+  slab.memory = MemoryShare(account);
   slab.places.reserve(order.size());
   slab.leaves.reserve(order.size());
   ColumnSum sum(rule, slab);
@@ -173,10 +178,11 @@ ValueSlab sum_slab(const DifferenceLeaves& map, SumRule rule) {
 /// the sums.
 class LeavesPool {
 public:
+  explicit LeavesPool(MemoryAccount& account) : account_(account) {}
   std::unique_ptr<DifferenceLeaves> take() {
     const std::lock_guard lock(mutex_);
     if (free_.empty())
-      return std::make_unique<DifferenceLeaves>();
+      return std::make_unique<DifferenceLeaves>(account_);
     std::unique_ptr<DifferenceLeaves> leaves = std::move(free_.back());
     free_.pop_back();
     return leaves;
@@ -188,6 +194,7 @@ public:
   }
 
 private:
+  MemoryAccount& account_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<DifferenceLeaves>> free_;
 };
@@ -245,10 +252,12 @@ DifferenceLeaf& DifferenceLeaves::find(LeafPlace place) {
       slot = slot_of(place);
     }
     slots_[slot] = static_cast<std::uint32_t>(places.size());
-    if (places.size() < leaves_.size())
+    if (places.size() < leaves_.size()) {
       leaves_[places.size()] = {};
-    else
+    } else {
+      memory_.add(sizeof(DifferenceLeaf) + sizeof(LeafPlace) + 16);
       leaves_.emplace_back();
+    }
     places.push_back(place);
   }
   last_place_ = place;
@@ -322,16 +331,18 @@ void sort_into_slabs(const Context& context, SlabbedMesh& mesh, double margin) {
 Grid sum_slabs(const Context& context, const SlabbedMesh& mesh, const GridTransform& transform,
                SumRule rule, CoverageReport& report,
                const std::function<void(std::size_t, DifferenceLeaves&)>& fill) {
+  MemoryAccount memory(context, "the voxelized mesh");
   std::vector<ValueSlab> slabs(mesh.slab_begin.size() - 1);
-  LeavesPool pool;
+  std::optional<LeavesPool> pool(std::in_place, memory);
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      std::unique_ptr<DifferenceLeaves> leaves = pool.take();
+      std::unique_ptr<DifferenceLeaves> leaves = pool->take();
       fill(s, *leaves);
-      slabs[s] = sum_slab(*leaves, rule);
-      pool.give_back(std::move(leaves));
+      slabs[s] = sum_slab(*leaves, rule, memory);
+      pool->give_back(std::move(leaves));
     }
   });
+  pool.reset();
   GridInfo info;
   info.transform = transform;
   GridBuilder builder(info);

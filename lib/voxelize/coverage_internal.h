@@ -7,6 +7,7 @@
 // voxel's top, adds V to voxel k and A to each voxel above. Kept are the differences along k: V at
 // k, A - V at k + 1.
 
+#include "base/memory_account.h"
 #include "voxelize/coverage.h"
 
 #include <array>
@@ -40,7 +41,7 @@ struct LeafPlace {
 /// The leaves of a slab by place: an open-addressing hash table that remembers the last answer.
 class DifferenceLeaves {
 public:
-  DifferenceLeaves() : slots_(256, empty) {}
+  explicit DifferenceLeaves(MemoryAccount& account) : slots_(256, empty), memory_(account) {}
   DifferenceLeaf& at(LeafPlace place) {
     if (last_ != nullptr && place == last_place_)
       return *last_;
@@ -57,6 +58,7 @@ private:
   std::size_t slot_of(LeafPlace place) const;
   std::vector<std::uint32_t> slots_;
   std::deque<DifferenceLeaf> leaves_; ///< the first places.size() are in use
+  MemoryShare memory_;
   LeafPlace last_place_{};
   DifferenceLeaf* last_ = nullptr;
 };

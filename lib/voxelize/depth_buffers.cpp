@@ -143,10 +143,12 @@ InsideScan depth_buffer_scan(const Context& context, const SampleMesh& mesh,
                                         DepthTiles(pairs[2])};
 
   const Range i = pairs[2].u, j = pairs[2].v, k = pairs[0].v;
+  MemoryAccount memory(context, "the voxelized mesh");
   std::vector<Slab<BitLeaf>> slabs(static_cast<std::size_t>((i.end - i.begin) / leaf_dim));
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       Slab<BitLeaf>& slab = slabs[s];
+      slab.memory = MemoryShare(memory);
       const std::int32_t row = i.begin + static_cast<std::int32_t>(s) * leaf_dim;
       const auto tile_at = [&](std::size_t axis, std::int32_t u, std::int32_t v) {
         const DepthPair& pair = pairs[axis];

@@ -23,7 +23,18 @@ struct BandLeaf {
 };
 
 /// Leaves of the band of one slab, in ascending order.
-using BandLeaves = std::map<LeafPlace, std::unique_ptr<BandLeaf>>;
+struct BandLeaves {
+  std::map<LeafPlace, std::unique_ptr<BandLeaf>> at;
+  MemoryShare memory;
+
+  BandLeaf& make(LeafPlace place) {
+    memory.add(sizeof(BandLeaf) + 96); // a node of the map
+    std::unique_ptr<BandLeaf>& slot = at[place];
+    slot = std::make_unique<BandLeaf>();
+    slot->squared.fill(HUGE_VAL);
+    return *slot;
+  }
+};
 
 /// Offers triangle n to all voxels of the slab nearer to it than `reach`. \param faces  null unless
 /// the rule is that of the winding number
@@ -71,12 +82,9 @@ void offer(const SlabbedMesh& mesh, const OrientedFaces* faces, std::uint32_t n,
             if (!(squared < limit))
               continue;
             if (leaf == nullptr) {
-              std::unique_ptr<BandLeaf>& slot = leaves[{j_leaf, k_leaf}];
-              if (slot == nullptr) {
-                slot = std::make_unique<BandLeaf>();
-                slot->squared.fill(HUGE_VAL);
-              }
-              leaf = slot.get();
+              const LeafPlace place{j_leaf, k_leaf};
+              const auto found = leaves.at.find(place);
+              leaf = found != leaves.at.end() ? found->second.get() : &leaves.make(place);
               if (faces != nullptr)
                 leaf->near.push_back(n);
             }
@@ -172,6 +180,7 @@ struct RampLeaf {
   std::array<std::uint64_t, 8> active{};
 };
 struct RampSlab {
+  MemoryShare memory;
   std::vector<RampLeaf> leaves;
   std::uint64_t band_voxels = 0;
 };
@@ -264,18 +273,23 @@ Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTr
 
   const InsideBits bits(scan);
   const Windings windings(scan);
+  MemoryAccount memory(context, "the voxelized mesh");
   std::vector<RampSlab> slabs(slabbed.slab_begin.size() - 1);
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       const std::int32_t row = (slabbed.first_slab + static_cast<std::int32_t>(s)) * leaf_dim;
       BandLeaves band;
+      band.memory = MemoryShare(memory);
       for (std::size_t n = slabbed.slab_begin[s]; n < slabbed.slab_begin[s + 1]; ++n)
         offer(slabbed, source.faces, slabbed.members[n], row, half_width, band);
       // Mixed leaves lie in the band; only rays that were left empty can make others.
       for (auto at = std::ranges::lower_bound(scan.origins, Int3{row, INT32_MIN, INT32_MIN});
            at != scan.origins.end() && (*at)[0] == row; ++at)
-        band.try_emplace({(*at)[1] >> 3, (*at)[2] >> 3});
-      for (const auto& [place, leaf] : band) {
+        band.at.try_emplace({(*at)[1] >> 3, (*at)[2] >> 3});
+      slabs[s].memory = MemoryShare(memory);
+      slabs[s].memory.add(band.at.size() * sizeof(RampLeaf));
+      slabs[s].leaves.reserve(band.at.size());
+      for (const auto& [place, leaf] : band.at) {
         const Int3 origin{row, 8 * place.j, 8 * place.k};
         slabs[s].leaves.push_back(ramp_leaf(source, leaf.get(), origin, bits.of(origin),
                                             windings.of(origin), slabs[s].band_voxels));

@@ -143,18 +143,19 @@ InsideScan count_samples(const Context& context, const InsideScan& fine, int sam
     include(tile.origin[0], tile.dim);
   if (low >= high)
     return {samples, {}, {}, {}, {}, {}};
+  MemoryAccount memory(context, "the voxelized mesh");
   std::vector<Slab<CountLeaf>> slabs(static_cast<std::size_t>(high - low));
   parallel_blocks(context, slabs.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t s = first; s < last; ++s) {
       const std::int32_t begin = (low + static_cast<std::int32_t>(s)) * rows, end = begin + rows;
-      LeafMap<CountLeaf> map;
+      LeafMap<CountLeaf> map(memory);
       for (const TileView& tile : fine.tiles)
         add_cube(tile, samples, begin, end, map);
       for (std::size_t leaf = 0; leaf < fine.origins.size(); ++leaf)
         if (fine.origins[leaf][0] >= begin && fine.origins[leaf][0] < end)
           add_leaf(fine.origins[leaf], fine.bits[leaf], samples, map);
       // What stands in the map already are sums, not flips: their differences along k are.
-      LeafMap<CountLeaf> flips;
+      LeafMap<CountLeaf> flips(memory);
       for (std::size_t leaf = 0; leaf < map.keys.size(); ++leaf) {
         const LeafKey key = map.keys[leaf];
         for (std::size_t column = 0; column < 64; ++column) {
@@ -169,6 +170,7 @@ InsideScan count_samples(const Context& context, const InsideScan& fine, int sam
             flips.at({key.j, key.k + 1}).count[8 * column] -= before;
         }
       }
+      slabs[s].memory = MemoryShare(memory);
       (void)integrate_slab(flips, samples, slabs[s]);
     }
   });

@@ -2,6 +2,7 @@
 // Leaves of inside/outside states under construction, slab by slab (8 voxels along i), and how they
 // become an InsideScan. Internal to the rules of the voxelizer.
 
+#include "base/memory_account.h"
 #include "voxelize/voxelize.h"
 
 #include <algorithm>
@@ -68,6 +69,7 @@ template <class Leaf>
 class LeafMap {
 public:
   LeafMap() : slots_(512) {}
+  explicit LeafMap(MemoryAccount& account) : slots_(512), memory_(account) {}
 
   Leaf& at(LeafKey key) {
     const std::uint64_t word = static_cast<std::uint64_t>(static_cast<std::uint32_t>(key.j)) << 32 |
@@ -78,6 +80,7 @@ public:
         grow();
         slot = find(word);
       }
+      memory_.add(sizeof(Leaf) + sizeof(LeafKey) + 2 * sizeof(Slot));
       slots_[slot] = {word, static_cast<std::uint32_t>(keys.size())};
       keys.push_back(key);
       leaves.emplace_back();
@@ -111,7 +114,15 @@ private:
   }
 
   std::vector<Slot> slots_;
+  MemoryShare memory_;
 };
+
+/// Maps for the slabs of a chunk.
+template <class Leaf>
+std::array<LeafMap<Leaf>, 4> leaf_maps(MemoryAccount& memory) {
+  return {LeafMap<Leaf>(memory), LeafMap<Leaf>(memory), LeafMap<Leaf>(memory),
+          LeafMap<Leaf>(memory)};
+}
 
 /// Leaves [k_begin, k_end) of a column of leaves that are wholly inside.
 struct FullRun {
@@ -121,6 +132,7 @@ struct FullRun {
 /// Result of one slab.
 template <class Leaf>
 struct Slab {
+  MemoryShare memory;
   std::vector<LeafKey> keys;
   std::vector<Leaf> leaves;
   std::vector<FullRun> runs;
@@ -136,6 +148,7 @@ struct Slab {
         runs.push_back({from.j, from.k, k_end});
       return;
     }
+    memory.add(static_cast<std::uint64_t>(k_end - from.k) * (sizeof(Leaf) + sizeof(LeafKey)));
     for (std::int32_t k = from.k; k < k_end; ++k) {
       keys.push_back({from.j, k});
       leaves.push_back(leaf);

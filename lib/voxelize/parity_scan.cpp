@@ -25,8 +25,8 @@ struct Counters {
 
 /// One sample per voxel: flips go straight to the bits.
 void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk,
-                std::span<Slab<BitLeaf>> slabs, Counters& counters) {
-  std::array<LeafMap<BitLeaf>, 4> maps;
+                std::span<Slab<BitLeaf>> slabs, Counters& counters, MemoryAccount& memory) {
+  std::array<LeafMap<BitLeaf>, 4> maps = leaf_maps<BitLeaf>(memory);
   const std::int32_t first = chunk * chunks.slabs_each * leaf_dim;
   for_each_crossing(mesh, chunks, chunk, {first, first + chunks.slabs_each * leaf_dim},
                     TieOrder::xyz, counters.exact_tests,
@@ -52,9 +52,9 @@ Place place_of(std::int32_t fine, std::int32_t samples) {
 
 /// samples³ samples per voxel: the crossings of a ray are paired, and each pair adds its samples.
 void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk,
-                std::span<Slab<CountLeaf>> slabs, Counters& counters) {
+                std::span<Slab<CountLeaf>> slabs, Counters& counters, MemoryAccount& memory) {
   constexpr std::int32_t rows_at_once = 64;
-  LeafMap<CountLeaf> map;
+  LeafMap<CountLeaf> map(memory);
   const std::int32_t n = mesh.samples;
   const std::int32_t first = chunk * leaf_dim * n, last = first + leaf_dim * n;
   std::vector<std::vector<std::uint64_t>> rows(rows_at_once); // crossings, j above k, both biased
@@ -106,11 +106,13 @@ void scan_chunk(const SampleMesh& mesh, const Chunks& chunks, std::int32_t chunk
 // ---- all chunks
 
 template <class Leaf>
-std::vector<Slab<Leaf>> scan_chunks(const Context& context, const SampleMesh& mesh,
-                                    const Chunks& chunks, VoxelizeReport& report,
-                                    const std::function<void()>& beside) {
+std::vector<Slab<Leaf>> scan_chunks(const Context& context, MemoryAccount& memory,
+                                    const SampleMesh& mesh, const Chunks& chunks,
+                                    VoxelizeReport& report, const std::function<void()>& beside) {
   const auto each = static_cast<std::size_t>(chunks.slabs_each);
   std::vector<Slab<Leaf>> slabs(chunks.count() * each);
+  for (Slab<Leaf>& slab : slabs)
+    slab.memory = MemoryShare(memory);
   std::vector<Counters> counters(chunks.count());
   parallel_blocks(context, chunks.count() + 1, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -118,7 +120,7 @@ std::vector<Slab<Leaf>> scan_chunks(const Context& context, const SampleMesh& me
         beside();
       else
         scan_chunk(mesh, chunks, chunks.range.begin + static_cast<std::int32_t>(n - 1),
-                   std::span(slabs).subspan((n - 1) * each, each), counters[n - 1]);
+                   std::span(slabs).subspan((n - 1) * each, each), counters[n - 1], memory);
     }
   });
   for (const Counters& c : counters) {
@@ -137,11 +139,12 @@ InsideScan parity_scan(const Context& context, const SampleMesh& mesh, VoxelizeR
   for (const Block& block : chunks.blocks)
     report.triangles_skipped += block.skipped;
   const std::int32_t first_slab = chunks.range.begin * chunks.slabs_each;
+  MemoryAccount memory(context, "the voxelized mesh");
   if (mesh.samples == 1) {
-    auto slabs = scan_chunks<BitLeaf>(context, mesh, chunks, report, beside);
+    auto slabs = scan_chunks<BitLeaf>(context, memory, mesh, chunks, report, beside);
     return join_slabs(slabs, first_slab);
   }
-  auto slabs = scan_chunks<CountLeaf>(context, mesh, chunks, report, beside);
+  auto slabs = scan_chunks<CountLeaf>(context, memory, mesh, chunks, report, beside);
   return join_slabs(slabs, first_slab, mesh.samples);
 }
 

@@ -20,9 +20,10 @@ namespace {
 
 constexpr double index_limit = 1 << 30;
 
-/// Surface area in faces of voxels, and the box of the points in voxels.
+/// Surface area in faces of voxels, the longest triangle and the box of the points in voxels.
 struct Extent {
   double area = 0;
+  double longest = 0; ///< sum of the edges of a triangle's box
   Box3 box;
 
   void add(const Vec3& p) {
@@ -60,10 +61,16 @@ IndexMesh index_mesh(const Context& context, const TriangleMesh& mesh,
   blocks(mesh.triangles.size(), mesh.points.size() / grain + 1, [&](std::size_t n, Extent& extent) {
     const Triangle& t = mesh.triangles[n];
     const Vec3& a = index.points[t[0]];
-    extent.area += norm(cross(index.points[t[1]] - a, index.points[t[2]] - a)) / 2;
+    const Vec3 &b = index.points[t[1]], &c = index.points[t[2]];
+    extent.area += norm(cross(b - a, c - a)) / 2;
+    double edges = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      edges += std::max({a[axis], b[axis], c[axis]}) - std::min({a[axis], b[axis], c[axis]});
+    extent.longest = std::max(extent.longest, edges);
   });
   for (const Extent& part : parts) {
     index.extent.area += part.area;
+    index.extent.longest = std::max(index.extent.longest, part.longest);
     if (!part.box.empty()) {
       index.extent.add(part.box.min);
       index.extent.add(part.box.max);
@@ -90,8 +97,8 @@ double scan_bytes(const Extent& extent, const TriangleMesh& mesh, int samples) {
   const auto cells = [&](double edge) { // that the surface meets, at most all of the box
     const Vec3 size = extent.box.size() * (1 / edge);
     // A patch meets |nx| + |ny| + |nz| <= sqrt(3) cells for each face's area of it, more at its
-    // rim.
-    return std::fmin(1.75 * extent.area / (edge * edge) + 8,
+    // rim: a needle as many as the planes between cells that it crosses.
+    return std::fmin(std::fmax(1.75 * extent.area / (edge * edge), extent.longest / edge) + 8,
                      (size.x + 2) * (size.y + 2) * (size.z + 2));
   };
   const double leaf_bytes = (samples == 1 ? 64 : 2 * 4 * leaf_voxels) + 4 * leaf_voxels + 200;

@@ -143,7 +143,7 @@ void keep(const CountLeaf& leaf, const BitLeaf& bits, std::int32_t slab_i, LeafK
 /// null, gets the winding numbers
 Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<const Int3> near,
                         const SolidAngleTree& cones, std::vector<WindingRun>* runs,
-                        Counters& counters) {
+                        Counters& counters, MemoryAccount& memory) {
   for (const Int3& leaf : near)
     (void)map.at({leaf[1], leaf[2]});
   std::vector<std::uint32_t> order(map.keys.size());
@@ -152,6 +152,7 @@ Slab<BitLeaf> integrate(LeafMap<CountLeaf>& map, std::int32_t slab_i, std::span<
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return map.keys[a] < map.keys[b]; });
   Slab<BitLeaf> slab;
+  slab.memory = MemoryShare(memory);
   const std::uint64_t full = BitLeaf::full(1);
   CountLeaf::Carry carry{};
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -233,12 +234,13 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
       slabs_range.begin >= 0 ? slabs_range.begin / each : -((-slabs_range.begin + each - 1) / each),
       slabs_range.end > 0 ? (slabs_range.end + each - 1) / each : -(-slabs_range.end / each)};
   const auto count = static_cast<std::size_t>(range.end - range.begin);
+  MemoryAccount memory(context, "the voxelized mesh");
   std::vector<Slab<BitLeaf>> slabs(count * static_cast<std::size_t>(each));
   std::vector<std::vector<WindingRun>> windings(slabs.size());
   std::vector<Counters> counters(count);
   parallel_blocks(context, count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      std::array<LeafMap<CountLeaf>, 4> maps;
+      std::array<LeafMap<CountLeaf>, 4> maps = leaf_maps<CountLeaf>(memory);
       const std::int32_t chunk = range.begin + static_cast<std::int32_t>(n);
       const std::int32_t first = chunk * each * leaf_dim;
       for (std::size_t way = 0; way < 2; ++way)
@@ -261,7 +263,7 @@ InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
         const std::size_t at = n * static_cast<std::size_t>(each) + static_cast<std::size_t>(s);
         slabs[at] = integrate(maps[static_cast<std::size_t>(s)], slab_i,
                               {of_slab(slab_i), of_slab(slab_i + 1)}, cones,
-                              keep_windings ? &windings[at] : nullptr, counters[n]);
+                              keep_windings ? &windings[at] : nullptr, counters[n], memory);
       }
     }
   });

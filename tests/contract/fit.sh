@@ -82,7 +82,8 @@ test_bad_data_is_named() {
   refused ":2: surplus word '7'" "$load" "$good 7"
   refused ":3: the place is 70 mm off the body" "$load" "$good" 'measure 0 0 100 - 1 -'
   refused ":3: what is measured there is held" "$load" "$good" 'measure -6 -6 -28.6304045 - 1 -'
-  refused 'goes against the loads' "$load" 'measure 0 0 29 - 0.5 -'
+  refused ':2: what is measured goes against the loads' "$load" 'measure 0 0 29 - 0.5 -'
+  refused ':3: what is measured goes against the loads, here the most' "$load" "$good" 'measure 0 0 28 - 20 -' "$good"
   refused 'the loads move nothing' "$good"
   refused "known 'liver' is no material" "$load" "$good" 'known liver'
   refused 'all materials are known' "$load" "$good" 'known generic'

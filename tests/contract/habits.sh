@@ -79,6 +79,14 @@ test_gewebe_starts_every_program() {
   printf '#!/bin/sh\necho "$@"\n' >bin/man
   chmod +x bin/man
   [[ $(PATH=$PWD/bin:$PATH bin/gewebe help materials) == "-l $PWD/share/man/man5/gewebe_materials.5" ]] || fail 'it shows another page'
+  # In the tree that the programs are built in, the pages of other things than programs are found.
+  mkdir -p tree/build/release tree/man
+  cp "$BUILD/gewebe" tree/build/release/
+  touch tree/man/scene.5
+  [[ $(PATH=$PWD/bin:$PATH tree/build/release/gewebe help scene) == "-l $PWD/tree/man/scene.5" ]] || fail 'the page of the tree is not shown'
+  # What people look for has another name.
+  expect_failure 2 gewebe gewebe convert
+  [[ $(gewebe convert in.obj out.ply 2>&1 || true) == *"no program 'convert', but exp2ela --to KIND"* ]] || fail 'no advice'
   # It starts what stands beside it, not what the PATH holds.
   mkdir other
   printf '#!/bin/sh\necho other\n' >other/csg

@@ -353,6 +353,35 @@ TEST(DistanceRamp, SameBytesForAnyThreads) {
             sramek_density(with(2), mesh, unit_lattice, OpenMesh::refuse).digest());
 }
 
+// Needles meet many leaves with little area: neither their area nor the longest of them tells how
+// much they need.
+TEST(DistanceRamp, NeedlesHoldTheLimitOfMemory) {
+  TriangleMesh mesh;
+  for (std::uint32_t n = 0; n < 64; ++n) {
+    const double x = 40 * n;
+    const std::uint32_t first = 4 * n;
+    mesh.points.insert(mesh.points.end(),
+                       {{x, 0, 0}, {x + 0.05, 0, 0}, {x, 0.05, 0}, {x + 0.01, 0.01, 3e4}});
+    for (const Triangle& t : {Triangle{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})
+      mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  }
+  Context context;
+  context.max_memory = std::uint64_t{300} << 20;
+  const GridTransform voxels = uniform_transform(1);
+  const auto refused = [&](auto&& work) {
+    try {
+      (void)work();
+      ADD_FAILURE() << "not refused";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("--max-memory"), std::string::npos) << error.what();
+    }
+  };
+  refused([&] { return jones_density(context, mesh, voxels, OpenMesh::refuse, nullptr); });
+  refused([&] { return exact_coverage(context, mesh, voxels, OpenMesh::refuse, nullptr); });
+  mesh.triangles.resize(8); // two of them are no problem
+  EXPECT_GT(jones_density(context, mesh, voxels, OpenMesh::refuse, nullptr).active_voxels(), 1000u);
+}
+
 TEST(DistanceRamp, OpenMeshesAndNeedles) {
   TriangleMesh open = box_mesh({0.2, 0.2, 0.2}, {10.2, 10.2, 10.2});
   open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);

@@ -323,9 +323,20 @@ TEST(MeshFile, Units) {
   EXPECT_EQ(bounding_box(read(folder / "m.ply", options)).max, (Vec3{1000, 1000, 0}));
   options.unit = "inch";
   EXPECT_THROW(read(obj, options), UsageError);
-  write(folder / "m.glb", read(obj));
-  options.unit = "mm";
-  EXPECT_THROW(read(folder / "m.glb", options), UsageError);
+  // Formats that state a unit: --unit says what the numbers mean in spite of that.
+  write(folder / "m.glb", read(obj)); // as 0.001 m
+  write(folder / "m.dae", read(obj)); // as 1, of 0.001 m
+  for (const char* const name : {"m.glb", "m.dae"}) {
+    EXPECT_NEAR(bounding_box(read(folder / name)).max.x, 1, 1e-6) << name;
+    options.unit = "mm";
+    EXPECT_NEAR(bounding_box(read(folder / name, options)).max.x,
+                std::string(name) == "m.glb" ? 0.001 : 1, 1e-6)
+        << name;
+    options.unit = "m";
+    EXPECT_NEAR(bounding_box(read(folder / name, options)).max.x,
+                std::string(name) == "m.glb" ? 1 : 1000, 1e-3)
+        << name;
+  }
 }
 
 TEST(MeshFile, CornersOfAStrangeColladaUnit) {

@@ -307,7 +307,8 @@ TEST(Selector, WhatTheModelLacksIsAnError) {
                            "near:99,0,0,1", "1 and 2", "not surface"})
     EXPECT_NE(complaint([&] { select(text); }), "") << text;
   EXPECT_EQ(complaint([] { select("1 and 2"); }),
-            "selector '1 and 2' selects no node, expected at least one");
+            "selector '1 and 2' selects no node, expected at least one; the model's box is -6,0,0 "
+            "to 4,21,11");
 }
 
 } // namespace

@@ -129,6 +129,19 @@ TEST(VolumeFileOpenvdb, FaultsAreSaidWithoutTheWordsOfTheLibrary) {
   }
 }
 
+// OpenVDB makes a string as long as a stream says, up to 4 GiB, before it reads it.
+TEST(VolumeFileOpenvdb, LengthsBeyondTheStreamAreRefused) {
+  const std::string whole = stream_of(
+      {cube<openvdb::FloatGrid>("temperature", 20), cube<openvdb::FloatGrid>("density", 1)});
+  for (const char* const text : {"Tree_float_5_4_3", "UniformScaleMap"})
+    for (const std::size_t place : {whole.find(text), whole.rfind(text)}) {
+      std::string bytes = whole;
+      bytes[place - 1] = '\xf0'; // the highest byte of its length
+      EXPECT_NE(complaint(bytes).find("ends early, expected a "), std::string::npos)
+          << text << " at " << place << ": " << complaint(bytes);
+    }
+}
+
 #ifndef GEWEBE_SANITIZE // OpenVDB's reader of other types leaks the tree when it throws
 TEST(VolumeFileOpenvdb, TruncatedStreamsOfSeveralGridsAreRefused) {
   for (const bool packed : {true, false}) {

@@ -7,6 +7,7 @@
 #include "volume/crop.h"
 #include "volume/resample.h"
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -51,13 +52,16 @@ PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& inp
   result.grid = run.timed("read", [&] { return read_volume(input, context); });
   result.isovalue = arguments.isovalue.value_or(default_isovalue(result.grid.info()));
   at(input.name(), [&] {
+    std::optional<Grid> resampled; // first, since what it needs is refused before long work
+    if (arguments.voxel)
+      resampled = run.timed("resample", [&] {
+        return resample(context, result.grid, uniform_transform(*arguments.voxel));
+      });
     if (arguments.voxel || arguments.cell)
       result.before =
           run.timed("topology", [&] { return topology_of(context, result.grid, arguments); });
-    if (arguments.voxel)
-      result.grid = run.timed("resample", [&] {
-        return resample(context, result.grid, uniform_transform(*arguments.voxel));
-      });
+    if (resampled)
+      result.grid = *std::move(resampled);
     if (!arguments.box.empty())
       result.grid = run.timed("crop", [&] {
         return crop(context, result.grid, box_of(arguments.box), result.isovalue);

@@ -74,10 +74,12 @@ TriangleMesh open_mesh(const TetMesh& mesh, const ClipPlane& plane, SolidReport&
   return std::move(left.mesh);
 }
 
-Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report) {
+Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report,
+                   const Context& context) {
   report = {};
   TetReadOptions reading;
   reading.kind = options.kind;
+  reading.max_memory = context.max_memory;
   if (!options.unit.empty())
     reading.scale = millimetres_per(options.unit);
   const TetMesh mesh = read_tet_mesh(input, reading);

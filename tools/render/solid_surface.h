@@ -15,7 +15,8 @@ namespace gewebe {
 /// own, so that the rim is an edge. Quadratic tetrahedra are drawn by their corners.
 /// \throw Error with place: what read_tet_mesh, require_sound and clip_tetrahedra refuse; a plane
 /// that takes all away
-Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report);
+Surface read_solid(Input& input, const SurfaceReadOptions& options, SolidReport& report,
+                   const Context& context);
 
 /// Adds to the report. \throw Error if require_sound refuses
 void examine_solid(const TetMesh& mesh, SolidReport& report);

@@ -111,7 +111,7 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
   report = {};
   if (is_solid) {
     std::vector<Surface> surfaces;
-    surfaces.push_back(read_solid(input, options, report));
+    surfaces.push_back(read_solid(input, options, report, context));
     return surfaces;
   }
   if (is_result)
@@ -126,7 +126,11 @@ std::vector<Surface> read_surfaces(Input& input, const SurfaceReadOptions& optio
       surfaces[0].materials.push_back(material.name);
     return surfaces;
   }
-  return one(read_mesh(input, {options.kind, options.unit, std::nullopt, false}));
+  MeshReadOptions reading;
+  reading.kind = options.kind;
+  reading.unit = options.unit;
+  reading.max_memory = context.max_memory;
+  return one(read_mesh(input, reading));
 }
 
 } // namespace gewebe

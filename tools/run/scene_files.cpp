@@ -98,14 +98,15 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
       throw Error(path, "is no regular file, expected one");
     return list_text(Input(path, false));
   };
-  files.instrument = [resolve](const std::string& name, InstrumentShape shape) {
+  files.instrument = [resolve, context](const std::string& name, InstrumentShape shape) {
     const std::string path = resolve(name);
     (void)facts_of(path);
     Input input(path, true);
     // The readers of other formats would have to be loaded with this program, by all who start it.
     if (input_kind(input.peek(4096), path, "") != Kind::ply)
       throw Error(path, "is no PLY file, expected one, as exp2ela --to ply makes of any mesh");
-    TriangleMesh mesh = at(path, [&] { return read_ply(input.read_all(), path); });
+    TriangleMesh mesh =
+        at(path, [&] { return read_ply(input.read_all(context.max_memory), path); });
     weld(mesh, {.mode = Weld::all, .drop_unused = true});
     shape.core = at(path, [&] { return std::make_shared<const ConvexCore>(mesh); });
     if (!(shape.radius > 0))

@@ -1,5 +1,6 @@
 #include "tools/shared/antialias.h"
 
+#include "tools/shared/filling_rule.h"
 #include "voxelize/distance_ramp.h"
 
 #include <charconv>
@@ -9,27 +10,6 @@ namespace gewebe {
 namespace {
 
 constexpr int lines_instead = 4; ///< N of lines:N where exact cannot be
-
-/// What is wrong with the mesh, "" if nothing.
-std::string defects_of(const VoxelizeReport& mesh, const VoxelizeOptions& options) {
-  std::string text;
-  const auto add = [&](std::uint64_t count, const char* one, const char* many) {
-    if (count > 0)
-      text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
-  };
-  const bool open = mesh.boundary_edges > 0;
-  add(mesh.boundary_edges, "boundary edge", "boundary edges");
-  if (open && options.on_open == OpenMesh::fill)
-    add(mesh.holes, "hole closed", "holes closed");
-  else if (open && options.rule == VoxelRule::parity)
-    text += ", " + std::to_string(mesh.odd_rays) + " odd rays left empty";
-  else
-    add(mesh.holes, "hole", "holes");
-  add(mesh.parts_turned, "part turned outward", "parts turned outward");
-  add(mesh.triangles_turned, "triangle turned", "triangles turned");
-  add(mesh.triangles_duplicate, "duplicate triangle left out", "duplicate triangles left out");
-  return text.empty() ? text : (open ? "the mesh is open: " : "the mesh had ") + text;
-}
 
 } // namespace
 
@@ -89,7 +69,7 @@ Grid antialiased(cli::Run& run, const std::string& place, const TriangleMesh& me
     return run.timed("grid", [&] { return grid_from_scan(context, scan, transform); });
   };
   Grid grid = at(place, volume);
-  std::string warning = defects_of(report.mesh, options);
+  std::string warning = mesh_defects(report.mesh, options);
   if (!instead.empty())
     warning += (warning.empty() ? "" : "; ") + instead;
   if (!warning.empty())

@@ -4,6 +4,7 @@
 #include "base/number_text.h"
 #include "formats/stream/file_names.h"
 #include "formats/stream/program_start.h"
+#include "tools/shared/memory_limit.h"
 #include "tools/shared/messages.h"
 #include "tools/shared/options_internal.h"
 #include "tools/shared/progress_bar.h"
@@ -15,7 +16,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <fstream>
 #include <sys/stat.h>
 #include <type_traits>
 #include <unistd.h>
@@ -37,28 +37,6 @@ namespace {
   }
   print_message(program_invocation_short_name, text);
   ::_exit(1);
-}
-
-std::uint64_t read_number_file(const char* path) {
-  std::ifstream file(path);
-  std::uint64_t value = 0;
-  return file >> value ? value : UINT64_MAX; // "max" means no limit
-}
-
-/// What the machine and the control group leave to a new allocation.
-std::uint64_t available_memory() {
-  std::uint64_t available = UINT64_MAX;
-  std::ifstream info("/proc/meminfo");
-  std::string key;
-  std::uint64_t kilobytes = 0;
-  for (std::string unit; info >> key >> kilobytes && std::getline(info, unit);)
-    if (key == "MemAvailable:")
-      available = kilobytes * 1024;
-  const std::uint64_t limit = read_number_file("/sys/fs/cgroup/memory.max");
-  const std::uint64_t used = read_number_file("/sys/fs/cgroup/memory.current");
-  if (limit != UINT64_MAX && used < limit)
-    available = std::min(available, limit - used);
-  return available;
 }
 
 void write_text(const std::string& path, const std::string& text) {
@@ -232,7 +210,7 @@ void Program::declare_common() {
   State& s = *state_;
   option("-o,--output", s.output, "FILE", "where the result goes, - is standard output");
   option("-j,--threads", s.threads, "N", "threads, 0 = all").range(0, 4096);
-  flag("-q,--quiet", s.quiet, "no warnings");
+  flag("-q,--quiet", s.quiet, "no warnings but of results that cannot be trusted");
   flag("-v,--verbose", s.verbose, "say what is done");
   option("--progress", s.progress, "WHEN", "progress bar: auto, always, never")
       .one_of({"auto", "always", "never"});

@@ -64,6 +64,12 @@ void declare(cli::Program& p, ModelArguments& a) {
       .positive();
   p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
   p.option("--cell", a.cell, "S", "edge of the cells that fill it, in mm").positive();
+  p.option("--rule", a.rule, "RULE", "with --solid: when a point is inside: parity, winding")
+      .one_of({"parity", "winding"});
+  p.option("--on-open", a.on_open, "WHAT",
+           "with --solid, an open surface: error, warn (odd rays stay empty), fill (close the "
+           "holes)")
+      .one_of({"error", "warn", "fill"});
   p.flag("--no-skin", a.no_skin, "leave the surface out of the solid that fills it");
   p.option("--poisson", a.values.poisson, "NU",
            "of tetrahedra: Poisson's ratio, instead of the material's")
@@ -103,6 +109,9 @@ void complete(ModelArguments& a) {
   refuse(a.fix == "none" && a.axes != ModelArguments{}.axes,
          "--fix-axes without --fix, expected both");
   refuse(a.cell && !a.solid, "--cell without --solid, expected both");
+  refuse(!a.solid && a.rule != ModelArguments{}.rule, "--rule without --solid, expected both");
+  refuse(!a.solid && a.on_open != ModelArguments{}.on_open,
+         "--on-open without --solid, expected both");
   refuse(a.no_skin && !a.solid, "--no-skin without --solid, expected both");
   refuse(a.scale_mass && !a.dt, "--scale-mass without --dt, expected both");
   refuse(a.primitive.empty() && !a.size.empty(), "--size without --primitive, expected both");

@@ -16,7 +16,8 @@ namespace gewebe {
 
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
-              axes = "xyz", primitive, size, repair, materials, fit;
+              axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
+              on_open = "error";
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;

@@ -9,7 +9,9 @@
 #include "solid/solid_model.h"
 #include "tetrahedra/check.h"
 #include "tetrahedra/components.h"
+#include "tools/shared/filling_rule.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -111,6 +113,7 @@ constexpr double tetrahedra_per_cell = 12; // of a body-centred lattice
 constexpr double usual_tetrahedra = 10000; // without a grade
 constexpr unsigned usual_grade = 1;
 constexpr double voxels_per_cell = 2;
+constexpr double least_share = 0.1;         // of the box of an organ that is filled
 constexpr double told_loss = 0.02;          // of the volume
 constexpr std::int32_t unnamed = INT32_MAX; // no part that --material can name
 
@@ -129,6 +132,7 @@ Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
   refuse_surfaces(a);
   TetReadOptions options;
   options.kind = kind;
+  options.max_memory = run.context().max_memory;
   if (!a.unit.empty())
     options.scale = millimetres_per(a.unit);
   TetMesh mesh = run.timed("read", [&] { return read_tet_mesh(input, options); });
@@ -146,7 +150,14 @@ Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
 Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh,
                      const ModelArguments& a) {
   refuse_others(a);
-  const double volume = std::abs(signed_volume(mesh));
+  const VoxelizeOptions rule{.rule = voxel_rule_from_text(a.rule),
+                             .on_open = open_mesh_from_text(a.on_open)};
+  double volume = std::abs(signed_volume(mesh));
+  if (rule.rule != VoxelRule::parity || rule.on_open != OpenMesh::refuse) {
+    // Parts that are turned inward or open can take all of it away.
+    const Vec3 box = bounding_box(mesh).size();
+    volume = std::max(volume, least_share * box.x * box.y * box.z);
+  }
   const double cell = a.cell.value_or(std::cbrt(tetrahedra_per_cell * volume / usual_tetrahedra));
   return at(name, [&] {
     if (!(cell > 0 && std::isfinite(cell)))
@@ -154,14 +165,24 @@ Model filled_surface(Run& run, const std::string& name, const TriangleMesh& mesh
     const std::vector<std::int32_t> parts =
         mesh.part.empty() ? std::vector<std::int32_t>{} : a.build.material.named;
     FilledSurface filled = run.timed("fill", [&] {
-      return fill_surface(mesh, name, {cell / voxels_per_cell, cell, usual_grade, parts},
-                          run.context());
+      return fill_surface(
+          mesh, name, {cell / voxels_per_cell, cell, usual_grade, parts, rule.rule, rule.on_open},
+          run.context());
     });
+    for (const VoxelizeReport& found : filled.found)
+      if (const std::string defects = mesh_defects(found, rule); !defects.empty())
+        run.warn(name + ": " + defects);
     TetMesh& tets = filled.mesh;
     if (tets.tetrahedra.empty())
       throw Error("no cell of " + number_text(cell) + " mm lies inside, expected a smaller --cell");
     run.stats().set("cell", cell);
-    run.stats().set("volume_surface", volume);
+    double of_surface = std::abs(signed_volume(mesh));
+    if (of_surface < volume) { // what was found to be inside it
+      of_surface = 0;
+      for (const FilledSurface::Volume& one : filled.volumes)
+        of_surface += one.of_surface;
+    }
+    run.stats().set("volume_surface", of_surface);
     run.stats().set("volume", gewebe::volume(tets));
     run.say(name + ": " + std::to_string(tets.tetrahedra.size()) + " tetrahedra of cells of " +
             number_text(cell) + " mm");

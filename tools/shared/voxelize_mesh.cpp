@@ -58,6 +58,7 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
   read.kind = input_kind(input.peek(4096), a.name, run.format());
   read.unit = a.unit;
   read.weld = weld_from_name(a.weld);
+  read.max_memory = run.context().max_memory;
   read.drop_unused = true; // so that they don't count for --dim
   const TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
   const GridTransform transform = lattice(a, input, mesh, run.context());

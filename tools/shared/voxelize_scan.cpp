@@ -18,7 +18,8 @@ double threshold_of(std::string_view word, const std::string& text) {
   double value = 0;
   const auto [rest, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (status != std::errc{} || rest != digits.data() + digits.size() || !std::isfinite(value))
-    throw UsageError("--threshold: '" + text + "', expected numbers, as LOW, LOW,HIGH or ,HIGH");
+    throw UsageError("--threshold: '" + text +
+                     "', expected numbers, as LOW, LOW,HIGH, \"LOW,\" or ,HIGH");
   return value;
 }
 
@@ -30,8 +31,10 @@ Thresholds thresholds_from_text(const std::string& text) {
   const std::string_view low = std::string_view(text).substr(0, comma);
   if (!low.empty() || comma == std::string::npos)
     t.low = threshold_of(low, text);
-  if (comma != std::string::npos)
-    t.high = threshold_of(std::string_view(text).substr(comma + 1), text);
+  const std::string_view high =
+      comma == std::string::npos ? "" : std::string_view(text).substr(comma + 1);
+  if (!high.empty() || (comma != std::string::npos && low.empty()))
+    t.high = threshold_of(high, text);
   if (!(t.low < t.high))
     throw UsageError("--threshold: '" + text + "', expected the smaller number first");
   return t;
