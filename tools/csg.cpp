@@ -4,6 +4,7 @@
 #include "formats/volume/volume_file.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/report.h"
+#include "tools/shared/space_option.h"
 #include "tools/shared/volume_output.h"
 
 using namespace gewebe;
@@ -23,19 +24,65 @@ void complete(Arguments& a) {
   cli::check_one_pipe(a.volumes);
 }
 
+/// The box of what is not background, in mm; empty if there is nothing.
+Box3 world_box(const Grid& grid) {
+  Box3 box;
+  Int3 low{}, high{};
+  if (grid.active_box(low, high))
+    for (int corner = 0; corner < 8; ++corner) {
+      Vec3 index;
+      for (int axis = 0; axis < 3; ++axis)
+        index[axis] = (corner >> axis & 1) != 0 ? high[static_cast<std::size_t>(axis)] + 0.5
+                                                : low[static_cast<std::size_t>(axis)] - 0.5;
+      box.add(grid.info().transform.to_world(index));
+    }
+  return box;
+}
+
+/// A volume that lies apart from all before it changes nothing of them, or leaves nothing.
+void warn_of_apart(cli::Run& run, const std::vector<CsgOperand>& operands) {
+  Box3 all;
+  for (const CsgOperand& operand : operands) {
+    const Box3 box = world_box(operand.grid);
+    if (!box.empty() && !all.empty())
+      for (int axis = 0; axis < 3; ++axis)
+        if (box.min[axis] >= all.max[axis] || box.max[axis] <= all.min[axis]) {
+          run.warn(operand.name + ": does not overlap the volumes before it, expected the same "
+                                  "place: look at units, spaces (--space) and transforms");
+          break;
+        }
+    if (!box.empty()) {
+      all.add(box.min);
+      all.add(box.max);
+    }
+  }
+}
+
 void work(cli::Run& run, const Arguments& a) {
   Output output = open_volume(run);
   std::vector<CsgOperand> operands;
+  VolumeOutput result = a.output;
+  bool spaces_match = true;
   run.timed("read", [&] {
+    std::string stated;
     for (const std::string& path : a.volumes) {
       Input input(path);
-      operands.push_back({read_volume(input, run.context()), input.name()});
+      Space space = Space::unknown;
+      operands.push_back({read_volume(input, run.context(), &space), input.name()});
+      warn_of_spaces(run, stated, result.space, input.name(), space);
+      spaces_match = spaces_match && !spaces_differ(result.space, space);
+      if (result.space == Space::unknown) {
+        result.space = space;
+        stated = input.name();
+      }
     }
   });
+  if (spaces_match)
+    warn_of_apart(run, operands);
   CsgReport counts;
   const Grid grid = run.timed(
       "csg", [&] { return csg(run.context(), a.operation, operands, a.options, &counts); });
-  write(run, output, grid, a.output);
+  write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("operation", a.word);

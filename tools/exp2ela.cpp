@@ -11,9 +11,13 @@
 #include "tools/shared/model_fit.h"
 #include "tools/shared/net_source.h"
 #include "tools/shared/solid_source.h"
+#include "tools/shared/space_option.h"
+#include "tools/shared/transform_option.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 using namespace gewebe;
@@ -44,7 +48,11 @@ void fix(Model& model, const ModelArguments& a) {
     model.nodes[node].fixed |= *fixed_axes_from_name(a.axes);
 }
 
-Model source(cli::Run& run, const ModelArguments& a) {
+/// \param space  gets the space that the model is in
+Model source(cli::Run& run, const ModelArguments& a, Space& space) {
+  const std::optional<Affine> map =
+      a.transform.empty() ? std::nullopt : std::optional(transform_from_text(a.transform));
+  space = space_from_name(a.space);
   if (a.matrix) {
     require_parts(a.build.material, {});
     const double nodes = static_cast<double>(a.matrix->m) * a.matrix->n;
@@ -52,7 +60,10 @@ Model source(cli::Run& run, const ModelArguments& a) {
                    nodes * static_cast<double>(sizeof(Vec3) + 2 * sizeof(Triangle)) +
                        (a.solid ? 0 : model_bytes(nodes, 2 * nodes, a.build.bend)),
                    "the primitive");
-    return cli::model_of_surface(run, a.primitive, primitive_mesh(*a.matrix), a);
+    TriangleMesh mesh = primitive_mesh(*a.matrix);
+    if (map)
+      apply(*map, mesh);
+    return cli::model_of_surface(run, a.primitive, std::move(mesh), a);
   }
   Input input(a.mesh);
   const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
@@ -60,8 +71,19 @@ Model source(cli::Run& run, const ModelArguments& a) {
   refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
                                a.order != 2 || a.solid || a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
-  if (from == Kind::ela)
-    return run.timed("read", [&] { return read_ela(input, run.context()); });
+  if (from == Kind::ela) {
+    Space stated = Space::unknown;
+    Model model = run.timed("read", [&] { return read_ela(input, run.context(), &stated); });
+    space = result_space(stated, a.space);
+    Affine whole;
+    if (spaces_differ(stated, space))
+      whole.m[0] = whole.m[5] = -1;
+    if (map)
+      whole = *map * whole;
+    if (whole != Affine{})
+      at(input.name(), [&] { apply(whole, model); });
+    return model;
+  }
   const bool tetrahedra = holds_tetrahedra(input.peek(4096), from);
   refuse(a.solid && tetrahedra, "--solid: the input holds tetrahedra already, expected a surface");
   if (tetrahedra)
@@ -73,6 +95,8 @@ Model source(cli::Run& run, const ModelArguments& a) {
                                 .weld = weld_from_name(a.weld),
                                 .max_memory = run.context().max_memory};
   TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, options); });
+  if (map)
+    at(input.name(), [&] { apply(*map, mesh); });
   at(input.name(), [&] { require_parts(a.build.material, mesh.part); });
   if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, {});
@@ -99,7 +123,8 @@ void work(cli::Run& run, ModelArguments& a) {
     choose_materials(a);
   const Kind to = output_kind(run.to(), run.output(), Kind::ela, and_ela(writable_mesh_kinds()));
   Output output(run.output(), run.output_options(is_binary(to)));
-  Model model = source(run, a);
+  Space space = Space::unknown;
+  Model model = source(run, a, space);
   if (!a.name.empty())
     model.name = a.name;
   if (a.fixed)
@@ -111,7 +136,7 @@ void work(cli::Run& run, ModelArguments& a) {
   hold_step(run, model, a);
   run.timed("write", [&] {
     if (to == Kind::ela)
-      write_ela(output, model, run.context());
+      write_ela(output, model, run.context(), space);
     else
       write_mesh(output, surface_mesh(model), to);
   });
@@ -132,6 +157,8 @@ int main(int argc, char** argv) {
   cli::Program p("exp2ela", "Turns a mesh into a deformable model.");
   ModelArguments a;
   declare(p, a);
+  declare_space(p, a.space);
+  declare_transform(p, a.transform);
   p.output_kinds(and_ela(writable_mesh_kinds()));
   p.input_kinds(all_inputs());
   p.operand("MESH", a.mesh, "the mesh, or a model");

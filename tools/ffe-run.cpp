@@ -63,7 +63,7 @@ void work(cli::Run& run, const Arguments& in) {
     record.emplace(in.record, run.output_options(false), name);
 
   SceneOptions options;
-  options.files = scene_files(name, run.context());
+  options.files = scene_files(name, run.context(), warn);
   options.warn = warn;
   options.distrust = [&](const std::string& text) { cli::distrust(run, "ffe-run", text); };
   options.serve = in.serve;

@@ -4,6 +4,7 @@
 #include "tools/mesh/mesh_arguments.h"
 #include "tools/mesh/mesh_work.h"
 #include "tools/shared/cli.h"
+#include "tools/shared/space_option.h"
 
 using namespace gewebe;
 
@@ -58,6 +59,7 @@ int main(int argc, char** argv) {
       .one_of({"stair", "follow"});
   program.option("--label", arguments.labels, "L[-M][,L...]",
                  "with --materials LABELS: these labels alone, each tetrahedron the nearest");
+  declare_space(program, arguments.space);
   program.output_kinds(writable_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");
   program.check([&] { check(arguments); });

@@ -35,7 +35,8 @@ void check(const Arguments& arguments) {
       throw UsageError("--bbox: expected x0,y0,z0,x1,y1,z1 with x0 < x1, y0 < y1, z0 < z1");
 }
 
-GridInfo lattice(const Arguments& arguments, const Particles& particles, const Context& context) {
+GridInfo lattice(const Arguments& arguments, const Particles& particles, const Context& context,
+                 Space& space) {
   GridInfo info;
   if (arguments.voxel) {
     info.transform = uniform_transform(*arguments.voxel);
@@ -43,7 +44,7 @@ GridInfo lattice(const Arguments& arguments, const Particles& particles, const C
     info.transform = lattice_for_dim(support_box(particles), *arguments.dim);
   } else {
     Input input(arguments.like);
-    info.transform = read_volume(input, context).info().transform;
+    info.transform = read_volume(input, context, &space).info().transform;
     if (!info.transform.is_cubic())
       throw Error(input.name(), "has " + info.transform.describe() + ", expected cubic voxels");
   }
@@ -64,7 +65,8 @@ void work(cli::Run& run, const Arguments& arguments) {
                           unit_in_mm(arguments.unit));
   });
   DensityOptions options;
-  options.info = lattice(arguments, particles, run.context());
+  VolumeOutput result = arguments.output;
+  options.info = lattice(arguments, particles, run.context(), result.space);
   if (const auto& b = arguments.bbox; !b.empty())
     options.clip = Box3{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
   options.band = arguments.band;
@@ -80,7 +82,7 @@ void work(cli::Run& run, const Arguments& arguments) {
   });
   if (grid.active_voxels() == 0)
     run.warn("no voxel centre lies inside a particle's support");
-  write(run, output, grid, arguments.output);
+  write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("particles", static_cast<std::uint64_t>(particles.size()));

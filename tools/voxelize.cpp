@@ -3,6 +3,8 @@
 #include "formats/mesh/mesh_file.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/filling_rule.h"
+#include "tools/shared/space_option.h"
+#include "tools/shared/transform_option.h"
 #include "tools/shared/voxelize_labels.h"
 #include "tools/shared/voxelize_mesh.h"
 #include "tools/shared/voxelize_scan.h"
@@ -13,13 +15,13 @@ namespace {
 
 struct Arguments {
   MeshToVoxelize mesh;
-  std::string on_open = "error", rule = "parity", labels, threshold;
+  std::string on_open = "error", rule = "parity", labels, threshold, space;
 };
 
 /// What says how a mesh is read and filled.
 void refuse_mesh_options(const cli::Program& p, const std::string& asked) {
   for (const std::string name :
-       {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format"})
+       {"--rule", "--antialias", "--on-open", "--unit", "--weld", "--format", "--transform"})
     if (p.given(name))
       throw UsageError(asked + ": " + name + " is for meshes, expected no " + name);
 }
@@ -74,11 +76,14 @@ int main(int argc, char** argv) {
   p.option("--unit", a.mesh.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
   p.option("--weld", a.mesh.weld, "MODE", "points that become one: auto, all, part, none")
       .one_of(weld_names());
+  declare_space(p, a.space);
+  declare_transform(p, a.mesh.transform);
   declare(p, a.mesh.output);
   p.input_kinds(readable_mesh_kinds());
   p.operand("MESH", a.mesh.name, "the mesh");
   p.check([&] { complete(p, a); });
   return p.run(argc, argv, [&](cli::Run& run) {
+    a.mesh.output.space = space_from_name(a.space);
     if (!a.threshold.empty())
       voxelize_scan(run, a.mesh.name, thresholds_from_text(a.threshold), a.mesh.voxel,
                     a.mesh.output);

@@ -176,10 +176,13 @@ public:
   }
 
   std::size_t line() const { return std::max<std::size_t>(in_.line(), 1); }
+  Space stated_space() const { return space_; }
 
   Model parse() {
     header();
     name();
+    if (section_ == "space")
+      space();
     materials();
     nodes();
     if (section_ == "normals")
@@ -312,8 +315,17 @@ private:
     next_section();
   }
 
+  void space() {
+    const std::string_view word = in_.word();
+    space_ = space_from_name(word);
+    if (space_ == Space::unknown)
+      throw Error(shown(word) + " is no space, expected RAS or LPS");
+    in_.end_line(2);
+    next_section();
+  }
+
   void materials() {
-    expect({"materials"});
+    expect({"space", "materials"});
     const std::size_t n = count(13);
     model_.materials.reserve(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -447,6 +459,7 @@ private:
   Model model_;
   ModelChecker check_;
   Context context_;
+  Space space_ = Space::unknown;
   std::string_view section_;
   std::string last_;
   std::size_t last_count_ = 0;
@@ -454,22 +467,26 @@ private:
 
 } // namespace
 
-Model parse_ela(std::string_view text, const std::string& name, const Context& context) {
+Model parse_ela(std::string_view text, const std::string& name, const Context& context,
+                Space* space) {
   Parser parser(text, context);
   try {
-    return parser.parse();
+    Model model = parser.parse();
+    if (space != nullptr)
+      *space = parser.stated_space();
+    return model;
   } catch (const Error& error) {
     throw Error(name + ":" + std::to_string(parser.line()), error.what());
   }
 }
 
-Model read_ela(Input& input, const Context& context) {
+Model read_ela(Input& input, const Context& context, Space* space) {
   const std::string text = input.read_all(context.max_memory);
   // The lines that we write take more bytes as text than as data.
   const std::string what = "the model in " + std::to_string(text.size()) + " bytes of text";
   at(input.name(),
      [&] { require_memory(context, 2 * static_cast<double>(text.size()), what.c_str()); });
-  return parse_ela(text, input.name(), context);
+  return parse_ela(text, input.name(), context, space);
 }
 
 } // namespace gewebe

@@ -94,9 +94,12 @@ void emit_skin(const Sink& sink, const Skin& skin, const Context& context) {
          });
 }
 
-void emit_model(const Sink& sink, const Model& m, const Context& context) {
-  sink("ela_expl 1\nname \"" + m.name + "\"\nmaterials " + std::to_string(m.materials.size()) +
-       "\n");
+void emit_model(const Sink& sink, const Model& m, const Context& context,
+                Space space = Space::unknown) {
+  sink("ela_expl 1\nname \"" + m.name + "\"\n");
+  if (space != Space::unknown)
+    sink("space " + std::string(space_name(space)) + "\n");
+  sink("materials " + std::to_string(m.materials.size()) + "\n");
   for (std::size_t i = 0; i < m.materials.size(); ++i) {
     const Material& k = m.materials[i];
     sink(std::to_string(i) + " \"" + k.name + "\" " + number_text(k.density) + " " +
@@ -148,8 +151,8 @@ std::string ela_text(const Model& model) {
   return text;
 }
 
-void write_ela(Output& output, const Model& model, const Context& context) {
-  emit_model([&](std::string_view piece) { output.write(piece); }, model, context);
+void write_ela(Output& output, const Model& model, const Context& context, Space space) {
+  emit_model([&](std::string_view piece) { output.write(piece); }, model, context, space);
 }
 
 } // namespace gewebe

@@ -40,6 +40,7 @@ constexpr std::size_t uuid_begin = 21;
 constexpr std::size_t uuid_length = 36;
 constexpr const char* isovalue_key = "gewebe_iso";
 constexpr const char* band_key = "gewebe_band_iso";
+constexpr const char* space_key = "gewebe_space";
 
 void initialize_openvdb() {
   static std::once_flag once;
@@ -523,6 +524,17 @@ std::optional<double> number_metadata(const openvdb::GridBase& grid, const char*
   return value;
 }
 
+Space space_metadata(const openvdb::GridBase& grid, const std::string& name) {
+  const openvdb::Metadata::ConstPtr metadata = grid[space_key];
+  if (!metadata)
+    return Space::unknown;
+  const auto* const text = dynamic_cast<const openvdb::StringMetadata*>(metadata.get());
+  const Space space = text == nullptr ? Space::unknown : space_from_name(text->value());
+  if (space == Space::unknown)
+    throw Error(name, std::string("metadata ") + space_key + " is no space, expected RAS or LPS");
+  return space;
+}
+
 openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std::string& name) {
   std::vector<openvdb::FloatGrid::Ptr> floats;
   for (const openvdb::GridBase::Ptr& grid : grids) {
@@ -539,7 +551,7 @@ openvdb::FloatGrid::Ptr choose_grid(const openvdb::GridPtrVec& grids, const std:
 }
 
 Grid parse_volume(std::string_view bytes, const std::string& name, const Context& context,
-                  StreamWay way) {
+                  StreamWay way, Space* space) {
   MemoryBuffer buffer(bytes, name);
   const auto storage = std::make_shared<LeafStorage>();
   openvdb::FloatGrid::Ptr native =
@@ -551,6 +563,8 @@ Grid parse_volume(std::string_view bytes, const std::string& name, const Context
   info.level_set = native->getGridClass() == openvdb::GRID_LEVEL_SET;
   info.isovalue = number_metadata(*native, isovalue_key, name).value_or(info.level_set ? 0 : 0.5);
   info.band_isovalue = number_metadata(*native, band_key, name);
+  if (space != nullptr)
+    *space = space_metadata(*native, name);
   native.reset(); // the tree has one owner
   Grid grid = make_grid(std::move(info), std::move(tree), storage);
   if (!grid.summary(context).finite)
@@ -597,22 +611,24 @@ void refuse_other_kinds(std::string_view bytes, const std::string& name) {
 
 } // namespace
 
-Grid read_volume(Input& input, const Context& context) {
-  return volume_from_bytes(input.read_all_pages(context.max_memory).view(), input.name(), context);
-}
-
-Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context) {
-  return volume_from_bytes(bytes, name, context, usual_way);
+Grid read_volume(Input& input, const Context& context, Space* space) {
+  return volume_from_bytes(input.read_all_pages(context.max_memory).view(), input.name(), context,
+                           space);
 }
 
 Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
-                       StreamWay way) {
+                       Space* space) {
+  return volume_from_bytes(bytes, name, context, usual_way, space);
+}
+
+Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
+                       StreamWay way, Space* space) {
   initialize_openvdb();
   refuse_other_kinds(bytes, name);
   check_vdb_head(bytes, name);
   Remarks remarks;
   try {
-    Grid grid = at(name, [&] { return parse_volume(bytes, name, context, way); });
+    Grid grid = at(name, [&] { return parse_volume(bytes, name, context, way, space); });
     if (const std::string remark = remarks.text(); !remark.empty())
       throw Error(name, fault_of(remark));
     return grid;
@@ -625,12 +641,13 @@ Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Co
   }
 }
 
-void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing) {
-  write_volume(output, grid, context, packing, usual_way);
+void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
+                  Space space) {
+  write_volume(output, grid, context, packing, usual_way, space);
 }
 
 void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
-                  StreamWay way) {
+                  StreamWay way, Space space) {
   initialize_openvdb();
   const GridInfo& info = grid.info();
   const auto native = std::make_shared<WriteGrid>(grid.native()->tree, context);
@@ -641,6 +658,8 @@ void write_volume(Output& output, const Grid& grid, const Context& context, Pack
     native->insertMeta(isovalue_key, openvdb::DoubleMetadata(info.isovalue));
   if (info.band_isovalue)
     native->insertMeta(band_key, openvdb::DoubleMetadata(*info.band_isovalue));
+  if (space != Space::unknown)
+    native->insertMeta(space_key, openvdb::StringMetadata(std::string(space_name(space))));
   native->addStatsMetadata(); // as OpenVDB does
   native->insertMeta(openvdb::GridBase::META_FILE_COMPRESSION,
                      openvdb::StringMetadata(openvdb::io::compressionToString(flags_of(packing))));

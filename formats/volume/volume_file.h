@@ -2,6 +2,7 @@
 // Volumes as OpenVDB streams (gewebe_volume(5)): one float grid, on a pipe as in a file. The same
 // content gives the same bytes: the UUID of the stream is derived from the content.
 
+#include "base/space.h"
 #include "formats/stream/stream.h"
 #include "volume/grid.h"
 
@@ -12,11 +13,12 @@ namespace gewebe {
 
 /// Reads the grid `density`, or the only float grid if none has that name.
 /// \throw Error with the place for anything that is not a whole, finite, affine float grid
-Grid read_volume(Input& input, const Context& context);
+/// `space` gets what the metadata gewebe_space states.
+Grid read_volume(Input& input, const Context& context, Space* space = nullptr);
 
 /// The same for bytes that are there already.
-Grid volume_from_bytes(std::string_view bytes, const std::string& name,
-                       const Context& context = {});
+Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context = {},
+                       Space* space = nullptr);
 
 /// How the values of leaves stand in a stream: those of active voxels, which cost a read and a
 /// write of memory alone, or these packed by blosc, to half to nine tenths of the bytes and at
@@ -25,7 +27,7 @@ enum class Packing { blosc, none };
 
 /// Writes one grid.
 void write_volume(Output& output, const Grid& grid, const Context& context,
-                  Packing packing = Packing::blosc);
+                  Packing packing = Packing::blosc, Space space = Space::unknown);
 
 /// What the head of an OpenVDB stream says, checked without OpenVDB: it believes every size it
 /// reads. Walks magic, version, file metadata and the first grid's descriptor, metadata and kind of

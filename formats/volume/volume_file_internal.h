@@ -15,8 +15,8 @@ enum class StreamWay {
 extern const StreamWay usual_way;
 
 Grid volume_from_bytes(std::string_view bytes, const std::string& name, const Context& context,
-                       StreamWay way);
+                       StreamWay way, Space* space = nullptr);
 void write_volume(Output& output, const Grid& grid, const Context& context, Packing packing,
-                  StreamWay way);
+                  StreamWay way, Space space = Space::unknown);
 
 } // namespace gewebe

@@ -19,10 +19,12 @@ class Model:
     held; central [n], the central node of each or -1; node_material [n]; springs, a structured array of i, j, kind
     (b'e', b'b', b'c'), stiffness, damping, rest; triangles [t, 3]; and where there are any normals, texcoords,
     tetrahedra [m, 4 or 10], tetrahedron_material [m], skin, skin_triangles, skin_texcoords as in the file, else None.
+    space is 'RAS', 'LPS' or None.
     """
 
     def __init__(self, name):
         self.name = name
+        self.space = None
         self.normals = self.triangles = self.texcoords = self.tetrahedra = self.tetrahedron_material = None
         self.skin = self.skin_triangles = self.skin_texcoords = None
 
@@ -72,6 +74,8 @@ def read_ela(source):
         if lines[0].split() != ['ela_expl', '1']:
             raise Error(f'{place}: no model of ela_expl(5), version 1')
         model, at = Model(shlex.split(lines[1])[1]), 2
+        if lines[at].split()[0] == 'space':
+            model.space, at = lines[at].split()[1], at + 1
         while lines[at] != 'end':
             section, count = lines[at].split()
             rows = lines[at + 1:at + 1 + int(count)]

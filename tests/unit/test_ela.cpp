@@ -134,7 +134,7 @@ TEST(Ela, EachFaultHasItsLine) {
       {"name \"t\"", "name \"t\" u", "2: surplus word 'u'"},
       {"name \"t\"", "name \"a\tb\"", "2: the name holds a quote"},
       {"name \"t\"\n", "", "2: section 'materials', expected 'name'"},
-      {"materials 1", "material 1", "3: 'material' is no section, expected 'materials'"},
+      {"materials 1", "material 1", "3: 'material' is no section, expected 'space' or 'materials'"},
       {"materials 1", "materials -1", "3: '-1' is no count"},
       {"materials 1", "materials 0", "4: '0' is no section, expected 'nodes' after 0 materials"},
       {"0 \"liver\"", "1 \"liver\"", "4: material index 1, expected 0"},

@@ -202,6 +202,10 @@ class Files(unittest.TestCase):
         self.assertLess(abs(length - model.springs['rest']).max(), 1e-9)
         self.assertEqual(model.materials[0]['name'], 'generic')
         self.assertIsNone(model.tetrahedra)
+        self.assertIsNone(model.space)
+        in_lps = gewebe.read_ela(sphere_model('lps.ela', more=['--space', 'lps']))
+        self.assertEqual(in_lps.space, 'LPS')
+        self.assertTrue((in_lps.points == model.points).all())
         for text in (b'', b'ela_expl 1\n', b'ela_expl 2\nend\n', b'ela_expl 1\nname "a"\nnodes 3\n0 0 0 1 1 - -1 0\nend\n'):
             with self.assertRaises(gewebe.Error):
                 gewebe.read_ela(text)

@@ -16,6 +16,13 @@ namespace {
 /// within a voxel of them, a coarse cell's edge some more.
 constexpr std::int32_t label_reach = 3;
 
+/// The materials of a source in the other space.
+MaterialSource in_other_space(MaterialSource source) {
+  return [source = std::move(source)]() -> MaterialAt {
+    return [at = source()](const Vec3& place) { return at(other_space(place)); };
+  };
+}
+
 } // namespace
 
 MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
@@ -32,15 +39,20 @@ MaterialVolumes::MaterialVolumes(const MeshArguments& arguments) {
     wanted = labels_from_text(arguments.labels, "whole numbers");
 }
 
-void MaterialVolumes::read(cli::Run& run) {
-  for (Input& input : inputs)
+void MaterialVolumes::read(cli::Run& run, Space space) {
+  for (Input& input : inputs) {
+    Space own = Space::ras; // of labels, as they are read
     if (is_labels) {
       AllLabels all = read_all_labels(input, wanted, run.context());
       for (const std::string& warning : all.warnings)
         run.warn(warning);
       labels = std::move(all.voxels);
-    } else
-      volumes.push_back(read_volume(input, run.context()));
+    } else {
+      own = Space::unknown;
+      volumes.push_back(read_volume(input, run.context(), &own));
+    }
+    turned.push_back(spaces_differ(own, space));
+  }
 }
 
 MaterialSource MaterialVolumes::source(const Grid& solid, double isovalue) const {
@@ -48,12 +60,21 @@ MaterialSource MaterialVolumes::source(const Grid& solid, double isovalue) const
     return {};
   if (is_labels)
     return at(inputs.front().name(), [&] {
-      return wanted.empty() ? label_source(labels, label_reach, inside_source(solid, isovalue))
-                            : label_source(labels, label_reach);
+      MaterialSource tissue;
+      if (wanted.empty()) {
+        tissue = inside_source(solid, isovalue);
+        if (turned.front())
+          tissue = in_other_space(std::move(tissue));
+      }
+      MaterialSource source = label_source(labels, label_reach, tissue);
+      return turned.front() ? in_other_space(std::move(source)) : source;
     });
   std::vector<MaterialSource> sources;
   for (std::size_t n = 0; n < volumes.size(); ++n)
-    sources.push_back(at(inputs[n].name(), [&] { return inside_source(volumes[n]); }));
+    sources.push_back(at(inputs[n].name(), [&] {
+      MaterialSource source = inside_source(volumes[n]);
+      return turned[n] ? in_other_space(std::move(source)) : source;
+    }));
   return [this, sources]() -> MaterialAt {
     std::vector<MaterialAt> inside;
     for (const MaterialSource& source : sources)

@@ -1,6 +1,7 @@
 #pragma once
 // The volumes that tell where the materials of a solid are.
 
+#include "base/space.h"
 #include "formats/stream/stream.h"
 #include "formats/volume/label_volume.h"
 #include "labels/label_runs.h"
@@ -17,7 +18,8 @@ namespace gewebe {
 struct MaterialVolumes {
   /// \throw UsageError, Error if they don't go together
   explicit MaterialVolumes(const MeshArguments& arguments);
-  void read(cli::Run& run);
+  /// \param space  of the places that source() is asked about
+  void read(cli::Run& run, Space space);
   /// Nothing where there are none. \pre read; `solid`, which is meshed at `isovalue`, outlives it
   MaterialSource source(const Grid& solid, double isovalue) const;
 
@@ -26,6 +28,7 @@ struct MaterialVolumes {
   std::vector<LabelRange> wanted; ///< of the labels; empty: all
   LabelRuns labels;
   std::vector<Grid> volumes;
+  std::vector<bool> turned; ///< per input: it is in the other space
 };
 
 } // namespace gewebe

@@ -11,7 +11,7 @@
 namespace gewebe {
 
 struct MeshArguments {
-  std::string volume = "-", place, components, materials, interface, labels;
+  std::string volume = "-", place, components, materials, interface, labels, space;
   std::optional<double> isovalue, voxel, epsilon, cell;
   std::vector<double> box; // x0 y0 z0 x1 y1 z1
   std::int64_t rounds = 0, grade = 0;

@@ -52,7 +52,7 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   Input input(arguments.volume);
   MaterialVolumes materials(arguments);
   const PreparedVolume prepared = prepare(run, arguments, input);
-  run.timed("materials", [&] { materials.read(run); });
+  run.timed("materials", [&] { materials.read(run, prepared.space); });
   const StuffingOptions options{
       prepared.isovalue, arguments.cell, static_cast<unsigned>(arguments.grade),
       materials.source(prepared.grid, prepared.isovalue), arguments.interface == "follow"};
@@ -78,11 +78,14 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
     stats.set("largest_dropped", kept.largest_dropped);
     warn_of_components(run, kept.kept, kept.dropped);
   }
+  const std::vector<Vec3> as_in_volume = mesh.points;
+  bring_to_space(run, prepared.space, arguments, mesh.points);
   run.timed("write",
             [&] { write_tet_mesh(output, mesh, kind, run.output_options(is_binary(kind))); });
   output.commit();
   if (run.stats_wanted())
     run.timed("examine", [&] {
+      mesh.points = as_in_volume; // beside which its distances are measured
       const TriangleMesh surface = cli::report_tetrahedra(run, mesh);
       if (!mesh.tetrahedra.empty())
         compare_surface(run, prepared, options, surface);

@@ -69,6 +69,7 @@ void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
   if (!snapped.mesh.triangles.empty() && prepared.before)
     compare_topology(run, "--resample", *prepared.before, topology(snapped.mesh));
   refine(run, arguments, prepared.grid, prepared.isovalue, snapped.mesh);
+  bring_to_space(run, prepared.space, arguments, snapped.mesh.points, &snapped.mesh.normals);
   run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });
   output.commit();
   if (run.stats_wanted())

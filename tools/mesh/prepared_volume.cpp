@@ -3,6 +3,7 @@
 #include "formats/volume/volume_file.h"
 #include "surface/marching_cubes.h"
 #include "tools/shared/distrust.h"
+#include "tools/shared/space_option.h"
 #include "tools/shared/surface_choice.h"
 #include "volume/crop.h"
 #include "volume/resample.h"
@@ -24,6 +25,21 @@ Topology topology_of(const Context& context, const Grid& grid, const MeshArgumen
 }
 
 } // namespace
+
+void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
+                    std::vector<Vec3>& points, std::vector<std::array<float, 3>>* normals) {
+  const Space to = result_space(from, arguments.space);
+  if (to != Space::unknown)
+    run.stats().set("space", std::string(space_name(to)));
+  if (!spaces_differ(from, to))
+    return;
+  for (Vec3& p : points)
+    p = other_space(p);
+  if (normals != nullptr)
+    for (std::array<float, 3>& n : *normals)
+      n = {0 - n[0], 0 - n[1], n[2]};
+  run.say("turned from " + std::string(space_name(from)) + " to " + std::string(space_name(to)));
+}
 
 void compare_topology(cli::Run& run, const char* option, const Topology& before,
                       const Topology& after) {
@@ -49,7 +65,7 @@ void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped
 PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input) {
   const Context& context = run.context();
   PreparedVolume result;
-  result.grid = run.timed("read", [&] { return read_volume(input, context); });
+  result.grid = run.timed("read", [&] { return read_volume(input, context, &result.space); });
   result.isovalue = arguments.isovalue.value_or(default_isovalue(result.grid.info()));
   at(input.name(), [&] {
     std::optional<Grid> resampled; // first, since what it needs is refused before long work

@@ -1,13 +1,16 @@
 #pragma once
 // The volume that mc-opt meshes, and what it says of its surface.
 
+#include "base/space.h"
 #include "formats/stream/stream.h"
 #include "mesh/components.h"
 #include "tools/mesh/mesh_arguments.h"
 #include "tools/shared/cli.h"
 #include "volume/grid.h"
 
+#include <array>
 #include <optional>
+#include <vector>
 
 namespace gewebe {
 
@@ -16,9 +19,15 @@ struct PreparedVolume {
   Grid grid;
   double isovalue = 0;
   std::optional<Topology> before;
+  Space space = Space::unknown; ///< of the grid, as stated in it
 };
 
 PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input);
+
+/// Brings what was meshed to the space that --space asks for, and says which it is.
+void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
+                    std::vector<Vec3>& points,
+                    std::vector<std::array<float, 3>>* normals = nullptr);
 
 /// Warns where `option` changed the topology.
 void compare_topology(cli::Run& run, const char* option, const Topology& before,

@@ -8,17 +8,21 @@
 #include "formats/stream/kind.h"
 #include "mesh/weld.h"
 #include "tools/run/scene_run.h"
+#include "tools/shared/space_option.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <istream>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace gewebe {
@@ -55,9 +59,35 @@ std::string list_text(Input input) {
   return text;
 }
 
+/// Warns of the first model whose space is not that of the models before it.
+class SpaceCheck {
+public:
+  explicit SpaceCheck(std::function<void(const std::string&)> warn) : warn_(std::move(warn)) {}
+  void add(const std::string& name, Space space) {
+    const std::lock_guard lock(mutex_);
+    if (warned_ || !warn_)
+      return;
+    warned_ = spaces_differ(first_, space);
+    if (warned_)
+      warn_(two_spaces_text(first_name_, first_, name, space));
+    if (first_ == Space::unknown) {
+      first_ = space;
+      first_name_ = name;
+    }
+  }
+
+private:
+  std::mutex mutex_;
+  std::function<void(const std::string&)> warn_;
+  Space first_ = Space::unknown;
+  std::string first_name_;
+  bool warned_ = false;
+};
+
 } // namespace
 
-SceneFiles scene_files(const std::string& scene, const Context& context) {
+SceneFiles scene_files(const std::string& scene, const Context& context,
+                       const std::function<void(const std::string&)>& warn) {
   const std::size_t slash = scene.find_last_of('/');
   const std::string folder =
       scene == "-" || slash == std::string::npos ? "" : scene.substr(0, slash + 1);
@@ -68,13 +98,17 @@ SceneFiles scene_files(const std::string& scene, const Context& context) {
   };
   SceneFiles files;
   files.check = [resolve](const std::string& name) { (void)facts_of(resolve(name)); };
-  files.model = [resolve, context](const std::string& name) {
+  const auto spaces = std::make_shared<SpaceCheck>(warn);
+  files.model = [resolve, context, spaces](const std::string& name) {
     const std::string path = resolve(name);
     Context reading = context;
     if (!S_ISREG(facts_of(path).st_mode)) // it may have no end, and memory has one
       reading.max_memory = std::min(reading.max_memory, longest_piped);
     Input input(path, false);
-    return read_ela(input, reading);
+    Space space = Space::unknown;
+    Model model = read_ela(input, reading, &space);
+    spaces->add(input.name(), space);
+    return model;
   };
   files.store = [resolve](const std::string& name, const Model& model) {
     const auto store = std::make_shared<StiffnessStore>(resolve(name));

@@ -44,7 +44,8 @@ struct SceneFiles {
 
 /// From files; relative names count from the folder of `scene`, or from the working folder where
 /// that is "-".
-SceneFiles scene_files(const std::string& scene, const Context& context);
+SceneFiles scene_files(const std::string& scene, const Context& context,
+                       const std::function<void(const std::string&)>& warn = {});
 
 struct SceneOptions {
   SceneFiles files;

@@ -17,7 +17,7 @@ namespace gewebe {
 struct ModelArguments {
   std::string mesh = "-", unit, weld = "auto", material = "generic", name, fix = "none",
               axes = "xyz", primitive, size, repair, materials, fit, rule = "parity",
-              on_open = "error";
+              on_open = "error", space, transform;
   MaterialOverrides values;
   BuildOptions build;
   RepairOptions repairs;

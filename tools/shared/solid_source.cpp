@@ -10,6 +10,7 @@
 #include "tetrahedra/check.h"
 #include "tetrahedra/components.h"
 #include "tools/shared/filling_rule.h"
+#include "tools/shared/transform_option.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,6 +137,8 @@ Model solid_source(Run& run, Input& input, Kind kind, const ModelArguments& a) {
   if (!a.unit.empty())
     options.scale = millimetres_per(a.unit);
   TetMesh mesh = run.timed("read", [&] { return read_tet_mesh(input, options); });
+  if (!a.transform.empty())
+    at(input.name(), [&] { apply(transform_from_text(a.transform), mesh); });
   return at(input.name(), [&] {
     if (!a.repair.empty())
       repair(run, input.name(), mesh, a.repairs);

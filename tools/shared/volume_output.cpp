@@ -18,8 +18,10 @@ Output open_volume(const cli::Run& run) {
 
 void write(cli::Run& run, Output& output, const Grid& grid, const VolumeOutput& options) {
   run.timed("write", [&] {
-    write_volume(output, grid, run.context(),
-                 options.uncompressed ? Packing::none : Packing::blosc);
+    write_volume(output, grid, run.context(), options.uncompressed ? Packing::none : Packing::blosc,
+                 options.space);
+    if (options.space != Space::unknown)
+      run.stats().set("space", std::string(space_name(options.space)));
   });
   output.commit();
 }

@@ -1,6 +1,7 @@
 #pragma once
 // How programs that make a volume write it.
 
+#include "base/space.h"
 #include "formats/stream/stream.h"
 #include "tools/shared/cli.h"
 #include "volume/grid.h"
@@ -9,6 +10,7 @@ namespace gewebe {
 
 struct VolumeOutput {
   bool uncompressed = false;
+  Space space = Space::unknown; ///< stated in the volume
 };
 
 /// Declares --to and --uncompressed.

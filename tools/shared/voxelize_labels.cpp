@@ -4,6 +4,7 @@
 #include "formats/volume/volume_file.h"
 #include "labels/label_density.h"
 #include "tools/shared/report.h"
+#include "tools/shared/space_option.h"
 
 #include <algorithm>
 #include <array>
@@ -73,19 +74,24 @@ void voxelize_labels(cli::Run& run, const std::string& path, const std::vector<L
   Output output = open_volume(run);
   Input input(path);
   // What its size rules out is refused before its voxels are unpacked.
-  const LabelVolume volume = run.timed("read", [&] {
+  LabelVolume volume = run.timed("read", [&] {
     return read_label_volume(input, labels, run.context(), [&](const LabelMask& mask) {
       check_label_density(run.context(), mask, {voxel});
     });
   });
   for (const std::string& warning : volume.warnings)
     run.warn(warning);
+  VolumeOutput result = to;
+  if (result.space == Space::lps)
+    volume.mask.transform = other_space(volume.mask.transform);
+  else
+    result.space = Space::ras; // as read
   LabelDensityReport report;
   const Grid grid = run.timed("density", [&] {
     return at(input.name(),
               [&] { return label_density(run.context(), volume.mask, {voxel}, &report); });
   });
-  write(run, output, grid, to);
+  write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("format", volume.format);

@@ -6,6 +6,8 @@
 #include "tools/shared/distrust.h"
 #include "tools/shared/mesh_size.h"
 #include "tools/shared/report.h"
+#include "tools/shared/space_option.h"
+#include "tools/shared/transform_option.h"
 #include "volume/lattice.h"
 
 #include <cmath>
@@ -14,14 +16,15 @@ namespace gewebe {
 
 namespace {
 
+/// The lattice; with --like its space too.
 GridTransform lattice(const MeshToVoxelize& a, const Input& input, const TriangleMesh& mesh,
-                      const Context& context) {
+                      const Context& context, Space& space) {
   if (a.voxel)
     return uniform_transform(*a.voxel);
   if (a.dim)
     return at(input.name(), [&] { return lattice_for_dim(bounding_box(mesh), *a.dim); });
   Input like(a.like);
-  const GridTransform transform = read_volume(like, context).info().transform;
+  const GridTransform transform = read_volume(like, context, &space).info().transform;
   if (!transform.is_cubic())
     throw Error(like.name(), "has " + transform.describe() + ", expected cubic voxels");
   return transform;
@@ -60,8 +63,20 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
   read.weld = weld_from_name(a.weld);
   read.max_memory = run.context().max_memory;
   read.drop_unused = true; // so that they don't count for --dim
-  const TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
-  const GridTransform transform = lattice(a, input, mesh, run.context());
+  TriangleMesh mesh = run.timed("read", [&] { return read_mesh(input, read); });
+  if (!a.transform.empty())
+    at(input.name(), [&] { apply(transform_from_text(a.transform), mesh); });
+  VolumeOutput to = a.output;
+  Space of_lattice = to.space;
+  const GridTransform transform = lattice(a, input, mesh, run.context(), of_lattice);
+  if (spaces_differ(to.space, of_lattice)) {
+    for (Vec3& p : mesh.points)
+      p = other_space(p);
+    run.say(input.name() + ": turned from " + std::string(space_name(to.space)) + " to " +
+            std::string(space_name(of_lattice)) + ", the space of --like");
+  }
+  if (of_lattice != Space::unknown)
+    to.space = of_lattice;
 
   CoverageReport counts;
   const Grid grid = run.timed("voxelize", [&] {
@@ -71,7 +86,7 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
     cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
   else if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
-  write(run, output, grid, a.output);
+  write(run, output, grid, to);
   report(run, a, counts);
   cli::report_volume(run, grid);
 }

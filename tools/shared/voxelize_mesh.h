@@ -18,6 +18,7 @@ struct MeshToVoxelize {
   std::string weld = "auto";
   std::optional<double> voxel;     ///< mm
   std::optional<std::int64_t> dim; ///< voxels along the longest side
+  std::string transform;           ///< of the mesh, as in transform_option.h
   std::string like;                ///< volume whose lattice is taken
   std::string antialias = "jones";
   AntialiasChoice choice; ///< what that text stands for

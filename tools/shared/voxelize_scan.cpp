@@ -5,6 +5,7 @@
 #include "formats/volume/volume_file.h"
 #include "labels/grey_density.h"
 #include "tools/shared/report.h"
+#include "tools/shared/space_option.h"
 
 #include <charconv>
 #include <cmath>
@@ -52,9 +53,14 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
                    std::optional<double> voxel, const VolumeOutput& to) {
   Output output = open_volume(run);
   Input input(path);
-  const GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
+  GreyScan scan = run.timed("read", [&] { return read_grey_volume(input, run.context()); });
   for (const std::string& warning : scan.warnings)
     run.warn(warning);
+  VolumeOutput result = to;
+  if (result.space == Space::lps)
+    scan.volume.transform = other_space(scan.volume.transform);
+  else
+    result.space = Space::ras; // as read
   GreyDensityReport report;
   const Grid grid = run.timed("density", [&] {
     return at(input.name(), [&] {
@@ -65,7 +71,7 @@ void voxelize_scan(cli::Run& run, const std::string& path, const Thresholds& thr
   if (report.missing > 0)
     run.warn(input.name() + ": " + std::to_string(report.missing) +
              " voxels have no value (NaN) and count as outside");
-  write(run, output, grid, to);
+  write(run, output, grid, result);
 
   cli::Stats& stats = run.stats();
   stats.set("format", scan.format);
