@@ -11,8 +11,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <span>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 
@@ -392,6 +394,12 @@ const HeaderField& HeaderFields::need(const std::string& key) const {
   throw Error(name_, "the " + header_ + " has no field '" + key + "', expected one");
 }
 
+void require_no_pipe(const std::string& path) {
+  std::error_code failure;
+  if (std::filesystem::is_other(path, failure))
+    throw Error(path, "is no regular file, expected one beside the header");
+}
+
 LabelVolume read_side_file(const std::string& header, const HeaderField& file,
                            const LabelRequest& request,
                            const std::function<LabelVolume(BufferedBytes&)>& read) {
@@ -402,6 +410,7 @@ LabelVolume read_side_file(const std::string& header, const HeaderField& file,
     throw Error(file.place,
                 "the voxels are in another file, expected a file name or one file of both");
   const std::string path = beside(header, file.value);
+  require_no_pipe(path);
   Input input(path);
   (void)input.peek(1);
   StreamBytes source(input.stream(), path);

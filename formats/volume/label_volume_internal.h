@@ -154,6 +154,10 @@ private:
   std::string header_;
 };
 
+/// Refuses a pipe or a device as the file beside a header: it might never end, or never begin.
+/// \throw Error
+void require_no_pipe(const std::string& path);
+
 /// Reads voxels from the file that a header's field names, in the header's folder. \throw Error if
 /// it names several, or the request has no side files
 LabelVolume read_side_file(const std::string& header, const HeaderField& file,

@@ -269,6 +269,7 @@ LabelVolume read_nifti(BufferedBytes& bytes, const LabelRequest& request) {
       throw Error(name, "is the header of a NIfTI pair, expected a file name or one file of both");
     (void)bytes.read(&more, 1); // extensions may follow; reads the checksum of a compressed one
     const std::string image = image_of(name);
+    require_no_pipe(image);
     Input input(image);
     (void)input.peek(1);
     StreamBytes source(input.stream(), image);
