@@ -88,7 +88,20 @@ SHARED := $(BUILD)/obj/tools/shared.a
 PLUGIN := $(BUILD)/gewebe-volume.so
 PLUGINDIR = $(patsubst %/,%,$(dir $(BINDIR)))/lib/gewebe
 
-obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(1))
+# Unity units: files of a room are compiled in groups, so that headers are read once (scripts/unity). UNITY=no compiles
+# each file by itself; a build folder that has such objects goes on with them unless UNITY=yes is given.
+# Files with flags of their own are in no group, nor those that would bring libraries to programs that need others of them.
+UNITY ?= $(if $(filter-out $(BUILD)/obj/lib/base/lib-base-%,$(wildcard $(BUILD)/obj/lib/base/*.o)),no,yes)
+SINGLE := %_avx2.cpp %_avx512.cpp %_baseline.cpp %_cgal.cpp lib/voxelize/coverage_exact.cpp tests/unit/mesh_fixtures.cpp
+GROUPED := $(filter-out $(SINGLE) tools/shared/% lib/volume/% formats/volume/%,$(LIB_SRC) $(SHARED_SRC) $(UNIT_SRC))
+ifneq ($(UNITY),no)
+ifneq ($(filter-out clean deps help html lint uninstall,$(or $(MAKECMDGOALS),all)),)
+UNITS := $(shell scripts/unity '$(BUILD)/unity' 2000 $(GROUPED))
+endif
+endif
+# Objects of source files: of the groups that hold them, or their own.
+obj = $(patsubst %.cpp,$(BUILD)/obj/%.o,$(if $(UNITS),$(filter-out $(GROUPED),$(1)),$(1))) \
+  $(patsubst %,$(BUILD)/obj/%.o,$(filter $(addsuffix /%,$(sort $(patsubst %/,%,$(dir $(filter $(GROUPED),$(1)))))),$(UNITS)))
 # The commit that programs tell; its own unit, so that another one compiles nothing else and links programs alone.
 COMMIT := $(BUILD)/obj/commit.o
 OBJECTS := $(call obj,$(LIB_SRC) $(SHARED_SRC) $(TOOL_SRC) $(UNIT_SRC) $(STRESS_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(VALIDATE_SRC) tests/fuzz/replay.cpp)
@@ -134,8 +147,8 @@ $(BUILD)/obj/lib/voxelize/coverage_exact.o: FILE_FLAGS := $(kernel)
 # Eight lanes on four, or on two: their vectors cross no call that is not inlined.
 $(BUILD)/obj/lib/raster/raster_kernel_%.o: FILE_FLAGS += -Wno-psabi
 $(BUILD)/obj/lib/raster/raster_kernel_baseline.o: FILE_FLAGS := -Wno-psabi $(kernel)
-# CGAL's interval arithmetic changes the rounding mode.
-$(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math
+# CGAL's interval arithmetic changes the rounding mode. More than -O1 takes twice as long to compile.
+$(BUILD)/obj/%_cgal.o: FILE_FLAGS := -frounding-math $(if $(filter release,$(config)),-O1)
 
 # Holds the command, so that other flags compile everything again.
 COMMAND := $(CXX) $(ALLFLAGS) $(unit_flags_$(config)) $(LDFLAGS)
@@ -160,6 +173,9 @@ $(BUILD)/obj/tests/unit/%.o $(BUILD)/precompiled/unit.h.gch: OPTIMIZE := $(unit_
 endif
 $(BUILD)/obj/tests/unit/%.o: KIND := unit
 
+# A class of one .cpp may have members of its anonymous namespace; within a unity unit g++ takes the .cpp for a header.
+UNITY_FLAGS := $(if $(filter g++%,$(notdir $(firstword $(CXX)))),-Wno-subobject-linkage)
+
 $(BUILD)/precompiled/%.h: Makefile
 	@mkdir -p $(@D)
 	@printf '#include <%s>\n' $(PRECOMPILED_$*) > $@.new && { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
@@ -167,13 +183,17 @@ $(BUILD)/precompiled/%.h.gch: $(BUILD)/precompiled/%.h $(BUILD)/flags | $(FIRST)
 	$(CCACHE) $(CXX) $(ALLFLAGS) -x c++-header $< -o $@
 .PRECIOUS: $(BUILD)/precompiled/%.h $(BUILD)/precompiled/%.h.gch
 
+$(BUILD)/obj/tests/unit/%.o: $(BUILD)/unity/tests/unit/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/unit.h.gch) | $(FIRST)
+	$(compile)
+$(BUILD)/obj/%.o: $(BUILD)/unity/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch) | $(FIRST)
+	$(compile)
 $(BUILD)/obj/tests/unit/%.o: tests/unit/%.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/unit.h.gch) | $(FIRST)
 	$(compile)
 $(BUILD)/obj/%.o: %.cpp $(BUILD)/flags $(if $(PRECOMPILED_lib),$(BUILD)/precompiled/lib.h.gch) | $(FIRST)
 	$(compile)
 define compile
 @mkdir -p $(@D)
-$(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) -MMD -MP -c $< -o $@
+$(CCACHE) $(CXX) $(ALLFLAGS) $(FILE_FLAGS) $(precompiled) $(if $(filter $(BUILD)/unity/%,$<),$(UNITY_FLAGS)) -MMD -MP -c $< -o $@
 endef
 
 $(ARCHIVE): $(call obj,$(LIB_SRC))
@@ -306,7 +326,14 @@ MAN_STAMPS := $(MAN:%=$(LINT)/%.mandoc)
 SHELL_STAMPS := $(SCRIPTS:%=$(LINT)/%.shellcheck)
 INCLUDE_STAMPS := $(patsubst %,$(LINT)/%.includes,$(LINT_CXX) $(LINT_HEADERS))
 
-lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
+NAMES_STAMP := $(LINT)/names
+
+lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
+
+$(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
+	@mkdir -p $(@D)
+	@echo 'check-names'
+	@scripts/check-names $(filter-out tests/bench/% tests/stress/% tests/fuzz/% tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
 
 $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@mkdir -p $(@D)
@@ -402,7 +429,8 @@ help:
 	@echo '  clean          remove build/'
 	@echo
 	@echo 'demo, check, golden-update, stress, bench, validate, report, deb, wheel and lint install their packages first; DEPS=no turns that off.'
-	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too.'
+	@echo 'WERROR=1 makes warnings errors. CXX=clang++-16 works too. UNITY=no compiles each file by itself: slower in all, quicker'
+	@echo 'after a change of one file.'
 
 FORCE:
 

@@ -73,3 +73,43 @@ test_no_comparison_lets_a_nan_pass() {
   find "$GEWEBE_ROOT/tests" -name '*.cpp' -o -name '*.h' | sed "s|^$GEWEBE_ROOT/||" >files.txt
   (cd "$GEWEBE_ROOT" && xargs "scripts/$script") <files.txt >said.txt 2>&1 || fail "$(<said.txt)"
 }
+
+test_no_name_is_defined_twice() {
+  local script=check-names
+  twice() { # HEADER-LINE SOURCE-LINE: whether a file passes beside a header
+    mkdir -p lib/a
+    printf '%s\n' 'namespace gewebe {' "$1" '} // namespace gewebe' >lib/a/a.h
+    printf '%s\n' 'namespace gewebe {' "$2" '} // namespace gewebe' >lib/a/b.cpp
+    CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/check-names" lib/a/a.h lib/a/b.cpp >said.txt 2>&1
+  }
+  twice 'struct Point {' 'struct Other {' || fail "$(<said.txt)"
+  twice 'struct Point {' 'struct Point;' || fail "$(<said.txt)"
+  twice 'inline int f(int a) {' 'inline int f(double a) {' || fail "$(<said.txt)"
+  ! twice 'struct Point {' 'class Point final : public Base {' || fail 'a type in two files passed'
+  ! twice 'inline int f(int a) {' 'inline int f(int a) {' || fail 'a function in two files passed'
+}
+
+test_unity_units_have_no_clashes() {
+  group() { # how many units a.cpp, which has LINE in an anonymous namespace, and b.cpp with b.h make
+    printf '%s\n' 'namespace gewebe {' 'namespace {' "$1" '} // namespace' '} // namespace gewebe' >lib/a/a.cpp
+    CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/unity" units 2000 lib/a/a.cpp lib/a/b.cpp | wc -l
+  }
+  mkdir -p lib/a
+  printf '%s\n' '#pragma once' 'namespace gewebe {' 'struct Hidden {' '  int member = 0;' '};' '} // namespace gewebe' >lib/a/b.h
+  printf '%s\n' '#include "a/b.h"' 'namespace gewebe {' 'namespace {' 'int own(int local) {' '  return called(local);' '}' '} // namespace' \
+    '} // namespace gewebe' >lib/a/b.cpp
+  local line
+  for line in 'int other(int a) {' 'double local(int a) {' 'using Vector = int;'; do
+    [[ $(group "$line") == 1 ]] || fail "apart without need: $line"
+  done
+  # A name of the other file, a function that it would call, a type of a header that only the other file includes.
+  for line in 'constexpr int first = 1, own = 2;' 'int own(double a) {' 'double called(double a) {' 'struct Hidden {' 'constexpr int Hidden = 1;'; do
+    [[ $(group "$line") == 2 ]] || fail "in one unit: $line"
+  done
+  [[ $(<units/lib/a/lib-a-a.cpp) == '#include "lib/a/a.cpp"' ]] || fail "$(<units/lib/a/lib-a-a.cpp)"
+  # What needs a library through a file beside the header that it includes.
+  printf '%s\n' '#include <CGAL/Surface_mesh.h>' >lib/a/c_cgal.cpp
+  printf '%s\n' '#pragma once' >lib/a/c.h
+  printf '%s\n' '#include "a/c.h"' >>lib/a/b.cpp
+  [[ $(group 'int other(int a) {') == 2 ]] || fail 'users of different libraries are in one unit'
+}
