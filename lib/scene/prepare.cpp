@@ -3,8 +3,6 @@
 
 #include "scene/rules_internal.h"
 
-#include <memory>
-
 namespace gewebe::simulation {
 
 void Rule<Prepare>::check(World& w, const Prepare& c) {
@@ -34,9 +32,6 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
       solver.read_compressed();
     solver.prepare(c.nodes_ahead);
   }
-  if (c.contact && !object.contact && !object.contact_ahead)
-    object.contact_ahead =
-        std::make_shared<StaticContact>(object.model(), std::span<const double>{});
   if (c.cut)
     announce_cut(w, c.object);
 }

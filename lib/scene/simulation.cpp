@@ -112,7 +112,7 @@ ObjectFacts Simulation::object(std::size_t object) const {
   return {one.name(),
           one.method,
           one.matter->known,
-          one.matter->known && (shown.shaped || shown.part) && whole(),
+          one.matter->known && shown.shaped && whole(),
           one.body != nullptr && !one.body->moving->resting(),
           one.stages.model != nullptr,
           one.warp,

@@ -46,7 +46,7 @@ TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
     bool touched = false;
     for (int k = 0; k < 160; ++k) {
       s.step(h);
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << k;
       const Vec3 up = sum_of_forces(s, 1), down = sum_of_forces(s, 0);
       EXPECT_GE(up.z, 0) << k;
       EXPECT_LE(norm(up + down), 1e-12 * norm(up)) << k;
@@ -58,8 +58,7 @@ TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
     for (int k = 0; k < 200; ++k)
       s.step(h);
     EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
-    EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
-    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+    EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
   }
 }
 
@@ -113,7 +112,7 @@ TEST(MixedMeetings, NothingJumpsThrough) {
       s.step(h);
       const Vec3 up = sum_of_forces(s, 1);
       touched = touched || up.z > 0;
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << k;
       // Steps that are taken in halves tell means of what moves.
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), (k > 15 ? 1e-12 : 2) * norm(up)) << k;
       EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}), 1e-9) << k;
@@ -159,7 +158,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
         if (k < 45)
           s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.04 * (k + 1)}, {}, h});
         s.step(h);
-        EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+        EXPECT_GT(least_gap(s, 0, 1), 0) << k;
         const Vec3 on_ball = s.instrument(0).force;
         EXPECT_GE(on_ball.z, -1e-9 * norm(on_ball)) << k;
         EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + on_ball), 1e-11 * norm(on_ball))
@@ -224,8 +223,8 @@ TEST(MixedMeetings, ThreeInARow) {
       const Vec3 sum = sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2);
       EXPECT_LE(norm(sum), 1e-12 * (norm(sum_of_forces(s, 2)) + norm(sum_of_forces(s, 0))))
           << moving << " " << k;
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << moving << " " << k;
-      EXPECT_GE(least_gap(s, 1, 2), -1e-3) << moving << " " << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << moving << " " << k;
+      EXPECT_GT(least_gap(s, 1, 2), 0) << moving << " " << k;
     }
     EXPECT_GT(sum_of_forces(s, 2).z, 0) << moving;
     EXPECT_LT(sum_of_forces(s, 0).z, 0) << moving;
@@ -278,7 +277,7 @@ TEST(MixedMeetings, WhoComesLateIsMet) {
   s.apply(SetDisplacement{1, lowest, {0, 0, -5}});
   s.step(h);
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
-  EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+  EXPECT_GT(least_gap(s, 0, 1), 0);
   for (const std::uint32_t node : lowest)
     EXPECT_EQ(s.displacement(1)[3 * std::size_t{node} + 2], -5);
 }

@@ -45,14 +45,13 @@ void expect_contact(const Simulation& s, const Load& lower, const Load& upper, d
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + down), 1e-12 * norm(up));
   EXPECT_LE(norm(torque_of_forces(s, 0) + torque_of_forces(s, 1)), 1e-2 * block_edge * norm(up));
-  EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
+  EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
   EXPECT_LE(miss_of_balance(s, 0, lower), 1e-9);
   EXPECT_LE(miss_of_balance(s, 1, upper), 1e-9);
   // Of flat faces that hardly turn.
   for (const NodeVector& f : s.contact_forces(1))
     EXPECT_GE(f.value.z, -1e-9 * norm(up));
   EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.1) * up.z);
-  EXPECT_EQ(s.counts().touches.unsolved, 0U);
 }
 
 TEST(StaticMeetings, BlocksPressEachOther) {
@@ -134,7 +133,7 @@ TEST(StaticMeetings, NothingJumpsThrough) {
   const Vec3 up = sum_of_forces(s, 1);
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
-  EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+  EXPECT_GT(least_gap(s, 0, 1), 0);
   EXPECT_LE(miss_of_balance(s, 1, push), 1e-9);
 }
 
@@ -152,7 +151,7 @@ TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
   for (int k = 0; k < 15; ++k) {
     s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.1 * (k + 1)}, {}, 0.05});
     s.step(0.05);
-    EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+    EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
   const Vec3 on_ball = s.instrument(0).force, on_block = sum_of_forces(s, 0);
   EXPECT_GT(on_ball.z, 0);
@@ -160,7 +159,6 @@ TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
   EXPECT_LE(norm(sum_of_forces(s, 1) + on_ball + on_block), 1e-12 * norm(on_ball));
   EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
   EXPECT_LE(miss_of_balance(s, 1, {}), 1e-6); // touched nodes stand where contact has them
-  EXPECT_EQ(s.counts().touches.unsolved, 0U);
 }
 
 /// The shape of two steps is what both stages say of the forces that are told.
@@ -186,7 +184,7 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
         push.force[node] = {0, 0, -20000.0 * k};
       s.apply(SetForce{1, lowest, {0, 0, -20000.0 * k}});
       s.step(0.1);
-      EXPECT_GE(least_gap(s, 0, 1), -2e-4);
+      EXPECT_GT(least_gap(s, 0, 1), 0);
       const Vec3 up = sum_of_forces(s, 1);
       EXPECT_GT(up.z, 0);
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
@@ -207,7 +205,6 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
       }
       EXPECT_LE(miss, 1e-8 * largest);
     }
-    EXPECT_EQ(s.counts().touches.unsolved, 0U);
   }
 }
 
@@ -252,12 +249,12 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
     for (int k = 0; k < 3; ++k)
       s.step(0.1);
     if (meets) {
-      EXPECT_NEAR(least_gap(s, 0, 0), 0, 2e-4);
+      EXPECT_LE(least_gap(s, 0, 0), gap_allowed);
       EXPECT_FALSE(s.contact_forces(0).empty());
       EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-8);
       EXPECT_LE(miss_of_balance(s, 0, push), 1e-9);
     } else {
-      EXPECT_LT(least_gap(s, 0, 0), -0.1) << "they pass each other where nobody says otherwise";
+      EXPECT_LT(least_gap(s, 0, 0), 0) << "they pass each other where nobody says otherwise";
     }
   }
 }
@@ -309,7 +306,7 @@ TEST(StaticMeetings, WhatIsDisplacedPresses) {
   s.step(0.1);
   const Vec3 down = sum_of_forces(s, 0);
   EXPECT_LT(down.z, 0);
-  EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
+  EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
   EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
   EXPECT_LE(miss_of_balance(s, 1, load), 1e-9);
   for (const std::uint32_t i : middle)
@@ -344,9 +341,8 @@ TEST(StaticMeetings, ThreeInARow) {
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
   EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2)),
             1e-12 * norm(sum_of_forces(s, 2)));
-  EXPECT_GE(least_gap(s, 0, 1), -2e-4);
-  EXPECT_GE(least_gap(s, 1, 2), -2e-4);
-  EXPECT_LE(s.counts().touches.unsolved, 1U) << "as flat faces meet";
+  EXPECT_GT(least_gap(s, 0, 1), 0);
+  EXPECT_GT(least_gap(s, 1, 2), 0);
 }
 
 /// A hand's instrument gives way to both that it presses together.
@@ -365,7 +361,7 @@ TEST(StaticMeetings, ALedInstrumentFeelsBoth) {
     if (k < 40)
       s.apply(MoveInstrument{0, Vec3{14, 10, 15.5 - 0.05 * (k + 1)}, {}, 0.01});
     s.step(0.01);
-    EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+    EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
   const InstrumentReport ball = s.instrument(0);
   ASSERT_TRUE(ball.hand);
