@@ -19,6 +19,9 @@ struct Parameters {
   /// with at most this speed.
   double stick_speed = 0.1;
 
+  /// Typical force of an impact, over the force that would stop the bodies within the step.
+  double stop_share = 0.125;
+
   // ---- iterations
   int max_iterations = 100; ///< Newton iterations of one round, then the step fails
   int max_rounds = 40;      ///< linearisations of bodies that are not linear

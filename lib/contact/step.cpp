@@ -69,7 +69,8 @@ public:
 
 private:
   void read_positions(std::vector<Vec3>& x);
-  void set_stiffness();
+  double longest_way() const;
+  void set_stiffness(double energy, std::span<const Vec3> to);
   void search(std::span<const Vec3> to, double reach);
   void find_pairs(std::span<const Vec3> x) {
     find_active_pairs(island_.surface, candidates_, x, d_hat_, pairs_);
@@ -119,13 +120,29 @@ void StepSolver::Work::read_positions(std::vector<Vec3>& x) {
         std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
 }
 
-void StepSolver::Work::set_stiffness() {
+double StepSolver::Work::longest_way() const {
+  double longest = 0;
+  for (const Vec3& way : way_)
+    longest = std::max(longest, norm(way));
+  return longest;
+}
+
+/// Scales the barrier by a typical contact force: that of the bodies, or, where the bodies collide
+/// on their ways to `to`, a part of the force that stops them within the step.
+/// \param energy  R^T A R of the ways R
+void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
   double force = std::numeric_limits<double>::infinity();
   for (const ContactBody* const body : island_.table.bodies)
     if (const double typical = body->typical_force(); typical > 0)
       force = std::min(force, typical);
   if (!std::isfinite(force))
     force = 1;
+  if (const double longest = longest_way(); longest > 0) {
+    const double stop = options_.parameters.stop_share * energy / longest;
+    if (stop > force && collision::collision_free_step(island_.surface, candidates_, at_, to,
+                                                       {0, options_.parameters.kept_gap, d_hat_, 1000}) < 1)
+      force = stop;
+  }
   typical_force_ = force;
   kappa_ = force / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
 }
@@ -308,21 +325,20 @@ StepReport StepSolver::Work::run() {
       to[v] = at_[v] + way_[v];
       start[v] = -way_[v];
     }
-    if (round == 0)
-      set_stiffness();
     // Work of a typical force on the way: what prescribed vertices may cost at first.
-    double longest = 0;
-    for (const Vec3& way : way_)
-      longest = std::max(longest, norm(way));
-    energy += typical_force_ * longest;
+    const double longest = longest_way();
+    const double way_energy = energy;
     round_begin = at_;
     for (int attempt = 0;; ++attempt) {
       if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
         search(to, d_hat_ + margin);
+        if (round == 0 && attempt == 0)
+          set_stiffness(way_energy, to);
         find_pairs(at_);
         if (round == 0 && attempt == 0)
           lag();
       }
+      energy = way_energy + typical_force_ * longest;
       CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
       bool converged = vertices_.empty();
       int iteration = 0, lags = 0;
