@@ -478,6 +478,34 @@ void CondensedSystem::advance(double part) {
     s.pushed[node] = (1 - part) * s.pushed[node] - part * s.response[node];
 }
 
+CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradient) const {
+  const State& s = *state_;
+  std::vector<Vec3> sum(s.nodes.size());
+  for (std::size_t place = 0; place < s.vertices.size(); ++place)
+    sum[s.node_of[place]] -= gradient[s.vertices[place]];
+  Residual result;
+  for (std::size_t node = 0; node < s.nodes.size(); ++node) {
+    const std::uint32_t active = s.nodes[node].active;
+    if (active == none && sum[node] == Vec3{})
+      continue;
+    Vec3 force;
+    std::array<bool, 3> moves{};
+    if (active != none) {
+      force = s.force[active];
+      for (std::size_t a = 0; a < 3; ++a)
+        moves[a] = s.active[active].unknown[a] >= 0;
+    }
+    Vec3 difference = force - sum[node];
+    for (int a = 0; a < 3; ++a)
+      if (active != none && !moves[static_cast<std::size_t>(a)])
+        difference[a] = 0; // carried to its target
+    if (const double size = norm(difference); !(size <= result.difference))
+      result.difference = size;
+    result.largest = std::max(result.largest, norm(force));
+  }
+  return result;
+}
+
 double CondensedSystem::share() const {
   return state_->c;
 }

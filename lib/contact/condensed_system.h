@@ -80,6 +80,12 @@ public:
   void advance(double part);
 
   double share() const; ///< c
+  /// Largest difference of F and the forces that follow from a gradient of the contact energy, and
+  /// the largest of F, over nodes: {0, 0} without forces.
+  struct Residual {
+    double difference = 0, largest = 0;
+  };
+  Residual residual(std::span<const Vec3> gradient) const;
   /// Weight of 1/2 c^2 in energy(): rises until `slope() + contact_slope` is a descent.
   void require_descent(double contact_slope);
   /// Ten times that weight: no part of the step was accepted.

@@ -4,6 +4,8 @@
 #include "contact/convex_core.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -17,6 +19,8 @@ constexpr int max_halvings = 8;
 /// Part of d_hat by which d_min of a radius is less than it, so that a typical force acts where the
 /// surfaces just touch.
 constexpr double radius_offset = 0.6;
+
+constexpr double typical_strain = 1e-2;
 
 double median_edge(const collision::CollisionSurface& surface) {
   std::vector<double> lengths;
@@ -61,6 +65,26 @@ ModelSurface model_surface(const Model& model) {
   for (const Triangle& t : model.triangles)
     all.surface.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
   return all;
+}
+
+double typical_contact_force(const Model& model) {
+  double edges = 0;
+  std::size_t count = 0;
+  for (const Triangle& t : model.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges += norm(model.nodes[t[k]].position - model.nodes[t[(k + 1) % 3]].position);
+      ++count;
+    }
+  if (count == 0)
+    return 0;
+  const double edge = edges / static_cast<double>(count);
+  double stiffness = HUGE_VAL; // of a piece of the size of an edge
+  if (!model.tetrahedra.empty())
+    for (const Material& m : model.materials)
+      stiffness = m.young > 0 ? std::min(stiffness, m.young * edge) : stiffness;
+  for (const Spring& spring : model.springs)
+    stiffness = spring.stiffness > 0 ? std::min(stiffness, spring.stiffness) : stiffness;
+  return std::isfinite(stiffness) ? typical_strain * stiffness * edge : 0;
 }
 
 BodySurface instrument_surface(const InstrumentShape& shape) {
@@ -149,7 +173,15 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
   table.bodies.clear();
   for (IslandMember* const member : members)
     table.bodies.push_back(&member->begin(from, to, context));
-  report_.add(solver_->solve({to - from, parameters_}, context));
+  const StepReport one = solver_->solve({to - from, parameters_}, context);
+  report_.add(one);
+  if (std::getenv("DBG")) {
+    std::vector<Vec3> x(table.vertex_count());
+    for (std::size_t b = 0; b < table.bodies.size(); ++b)
+      table.bodies[b]->positions(std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+    const auto cut = find_intersection(x);
+    std::fprintf(stderr, "DBG %.6f..%.6f it %d rounds %d lags %d searches %d pairs %d gap %.3e dhat %.3e %s\n", from, to, (int)one.iterations, (int)one.rounds, (int)one.lags, (int)one.searches, (int)one.pairs, one.gap, island_->activation_distance, cut ? "INTERSECTS" : "");
+  }
   std::vector<std::vector<IslandMember::Force>> forces(members.size());
   std::size_t body = 0;
   for (const ContactForce& f : solver_->forces()) { // by ascending vertex

@@ -39,6 +39,9 @@ struct ModelSurface {
   std::vector<std::uint32_t> node; ///< by vertex, ascending
 };
 ModelSurface model_surface(const Model& model);
+/// A force that is typical for contacts of a solid or a net, 1e-6 N: it strains a piece of the size
+/// of an edge by a hundredth. 0 without material, springs or triangles.
+double typical_contact_force(const Model& model);
 /// A point, an edge or the triangles of a convex core, at its own pose. \pre no blade
 BodySurface instrument_surface(const InstrumentShape& shape);
 

@@ -33,6 +33,9 @@ struct Parameters {
   // ---- tolerances
   /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
   double step_tolerance = 1e-2;
+  /// Largest difference of a force on a vertex from those of its pairs, over the largest force. Deep
+  /// in the barrier steps are short long before forces balance.
+  double force_tolerance = 1e-3;
   /// Largest change of a friction force by its last lag, over the largest pair force.
   double friction_tolerance = 1e-3;
   /// Largest last change of a round, over d_hat.

@@ -88,6 +88,10 @@ private:
   void move_bodies(const CondensedSystem& system);
   bool covered(std::span<const Vec3> x, double room) const;
   double largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const;
+  /// Length of a step of Newton's method below which positions have converged.
+  double step_limit() const {
+    return options_.parameters.step_tolerance * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
+  }
 
   const Island& island_;
   collision::BroadPhase& broad_phase_;
@@ -101,6 +105,7 @@ private:
   std::vector<Vec3> trial_, gradient_, friction_before_;
   double d_hat_, stick_, margin_;
   double kappa_ = 0, typical_force_ = 0;
+  double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
   bool rough_ = false; ///< some pairs have friction
   collision::Candidates candidates_;
   std::vector<std::uint32_t> vertices_; ///< of candidates, and those with forces
@@ -231,6 +236,14 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   find_pairs(at_);
   const double before = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
                         add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
+  if (last_step_ <= step_limit()) {
+    const auto [difference, largest] = system.residual(gradient_);
+    if (difference <= p.force_tolerance * std::max(largest, typical_force_)) {
+      converged = true;
+      return true;
+    }
+  }
+  last_step_ = std::numeric_limits<double>::infinity();
   const bool simple = iteration < p.gauss_newton;
   barrier_hessian(pairs_, at_, kappa_, simple ? HessianMode::gauss_newton : HessianMode::projected,
                   blocks_);
@@ -261,8 +274,7 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   }
   if (!std::isfinite(length))
     throw NotSolved("contact: Newton's step is not finite");
-  const double limit = p.step_tolerance * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
-  converged = length <= limit;
+  converged = false;
   system.require_descent(contact_slope);
   double slope = system.slope() + contact_slope;
   const double free =
@@ -287,11 +299,18 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
     if (there <= here + armijo * part * std::min(slope, 0.0) + unsure) {
       system.advance(part);
       at_.swap(trial_);
-      converged = converged && part == 1;
+      if (part == 1)
+        last_step_ = length;
       return true;
     }
   }
-  return converged;
+  if (!(length <= step_limit()) || free < 1)
+    return false;
+  // The energy cannot be told from rounding; forces can.
+  system.advance(1);
+  at_ = target;
+  last_step_ = length;
+  return true;
 }
 
 /// Moves all bodies under the forces found.
@@ -341,6 +360,7 @@ StepReport StepSolver::Work::run() {
       energy = way_energy + typical_force_ * longest;
       CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
       bool converged = vertices_.empty();
+      last_step_ = std::numeric_limits<double>::infinity();
       int iteration = 0, lags = 0;
       if (vertices_.empty())
         system.advance(1);
@@ -372,8 +392,12 @@ StepReport StepSolver::Work::run() {
       move_bodies(system);
       trial_.resize(count_);
       read_positions(trial_);
-      if (covered(trial_, margin / 2))
+      if (covered(trial_, margin / 2)) {
+        if (collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                           {0, 0, d_hat_, 1000}) < 1)
+          throw NotSolved("contact: bodies pass each other where rounding moves them");
         break;
+      }
       // Some went where nobody looked: perhaps nothing was there.
       std::swap(at_, round_begin);
       search(trial_, d_hat_ + margin);

@@ -405,20 +405,22 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   state_.time = to_;
 }
 
-/// Of a free body an eighth of its load, or of the force that would stop it in a step; else what
-/// strains a piece of an edge's size by a hundredth.
+/// An eighth of the load of a body, or of the force that would stop a free one in a step; else what
+/// strains a piece of the size of an edge by a hundredth.
 double SolidDynamic::typical_force(double h) const {
+  if (all_held_)
+    return 0;
   Vec3 load, momentum;
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
     load += vector_at(std::span<const double>(load_), i);
     momentum += engine_->masses()[i] * vector_at(engine_->velocity(), i);
   }
-  const bool free = std::ranges::none_of(held_, [](std::uint8_t held) { return held != 0; });
-  if (free && norm(load) > 0)
+  if (norm(load) > 0)
     return norm(load) / 8;
+  const bool free = std::ranges::none_of(held_, [](std::uint8_t held) { return held != 0; });
   if (free && norm(momentum) > 0)
     return norm(momentum) / (8 * h);
-  return 0;
+  return contact::typical_contact_force(model_);
 }
 
 void SolidDynamic::clear_contact() {

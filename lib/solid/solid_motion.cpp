@@ -74,6 +74,7 @@ struct SolidMotion::State {
     MotionObjective objective;
     MotionPoint found;      ///< the iterate
     Numbers base, step; ///< where it was linearised, and the model's step from there
+    Numbers forces;     ///< f_0
     bool fresh = true;  ///< nothing was linearised yet
     SolidStep counts{};
   };
@@ -296,7 +297,7 @@ void SolidMotion::begin_step(double h, const Context& context) {
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
   if (made > 0)
     s.matrix_version = unique_number();
-  s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}});
+  s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}, {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
@@ -311,6 +312,7 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
   }
   State::Open& open = *s.open;
   open.base = open.found.at;
+  open.forces.assign(forces.begin(), forces.end());
   MotionPoint point;
   point.at = open.base;
   if (open.fresh)
@@ -380,16 +382,24 @@ void SolidMotion::move_iterate(double share, std::span<const double> change,
   State::Open& open = *s.open;
   open.found.at = open.base;
   add(open.found.at, 1 - share, open.step);
-  if (std::ranges::all_of(change, [](double f) { return f == 0; }))
+  if (!std::ranges::all_of(change, [](double f) { return f == 0; })) {
+    Numbers answer(change.begin(), change.end());
+    s.quick.into_frames(answer, context);
+    s.quick.solve(answer, context);
+    s.quick.out_of_frames(answer, context);
+    ++open.counts.rounds;
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      if (s.now.held[axis] == 0)
+        open.found.at[axis] += answer[axis];
+  }
+  if (share != 0 || s.now.any_held())
     return;
-  Numbers answer(change.begin(), change.end());
-  s.quick.into_frames(answer, context);
-  s.quick.solve(answer, context);
-  s.quick.out_of_frames(answer, context);
-  ++open.counts.rounds;
+  // The constant matrix moves a body that is strained not quite by what its forces say.
+  Numbers forces = open.forces;
+  add(forces, 1, change);
+  const std::array<double, 3> off = open.objective.momentum_off(open.found.at, forces);
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0)
-      open.found.at[axis] += answer[axis];
+    open.found.at[axis] -= off[axis % 3];
 }
 
 std::span<const double> SolidMotion::iterate() const noexcept {

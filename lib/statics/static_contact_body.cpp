@@ -1,6 +1,7 @@
 #include "statics/static_contact_body.h"
 
 #include "base/vector_at.h"
+#include "contact/island.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,31 +11,8 @@ namespace gewebe {
 
 using contact::Block3, contact::VertexForce;
 
-namespace {
-
-constexpr double typical_strain = 1e-2;
-
-} // namespace
-
-double typical_contact_force(const Model& model) {
-  double edges = 0;
-  std::size_t count = 0;
-  for (const Triangle& t : model.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      edges += norm(model.nodes[t[k]].position - model.nodes[t[(k + 1) % 3]].position);
-      ++count;
-    }
-  if (count == 0)
-    return 0;
-  const double edge = edges / static_cast<double>(count);
-  double young = HUGE_VAL;
-  for (const Material& m : model.materials)
-    young = m.young > 0 ? std::min(young, m.young) : young;
-  return std::isfinite(young) ? typical_strain * young * edge * edge : 0;
-}
-
 StaticContactBody::StaticContactBody(StaticContactState state)
-    : state_(std::move(state)), typical_force_(typical_contact_force(*state_.model)),
+    : state_(std::move(state)), typical_force_(contact::typical_contact_force(*state_.model)),
       displacement_(state_.displacement.begin(), state_.displacement.end()) {}
 
 void StaticContactBody::positions(std::span<Vec3> x) {

@@ -26,10 +26,6 @@ struct StaticContactState {
   std::vector<contact::VertexForce> forces{};           ///< contact forces then
 };
 
-/// A force that is typical for contacts of a solid or a net: it strains a piece of the size of an
-/// edge by a hundredth.
-double typical_contact_force(const Model& model);
-
 /// What the methods of statics have in common.
 class StaticContactBody : public contact::ContactBody {
 public:
