@@ -62,6 +62,11 @@ public:
   /// Moves to x_free + A^-1 S^T f, less `share` of `step`. \param forces  f by ascending vertex
   virtual void move(double share, std::span<const VertexForce> forces) = 0;
 
+  /// Translates a free body that has moved so that it has the momentum which its forces give it,
+  /// where that takes at most `room`. Exact models leave nothing to do.
+  /// \return whether the momentum is right
+  virtual bool keep_momentum(double /*room*/) { return true; }
+
   /// Whether one model serves for the whole step.
   virtual bool is_linear() const = 0;
   /// All vertices translate together: W has the same block for all of them.

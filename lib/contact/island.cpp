@@ -4,8 +4,6 @@
 #include "contact/convex_core.h"
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -173,15 +171,7 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
   table.bodies.clear();
   for (IslandMember* const member : members)
     table.bodies.push_back(&member->begin(from, to, context));
-  const StepReport one = solver_->solve({to - from, parameters_}, context);
-  report_.add(one);
-  if (std::getenv("DBG")) {
-    std::vector<Vec3> x(table.vertex_count());
-    for (std::size_t b = 0; b < table.bodies.size(); ++b)
-      table.bodies[b]->positions(std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
-    const auto cut = find_intersection(x);
-    std::fprintf(stderr, "DBG %.6f..%.6f it %d rounds %d lags %d searches %d pairs %d gap %.3e dhat %.3e %s\n", from, to, (int)one.iterations, (int)one.rounds, (int)one.lags, (int)one.searches, (int)one.pairs, one.gap, island_->activation_distance, cut ? "INTERSECTS" : "");
-  }
+  report_.add(solver_->solve({to - from, parameters_}, context));
   std::vector<std::vector<IslandMember::Force>> forces(members.size());
   std::size_t body = 0;
   for (const ContactForce& f : solver_->forces()) { // by ascending vertex

@@ -85,7 +85,7 @@ private:
   bool lag_changes();
   void minimise();
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
-  void move_bodies(const CondensedSystem& system);
+  bool move_bodies(const CondensedSystem& system);
   bool covered(std::span<const Vec3> x, double room) const;
   double largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const;
   /// Length of a step of Newton's method below which positions have converged.
@@ -313,12 +313,19 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   return true;
 }
 
-/// Moves all bodies under the forces found.
-void StepSolver::Work::move_bodies(const CondensedSystem& system) {
+/// Moves all bodies under the forces found. \return whether their momenta are right
+bool StepSolver::Work::move_bodies(const CondensedSystem& system) {
+  find_pairs(at_);
+  const double room =
+      options_.parameters.momentum_room * std::min(d_hat_, smallest_gap(pairs_, at_));
+  bool exact = true;
   for (std::size_t b = 0; b < island_.table.bodies.size(); ++b) {
+    ContactBody& body = *island_.table.bodies[b];
     force_[b] = system.forces(b);
-    island_.table.bodies[b]->move(system.share(), force_[b]);
+    body.move(system.share(), force_[b]);
+    exact = body.keep_momentum(room) && exact;
   }
+  return exact;
 }
 
 StepReport StepSolver::Work::run() {
@@ -348,6 +355,7 @@ StepReport StepSolver::Work::run() {
     const double longest = longest_way();
     const double way_energy = energy;
     round_begin = at_;
+    bool exact = true;
     for (int attempt = 0;; ++attempt) {
       if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
         search(to, d_hat_ + margin);
@@ -389,7 +397,7 @@ StepReport StepSolver::Work::run() {
       }
       report_.iterations += static_cast<std::uint64_t>(iteration);
       report_.vertices = std::max(report_.vertices, system.unknowns() / 3);
-      move_bodies(system);
+      exact = move_bodies(system);
       trial_.resize(count_);
       read_positions(trial_);
       if (covered(trial_, margin / 2)) {
@@ -414,7 +422,7 @@ StepReport StepSolver::Work::run() {
     }
     const double change = largest_distance(trial_, round_begin);
     at_.swap(trial_);
-    if (linear || (round > 0 && change <= p.round_tolerance * d_hat_))
+    if (linear || (round > 0 && exact && change <= p.round_tolerance * d_hat_))
       break;
     if (round + 1 == p.max_rounds)
       throw NotSolved("contact: bodies that are not linear did not come to rest in " +

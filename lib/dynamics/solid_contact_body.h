@@ -39,6 +39,7 @@ public:
   }
   std::uint64_t matrix_id() const override { return motion_.matrix_version(); }
   void move(double share, std::span<const contact::VertexForce> forces) override;
+  bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }
 

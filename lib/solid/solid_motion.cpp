@@ -74,7 +74,6 @@ struct SolidMotion::State {
     MotionObjective objective;
     MotionPoint found;      ///< the iterate
     Numbers base, step; ///< where it was linearised, and the model's step from there
-    Numbers forces;     ///< f_0
     bool fresh = true;  ///< nothing was linearised yet
     SolidStep counts{};
   };
@@ -297,7 +296,7 @@ void SolidMotion::begin_step(double h, const Context& context) {
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
   if (made > 0)
     s.matrix_version = unique_number();
-  s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}, {}});
+  s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
@@ -312,7 +311,6 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
   }
   State::Open& open = *s.open;
   open.base = open.found.at;
-  open.forces.assign(forces.begin(), forces.end());
   MotionPoint point;
   point.at = open.base;
   if (open.fresh)
@@ -392,14 +390,21 @@ void SolidMotion::move_iterate(double share, std::span<const double> change,
       if (s.now.held[axis] == 0)
         open.found.at[axis] += answer[axis];
   }
-  if (share != 0 || s.now.any_held())
-    return;
-  // The constant matrix moves a body that is strained not quite by what its forces say.
-  Numbers forces = open.forces;
-  add(forces, 1, change);
+}
+
+bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
+  State& s = *state_;
+  if (s.recovery.on())
+    return s.recovery.soft().keep_momentum(forces, room);
+  if (s.now.any_held())
+    return true;
+  State::Open& open = *s.open;
   const std::array<double, 3> off = open.objective.momentum_off(open.found.at, forces);
+  if (!(std::hypot(off[0], off[1], off[2]) <= room))
+    return false;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     open.found.at[axis] -= off[axis % 3];
+  return true;
 }
 
 std::span<const double> SolidMotion::iterate() const noexcept {

@@ -218,6 +218,10 @@ public:
   /// Moves the iterate, from where it was linearised, by (1 - share) step + A^-1 (f - f_0).
   /// \param change  f - f_0, 3 n
   void move_iterate(double share, std::span<const double> change, const Context& context);
+  /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
+  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not quite
+  /// by what its forces say. \param forces  f, 3 n \return whether the momentum is right
+  bool keep_momentum(std::span<const double> forces, double room);
   std::span<const double> iterate() const noexcept; ///< 3 n
   /// Ends the step at the iterate. \param forces  that act there, 3 n
   SolidStep end_step(std::span<const double> forces, const Context& context);
