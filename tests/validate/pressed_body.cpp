@@ -20,7 +20,13 @@ PressedBody::PressedBody(const Model& model, Elastostatic& solver, const Instrum
   steps_.emplace(island_);
 }
 
-bool PressedBody::move(const Pose& to) {
+bool PressedBody::move(const Pose& to, int halvings) {
+  if (step(to))
+    return true;
+  return halvings > 0 && move(between(pose_, to, 0.5), halvings - 1) && move(to, halvings - 1);
+}
+
+bool PressedBody::step(const Pose& to) {
   ElastostaticContactBody body({&model_, &body_.node, &load_, displacement_, last_},
                                [this]() -> Elastostatic& { return solver_; });
   contact::InstrumentBody tool(tool_.rest, pose_, to, 0, {});

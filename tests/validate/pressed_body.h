@@ -22,8 +22,9 @@ public:
   PressedBody(const Model& model, Elastostatic& solver, const InstrumentShape& shape,
               const Pose& start, const contact::Parameters& parameters = {});
 
-  /// Moves the instrument in one step. \return whether contact was solved; else all is as before
-  bool move(const Pose& to);
+  /// Moves the instrument, in halves of the way where contact is not solved, as ffe-run does.
+  /// \return whether it was solved; else the instrument is on its way
+  bool move(const Pose& to) { return move(to, max_halvings); }
 
   struct Force {
     std::uint32_t node = 0;
@@ -39,6 +40,10 @@ public:
   double activation_distance() const { return island_.activation_distance; }
 
 private:
+  static constexpr int max_halvings = 8;
+  bool move(const Pose& to, int halvings);
+  bool step(const Pose& to);
+
   const Model& model_;
   Elastostatic& solver_;
   InstrumentShape shape_;

@@ -117,7 +117,7 @@ struct Slide {
   double jump = 0;  ///< change of a step, over the force
   double depth = 0; ///< over the radius
   double pull = 0;  ///< over the largest force
-  double cone = 0;  ///< friction of a node over what its normal force allows, less 1
+  double cone = 0;  ///< friction on a sphere over what its normal forces allow, less 1
   double gain = 0;  ///< work of friction in a step, over what the largest force does
   std::size_t steps = 0, failed = 0; ///< not solved
 };
@@ -134,18 +134,22 @@ void judge(const PressedBody& pressed, const Body& body, std::span<const double>
   std::ranges::copy(now, u.begin());
   worse(slide.depth, test::surface_depth(body.model, u, shape, pressed.pose()));
   const PlacedInstrument placed(shape, pressed.pose());
-  double largest = 0, work = 0;
+  // Sums over nodes are those over pairs of a force each: of normal forces f along the radius d,
+  // f d; of friction t across it, the torque d t.
+  double largest = 0, work = 0, reach = 0;
+  Vec3 torque;
   for (const PressedBody::Force& f : pressed.forces())
     worse(largest, norm(f.normal));
   for (const PressedBody::Force& f : pressed.forces()) {
     const Vec3 was = vector_at(before, f.node), is = vector_at(now, f.node);
     const Vec3 p = body.model.nodes[f.node].position + is;
     worse(slide.pull, -dot(f.normal, placed.normal(p)) / largest);
-    // Both are sums over the triangles around the node, whose normals differ by little.
-    if (norm(f.normal) > 1e-3 * largest && shape.friction > 0)
-      worse(slide.cone, norm(f.friction) / (shape.friction * norm(f.normal)) - 1);
+    reach += dot(f.normal, p - pressed.pose().place);
+    torque += cross(p - pressed.pose().place, f.friction);
     work += dot(f.friction, is - was - (pressed.pose().place - from.place));
   }
+  if (largest > 0 && shape.friction > 0 && shape.axis == Vec3{})
+    worse(slide.cone, norm(torque) / (shape.friction * reach) - 1);
   if (largest > 0)
     worse(slide.gain, work / (largest * along));
 }
@@ -158,10 +162,7 @@ Slide slide(const Body& body, double radius, double friction, double length, dou
     const auto [point, normal] = body.surface(at);
     return Pose{point + (radius - depth) * normal - 0.5 * shape.axis, {}};
   };
-  // Friction is full behind a hundredth of a step.
-  contact::Parameters parameters;
-  parameters.stick_length = 1e-2 * along / body.edge;
-  PressedBody pressed(body.model, *body.solver, shape, pose(-0.01 * radius, -way / 2), parameters);
+  PressedBody pressed(body.model, *body.solver, shape, pose(-0.01 * radius, -way / 2));
   const auto go = [&](const Pose& to) {
     const std::vector<double> before(pressed.displacement().begin(), pressed.displacement().end());
     const Pose from = pressed.pose();
@@ -246,7 +247,7 @@ Section sliding() {
   };
   all("depth of the surface in an instrument, over its radius", worst.depth, test::depth_allowed);
   all("pull, over the largest force", worst.pull, 1e-9);
-  all("friction of a node over what its normal force allows, less 1", worst.cone, 0.01);
+  all("friction on a sphere over what its normal forces allow, less 1", worst.cone, 0.01);
   all("work that friction gives in a step, over that of the largest force", worst.gain, 1e-6);
   all("steps of " + std::to_string(worst.steps) + " not solved", static_cast<double>(worst.failed),
       0);
