@@ -162,7 +162,8 @@ Slide slide(const Body& body, double radius, double friction, double length, dou
     const auto [point, normal] = body.surface(at);
     return Pose{point + (radius - depth) * normal - 0.5 * shape.axis, {}};
   };
-  PressedBody pressed(body.model, *body.solver, shape, pose(-0.01 * radius, -way / 2));
+  PressedBody pressed(body.model, *body.solver, shape,
+                      pose(-0.01 * radius - 0.5 * length, -way / 2));
   const auto go = [&](const Pose& to) {
     const std::vector<double> before(pressed.displacement().begin(), pressed.displacement().end());
     const Pose from = pressed.pose();
