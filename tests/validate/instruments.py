@@ -596,7 +596,7 @@ def main():
                         print(s, found, ran.stderr)
                     bounds = {"depth": TOUCH, "sum": 1e-9}
                     if case.strict[s]:
-                        bounds |= {"cone": 2e-3 if case.friction else 1e-5, "apart": 1e-6}
+                        bounds |= {"cone": 1e-4 if case.friction else 1e-5, "apart": 1e-6}
                     for what, bound in bounds.items():
                         worst[what] = max(worst[what], found[what])
                         if not found[what] <= bound:
