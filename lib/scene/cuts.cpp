@@ -144,7 +144,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&
-                        !old.warp;
+                        !old.warp && !old.meets;
   if (ffe && !deferred)
     (void)whole_shape_in_step(w, old);
   const Moves moves = moves_of(w, index, cut, free);

@@ -437,8 +437,37 @@ void Rule<SetContact>::check(World& w, const SetContact& c) {
   }
 }
 
+namespace {
+
+/// Walls of cuts made before contact was asked for.
+void part_walls(World& w, const SetContact& c) {
+  Motions motions;
+  for (const std::size_t index : {c.object, c.other})
+    if (const auto& body = w.now.objects[index].body)
+      for (const std::size_t part : body->parts) {
+        const std::span<const NodeMotion> all = motion_of(w.now.objects[part]);
+        motions[part].assign(all.begin(), all.end());
+      }
+  std::vector<std::size_t> objects{c.object, c.other};
+  objects.resize(c.object == c.other ? 1 : 2);
+  const std::vector<std::size_t> moved = separate_walls(w, objects, motions);
+  if (std::ranges::none_of(
+          moved, [&](std::size_t index) { return w.now.objects[index].method == Method::ela; }))
+    return;
+  for (const auto& [index, motion] : motions)
+    if (const std::shared_ptr<Body> body = w.now.objects[index].body) {
+      drop_body(w, body.get());
+      for (const std::size_t part : body->parts)
+        w.now.objects[part].body = nullptr;
+    }
+  renew_bodies(w, motions);
+}
+
+} // namespace
+
 void Rule<SetContact>::apply(World& w, const SetContact& c) {
   require_apart(w, {c.object, c.other, c.friction});
+  part_walls(w, c);
   const auto known = std::ranges::find_if(w.now.contacts, [&](const ContactRule& rule) {
     return std::minmax(rule.object, rule.other) == std::minmax(c.object, c.other);
   });

@@ -466,7 +466,7 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   if (old.statics->solver)
     add_counts(spent, old.statics->solver->counts());
   move_shown(w.now.objects[index], moves, pieces);
-  const Motions motions = motions_of(w, index, moves, pieces, velocity);
+  Motions motions = motions_of(w, index, moves, pieces, velocity);
   if (old.body != nullptr) {
     drop_body(w, old.body.get());
     for (const std::size_t part : old.body->parts)
@@ -481,6 +481,10 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   move_ties(w, index, moves);
   move_contacts(w, index, moves);
   move_events(w, index, moves);
+  if (std::ranges::any_of(w.now.contacts, [&](const ContactRule& rule) {
+        return rule.object == index && rule.other == index;
+      }))
+    separate_walls(w, moves.objects, motions);
   renew_bodies(w, motions);
 }
 

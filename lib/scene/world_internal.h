@@ -249,6 +249,13 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
                                      bool skin_too = true);
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 
+// wound_walls.cpp: walls of cuts in contact
+/// Moves nodes of these objects' surfaces apart that stand at one place, so that contact can begin.
+/// \param motions  of bodies' objects; elastodynamic objects that are moved are among them then
+/// \return objects that were moved
+std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
+                                        Motions& motions);
+
 // tears.cpp: what gives way at the end of a step
 void tear(World& w);
 
