@@ -374,7 +374,18 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
   if (!body_)
     body_ = std::make_unique<SolidContactBody>(moving, collision_surface().node,
                                                model_.nodes.size());
-  const std::vector<double> target = begin_step(from, to);
+  std::vector<double> target = begin_step(from, to);
+  if (all_held_) {
+    std::vector<Vec3> before, behind;
+    for (const std::uint32_t node : collision_surface().node) {
+      before.push_back(vector_at(moving.places(), node));
+      behind.push_back(model_.nodes[node].position +
+                       vector_at(std::span<const double>(target), node));
+    }
+    target_ = std::move(target);
+    held_body_ = std::make_unique<contact::HeldBody>(std::move(before), std::move(behind));
+    return *held_body_;
+  }
   if (!target.empty())
     moving.move_held(target);
   moving.begin_step(h, context);
@@ -386,7 +397,17 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
                                     const Context& context) {
   SolidMotion& moving = *engine_;
   const std::vector<double> before(moving.places().begin(), moving.places().end());
-  const SolidStep took = moving.end_step(body_->forces(), context);
+  SolidStep took;
+  if (all_held_) {
+    std::vector<double> all = load_;
+    for (const contact::VertexForce& f : forces)
+      for (int a = 0; a < 3; ++a)
+        all[axis_of(collision_surface().node[f.vertex], a)] += f.force[a];
+    moving.set_load(all);
+    hold_all(target_, to_ - from_, context);
+  } else {
+    took = moving.end_step(body_->forces(), context);
+  }
   state_.contact.assign(forces.begin(), forces.end());
   state_.version = ++versions_;
   state_.resting = false;

@@ -11,6 +11,7 @@
 
 #include "base/context.h"
 #include "base/copy_on_write.h"
+#include "contact/held_body.h"
 #include "contact/load.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_contact_body.h"
@@ -110,7 +111,9 @@ private:
   double last_step_ = 0;                  ///< of the engine
   std::optional<contact::ModelSurface> surface_;
   std::unique_ptr<SolidContactBody> body_; ///< of the engine
+  std::unique_ptr<contact::HeldBody> held_body_; ///< where all nodes are held
   std::vector<double> load_;               ///< forces of the step, 3 n
+  std::vector<double> target_;             ///< displacements at its end where all nodes are held
   double from_ = 0, to_ = 0;               ///< of the step with contact that was begun
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;

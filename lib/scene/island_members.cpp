@@ -79,6 +79,13 @@ StaticMember::StaticMember(World& w, std::size_t object, const contact::ModelSur
 
 contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
+  if (is_held_altogether(object)) {
+    std::vector<Vec3> x;
+    for (const std::uint32_t node : surface_.node)
+      x.push_back(object.model().nodes[node].position);
+    held_ = std::make_unique<contact::HeldBody>(x, x);
+    return *held_;
+  }
   object.statics->ahead = true;
   load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
   StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {}};
@@ -107,11 +114,13 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
 
 void StaticMember::end(std::span<const Force> forces, double /*h*/, const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
+  object.touching = nodal_forces(forces, surface_.node, instrument_of_piece_);
+  if (held_)
+    return;
   const std::span<const double> u = body_->displacement();
   object.shown.displacement.replace().assign(u.begin(), u.end());
   object.shown.whole = {};
   object.shown.box.reset();
-  object.touching = nodal_forces(forces, surface_.node, instrument_of_piece_);
   if (object.statics->warped)
     object.warped = object.statics->warped->answer();
 }

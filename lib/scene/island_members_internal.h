@@ -1,6 +1,7 @@
 #pragma once
 // Objects and instruments as members of an island (contact/island.h).
 
+#include "contact/held_body.h"
 #include "contact/instrument_body.h"
 #include "contact/island.h"
 #include "contact/nodal_contact_force.h"
@@ -87,6 +88,7 @@ private:
   Load load_;
   std::optional<Load> given_;
   std::unique_ptr<StaticContactBody> body_;
+  std::unique_ptr<contact::HeldBody> held_; ///< in its place where the model holds all nodes
 };
 
 class InstrumentMember final : public contact::IslandMember {

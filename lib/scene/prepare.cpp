@@ -21,6 +21,8 @@ void Rule<Prepare>::check(World& w, const Prepare& c) {
 void Rule<Prepare>::apply(World& w, const Prepare& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
+  if (is_held_altogether(object))
+    return;
   object.statics->ahead = true;
   if (object.warp) {
     (void)warped_of(w, object);

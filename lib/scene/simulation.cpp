@@ -75,7 +75,7 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   object.method = method;
   need_model(object);
   object.matter->source = {};
-  if (method == Method::ffe)
+  if (method == Method::ffe && !is_held_altogether(object))
     make_solver(w, object, std::move(source));
   insert(w, std::move(object));
   if (method == Method::ffe)

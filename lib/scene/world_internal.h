@@ -68,6 +68,12 @@ void guarded(World& w, Work&& work) {
 void insert(World& w, Object object);
 void need_model(Object& object);
 
+/// Whether the model holds all of its nodes. \pre its model is known
+inline bool is_held_altogether(const Object& object) {
+  return std::ranges::all_of(object.model().nodes,
+                             [](const Node& node) { return node.fixed == fixed_all; });
+}
+
 /// What is shown of it, or moves it, is no longer right.
 inline void touch(Object& object) {
   object.shown.valid = false;
