@@ -117,6 +117,8 @@ void StaticMember::end(std::span<const Force> forces, double /*h*/, const Contex
   object.touching = nodal_forces(forces, surface_.node, instrument_of_piece_);
   if (held_)
     return;
+  if (forces.empty() && body_->acting().force != load_.force)
+    body_->move(0, {}); // without rounding of forces that have gone
   const std::span<const double> u = body_->displacement();
   object.shown.displacement.replace().assign(u.begin(), u.end());
   object.shown.whole = {};
