@@ -262,10 +262,23 @@ struct Elastostatic::State {
     return id;
   }
 
+  /// Columns of these nodes and of displaced ones.
+  void need_columns(const Load& now, std::span<const std::uint32_t> nodes) {
+    std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
+    for (const auto& entry : now.displacement)
+      all.push_back(entry.first);
+    if (!compliance.fit(all))
+      throw Error("the columns of " + std::to_string(all.size()) +
+                  " nodes in contact do not fit in memory, expected more of it or fewer contacts");
+    compliance.need(all);
+  }
+
   void compliance_blocks(const Load& now, std::uint32_t node, std::span<const std::uint32_t> rows,
                          std::span<std::array<double, 9>> blocks) {
     if (!now.displacement.empty())
       update(now);
+    if (now.displacement.empty() || by_block)
+      need_columns(now, std::span(&node, 1));
     const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j)
@@ -280,13 +293,6 @@ struct Elastostatic::State {
                 columns.entry(node, static_cast<int>(j), 3 * std::size_t{rows[k]} + i);
       return;
     }
-    std::vector<std::uint32_t> all{node};
-    for (const auto& entry : now.displacement)
-      all.push_back(entry.first);
-    if (!compliance.fit(all))
-      throw Error("the columns of " + std::to_string(all.size()) +
-                  " nodes in contact do not fit in memory, expected more of it or fewer contacts");
-    compliance.need(all);
     for (std::size_t k = 0; k < rows.size(); ++k)
       put(compliance.column_block(node, rows[k]), blocks[k]);
     if (now.displacement.empty())
@@ -307,6 +313,42 @@ struct Elastostatic::State {
                 given[h] * compliance.entry(of, axis, 3 * std::size_t{rows[k]} + i);
       }
     }
+  }
+
+  DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
+    update(now);
+    const bool held_by_factor = !now.displacement.empty() && !by_block;
+    if (!held_by_factor)
+      need_columns(now, nodes); // rows of nodes inside, too
+    DelassusOperator delassus{{nodes.begin(), nodes.end()}, {}, {}};
+    const std::size_t size = 3 * nodes.size();
+    delassus.compliance.resize(size * size);
+    std::vector<std::array<double, 9>> blocks(nodes.size());
+    std::vector<std::size_t> where;
+    for (std::size_t c = 0; c < nodes.size(); ++c) {
+      compliance_blocks(now, nodes[c], nodes, blocks);
+      for (std::size_t k = 0; k < nodes.size(); ++k)
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j)
+            delassus.compliance[(3 * c + j) * size + 3 * k + i] = blocks[k][3 * i + j];
+      for (int a = 0; a < 3; ++a)
+        where.push_back(axis_of(nodes[c], a));
+    }
+    if (held_by_factor) {
+      const std::vector<double>& shape = need_whole();
+      for (const std::size_t axis : where)
+        delassus.free.push_back(shape[axis]);
+      return delassus;
+    }
+    delassus.free = answer.at(now, where);
+    if (now.displacement.empty())
+      return delassus;
+    const std::vector<std::size_t> axes = block.axes();
+    for (std::size_t c = 0; c < size; ++c)
+      for (std::size_t h = 0; h < axes.size(); ++h)
+        delassus.free[c] +=
+            block.force()[h] * compliance.entry(nodes[c / 3], static_cast<int>(c % 3), axes[h]);
+    return delassus;
   }
 };
 
@@ -345,22 +387,7 @@ std::uint64_t Elastostatic::compliance_id(const Load& load) {
 
 DelassusOperator Elastostatic::delassus_operator(const Load& load,
                                                  std::span<const std::uint32_t> nodes) {
-  DelassusOperator delassus{{nodes.begin(), nodes.end()}, {}, {}};
-  const std::size_t size = 3 * nodes.size();
-  delassus.compliance.resize(size * size);
-  std::vector<std::array<double, 9>> blocks(nodes.size());
-  std::vector<std::size_t> where;
-  for (std::size_t c = 0; c < nodes.size(); ++c) {
-    state_->compliance_blocks(load, nodes[c], nodes, blocks);
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
-          delassus.compliance[(3 * c + j) * size + 3 * k + i] = blocks[k][3 * i + j];
-    for (int a = 0; a < 3; ++a)
-      where.push_back(axis_of(nodes[c], a));
-  }
-  delassus.free = state_->answer.at(load, where);
-  return delassus;
+  return state_->delassus_operator(load, nodes);
 }
 
 void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {
