@@ -63,8 +63,9 @@ public:
   virtual void move(double share, std::span<const VertexForce> forces) = 0;
 
   /// Translates a free body that has moved so that it has the momentum which its forces give it,
-  /// where that takes at most `room`. Exact models leave nothing to do.
-  /// \return whether the momentum is right
+  /// where that takes at most `room`; one at rest takes the shape that belongs to its forces. Exact
+  /// models leave nothing to do.
+  /// \return whether the momentum, or the shape, is right
   virtual bool keep_momentum(double /*room*/) { return true; }
 
   /// Whether one model serves for the whole step.

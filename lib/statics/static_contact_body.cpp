@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <utility>
 
 namespace gewebe {
@@ -35,6 +37,9 @@ double StaticContactBody::linearise(std::span<const VertexForce> forces, std::sp
   act(forces);
   const std::span<const double> u = shape_under(acting_);
   begin_ = displacement_;
+  forces_.assign(forces.begin(), forces.end());
+  if (!is_linear())
+    shape_.assign(u.begin(), u.begin() + std::ssize(begin_));
   step_.resize(begin_.size());
   double most = 0;
   for (std::size_t k = 0; k < begin_.size(); ++k) {
@@ -50,6 +55,8 @@ void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::ui
                                    std::span<Block3> blocks) {
   const std::uint32_t node = (*state_.vertices)[vertex];
   std::ranges::fill(blocks, Block3{});
+  if (!is_linear() && !std::ranges::equal(rows, rows_))
+    rows_.assign(rows.begin(), rows.end());
   if (load().displacement.contains(node))
     return;
   std::vector<std::uint32_t> nodes;
@@ -67,10 +74,50 @@ void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::ui
 }
 
 void StaticContactBody::move(double share, std::span<const VertexForce> forces) {
-  act(forces);
-  const std::span<const double> u = shape_under(acting_);
+  if (is_linear()) {
+    act(forces);
+    const std::span<const double> u = shape_under(acting_);
+    for (std::size_t k = 0; k < displacement_.size(); ++k)
+      displacement_[k] = u[k] - (share > 0 ? share * step_[k] : 0);
+    return;
+  }
+  std::map<std::uint32_t, Vec3> changes;
+  for (const VertexForce& f : forces)
+    changes[f.vertex] += f.force;
+  for (const VertexForce& f : forces_)
+    changes[f.vertex] -= f.force;
   for (std::size_t k = 0; k < displacement_.size(); ++k)
-    displacement_[k] = u[k] - (share > 0 ? share * step_[k] : 0);
+    displacement_[k] = shape_[k] - (share > 0 ? share * step_[k] : 0);
+  std::vector<Block3> blocks(rows_.size());
+  for (const auto& [vertex, f] : changes) {
+    if (f == Vec3{})
+      continue;
+    compliance(vertex, rows_, blocks);
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const Block3& b = blocks[k];
+      for (std::size_t a = 0; a < 3; ++a)
+        displacement_[axis_of((*state_.vertices)[rows_[k]], static_cast<int>(a))] +=
+            b[3 * a] * f.x + b[3 * a + 1] * f.y + b[3 * a + 2] * f.z;
+    }
+  }
+  act(forces);
+}
+
+/// At rest: whether it has the shape that belongs to its forces, which it takes where it is near.
+bool StaticContactBody::keep_momentum(double room) {
+  if (is_linear())
+    return true;
+  const std::span<const double> u = shape_under(acting_);
+  double miss = 0, largest = 0;
+  for (std::size_t k = 0; k < displacement_.size(); ++k) {
+    miss = std::max(miss, std::abs(u[k] - displacement_[k]));
+    largest = std::max(largest, std::abs(u[k]));
+  }
+  if (miss <= room) {
+    displacement_.assign(u.begin(), u.begin() + std::ssize(displacement_));
+    return true;
+  }
+  return miss <= shape_tolerance() * largest;
 }
 
 // ---- the linear method

@@ -26,7 +26,8 @@ struct StaticContactState {
   std::vector<contact::VertexForce> forces{};           ///< contact forces then
 };
 
-/// What the methods of statics have in common.
+/// What the methods of statics have in common. Bodies that are not linear move by their quadratic
+/// models, so that they pass nothing, until these agree with the shape under the forces.
 class StaticContactBody : public contact::ContactBody {
 public:
   explicit StaticContactBody(StaticContactState state);
@@ -38,6 +39,7 @@ public:
   void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                   std::span<contact::Block3> blocks) override;
   void move(double share, std::span<const contact::VertexForce> forces) override;
+  bool keep_momentum(double room) override;
   double typical_force() const override { return typical_force_; }
 
   /// Displacement of the surface's nodes, and all that acts.
@@ -51,6 +53,8 @@ protected:
 private:
   /// Shape under a load, of the surface's nodes at least.
   virtual std::span<const double> shape_under(const Load& load) = 0;
+  /// Error of that over the largest displacement.
+  virtual double shape_tolerance() const { return 0; }
   /// Blocks [row][force] of the compliance near the last shape. \param nodes  rows
   virtual void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                          std::span<contact::Block3> blocks) = 0;
@@ -60,6 +64,10 @@ private:
   double typical_force_ = 0;
   Load acting_;
   std::vector<double> displacement_, begin_, step_;
+  // Of the quadratic model.
+  std::vector<double> shape_; ///< under `forces_`
+  std::vector<contact::VertexForce> forces_;
+  std::vector<std::uint32_t> rows_; ///< vertices that the compliance was asked for
 };
 
 /// The linear method.
@@ -102,6 +110,7 @@ public:
 
 private:
   std::span<const double> shape_under(const Load& load) override;
+  double shape_tolerance() const override { return warp_tolerance; }
   void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
                  std::span<contact::Block3> blocks) override;
   std::function<WarpedStatics&()> solver_;
