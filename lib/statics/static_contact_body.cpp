@@ -13,6 +13,13 @@ namespace gewebe {
 
 using contact::Block3, contact::VertexForce;
 
+namespace {
+
+/// Part of the room in which a shape is taken at once: forces change by twice of it.
+constexpr double shape_room = 0.1;
+
+} // namespace
+
 StaticContactBody::StaticContactBody(StaticContactState state)
     : state_(std::move(state)), typical_force_(contact::typical_contact_force(*state_.model)),
       displacement_(state_.displacement.begin(), state_.displacement.end()) {}
@@ -36,6 +43,8 @@ void StaticContactBody::act(std::span<const VertexForce> forces) {
 double StaticContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
   act(forces);
   const std::span<const double> u = shape_under(acting_);
+  // Of all nodes, or of the surface's alone.
+  displacement_.resize(std::min(displacement_.size(), u.size()));
   begin_ = displacement_;
   forces_.assign(forces.begin(), forces.end());
   if (!is_linear())
@@ -113,7 +122,7 @@ bool StaticContactBody::keep_momentum(double room) {
     miss = std::max(miss, std::abs(u[k] - displacement_[k]));
     largest = std::max(largest, std::abs(u[k]));
   }
-  if (miss <= room) {
+  if (miss <= shape_room * room) {
     displacement_.assign(u.begin(), u.begin() + std::ssize(displacement_));
     return true;
   }

@@ -23,6 +23,9 @@ namespace {
 using namespace test;
 
 constexpr double h = 1.0 / 600; ///< steps of one step of integration each
+/// Part of the largest displacement to which shapes and forces agree at rest, and while what moves
+/// is translated, by a small part of the gap, so that it has the momentum of its forces.
+constexpr double balance_met = 1e-5, balance_moving = 1e-2;
 
 /// A block that falls on an elastostatic one.
 void falls_on(Simulation& s, const Vec3& corner, double friction) {
@@ -51,12 +54,13 @@ TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
       EXPECT_GE(up.z, 0) << k;
       EXPECT_LE(norm(up + down), 1e-12 * norm(up)) << k;
       EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z) << k;
-      EXPECT_LE(miss_of_balance(s, 0, weight_alone()), 1e-9) << k;
+      EXPECT_LE(miss_of_balance(s, 0, weight_alone()), balance_moving) << k;
       touched = touched || up.z > 0;
     }
     EXPECT_TRUE(touched);
     for (int k = 0; k < 200; ++k)
       s.step(h);
+    EXPECT_LE(miss_of_balance(s, 0, weight_alone()), balance_met);
     EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
     EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
   }
@@ -115,7 +119,9 @@ TEST(MixedMeetings, NothingJumpsThrough) {
       EXPECT_GT(least_gap(s, 0, 1), 0) << k;
       // Steps that are taken in halves tell means of what moves.
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), (k > 15 ? 1e-12 : 2) * norm(up)) << k;
-      EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}), 1e-9) << k;
+      EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}),
+                balance_moving)
+          << k;
     }
     EXPECT_TRUE(touched);
   }
@@ -169,7 +175,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
       const InstrumentReport ball = s.instrument(0);
       EXPECT_GT(ball.force.z, 0) << beam_moves << led;
       EXPECT_LT(sum_of_forces(s, 0).z, 0) << beam_moves << led;
-      EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), 1e-6); // touched nodes as contact has
+      EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), balance_met);
       if (led) { // at rest the spring bears what presses
         EXPECT_NEAR(1e5 * (ball.pose.place.z - ball.hand->z), ball.force.z, 1e-2 * ball.force.z);
       }

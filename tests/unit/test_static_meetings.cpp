@@ -31,6 +31,10 @@ namespace {
 
 using namespace test;
 
+/// Part of the largest displacement to which shapes and forces agree: contact is solved until its
+/// forces balance to about as much, and friction changes by no more.
+constexpr double balance_met = 1e-5, friction_met = 1e-3;
+
 Vec3 torque_of_forces(const Simulation& s, std::size_t object) {
   Vec3 sum;
   for (const NodeVector& f : s.contact_forces(object))
@@ -46,8 +50,9 @@ void expect_contact(const Simulation& s, const Load& lower, const Load& upper, d
   EXPECT_LE(norm(up + down), 1e-12 * norm(up));
   EXPECT_LE(norm(torque_of_forces(s, 0) + torque_of_forces(s, 1)), 1e-2 * block_edge * norm(up));
   EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
-  EXPECT_LE(miss_of_balance(s, 0, lower), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, upper), 1e-9);
+  const double met = friction > 0 ? friction_met : balance_met;
+  EXPECT_LE(miss_of_balance(s, 0, lower), met);
+  EXPECT_LE(miss_of_balance(s, 1, upper), met);
   // Of flat faces that hardly turn.
   for (const NodeVector& f : s.contact_forces(1))
     EXPECT_GE(f.value.z, -1e-9 * norm(up));
@@ -135,7 +140,7 @@ TEST(StaticMeetings, NothingJumpsThrough) {
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
   EXPECT_GT(least_gap(s, 0, 1), 0);
-  EXPECT_LE(miss_of_balance(s, 1, push), 1e-9);
+  EXPECT_LE(miss_of_balance(s, 1, push), balance_met);
 }
 
 TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
@@ -158,8 +163,8 @@ TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
   EXPECT_GT(on_ball.z, 0);
   EXPECT_LT(on_block.z, 0);
   EXPECT_LE(norm(sum_of_forces(s, 1) + on_ball + on_block), 1e-12 * norm(on_ball));
-  EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, {}), 1e-6); // touched nodes stand where contact has them
+  EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
+  EXPECT_LE(miss_of_balance(s, 1, {}), balance_met);
 }
 
 /// The shape of two steps is what both stages say of the forces that are told.
@@ -189,7 +194,7 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
       const Vec3 up = sum_of_forces(s, 1);
       EXPECT_GT(up.z, 0);
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
-      EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
+      EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
       for (const NodeVector& f : s.contact_forces(1))
         push.force[f.node] += f.value;
       Elastostatic first(above, nullptr, one_thread());
@@ -204,7 +209,7 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
         miss = larger(miss, std::abs(u[i] - s.displacement(1)[i]));
         largest = larger(largest, std::abs(u[i]));
       }
-      EXPECT_LE(miss, 1e-8 * largest);
+      EXPECT_LE(miss, balance_met * largest);
     }
   }
 }
@@ -253,7 +258,7 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
       EXPECT_LE(least_gap(s, 0, 0), gap_allowed);
       EXPECT_FALSE(s.contact_forces(0).empty());
       EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-8);
-      EXPECT_LE(miss_of_balance(s, 0, push), 1e-9);
+      EXPECT_LE(miss_of_balance(s, 0, push), balance_met);
     } else {
       EXPECT_LT(least_gap(s, 0, 0), 0) << "they pass each other where nobody says otherwise";
     }
@@ -313,8 +318,8 @@ TEST(StaticMeetings, WhatIsDisplacedPresses) {
   const Vec3 down = sum_of_forces(s, 0);
   EXPECT_LT(down.z, 0);
   EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
-  EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, load), 1e-9);
+  EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
+  EXPECT_LE(miss_of_balance(s, 1, load), balance_met);
   for (const std::uint32_t i : middle)
     EXPECT_EQ(vector_at(s.displacement(1), i), Vec3(0.2, 0, -1));
   s.apply(Release{1, middle});
