@@ -45,6 +45,12 @@ struct Part {
   VectorXd start;                           ///< W_aa^-1 R0_a
 };
 
+/// Solution of Newton's system for one right-hand side.
+struct Direction {
+  VectorXd p;
+  std::vector<Vec3> change, response; ///< as in CondensedSystem::State
+};
+
 Vec3 times(const Block3& b, const Vec3& v) {
   return {b[0] * v.x + b[1] * v.y + b[2] * v.z, b[3] * v.x + b[4] * v.y + b[5] * v.z,
           b[6] * v.x + b[7] * v.y + b[8] * v.z};
@@ -86,12 +92,15 @@ struct CondensedSystem::State {
   std::vector<Vec3> change;   ///< q by active node
   std::vector<Vec3> response; ///< W q by node
   std::vector<Vec3> step;     ///< by place
+  std::array<Direction, 3> direction; ///< at the same share c, by all of it, of a correction
+  bool corrected = false;
+  double reach = 1;                   ///< part of c that the step is to take
   double c = 1, penalty = 0;
   CpuLevel cpu;
   DenseCholesky cholesky;
   MatrixXd hessian, matrix;
   VectorXd carried; ///< H_af p_f of immovable vertices
-  VectorXd p, rhs;
+  VectorXd p;
   // Of energy(): quadratic in c, F and q.
   double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
 
@@ -132,6 +141,45 @@ struct CondensedSystem::State {
     pushed.resize(nodes.size());
     response.resize(nodes.size());
     step.resize(vertices.size());
+  }
+
+  /// Of vectors on all vertices, over the unknowns.
+  VectorXd condensed(std::span<const Vec3> by_vertex) const {
+    VectorXd all = VectorXd::Zero(matrix_order);
+    for (std::size_t place = 0; place < vertices.size(); ++place) {
+      const Node& node = nodes[node_of[place]];
+      if (node.active == none)
+        continue;
+      const ActiveNode& one = active[node.active];
+      for (int a = 0; a < 3; ++a)
+        if (const std::int32_t u = one.unknown[static_cast<std::size_t>(a)]; u >= 0)
+          all[u] += by_vertex[vertices[place]][a];
+    }
+    return all;
+  }
+
+  /// Solves for a direction, whose p is the right-hand side up to now, and finds its part of
+  /// q = -(F + c W^-1 R0 + W^-1 p).
+  void finish(Direction& d, bool forces, bool moves) {
+    if (matrix_order > 0)
+      cholesky.solve({d.p.data(), size()});
+    d.change.assign(active.size(), {});
+    d.response.resize(nodes.size());
+    for (const Part& part : parts) {
+      const auto count = static_cast<Index>(part.unknowns.size());
+      VectorXd own(count);
+      for (Index i = 0; i < count; ++i)
+        own[i] = d.p[part.unknowns[static_cast<std::size_t>(i)]];
+      VectorXd q = -(part.inverse * own);
+      if (moves)
+        q -= c * part.start;
+      Index i = 0;
+      for (const std::uint32_t k : part.active)
+        for (int a = 0; a < 3; ++a)
+          if (active[k].unknown[static_cast<std::size_t>(a)] >= 0)
+            d.change[k][a] = q[i++] - (forces ? force[k][a] : 0);
+    }
+    respond(d.change, d.response);
   }
 
   Vec3 start_of(std::uint32_t node) const { // R0 of a node's vertex
@@ -375,58 +423,65 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient) {
   State& s = *state_;
   const Index order = s.matrix_order;
   s.matrix = s.hessian;
-  s.rhs = -s.carried;
+  auto& [still, whole, correction] = s.direction;
+  whole.p = -s.carried;
   for (const Part& part : s.parts) {
     const auto count = static_cast<Index>(part.unknowns.size());
     for (Index j = 0; j < count; ++j) {
       const Index column = part.unknowns[static_cast<std::size_t>(j)];
-      s.rhs[column] -= s.c * part.start[j];
+      whole.p[column] -= s.c * part.start[j];
       for (Index i = 0; i < count; ++i)
         s.matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
     }
   }
-  for (std::size_t place = 0; place < s.vertices.size(); ++place) {
-    const Node& node = s.nodes[s.node_of[place]];
-    if (node.active == none)
-      continue;
-    const ActiveNode& active = s.active[node.active];
-    const Vec3& g = gradient[s.vertices[place]];
-    for (int a = 0; a < 3; ++a)
-      if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
-        s.rhs[u] -= g[a];
-  }
+  still.p = -s.condensed(gradient);
   for (const ActiveNode& active : s.active)
     for (int a = 0; a < 3; ++a)
       if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
-        s.rhs[u] -= s.force[s.nodes[active.node].active][a];
-  s.p.setZero(order);
-  if (order > 0) {
-    if (!s.cholesky.factor({s.matrix.data(), static_cast<std::size_t>(s.matrix.size())},
-                           static_cast<std::size_t>(order), s.cpu))
-      return false;
-    s.p = s.rhs;
-    s.cholesky.solve({s.p.data(), static_cast<std::size_t>(order)});
-  }
-  // q = -(F + c W^-1 R0 + W^-1 p)
-  for (const Part& part : s.parts) {
-    const auto count = static_cast<Index>(part.unknowns.size());
-    VectorXd own(count);
-    for (Index i = 0; i < count; ++i)
-      own[i] = s.p[part.unknowns[static_cast<std::size_t>(i)]];
-    const VectorXd q = -(s.c * part.start + part.inverse * own);
-    Index i = 0;
-    for (const std::uint32_t k : part.active) {
-      const ActiveNode& active = s.active[k];
-      s.change[k] = {};
-      for (int a = 0; a < 3; ++a)
-        if (active.unknown[static_cast<std::size_t>(a)] >= 0)
-          s.change[k][a] = q[i++] - s.force[k][a];
+        still.p[u] -= s.force[s.nodes[active.node].active][a];
+  if (order > 0 && !s.cholesky.factor({s.matrix.data(), static_cast<std::size_t>(s.matrix.size())},
+                                      static_cast<std::size_t>(order), s.cpu))
+    return false;
+  s.finish(still, true, false);
+  s.finish(whole, false, true);
+  s.corrected = false;
+  choose_reach(1);
+  return still.p.allFinite() && whole.p.allFinite();
+}
+
+void CondensedSystem::correct(std::span<const Vec3> forces) {
+  State& s = *state_;
+  Direction& correction = s.direction[2];
+  correction.p = s.condensed(forces);
+  s.finish(correction, false, false);
+  s.corrected = true;
+  choose_reach(s.reach);
+}
+
+void CondensedSystem::drop_correction() {
+  state_->corrected = false;
+  choose_reach(state_->reach);
+}
+
+void CondensedSystem::choose_reach(double reach) {
+  State& s = *state_;
+  s.reach = s.c > 0 ? reach : 1;
+  const auto& [still, whole, correction] = s.direction;
+  s.p = still.p + s.reach * whole.p;
+  if (s.corrected)
+    s.p += correction.p;
+  const auto combine = [&](auto of, std::vector<Vec3>& to) {
+    for (std::size_t k = 0; k < to.size(); ++k) {
+      to[k] = (still.*of)[k] + s.reach * (whole.*of)[k];
+      if (s.corrected)
+        to[k] += (correction.*of)[k];
     }
-  }
-  s.respond(s.change, s.response);
+  };
+  combine(&Direction::change, s.change);
+  combine(&Direction::response, s.response);
   for (std::size_t place = 0; place < s.vertices.size(); ++place) {
     const std::uint32_t node = s.node_of[place];
-    s.step[place] = -s.c * s.start[place] - s.pushed[node] - s.response[node];
+    s.step[place] = -s.reach * s.c * s.start[place] - s.pushed[node] - s.response[node];
   }
   s.ff = s.fq = s.qq = s.rf = s.rq = 0;
   for (std::size_t k = 0; k < s.active.size(); ++k) {
@@ -438,7 +493,6 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient) {
     s.rf += dot(r0, s.force[k]);
     s.rq += dot(r0, s.change[k]);
   }
-  return s.p.allFinite();
 }
 
 const Vec3& CondensedSystem::step(std::size_t place) const {
@@ -447,14 +501,14 @@ const Vec3& CondensedSystem::step(std::size_t place) const {
 
 double CondensedSystem::energy(double part) const {
   const State& s = *state_;
-  const double stay = 1 - part, c = stay * s.c;
+  const double stay = 1 - part, c = (1 - part * s.reach) * s.c;
   return 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq) +
          c * (stay * s.rf - part * s.rq) + 0.5 * s.penalty * c * c;
 }
 
 double CondensedSystem::slope() const {
   const State& s = *state_;
-  return -s.ff - s.fq - s.c * (2 * s.rf + s.rq) - s.penalty * s.c * s.c;
+  return -s.ff - s.fq - s.c * ((1 + s.reach) * s.rf + s.rq) - s.penalty * s.reach * s.c * s.c;
 }
 
 void CondensedSystem::require_descent(double contact_slope) {
@@ -462,7 +516,7 @@ void CondensedSystem::require_descent(double contact_slope) {
   // Newton's decrement that the step would have without the carried share.
   const double descent = s.p.dot(s.hessian * s.p) + s.qq, total = slope() + contact_slope;
   if (s.c > 0 && !(total <= -0.5 * descent))
-    s.penalty += (total + descent) / (s.c * s.c);
+    s.penalty += (total + descent) / (s.reach * s.c * s.c);
 }
 
 void CondensedSystem::raise_penalty() {
@@ -471,7 +525,7 @@ void CondensedSystem::raise_penalty() {
 
 void CondensedSystem::advance(double part) {
   State& s = *state_;
-  s.c = part < 1 ? (1 - part) * s.c : 0;
+  s.c = part * s.reach < 1 ? (1 - part * s.reach) * s.c : 0;
   for (std::size_t k = 0; k < s.active.size(); ++k)
     s.force[k] = (1 - part) * s.force[k] - part * s.change[k];
   for (std::size_t node = 0; node < s.nodes.size(); ++node)
@@ -504,6 +558,13 @@ CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradie
     result.largest = std::max(result.largest, norm(force));
   }
   return result;
+}
+
+double CondensedSystem::largest_force() const {
+  double largest = 0;
+  for (const Vec3& f : state_->force)
+    largest = std::max(largest, norm(f));
+  return largest;
 }
 
 double CondensedSystem::share() const {

@@ -67,9 +67,15 @@ public:
   /// \param block  of order 3 of.size(), row-major
   void add_hessian(std::span<const std::uint32_t> of, std::span<const double> block);
 
-  /// Newton's step for the gradient of the contact energy at all vertices.
+  /// Newton's step for the gradient of the contact energy at all vertices, by all of the way.
   /// \return whether the system was positive definite
   bool solve(std::span<const Vec3> gradient);
+  /// Adds to the step what the system moves under these forces, by vertex. \pre solved
+  void correct(std::span<const Vec3> forces);
+  void drop_correction();
+  /// Newton's step that balances the forces behind a part of the way that is left: c becomes
+  /// (1 - reach) c. \pre solved; 0 < reach <= 1
+  void choose_reach(double reach);
   /// Step of a vertex of vertices(), by its place there. \pre solved
   const Vec3& step(std::size_t place) const;
 
@@ -85,6 +91,7 @@ public:
   struct Residual {
     double difference = 0, largest = 0;
   };
+  double largest_force() const; ///< of F
   Residual residual(std::span<const Vec3> gradient) const;
   /// Weight of 1/2 c^2 in energy(): rises until `slope() + contact_slope` is a descent.
   void require_descent(double contact_slope);

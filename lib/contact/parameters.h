@@ -22,10 +22,24 @@ struct Parameters {
   /// Typical force of an impact, over the force that would stop the bodies within the step.
   double stop_share = 0.125;
 
+  /// ... over the largest force of the last step: gaps stay a good part of d_hat.
+  double last_share = 0.25;
+  /// The barrier becomes stiffer within a step where that share of a force is by the first factor
+  /// larger than the typical force, by at most the second one at a time: deep in the barrier surfaces
+  /// that slide on each other move only by about the root of gap times radius.
+  double soft_factor = 4, stiffness_factor = 10;
+
   // ---- iterations
   int max_iterations = 100; ///< Newton iterations of one round, then the step fails
   int max_rounds = 40;      ///< linearisations of bodies that are not linear
   int gauss_newton = 12;    ///< iterations before the projected Hessian takes over
+  /// A step of which collision detection allows less than this part is taken again by a smaller
+  /// part of the way, at most so many times and not below the least part.
+  double full_reach = 0.5, least_reach = 1e-4;
+  int max_reaches = 3;
+  /// Longest step over an edge, by which less of the way is taken.
+  double longest_step = 0.25;
+  int max_corrections = 2; ///< second-order corrections of a step
   int lag_interval = 3;     ///< iterations between two renewals of normal forces for friction
   int max_lags = 30;        ///< renewals in one round
   int max_searches = 5;     ///< broad phases of one step, each with twice the margin

@@ -70,6 +70,7 @@ public:
 private:
   void read_positions(std::vector<Vec3>& x);
   double longest_way() const;
+  void raise_stiffness(double force);
   void set_stiffness(double energy, std::span<const Vec3> to);
   void search(std::span<const Vec3> to, double reach);
   void find_pairs(std::span<const Vec3> x) {
@@ -84,6 +85,14 @@ private:
   void lag();
   bool lag_changes();
   void minimise();
+  bool solve_system(CondensedSystem& system, HessianMode mode);
+  struct Step {
+    double slope = 0;  ///< of the contact energy
+    double length = 0; ///< the longest of a vertex
+    double free = 0;   ///< part of it that collision detection allows
+  };
+  Step take_step(const CondensedSystem& system);
+  Step correct_step(CondensedSystem& system, const Step& step);
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
   bool move_bodies(const CondensedSystem& system);
   bool covered(std::span<const Vec3> x, double room) const;
@@ -102,9 +111,10 @@ private:
   std::vector<Vec3> begin_; ///< y_n
   std::vector<Vec3> at_;    ///< present positions
   std::vector<Vec3> way_;   ///< x_free - x of the round
-  std::vector<Vec3> trial_, gradient_, friction_before_;
+  std::vector<Vec3> trial_, gradient_, correction_, friction_before_;
   double d_hat_, stick_, margin_;
   double kappa_ = 0, typical_force_ = 0;
+  double barrier_force_ = 0; ///< force at half of d_hat
   double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
   bool rough_ = false; ///< some pairs have friction
   collision::Candidates candidates_;
@@ -132,24 +142,41 @@ double StepSolver::Work::longest_way() const {
   return longest;
 }
 
-/// Scales the barrier by a typical contact force: that of the bodies, or, where the bodies collide
-/// on their ways to `to`, a part of the force that stops them within the step.
+/// Scales the barrier by a typical contact force: that of the bodies, a part of the largest of the
+/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops them
+/// within the step.
 /// \param energy  R^T A R of the ways R
 void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
+  const Parameters& p = options_.parameters;
   double force = std::numeric_limits<double>::infinity();
   for (const ContactBody* const body : island_.table.bodies)
     if (const double typical = body->typical_force(); typical > 0)
       force = std::min(force, typical);
   if (!std::isfinite(force))
     force = 1;
+  for (const std::vector<VertexForce>& of : force_)
+    for (const VertexForce& f : of)
+      force = std::max(force, p.last_share * norm(f.force));
   if (const double longest = longest_way(); longest > 0) {
-    const double stop = options_.parameters.stop_share * energy / longest;
+    const double stop = p.stop_share * energy / longest;
     if (stop > force && collision::collision_free_step(island_.surface, candidates_, at_, to,
-                                                       {0, options_.parameters.kept_gap, d_hat_, 1000}) < 1)
+                                                       {0, p.kept_gap, d_hat_, 1000}) < 1)
       force = stop;
   }
-  typical_force_ = force;
+  typical_force_ = barrier_force_ = force;
   kappa_ = force / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
+}
+
+/// Makes the barrier stiffer where forces have become much larger than the typical one: deep in the
+/// barrier Newton's steps are short. \param force  largest of those that balance
+void StepSolver::Work::raise_stiffness(double force) {
+  const Parameters& p = options_.parameters;
+  const double wanted = p.last_share * force;
+  if (!(wanted > p.soft_factor * barrier_force_))
+    return;
+  const double factor = std::min(wanted / barrier_force_, p.stiffness_factor);
+  barrier_force_ *= factor;
+  kappa_ *= factor;
 }
 
 void StepSolver::Work::search(std::span<const Vec3> to, double reach) {
@@ -229,6 +256,62 @@ bool StepSolver::Work::lag_changes() {
   return !(report_.friction_residual <= options_.parameters.friction_tolerance);
 }
 
+/// Newton's system at the present positions. \return whether it was positive definite
+bool StepSolver::Work::solve_system(CondensedSystem& system, HessianMode mode) {
+  barrier_hessian(pairs_, at_, kappa_, mode, blocks_);
+  friction_hessian(friction_, at_, begin_, stick_, friction_blocks_);
+  std::vector<std::uint32_t> active;
+  for (const auto* const list : {&blocks_, &friction_blocks_})
+    for (const HessianBlock& block : *list)
+      active.insert(active.end(), block.vertex.begin(), block.vertex.begin() + block.count);
+  std::ranges::sort(active);
+  active.erase(std::ranges::unique(active).begin(), active.end());
+  system.activate(active);
+  system.clear_hessian();
+  for (const auto* const list : {&blocks_, &friction_blocks_})
+    for (const HessianBlock& block : *list)
+      system.add_hessian(std::span(block.vertex).first(block.count),
+                         std::span(block.entry).first(std::size_t{9} * block.count * block.count));
+  return system.solve(gradient_);
+}
+
+/// The chosen step of the system; trial_ becomes its end.
+StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system) {
+  Step result;
+  const std::span<const std::uint32_t> vertices = system.vertices();
+  trial_ = at_;
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    const Vec3& step = system.step(k);
+    result.slope += dot(gradient_[vertices[k]], step);
+    const double size = norm(step);
+    result.length = size <= result.length ? result.length : size;
+    trial_[vertices[k]] += step;
+  }
+  if (!std::isfinite(result.length))
+    throw NotSolved("contact: Newton's step is not finite");
+  result.free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                               {0, options_.parameters.kept_gap, d_hat_, 1000});
+  return result;
+}
+
+/// Corrects a step of which collision detection allows but a part: at its end pairs are to be as far
+/// apart as its linear model has it.
+StepSolver::Work::Step StepSolver::Work::correct_step(CondensedSystem& system, const Step& step) {
+  Step now = step;
+  correction_.assign(count_, {});
+  for (int k = 0; k < options_.parameters.max_corrections && now.free < 1; ++k) {
+    if (!add_curvature_correction(pairs_, at_, trial_, kappa_, correction_))
+      break;
+    system.correct(correction_);
+    now = take_step(system);
+    if (!(now.slope + system.slope() < 0)) {
+      system.drop_correction();
+      return take_step(system);
+    }
+  }
+  return now;
+}
+
 /// One iteration of Newton's method. \return whether anything was gained
 bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& converged) {
   const Parameters& p = options_.parameters;
@@ -243,47 +326,39 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
       return true;
     }
   }
+  const bool was_full = std::isfinite(last_step_);
   last_step_ = std::numeric_limits<double>::infinity();
-  const bool simple = iteration < p.gauss_newton;
-  barrier_hessian(pairs_, at_, kappa_, simple ? HessianMode::gauss_newton : HessianMode::projected,
-                  blocks_);
-  friction_hessian(friction_, at_, begin_, stick_, friction_blocks_);
-  std::vector<std::uint32_t> active;
-  for (const auto* const list : {&blocks_, &friction_blocks_})
-    for (const HessianBlock& block : *list)
-      active.insert(active.end(), block.vertex.begin(), block.vertex.begin() + block.count);
-  std::ranges::sort(active);
-  active.erase(std::ranges::unique(active).begin(), active.end());
-  system.activate(active);
-  system.clear_hessian();
-  for (const auto* const list : {&blocks_, &friction_blocks_})
-    for (const HessianBlock& block : *list)
-      system.add_hessian(std::span(block.vertex).first(block.count),
-                         std::span(block.entry).first(std::size_t{9} * block.count * block.count));
-  if (!system.solve(gradient_))
+  const bool simple = iteration < p.gauss_newton && !was_full;
+  if (!solve_system(system, simple ? HessianMode::gauss_newton : HessianMode::exact) &&
+      !solve_system(system, HessianMode::projected))
     throw NotSolved("contact: Newton's system is not positive definite");
-  double contact_slope = 0, length = 0;
-  const std::span<const std::uint32_t> vertices = system.vertices();
-  trial_ = at_;
-  for (std::size_t k = 0; k < vertices.size(); ++k) {
-    const Vec3& step = system.step(k);
-    contact_slope += dot(gradient_[vertices[k]], step);
-    const double size = norm(step);
-    length = size <= length ? length : size;
-    trial_[vertices[k]] += step;
-  }
-  if (!std::isfinite(length))
-    throw NotSolved("contact: Newton's step is not finite");
   converged = false;
+  Step step = take_step(system);
+  double reach = 1;
+  if (const double most = p.longest_step * island_.edge;
+      system.share() > 0 && !pairs_.pairs.empty() && step.length > most) {
+    reach = std::max(most / step.length, p.least_reach);
+    system.choose_reach(reach);
+    step = take_step(system);
+  }
+  if (step.free < p.full_reach)
+    step = correct_step(system, step);
+  if (system.share() > 0 && !pairs_.pairs.empty() && step.free < p.full_reach) {
+    // Less of the way, so that forces balance along it.
+    for (int k = 0; k < p.max_reaches && step.free < p.full_reach; ++k) {
+      reach = std::max(reach * step.free, p.least_reach);
+      system.choose_reach(reach);
+      step = correct_step(system, take_step(system));
+    }
+  }
+  const double length = step.length, contact_slope = step.slope, free = step.free;
   system.require_descent(contact_slope);
   double slope = system.slope() + contact_slope;
-  const double free =
-      collision::collision_free_step(island_.surface, candidates_, at_, trial_,
-                                     {0, p.kept_gap, d_hat_, 1000});
   const std::vector<Vec3> target = trial_;
   double part = free;
   report_.cuts += free < 1 ? 1 : 0;
   double here = system.energy(0) + before;
+  const std::span<const std::uint32_t> vertices = system.vertices();
   for (int k = 0; k < max_halvings; ++k, part /= 2) {
     if (k > 0 && k % halvings_until_raised == 0 && system.share() > 0) {
       // Surfaces that only now come into contact have no slope yet.
@@ -299,12 +374,14 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
     if (there <= here + armijo * part * std::min(slope, 0.0) + unsure) {
       system.advance(part);
       at_.swap(trial_);
-      if (part == 1)
+      if (part == 1 && system.share() == 0)
         last_step_ = length;
+      if (part == 1)
+        raise_stiffness(system.largest_force());
       return true;
     }
   }
-  if (!(length <= step_limit()) || free < 1)
+  if (!(length <= step_limit()) || free < 1 || system.share() > 0)
     return false;
   // The energy cannot be told from rounding; forces can.
   system.advance(1);

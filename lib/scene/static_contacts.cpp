@@ -397,7 +397,7 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
       box.add(p);
     if (!near(box, PlacedInstrument(shape, start).box()) || !is_inside(shape, start, surface, x))
       continue;
-    // Out along its own axis, or away from the nearest point of the surface.
+    // Out along its own axis, or by the nearest point of the surface.
     Vec3 way = norm(shape.axis) > 0 ? rotated(start.turn, shape.axis) : Vec3{};
     if (way == Vec3{}) {
       double best = HUGE_VAL;
@@ -406,6 +406,8 @@ Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
           best = d;
           way = p - start.place;
         }
+      if (!(winding(surface, x, start.place) > 0.5))
+        way = -way;
       if (!(norm(way) > 0))
         way = {0, 0, 1};
     }
