@@ -12,6 +12,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <set>
 #include <utility>
 
 namespace gewebe::simulation {
@@ -88,7 +90,19 @@ bool touched_by(const Object& object, std::size_t instrument) {
   });
 }
 
-std::vector<Group> groups_of(World& w) {
+using ObjectPair = std::pair<std::size_t, std::size_t>;
+
+/// Whether two objects, or one and itself, may touch where nothing moves far.
+bool are_near(World& w, const ObjectPair& pair) {
+  if (pair.first == pair.second)
+    return true;
+  const Box3 &one = shown_box(w, pair.first), &other = shown_box(w, pair.second);
+  return near(one, other, near_part * std::min(one.longest_side(), other.longest_side()));
+}
+
+/// \param late  pairs that count as near \param apart  becomes those that are not near
+std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
+                             std::vector<ObjectPair>& apart) {
   const std::size_t objects = w.now.objects.size(), instruments = w.now.instruments.size();
   DisjointSets sets(objects + instruments);
   const auto join = [&](std::size_t a, std::size_t b) {
@@ -97,7 +111,11 @@ std::vector<Group> groups_of(World& w) {
   std::vector<std::uint8_t> takes_part(objects);
   for (const ContactRule& rule : w.now.contacts)
     if (is_static(w.now.objects[rule.object]) && is_static(w.now.objects[rule.other])) {
-      join(rule.object, rule.other);
+      const ObjectPair pair(rule.object, rule.other);
+      if (late.contains(pair) || are_near(w, pair))
+        join(rule.object, rule.other);
+      else
+        apart.push_back(pair);
       takes_part[rule.object] = takes_part[rule.other] = 1;
     }
   std::vector<std::pair<std::size_t, std::size_t>> near; // object, instrument
@@ -274,22 +292,59 @@ const Box3& shown_box(World& w, std::size_t index) {
   return box;
 }
 
+namespace {
+
+/// Shows objects in contact where pairs of objects are near, or late.
+/// \param shown, followed  by object and instrument: become 1 \return pairs that passed each
+/// other's boxes unseen
+std::vector<ObjectPair> show_groups(World& w, const std::set<ObjectPair>& late,
+                                    std::vector<std::uint8_t>& shown,
+                                    std::vector<std::uint8_t>& followed) {
+  std::vector<ObjectPair> apart;
+  const std::vector<Group> groups = groups_of(w, late, apart);
+  std::map<std::size_t, Box3> swept;
+  for (const auto& [a, b] : apart)
+    for (const std::size_t index : {a, b})
+      swept[index] = shown_box(w, index);
+  for (const Group& group : groups) {
+    for (const std::size_t index : group.parts.statics) {
+      shape_in_step(w, w.now.objects[index]);
+      shown[index] = 1;
+    }
+    for (const std::size_t k : group.parts.instruments)
+      followed[k] = 1;
+    if (needs_showing(w, group)) {
+      GroupStep step(w, group);
+      step.run();
+    }
+  }
+  for (auto& [index, box] : swept) {
+    const Box3& now = shown_box(w, index);
+    box.add(now.min);
+    box.add(now.max);
+  }
+  std::erase_if(apart, [&](const ObjectPair& pair) {
+    return !near(swept.at(pair.first), swept.at(pair.second));
+  });
+  return apart;
+}
+
+} // namespace
+
 std::vector<std::uint8_t> show_static_contacts(World& w) {
   std::vector<std::uint8_t> shown(w.now.objects.size());
   std::vector<std::uint8_t> followed(w.now.instruments.size());
-  if (!w.now.contacts.empty() || !w.now.instruments.empty())
-    for (const Group& group : groups_of(w)) {
-      for (const std::size_t index : group.parts.statics) {
-        shape_in_step(w, w.now.objects[index]);
-        shown[index] = 1;
-      }
-      for (const std::size_t k : group.parts.instruments)
-        followed[k] = 1;
-      if (needs_showing(w, group)) {
-        GroupStep step(w, group);
-        step.run();
-      }
-    }
+  std::set<ObjectPair> late;
+  while (!w.now.contacts.empty() || !w.now.instruments.empty()) {
+    std::optional<Saved> saved;
+    if (!w.now.contacts.empty())
+      saved = saved_now(w);
+    const std::vector<ObjectPair> met = show_groups(w, late, shown, followed);
+    if (met.empty())
+      break;
+    take_back_again(w, std::move(*saved));
+    late.insert(met.begin(), met.end());
+  }
   for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
     Instrument& i = w.now.instruments[k];
     if (i.coupled && i.present && !i.stepped && followed[k] == 0)
