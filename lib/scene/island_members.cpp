@@ -73,9 +73,36 @@ void BodyMember::end(std::span<const Force> forces, double h, const Context& con
 
 // ---- elastostatic objects
 
+Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part) {
+  if (part == 1)
+    return to;
+  Load load = to;
+  for (auto& [node, f] : load.force)
+    f *= part;
+  for (const auto& [node, f] : from.force)
+    load.force[node] += (1 - part) * f;
+  for (auto& [node, u] : load.displacement)
+    if (3 * std::size_t{node} < shape.size()) {
+      const Vec3 stood = vector_at(shape, node);
+      u = stood + part * (u - stood);
+    }
+  load.gravity = from.gravity + part * (to.gravity - from.gravity);
+  return load;
+}
+
 StaticMember::StaticMember(World& w, std::size_t object, const contact::ModelSurface& surface,
                            const std::vector<std::uint32_t>& instrument_of_piece)
     : w_(w), object_(object), surface_(surface), instrument_of_piece_(instrument_of_piece) {}
+
+void StaticMember::follow_load(double start, double end) {
+  const Object& object = w_.now.objects[object_];
+  if (!object.load->force_period.empty() ||
+      std::ranges::any_of(object.load->pressure, [](const auto& p) { return p.second.period > 0; }))
+    return;
+  way_ = Way{w_.now.clock.shown < start ? load_at(*object.load, object.model(), start)
+                                        : *object.shown.load,
+             load_at(*object.load, object.model(), end), object.shown.displacement, start, end};
+}
 
 contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Context& /*context*/) {
   Object& object = w_.now.objects[object_];
@@ -87,7 +114,10 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     return *held_;
   }
   object.statics->ahead = true;
-  load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
+  if (way_)
+    load_ = load_between(way_->from, way_->to, *way_->stood, (to - way_->start) / (way_->end - way_->start));
+  else
+    load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
   StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {}};
   for (const NodalContactForce& f : object.touching) {
     const auto vertex = static_cast<std::uint32_t>(

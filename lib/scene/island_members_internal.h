@@ -79,14 +79,23 @@ public:
   void end(std::span<const Force> forces, double h, const Context& context) override;
   /// In place of the load at the end of the step.
   void set_load(Load load) { given_ = std::move(load); }
+  /// Lets the load go from what is shown to that at the end of a way, unless it pulses: what jumps
+  /// between steps of the scene moves others no faster than the way takes.
+  void follow_load(double start, double end);
 
 private:
+  struct Way {
+    Load from, to;
+    CopyOnWrite<std::vector<double>> stood; ///< displacement at the start
+    double start = 0, end = 0;
+  };
   World& w_;
   std::size_t object_;
   const contact::ModelSurface& surface_;
   const std::vector<std::uint32_t>& instrument_of_piece_;
   Load load_;
   std::optional<Load> given_;
+  std::optional<Way> way_;
   std::unique_ptr<StaticContactBody> body_;
   std::unique_ptr<contact::HeldBody> held_; ///< in its place where the model holds all nodes
 };
@@ -133,6 +142,8 @@ void make_members(World& w, const IslandParts& parts, const IslandCache& island,
 /// Largest displacement of an instrument's point in one step, over its radius.
 inline constexpr double instrument_step = 0.5;
 
+/// Between two loads; of prescribed displacements the way from where nodes stand.
+Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part);
 /// \throw Error that names the island's objects
 [[noreturn]] void fail_contact(const World& w, const IslandParts& parts, const Error& error);
 void count_contact(World& w, const contact::StepReport& report);

@@ -2,6 +2,7 @@
 // elastostatic objects and instruments. What is far from everything moves by itself.
 
 #include "base/disjoint_sets.h"
+#include "base/vector_at.h"
 #include "scene/extents.h"
 #include "scene/island_members_internal.h"
 #include "scene/rules_internal.h"
@@ -65,6 +66,28 @@ struct Ways {
       box.add(here.min);
       box.add(here.max);
     }
+    return box;
+  }
+  /// Where an object is at the end of the way: an elastostatic one that no island has moved, under
+  /// its load then.
+  Box3 arrived(std::size_t index) const {
+    Object& object = w.now.objects[index];
+    const Shown& shown = object.shown;
+    const bool moves = object.method == Method::ffe && !object.in_motion &&
+                       !is_held_altogether(object) &&
+                       (!shown.valid || object.load->changes_until() > shown.time) &&
+                       (object.statics->made() || !object.load->empty());
+    if (!moves)
+      return of_object(index).box;
+    Load load = load_at(*object.load, object.model(), to);
+    for (const NodalContactForce& f : shown.contact)
+      if (!load.displacement.contains(f.node))
+        load.force[f.node] += f.force;
+    update_solver(w, object, load);
+    const std::span<const double> u = static_surface(object);
+    Box3 box;
+    for (std::size_t i = 0; i < surface_count(object.model()); ++i)
+      box.add(object.model().nodes[i].position + vector_at(u, i));
     return box;
   }
   bool are_near(const NodePair& pair, std::size_t objects) const {
@@ -212,6 +235,8 @@ void advance_island(World& w, IslandParts& island, double to) {
   }
   IslandMembers members;
   make_members(w, island, cache, stood, members);
+  for (StaticMember& member : members.statics)
+    member.follow_load(start, to);
   const double count = std::max(1.0, std::ceil(duration / step * (1 - 1e-12)));
   const double h = duration / count;
   try {
@@ -310,7 +335,7 @@ std::vector<NodePair> advance_once(World& w, double to, const std::set<NodePair>
     if (node >= graph.objects)
       return ways.of_instrument(node - graph.objects);
     Box3 box = boxes.at(node);
-    const Box3 now = arrived.of_object(node).box;
+    const Box3 now = arrived.arrived(node);
     box.add(now.min);
     box.add(now.max);
     return box;

@@ -27,24 +27,6 @@ bool is_static(const Object& object) {
   return object.method == Method::ffe && !object.in_motion;
 }
 
-/// Between two loads; of prescribed displacements the way from where nodes stand.
-Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part) {
-  if (part == 1)
-    return to;
-  Load load = to;
-  for (auto& [node, f] : load.force)
-    f *= part;
-  for (const auto& [node, f] : from.force)
-    load.force[node] += (1 - part) * f;
-  for (auto& [node, u] : load.displacement)
-    if (3 * std::size_t{node} < shape.size()) {
-      const Vec3 stood = vector_at(shape, node);
-      u = stood + part * (u - stood);
-    }
-  load.gravity = from.gravity + part * (to.gravity - from.gravity);
-  return load;
-}
-
 /// Whether contact of the object has something to do with instruments.
 bool near_instrument(World& w, std::size_t object, std::size_t k) {
   const Box3& box = shown_box(w, object);
