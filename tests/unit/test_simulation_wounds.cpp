@@ -323,6 +323,36 @@ TEST(WoundScenes, ItsWallsDoNotPass) {
   }
 }
 
+/// Contact that is asked for after the cut, whose walls stand at one place then; they part by less
+/// than a thousandth of an edge.
+TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
+  for (const Method method : {Method::ela, Method::ffe})
+    for (const bool through : {false, true}) {
+      Simulation s(one_thread(), {});
+      s.add_object("bar", short_bar(false), method);
+      s.apply(CutObject{0, through ? slanted
+                                   : PlaneToCut{slanted.plane, nodes_where(s.model(0), [](const Vec3& p) {
+                                                  return p.z > 2;
+                                                })}});
+      const std::size_t last = s.object_count() - 1;
+      ASSERT_EQ(last, through ? 1U : 0U);
+      s.apply(SetContact{0, last, 0.8});
+      pull(s, last, -1e4);
+      for (int k = 0; k < 5; ++k) {
+        s.step(1.0 / 60);
+        if (through) {
+          EXPECT_GT(least_gap(s, 0, 1), 0) << k;
+        } else {
+          EXPECT_GE(wall_gap(s), -1e-2) << k;
+        }
+      }
+      EXPECT_FALSE(s.contact_forces(0).empty());
+      if (through && method == Method::ela) { // else one tells means over its step
+        EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)), 1e-11 * norm(sum_of_forces(s, 0)));
+      }
+    }
+}
+
 TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
   for (const bool meets : {true, false}) {
     Simulation s(one_thread(), {});
