@@ -94,14 +94,23 @@ StaticMember::StaticMember(World& w, std::size_t object, const contact::ModelSur
                            const std::vector<std::uint32_t>& instrument_of_piece)
     : w_(w), object_(object), surface_(surface), instrument_of_piece_(instrument_of_piece) {}
 
+std::vector<double> stood_shape(World& w, Object& object) {
+  const std::span<const double> u = *object.shown.displacement;
+  const bool inside = std::ranges::any_of(object.load->displacement, [&](const auto& entry) {
+    return axis_of(entry.first, 0) >= u.size();
+  });
+  const std::span<const double> shape = inside ? whole_shape_in_step(w, object) : u;
+  return {shape.begin(), shape.end()};
+}
+
 void StaticMember::follow_load(double start, double end) {
-  const Object& object = w_.now.objects[object_];
+  Object& object = w_.now.objects[object_];
   if (!object.load->force_period.empty() ||
       std::ranges::any_of(object.load->pressure, [](const auto& p) { return p.second.period > 0; }))
     return;
   way_ = Way{w_.now.clock.shown < start ? load_at(*object.load, object.model(), start)
                                         : *object.shown.load,
-             load_at(*object.load, object.model(), end), object.shown.displacement, start, end};
+             load_at(*object.load, object.model(), end), stood_shape(w_, object), start, end};
 }
 
 contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Context& /*context*/) {
@@ -115,7 +124,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
   }
   object.statics->ahead = true;
   if (way_)
-    load_ = load_between(way_->from, way_->to, *way_->stood, (to - way_->start) / (way_->end - way_->start));
+    load_ = load_between(way_->from, way_->to, way_->stood, (to - way_->start) / (way_->end - way_->start));
   else
     load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
   StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {}};

@@ -86,7 +86,7 @@ public:
 private:
   struct Way {
     Load from, to;
-    CopyOnWrite<std::vector<double>> stood; ///< displacement at the start
+    std::vector<double> stood; ///< displacement at the start
     double start = 0, end = 0;
   };
   World& w_;
@@ -144,6 +144,8 @@ inline constexpr double instrument_step = 0.5;
 
 /// Between two loads; of prescribed displacements the way from where nodes stand.
 Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part);
+/// The shape that is shown, as far as displaced nodes need it: of all nodes if one of them is inside.
+std::vector<double> stood_shape(World& w, Object& object);
 /// \throw Error that names the island's objects
 [[noreturn]] void fail_contact(const World& w, const IslandParts& parts, const Error& error);
 void count_contact(World& w, const contact::StepReport& report);

@@ -152,7 +152,7 @@ public:
     for (const std::size_t index : group.parts.statics) {
       Object& object = w.now.objects[index];
       before_.push_back(*object.shown.load);
-      shape_.push_back(*object.shown.displacement);
+      shape_.push_back(stood_shape(w, object));
       begin_showing(w, object);
       load_shown(w, object);
     }
@@ -234,7 +234,7 @@ private:
     const double share = begin + to * (end - begin);
     for (std::size_t k = 0; k < parts.statics.size(); ++k)
       members.statics[k].set_load(
-          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, *shape_[k], share));
+          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
     const double now = w_.now.clock.time;
     try {
       cache.motion->advance(members.all, now, now, w_.context);
@@ -254,7 +254,7 @@ private:
   World& w_;
   const Group& group_;
   std::vector<Load> before_;
-  std::vector<CopyOnWrite<std::vector<double>>> shape_;
+  std::vector<std::vector<double>> shape_;
   std::vector<Leg> legs_;
 };
 
