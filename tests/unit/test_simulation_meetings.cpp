@@ -45,7 +45,7 @@ TEST(SimulationMeetings, ABlockRestsOnAnother) {
       EXPECT_LE(norm(sum), 1e-12 * norm(up));
       EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z); // it isn't quite even
     }
-    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-5 * weight_of(s, 1));
+    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
     EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
     EXPECT_EQ(s.state().kinetic_energy<1e-9, friction> 0) << "it slides where nothing rubs";
   }
@@ -221,7 +221,7 @@ TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
       for (std::size_t i = 0; i < s.model(1).nodes.size(); ++i)
         depth =
             test::larger(depth, -probe.distance(s.model(1).nodes[i].position + vector_at(u, i)));
-      EXPECT_LE(depth, 1e-6 * 6);
+      EXPECT_LE(depth, depth_allowed * 6);
     }
     // What the probe presses with goes through to the lower block.
     const Vec3 probe = s.instrument(0).force, below = sum_of_forces(s, 0);
@@ -293,26 +293,6 @@ TEST(SimulationMeetings, WhatIsCutOffTouchesStill) {
   EXPECT_GT(plate.z, 0) << "it lies on what came off";
   EXPECT_GT(least_gap(s, 1, 2), 0);
   EXPECT_LE(norm(plate + sum_of_forces(s, 0) + sum_of_forces(s, 2)), 1e-10 * norm(plate));
-}
-
-TEST(SimulationMeetings, WhatCannotBeServedIsRefused) {
-  const auto message = [](const SetContact& contact, Method method, Integration integration) {
-    Simulation s(one_thread(), {});
-    s.add_object("o", test::organ(2), method, {}, integration);
-    add(s, "p", test::organ(2));
-    try {
-      s.apply(contact);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  const char* const steps = "object o moves by explicit steps, expected integration=implicit or "
-                            "auto for contact";
-  EXPECT_EQ(message({1, 0, 0}, Method::ela, Integration::semi_implicit), steps);
-  EXPECT_EQ(message({0, 0, 0}, Method::ela, Integration::semi_implicit), steps);
-  EXPECT_EQ(message({0, 1, 0}, Method::ffe, Integration::implicit), "");
-  EXPECT_EQ(message({0, 1, 0}, Method::ela, Integration::implicit), "");
 }
 
 } // namespace
