@@ -235,13 +235,15 @@ void StepSolver::Work::lag() {
   ++report_.lags;
 }
 
-/// Takes a new lag and tells whether it changes forces by more than the tolerance.
+/// Takes a new lag where that changes forces by more than the tolerance, and tells whether it did: the
+/// forces that balance are those of the lag that stays.
 bool StepSolver::Work::lag_changes() {
   if (!rough_)
     return false;
   friction_before_.assign(count_, {});
   std::vector<Vec3> now(count_);
   (void)add_friction_gradient(friction_, at_, begin_, stick_, friction_before_);
+  std::vector<FrictionPair> before = friction_;
   find_pairs(at_);
   lag();
   (void)add_friction_gradient(friction_, at_, begin_, stick_, now);
@@ -253,7 +255,10 @@ bool StepSolver::Work::lag_changes() {
   for (const std::uint32_t v : vertices_)
     change = std::max(change, norm(now[v] - friction_before_[v]));
   report_.friction_residual = largest > 0 ? change / largest : 0;
-  return !(report_.friction_residual <= options_.parameters.friction_tolerance);
+  if (!(report_.friction_residual <= options_.parameters.friction_tolerance))
+    return true;
+  friction_ = std::move(before);
+  return false;
 }
 
 /// Newton's system at the present positions. \return whether it was positive definite
