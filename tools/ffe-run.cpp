@@ -8,15 +8,19 @@
 #include "tools/run/result_choice.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_answers.h"
+#include "tools/run/scene_progress.h"
 #include "tools/run/scene_record.h"
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
 #include "tools/shared/cli.h"
 #include "tools/shared/distrust.h"
+#include "tools/shared/progress_bar.h"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <unistd.h>
 #include <utility>
 
 using namespace gewebe;
@@ -32,6 +36,19 @@ struct Arguments {
   std::string listen, shapes, events, record, latencies, recover;
   ResultChoice result;
 };
+
+/// Progress of the scene, where it is wanted. A scene that is typed has none: what is typed would
+/// stand behind the bar.
+void start_progress(std::optional<SceneProgress>& progress, cli::Run& run, const Arguments& in) {
+  cli::ProgressBar* const bar = run.progress_bar();
+  const bool typed = in.listen.empty() && in.scene == "-" && ::isatty(0) != 0;
+  if (bar == nullptr || (typed && !bar->always()))
+    return;
+  std::optional<double> end;
+  if (in.listen.empty()) // else clients make it last as long as they like
+    end = find_scene_end(in.scene);
+  progress.emplace(*bar, end);
+}
 
 void work(cli::Run& run, const Arguments& in) {
   if (!in.recover.empty())
@@ -54,6 +71,8 @@ void work(cli::Run& run, const Arguments& in) {
   StepLatency latency(in.rate.value_or(0));
   if (!in.latencies.empty())
     latency.log_to(in.latencies, run.output_options(false));
+  std::optional<SceneProgress> progress;
+  start_progress(progress, run, in);
   std::optional<Input> input;
   if (reads)
     input.emplace(in.scene, false);
@@ -79,8 +98,15 @@ void work(cli::Run& run, const Arguments& in) {
   options.measure_error = in.verify;
   options.tolerance = in.tolerance;
   options.gone = [&] { return answers.unheard(); };
+  const bool shared_screen = progress && spoken && ::isatty(1) != 0;
   if (answers.any())
-    options.reply = [&](std::string_view bytes) { answers.write(bytes); };
+    options.reply = [&](std::string_view bytes) {
+      if (shared_screen)
+        cli::erase_progress();
+      answers.write(bytes);
+    };
+  if (progress)
+    options.progress = [&](double time, std::uint64_t frames) { progress->advance(time, frames); };
   Context context = run.context();
   context.cancelled = [] { return deferred_signal() != 0; };
   SceneRun scene(input ? name : in.listen, context, options);
@@ -92,6 +118,8 @@ void work(cli::Run& run, const Arguments& in) {
       answers.run(input ? &*input : nullptr, scene);
       scene.finish();
     });
+    if (progress)
+      progress->finish();
     run.timed("write", [&] {
       if (result)
         result->commit();

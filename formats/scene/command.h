@@ -36,8 +36,9 @@ struct EmitStressCommand {
   std::string object;
   std::optional<Selector> nodes;
 };
+constexpr double default_step = 1.0 / 60; ///< s
 struct StepCommand {
-  std::optional<double> dt; ///< >= 0
+  std::optional<double> dt; ///< >= 0; absent: the timestep that is set, or default_step
 };
 struct RunCommand {
   double until = 0, every = 0; ///< every > 0

@@ -15,7 +15,7 @@ from pathlib import Path
 from .errors import Error
 from .ply import read_ply
 
-# What --progress draws: "\rTOOL [####....]  42 %  …", and "\r" alone where it takes that away.
+# What --progress draws: "\rTOOL [####....]  42 %  …\x1b[K", without a bar where the end is unknown, and "\r\x1b[K" where it takes that away.
 _BAR = re.compile(r'^([a-z0-9-]+) \[[#.]+\] +(\d+) %')
 _ESCAPE = '\x1b[K'
 
@@ -85,10 +85,11 @@ class _Listener(threading.Thread):
         self.stream.close()
 
     def hear(self, line):
+        drawn = line.endswith(_ESCAPE)
         line = line.replace(_ESCAPE, '')
         bar = _BAR.match(line)
         if bar is None:
-            if line:
+            if line and not drawn:
                 self.lines.append(line)
         elif self.progress is not None and self.failure is None:
             try:

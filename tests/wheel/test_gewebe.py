@@ -1,4 +1,5 @@
 """The module gewebe and the programs that its wheel brings: run in a folder that may be written, by tests/contract/wheel.sh."""
+import io
 import itertools
 import math
 import os
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy
 
 import gewebe
+from gewebe import programs
 
 try:
     import h5py  # noqa: F401
@@ -61,6 +63,13 @@ class Programs(unittest.TestCase):
         self.assertEqual({name for name, _ in told}, {'metaball2vol', 'mc-opt'})
         self.assertTrue(all(0 <= done <= 1 for _, done in told))
         self.assertGreater(len({done for _, done in told}), 1)
+
+    def test_figures_without_an_end_are_neither_progress_nor_a_message(self):
+        told = []
+        said = b'\rffe-run 0.1 s  2 x real time  1 frame\x1b[K\r\x1b[Kffe-run: warning: a\n\rffe-run 0.2 s  2 x real time  2 frames\x1b[K'
+        listener = programs._Listener(io.BytesIO(said), lambda *what: told.append(what))
+        listener.join()
+        self.assertEqual((listener.lines, told), (['ffe-run: warning: a'], []))
 
     def test_what_progress_raises_is_raised(self):
         def stop(name, done):

@@ -2,6 +2,7 @@
 
 #include "base/number_text.h"
 #include "formats/stream/removal.h"
+#include "tools/shared/progress_bar.h"
 
 #include <csignal>
 #include <string>
@@ -77,8 +78,10 @@ void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs, dou
   if (!unheard)
     (void)logs.commit(); // they tell how it came to this
   const Error ending = ending_of(error, result, time);
-  if (unheard)
+  if (unheard) {
+    cli::erase_progress();
     end_by_deferred_signal();
+  }
   throw Error(ending);
 }
 

@@ -16,7 +16,6 @@ namespace gewebe {
 namespace {
 
 constexpr double max_samples = 1e9;
-constexpr double default_step = 1.0 / 60;
 
 template <class Work>
 auto of_object(const LinePlace& line, Work&& work) {

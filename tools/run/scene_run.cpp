@@ -123,6 +123,8 @@ void SceneRun::State::answer() {
     deliver([&] { measure(); });
   if (options.events != nullptr)
     deliver([&] { options.events->keep(); });
+  if (options.progress)
+    options.progress(simulation.time(), result ? result->frames() : steps);
 }
 
 void SceneRun::State::measure() {

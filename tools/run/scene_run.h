@@ -63,9 +63,12 @@ struct SceneOptions {
   SceneRecord* record = nullptr;
   StepLatency* latency = nullptr;
   SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is told
-  bool measure = false;           ///< digest and largest displacement
-  bool measure_error = false;     ///< of every shape
-  double tolerance = 0;           ///< see ElastostaticOptions
+  /// Called behind each answer with the scene's time in s and the frames so far: of the result, or
+  /// answers if there is none. May be absent.
+  std::function<void(double time, std::uint64_t frames)> progress{};
+  bool measure = false;       ///< digest and largest displacement
+  bool measure_error = false; ///< of every shape
+  double tolerance = 0;       ///< see ElastostaticOptions
 };
 
 struct SceneCounts {

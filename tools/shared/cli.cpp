@@ -297,12 +297,14 @@ void Program::carry_out(const std::function<void(Run&)>& work) {
   std::optional<ProgressBar> bar;
   if (progress_wanted(s.progress)) {
     bar.emplace(run.tool_, s.progress == "always");
+    run.progress_bar_ = &*bar;
     run.context_.progress = [&bar](double done) { bar->update(done); };
   }
   std::optional<Output> stats_output; // before the work, so that a clash of names ends it
   if (!s.stats_file.empty())
     stats_output.emplace(s.stats_file, Output::Options{.binary = false});
   work(run);
+  run.progress_bar_ = nullptr;
   bar.reset();
   run.stats_.seconds("total", now_seconds() - start);
   if (s.verbose && !run.failure_)

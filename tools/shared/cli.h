@@ -26,6 +26,8 @@
 
 namespace gewebe::cli {
 
+class ProgressBar;
+
 /// One JSON object under construction; keys keep the order of their first use.
 class Stats {
 public:
@@ -69,6 +71,8 @@ public:
   /// Whether --stats was given: figures that cost a pass over the result are worth it only then.
   bool stats_wanted() const { return stats_wanted_; }
   Stats& stats() { return stats_; }
+  /// Null if none is wanted. Most programs leave it to the context's progress.
+  ProgressBar* progress_bar() const { return progress_bar_; }
   /// Runs `work`, adds its wall time under stats "seconds": {name: …}.
   template <class Work>
   auto timed(std::string_view name, Work&& work) {
@@ -95,6 +99,7 @@ private:
   };
   std::string tool_;
   Context context_;
+  ProgressBar* progress_bar_ = nullptr;
   std::string output_ = "-", to_, format_;
   bool keep_unchanged_ = false, verbose_ = false, quiet_ = false, stats_wanted_ = false;
   Stats stats_;

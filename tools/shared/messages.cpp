@@ -1,5 +1,7 @@
 #include "tools/shared/messages.h"
 
+#include "tools/shared/progress_bar.h"
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -51,7 +53,7 @@ std::string one_line(std::string_view text) {
 }
 
 void print_message(const std::string& tool, std::string_view text) {
-  const std::string line = tool + ": " + one_line(text) + "\n";
+  const std::string line = progress_eraser() + tool + ": " + one_line(text) + "\n";
   (void)std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

@@ -11,7 +11,7 @@ namespace gewebe::cli {
 /// end, and \xNN for each byte that is no part of UTF-8.
 std::string one_line(std::string_view text);
 
-/// `tool: text` on standard error, as one line.
+/// `tool: text` on standard error, as one line, in place of a progress bar.
 void print_message(const std::string& tool, std::string_view text);
 
 /// What an exception means that isn't of ours: texts of libraries tell a user nothing.

@@ -1,9 +1,12 @@
 #include "tools/shared/progress_bar.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdio>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -15,11 +18,42 @@ double now_seconds() {
   return std::chrono::duration<double>(since_start).count();
 }
 
-ProgressBar::ProgressBar(std::string tool, bool at_once)
-    : tool_(std::move(tool)), start_(now_seconds()), quiet_until_(at_once ? 0 : start_ + 1) {}
+namespace {
+
+std::atomic<bool> on_screen{false};
+
+/// 0: standard error is no terminal.
+std::size_t terminal_width() {
+  winsize size{};
+  return ::ioctl(2, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+} // namespace
+
+const char* progress_eraser() {
+  return on_screen.exchange(false) ? "\r\033[K" : "";
+}
+
+void erase_progress() {
+  (void)std::fputs(progress_eraser(), stderr);
+}
+
+ProgressBar::ProgressBar(std::string tool, bool always)
+    : tool_(std::move(tool)), always_(always), start_(now_seconds()),
+      quiet_until_(always ? 0 : start_ + 1) {}
 ProgressBar::~ProgressBar() {
-  if (drawn_)
-    (void)std::fputs("\r\033[K", stderr);
+  erase_progress();
+}
+
+bool ProgressBar::is_due(double now) {
+  if (now < quiet_until_ || now < next_)
+    return false;
+  next_ = now + 0.1;
+  return true;
+}
+
+bool ProgressBar::is_due() {
+  return is_due(now_seconds());
 }
 
 void ProgressBar::update(double done) {
@@ -28,17 +62,37 @@ void ProgressBar::update(double done) {
   if (done < last_)
     start_ = now; // a new phase
   last_ = done;
-  if (now < quiet_until_ || now < next_)
+  if (!is_due(now))
     return;
-  next_ = now + 0.1;
-  drawn_ = true;
   const double elapsed = now - start_;
   const double rate = elapsed > 0 ? done / elapsed : 0;
   const double left = rate > 0 ? (1 - done) / rate : 0;
-  std::string bar(30, '.');
-  std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(30 * std::clamp(done, 0.0, 1.0)), '#');
-  (void)std::fprintf(stderr, "\r%s [%s] %3.0f %%  %.1f %%/s  %.0f s left\033[K", tool_.c_str(),
-                     bar.c_str(), 100 * done, 100 * rate, left);
+  std::array<char, 64> figures{};
+  (void)std::snprintf(figures.data(), figures.size(), "%.1f %%/s  %.0f s left", 100 * rate, left);
+  draw(done, figures.data());
+}
+
+void ProgressBar::draw(std::optional<double> done, const std::string& figures) {
+  constexpr std::size_t widest = 30, narrowest = 5;
+  const std::size_t columns = terminal_width();
+  std::string line = tool_ + " ";
+  if (done) {
+    const std::size_t rest = line.size() + figures.size() + 12; // brackets, percentage, a margin
+    const std::size_t width =
+        columns == 0 ? widest : std::clamp(std::max(columns, rest) - rest, narrowest, widest);
+    const double share = std::clamp(*done, 0.0, 1.0);
+    std::string bar(width, '.');
+    std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(static_cast<double>(width) * share), '#');
+    std::array<char, 16> percent{};
+    (void)std::snprintf(percent.data(), percent.size(), "] %3.0f %%  ", 100 * share);
+    line += "[" + bar + percent.data();
+  }
+  line += figures;
+  if (columns > 1 && line.size() >= columns)
+    line.resize(columns - 1); // a second row would stay behind
+  was_drawn_ = true;
+  on_screen = true;
+  (void)std::fprintf(stderr, "\r%s\033[K", line.c_str());
 }
 
 bool progress_wanted(const std::string& mode) {
