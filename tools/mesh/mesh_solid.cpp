@@ -10,6 +10,7 @@
 #include "tools/mesh/prepared_volume.h"
 #include "tools/shared/surface_choice.h"
 #include "tools/shared/tet_report.h"
+#include "tools/shared/topology_change.h"
 
 #include <cstdint>
 #include <string>
@@ -68,8 +69,9 @@ void mesh_solid(cli::Run& run, const MeshArguments& arguments) {
   const bool comparable = prepared.before && prepared.before->components > 0;
   warn_if_empty(run, mesh.tetrahedra.empty() && !comparable);
   if (comparable)
-    compare_topology(run, arguments.cell ? "--cell" : "--resample", *prepared.before,
-                     topology(boundary(mesh).mesh));
+    cli::compare_topology(run, "mc-opt", "", arguments.cell ? "--cell" : "--resample",
+                          *prepared.before, topology(boundary(mesh).mesh),
+                          arguments.cell ? "cells" : "voxels");
   if (!arguments.components.empty()) {
     const TetComponentReport kept = keep_components(mesh, component_choice(arguments.components));
     stats.set("components_dropped", kept.dropped);

@@ -7,6 +7,7 @@
 #include "tools/mesh/prepared_volume.h"
 #include "tools/shared/surface_choice.h"
 #include "tools/shared/surface_report.h"
+#include "tools/shared/topology_change.h"
 
 #include <string>
 
@@ -67,7 +68,8 @@ void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
           std::to_string(snapped.report.points_after) + " after snapping");
   warn_if_empty(run, snapped.mesh.triangles.empty());
   if (!snapped.mesh.triangles.empty() && prepared.before)
-    compare_topology(run, "--resample", *prepared.before, topology(snapped.mesh));
+    cli::compare_topology(run, "mc-opt", "", "--resample", *prepared.before, topology(snapped.mesh),
+                          "voxels");
   refine(run, arguments, prepared.grid, prepared.isovalue, snapped.mesh);
   bring_to_space(run, prepared.space, arguments, snapped.mesh.points, &snapped.mesh.normals);
   run.timed("write", [&] { write_mesh(output, snapped.mesh, kind); });

@@ -10,7 +10,6 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 
 namespace gewebe {
 namespace {
@@ -39,21 +38,6 @@ void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
     for (std::array<float, 3>& n : *normals)
       n = {0 - n[0], 0 - n[1], n[2]};
   run.say("turned from " + std::string(space_name(from)) + " to " + std::string(space_name(to)));
-}
-
-void compare_topology(cli::Run& run, const char* option, const Topology& before,
-                      const Topology& after) {
-  run.stats().set("components_before", before.components);
-  run.stats().set("euler_before", before.euler);
-  if (before == after)
-    return;
-  cli::distrust(run, "mc-opt",
-                std::string(option) + " changes the surface from " +
-                    std::to_string(before.components) +
-                    (before.components == 1 ? " component" : " components") + " and Euler number " +
-                    std::to_string(before.euler) + " to " + std::to_string(after.components) +
-                    " and " + std::to_string(after.euler) + ", expected the same of finer " +
-                    (option == std::string_view("--cell") ? "cells" : "voxels"));
 }
 
 void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped) {

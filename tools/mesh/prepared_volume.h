@@ -29,9 +29,6 @@ void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
                     std::vector<Vec3>& points,
                     std::vector<std::array<float, 3>>* normals = nullptr);
 
-/// Warns where `option` changed the topology.
-void compare_topology(cli::Run& run, const char* option, const Topology& before,
-                      const Topology& after);
 void warn_if_empty(cli::Run& run, bool empty);
 void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped);
 

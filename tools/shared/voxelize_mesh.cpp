@@ -3,10 +3,12 @@
 #include "formats/mesh/mesh_file.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/volume_file.h"
+#include "surface/marching_cubes.h"
 #include "tools/shared/distrust.h"
 #include "tools/shared/mesh_size.h"
 #include "tools/shared/report.h"
 #include "tools/shared/space_option.h"
+#include "tools/shared/topology_change.h"
 #include "tools/shared/transform_option.h"
 #include "volume/lattice.h"
 
@@ -49,6 +51,32 @@ void report(cli::Run& run, const MeshToVoxelize& a, const CoverageReport& r) {
   stats.set("samples_summed", r.mesh.samples_summed);
 }
 
+/// Whether the topology is compared: with more leaves than this that takes too large a part of the
+/// run, so that only --stats is worth it.
+bool compares_topology(const cli::Run& run, const Grid& grid, const CoverageReport& r) {
+  constexpr std::size_t most_leaves = 1000;
+  return r.mesh.boundary_edges == 0 && grid.active_voxels() > 0 &&
+         (run.stats_wanted() || grid.leaves().size() <= most_leaves);
+}
+
+/// Warns where the voxels are too coarse for a closed mesh.
+void check_topology(cli::Run& run, const MeshToVoxelize& a, const std::string& place,
+                    const TriangleMesh& mesh, const Grid& grid) {
+  const cli::FilledTopology before = cli::filled_topology(mesh);
+  Topology after;
+  try {
+    after = topology(marching_cubes(run.context(), grid).mesh);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) { // memory that the volume itself did not need
+    return run.say("the topology is not compared: " + std::string(error.what()));
+  }
+  if (before.topology != after && !cli::is_surface_of_volume(run.context(), before, a.options.rule))
+    return;
+  const char* option = a.voxel ? "--voxel" : a.dim ? "--dim" : "--like";
+  cli::compare_topology(run, "voxelize", place, option, before.topology, after, "voxels");
+}
+
 } // namespace
 
 void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
@@ -86,6 +114,8 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
     cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
   else if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
+  if (compares_topology(run, grid, counts))
+    run.timed("topology", [&] { check_topology(run, a, input.name(), mesh, grid); });
   write(run, output, grid, to);
   report(run, a, counts);
   cli::report_volume(run, grid);
