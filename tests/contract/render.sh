@@ -173,6 +173,9 @@ test_materials_have_their_own_textures() {
   emboss-render --plain --backend cpu --color 7=1,0,0 in.ply -o out.png 2>stderr.txt
   [[ $(<stderr.txt) == 'emboss-render: warning: no triangle is of material 7' ]] || fail 'a material that is not there' "$(<stderr.txt)"
   expect_failure 1 emboss-render emboss-render --plain --backend cpu --texture 0=none.ppm in.ply -o out.png
+  # A texture that no triangle has is not opened.
+  emboss-render --plain --backend cpu --texture 7=none.ppm in.ply -o out.png 2>stderr.txt || fail 'an unused texture was opened' "$(<stderr.txt)"
+  [[ $(<stderr.txt) == 'emboss-render: warning: no triangle is of material 7' ]] || fail 'an unused texture' "$(<stderr.txt)"
   expect_failure 2 emboss-render emboss-render --texture 1= in.ply -o out.png
   expect_failure 2 emboss-render emboss-render --texture 1=red.ppm --texture 1=red.ppm in.ply -o out.png
   expect_failure 2 emboss-render emboss-render --by part in.ply -o out.png

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <utility>
 
 namespace gewebe::cli {
@@ -16,6 +17,24 @@ constexpr std::array<RenderLayer RenderMaterial::*, 4> layers{
     &RenderMaterial::base, &RenderMaterial::detail, &RenderMaterial::reflection,
     &RenderMaterial::structure};
 constexpr std::array<const char*, 4> words{"texture", "detail", "reflection", "structure"};
+
+/// The numbers of materials, parts or objects that the triangles have.
+std::set<std::int32_t> numbers_of(const std::vector<Surface>& surfaces, GroupBy by) {
+  std::set<std::int32_t> numbers;
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    const TriangleMesh& mesh = surfaces[s].mesh;
+    if (surfaces[s].instrument || mesh.triangles.empty())
+      continue;
+    const std::vector<std::int32_t>& own = by == GroupBy::part ? mesh.part : mesh.material;
+    if (by == GroupBy::surface)
+      numbers.insert(static_cast<std::int32_t>(s));
+    else if (own.empty())
+      numbers.insert(0);
+    else
+      numbers.insert(own.begin(), own.end());
+  }
+  return numbers;
+}
 
 } // namespace
 
@@ -51,13 +70,15 @@ std::vector<std::string> material_paths(const RenderArguments& a) {
 }
 
 void add_group_materials(SurfaceMaterial& common, const RenderArguments& a,
-                         const Context& context) {
+                         const std::vector<Surface>& surfaces, const Context& context) {
+  const std::set<std::int32_t> used = numbers_of(surfaces, a.drawing.group_by);
   std::vector<SurfaceMaterial> others;
   for (const auto& [number, material] : a.materials) {
     SurfaceMaterial& own = others.emplace_back(common);
-    take_textures(own,
-                  {&material.base, &material.detail, &material.reflection, &material.structure},
-                  context);
+    if (!a.frames.empty() || used.contains(number)) // a cut shows what lies inside
+      take_textures(own,
+                    {&material.base, &material.detail, &material.reflection, &material.structure},
+                    context);
     own.color = material.color.value_or(common.color);
     own.film = film_of(a, &material);
   }

@@ -21,10 +21,11 @@ bool has_solid_structure(const RenderArguments& arguments);
 /// Their files.
 std::vector<std::string> material_paths(const RenderArguments& arguments);
 
-/// Reads their textures: those of the groups 1, 2, … in `common`, which holds what is for all.
-/// \throw Error with place
+/// Adds the materials of the groups 1, 2, … to `common`, which holds what is for all. Textures of
+/// groups without a triangle are not read, unless other frames may bring some. \param surfaces the
+/// first ones that are drawn \throw Error with place
 void add_group_materials(SurfaceMaterial& common, const RenderArguments& arguments,
-                         const Context& context);
+                         const std::vector<Surface>& surfaces, const Context& context);
 
 /// Reads, or not, the instruments that a result has. \throw UsageError if the input is no result
 /// and words about instruments were given; Error with place

@@ -15,11 +15,12 @@ namespace gewebe::cli {
 namespace {
 
 /// The material with its textures; one that was not asked for is not read.
-SurfaceMaterial material_of(const RenderArguments& a, const Context& context) {
+SurfaceMaterial material_of(const RenderArguments& a, const std::vector<Surface>& surfaces,
+                            const Context& context) {
   SurfaceMaterial material = a.common;
   material.film = film_of(a, nullptr);
   take_textures(material, {&a.base, &a.detail, &a.reflection, &a.structure}, context);
-  add_group_materials(material, a, context);
+  add_group_materials(material, a, surfaces, context);
   return material;
 }
 
@@ -50,12 +51,12 @@ Vec3 rotated_light(const Vec3& light, const Camera& camera, double part, bool di
 } // namespace
 
 Pictures::Pictures(Run& run, const RenderArguments& arguments)
-    : run_(run), arguments_(arguments),
-      material_(run.timed("textures", [&] { return material_of(arguments, run.context()); })),
-      options_(options_of(arguments)), drawing_(arguments.drawing) {}
+    : run_(run), arguments_(arguments), options_(options_of(arguments)),
+      drawing_(arguments.drawing) {}
 
 void Pictures::start(const std::vector<Surface>& surfaces) {
   const RenderArguments& a = arguments_;
+  material_ = run_.timed("textures", [&] { return material_of(a, surfaces, run_.context()); });
   box_ = rest_box(surfaces);
   camera_ = camera_of(0);
   drawing_.light = a.light.value_or(default_light(*camera_));

@@ -21,8 +21,8 @@ namespace gewebe::cli {
 /// light stand still too.
 class Pictures {
 public:
-  /// Reads the textures. \throw Error with place
   Pictures(Run& run, const RenderArguments& arguments);
+  /// Draws a picture; the first time it reads the textures. \throw Error with place
   const Image& of(std::vector<Surface> surfaces);
   /// Whether the last picture is that before it.
   bool kept() const { return kept_last_; }
