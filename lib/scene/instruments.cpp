@@ -82,7 +82,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
     return report;
   if (i.coupled) {
     report.hand = i.way.at(w.now.clock.time).place;
-    report.coupling = i.coupled->led.coupling;
+    report.coupling = i.coupled->coupling;
   }
   const auto add = [&](const Vec3& at, const Vec3& force) {
     report.force -= force;
@@ -90,7 +90,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
     ++report.nodes;
   };
   for (const Object& object : w.now.objects)
-    for (const NodeTouch& t : object.shown.touches)
+    for (const NodalContactForce& t : object.shown.contact)
       if (t.instrument == instrument)
         add(object.model().nodes[t.node].position + vector_at(*object.shown.displacement, t.node),
             t.force);
@@ -174,8 +174,13 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   i.coupled.reset();
   i.path.clear();
   i.shape = c.shape;
-  i.way = {c.pose, c.pose, w.now.clock.time, w.now.clock.time};
-  i.before = c.pose;
+  const double now = w.now.clock.time;
+  i.before = entry_pose(w, c.shape, c.pose); // from outside of what it appears in
+  if (i.before != c.pose) {
+    i.way = {i.before, i.before, now, now};
+    note_poses(w);
+  }
+  i.way = {c.pose, c.pose, now, now};
   note_poses(w);
 }
 void Rule<SetInstrument>::announce(World& w, const SetInstrument& c) {
@@ -229,11 +234,9 @@ void Rule<SetCoupling>::apply(World& w, const SetCoupling& c) {
   if (!c.coupling) { // at once to where the hand is
     i.coupled.reset();
   } else if (i.coupled) {
-    i.coupled->led.coupling = i.coupled->shown.coupling = *c.coupling;
+    i.coupled->coupling = *c.coupling;
   } else {
-    Instrument::Coupled& led = i.coupled.emplace();
-    led.led = {.coupling = *c.coupling, .place = hand.place, .lag = {}, .force = {}, .others = {}};
-    led.shown = led.led;
+    i.coupled = Instrument::Coupled{*c.coupling, hand.place, {}, {}};
   }
   note_poses(w);
 }

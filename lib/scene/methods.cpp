@@ -15,13 +15,13 @@ namespace {
 /// The elastostatic shape under what acts now; empty: nothing ever touched the object.
 std::span<const double> shape_now(World& w, Object& object) {
   std::span<const double> u;
-  if (object.statics->made() || !object.load->empty()) {
+  if (object.statics->made() || (!object.load->empty() && !is_held_altogether(object))) {
     update_solver(w, object, load_at(*object.load, object.model(), w.now.clock.time));
     u = static_shape(object);
     require_bounded(object, u);
   }
   const Shown& shown = object.shown;
-  if (!shown.touches.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
+  if (!shown.contact.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
     u = whole_shape(w, object); // instruments among what acts
   return u;
 }
@@ -48,7 +48,6 @@ double stop(World& w, Object& object, std::span<const double> u) {
   double jump = 0;
   if (object.body == nullptr)
     return jump;
-  gather_impulses(w, *object.body);
   const std::span<const NodeMotion> motion = object.body->moving->motion();
   for (std::size_t i = 0; i < motion.size(); ++i)
     jump = std::max(jump, norm((u.empty() ? Vec3{} : at(u, i)) - motion[i].displacement));
@@ -65,7 +64,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
     return;
   require_support(w, object, Feature::method);
   const std::span<const double> u = shape_now(w, object);
-  object.contact = nullptr;
+  object.touching.clear();
   if (c.method == Method::ela) {
     set_going(w, c.object, u);
   } else {

@@ -1,6 +1,7 @@
 #include "solid/solid_motion.h"
 
 #include "base/error.h"
+#include "base/unique_number.h"
 #include "solid/assembly_internal.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
@@ -68,6 +69,16 @@ struct SolidMotion::State {
   MotionTangent tangent;
   MotionRecovery recovery;
   bool recovered = false; ///< since the last step
+  /// A step in parts.
+  struct Open {
+    MotionObjective objective;
+    MotionPoint found;      ///< the iterate
+    Numbers base, step; ///< where it was linearised, and the model's step from there
+    bool fresh = true;  ///< nothing was linearised yet
+    SolidStep counts{};
+  };
+  std::optional<Open> open;
+  std::uint64_t matrix_version = 0;
 
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
@@ -268,6 +279,188 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.last_step = h;
   s.moved = false;
   return step;
+}
+
+void SolidMotion::begin_step(double h, const Context& context) {
+  State& s = *state_;
+  s.open.reset();
+  s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
+  if (s.recovery.on()) {
+    SolidMotion& soft = s.recovery.soft();
+    soft.set_load(s.now.load);
+    if (s.moved)
+      soft.move_held(s.target);
+    soft.begin_step(h, context);
+    return;
+  }
+  const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
+  if (made > 0)
+    s.matrix_version = unique_number();
+  s.open.emplace(State::Open{MotionObjective(s.body, s.now, s.energy, h, s.options), {}, {}, {}});
+  State::Open& open = *s.open;
+  open.found.at = s.now.place;
+  open.counts.factorisations = made;
+}
+
+void SolidMotion::linearise_step(std::span<double> step, std::span<const double> forces,
+                                 const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().linearise_step(step, forces, context);
+    return;
+  }
+  State::Open& open = *s.open;
+  open.base = open.found.at;
+  MotionPoint point;
+  point.at = open.base;
+  if (open.fresh)
+    add(point.at, open.objective.step(), s.now.velocity);
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] != 0)
+      point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
+  open.objective.evaluate(point, context, true);
+  if (s.quick.wants_tangent() && s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
+    s.matrix_version = unique_number();
+  s.quick.turn(s.energy, context);
+  s.quick.fill(s.energy.volumes(), context);
+  if (!s.energy.volumes().empty())
+    s.matrix_version = unique_number();
+  Numbers direction = point.gradient;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] == 0)
+      direction[axis] -= forces[axis];
+  s.quick.into_frames(direction, context);
+  s.quick.solve(direction, context);
+  s.quick.out_of_frames(direction, context);
+  ++open.counts.rounds;
+  open.step.resize(s.body.axes());
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    open.step[axis] =
+        point.at[axis] - (s.now.held[axis] != 0 ? 0 : direction[axis]) - open.base[axis];
+  open.fresh = false;
+  std::ranges::copy(open.step, step.begin());
+}
+
+void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
+                                 const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().unit_responses(node, columns, context);
+    return;
+  }
+  Numbers column;
+  for (std::size_t a = 0; a < 3; ++a) {
+    column.assign(s.body.axes(), 0);
+    const std::size_t axis = 3 * std::size_t{node} + a;
+    if (s.now.held[axis] == 0) {
+      column[axis] = 1;
+      s.quick.solve(column, context);
+    }
+    std::ranges::copy(column, columns.begin() + static_cast<std::ptrdiff_t>(a * s.body.axes()));
+  }
+}
+
+std::uint64_t SolidMotion::matrix_version() const noexcept {
+  return state_->recovery.on() ? state_->recovery.soft().matrix_version()
+                               : state_->matrix_version;
+}
+
+std::array<double, 9> SolidMotion::frame_of(std::uint32_t node) const {
+  return state_->recovery.on() ? state_->recovery.soft().frame_of(node)
+                               : state_->quick.frame_of(node);
+}
+
+void SolidMotion::move_iterate(double share, std::span<const double> change,
+                               const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().move_iterate(share, change, context);
+    return;
+  }
+  State::Open& open = *s.open;
+  open.found.at = open.base;
+  add(open.found.at, 1 - share, open.step);
+  if (!std::ranges::all_of(change, [](double f) { return f == 0; })) {
+    Numbers answer(change.begin(), change.end());
+    s.quick.into_frames(answer, context);
+    s.quick.solve(answer, context);
+    s.quick.out_of_frames(answer, context);
+    ++open.counts.rounds;
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      if (s.now.held[axis] == 0)
+        open.found.at[axis] += answer[axis];
+  }
+}
+
+bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
+  State& s = *state_;
+  if (s.recovery.on())
+    return s.recovery.soft().keep_momentum(forces, room);
+  if (s.now.any_held())
+    return true;
+  State::Open& open = *s.open;
+  const std::array<double, 3> off = open.objective.momentum_off(open.found.at, forces);
+  if (!(std::hypot(off[0], off[1], off[2]) <= room))
+    return false;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    open.found.at[axis] -= off[axis % 3];
+  return true;
+}
+
+std::span<const double> SolidMotion::iterate() const noexcept {
+  return state_->recovery.on() ? state_->recovery.soft().iterate()
+                               : std::span<const double>(state_->open->found.at);
+}
+
+SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    SolidMotion& soft = s.recovery.soft();
+    SolidStep step = soft.end_step(forces, context);
+    s.take_over(soft);
+    s.moved = false;
+    if (MotionRecovery::is_right(s.body, s.now.place)) {
+      Numbers own(s.body.axes());
+      const double whole = s.energy.evaluate(s.now.place, {}, own, context, true);
+      if (whole <= s.elastic) {
+        s.elastic = whole;
+        s.energy.keep();
+        s.quick.forget();
+        s.forecast.clear();
+        s.recovery.end();
+      }
+    }
+    return step;
+  }
+  State::Open open = std::move(*s.open);
+  s.open.reset();
+  const double h = open.objective.step();
+  open.objective.evaluate(open.found, context);
+  if (!std::isfinite(open.found.value))
+    throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
+  s.energy.keep();
+  s.reactions = open.found.forces;
+  Numbers acceleration(s.body.axes());
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
+    if (s.now.held[axis] == 0)
+      s.reactions[axis] = 0;
+    else
+      s.reactions[axis] -= forces.empty() ? 0 : forces[axis];
+    const double speed = (open.found.at[axis] - s.now.place[axis]) / h;
+    acceleration[axis] = (speed - s.now.velocity[axis]) / h;
+    s.now.velocity[axis] = speed;
+  }
+  if (s.last_step != h)
+    s.forecast.clear();
+  s.forecast.add(std::move(acceleration), s.body.masses, context);
+  s.now.place = std::move(open.found.at);
+  s.elastic = s.energy.elastic();
+  s.last_step = h;
+  s.moved = false;
+  s.lent = 0;
+  open.counts.evaluations = open.objective.evaluations();
+  open.counts.change = open.counts.left = 0;
+  return open.counts;
 }
 
 std::span<const double> SolidMotion::places() const noexcept {

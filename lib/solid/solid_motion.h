@@ -48,6 +48,7 @@
 #include "solid/hyperelastic.h"
 #include "tetrahedra/tet_mesh.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -191,6 +192,39 @@ public:
   void drop_tangent();
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
+
+  // A step in parts, for a caller that adds forces which depend on positions (lib/contact).
+  //
+  // The iterate is a position of all nodes. A part of the step builds the quadratic model
+  // 1/2 (x - x_free)^T A (x - x_free) of the step's energy around the iterate, with the constant
+  // matrix A in the frames of the iterate; the caller finds the forces f that act at
+  // x = x_free + A^-1 f, and moves there.
+
+  /// Begins a step of h; the iterate is the present position. An open step is abandoned without a
+  /// trace. \pre h > 0, set_load and move_held were called for this step \throw as step
+  void begin_step(double h, const Context& context);
+  /// Builds the model around the iterate, at first around where the motion leads.
+  /// \param forces  f_0 that act beside the load, 3 n
+  /// \param step  becomes x_free + A^-1 f_0 minus the iterate, 3 n; on held axes the way to their
+  /// targets
+  void linearise_step(std::span<double> step, std::span<const double> forces,
+                      const Context& context);
+  /// Response of the model to unit forces on the three axes of a node, in the frame of each node:
+  /// three columns of 3 n numbers. They are the same until matrix_version() changes.
+  void unit_responses(std::uint32_t node, std::span<double> columns, const Context& context);
+  std::uint64_t matrix_version() const noexcept;
+  /// Rotation of a node's frame in the model, row-major.
+  std::array<double, 9> frame_of(std::uint32_t node) const;
+  /// Moves the iterate, from where it was linearised, by (1 - share) step + A^-1 (f - f_0).
+  /// \param change  f - f_0, 3 n
+  void move_iterate(double share, std::span<const double> change, const Context& context);
+  /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
+  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not quite
+  /// by what its forces say. \param forces  f, 3 n \return whether the momentum is right
+  bool keep_momentum(std::span<const double> forces, double room);
+  std::span<const double> iterate() const noexcept; ///< 3 n
+  /// Ends the step at the iterate. \param forces  that act there, 3 n
+  SolidStep end_step(std::span<const double> forces, const Context& context);
 
   /// Whether it was scrambled, and has not found back yet.
   bool recovering() const noexcept;

@@ -174,17 +174,15 @@ struct Rest {
 
 constexpr double press_step = 1.0 / 60;
 
-/// Steps until nothing moves by over 1e-6 of an edge in one whose forces are found: what is held
-/// back does not rest. \param look of each step
+/// Steps until nothing moves by over 1e-6 of an edge in one. \param look of each step
 template <class Look>
 bool come_to_rest(Simulation& s, double edge, double longest, Look&& look) {
   const double before = s.time();
   std::vector<std::vector<double>> was(s.object_count());
   while (s.time() - before < longest) {
-    const std::uint64_t unsolved = s.counts().solids.touches.unsolved;
     s.step(press_step);
     look();
-    double most = s.counts().solids.touches.unsolved > unsolved ? edge : 0;
+    double most = 0;
     for (std::size_t k = 0; k < s.object_count(); ++k) {
       std::vector<double> now = shape(s, k);
       for (std::size_t a = 0; a < now.size(); ++a)

@@ -1,0 +1,68 @@
+#pragma once
+// Parameters of the contact solver: the one place where their defaults stand, each with its reason.
+
+namespace gewebe::contact {
+
+struct Parameters {
+  // ---- lengths, over the median edge of the collision surfaces
+  /// Activation distance d_hat of the barrier. Surfaces at rest on each other stand apart by less.
+  /// Hertz: the force is off by 0.3 % with 1e-3 where the offset of d_min is used.
+  double activation_distance = 1e-3;
+  /// ... but at most this part of an instrument's radius.
+  double activation_over_radius = 1e-3;
+  /// Margin of the broad phase, so that one set of candidates serves for a step.
+  double margin = 0.1;
+  /// At rest: displacement below which friction is not yet fully developed.
+  double stick_length = 1e-3;
+
+  /// Slip speed below which friction is not yet fully developed, mm/s. A body that sticks creeps
+  /// with at most this speed.
+  double stick_speed = 0.1;
+
+  /// Typical force of an impact, over the force that would stop the bodies within the step.
+  double stop_share = 0.125;
+
+  /// ... over the largest force of the last step: gaps stay a good part of d_hat.
+  double last_share = 0.25;
+  /// The barrier becomes stiffer within a step where that share of a force is by the first factor
+  /// larger than the typical force, by at most the second one at a time: deep in the barrier surfaces
+  /// that slide on each other move only by about the root of gap times radius.
+  double soft_factor = 4, stiffness_factor = 10;
+
+  // ---- iterations
+  int max_iterations = 100; ///< Newton iterations of one round, then the step fails
+  int max_rounds = 40;      ///< linearisations of bodies that are not linear
+  int gauss_newton = 12;    ///< iterations before the projected Hessian takes over
+  /// A step of which collision detection allows less than this part is taken again by a smaller
+  /// part of the way, at most so many times and not below the least part.
+  double full_reach = 0.5, least_reach = 1e-4;
+  int max_reaches = 3;
+  /// Longest step over an edge, by which less of the way is taken.
+  double longest_step = 0.25;
+  int max_corrections = 2; ///< second-order corrections of a step
+  int lag_interval = 3;     ///< iterations between two renewals of normal forces for friction
+  int max_lags = 30;        ///< renewals in one round
+  int max_searches = 5;     ///< broad phases of one step, each with twice the margin
+
+  // ---- tolerances
+  /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
+  double step_tolerance = 1e-2;
+  /// Largest difference of a force on a vertex from those of its pairs, over the largest force. Deep
+  /// in the barrier steps are short long before forces balance.
+  double force_tolerance = 1e-3;
+  /// Largest change of a friction force by its last lag, over the largest pair force.
+  double friction_tolerance = 1e-3;
+  /// Largest last change of a round, over d_hat.
+  double round_tolerance = 0.5;
+  /// Part of the smallest gap (at most of d_hat) by which bodies may be translated at the end, so
+  /// that momentum is exact; forces change by twice as much.
+  double momentum_room = 2e-3;
+  /// Part of the gap (at most of d_hat) that a step may not use up: it would land deep in the
+  /// barrier.
+  double kept_gap = 0.5;
+  /// Compliance that is added to the diagonal where rounding has made W indefinite, over its
+  /// largest entry.
+  double ridge = 1e-7;
+};
+
+} // namespace gewebe::contact

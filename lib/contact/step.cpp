@@ -1,0 +1,559 @@
+#include "contact/step.h"
+
+#include "contact/barrier.h"
+#include "contact/contact_pairs.h"
+#include "contact/friction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+namespace gewebe::contact {
+
+namespace {
+
+/// Force of a pair of weight 1 at half of d_hat is 1/4.33 of kappa d_hat^3.
+constexpr double barrier_at_half = 4.33;
+constexpr double armijo = 1e-4;
+constexpr int max_halvings = 40;
+/// Halvings of a step behind which the way of prescribed vertices gets more weight.
+constexpr int halvings_until_raised = 4;
+/// Decrement below which an energy cannot be told from rounding.
+constexpr double rounding = 1e-13;
+
+double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& way) {
+  const double square = dot(way, way);
+  const double t = square > 0 ? std::clamp(dot(p - a, way) / square, 0.0, 1.0) : 0;
+  return norm(p - a - t * way);
+}
+
+} // namespace
+
+void StepReport::add(const StepReport& more) {
+  iterations += more.iterations;
+  rounds += more.rounds;
+  lags += more.lags;
+  searches += more.searches;
+  cuts += more.cuts;
+  steps += more.steps;
+  halvings += more.halvings;
+  most_iterations = std::max(most_iterations, more.most_iterations);
+  pairs = std::max(pairs, more.pairs);
+  vertices = std::max(vertices, more.vertices);
+  gap = std::min(gap, more.gap);
+  friction_residual = std::max(friction_residual, more.friction_residual);
+}
+
+/// The contact energy of a step, and what its minimisation needs.
+class StepSolver::Work {
+public:
+  Work(const Island& island, collision::BroadPhase& broad_phase, InverseCache& inverses,
+       const StepOptions& options, const Context& context)
+      : island_(island), broad_phase_(broad_phase), inverses_(inverses), options_(options), context_(context),
+        count_(island.table.vertex_count()), begin_(count_), at_(count_), way_(count_),
+        trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
+        stick_(options.h > 0 ? options.parameters.stick_speed * options.h
+                             : options.parameters.stick_length * island.edge),
+        margin_(options.parameters.margin * island.edge) {
+    read_positions(begin_);
+    at_ = begin_;
+    for (std::size_t a = 0; a < island.friction.owners(); ++a)
+      for (std::size_t b = 0; b < island.friction.owners(); ++b)
+        rough_ = rough_ || (island.allowed.at(a, b) != 0 && island.friction.at(a, b) > 0);
+  }
+
+  StepReport run();
+  std::vector<ContactForce> forces();
+
+private:
+  void read_positions(std::vector<Vec3>& x);
+  double longest_way() const;
+  void raise_stiffness(double force);
+  void set_stiffness(double energy, std::span<const Vec3> to);
+  void search(std::span<const Vec3> to, double reach);
+  void find_pairs(std::span<const Vec3> x) {
+    find_active_pairs(island_.surface, candidates_, x, d_hat_, pairs_);
+    for (ContactPair& pair : pairs_.pairs) {
+      // The same force at the same part of d_hat, whatever d_min is.
+      const double scale = d_hat_ * d_hat_ / barrier_range(d_hat_, pair.d_min);
+      pair.weight *= scale * scale;
+    }
+  }
+  double energy_at(std::span<const Vec3> x);
+  void lag();
+  bool lag_changes();
+  void minimise();
+  bool solve_system(CondensedSystem& system, HessianMode mode);
+  struct Step {
+    double slope = 0;  ///< of the contact energy
+    double length = 0; ///< the longest of a vertex
+    double free = 0;   ///< part of it that collision detection allows
+  };
+  Step take_step(const CondensedSystem& system);
+  Step correct_step(CondensedSystem& system, const Step& step);
+  bool iterate(CondensedSystem& system, int iteration, bool& converged);
+  bool move_bodies(const CondensedSystem& system);
+  bool covered(std::span<const Vec3> x, double room) const;
+  double largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const;
+  /// Length of a step of Newton's method below which positions have converged.
+  double step_limit() const {
+    return options_.parameters.step_tolerance * (rough_ ? std::min(d_hat_, stick_) : d_hat_);
+  }
+
+  const Island& island_;
+  collision::BroadPhase& broad_phase_;
+  InverseCache& inverses_;
+  const StepOptions& options_;
+  const Context& context_;
+  std::size_t count_;
+  std::vector<Vec3> begin_; ///< y_n
+  std::vector<Vec3> at_;    ///< present positions
+  std::vector<Vec3> way_;   ///< x_free - x of the round
+  std::vector<Vec3> trial_, gradient_, correction_, friction_before_;
+  double d_hat_, stick_, margin_;
+  double kappa_ = 0, typical_force_ = 0;
+  double barrier_force_ = 0; ///< force at half of d_hat
+  double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
+  bool rough_ = false; ///< some pairs have friction
+  collision::Candidates candidates_;
+  std::vector<std::uint32_t> vertices_; ///< of candidates, and those with forces
+  std::vector<std::vector<VertexForce>> force_; ///< by body
+  std::vector<Vec3> swept_from_, swept_; ///< what the candidates are of
+  ContactPairs pairs_;
+  std::vector<FrictionPair> friction_;
+  std::vector<std::array<Vec3, 4>> pair_forces_;
+  std::vector<HessianBlock> blocks_, friction_blocks_;
+  StepReport report_;
+};
+
+void StepSolver::Work::read_positions(std::vector<Vec3>& x) {
+  const BodyTable& table = island_.table;
+  for (std::size_t b = 0; b < table.bodies.size(); ++b)
+    table.bodies[b]->positions(
+        std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+}
+
+double StepSolver::Work::longest_way() const {
+  double longest = 0;
+  for (const Vec3& way : way_)
+    longest = std::max(longest, norm(way));
+  return longest;
+}
+
+/// Scales the barrier by a typical contact force: that of the bodies, a part of the largest of the
+/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops them
+/// within the step.
+/// \param energy  R^T A R of the ways R
+void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
+  const Parameters& p = options_.parameters;
+  double force = std::numeric_limits<double>::infinity();
+  for (const ContactBody* const body : island_.table.bodies)
+    if (const double typical = body->typical_force(); typical > 0)
+      force = std::min(force, typical);
+  if (!std::isfinite(force))
+    force = 1;
+  for (const std::vector<VertexForce>& of : force_)
+    for (const VertexForce& f : of)
+      force = std::max(force, p.last_share * norm(f.force));
+  if (const double longest = longest_way(); longest > 0) {
+    const double stop = p.stop_share * energy / longest;
+    if (stop > force && collision::collision_free_step(island_.surface, candidates_, at_, to,
+                                                       {0, p.kept_gap, d_hat_, 1000}) < 1)
+      force = stop;
+  }
+  typical_force_ = barrier_force_ = force;
+  kappa_ = force / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
+}
+
+/// Makes the barrier stiffer where forces have become much larger than the typical one: deep in the
+/// barrier Newton's steps are short. \param force  largest of those that balance
+void StepSolver::Work::raise_stiffness(double force) {
+  const Parameters& p = options_.parameters;
+  const double wanted = p.last_share * force;
+  if (!(wanted > p.soft_factor * barrier_force_))
+    return;
+  const double factor = std::min(wanted / barrier_force_, p.stiffness_factor);
+  barrier_force_ *= factor;
+  kappa_ *= factor;
+}
+
+void StepSolver::Work::search(std::span<const Vec3> to, double reach) {
+  broad_phase_.find(island_.surface, at_, to, reach, island_.allowed, candidates_);
+  ++report_.searches;
+  swept_from_ = at_;
+  swept_.resize(count_);
+  for (std::size_t v = 0; v < count_; ++v)
+    swept_[v] = to[v] - at_[v];
+  std::vector<std::uint8_t> used(count_);
+  const auto use = [&](const auto& lists) {
+    for (const auto& list : lists)
+      for (const std::uint32_t v : list)
+        used[v] = 1;
+  };
+  use(candidates_.point_point);
+  use(candidates_.point_edge);
+  use(candidates_.edge_edge);
+  use(candidates_.point_triangle);
+  for (std::size_t b = 0; b < force_.size(); ++b)
+    for (const VertexForce& f : force_[b])
+      used[island_.table.first[b] + f.vertex] = 1;
+  vertices_.clear();
+  for (std::uint32_t v = 0; v < count_; ++v)
+    if (used[v] != 0)
+      vertices_.push_back(v);
+}
+
+/// Whether all vertices are within `room` of what the candidates were searched for.
+bool StepSolver::Work::covered(std::span<const Vec3> x, double room) const {
+  for (std::size_t v = 0; v < count_; ++v)
+    if (!(distance_to_segment(x[v], swept_from_[v], swept_[v]) <= room))
+      return false;
+  return true;
+}
+
+double StepSolver::Work::largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const {
+  double most = 0;
+  for (std::size_t v = 0; v < count_; ++v)
+    if (const double d = norm(a[v] - b[v]); !(d <= most))
+      most = d;
+  return most;
+}
+
+/// Energy of contact; leaves the pairs of x.
+double StepSolver::Work::energy_at(std::span<const Vec3> x) {
+  find_pairs(x);
+  return barrier_energy(pairs_, x, kappa_) + friction_energy(friction_, x, begin_, stick_);
+}
+
+/// Normal forces and tangent planes of friction at the present positions. \pre pairs are of here
+void StepSolver::Work::lag() {
+  if (!rough_)
+    return;
+  lag_friction(island_.surface, pairs_, at_, kappa_, island_.friction, friction_);
+  ++report_.lags;
+}
+
+/// Takes a new lag where that changes forces by more than the tolerance, and tells whether it did: the
+/// forces that balance are those of the lag that stays.
+bool StepSolver::Work::lag_changes() {
+  if (!rough_)
+    return false;
+  friction_before_.assign(count_, {});
+  std::vector<Vec3> now(count_);
+  (void)add_friction_gradient(friction_, at_, begin_, stick_, friction_before_);
+  std::vector<FrictionPair> before = friction_;
+  find_pairs(at_);
+  lag();
+  (void)add_friction_gradient(friction_, at_, begin_, stick_, now);
+  double change = 0, largest = 0;
+  barrier_forces(pairs_, at_, kappa_, pair_forces_);
+  for (const std::array<Vec3, 4>& forces : pair_forces_)
+    for (const Vec3& f : forces)
+      largest = std::max(largest, norm(f));
+  for (const std::uint32_t v : vertices_)
+    change = std::max(change, norm(now[v] - friction_before_[v]));
+  report_.friction_residual = largest > 0 ? change / largest : 0;
+  if (!(report_.friction_residual <= options_.parameters.friction_tolerance))
+    return true;
+  friction_ = std::move(before);
+  return false;
+}
+
+/// Newton's system at the present positions. \return whether it was positive definite
+bool StepSolver::Work::solve_system(CondensedSystem& system, HessianMode mode) {
+  barrier_hessian(pairs_, at_, kappa_, mode, blocks_);
+  friction_hessian(friction_, at_, begin_, stick_, friction_blocks_);
+  std::vector<std::uint32_t> active;
+  for (const auto* const list : {&blocks_, &friction_blocks_})
+    for (const HessianBlock& block : *list)
+      active.insert(active.end(), block.vertex.begin(), block.vertex.begin() + block.count);
+  std::ranges::sort(active);
+  active.erase(std::ranges::unique(active).begin(), active.end());
+  system.activate(active);
+  system.clear_hessian();
+  for (const auto* const list : {&blocks_, &friction_blocks_})
+    for (const HessianBlock& block : *list)
+      system.add_hessian(std::span(block.vertex).first(block.count),
+                         std::span(block.entry).first(std::size_t{9} * block.count * block.count));
+  return system.solve(gradient_);
+}
+
+/// The chosen step of the system; trial_ becomes its end.
+StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system) {
+  Step result;
+  const std::span<const std::uint32_t> vertices = system.vertices();
+  trial_ = at_;
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    const Vec3& step = system.step(k);
+    result.slope += dot(gradient_[vertices[k]], step);
+    const double size = norm(step);
+    result.length = size <= result.length ? result.length : size;
+    trial_[vertices[k]] += step;
+  }
+  if (!std::isfinite(result.length))
+    throw NotSolved("contact: Newton's step is not finite");
+  result.free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                               {0, options_.parameters.kept_gap, d_hat_, 1000});
+  return result;
+}
+
+/// Corrects a step of which collision detection allows but a part: at its end pairs are to be as far
+/// apart as its linear model has it.
+StepSolver::Work::Step StepSolver::Work::correct_step(CondensedSystem& system, const Step& step) {
+  Step now = step;
+  correction_.assign(count_, {});
+  for (int k = 0; k < options_.parameters.max_corrections && now.free < 1; ++k) {
+    if (!add_curvature_correction(pairs_, at_, trial_, kappa_, correction_))
+      break;
+    system.correct(correction_);
+    now = take_step(system);
+    if (!(now.slope + system.slope() < 0)) {
+      system.drop_correction();
+      return take_step(system);
+    }
+  }
+  return now;
+}
+
+/// One iteration of Newton's method. \return whether anything was gained
+bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& converged) {
+  const Parameters& p = options_.parameters;
+  std::ranges::fill(gradient_, Vec3{});
+  find_pairs(at_);
+  const double before = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
+                        add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
+  if (last_step_ <= step_limit()) {
+    const auto [difference, largest] = system.residual(gradient_);
+    if (difference <= p.force_tolerance * std::max(largest, typical_force_)) {
+      converged = true;
+      return true;
+    }
+  }
+  const bool was_full = std::isfinite(last_step_);
+  last_step_ = std::numeric_limits<double>::infinity();
+  const bool simple = iteration < p.gauss_newton && !was_full;
+  if (!solve_system(system, simple ? HessianMode::gauss_newton : HessianMode::exact) &&
+      !solve_system(system, HessianMode::projected))
+    throw NotSolved("contact: Newton's system is not positive definite");
+  converged = false;
+  Step step = take_step(system);
+  double reach = 1;
+  if (const double most = p.longest_step * island_.edge;
+      system.share() > 0 && !pairs_.pairs.empty() && step.length > most) {
+    reach = std::max(most / step.length, p.least_reach);
+    system.choose_reach(reach);
+    step = take_step(system);
+  }
+  if (step.free < p.full_reach)
+    step = correct_step(system, step);
+  if (system.share() > 0 && !pairs_.pairs.empty() && step.free < p.full_reach) {
+    // Less of the way, so that forces balance along it.
+    for (int k = 0; k < p.max_reaches && step.free < p.full_reach; ++k) {
+      reach = std::max(reach * step.free, p.least_reach);
+      system.choose_reach(reach);
+      step = correct_step(system, take_step(system));
+    }
+  }
+  const double length = step.length, contact_slope = step.slope, free = step.free;
+  system.require_descent(contact_slope);
+  double slope = system.slope() + contact_slope;
+  const std::vector<Vec3> target = trial_;
+  double part = free;
+  report_.cuts += free < 1 ? 1 : 0;
+  double here = system.energy(0) + before;
+  const std::span<const std::uint32_t> vertices = system.vertices();
+  for (int k = 0; k < max_halvings; ++k, part /= 2) {
+    if (k > 0 && k % halvings_until_raised == 0 && system.share() > 0) {
+      // Surfaces that only now come into contact have no slope yet.
+      system.raise_penalty();
+      slope = system.slope() + contact_slope;
+      here = system.energy(0) + before;
+      part = free;
+    }
+    for (const std::uint32_t v : vertices)
+      trial_[v] = part < 1 ? at_[v] + part * (target[v] - at_[v]) : target[v];
+    const double there = system.energy(part) + energy_at(trial_);
+    const double unsure = rounding * (std::abs(here) + std::abs(before));
+    if (there <= here + armijo * part * std::min(slope, 0.0) + unsure) {
+      system.advance(part);
+      at_.swap(trial_);
+      if (part == 1 && system.share() == 0)
+        last_step_ = length;
+      if (part == 1)
+        raise_stiffness(system.largest_force());
+      return true;
+    }
+  }
+  if (!(length <= step_limit()) || free < 1 || system.share() > 0)
+    return false;
+  // The energy cannot be told from rounding; forces can.
+  system.advance(1);
+  at_ = target;
+  last_step_ = length;
+  return true;
+}
+
+/// Moves all bodies under the forces found. \return whether their momenta are right
+bool StepSolver::Work::move_bodies(const CondensedSystem& system) {
+  find_pairs(at_);
+  const double room =
+      options_.parameters.momentum_room * std::min(d_hat_, smallest_gap(pairs_, at_));
+  bool exact = true;
+  for (std::size_t b = 0; b < island_.table.bodies.size(); ++b) {
+    ContactBody& body = *island_.table.bodies[b];
+    force_[b] = system.forces(b);
+    body.move(system.share(), force_[b]);
+    exact = body.keep_momentum(room) && exact;
+  }
+  return exact;
+}
+
+StepReport StepSolver::Work::run() {
+  const Parameters& p = options_.parameters;
+  const BodyTable& table = island_.table;
+  const bool linear =
+      std::ranges::all_of(table.bodies, [](const ContactBody* b) { return b->is_linear(); });
+  std::vector<Vec3> to(count_), start(count_), round_begin;
+  std::vector<std::vector<VertexForce>> round_force;
+  for (const ContactBody* const body : table.bodies)
+    force_.push_back(body->last_forces());
+  double margin = margin_;
+  for (int round = 0; round < p.max_rounds; ++round) {
+    if (context_.cancelled && context_.cancelled())
+      throw Cancelled();
+    ++report_.rounds;
+    round_force = force_;
+    double energy = 0;
+    for (std::size_t b = 0; b < table.bodies.size(); ++b)
+      energy += table.bodies[b]->linearise(
+          force_[b], std::span(way_).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+    for (std::size_t v = 0; v < count_; ++v) {
+      to[v] = at_[v] + way_[v];
+      start[v] = -way_[v];
+    }
+    // Work of a typical force on the way: what prescribed vertices may cost at first.
+    const double longest = longest_way();
+    const double way_energy = energy;
+    round_begin = at_;
+    bool exact = true;
+    for (int attempt = 0;; ++attempt) {
+      if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
+        search(to, d_hat_ + margin);
+        if (round == 0 && attempt == 0)
+          set_stiffness(way_energy, to);
+        find_pairs(at_);
+        if (round == 0 && attempt == 0)
+          lag();
+      }
+      energy = way_energy + typical_force_ * longest;
+      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
+      bool converged = vertices_.empty();
+      last_step_ = std::numeric_limits<double>::infinity();
+      int iteration = 0, lags = 0;
+      if (vertices_.empty())
+        system.advance(1);
+      while (!converged) {
+        if (iteration >= p.max_iterations)
+          throw NotSolved("contact: Newton's method did not converge in " +
+                          std::to_string(iteration) + " iterations");
+        bool done = false;
+        const bool gained = iterate(system, iteration, done);
+        ++iteration;
+        if (!gained && !done) {
+          // Nothing to be gained by the simple Hessian, perhaps by the projected one.
+          if (iteration <= p.gauss_newton) {
+            iteration = p.gauss_newton;
+            continue;
+          }
+          throw NotSolved("contact: no descent");
+        }
+        if (done) {
+          converged = lags >= p.max_lags || !lag_changes();
+          ++lags;
+        } else if (rough_ && iteration % p.lag_interval == 0 && lags < p.max_lags) {
+          find_pairs(at_);
+          lag();
+        }
+      }
+      report_.iterations += static_cast<std::uint64_t>(iteration);
+      report_.vertices = std::max(report_.vertices, system.unknowns() / 3);
+      exact = move_bodies(system);
+      trial_.resize(count_);
+      read_positions(trial_);
+      if (covered(trial_, margin / 2)) {
+        if (collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                           {0, 0, d_hat_, 1000}) < 1)
+          throw NotSolved("contact: bodies pass each other where rounding moves them");
+        break;
+      }
+      // Some went where nobody looked: perhaps nothing was there.
+      std::swap(at_, round_begin);
+      search(trial_, d_hat_ + margin);
+      const double free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                                         {0, 0, d_hat_, 1000});
+      std::swap(at_, round_begin);
+      if (free >= 1)
+        break;
+      if (attempt >= p.max_searches)
+        throw NotSolved("contact: bodies move farther than they were searched for");
+      margin *= 2;
+      at_ = round_begin;
+      to = trial_;
+    }
+    const double change = largest_distance(trial_, round_begin);
+    at_.swap(trial_);
+    if (linear || (round > 0 && exact && change <= p.round_tolerance * d_hat_))
+      break;
+    if (round + 1 == p.max_rounds)
+      throw NotSolved("contact: bodies that are not linear did not come to rest in " +
+                      std::to_string(round + 1) + " rounds");
+  }
+  find_pairs(at_);
+  report_.pairs = pairs_.pairs.size();
+  report_.gap = std::min(report_.gap, smallest_gap(pairs_, at_));
+  report_.steps = 1;
+  report_.most_iterations = report_.iterations;
+  return report_;
+}
+
+std::vector<ContactForce> StepSolver::Work::forces() {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, ContactForce> all;
+  const auto add = [&](const auto& pair, const std::array<Vec3, 4>& forces, bool normal) {
+    const std::vector<std::uint32_t>& owner = island_.surface.owner;
+    const std::uint32_t one = owner[pair.vertex[0]];
+    std::uint32_t other = one;
+    for (std::size_t k = 1; k < pair.count; ++k)
+      other = owner[pair.vertex[k]] != one ? owner[pair.vertex[k]] : other;
+    for (std::size_t k = 0; k < pair.count; ++k) {
+      const std::uint32_t v = pair.vertex[k], from = owner[v] == one ? other : one;
+      ContactForce& f = all[{v, from}];
+      f.vertex = v;
+      f.from = from;
+      (normal ? f.normal : f.friction) += forces[k];
+    }
+  };
+  barrier_forces(pairs_, at_, kappa_, pair_forces_);
+  for (std::size_t k = 0; k < pairs_.pairs.size(); ++k)
+    add(pairs_.pairs[k], pair_forces_[k], true);
+  friction_forces(friction_, at_, begin_, stick_, pair_forces_);
+  for (std::size_t k = 0; k < friction_.size(); ++k)
+    add(friction_[k], pair_forces_[k], false);
+  std::vector<ContactForce> list;
+  for (const auto& entry : all)
+    if (entry.second.normal != Vec3{} || entry.second.friction != Vec3{})
+      list.push_back(entry.second);
+  return list;
+}
+
+StepSolver::StepSolver(const Island& island) : island_(island), broad_phase_(island.surface) {}
+
+StepReport StepSolver::solve(const StepOptions& options, const Context& context) {
+  Work work(island_, broad_phase_, inverses_, options, context);
+  const StepReport report = work.run();
+  forces_ = work.forces();
+  return report;
+}
+
+} // namespace gewebe::contact

@@ -1,0 +1,79 @@
+#include "dynamics/solid_contact_body.h"
+
+#include "base/vector_at.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+using contact::Block3, contact::VertexForce;
+
+void SolidContactBody::begin(double h, std::vector<VertexForce> last, double typical_force,
+                             const Context& context) {
+  h_ = h;
+  context_ = context;
+  last_ = std::move(last);
+  typical_force_ = typical_force;
+  forces_.assign(axes_, 0);
+}
+
+void SolidContactBody::positions(std::span<Vec3> x) {
+  const std::span<const double> at = motion_.iterate();
+  for (std::size_t k = 0; k < vertices_.size(); ++k)
+    x[k] = vector_at(at, vertices_[k]);
+}
+
+void SolidContactBody::spread(std::span<const VertexForce> forces) {
+  forces_.assign(axes_, 0);
+  for (const VertexForce& f : forces)
+    for (std::size_t a = 0; a < 3; ++a)
+      forces_[3 * std::size_t{vertices_[f.vertex]} + a] += f.force[static_cast<int>(a)];
+}
+
+double SolidContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
+  spread(forces);
+  linearised_ = forces_;
+  step_.resize(axes_);
+  motion_.linearise_step(step_, forces_, context_);
+  if (motion_.matrix_version() != version_) {
+    columns_.clear();
+    version_ = motion_.matrix_version();
+  }
+  for (std::size_t k = 0; k < vertices_.size(); ++k)
+    step[k] = vector_at(std::span<const double>(step_), vertices_[k]);
+  double energy = 0; // of inertia alone
+  for (std::size_t axis = 0; axis < axes_; ++axis)
+    energy += motion_.masses()[axis / 3] * step_[axis] * step_[axis];
+  return energy / (h_ * h_);
+}
+
+void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
+                                  std::span<Block3> blocks) {
+  auto found = columns_.find(vertex);
+  if (found == columns_.end()) {
+    std::vector<double> whole(3 * axes_);
+    motion_.unit_responses(vertices_[vertex], whole, context_);
+    std::vector<double> kept;
+    kept.reserve(9 * vertices_.size());
+    for (const std::uint32_t node : vertices_)
+      for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t column = 0; column < 3; ++column)
+          kept.push_back(whole[column * axes_ + 3 * std::size_t{node} + a]);
+    found = columns_.emplace(vertex, std::move(kept)).first;
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    std::copy_n(found->second.begin() + std::ptrdiff_t{9} * rows[k], 9, blocks[k].begin());
+}
+
+void SolidContactBody::move(double share, std::span<const VertexForce> forces) {
+  spread(forces);
+  std::vector<double> change = forces_;
+  for (std::size_t axis = 0; axis < axes_; ++axis)
+    change[axis] -= linearised_[axis];
+  motion_.move_iterate(share, change, context_);
+}
+
+} // namespace gewebe
