@@ -30,7 +30,9 @@ struct Parameters {
   double soft_factor = 4, stiffness_factor = 10;
 
   // ---- iterations
-  int max_iterations = 100; ///< Newton iterations of one round, then the step fails
+  int max_iterations = 100; ///< Newton iterations of one round behind the whole way, then the step fails
+  /// ... on the way: past curved surfaces each goes but about the root of gap times radius.
+  int max_way_iterations = 1000;
   int max_rounds = 40;      ///< linearisations of bodies that are not linear
   int gauss_newton = 12;    ///< iterations before the projected Hessian takes over
   /// A step of which collision detection allows less than this part is taken again by a smaller

@@ -451,16 +451,18 @@ StepReport StepSolver::Work::run() {
       CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
       bool converged = vertices_.empty();
       last_step_ = std::numeric_limits<double>::infinity();
-      int iteration = 0, lags = 0;
+      int iteration = 0, way_iterations = 0, lags = 0;
       if (vertices_.empty())
         system.advance(1);
       while (!converged) {
-        if (iteration >= p.max_iterations)
+        if (iteration - way_iterations >= p.max_iterations || way_iterations >= p.max_way_iterations)
           throw NotSolved("contact: Newton's method did not converge in " +
                           std::to_string(iteration) + " iterations");
         bool done = false;
         const bool gained = iterate(system, iteration, done);
         ++iteration;
+        if (system.share() > 0)
+          way_iterations = iteration;
         if (!gained && !done) {
           // Nothing to be gained by the simple Hessian, perhaps by the projected one.
           if (iteration <= p.gauss_newton) {
