@@ -57,7 +57,8 @@ public:
   /// Rotation of a vertex's frame, the identity by default. A vertex with an axis that cannot move
   /// has no other.
   virtual Block3 frame(std::uint32_t /*vertex*/) const { return {1, 0, 0, 0, 1, 0, 0, 0, 1}; }
-  /// Bodies with the same number (but 0), see base/unique_number.h, have the same compliance() of the same vertices.
+  /// Bodies with the same number (but 0), see base/unique_number.h, have the same compliance() of
+  /// the same vertices.
   virtual std::uint64_t matrix_id() const { return 0; }
   /// Moves to x_free + A^-1 S^T f, less `share` of `step`. \param forces  f by ascending vertex
   virtual void move(double share, std::span<const VertexForce> forces) = 0;
@@ -75,6 +76,9 @@ public:
   /// A force that is typical for the contacts of this body, 1e-6 N, or 0: unknown. It scales the
   /// barrier; an error of a factor 1000 changes no result noticeably.
   virtual double typical_force() const = 0;
+  /// Force with which it resists a displacement of a vertex, roughly, 1e-6 N/mm, or 0: unknown. It
+  /// scales the barrier, too.
+  virtual double vertex_stiffness() const { return 0; }
 };
 
 } // namespace gewebe::contact

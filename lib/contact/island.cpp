@@ -65,7 +65,7 @@ ModelSurface model_surface(const Model& model) {
   return all;
 }
 
-double typical_contact_force(const Model& model) {
+TypicalContact typical_contact(const Model& model) {
   double edges = 0;
   std::size_t count = 0;
   for (const Triangle& t : model.triangles)
@@ -74,7 +74,7 @@ double typical_contact_force(const Model& model) {
       ++count;
     }
   if (count == 0)
-    return 0;
+    return {};
   const double edge = edges / static_cast<double>(count);
   double stiffness = HUGE_VAL; // of a piece of the size of an edge
   if (!model.tetrahedra.empty())
@@ -82,7 +82,9 @@ double typical_contact_force(const Model& model) {
       stiffness = m.young > 0 ? std::min(stiffness, m.young * edge) : stiffness;
   for (const Spring& spring : model.springs)
     stiffness = spring.stiffness > 0 ? std::min(stiffness, spring.stiffness) : stiffness;
-  return std::isfinite(stiffness) ? typical_strain * stiffness * edge : 0;
+  if (!std::isfinite(stiffness))
+    return {};
+  return {stiffness, typical_strain * stiffness * edge};
 }
 
 BodySurface instrument_surface(const InstrumentShape& shape) {
@@ -147,9 +149,8 @@ IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
   island.edge = median_edge(all);
   if (!(island.edge > 0))
     island.edge = std::isfinite(smallest_radius) ? smallest_radius : 1;
-  island.activation_distance =
-      std::min(parameters_.activation_distance * island.edge,
-               parameters_.activation_over_radius * smallest_radius);
+  island.activation_distance = std::min(parameters_.activation_distance * island.edge,
+                                        parameters_.activation_over_radius * smallest_radius);
   for (double& radius : all.radius)
     if (radius > 0)
       radius -= radius_offset * island.activation_distance;

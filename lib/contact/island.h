@@ -10,9 +10,9 @@
 #include "contact/step.h"
 #include "model/model.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -30,7 +30,7 @@ struct BodySurface {
   /// By vertex: which of the surface's pieces it is of, for who may meet; empty: all of the first.
   std::vector<std::uint32_t> piece;
   std::uint32_t pieces = 1;
-  double radius = 0;                               ///< the surface lies so far outside, mm
+  double radius = 0; ///< the surface lies so far outside, mm
 };
 
 /// Surface of a model: its triangles, with nodes of the model as vertices.
@@ -39,9 +39,12 @@ struct ModelSurface {
   std::vector<std::uint32_t> node; ///< by vertex, ascending
 };
 ModelSurface model_surface(const Model& model);
-/// A force that is typical for contacts of a solid or a net, 1e-6 N: it strains a piece of the size
-/// of an edge by a hundredth. 0 without material, springs or triangles.
-double typical_contact_force(const Model& model);
+/// What is typical for contacts of a solid or a net; 0 without material, springs or triangles.
+struct TypicalContact {
+  double stiffness = 0; ///< of a piece of the size of an edge, 1e-6 N/mm
+  double force = 0;     ///< strains such a piece by a hundredth, 1e-6 N
+};
+TypicalContact typical_contact(const Model& model);
 /// A point, an edge or the triangles of a convex core, at its own pose. \pre no blade
 BodySurface instrument_surface(const InstrumentShape& shape);
 
@@ -93,8 +96,7 @@ public:
 private:
   using Members = std::span<IslandMember* const>;
   void step(Members members, double from, double to, const Context& context);
-  void advance_parts(Members members, double from, double to, int halvings,
-                     const Context& context);
+  void advance_parts(Members members, double from, double to, int halvings, const Context& context);
 
   Parameters parameters_;
   std::unique_ptr<Island> island_;

@@ -51,9 +51,9 @@ class StepSolver::Work {
 public:
   Work(const Island& island, collision::BroadPhase& broad_phase, InverseCache& inverses,
        const StepOptions& options, const Context& context)
-      : island_(island), broad_phase_(broad_phase), inverses_(inverses), options_(options), context_(context),
-        count_(island.table.vertex_count()), begin_(count_), at_(count_), way_(count_),
-        trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
+      : island_(island), broad_phase_(broad_phase), inverses_(inverses), options_(options),
+        context_(context), count_(island.table.vertex_count()), begin_(count_), at_(count_),
+        way_(count_), trial_(count_), gradient_(count_), d_hat_(island.activation_distance),
         stick_(options.h > 0 ? options.parameters.stick_speed * options.h
                              : options.parameters.stick_length * island.edge),
         margin_(options.parameters.margin * island.edge) {
@@ -115,12 +115,12 @@ private:
   double d_hat_, stick_, margin_;
   double kappa_ = 0, typical_force_ = 0;
   double barrier_force_ = 0; ///< force at half of d_hat
-  double last_step_ = 0; ///< length of the last full step of Newton's method; else infinite
-  bool rough_ = false; ///< some pairs have friction
+  double last_step_ = 0;     ///< length of the last full step of Newton's method; else infinite
+  bool rough_ = false;       ///< some pairs have friction
   collision::Candidates candidates_;
-  std::vector<std::uint32_t> vertices_; ///< of candidates, and those with forces
+  std::vector<std::uint32_t> vertices_;         ///< of candidates, and those with forces
   std::vector<std::vector<VertexForce>> force_; ///< by body
-  std::vector<Vec3> swept_from_, swept_; ///< what the candidates are of
+  std::vector<Vec3> swept_from_, swept_;        ///< what the candidates are of
   ContactPairs pairs_;
   std::vector<FrictionPair> friction_;
   std::vector<std::array<Vec3, 4>> pair_forces_;
@@ -143,9 +143,8 @@ double StepSolver::Work::longest_way() const {
 }
 
 /// Scales the barrier by a typical contact force: that of the bodies, a part of the largest of the
-/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops them
-/// within the step.
-/// \param energy  R^T A R of the ways R
+/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops
+/// them within the step. \param energy  R^T A R of the ways R
 void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
   const Parameters& p = options_.parameters;
   double force = std::numeric_limits<double>::infinity();
@@ -157,8 +156,15 @@ void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
   for (const std::vector<VertexForce>& of : force_)
     for (const VertexForce& f : of)
       force = std::max(force, p.last_share * norm(f.force));
+  double stiffness = std::numeric_limits<double>::infinity();
+  for (const ContactBody* const body : island_.table.bodies)
+    if (const double own = body->vertex_stiffness(); own > 0)
+      stiffness = std::min(stiffness, own);
+  if (!std::isfinite(stiffness))
+    stiffness = 0;
+  force = std::max(force, d_hat_ * stiffness);
   if (const double longest = longest_way(); longest > 0) {
-    const double stop = p.stop_share * energy / longest;
+    const double stop = p.stop_share * std::max(energy / longest, stiffness * longest);
     if (stop > force && collision::collision_free_step(island_.surface, candidates_, at_, to,
                                                        {0, p.kept_gap, d_hat_, 1000}) < 1)
       force = stop;
@@ -235,8 +241,8 @@ void StepSolver::Work::lag() {
   ++report_.lags;
 }
 
-/// Takes a new lag where that changes forces by more than the tolerance, and tells whether it did: the
-/// forces that balance are those of the lag that stays.
+/// Takes a new lag where that changes forces by more than the tolerance, and tells whether it did:
+/// the forces that balance are those of the lag that stays.
 bool StepSolver::Work::lag_changes() {
   if (!rough_)
     return false;
@@ -299,8 +305,8 @@ StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system
   return result;
 }
 
-/// Corrects a step of which collision detection allows but a part: at its end pairs are to be as far
-/// apart as its linear model has it.
+/// Corrects a step of which collision detection allows but a part: at its end pairs are to be as
+/// far apart as its linear model has it.
 StepSolver::Work::Step StepSolver::Work::correct_step(CondensedSystem& system, const Step& step) {
   Step now = step;
   correction_.assign(count_, {});
@@ -448,14 +454,16 @@ StepReport StepSolver::Work::run() {
           lag();
       }
       energy = way_energy + typical_force_ * longest;
-      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_, context_.cpu);
+      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_,
+                             context_.cpu);
       bool converged = vertices_.empty();
       last_step_ = std::numeric_limits<double>::infinity();
       int iteration = 0, way_iterations = 0, lags = 0;
       if (vertices_.empty())
         system.advance(1);
       while (!converged) {
-        if (iteration - way_iterations >= p.max_iterations || way_iterations >= p.max_way_iterations)
+        if (iteration - way_iterations >= p.max_iterations ||
+            way_iterations >= p.max_way_iterations)
           throw NotSolved("contact: Newton's method did not converge in " +
                           std::to_string(iteration) + " iterations");
         bool done = false;

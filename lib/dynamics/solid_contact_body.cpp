@@ -11,12 +11,17 @@ namespace gewebe {
 
 using contact::Block3, contact::VertexForce;
 
-void SolidContactBody::begin(double h, std::vector<VertexForce> last, double typical_force,
-                             const Context& context) {
+void SolidContactBody::begin(double h, std::vector<VertexForce> last,
+                             const contact::TypicalContact& typical, const Context& context) {
   h_ = h;
   context_ = context;
   last_ = std::move(last);
-  typical_force_ = typical_force;
+  typical_force_ = typical.force;
+  double lightest = 0;
+  for (const std::uint32_t node : vertices_)
+    if (const double mass = motion_.masses()[node]; mass > 0)
+      lightest = lightest > 0 ? std::min(lightest, mass) : mass;
+  stiffness_ = typical.stiffness + lightest / (h * h);
   forces_.assign(axes_, 0);
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/context.h"
 #include "contact/contact_body.h"
+#include "contact/island.h"
 #include "solid/solid_motion.h"
 
 #include <cstddef>
@@ -22,9 +23,9 @@ public:
       : motion_(motion), vertices_(vertices), axes_(3 * nodes) {}
 
   /// A step begins. \pre SolidMotion::begin_step \param last  forces at the end of the last step
-  /// \param typical_force  see ContactBody
-  void begin(double h, std::vector<contact::VertexForce> last, double typical_force,
-             const Context& context);
+  /// \param typical  force, and stiffness without inertia, see ContactBody
+  void begin(double h, std::vector<contact::VertexForce> last,
+             const contact::TypicalContact& typical, const Context& context);
   /// The step's contact forces over the 3 n axes.
   std::span<const double> forces() const { return forces_; }
 
@@ -42,6 +43,7 @@ public:
   bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }
+  double vertex_stiffness() const override { return stiffness_; }
 
 private:
   void spread(std::span<const contact::VertexForce> forces);
@@ -50,7 +52,7 @@ private:
   const std::vector<std::uint32_t>& vertices_;
   std::size_t axes_;
   Context context_;
-  double h_ = 0, typical_force_ = 0;
+  double h_ = 0, typical_force_ = 0, stiffness_ = 0;
   std::vector<contact::VertexForce> last_;
   std::vector<double> step_, forces_;
   std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n

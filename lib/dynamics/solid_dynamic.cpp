@@ -325,9 +325,8 @@ void SolidDynamic::settle(std::span<const double> before, double to, double room
       moved = larger(moved, by);
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
-  const bool quiet =
-      moved <= std::max({rest_tolerance * largest, rest_rounding * size_, room}) &&
-      !moving.recovering() && !(state_.load->changes_until() > to);
+  const bool quiet = moved <= std::max({rest_tolerance * largest, rest_rounding * size_, room}) &&
+                     !moving.recovering() && !(state_.load->changes_until() > to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
     return;
@@ -372,8 +371,8 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
   from_ = from;
   to_ = to;
   if (!body_)
-    body_ = std::make_unique<SolidContactBody>(moving, collision_surface().node,
-                                               model_.nodes.size());
+    body_ =
+        std::make_unique<SolidContactBody>(moving, collision_surface().node, model_.nodes.size());
   std::vector<double> target = begin_step(from, to);
   if (all_held_) {
     std::vector<Vec3> before, behind;
@@ -389,7 +388,9 @@ contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
   if (!target.empty())
     moving.move_held(target);
   moving.begin_step(h, context);
-  body_->begin(h, state_.contact, typical_force(h), context);
+  contact::TypicalContact typical = contact::typical_contact(model_);
+  typical.force = typical_force(h, typical.force);
+  body_->begin(h, state_.contact, typical, context);
   return *body_;
 }
 
@@ -426,9 +427,9 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
   state_.time = to_;
 }
 
-/// An eighth of the load of a body, or of the force that would stop a free one in a step; else what
-/// strains a piece of the size of an edge by a hundredth.
-double SolidDynamic::typical_force(double h) const {
+/// An eighth of the load of a body, or of the force that would stop a free one in a step; else
+/// `strained`.
+double SolidDynamic::typical_force(double h, double strained) const {
   if (all_held_)
     return 0;
   Vec3 load, momentum;
@@ -441,7 +442,7 @@ double SolidDynamic::typical_force(double h) const {
   const bool free = std::ranges::none_of(held_, [](std::uint8_t held) { return held != 0; });
   if (free && norm(momentum) > 0)
     return norm(momentum) / (8 * h);
-  return contact::typical_contact_force(model_);
+  return strained;
 }
 
 void SolidDynamic::clear_contact() {

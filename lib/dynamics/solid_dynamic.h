@@ -56,8 +56,7 @@ public:
 
   bool has_contact_steps() const override { return true; }
   const contact::ModelSurface& collision_surface() override;
-  contact::ContactBody& begin_contact_step(double from, double to,
-                                           const Context& context) override;
+  contact::ContactBody& begin_contact_step(double from, double to, const Context& context) override;
   void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
                         const Context& context) override;
   void clear_contact() override;
@@ -86,7 +85,7 @@ private:
   SolidMotion& engine(const Context& context);
   std::vector<double> forces_at(double time) const;
   Vec3 held_at(std::uint32_t node, double time) const;
-  double typical_force(double h) const;
+  double typical_force(double h, double strained) const;
   void step(double h, double from, double to, const Context& context);
   std::vector<double> begin_step(double from, double to);
   void hold_all(std::span<const double> target, double h, const Context& context);
@@ -108,13 +107,13 @@ private:
   std::vector<PressedCorner> pressed_;
 
   std::optional<SolidMotion> engine_;
-  double last_step_ = 0;                  ///< of the engine
+  double last_step_ = 0; ///< of the engine
   std::optional<contact::ModelSurface> surface_;
-  std::unique_ptr<SolidContactBody> body_; ///< of the engine
+  std::unique_ptr<SolidContactBody> body_;       ///< of the engine
   std::unique_ptr<contact::HeldBody> held_body_; ///< where all nodes are held
-  std::vector<double> load_;               ///< forces of the step, 3 n
-  std::vector<double> target_;             ///< displacements at its end where all nodes are held
-  double from_ = 0, to_ = 0;               ///< of the step with contact that was begun
+  std::vector<double> load_;                     ///< forces of the step, 3 n
+  std::vector<double> target_; ///< displacements at its end where all nodes are held
+  double from_ = 0, to_ = 0;   ///< of the step with contact that was begun
   SolidStepCounts counts_;
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false;

@@ -21,7 +21,7 @@ constexpr double shape_room = 0.1;
 } // namespace
 
 StaticContactBody::StaticContactBody(StaticContactState state)
-    : state_(std::move(state)), typical_force_(contact::typical_contact_force(*state_.model)),
+    : state_(std::move(state)), typical_(contact::typical_contact(*state_.model)),
       displacement_(state_.displacement.begin(), state_.displacement.end()) {}
 
 void StaticContactBody::positions(std::span<Vec3> x) {
@@ -57,7 +57,7 @@ double StaticContactBody::linearise(std::span<const VertexForce> forces, std::sp
   }
   for (std::size_t k = 0; k < step.size(); ++k)
     step[k] = vector_at(std::span<const double>(step_), (*state_.vertices)[k]);
-  return typical_force_ * most;
+  return typical_.force * most;
 }
 
 void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
@@ -71,8 +71,7 @@ void StaticContactBody::compliance(std::uint32_t vertex, std::span<const std::ui
   std::vector<std::uint32_t> nodes;
   std::vector<std::size_t> place;
   for (std::size_t k = 0; k < rows.size(); ++k)
-    if (const std::uint32_t row = (*state_.vertices)[rows[k]];
-        !load().displacement.contains(row)) {
+    if (const std::uint32_t row = (*state_.vertices)[rows[k]]; !load().displacement.contains(row)) {
       nodes.push_back(row);
       place.push_back(k);
     }
@@ -184,8 +183,8 @@ void WarpedContactBody::blocks_of(std::uint32_t node, std::span<const std::uint3
     compliance_ = solver.compliance_at(touched_);
   }
   const std::size_t order = 3 * touched_.size();
-  const auto at = static_cast<std::size_t>(std::ranges::lower_bound(touched_, node) -
-                                           touched_.begin());
+  const auto at =
+      static_cast<std::size_t>(std::ranges::lower_bound(touched_, node) - touched_.begin());
   for (std::size_t k = 0; k < blocks.size(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j)

@@ -3,6 +3,7 @@
 // alone, W the compliance C between vertices.
 
 #include "contact/contact_body.h"
+#include "contact/island.h"
 #include "contact/load.h"
 #include "model/model.h"
 #include "statics/elastostatic.h"
@@ -40,7 +41,8 @@ public:
                   std::span<contact::Block3> blocks) override;
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool keep_momentum(double room) override;
-  double typical_force() const override { return typical_force_; }
+  double typical_force() const override { return typical_.force; }
+  double vertex_stiffness() const override { return typical_.stiffness; }
 
   /// Displacement of the surface's nodes, and all that acts.
   std::span<const double> displacement() const { return displacement_; }
@@ -61,7 +63,7 @@ private:
   void act(std::span<const contact::VertexForce> forces);
 
   StaticContactState state_;
-  double typical_force_ = 0;
+  contact::TypicalContact typical_;
   Load acting_;
   std::vector<double> displacement_, begin_, step_;
   // Of the quadratic model.
