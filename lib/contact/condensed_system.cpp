@@ -86,23 +86,23 @@ struct CondensedSystem::State {
   std::vector<Block3> frames; ///< by node
   std::vector<Part> parts;
   std::vector<ActiveNode> active;
-  std::vector<Vec3> start;    ///< R0 by place
-  std::vector<Vec3> force;    ///< F by active node
-  std::vector<Vec3> pushed;   ///< W F by node
-  std::vector<Vec3> change;   ///< q by active node
-  std::vector<Vec3> response; ///< W q by node
-  std::vector<Vec3> step;     ///< by place
+  std::vector<Vec3> start;            ///< R0 by place
+  std::vector<Vec3> force;            ///< F by active node
+  std::vector<Vec3> pushed;           ///< W F by node
+  std::vector<Vec3> change;           ///< q by active node
+  std::vector<Vec3> response;         ///< W q by node
+  std::vector<Vec3> step;             ///< by place
   std::array<Direction, 3> direction; ///< at the same share c, by all of it, of a correction
   bool corrected = false;
-  double reach = 1;                   ///< part of c that the step is to take
-  double c = 1, penalty = 0;
+  double reach = 1; ///< part of c that the step is to take
+  double c = 1;
   CpuLevel cpu;
   DenseCholesky cholesky;
   MatrixXd hessian, matrix;
   VectorXd carried; ///< H_af p_f of immovable vertices
   VectorXd p;
-  // Of energy(): quadratic in c, F and q.
-  double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
+  // Of energy(): quadratic in F and q.
+  double ff = 0, fq = 0, qq = 0;
 
   State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
       : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
@@ -131,8 +131,8 @@ struct CondensedSystem::State {
       of_rigid[body] = node;
       node_of.push_back(node);
       Part& part = parts[body];
-      nodes.push_back({body, vertex - table.first[body],
-                       static_cast<std::uint32_t>(part.nodes.size()), none});
+      nodes.push_back(
+          {body, vertex - table.first[body], static_cast<std::uint32_t>(part.nodes.size()), none});
       part.nodes.push_back(node);
       part.rows.push_back(vertex - table.first[body]);
     }
@@ -324,11 +324,10 @@ struct CondensedSystem::State {
 
 CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                                  std::span<const Vec3> start,
-                                 std::span<const std::vector<VertexForce>> forces, double energy,
-                                 double ridge, InverseCache& cache, CpuLevel cpu)
+                                 std::span<const std::vector<VertexForce>> forces, double ridge,
+                                 InverseCache& cache, CpuLevel cpu)
     : state_(std::make_unique<State>(table, ridge, cache, cpu)) {
   State& s = *state_;
-  s.penalty = energy;
   s.vertices = std::move(vertices);
   s.make_nodes();
   for (const std::uint32_t vertex : s.vertices)
@@ -367,8 +366,8 @@ void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
     n.active = static_cast<std::uint32_t>(s.active.size());
     s.active.push_back({node, {-1, -1, -1}});
     Part& part = s.parts[n.body];
-    const auto place = std::ranges::lower_bound(
-        part.active, node, {}, [&](std::uint32_t k) { return s.active[k].node; });
+    const auto place = std::ranges::lower_bound(part.active, node, {},
+                                                [&](std::uint32_t k) { return s.active[k].node; });
     const auto column = part.columns.begin() + (place - part.active.begin());
     std::vector<Block3> blocks(part.rows.size());
     s.table.bodies[n.body]->compliance(n.vertex, part.rows, blocks);
@@ -483,15 +482,12 @@ void CondensedSystem::choose_reach(double reach) {
     const std::uint32_t node = s.node_of[place];
     s.step[place] = -s.reach * s.c * s.start[place] - s.pushed[node] - s.response[node];
   }
-  s.ff = s.fq = s.qq = s.rf = s.rq = 0;
+  s.ff = s.fq = s.qq = 0;
   for (std::size_t k = 0; k < s.active.size(); ++k) {
     const std::uint32_t node = s.active[k].node;
-    const Vec3 r0 = s.start_of(node);
     s.ff += dot(s.force[k], s.pushed[node]);
     s.fq += dot(s.force[k], s.response[node]);
     s.qq += dot(s.change[k], s.response[node]);
-    s.rf += dot(r0, s.force[k]);
-    s.rq += dot(r0, s.change[k]);
   }
 }
 
@@ -501,26 +497,12 @@ const Vec3& CondensedSystem::step(std::size_t place) const {
 
 double CondensedSystem::energy(double part) const {
   const State& s = *state_;
-  const double stay = 1 - part, c = (1 - part * s.reach) * s.c;
-  return 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq) +
-         c * (stay * s.rf - part * s.rq) + 0.5 * s.penalty * c * c;
+  const double stay = 1 - part;
+  return 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq);
 }
 
 double CondensedSystem::slope() const {
-  const State& s = *state_;
-  return -s.ff - s.fq - s.c * ((1 + s.reach) * s.rf + s.rq) - s.penalty * s.reach * s.c * s.c;
-}
-
-void CondensedSystem::require_descent(double contact_slope) {
-  State& s = *state_;
-  // Newton's decrement that the step would have without the carried share.
-  const double descent = s.p.dot(s.hessian * s.p) + s.qq, total = slope() + contact_slope;
-  if (s.c > 0 && !(total <= -0.5 * descent))
-    s.penalty += (total + descent) / (s.reach * s.c * s.c);
-}
-
-void CondensedSystem::raise_penalty() {
-  state_->penalty *= 10;
+  return -state_->ff - state_->fq;
 }
 
 void CondensedSystem::advance(double part) {

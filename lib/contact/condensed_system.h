@@ -9,7 +9,8 @@
 // (Woodbury's identity): the exact full-space step from columns of W of active vertices alone.
 // Along a step r stays c R0 + W F, with the share c of the way that is left (1 at the start, 0
 // after a full step) and forces F, which become the contact forces: -g_a. They start as those of
-// the last step, F_0; R0 is x - x_free - W F_0 at the start. Vertices that cannot move (W = 0) are carried to their targets by c alone.
+// the last step, F_0; R0 is x - x_free - W F_0 at the start. Vertices that cannot move (W = 0) are
+// carried to their targets by c alone.
 
 #include "base/cpu.h"
 #include "base/vec3.h"
@@ -48,10 +49,10 @@ class CondensedSystem {
 public:
   /// \param vertices  that may take part, ascending \param start  R0 of all vertices
   /// \param forces  F_0 by body, on some of these vertices
-  /// \param energy  R0^T A R0 of all bodies \param ridge  see Parameters \pre the bodies are linearised; they outlive this
+  /// \param ridge  see Parameters \pre the bodies are linearised; they outlive this
   CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                   std::span<const Vec3> start, std::span<const std::vector<VertexForce>> forces,
-                  double energy, double ridge, InverseCache& cache, CpuLevel cpu);
+                  double ridge, InverseCache& cache, CpuLevel cpu);
   ~CondensedSystem();
   CondensedSystem(const CondensedSystem&) = delete;
   CondensedSystem& operator=(const CondensedSystem&) = delete;
@@ -74,12 +75,13 @@ public:
   void correct(std::span<const Vec3> forces);
   void drop_correction();
   /// Newton's step that balances the forces behind a part of the way that is left: c becomes
-  /// (1 - reach) c. \pre solved; 0 < reach <= 1
+  /// (1 - reach) c. \pre solved; 0 <= reach <= 1
   void choose_reach(double reach);
   /// Step of a vertex of vertices(), by its place there. \pre solved
   const Vec3& step(std::size_t place) const;
 
-  /// Energy 1/2 r^T A r behind a part of the step, without a constant; and its slope at 0.
+  /// Energy 1/2 s^T A s, s = r - c R0, behind a part of the step; and its slope at 0. \pre c is 0,
+  /// or the reach is
   double energy(double part) const;
   double slope() const;
   /// Takes a part of the step.
@@ -93,10 +95,6 @@ public:
   };
   double largest_force() const; ///< of F
   Residual residual(std::span<const Vec3> gradient) const;
-  /// Weight of 1/2 c^2 in energy(): rises until `slope() + contact_slope` is a descent.
-  void require_descent(double contact_slope);
-  /// Ten times that weight: no part of the step was accepted.
-  void raise_penalty();
   /// Forces F on the vertices of a body.
   std::vector<VertexForce> forces(std::size_t body) const;
 

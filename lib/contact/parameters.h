@@ -25,16 +25,17 @@ struct Parameters {
   /// ... over the largest force of the last step: gaps stay a good part of d_hat.
   double last_share = 0.25;
   /// The barrier becomes stiffer within a step where that share of a force is by the first factor
-  /// larger than the typical force, by at most the second one at a time: deep in the barrier surfaces
-  /// that slide on each other move only by about the root of gap times radius.
+  /// larger than the typical force, by at most the second one at a time: deep in the barrier
+  /// surfaces that slide on each other move only by about the root of gap times radius.
   double soft_factor = 4, stiffness_factor = 10;
 
   // ---- iterations
-  int max_iterations = 100; ///< Newton iterations of one round behind the whole way, then the step fails
+  int max_iterations =
+      100; ///< Newton iterations of one round behind the whole way, then the step fails
   /// ... on the way: past curved surfaces each goes but about the root of gap times radius.
   int max_way_iterations = 1000;
-  int max_rounds = 40;      ///< linearisations of bodies that are not linear
-  int gauss_newton = 12;    ///< iterations before the projected Hessian takes over
+  int max_rounds = 40;   ///< linearisations of bodies that are not linear
+  int gauss_newton = 12; ///< iterations before the projected Hessian takes over
   /// A step of which collision detection allows less than this part is taken again by a smaller
   /// part of the way, at most so many times and not below the least part.
   double full_reach = 0.5, least_reach = 1e-4;
@@ -42,18 +43,22 @@ struct Parameters {
   /// Longest step over an edge, by which less of the way is taken.
   double longest_step = 0.25;
   int max_corrections = 2; ///< second-order corrections of a step
-  int lag_interval = 3;     ///< iterations between two renewals of normal forces for friction
-  int max_lags = 30;        ///< renewals in one round
-  int max_searches = 5;     ///< broad phases of one step, each with twice the margin
+  int max_lags = 30;       ///< renewals in one round
+  int max_searches = 5;    ///< broad phases of one step, each with twice the margin
 
   // ---- tolerances
   /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
   double step_tolerance = 1e-2;
-  /// Largest difference of a force on a vertex from those of its pairs, over the largest force. Deep
-  /// in the barrier steps are short long before forces balance.
+  /// Largest difference of a force on a vertex from those of its pairs, over the largest force.
+  /// Deep in the barrier steps are short long before forces balance.
   double force_tolerance = 1e-3;
   /// Largest change of a friction force by its last lag, over the largest pair force.
   double friction_tolerance = 1e-3;
+  /// The same, where bodies still are on their ways: what suffices for the next part of them.
+  double way_tolerance = 0.2;
+  /// The same, behind which friction takes the normal forces of its limits anew: those that do not
+  /// balance mislead it.
+  double lag_tolerance = 5e-3;
   /// Largest last change of a round, over d_hat.
   double round_tolerance = 0.5;
   /// Part of the smallest gap (at most of d_hat) by which bodies may be translated at the end, so

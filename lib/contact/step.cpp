@@ -18,8 +18,6 @@ namespace {
 constexpr double barrier_at_half = 4.33;
 constexpr double armijo = 1e-4;
 constexpr int max_halvings = 40;
-/// Halvings of a step behind which the way of prescribed vertices gets more weight.
-constexpr int halvings_until_raised = 4;
 /// Decrement below which an energy cannot be told from rounding.
 constexpr double rounding = 1e-13;
 
@@ -93,6 +91,9 @@ private:
   };
   Step take_step(const CondensedSystem& system);
   Step correct_step(CondensedSystem& system, const Step& step);
+  bool follow_way(CondensedSystem& system, bool balanced);
+  void take(CondensedSystem& system, const Step& step, double part);
+  bool lower_energy(CondensedSystem& system, double contact);
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
   bool move_bodies(const CondensedSystem& system);
   bool covered(std::span<const Vec3> x, double room) const;
@@ -323,82 +324,102 @@ StepSolver::Work::Step StepSolver::Work::correct_step(CondensedSystem& system, c
   return now;
 }
 
+/// Takes a part of the way that is left, with the forces of the linear forecast behind it. \return
+/// whether it did; else forces must balance first
+bool StepSolver::Work::follow_way(CondensedSystem& system, bool balanced) {
+  const Parameters& p = options_.parameters;
+  double reach = 1;
+  Step step = take_step(system);
+  if (const double most = p.longest_step * island_.edge;
+      !pairs_.pairs.empty() && step.length > most) {
+    reach = std::max(most / step.length, p.least_reach);
+    system.choose_reach(reach);
+    step = take_step(system);
+  }
+  for (int k = 0; k < p.max_reaches && !pairs_.pairs.empty() && step.free < p.full_reach; ++k) {
+    if (!balanced)
+      return false;
+    reach = std::max(reach * step.free, p.least_reach);
+    system.choose_reach(reach);
+    step = take_step(system);
+  }
+  take(system, step, step.free);
+  return true;
+}
+
+/// Takes a part of the step that ends at trial_.
+void StepSolver::Work::take(CondensedSystem& system, const Step& step, double part) {
+  for (const std::uint32_t v : system.vertices())
+    at_[v] = part < 1 ? at_[v] + part * (trial_[v] - at_[v]) : trial_[v];
+  system.advance(part);
+  report_.cuts += step.free < 1 ? 1 : 0;
+  if (part == 1) {
+    if (system.share() == 0)
+      last_step_ = step.length;
+    raise_stiffness(system.largest_force());
+  }
+}
+
+/// Lowers the energy with the way that is left as it is. \param contact  energy of contact here
+/// \return whether anything was gained
+bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
+  system.choose_reach(0);
+  Step step = take_step(system);
+  if (step.free < options_.parameters.full_reach)
+    step = correct_step(system, step);
+  const double slope = system.slope() + step.slope, here = system.energy(0) + contact;
+  const double unsure = rounding * (std::abs(here) + std::abs(contact));
+  const std::vector<Vec3> target = trial_;
+  double part = step.free;
+  for (int k = 0; k < max_halvings; ++k, part /= 2) {
+    for (const std::uint32_t v : system.vertices())
+      trial_[v] = part < 1 ? at_[v] + part * (target[v] - at_[v]) : target[v];
+    if (system.energy(part) + energy_at(trial_) <=
+        here + armijo * part * std::min(slope, 0.0) + unsure) {
+      trial_ = target;
+      take(system, step, part);
+      return true;
+    }
+  }
+  if (!(step.length <= step_limit()) || step.free < 1)
+    return false;
+  // The energy cannot be told from rounding; forces can.
+  trial_ = target;
+  take(system, step, 1);
+  return true;
+}
+
 /// One iteration of Newton's method. \return whether anything was gained
 bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& converged) {
   const Parameters& p = options_.parameters;
   std::ranges::fill(gradient_, Vec3{});
   find_pairs(at_);
-  const double before = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
-                        add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
-  if (last_step_ <= step_limit()) {
-    const auto [difference, largest] = system.residual(gradient_);
-    if (difference <= p.force_tolerance * std::max(largest, typical_force_)) {
-      converged = true;
-      return true;
-    }
+  double contact = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
+                   add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
+  const auto [difference, largest] = system.residual(gradient_);
+  const double scale = std::max(largest, typical_force_);
+  converged = last_step_ <= step_limit() && difference <= p.force_tolerance * scale;
+  if (converged)
+    return true;
+  const bool balanced = difference <= p.way_tolerance * scale;
+  if (difference <= p.lag_tolerance * scale && rough_ && iteration > 0) {
+    // Normal forces that do not balance are none to hold anything by friction.
+    lag();
+    std::ranges::fill(gradient_, Vec3{});
+    contact = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
+              add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
   }
-  const bool was_full = std::isfinite(last_step_);
+  const bool near = last_step_ <= d_hat_;
   last_step_ = std::numeric_limits<double>::infinity();
-  const bool simple = iteration < p.gauss_newton && !was_full;
-  if (!solve_system(system, simple ? HessianMode::gauss_newton : HessianMode::exact) &&
+  // The exact Hessian converges fastest from near by; from afar it may be all but singular.
+  const HessianMode from_afar =
+      iteration < p.gauss_newton ? HessianMode::gauss_newton : HessianMode::projected;
+  if (!(near && solve_system(system, HessianMode::exact)) && !solve_system(system, from_afar) &&
       !solve_system(system, HessianMode::projected))
     throw NotSolved("contact: Newton's system is not positive definite");
-  converged = false;
-  Step step = take_step(system);
-  double reach = 1;
-  if (const double most = p.longest_step * island_.edge;
-      system.share() > 0 && !pairs_.pairs.empty() && step.length > most) {
-    reach = std::max(most / step.length, p.least_reach);
-    system.choose_reach(reach);
-    step = take_step(system);
-  }
-  if (step.free < p.full_reach)
-    step = correct_step(system, step);
-  if (system.share() > 0 && !pairs_.pairs.empty() && step.free < p.full_reach) {
-    // Less of the way, so that forces balance along it.
-    for (int k = 0; k < p.max_reaches && step.free < p.full_reach; ++k) {
-      reach = std::max(reach * step.free, p.least_reach);
-      system.choose_reach(reach);
-      step = correct_step(system, take_step(system));
-    }
-  }
-  const double length = step.length, contact_slope = step.slope, free = step.free;
-  system.require_descent(contact_slope);
-  double slope = system.slope() + contact_slope;
-  const std::vector<Vec3> target = trial_;
-  double part = free;
-  report_.cuts += free < 1 ? 1 : 0;
-  double here = system.energy(0) + before;
-  const std::span<const std::uint32_t> vertices = system.vertices();
-  for (int k = 0; k < max_halvings; ++k, part /= 2) {
-    if (k > 0 && k % halvings_until_raised == 0 && system.share() > 0) {
-      // Surfaces that only now come into contact have no slope yet.
-      system.raise_penalty();
-      slope = system.slope() + contact_slope;
-      here = system.energy(0) + before;
-      part = free;
-    }
-    for (const std::uint32_t v : vertices)
-      trial_[v] = part < 1 ? at_[v] + part * (target[v] - at_[v]) : target[v];
-    const double there = system.energy(part) + energy_at(trial_);
-    const double unsure = rounding * (std::abs(here) + std::abs(before));
-    if (there <= here + armijo * part * std::min(slope, 0.0) + unsure) {
-      system.advance(part);
-      at_.swap(trial_);
-      if (part == 1 && system.share() == 0)
-        last_step_ = length;
-      if (part == 1)
-        raise_stiffness(system.largest_force());
-      return true;
-    }
-  }
-  if (!(length <= step_limit()) || free < 1 || system.share() > 0)
-    return false;
-  // The energy cannot be told from rounding; forces can.
-  system.advance(1);
-  at_ = target;
-  last_step_ = length;
-  return true;
+  if (system.share() > 0 && (balanced || iteration == 0) && follow_way(system, balanced))
+    return true;
+  return lower_energy(system, contact);
 }
 
 /// Moves all bodies under the forces found. \return whether their momenta are right
@@ -439,22 +460,18 @@ StepReport StepSolver::Work::run() {
       to[v] = at_[v] + way_[v];
       start[v] = -way_[v];
     }
-    // Work of a typical force on the way: what prescribed vertices may cost at first.
-    const double longest = longest_way();
-    const double way_energy = energy;
     round_begin = at_;
     bool exact = true;
     for (int attempt = 0;; ++attempt) {
       if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
         search(to, d_hat_ + margin);
         if (round == 0 && attempt == 0)
-          set_stiffness(way_energy, to);
+          set_stiffness(energy, to);
         find_pairs(at_);
         if (round == 0 && attempt == 0)
           lag();
       }
-      energy = way_energy + typical_force_ * longest;
-      CondensedSystem system(table, vertices_, start, round_force, energy, p.ridge, inverses_,
+      CondensedSystem system(table, vertices_, start, round_force, p.ridge, inverses_,
                              context_.cpu);
       bool converged = vertices_.empty();
       last_step_ = std::numeric_limits<double>::infinity();
@@ -482,9 +499,6 @@ StepReport StepSolver::Work::run() {
         if (done) {
           converged = lags >= p.max_lags || !lag_changes();
           ++lags;
-        } else if (rough_ && iteration % p.lag_interval == 0 && lags < p.max_lags) {
-          find_pairs(at_);
-          lag();
         }
       }
       report_.iterations += static_cast<std::uint64_t>(iteration);
