@@ -22,6 +22,9 @@ namespace {
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 /// In contact: of the shortest edge, for contact is not solved to rounding.
 constexpr double rest_in_contact = 1e-6;
+/// Length of a step, s, below which that is a speed: what begins to fall goes less than this far in a
+/// very short step.
+constexpr double rest_step = 1e-3;
 constexpr int quiet_steps = 2;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
@@ -422,7 +425,8 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
     take_over();
     return;
   }
-  settle(before, to_, forces.empty() ? 0 : rest_in_contact * size_, context);
+  const double room = rest_in_contact * size_ * std::min(1.0, (to_ - from_) / rest_step);
+  settle(before, to_, forces.empty() ? 0 : room, context);
   take_over();
   state_.time = to_;
 }
