@@ -151,9 +151,12 @@ std::vector<IslandParts> islands_of(World& w, const Graph& graph, std::span<cons
   return islands;
 }
 
+bool rests(const std::shared_ptr<Body>& body) {
+  return body->moving->resting() && !body->changed;
+}
+
 /// Whether nothing of an island moves, or is about to.
 bool sleeps(const World& w, const IslandParts& island, double to) {
-  const auto rests = [](const auto& body) { return body->moving->resting() && !body->changed; };
   const auto stands = [&](std::size_t k) {
     const Instrument& i = w.now.instruments[k];
     if (i.changed)
@@ -173,6 +176,16 @@ bool sleeps(const World& w, const IslandParts& island, double to) {
   return std::ranges::all_of(island.bodies, rests) &&
          std::ranges::all_of(island.instruments, stands) &&
          std::ranges::all_of(island.statics, stays);
+}
+
+/// Whether an island has come to rest at `time` of its step to `to`.
+bool has_come_to_rest(const World& w, const IslandParts& island, double time, double to) {
+  const auto stands = [&](std::size_t k) {
+    const Instrument& i = w.now.instruments[k];
+    return !i.coupled && i.way.at(time) == i.way.at(to);
+  };
+  return island.statics.empty() && std::ranges::all_of(island.bodies, rests) &&
+         std::ranges::all_of(island.instruments, stands);
 }
 
 /// Contact forces of an island that sleeps act on.
@@ -241,9 +254,14 @@ void advance_island(World& w, IslandParts& island, double to) {
   const double h = duration / count;
   try {
     clear_jumps(w, island, *cache.motion, members, h);
-    for (double k = 0; k < count; ++k)
-      cache.motion->advance(members.all, start + k * h,
-                            k + 1 == count ? to : start + (k + 1) * h, w.context);
+    for (double k = 0; k < count; ++k) {
+      const double end = k + 1 == count ? to : start + (k + 1) * h;
+      cache.motion->advance(members.all, start + k * h, end, w.context);
+      if (end < to && has_come_to_rest(w, island, end, to)) {
+        sleep_on(w, island, to - end);
+        break;
+      }
+    }
   } catch (const contact::NotSolved& error) {
     count_contact(w, cache.motion->take_report());
     fail_contact(w, island, error);
