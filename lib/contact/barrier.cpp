@@ -268,35 +268,6 @@ void barrier_hessian(const ContactPairs& pairs, std::span<const Vec3> x, double 
     pair_hessian(pairs.pairs[k], x, pairs.d_hat, kappa, mode, blocks[k]);
 }
 
-bool add_curvature_correction(const ContactPairs& pairs, std::span<const Vec3> x,
-                              std::span<const Vec3> y, double kappa, std::span<Vec3> forces) {
-  bool any = false;
-  for (const ContactPair& pair : pairs.pairs) {
-    const Evaluated e = evaluate(pair, x, pairs.d_hat);
-    const double d = std::sqrt(e.closest.squared_distance);
-    const double curvature = 4 * e.closest.squared_distance * e.b.second + 2 * e.b.first;
-    if (!(d > 0) || !(curvature > 0))
-      continue;
-    const Vec3 normal = e.closest.difference / d;
-    std::array<Vec3, 4> copy;
-    const ClosestPoints there =
-        collision::closest_points(pair.feature, positions_of(pair, y, copy));
-    double forecast = d;
-    for (std::size_t k = 0; k < pair.count; ++k)
-      forecast += e.closest.weight[k] * dot(normal, copy[k] - e.copy[k]);
-    const double distance = std::copysign(std::sqrt(there.squared_distance),
-                                          dot(there.difference, e.closest.difference));
-    if (!(forecast > distance))
-      continue;
-    const double m = pair.eps_x > 0 ? collision::edge_edge_mollifier(edges(e.copy), pair.eps_x) : 1;
-    const double force = kappa * pair.weight * m * curvature * (forecast - distance);
-    for (std::size_t k = 0; k < pair.count; ++k)
-      forces[pair.vertex[k]] += force * e.closest.weight[k] * normal;
-    any = true;
-  }
-  return any;
-}
-
 double smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x) {
   double least = infinity;
   for (const ContactPair& pair : pairs.pairs) {

@@ -58,13 +58,6 @@ struct HessianBlock {
 void barrier_hessian(const ContactPairs& pairs, std::span<const Vec3> x, double kappa,
                      HessianMode mode, std::vector<HessianBlock>& blocks);
 
-/// Second-order correction of a step from x to y, which takes a straight way past curved surfaces
-/// (Nocedal & Wright, Numerical Optimization, 2006, section 15.6): forces that, under the
-/// gauss_newton Hessian, make up for what each pair's distance at y is less than its linear forecast.
-/// \param forces  by vertex, added to \return whether there are any
-bool add_curvature_correction(const ContactPairs& pairs, std::span<const Vec3> x,
-                              std::span<const Vec3> y, double kappa, std::span<Vec3> forces);
-
 /// Smallest gap d - d_min of the pairs; +inf without any.
 double smallest_gap(const ContactPairs& pairs, std::span<const Vec3> x);
 

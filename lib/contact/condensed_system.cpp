@@ -92,9 +92,8 @@ struct CondensedSystem::State {
   std::vector<Vec3> change;           ///< q by active node
   std::vector<Vec3> response;         ///< W q by node
   std::vector<Vec3> step;             ///< by place
-  std::array<Direction, 3> direction; ///< at the same share c, by all of it, of a correction
-  bool corrected = false;
-  double reach = 1; ///< part of c that the step is to take
+  std::array<Direction, 2> direction; ///< at the same share c, by all of it
+  double reach = 1;                   ///< part of c that the step is to take
   double c = 1;
   CpuLevel cpu;
   DenseCholesky cholesky;
@@ -418,11 +417,12 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
   }
 }
 
-bool CondensedSystem::solve(std::span<const Vec3> gradient) {
+bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
   State& s = *state_;
   const Index order = s.matrix_order;
   s.matrix = s.hessian;
-  auto& [still, whole, correction] = s.direction;
+  s.matrix.diagonal().array() += damping;
+  auto& [still, whole] = s.direction;
   whole.p = -s.carried;
   for (const Part& part : s.parts) {
     const auto count = static_cast<Index>(part.unknowns.size());
@@ -443,38 +443,18 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient) {
     return false;
   s.finish(still, true, false);
   s.finish(whole, false, true);
-  s.corrected = false;
   choose_reach(1);
   return still.p.allFinite() && whole.p.allFinite();
-}
-
-void CondensedSystem::correct(std::span<const Vec3> forces) {
-  State& s = *state_;
-  Direction& correction = s.direction[2];
-  correction.p = s.condensed(forces);
-  s.finish(correction, false, false);
-  s.corrected = true;
-  choose_reach(s.reach);
-}
-
-void CondensedSystem::drop_correction() {
-  state_->corrected = false;
-  choose_reach(state_->reach);
 }
 
 void CondensedSystem::choose_reach(double reach) {
   State& s = *state_;
   s.reach = s.c > 0 ? reach : 1;
-  const auto& [still, whole, correction] = s.direction;
+  const auto& [still, whole] = s.direction;
   s.p = still.p + s.reach * whole.p;
-  if (s.corrected)
-    s.p += correction.p;
   const auto combine = [&](auto of, std::vector<Vec3>& to) {
-    for (std::size_t k = 0; k < to.size(); ++k) {
+    for (std::size_t k = 0; k < to.size(); ++k)
       to[k] = (still.*of)[k] + s.reach * (whole.*of)[k];
-      if (s.corrected)
-        to[k] += (correction.*of)[k];
-    }
   };
   combine(&Direction::change, s.change);
   combine(&Direction::response, s.response);

@@ -69,11 +69,9 @@ public:
   void add_hessian(std::span<const std::uint32_t> of, std::span<const double> block);
 
   /// Newton's step for the gradient of the contact energy at all vertices, by all of the way.
+  /// \param damping  stiffness against any step of an active vertex, 1e-6 N/mm
   /// \return whether the system was positive definite
-  bool solve(std::span<const Vec3> gradient);
-  /// Adds to the step what the system moves under these forces, by vertex. \pre solved
-  void correct(std::span<const Vec3> forces);
-  void drop_correction();
+  bool solve(std::span<const Vec3> gradient, double damping);
   /// Newton's step that balances the forces behind a part of the way that is left: c becomes
   /// (1 - reach) c. \pre solved; 0 <= reach <= 1
   void choose_reach(double reach);

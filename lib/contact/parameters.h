@@ -27,13 +27,12 @@ struct Parameters {
   /// The barrier becomes stiffer within a step where that share of a force is by the first factor
   /// larger than the typical force, by at most the second one at a time: deep in the barrier
   /// surfaces that slide on each other move only by about the root of gap times radius.
-  double soft_factor = 4, stiffness_factor = 10;
+  double soft_factor = 1.5, stiffness_factor = 10;
 
   // ---- iterations
-  int max_iterations =
-      100; ///< Newton iterations of one round behind the whole way, then the step fails
-  /// ... on the way: past curved surfaces each goes but about the root of gap times radius.
-  int max_way_iterations = 1000;
+  /// Newton iterations of one round, then the step fails. Each goes past curved surfaces by but
+  /// about the root of gap times radius.
+  int max_iterations = 1000;
   int max_rounds = 40;   ///< linearisations of bodies that are not linear
   int gauss_newton = 12; ///< iterations before the projected Hessian takes over
   /// A step of which collision detection allows less than this part is taken again by a smaller
@@ -42,16 +41,19 @@ struct Parameters {
   int max_reaches = 3;
   /// Longest step over an edge, by which less of the way is taken.
   double longest_step = 0.25;
-  int max_corrections = 2; ///< second-order corrections of a step
-  int max_lags = 30;       ///< renewals in one round
-  int max_searches = 5;    ///< broad phases of one step, each with twice the margin
+  /// Steps of which collision detection allows less than full_reach are damped, at most so many
+  /// times, by so many times more each time.
+  int max_dampings = 6;
+  double damping_factor = 6;
+  int max_lags = 30;    ///< renewals in one round
+  int max_searches = 5; ///< broad phases of one step, each with twice the margin
 
   // ---- tolerances
   /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
   double step_tolerance = 1e-2;
   /// Largest difference of a force on a vertex from those of its pairs, over the largest force.
   /// Deep in the barrier steps are short long before forces balance.
-  double force_tolerance = 1e-3;
+  double force_tolerance = 1e-5;
   /// Largest change of a friction force by its last lag, over the largest pair force.
   double friction_tolerance = 1e-3;
   /// The same, where bodies still are on their ways: what suffices for the next part of them.

@@ -18,6 +18,8 @@ namespace {
 constexpr double barrier_at_half = 4.33;
 constexpr double armijo = 1e-4;
 constexpr int max_halvings = 40;
+/// Part of a step below which nothing moves any more.
+constexpr double stuck = 1e-12;
 /// Decrement below which an energy cannot be told from rounding.
 constexpr double rounding = 1e-13;
 
@@ -90,7 +92,6 @@ private:
     double free = 0;   ///< part of it that collision detection allows
   };
   Step take_step(const CondensedSystem& system);
-  Step correct_step(CondensedSystem& system, const Step& step);
   bool follow_way(CondensedSystem& system, bool balanced);
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
@@ -112,7 +113,7 @@ private:
   std::vector<Vec3> begin_; ///< y_n
   std::vector<Vec3> at_;    ///< present positions
   std::vector<Vec3> way_;   ///< x_free - x of the round
-  std::vector<Vec3> trial_, gradient_, correction_, friction_before_;
+  std::vector<Vec3> trial_, gradient_, friction_before_;
   double d_hat_, stick_, margin_;
   double kappa_ = 0, typical_force_ = 0;
   double barrier_force_ = 0; ///< force at half of d_hat
@@ -284,7 +285,7 @@ bool StepSolver::Work::solve_system(CondensedSystem& system, HessianMode mode) {
     for (const HessianBlock& block : *list)
       system.add_hessian(std::span(block.vertex).first(block.count),
                          std::span(block.entry).first(std::size_t{9} * block.count * block.count));
-  return system.solve(gradient_);
+  return system.solve(gradient_, 0);
 }
 
 /// The chosen step of the system; trial_ becomes its end.
@@ -303,25 +304,9 @@ StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system
     throw NotSolved("contact: Newton's step is not finite");
   result.free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
                                                {0, options_.parameters.kept_gap, d_hat_, 1000});
+  if (!(result.free > stuck))
+    throw NotSolved("contact: what is led or fixed stands in the way");
   return result;
-}
-
-/// Corrects a step of which collision detection allows but a part: at its end pairs are to be as
-/// far apart as its linear model has it.
-StepSolver::Work::Step StepSolver::Work::correct_step(CondensedSystem& system, const Step& step) {
-  Step now = step;
-  correction_.assign(count_, {});
-  for (int k = 0; k < options_.parameters.max_corrections && now.free < 1; ++k) {
-    if (!add_curvature_correction(pairs_, at_, trial_, kappa_, correction_))
-      break;
-    system.correct(correction_);
-    now = take_step(system);
-    if (!(now.slope + system.slope() < 0)) {
-      system.drop_correction();
-      return take_step(system);
-    }
-  }
-  return now;
 }
 
 /// Takes a part of the way that is left, with the forces of the linear forecast behind it. \return
@@ -363,10 +348,21 @@ void StepSolver::Work::take(CondensedSystem& system, const Step& step, double pa
 /// Lowers the energy with the way that is left as it is. \param contact  energy of contact here
 /// \return whether anything was gained
 bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
+  const Parameters& p = options_.parameters;
   system.choose_reach(0);
   Step step = take_step(system);
-  if (step.free < options_.parameters.full_reach)
-    step = correct_step(system, step);
+  // What is stiff is restored by a damped step, too; a part of a step would leave it as it is.
+  double damping = 0;
+  for (int k = 0; k < p.max_dampings && step.free < p.full_reach; ++k) {
+    const double size = step.length * step.length;
+    const double softest = size > 0 ? -(system.slope() + step.slope) / size : 0;
+    damping =
+        damping > 0 ? p.damping_factor * damping : softest / std::max(step.free, p.least_reach);
+    if (!(damping > 0) || !system.solve(gradient_, damping))
+      break;
+    system.choose_reach(0);
+    step = take_step(system);
+  }
   const double slope = system.slope() + step.slope, here = system.energy(0) + contact;
   const double unsure = rounding * (std::abs(here) + std::abs(contact));
   const std::vector<Vec3> target = trial_;
@@ -475,19 +471,16 @@ StepReport StepSolver::Work::run() {
                              context_.cpu);
       bool converged = vertices_.empty();
       last_step_ = std::numeric_limits<double>::infinity();
-      int iteration = 0, way_iterations = 0, lags = 0;
+      int iteration = 0, lags = 0;
       if (vertices_.empty())
         system.advance(1);
       while (!converged) {
-        if (iteration - way_iterations >= p.max_iterations ||
-            way_iterations >= p.max_way_iterations)
+        if (iteration >= p.max_iterations)
           throw NotSolved("contact: Newton's method did not converge in " +
                           std::to_string(iteration) + " iterations");
         bool done = false;
         const bool gained = iterate(system, iteration, done);
         ++iteration;
-        if (system.share() > 0)
-          way_iterations = iteration;
         if (!gained && !done) {
           // Nothing to be gained by the simple Hessian, perhaps by the projected one.
           if (iteration <= p.gauss_newton) {
