@@ -45,7 +45,8 @@ public:
   /// \pre complete_surface(surface)
   explicit BroadPhase(const CollisionSurface& surface);
 
-  /// Finds pairs of owners that may meet, without a vertex in common and not fixed as a whole,
+  /// Finds pairs of owners that may meet, without a vertex in common, not fixed as a whole and of
+  /// which none holds the other,
   /// whose distance at x0 exceeds d_min + reach by no more than their relative motion to x1.
   /// \param surface  the one of the constructor
   /// \param reach  mm

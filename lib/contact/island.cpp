@@ -133,6 +133,8 @@ IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
     all.radius.resize(all.rest.size(), own.radius);
     all.fixed.insert(all.fixed.end(), own.fixed.begin(), own.fixed.end());
     all.fixed.resize(all.rest.size(), 0);
+    all.holder.insert(all.holder.end(), own.holder.begin(), own.holder.end());
+    all.holder.resize(all.rest.size(), collision::no_owner);
     if (own.radius > 0)
       smallest_radius = std::min(smallest_radius, own.radius);
   }

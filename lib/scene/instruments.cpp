@@ -105,13 +105,38 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
   return report;
 }
 
+namespace {
+
+/// Lets an instrument come to where it is from outside of what it would be in.
+void enter_from_outside(World& w, Instrument& i) {
+  const double now = w.now.clock.time;
+  const Pose pose = i.way.at(now), start = entry_pose(w, i.shape, pose);
+  if (start == pose)
+    return;
+  const PoseWay way = i.way;
+  i.before = start;
+  i.changed = true;
+  i.present = false;
+  note_poses(w); // it takes no way to there
+  i.present = true;
+  i.way = {start, start, now, now};
+  note_poses(w);
+  i.way = way;
+  note_poses(w);
+}
+
+} // namespace
+
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
-  for (Instrument& i : w.now.instruments)
-    if (!i.grips.empty())
-      std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
-        return grip.object == object &&
-               std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
-      });
+  for (Instrument& i : w.now.instruments) {
+    if (i.grips.empty())
+      continue;
+    const std::size_t dropped = std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
+      return grip.object == object && std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
+    });
+    if (dropped > 0 && i.present)
+      enter_from_outside(w, i); // it pushes what it held
+  }
 }
 
 /// Remembers where the instruments are. Where one jumps behind others that jumped just now, they
@@ -175,12 +200,9 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   i.path.clear();
   i.shape = c.shape;
   const double now = w.now.clock.time;
-  i.before = entry_pose(w, c.shape, c.pose); // from outside of what it appears in
-  if (i.before != c.pose) {
-    i.way = {i.before, i.before, now, now};
-    note_poses(w);
-  }
+  i.before = c.pose;
   i.way = {c.pose, c.pose, now, now};
+  enter_from_outside(w, i);
   note_poses(w);
 }
 void Rule<SetInstrument>::announce(World& w, const SetInstrument& c) {

@@ -228,6 +228,34 @@ std::vector<double> friction_of(World& w, std::span<const std::optional<std::siz
   return all;
 }
 
+/// What instruments of an island grasp, ascending.
+std::vector<HeldNode> held_nodes(const World& w, const IslandParts& parts) {
+  std::vector<HeldNode> all;
+  for (const std::size_t k : parts.instruments)
+    for (const Instrument::Grip& grip : w.now.instruments[k].grips)
+      all.push_back({grip.object, grip.node, k});
+  std::ranges::sort(all);
+  return all;
+}
+
+/// Tells a surface which of its vertices are held. \param offset  of the object's nodes in the surface's model
+/// \param first_instrument  piece of the island's first instrument
+void hold_vertices(std::span<const HeldNode> held, std::size_t object, std::size_t offset,
+                   std::span<const std::size_t> instruments, std::size_t first_instrument,
+                   contact::ModelSurface& model) {
+  for (const HeldNode& one : held) {
+    if (one.object != object)
+      continue;
+    const auto at = std::ranges::lower_bound(model.node, one.node + offset);
+    if (at == model.node.end() || *at != one.node + offset)
+      continue;
+    const auto k = std::ranges::find(instruments, one.instrument) - instruments.begin();
+    model.surface.holder.resize(model.node.size(), collision::no_owner);
+    model.surface.holder[static_cast<std::size_t>(at - model.node.begin())] =
+        static_cast<std::uint32_t>(first_instrument + static_cast<std::size_t>(k));
+  }
+}
+
 } // namespace
 
 IslandCache& island_of(World& w, const IslandParts& parts) {
@@ -252,11 +280,13 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
     instrument.push_back(static_cast<std::uint32_t>(k));
   }
   std::vector<double> friction = friction_of(w, object, instrument);
+  std::vector<HeldNode> held = held_nodes(w, parts);
+  const std::size_t first_instrument = object.size() - parts.instruments.size();
   std::uint64_t latest = 0;
   for (const auto& one : w.islands)
     latest = std::max(latest, one->used);
   for (const auto& one : w.islands)
-    if (one->keys == keys && one->friction == friction &&
+    if (one->keys == keys && one->friction == friction && one->held == held &&
         one->instrument_of_piece == instrument) {
       one->used = latest + 1;
       return *one;
@@ -275,11 +305,16 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
         ++piece;
       model.surface.piece.push_back(piece);
     }
+    for (const std::size_t part : body->parts)
+      hold_vertices(held, part, w.now.objects[part].offset, parts.instruments, first_instrument, model);
     surfaces.push_back(&model.surface);
   }
-  for (const std::size_t index : parts.statics)
-    surfaces.push_back(
-        &made->models.emplace_back(contact::model_surface(w.now.objects[index].model())).surface);
+  for (const std::size_t index : parts.statics) {
+    contact::ModelSurface& model =
+        made->models.emplace_back(contact::model_surface(w.now.objects[index].model()));
+    hold_vertices(held, index, 0, parts.instruments, first_instrument, model);
+    surfaces.push_back(&model.surface);
+  }
   for (const std::size_t k : parts.instruments)
     surfaces.push_back(
         &made->surfaces.emplace_back(contact::instrument_surface(w.now.instruments[k].shape)));
@@ -289,6 +324,7 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
       table.set(a, b, friction[a * object.size() + b]);
   made->motion = std::make_unique<contact::IslandMotion>(surfaces, table);
   made->friction = std::move(friction);
+  made->held = std::move(held);
   made->used = latest + 1;
   if (w.islands.size() >= kept_islands)
     w.islands.erase(std::ranges::min_element(

@@ -30,6 +30,14 @@ struct IslandParts {
   std::vector<std::size_t> objects() const;
 };
 
+/// A node that an instrument grasps, which does not touch what has it.
+struct HeldNode {
+  std::size_t object = 0;
+  std::uint32_t node = 0;
+  std::size_t instrument = 0;
+  auto operator<=>(const HeldNode&) const = default;
+};
+
 /// Surfaces of an island, which serve as long as the same models and instruments take part.
 struct IslandCache {
   struct Key {
@@ -43,6 +51,7 @@ struct IslandCache {
   };
   std::vector<Key> keys;
   std::vector<double> friction; ///< of all pairs of pieces
+  std::vector<HeldNode> held;   ///< by instruments
   std::deque<contact::ModelSurface> models;
   std::deque<contact::BodySurface> surfaces;
   std::vector<std::uint32_t> instrument_of_piece; ///< or other_surface
