@@ -13,6 +13,9 @@ namespace gewebe::simulation {
 
 namespace {
 
+/// Of its radius, by which an instrument may be inside: more than its shift (gewebe-contact(7), "Gap").
+constexpr double allowed_depth = 1e-3;
+
 void require_single(std::initializer_list<Vec3> all, double radius) {
   for (const Vec3& v : all)
     radius = std::max({radius, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -125,6 +128,14 @@ void enter_from_outside(World& w, Instrument& i) {
   note_poses(w);
 }
 
+/// Whether it is in an object by more than contact allows.
+bool stands_inside(World& w, const Instrument& i) {
+  InstrumentShape thinner = i.shape;
+  thinner.radius *= 1 - allowed_depth;
+  const Pose pose = i.way.at(w.now.clock.time);
+  return entry_pose(w, thinner, pose) != pose;
+}
+
 } // namespace
 
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
@@ -134,7 +145,7 @@ void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& 
     const std::size_t dropped = std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
       return grip.object == object && std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
     });
-    if (dropped > 0 && i.present)
+    if (dropped > 0 && i.present && stands_inside(w, i))
       enter_from_outside(w, i); // it pushes what it held
   }
 }
