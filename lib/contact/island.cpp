@@ -2,6 +2,7 @@
 
 #include "collision/bvh.h"
 #include "contact/convex_core.h"
+#include "contact/fit_radii.h"
 
 #include <algorithm>
 #include <cmath>
@@ -157,6 +158,7 @@ IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
     if (radius > 0)
       radius -= radius_offset * island.activation_distance;
   solver_ = std::make_unique<StepSolver>(island);
+  radii_ = std::make_unique<RadiusFit>(island);
 }
 
 IslandMotion::~IslandMotion() = default;
@@ -174,6 +176,10 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
   table.bodies.clear();
   for (IslandMember* const member : members)
     table.bodies.push_back(&member->begin(from, to, context));
+  std::vector<Vec3> x(table.vertex_count());
+  for (std::size_t b = 0; b < table.bodies.size(); ++b)
+    table.bodies[b]->positions(std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+  radii_->fit(x);
   report_.add(solver_->solve({to - from, parameters_}, context));
   std::vector<std::vector<IslandMember::Force>> forces(members.size());
   std::size_t body = 0;

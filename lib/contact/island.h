@@ -72,6 +72,8 @@ public:
   virtual void end(std::span<const Force> forces, double h, const Context& context) = 0;
 };
 
+class RadiusFit;
+
 class IslandMotion {
 public:
   /// \param surfaces  of the members; their pieces are numbered one behind the other
@@ -104,6 +106,7 @@ private:
   Parameters parameters_;
   std::unique_ptr<Island> island_;
   std::unique_ptr<StepSolver> solver_;
+  std::unique_ptr<RadiusFit> radii_;
   StepReport report_;
 };
 
