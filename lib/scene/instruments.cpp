@@ -110,20 +110,20 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
 
 namespace {
 
-/// Lets an instrument come to where it is from outside of what it would be in.
+/// Lets an instrument come to where it is from outside of what it would be in. It waits there since the last step, so that what
+/// moves or gives way in this one meets it, and takes no way from where it was.
 void enter_from_outside(World& w, Instrument& i) {
+  const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
   const double now = w.now.clock.time;
-  const Pose pose = i.way.at(now), start = entry_pose(w, i.shape, pose);
-  if (start == pose)
-    return;
   const PoseWay way = i.way;
+  const Pose start = entry_pose(w, i.shape, way.at(now));
   i.before = start;
   i.changed = true;
-  i.present = false;
-  note_poses(w); // it takes no way to there
-  i.present = true;
   i.way = {start, start, now, now};
   note_poses(w);
+  for (std::size_t p = 0; p < w.now.poses.size(); ++p)
+    if (number < w.now.poses[p].size())
+      w.now.poses[p][number] = p > 0 ? std::optional(start) : std::nullopt;
   i.way = way;
   note_poses(w);
 }
@@ -205,7 +205,7 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   let_go(w, c.instrument);
   i.changed = i.changed || !c.shape.blade || (i.present && !i.shape.blade);
   i.present = false;
-  note_poses(w); // it takes no way from where it was
+  note_poses(w);
   i.present = true;
   i.coupled.reset();
   i.path.clear();
@@ -213,8 +213,10 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   const double now = w.now.clock.time;
   i.before = c.pose;
   i.way = {c.pose, c.pose, now, now};
-  enter_from_outside(w, i);
-  note_poses(w);
+  if (c.shape.blade)
+    note_poses(w);
+  else
+    enter_from_outside(w, i);
 }
 void Rule<SetInstrument>::announce(World& w, const SetInstrument& c) {
   if (c.shape.blade)

@@ -20,10 +20,17 @@ std::span<const double> shape_now(World& w, Object& object) {
     u = static_shape(object);
     require_bounded(object, u);
   }
-  const Shown& shown = object.shown;
-  if (!shown.contact.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
-    u = whole_shape(w, object); // instruments among what acts
+  if (!object.shown.contact.empty() && object.method == Method::ffe)
+    u = whole_shape(w, object); // where contact has it
   return u;
+}
+
+/// Instruments that touch the object go from where they stood when it was shown.
+void stand_back(World& w, const Object& object) {
+  for (const NodalContactForce& f : object.shown.contact)
+    if (f.instrument < w.now.instruments.size())
+      if (const std::optional<Pose> stood = pose_at(w, 0, f.instrument))
+        w.now.instruments[f.instrument].before = *stood;
 }
 
 Vec3 at(std::span<const double> shape, std::size_t i) {
@@ -67,6 +74,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
   object.touching.clear();
   if (c.method == Method::ela) {
     set_going(w, c.object, u);
+    stand_back(w, object);
   } else {
     const double jump = stop(w, object, u);
     w.now.news.jumps.push_back({c.object, jump});
