@@ -1,6 +1,7 @@
 // Instruments that a hand leads through a spring and a damper.
 
 #include "base/error.h"
+#include "contact/parameters.h"
 #include "contact_checks.h"
 #include "larger.h"
 #include "scene/simulation.h"
@@ -63,13 +64,15 @@ TEST(Coupled, AtRestSpringAndTissueShareTheWay) {
     EXPECT_LT(-lag.z, 3.2);
     // One balances the other; what moves still comes to rest, and tells means over steps.
     EXPECT_LE(norm(tool.force + k * lag), (method == Method::ffe ? 1e-4 : 1e-2) * norm(tool.force));
-    EXPECT_LE(depth(*led), method == Method::ffe ? 1e-8 : 1e-6);
-    // Led there without a coupling it feels the same.
+    EXPECT_LE(std::abs(depth(*led)), test::depth_allowed); // touches, but for d_hat
+    // Led there without a coupling it feels the same, but for the tolerance of forces, which leaves
+    // gaps as different as ways are.
     held->apply(MoveInstrument{0, tool.pose.place, {}, 0.2});
     held->step(method == Method::ffe ? 0.2 : 1.5);
     held->step(0.1);
     EXPECT_LE(norm(held->instrument(0).force - tool.force),
-              (method == Method::ffe ? 1e-6 : 2e-2) * norm(tool.force));
+              (method == Method::ffe ? contact::Parameters{}.force_tolerance : 2e-2) *
+                  norm(tool.force));
   }
 }
 
