@@ -231,7 +231,8 @@ private:
         nodes.push_back(i);
     return nodes;
   }
-  Attach tie() const { return {0, {top()}, 1, {top()}, 1e5}; }
+  // Weak, so that it does not throw about what the node of the other one goes past.
+  Attach tie() const { return {0, {top()}, 1, {top()}, 100}; }
   SetTwoStep two_step() const {
     if (way_ == Way::two_step)
       return {0, {.threshold = 1}, {}, std::make_shared<const Model>(stiffer(model_))};
