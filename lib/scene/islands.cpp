@@ -491,6 +491,7 @@ void part_walls(World& w, const SetContact& c) {
         const std::span<const NodeMotion> all = motion_of(w.now.objects[part]);
         motions[part].assign(all.begin(), all.end());
       }
+  require_parted_holds(w, c, motions);
   std::vector<std::size_t> objects{c.object, c.other};
   objects.resize(c.object == c.other ? 1 : 2);
   const std::vector<std::size_t> moved = separate_walls(w, objects, motions);

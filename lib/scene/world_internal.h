@@ -256,6 +256,9 @@ std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const Pl
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
 
 // wound_walls.cpp: walls of cuts in contact
+/// \throw Error where surfaces that are to touch share a place at nodes that are held: no contact
+/// force can part them
+void require_parted_holds(const World& w, const SetContact& c, const Motions& motions);
 /// Moves nodes of these objects' surfaces apart that stand at one place, so that contact can begin.
 /// \param motions  of bodies' objects; elastodynamic objects that are moved are among them then
 /// \return objects that were moved

@@ -1,6 +1,7 @@
 // New walls of cuts and tears in contact: both sides of a cut begin at the same place, where no
 // barrier can part them. Their nodes are moved apart by a small part of an edge.
 
+#include "base/error.h"
 #include "base/vector_at.h"
 #include "contact/parameters.h"
 #include "scene/world_internal.h"
@@ -11,6 +12,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -32,6 +34,7 @@ struct SurfaceNode {
   Vec3 normal; ///< unit, outward
   Vec3 inward; ///< unit, towards the triangles around
   bool held = false;
+  bool beside_free = false; ///< a triangle around has a node that is not held
 };
 
 Vec3 unit(const Vec3& v) {
@@ -76,7 +79,11 @@ private:
     const auto place = [&](std::uint32_t node) {
       return model.nodes[node].position + displacement_of(object, motions, index, node);
     };
+    const auto is_held = [&](std::uint32_t node) {
+      return model.nodes[node].fixed == fixed_all || object.load->displacement.contains(node);
+    };
     for (const Triangle& t : model.triangles) {
+      const bool has_free = !std::ranges::all_of(t, is_held);
       const std::array<Vec3, 3> x{place(t[0]), place(t[1]), place(t[2])};
       const Vec3 area = cross(x[1] - x[0], x[2] - x[0]);
       const Vec3 middle = (x[0] + x[1] + x[2]) / 3;
@@ -84,6 +91,7 @@ private:
         SurfaceNode& node = nodes[t[k]];
         node.normal += area;
         node.inward += norm(area) * unit(middle - x[k]);
+        node.beside_free = node.beside_free || has_free;
         edges_.push_back(norm(model.nodes[t[(k + 1) % 3]].position - model.nodes[t[k]].position));
       }
     }
@@ -92,8 +100,7 @@ private:
       node.node = number;
       node.normal = unit(node.normal);
       node.inward = unit(node.inward);
-      node.held = model.nodes[number].fixed == fixed_all ||
-                  object.load->displacement.contains(number);
+      node.held = is_held(number);
       const Vec3 x = place(number);
       by_place_[{x.x, x.y, x.z}].push_back(node);
     }
@@ -137,6 +144,26 @@ void displace(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions&
 }
 
 } // namespace
+
+void require_parted_holds(const World& w, const SetContact& c, const Motions& motions) {
+  std::vector<std::size_t> objects{c.object};
+  if (c.other != c.object)
+    objects.push_back(c.other);
+  SharedPlaces places(w, objects, motions);
+  const auto name = [&](const SurfaceNode& node) {
+    return std::to_string(node.node) + " of object " + w.now.objects[node.object].name();
+  };
+  for (const std::vector<SurfaceNode>& group : places.groups())
+    for (std::size_t k = 1; k < group.size(); ++k)
+      for (std::size_t j = 0; j < k; ++j) {
+        const SurfaceNode &a = group[j], &b = group[k];
+        if (a.held && b.held && (a.beside_free || b.beside_free) &&
+            (a.object != b.object || c.object == c.other))
+          throw Error("nodes " + name(a) + " and " + name(b) +
+                      " stand at one place and are held there, expected nodes that can move apart "
+                      "for contact");
+      }
+}
 
 std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects, Motions& motions) {
   SharedPlaces places(w, objects, motions);
