@@ -469,6 +469,7 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
                                  .time = w.now.clock.time,
                                  .text = {}});
   move_all(w, c.object, moves, std::move(pieces));
+  let_instruments_enter(w);
 }
 
 } // namespace gewebe::simulation

@@ -116,7 +116,13 @@ void enter_from_outside(World& w, Instrument& i) {
   const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
   const double now = w.now.clock.time;
   const PoseWay way = i.way;
-  const Pose start = entry_pose(w, i.shape, way.at(now));
+  const Pose start = entry_pose(w, i.shape, i.pose(now));
+  if (i.coupled) { // its hand draws it back
+    i.coupled->place = start.place;
+    i.coupled->lag = way.at(now).place - start.place;
+    i.changed = true;
+    return;
+  }
   i.before = start;
   i.changed = true;
   i.way = {start, start, now, now};
@@ -132,11 +138,17 @@ void enter_from_outside(World& w, Instrument& i) {
 bool stands_inside(World& w, const Instrument& i) {
   InstrumentShape thinner = i.shape;
   thinner.radius *= 1 - allowed_depth;
-  const Pose pose = i.way.at(w.now.clock.time);
+  const Pose pose = i.pose(w.now.clock.time);
   return entry_pose(w, thinner, pose) != pose;
 }
 
 } // namespace
+
+void let_instruments_enter(World& w) {
+  for (Instrument& i : w.now.instruments)
+    if (i.present && !i.shape.blade && stands_inside(w, i))
+      enter_from_outside(w, i);
+}
 
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
   for (Instrument& i : w.now.instruments) {

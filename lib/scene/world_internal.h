@@ -210,6 +210,8 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh);
 std::size_t instrument_place(const World& w, const std::string& name) noexcept;
 std::size_t add_instrument(World& w, const std::string& name);
 InstrumentReport report_of(const World& w, std::size_t instrument);
+/// Those that stand in an object whose shape is another one come to where they are from outside.
+void let_instruments_enter(World& w);
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
 void note_poses(World& w, std::optional<std::size_t> jumps = {});
 bool instruments_there(const World& w);
