@@ -127,7 +127,10 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     load_ = load_between(way_->from, way_->to, way_->stood, (to - way_->start) / (way_->end - way_->start));
   else
     load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
-  StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {}};
+  StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {},
+                           [this, &object](std::span<const double> u) {
+                             at_object(w_, object, [&] { require_bounded(object, u); });
+                           }};
   for (const NodalContactForce& f : object.touching) {
     const auto vertex = static_cast<std::uint32_t>(
         std::ranges::lower_bound(surface_.node, f.node) - surface_.node.begin());

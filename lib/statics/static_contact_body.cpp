@@ -43,6 +43,8 @@ void StaticContactBody::act(std::span<const VertexForce> forces) {
 double StaticContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
   act(forces);
   const std::span<const double> u = shape_under(acting_);
+  if (state_.require_shape)
+    state_.require_shape(u);
   // Of all nodes, or of the surface's alone.
   displacement_.resize(std::min(displacement_.size(), u.size()));
   begin_ = displacement_;

@@ -25,6 +25,8 @@ struct StaticContactState {
   const Load* load = nullptr;                           ///< at the end of the step
   std::span<const double> displacement{};               ///< at its beginning, of the surface
   std::vector<contact::VertexForce> forces{};           ///< contact forces then
+  /// Throws where a shape before contact is none: so far off that no contact could be found.
+  std::function<void(std::span<const double>)> require_shape{};
 };
 
 /// What the methods of statics have in common. Bodies that are not linear move by their quadratic
