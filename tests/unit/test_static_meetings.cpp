@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/vector_at.h"
 #include "compliance/compliance_source.h"
+#include "contact/parameters.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
@@ -31,9 +32,13 @@ namespace {
 
 using namespace test;
 
-/// Part of the largest displacement to which shapes and forces agree: contact is solved until its
-/// forces balance to about as much, and friction changes by no more.
-constexpr double balance_met = 1e-5, friction_met = 1e-3;
+/// Part of the largest displacement to which shapes and forces agree: the forces at each vertex
+/// balance to force_tolerance of the largest one, which is but a tenth of what presses a face of ten
+/// or more vertices. With friction also its last change, all around the edge of a face alike.
+constexpr contact::Parameters contact_parameters;
+constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.force_tolerance;
+constexpr double friction_met =
+    contact_parameters.friction_tolerance + 2 * contact_parameters.force_tolerance;
 
 Vec3 torque_of_forces(const Simulation& s, std::size_t object) {
   Vec3 sum;
