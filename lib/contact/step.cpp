@@ -1,5 +1,6 @@
 #include "contact/step.h"
 
+#include "base/rounded_text.h"
 #include "contact/barrier.h"
 #include "contact/contact_pairs.h"
 #include "contact/friction.h"
@@ -70,7 +71,7 @@ public:
 private:
   void read_positions(std::vector<Vec3>& x);
   double longest_way() const;
-  void raise_stiffness(double force);
+  bool raise_stiffness(double force);
   void set_stiffness(double energy, std::span<const Vec3> to);
   void search(std::span<const Vec3> to, double reach);
   void find_pairs(std::span<const Vec3> x) {
@@ -92,6 +93,7 @@ private:
     double free = 0;   ///< part of it that collision detection allows
   };
   Step take_step(const CondensedSystem& system);
+  [[noreturn]] void fail_stuck() const;
   bool follow_way(CondensedSystem& system, bool balanced);
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
@@ -177,14 +179,15 @@ void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
 
 /// Makes the barrier stiffer where forces have become much larger than the typical one: deep in the
 /// barrier Newton's steps are short. \param force  largest of those that balance
-void StepSolver::Work::raise_stiffness(double force) {
+bool StepSolver::Work::raise_stiffness(double force) {
   const Parameters& p = options_.parameters;
   const double wanted = p.last_share * force;
   if (!(wanted > p.soft_factor * barrier_force_))
-    return;
+    return false;
   const double factor = std::min(wanted / barrier_force_, p.stiffness_factor);
   barrier_force_ *= factor;
   kappa_ *= factor;
+  return true;
 }
 
 void StepSolver::Work::search(std::span<const Vec3> to, double reach) {
@@ -288,6 +291,23 @@ bool StepSolver::Work::solve_system(CondensedSystem& system, HessianMode mode) {
   return system.solve(gradient_, 0);
 }
 
+/// \throw NotSolved with the place of the smallest gap
+void StepSolver::Work::fail_stuck() const {
+  double least = std::numeric_limits<double>::infinity();
+  Vec3 place;
+  for (const ContactPair& pair : pairs_.pairs) {
+    ContactPairs one;
+    one.d_hat = d_hat_;
+    one.pairs = {pair};
+    if (const double gap = smallest_gap(one, at_); gap < least) {
+      least = gap;
+      place = at_[pair.vertex[pair.count - std::size_t{1}]];
+    }
+  }
+  throw NotSolved("contact: what is led meets what is fixed near " + rounded_text(place.x) + " " +
+                  rounded_text(place.y) + " " + rounded_text(place.z));
+}
+
 /// The chosen step of the system; trial_ becomes its end.
 StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system) {
   Step result;
@@ -305,7 +325,7 @@ StepSolver::Work::Step StepSolver::Work::take_step(const CondensedSystem& system
   result.free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
                                                {0, options_.parameters.kept_gap, d_hat_, 1000});
   if (!(result.free > stuck))
-    throw NotSolved("contact: what is led or fixed stands in the way");
+    fail_stuck();
   return result;
 }
 
@@ -338,11 +358,8 @@ void StepSolver::Work::take(CondensedSystem& system, const Step& step, double pa
     at_[v] = part < 1 ? at_[v] + part * (trial_[v] - at_[v]) : trial_[v];
   system.advance(part);
   report_.cuts += step.free < 1 ? 1 : 0;
-  if (part == 1) {
-    if (system.share() == 0)
-      last_step_ = step.length;
-    raise_stiffness(system.largest_force());
-  }
+  if (part == 1 && system.share() == 0)
+    last_step_ = step.length;
 }
 
 /// Lowers the energy with the way that is left as it is. \param contact  energy of contact here
@@ -392,20 +409,26 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   find_pairs(at_);
   double contact = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
                    add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
-  const auto [difference, largest] = system.residual(gradient_);
-  const double scale = std::max(largest, typical_force_);
-  converged = last_step_ <= step_limit() && difference <= p.force_tolerance * scale;
+  CondensedSystem::Residual residual = system.residual(gradient_);
+  converged = last_step_ <= step_limit() &&
+              residual.difference <= p.force_tolerance * std::max(residual.largest, typical_force_);
   if (converged)
     return true;
-  const bool balanced = difference <= p.way_tolerance * scale;
-  if (difference <= p.lag_tolerance * scale && rough_ && iteration > 0) {
-    // Normal forces that do not balance are none to hold anything by friction.
+  const auto balances = [&](double tolerance) {
+    return residual.difference <= tolerance * std::max(residual.largest, typical_force_);
+  };
+  // Normal forces that do not balance are none to hold anything by friction.
+  const bool lags = rough_ && iteration > 0 && balances(p.lag_tolerance);
+  const bool stiffer = balances(p.way_tolerance) && raise_stiffness(residual.largest);
+  if (lags)
     lag();
+  if (lags || stiffer) {
     std::ranges::fill(gradient_, Vec3{});
     contact = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
               add_friction_gradient(friction_, at_, begin_, stick_, gradient_);
+    residual = system.residual(gradient_);
   }
-  const bool near = last_step_ <= d_hat_;
+  const bool near = last_step_ <= d_hat_, balanced = balances(p.way_tolerance);
   last_step_ = std::numeric_limits<double>::infinity();
   // The exact Hessian converges fastest from near by; from afar it may be all but singular.
   const HessianMode from_afar =
