@@ -69,6 +69,12 @@ public:
   /// \return whether the momentum, or the shape, is right
   virtual bool keep_momentum(double /*room*/) { return true; }
 
+  /// Moves to where the step ends without contact, if the body can: better than by its models.
+  /// \return whether it can
+  virtual bool solve_alone() { return false; }
+  /// Moves back to where the step began. \pre it can solve_alone()
+  virtual void begin_again() {}
+
   /// Whether one model serves for the whole step.
   virtual bool is_linear() const = 0;
   /// All vertices translate together: W has the same block for all of them.

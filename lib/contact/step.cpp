@@ -99,6 +99,7 @@ private:
   bool lower_energy(CondensedSystem& system, double contact);
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
   bool move_bodies(const CondensedSystem& system);
+  bool move_alone(std::span<const Vec3> to);
   bool covered(std::span<const Vec3> x, double room) const;
   double largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const;
   /// Length of a step of Newton's method below which positions have converged.
@@ -456,6 +457,39 @@ bool StepSolver::Work::move_bodies(const CondensedSystem& system) {
   return exact;
 }
 
+/// The step of bodies that meet nothing on their ways. \param to  ends of the ways of linear bodies
+/// \return whether it is one; else all stand where they began
+bool StepSolver::Work::move_alone(std::span<const Vec3> to) {
+  const BodyTable& table = island_.table;
+  std::vector<std::size_t> moved;
+  bool alone = true;
+  trial_.assign(to.begin(), to.end());
+  for (std::size_t b = 0; b < table.bodies.size() && alone; ++b) {
+    ContactBody& body = *table.bodies[b];
+    if (body.is_linear())
+      continue;
+    alone = body.solve_alone();
+    if (!alone)
+      break;
+    moved.push_back(b);
+    body.positions(std::span(trial_).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+  }
+  if (alone) {
+    search(trial_, d_hat_);
+    alone = vertices_.empty();
+  }
+  if (!alone) {
+    for (const std::size_t b : moved)
+      table.bodies[b]->begin_again();
+    return false;
+  }
+  for (ContactBody* const body : table.bodies)
+    if (body->is_linear())
+      body->move(0, {});
+  at_ = trial_;
+  return true;
+}
+
 StepReport StepSolver::Work::run() {
   const Parameters& p = options_.parameters;
   const BodyTable& table = island_.table;
@@ -466,6 +500,7 @@ StepReport StepSolver::Work::run() {
   for (const ContactBody* const body : table.bodies)
     force_.push_back(body->last_forces());
   double margin = margin_;
+  bool may_be_alone = options_.h > 0 && !linear;
   for (int round = 0; round < p.max_rounds; ++round) {
     if (context_.cancelled && context_.cancelled())
       throw Cancelled();
@@ -480,15 +515,24 @@ StepReport StepSolver::Work::run() {
       start[v] = -way_[v];
     }
     round_begin = at_;
+    if (round == 0) {
+      search(to, d_hat_ + margin);
+      if (vertices_.empty() && may_be_alone) {
+        if (move_alone(to))
+          break;
+        may_be_alone = false;
+        round = -1; // with new models
+        continue;
+      }
+      set_stiffness(energy, to);
+      find_pairs(at_);
+      lag();
+    }
     bool exact = true;
     for (int attempt = 0;; ++attempt) {
-      if (round == 0 || attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
+      if (attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
         search(to, d_hat_ + margin);
-        if (round == 0 && attempt == 0)
-          set_stiffness(energy, to);
         find_pairs(at_);
-        if (round == 0 && attempt == 0)
-          lag();
       }
       CondensedSystem system(table, vertices_, start, round_force, p.ridge, inverses_,
                              context_.cpu);

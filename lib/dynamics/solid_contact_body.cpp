@@ -73,6 +73,12 @@ void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uin
     std::copy_n(found->second.begin() + std::ptrdiff_t{9} * rows[k], 9, blocks[k].begin());
 }
 
+bool SolidContactBody::solve_alone() {
+  forces_.assign(axes_, 0);
+  motion_.solve_alone(context_);
+  return true;
+}
+
 void SolidContactBody::move(double share, std::span<const VertexForce> forces) {
   spread(forces);
   std::vector<double> change = forces_;

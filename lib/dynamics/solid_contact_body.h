@@ -41,6 +41,8 @@ public:
   std::uint64_t matrix_id() const override { return motion_.matrix_version(); }
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
+  bool solve_alone() override;
+  void begin_again() override { motion_.begin_iterate_again(); }
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }
   double vertex_stiffness() const override { return stiffness_; }

@@ -72,7 +72,7 @@ struct SolidMotion::State {
   /// A step in parts.
   struct Open {
     MotionObjective objective;
-    MotionPoint found;      ///< the iterate
+    MotionPoint found;  ///< the iterate
     Numbers base, step; ///< where it was linearised, and the model's step from there
     bool fresh = true;  ///< nothing was linearised yet
     SolidStep counts{};
@@ -91,6 +91,7 @@ struct SolidMotion::State {
   void take_over(SolidMotion& soft);
   void limit(SolidStep& step);
   SolidStep step_softly(double h, const Context& context);
+  MotionPoint search(const MotionObjective& objective, SolidStep& step, const Context& context);
 };
 
 SolidMotion::~SolidMotion() = default;
@@ -177,6 +178,41 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   return step;
 }
 
+/// Where a step ends under the load.
+MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidStep& step,
+                                       const Context& context) {
+  const double h = objective.step();
+  MotionPoint found;
+  found.at = now.place;
+  add(found.at, h, now.velocity);
+  if (last_step != h)
+    forecast.clear();
+  forecast.add_to(found.at, h * h, context);
+  if (!guess.empty())
+    found.at = std::exchange(guess, {});
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] != 0)
+      found.at[axis] = moved ? body.rest[axis] + target[axis] : now.place[axis];
+  objective.evaluate(found, context, true);
+  // The shape of now, moved as its momentum has it: what rounds get below leaves speeds of the body
+  // as a whole to themselves.
+  MotionPoint stiff;
+  stiff.at = now.place;
+  if (!now.any_held())
+    objective.keep_momentum(stiff);
+  if (!(found.value <= objective.value_of_shape(stiff.at, elastic))) {
+    for (std::size_t axis = 0; axis < body.axes(); ++axis)
+      if (now.held[axis] == 0)
+        found.at[axis] = stiff.at[axis];
+    objective.evaluate(found, context, true);
+  }
+  if (options.reference)
+    descend_as_reference(objective, found, tangent, step, context);
+  else
+    descend_quickly(objective, found, quick, options, step, context);
+  return found;
+}
+
 void SolidMotion::set_load(std::span<const double> forces, const Between& between) {
   State& s = *state_;
   s.now.load.assign(forces.begin(), forces.end());
@@ -223,34 +259,7 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.allowed = motion_energy(s.body, s.now.velocity) + s.elastic -
               work_of_load(s.body, s.now.outer, s.now.place);
   const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
-  MotionPoint found;
-  found.at = s.now.place;
-  add(found.at, h, s.now.velocity);
-  if (s.last_step != h)
-    s.forecast.clear();
-  s.forecast.add_to(found.at, h * h, context);
-  if (!s.guess.empty())
-    found.at = std::exchange(s.guess, {});
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] != 0)
-      found.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
-  objective.evaluate(found, context, true);
-  // The shape of now, moved as its momentum has it: what rounds get below leaves speeds of the body
-  // as a whole to themselves.
-  MotionPoint stiff;
-  stiff.at = s.now.place;
-  if (!s.now.any_held())
-    objective.keep_momentum(stiff);
-  if (!(found.value <= objective.value_of_shape(stiff.at, s.elastic))) {
-    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-      if (s.now.held[axis] == 0)
-        found.at[axis] = stiff.at[axis];
-    objective.evaluate(found, context, true);
-  }
-  if (s.options.reference)
-    descend_as_reference(objective, found, s.tangent, step, context);
-  else
-    descend_quickly(objective, found, s.quick, s.options, step, context);
+  MotionPoint found = s.search(objective, step, context);
   if (!std::isfinite(found.value))
     throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
 
@@ -319,7 +328,8 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
     if (s.now.held[axis] != 0)
       point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
   open.objective.evaluate(point, context, true);
-  if (s.quick.wants_tangent() && s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
+  if (s.quick.wants_tangent() &&
+      s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
     s.matrix_version = unique_number();
   s.quick.turn(s.energy, context);
   s.quick.fill(s.energy.volumes(), context);
@@ -361,8 +371,7 @@ void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
 }
 
 std::uint64_t SolidMotion::matrix_version() const noexcept {
-  return state_->recovery.on() ? state_->recovery.soft().matrix_version()
-                               : state_->matrix_version;
+  return state_->recovery.on() ? state_->recovery.soft().matrix_version() : state_->matrix_version;
 }
 
 std::array<double, 9> SolidMotion::frame_of(std::uint32_t node) const {
@@ -405,6 +414,31 @@ bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     open.found.at[axis] -= off[axis % 3];
   return true;
+}
+
+void SolidMotion::solve_alone(const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().solve_alone(context);
+    return;
+  }
+  State::Open& open = *s.open;
+  const int made = open.counts.factorisations;
+  open.found = s.search(open.objective, open.counts, context);
+  open.counts.factorisations = made;
+  if (!s.now.any_held())
+    open.objective.keep_momentum(open.found);
+}
+
+void SolidMotion::begin_iterate_again() {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().begin_iterate_again();
+    return;
+  }
+  s.open->found = {};
+  s.open->found.at = s.now.place;
+  s.open->fresh = true;
 }
 
 std::span<const double> SolidMotion::iterate() const noexcept {

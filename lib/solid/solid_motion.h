@@ -219,9 +219,13 @@ public:
   /// \param change  f - f_0, 3 n
   void move_iterate(double share, std::span<const double> change, const Context& context);
   /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
-  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not quite
-  /// by what its forces say. \param forces  f, 3 n \return whether the momentum is right
+  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not
+  /// quite by what its forces say. \param forces  f, 3 n \return whether the momentum is right
   bool keep_momentum(std::span<const double> forces, double room);
+  /// Moves the iterate to where the step ends under the load alone, as step() finds it.
+  void solve_alone(const Context& context);
+  /// The iterate is where the step began, once more.
+  void begin_iterate_again();
   std::span<const double> iterate() const noexcept; ///< 3 n
   /// Ends the step at the iterate. \param forces  that act there, 3 n
   SolidStep end_step(std::span<const double> forces, const Context& context);
