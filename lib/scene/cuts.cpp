@@ -469,6 +469,9 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
                                  .time = w.now.clock.time,
                                  .text = {}});
   move_all(w, c.object, moves, std::move(pieces));
+  for (const ContactRule& rule : w.now.contacts) // parts that came off may be where it is whole
+    if (rule.object == c.object || rule.other == c.object)
+      require_apart(w, rule);
   let_instruments_enter(w);
 }
 
