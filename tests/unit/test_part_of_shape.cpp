@@ -88,7 +88,8 @@ std::vector<double> told_on_the_way(const StoredOrgan& organ, int threads, int a
   s.apply(SetInstrument{1, {1, {}, 0}, {middle + Vec3{0, 25, 0}, {}}, "other"});
   std::vector<double> all;
   for (int step = 0; step < 60; ++step) {
-    const double a = step < 25 ? 0.02 * step : 0.23 * step; // to where nothing was looked at
+    // To where nothing was looked at, but not to fixed nodes, at the lower end.
+    const double a = step < 25 ? 0.02 * step : 1.9 * std::sin(0.23 * step);
     const double deep = step == 0 ? 3 : step % 20 == 19 ? -1 : 0.6 + 0.3 * std::sin(a);
     s.apply(
         MoveInstrument{0, middle + (21.5 - deep) * Vec3{std::sin(a), 0.1, std::cos(a)}, {}, 0.001});

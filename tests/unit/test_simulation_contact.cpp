@@ -112,8 +112,8 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
       }
       std::array<std::uint32_t, 3> foot{};
       for (std::size_t c = 0; c < 3; ++c)
-        foot[c] = hold(n, n.position + Vec3{c == 0 ? 0.3 : -0.15,
-                                            c == 0 ? 0 : (c == 1 ? 0.26 : -0.26), -1});
+        foot[c] = hold(n, n.position +
+                              Vec3{c == 0 ? 0.3 : -0.15, c == 0 ? 0 : (c == 1 ? 0.26 : -0.26), -1});
       for (std::size_t c = 0; c < 3; ++c)
         m.triangles.push_back({node, foot[c], foot[(c + 1) % 3]});
     }
@@ -476,7 +476,7 @@ TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
       force.push_back(s.instrument(0).force);
       EXPECT_NEAR(force.back().z, -total, 1e-3 * total);
       EXPECT_LT(std::abs(at.back().z - at.front().z), 1e-3); // d_hat
-      if (friction > 0.3) // else it slides
+      if (friction > 0.3)                                    // else it slides
         EXPECT_NEAR(force.back().y, 0.3 * total, 1e-3 * total);
       else
         EXPECT_NEAR(force.back().y, friction * total, 1e-3 * total);
@@ -616,7 +616,7 @@ TEST(SimulationContact, DrawnAlongALiver) {
           EXPECT_GE(dot(f.value, n), method == Method::ffe ? 0 : -1e-2 * norm(f.value));
         }
       }
-      EXPECT_LT(deepest, 1e-6);
+      EXPECT_LT(deepest, 6.01e-4 * radius); // as depth_allowed
       EXPECT_GT(touched, 50U);
       for (const std::string& w : warnings)
         EXPECT_EQ(w.find("not exact"), std::string::npos) << w;
@@ -628,6 +628,7 @@ TEST(SimulationContact, StrangeScenes) {
     const char* name;
     double radius;
     Vec3 at;
+    bool held = false; ///< it would have to pass fixed nodes
   };
   const Model model = organ();
   const std::uint32_t node = free_nodes(model)[5];
@@ -636,14 +637,23 @@ TEST(SimulationContact, StrangeScenes) {
     for (const Strange& strange :
          {Strange{"tiny, its centre at a node", 1e-4, at}, Strange{"its centre at a node", 4, at},
           Strange{"huge", 1e5, middle + Vec3{0, 0, 1e5 + 19}},
-          Strange{"around all of it", 50, middle}, Strange{"in the middle", 10, middle},
-          Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}}}) {
+          Strange{"around all of it", 50, middle, true}, Strange{"in the middle", 10, middle},
+          Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}, true}}) {
       std::vector<std::string> warnings;
       Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("o", model, method);
       s.apply(sphere(strange.radius, strange.at));
-      for (int k = 0; k < 3; ++k)
-        s.step(0.001);
+      std::string failure;
+      try {
+        for (int k = 0; k < 3; ++k)
+          s.step(0.001);
+      } catch (const Error& e) {
+        failure = e.what();
+      }
+      EXPECT_EQ(failure.find("what is led meets what is fixed") != std::string::npos, strange.held)
+          << strange.name << failure;
+      if (!failure.empty())
+        continue;
       for (const double u : s.displacement(0))
         ASSERT_TRUE(std::isfinite(u)) << strange.name;
       EXPECT_LT(depth(s, 0, {strange.radius, {}, 0}, {strange.at, {}}), test::depth_allowed)

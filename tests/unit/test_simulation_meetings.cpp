@@ -47,7 +47,8 @@ TEST(SimulationMeetings, ABlockRestsOnAnother) {
     }
     EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
     EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
-    EXPECT_EQ(s.state().kinetic_energy<1e-9, friction> 0) << "it slides where nothing rubs";
+    // 1e-5 g mm^2/s^2 is a speed of 0.004 mm/s, of 0.1 mm/s at which what sticks may creep.
+    EXPECT_EQ(s.state().kinetic_energy<1e-5, friction> 0) << "it slides where nothing rubs";
   }
 }
 
