@@ -94,14 +94,14 @@ struct CondensedSystem::State {
   std::vector<Vec3> step;             ///< by place
   std::array<Direction, 2> direction; ///< at the same share c, by all of it
   double reach = 1;                   ///< part of c that the step is to take
-  double c = 1;
+  double c = 1, way_energy = 0;
   CpuLevel cpu;
   DenseCholesky cholesky;
   MatrixXd hessian, matrix;
   VectorXd carried; ///< H_af p_f of immovable vertices
   VectorXd p;
-  // Of energy(): quadratic in F and q.
-  double ff = 0, fq = 0, qq = 0;
+  // Of energy(): quadratic in c, F and q.
+  double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
 
   State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
       : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
@@ -323,10 +323,12 @@ struct CondensedSystem::State {
 
 CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                                  std::span<const Vec3> start,
-                                 std::span<const std::vector<VertexForce>> forces, double ridge,
-                                 InverseCache& cache, CpuLevel cpu)
+                                 std::span<const std::vector<VertexForce>> forces, double energy,
+                                 double share, double ridge, InverseCache& cache, CpuLevel cpu)
     : state_(std::make_unique<State>(table, ridge, cache, cpu)) {
   State& s = *state_;
+  s.way_energy = energy;
+  s.c = share;
   s.vertices = std::move(vertices);
   s.make_nodes();
   for (const std::uint32_t vertex : s.vertices)
@@ -462,9 +464,12 @@ void CondensedSystem::choose_reach(double reach) {
     const std::uint32_t node = s.node_of[place];
     s.step[place] = -s.reach * s.c * s.start[place] - s.pushed[node] - s.response[node];
   }
-  s.ff = s.fq = s.qq = 0;
+  s.ff = s.fq = s.qq = s.rf = s.rq = 0;
   for (std::size_t k = 0; k < s.active.size(); ++k) {
     const std::uint32_t node = s.active[k].node;
+    const Vec3 r0 = s.start_of(node);
+    s.rf += dot(r0, s.force[k]);
+    s.rq += dot(r0, s.change[k]);
     s.ff += dot(s.force[k], s.pushed[node]);
     s.fq += dot(s.force[k], s.response[node]);
     s.qq += dot(s.change[k], s.response[node]);
@@ -478,11 +483,28 @@ const Vec3& CondensedSystem::step(std::size_t place) const {
 double CondensedSystem::energy(double part) const {
   const State& s = *state_;
   const double stay = 1 - part;
-  return 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq);
+  double energy = 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq);
+  if (s.reach > 0) {
+    const double c = stay * s.c;
+    energy += c * (stay * s.rf - part * s.rq) + 0.5 * s.way_energy * c * c;
+  }
+  return energy;
 }
 
 double CondensedSystem::slope() const {
-  return -state_->ff - state_->fq;
+  const State& s = *state_;
+  double slope = -s.ff - s.fq;
+  if (s.reach > 0)
+    slope -= s.c * (2 * s.rf + s.rq) + s.way_energy * s.c * s.c;
+  return slope;
+}
+
+void CondensedSystem::require_descent(double contact_slope) {
+  State& s = *state_;
+  // Newton's decrement that the step would have without the way.
+  const double descent = s.p.dot(s.hessian * s.p) + s.qq, total = slope() + contact_slope;
+  if (s.c > 0 && s.reach > 0 && !(total <= -0.5 * descent))
+    s.way_energy += (total + descent) / (s.c * s.c);
 }
 
 void CondensedSystem::advance(double part) {

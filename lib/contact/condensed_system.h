@@ -49,10 +49,11 @@ class CondensedSystem {
 public:
   /// \param vertices  that may take part, ascending \param start  R0 of all vertices
   /// \param forces  F_0 by body, on some of these vertices
-  /// \param ridge  see Parameters \pre the bodies are linearised; they outlive this
+  /// \param energy  R0^T A R0, roughly \param share  c \param ridge  see Parameters \pre the bodies
+  /// are linearised; they outlive this
   CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
                   std::span<const Vec3> start, std::span<const std::vector<VertexForce>> forces,
-                  double ridge, InverseCache& cache, CpuLevel cpu);
+                  double energy, double share, double ridge, InverseCache& cache, CpuLevel cpu);
   ~CondensedSystem();
   CondensedSystem(const CondensedSystem&) = delete;
   CondensedSystem& operator=(const CondensedSystem&) = delete;
@@ -78,10 +79,13 @@ public:
   /// Step of a vertex of vertices(), by its place there. \pre solved
   const Vec3& step(std::size_t place) const;
 
-  /// Energy 1/2 s^T A s, s = r - c R0, behind a part of the step; and its slope at 0. \pre c is 0,
-  /// or the reach is
+  /// Energy behind a part of the step, without a constant, and its slope at 0: 1/2 r^T A r, of a
+  /// step by all of the way, or, of one by none of it, 1/2 s^T A s, s = r - c R0.
   double energy(double part) const;
   double slope() const;
+  /// Raises the weight of 1/2 c^2 in the energy of a step by all of the way, at first R0^T A R0,
+  /// until `slope() + contact_slope` is a descent.
+  void require_descent(double contact_slope);
   /// Takes a part of the step.
   void advance(double part);
 

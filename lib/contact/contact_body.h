@@ -77,6 +77,8 @@ public:
 
   /// Whether one model serves for the whole step.
   virtual bool is_linear() const = 0;
+  /// Whether some vertices go ways in this step that no force can stop.
+  virtual bool is_led() const { return false; }
   /// All vertices translate together: W has the same block for all of them.
   virtual bool is_rigid() const { return false; }
   /// A force that is typical for the contacts of this body, 1e-6 N, or 0: unknown. It scales the

@@ -18,7 +18,8 @@ constexpr double too_near = 0.002, room = 0.01;
 constexpr double most = 1e-2;
 
 template <std::size_t n>
-double distance_of(std::span<const Vec3> x, const std::array<std::uint32_t, n>& vertex, bool edges) {
+double distance_of(std::span<const Vec3> x, const std::array<std::uint32_t, n>& vertex,
+                   bool edges) {
   std::array<Vec3, n> y;
   for (std::size_t k = 0; k < n; ++k)
     y[k] = x[vertex[k]];

@@ -34,6 +34,7 @@ public:
     for (std::size_t k = 0; k < at_.size(); ++k)
       at_[k] = share > 0 ? to_[k] + share * (begin_[k] - to_[k]) : to_[k];
   }
+  bool is_led() const override { return at_ != to_; }
   bool is_linear() const override { return true; }
   double typical_force() const override { return 0; }
 

@@ -53,6 +53,7 @@ public:
   }
   bool is_linear() const override { return true; }
   bool is_rigid() const override { return true; }
+  bool is_led() const override { return !(compliance_ > 0) && from_ != to_; }
   double typical_force() const override { return 0; }
 
   /// How far it stands from its target.

@@ -178,7 +178,8 @@ void IslandMotion::step(Members members, double from, double to, const Context& 
     table.bodies.push_back(&member->begin(from, to, context));
   std::vector<Vec3> x(table.vertex_count());
   for (std::size_t b = 0; b < table.bodies.size(); ++b)
-    table.bodies[b]->positions(std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+    table.bodies[b]->positions(
+        std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
   radii_->fit(x);
   report_.add(solver_->solve({to - from, parameters_}, context));
   std::vector<std::vector<IslandMember::Force>> forces(members.size());

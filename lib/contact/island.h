@@ -27,8 +27,8 @@ struct BodySurface {
   std::vector<std::array<std::uint32_t, 2>> edges; ///< beside those of triangles
   std::vector<std::uint32_t> points;               ///< beside those of edges
   std::vector<std::uint8_t> fixed;                 ///< by vertex: 1 if it never moves
-  /// By vertex: the piece that holds it, counted over all surfaces of the island, or collision::no_owner;
-  /// empty: none is held.
+  /// By vertex: the piece that holds it, counted over all surfaces of the island, or
+  /// collision::no_owner; empty: none is held.
   std::vector<std::uint32_t> holder;
   /// By vertex: which of the surface's pieces it is of, for who may meet; empty: all of the first.
   std::vector<std::uint32_t> piece;

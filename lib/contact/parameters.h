@@ -30,9 +30,10 @@ struct Parameters {
   double soft_factor = 1.5, stiffness_factor = 10;
 
   // ---- iterations
-  /// Newton iterations of one round, then the step fails. Each goes past curved surfaces by but
+  /// Newton iterations of one round, then the step fails: models of bodies are not right far from
+  /// where they were made. ... where vertices are led past curved surfaces, which each goes by but
   /// about the root of gap times radius.
-  int max_iterations = 1000;
+  int max_iterations = 100, max_led_iterations = 1000;
   int max_rounds = 40;   ///< linearisations of bodies that are not linear
   int gauss_newton = 12; ///< iterations before the projected Hessian takes over
   /// A step of which collision detection allows less than this part is taken again by a smaller
@@ -45,8 +46,9 @@ struct Parameters {
   /// times, by so many times more each time.
   int max_dampings = 6;
   double damping_factor = 6;
-  int max_lags = 30;    ///< renewals in one round
-  int max_searches = 5; ///< broad phases of one step, each with twice the margin
+  int max_lags = 30;          ///< renewals in one round
+  int max_searches = 5;       ///< broad phases of one step, each with twice the margin
+  int max_way_searches = 100; ///< ... where vertices leave what was searched
 
   // ---- tolerances
   /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.

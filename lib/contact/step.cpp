@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <utility>
 
 namespace gewebe::contact {
@@ -98,8 +99,18 @@ private:
   void take(CondensedSystem& system, const Step& step, double part);
   bool lower_energy(CondensedSystem& system, double contact);
   bool iterate(CondensedSystem& system, int iteration, bool& converged);
-  bool move_bodies(const CondensedSystem& system);
+  bool move_bodies(const CondensedSystem& system, bool ends);
+  struct Round {
+    std::vector<Vec3> to, start;                 ///< ends of the ways; R0
+    double energy = 0;                           ///< R0^T A R0, roughly
+    std::vector<std::vector<VertexForce>> force; ///< F_0
+  };
+  bool follow_bodies(double margin);
+  bool solve_round(const Round& round, double margin, bool& exact);
   bool move_alone(std::span<const Vec3> to);
+  bool covered(std::uint32_t vertex, const Vec3& x, double room) const {
+    return distance_to_segment(x, swept_from_[vertex], swept_[vertex]) <= room;
+  }
   bool covered(std::span<const Vec3> x, double room) const;
   double largest_distance(std::span<const Vec3> a, std::span<const Vec3> b) const;
   /// Length of a step of Newton's method below which positions have converged.
@@ -122,6 +133,7 @@ private:
   double barrier_force_ = 0; ///< force at half of d_hat
   double last_step_ = 0;     ///< length of the last full step of Newton's method; else infinite
   bool rough_ = false;       ///< some pairs have friction
+  bool led_ = false;         ///< some vertices go ways that nothing stops
   collision::Candidates candidates_;
   std::vector<std::uint32_t> vertices_;         ///< of candidates, and those with forces
   std::vector<std::vector<VertexForce>> force_; ///< by body
@@ -219,8 +231,8 @@ void StepSolver::Work::search(std::span<const Vec3> to, double reach) {
 
 /// Whether all vertices are within `room` of what the candidates were searched for.
 bool StepSolver::Work::covered(std::span<const Vec3> x, double room) const {
-  for (std::size_t v = 0; v < count_; ++v)
-    if (!(distance_to_segment(x[v], swept_from_[v], swept_[v]) <= room))
+  for (std::uint32_t v = 0; v < count_; ++v)
+    if (!covered(v, x[v], room))
       return false;
   return true;
 }
@@ -367,7 +379,7 @@ void StepSolver::Work::take(CondensedSystem& system, const Step& step, double pa
 /// \return whether anything was gained
 bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
   const Parameters& p = options_.parameters;
-  system.choose_reach(0);
+  system.choose_reach(led_ ? 0 : 1);
   Step step = take_step(system);
   // What is stiff is restored by a damped step, too; a part of a step would leave it as it is.
   double damping = 0;
@@ -378,9 +390,10 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
         damping > 0 ? p.damping_factor * damping : softest / std::max(step.free, p.least_reach);
     if (!(damping > 0) || !system.solve(gradient_, damping))
       break;
-    system.choose_reach(0);
+    system.choose_reach(led_ ? 0 : 1);
     step = take_step(system);
   }
+  system.require_descent(step.slope);
   const double slope = system.slope() + step.slope, here = system.energy(0) + contact;
   const double unsure = rounding * (std::abs(here) + std::abs(contact));
   const std::vector<Vec3> target = trial_;
@@ -437,13 +450,14 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
   if (!(near && solve_system(system, HessianMode::exact)) && !solve_system(system, from_afar) &&
       !solve_system(system, HessianMode::projected))
     throw NotSolved("contact: Newton's system is not positive definite");
-  if (system.share() > 0 && (balanced || iteration == 0) && follow_way(system, balanced))
+  if (led_ && system.share() > 0 && (balanced || iteration == 0) && follow_way(system, balanced))
     return true;
   return lower_energy(system, contact);
 }
 
-/// Moves all bodies under the forces found. \return whether their momenta are right
-bool StepSolver::Work::move_bodies(const CondensedSystem& system) {
+/// Moves all bodies under the forces found. \param ends  with the momenta that belong to them
+/// \return whether these are right
+bool StepSolver::Work::move_bodies(const CondensedSystem& system, bool ends) {
   find_pairs(at_);
   const double room =
       options_.parameters.momentum_room * std::min(d_hat_, smallest_gap(pairs_, at_));
@@ -452,7 +466,7 @@ bool StepSolver::Work::move_bodies(const CondensedSystem& system) {
     ContactBody& body = *island_.table.bodies[b];
     force_[b] = system.forces(b);
     body.move(system.share(), force_[b]);
-    exact = body.keep_momentum(room) && exact;
+    exact = (!ends || body.keep_momentum(room)) && exact;
   }
   return exact;
 }
@@ -490,109 +504,128 @@ bool StepSolver::Work::move_alone(std::span<const Vec3> to) {
   return true;
 }
 
+/// Moves the bodies to where the system has them and looks whether what was not watched on the way
+/// met anything. \param margin  of the candidates \return whether it met nothing; trial_ is where
+/// they are
+bool StepSolver::Work::follow_bodies(double margin) {
+  trial_.resize(count_);
+  read_positions(trial_);
+  if (!covered(trial_, margin / 2))
+    search(trial_, d_hat_ + margin);
+  return collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                        {0, 0, d_hat_, 1000}) >= 1;
+}
+
+/// Newton's method with one model of each body. Where vertices leave what was searched, it is
+/// searched again from there. \param exact  becomes whether momenta are right \return false: some
+/// met what nobody looked at; else trial_ is the end
+bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exact) {
+  const Parameters& p = options_.parameters;
+  auto system =
+      std::make_unique<CondensedSystem>(island_.table, vertices_, round.start, round.force,
+                                        round.energy, 1, p.ridge, inverses_, context_.cpu);
+  last_step_ = std::numeric_limits<double>::infinity();
+  bool converged = vertices_.empty();
+  if (converged)
+    system->advance(1);
+  int iteration = 0, lags = 0, searches = 0;
+  while (!converged) {
+    if (iteration >= (led_ ? p.max_led_iterations : p.max_iterations))
+      throw NotSolved("contact: Newton's method did not converge in " + std::to_string(iteration) +
+                      " iterations");
+    bool done = false;
+    const bool gained = iterate(*system, iteration, done);
+    ++iteration;
+    if (!gained && !done) {
+      // Nothing to be gained by the simple Hessian, perhaps by the projected one.
+      if (iteration <= p.gauss_newton) {
+        iteration = p.gauss_newton;
+        continue;
+      }
+      throw NotSolved("contact: no descent");
+    }
+    if (done) {
+      converged = lags >= p.max_lags || !lag_changes();
+      ++lags;
+    } else if (!std::ranges::all_of(
+                   vertices_, [&](std::uint32_t v) { return covered(v, at_[v], margin / 2); })) {
+      if (++searches > p.max_way_searches)
+        throw NotSolved("contact: bodies move farther than they were searched for");
+      (void)move_bodies(*system, false);
+      if (!follow_bodies(margin))
+        return false;
+      at_ = trial_;
+      search(round.to, d_hat_ + margin);
+      system = std::make_unique<CondensedSystem>(island_.table, vertices_, round.start, force_,
+                                                 round.energy, system->share(), p.ridge, inverses_,
+                                                 context_.cpu);
+      last_step_ = std::numeric_limits<double>::infinity();
+    }
+  }
+  report_.iterations += static_cast<std::uint64_t>(iteration);
+  report_.vertices = std::max(report_.vertices, system->unknowns() / 3);
+  exact = move_bodies(*system, true);
+  return follow_bodies(margin);
+}
+
 StepReport StepSolver::Work::run() {
   const Parameters& p = options_.parameters;
   const BodyTable& table = island_.table;
   const bool linear =
       std::ranges::all_of(table.bodies, [](const ContactBody* b) { return b->is_linear(); });
-  std::vector<Vec3> to(count_), start(count_), round_begin;
-  std::vector<std::vector<VertexForce>> round_force;
   for (const ContactBody* const body : table.bodies)
     force_.push_back(body->last_forces());
+  led_ = std::ranges::any_of(table.bodies, [](const ContactBody* b) { return b->is_led(); });
   double margin = margin_;
   bool may_be_alone = options_.h > 0 && !linear;
-  for (int round = 0; round < p.max_rounds; ++round) {
+  for (int number = 0; number < p.max_rounds; ++number) {
     if (context_.cancelled && context_.cancelled())
       throw Cancelled();
     ++report_.rounds;
-    round_force = force_;
-    double energy = 0;
+    Round round{std::vector<Vec3>(count_), std::vector<Vec3>(count_), 0, force_};
     for (std::size_t b = 0; b < table.bodies.size(); ++b)
-      energy += table.bodies[b]->linearise(
+      round.energy += table.bodies[b]->linearise(
           force_[b], std::span(way_).subspan(table.first[b], table.first[b + 1] - table.first[b]));
     for (std::size_t v = 0; v < count_; ++v) {
-      to[v] = at_[v] + way_[v];
-      start[v] = -way_[v];
+      round.to[v] = at_[v] + way_[v];
+      round.start[v] = -way_[v];
     }
-    round_begin = at_;
-    if (round == 0) {
-      search(to, d_hat_ + margin);
+    const std::vector<Vec3> round_begin = at_;
+    if (number == 0) {
+      search(round.to, d_hat_ + margin);
       if (vertices_.empty() && may_be_alone) {
-        if (move_alone(to))
+        if (move_alone(round.to))
           break;
         may_be_alone = false;
-        round = -1; // with new models
+        number = -1; // with new models
         continue;
       }
-      set_stiffness(energy, to);
+      set_stiffness(round.energy, round.to);
       find_pairs(at_);
       lag();
     }
     bool exact = true;
     for (int attempt = 0;; ++attempt) {
-      if (attempt > 0 || !covered(at_, margin / 2) || !covered(to, margin / 2)) {
-        search(to, d_hat_ + margin);
+      if (attempt > 0 || !covered(at_, margin / 2) || !covered(round.to, margin / 2)) {
+        search(round.to, d_hat_ + margin);
         find_pairs(at_);
       }
-      CondensedSystem system(table, vertices_, start, round_force, p.ridge, inverses_,
-                             context_.cpu);
-      bool converged = vertices_.empty();
-      last_step_ = std::numeric_limits<double>::infinity();
-      int iteration = 0, lags = 0;
-      if (vertices_.empty())
-        system.advance(1);
-      while (!converged) {
-        if (iteration >= p.max_iterations)
-          throw NotSolved("contact: Newton's method did not converge in " +
-                          std::to_string(iteration) + " iterations");
-        bool done = false;
-        const bool gained = iterate(system, iteration, done);
-        ++iteration;
-        if (!gained && !done) {
-          // Nothing to be gained by the simple Hessian, perhaps by the projected one.
-          if (iteration <= p.gauss_newton) {
-            iteration = p.gauss_newton;
-            continue;
-          }
-          throw NotSolved("contact: no descent");
-        }
-        if (done) {
-          converged = lags >= p.max_lags || !lag_changes();
-          ++lags;
-        }
-      }
-      report_.iterations += static_cast<std::uint64_t>(iteration);
-      report_.vertices = std::max(report_.vertices, system.unknowns() / 3);
-      exact = move_bodies(system);
-      trial_.resize(count_);
-      read_positions(trial_);
-      if (covered(trial_, margin / 2)) {
-        if (collision::collision_free_step(island_.surface, candidates_, at_, trial_,
-                                           {0, 0, d_hat_, 1000}) < 1)
-          throw NotSolved("contact: bodies pass each other where rounding moves them");
-        break;
-      }
-      // Some went where nobody looked: perhaps nothing was there.
-      std::swap(at_, round_begin);
-      search(trial_, d_hat_ + margin);
-      const double free = collision::collision_free_step(island_.surface, candidates_, at_, trial_,
-                                                         {0, 0, d_hat_, 1000});
-      std::swap(at_, round_begin);
-      if (free >= 1)
+      if (solve_round(round, margin, exact))
         break;
       if (attempt >= p.max_searches)
         throw NotSolved("contact: bodies move farther than they were searched for");
       margin *= 2;
+      force_ = round.force;
       at_ = round_begin;
-      to = trial_;
+      round.to = trial_;
     }
     const double change = largest_distance(trial_, round_begin);
     at_.swap(trial_);
-    if (linear || (round > 0 && exact && change <= p.round_tolerance * d_hat_))
+    if (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_))
       break;
-    if (round + 1 == p.max_rounds)
+    if (number + 1 == p.max_rounds)
       throw NotSolved("contact: bodies that are not linear did not come to rest in " +
-                      std::to_string(round + 1) + " rounds");
+                      std::to_string(number + 1) + " rounds");
   }
   find_pairs(at_);
   report_.pairs = pairs_.pairs.size();

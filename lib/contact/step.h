@@ -30,11 +30,11 @@ namespace gewebe::contact {
 /// Bodies that may touch each other, with their surfaces one behind the other.
 struct Island {
   BodyTable table;
-  collision::CollisionSurface surface;       ///< owner of a vertex: its body
-  collision::AllowedPairs allowed;           ///< by bodies
-  collision::OwnerTable<double> friction;    ///< Coulomb's coefficient, by bodies
-  double edge = 0;                           ///< median of the edges that may touch, mm
-  double activation_distance = 0;            ///< d_hat, mm
+  collision::CollisionSurface surface;    ///< owner of a vertex: its body
+  collision::AllowedPairs allowed;        ///< by bodies
+  collision::OwnerTable<double> friction; ///< Coulomb's coefficient, by bodies
+  double edge = 0;                        ///< median of the edges that may touch, mm
+  double activation_distance = 0;         ///< d_hat, mm
 };
 
 /// \param h  length of the step, s; 0: at rest
@@ -52,13 +52,13 @@ struct ContactForce {
 
 struct StepReport {
   std::uint64_t iterations = 0, rounds = 0, lags = 0;
-  std::uint64_t searches = 0;   ///< broad phases
-  std::uint64_t cuts = 0;       ///< iterations that collision detection shortened
+  std::uint64_t searches = 0; ///< broad phases
+  std::uint64_t cuts = 0;     ///< iterations that collision detection shortened
   std::uint64_t steps = 0, halvings = 0;
   std::uint64_t most_iterations = 0; ///< of one step
-  std::size_t pairs = 0;        ///< active at the end
-  std::size_t vertices = 0;     ///< unknowns of the last system over 3
-  double gap = 1e300;           ///< smallest, mm; 1e300 without pairs
+  std::size_t pairs = 0;             ///< active at the end
+  std::size_t vertices = 0;          ///< unknowns of the last system over 3
+  double gap = 1e300;                ///< smallest, mm; 1e300 without pairs
   double friction_residual = 0; ///< last change of a friction force over the largest pair force
 
   void add(const StepReport& more);

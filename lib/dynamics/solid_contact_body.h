@@ -43,6 +43,7 @@ public:
   bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
   bool solve_alone() override;
   void begin_again() override { motion_.begin_iterate_again(); }
+  bool is_led() const override { return motion_.moves_held(); }
   bool is_linear() const override { return false; }
   double typical_force() const override { return typical_force_; }
   double vertex_stiffness() const override { return stiffness_; }

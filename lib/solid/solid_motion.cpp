@@ -441,6 +441,10 @@ void SolidMotion::begin_iterate_again() {
   s.open->fresh = true;
 }
 
+bool SolidMotion::moves_held() const noexcept {
+  return state_->moved;
+}
+
 std::span<const double> SolidMotion::iterate() const noexcept {
   return state_->recovery.on() ? state_->recovery.soft().iterate()
                                : std::span<const double>(state_->open->found.at);

@@ -227,6 +227,8 @@ public:
   /// The iterate is where the step began, once more.
   void begin_iterate_again();
   std::span<const double> iterate() const noexcept; ///< 3 n
+  /// Whether the open step moves held axes.
+  bool moves_held() const noexcept;
   /// Ends the step at the iterate. \param forces  that act there, 3 n
   SolidStep end_step(std::span<const double> forces, const Context& context);
 

@@ -43,6 +43,7 @@ public:
                   std::span<contact::Block3> blocks) override;
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool keep_momentum(double room) override;
+  bool is_led() const override { return !state_.load->displacement.empty(); }
   double typical_force() const override { return typical_.force; }
   double vertex_stiffness() const override { return typical_.stiffness; }
 
