@@ -11,7 +11,7 @@ struct Parameters {
   /// ... but at most this part of an instrument's radius.
   double activation_over_radius = 1e-3;
   /// Margin of the broad phase, so that one set of candidates serves for a step.
-  double margin = 0.1;
+  double margin = 0.2;
   /// At rest: displacement below which friction is not yet fully developed.
   double stick_length = 1e-3;
 
@@ -24,10 +24,10 @@ struct Parameters {
 
   /// ... over the largest force of the last step: gaps stay a good part of d_hat.
   double last_share = 0.25;
-  /// The barrier becomes stiffer within a step where that share of a force is by the first factor
-  /// larger than the typical force, by at most the second one at a time: deep in the barrier
-  /// surfaces that slide on each other move only by about the root of gap times radius.
-  double soft_factor = 1.5, stiffness_factor = 10;
+  /// The barrier becomes stiffer within a step where that share of a force is larger than the
+  /// typical force, by at most this factor at a time: deep in the barrier surfaces that slide on
+  /// each other move only by about the root of gap times radius.
+  double stiffness_factor = 16;
 
   // ---- iterations
   /// Newton iterations of one round, then the step fails: models of bodies are not right far from

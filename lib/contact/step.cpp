@@ -31,6 +31,16 @@ double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& way) {
   return norm(p - a - t * way);
 }
 
+/// The next power of 4: the stiffness of the barrier stays from step to step while forces change
+/// little, so that what it stores is given back.
+double stepped(double force) {
+  int exponent = 0;
+  const double part = std::frexp(force, &exponent); // 0.5 <= part < 1
+  if (part == 0.5)
+    --exponent;
+  return std::ldexp(1, exponent + (exponent % 2 != 0 ? 1 : 0));
+}
+
 } // namespace
 
 void StepReport::add(const StepReport& more) {
@@ -186,16 +196,17 @@ void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
                                                        {0, p.kept_gap, d_hat_, 1000}) < 1)
       force = stop;
   }
-  typical_force_ = barrier_force_ = force;
-  kappa_ = force / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
+  typical_force_ = force;
+  barrier_force_ = stepped(force);
+  kappa_ = barrier_force_ / (barrier_at_half * d_hat_ * d_hat_ * d_hat_);
 }
 
 /// Makes the barrier stiffer where forces have become much larger than the typical one: deep in the
 /// barrier Newton's steps are short. \param force  largest of those that balance
 bool StepSolver::Work::raise_stiffness(double force) {
   const Parameters& p = options_.parameters;
-  const double wanted = p.last_share * force;
-  if (!(wanted > p.soft_factor * barrier_force_))
+  const double wanted = stepped(p.last_share * force);
+  if (!(wanted > barrier_force_))
     return false;
   const double factor = std::min(wanted / barrier_force_, p.stiffness_factor);
   barrier_force_ *= factor;
@@ -220,6 +231,9 @@ void StepSolver::Work::search(std::span<const Vec3> to, double reach) {
   use(candidates_.point_edge);
   use(candidates_.edge_edge);
   use(candidates_.point_triangle);
+  for (const FrictionPair& pair : friction_)
+    for (std::size_t k = 0; k < pair.count; ++k)
+      used[pair.vertex[k]] = 1;
   for (std::size_t b = 0; b < force_.size(); ++b)
     for (const VertexForce& f : force_[b])
       used[island_.table.first[b] + f.vertex] = 1;
@@ -381,8 +395,12 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
   const Parameters& p = options_.parameters;
   system.choose_reach(led_ ? 0 : 1);
   Step step = take_step(system);
-  // What is stiff is restored by a damped step, too; a part of a step would leave it as it is.
-  double damping = 0;
+  // What is stiff is restored by a damped step, too; a part of a step would leave it as it is. The
+  // one that is expected to lower the energy most is taken.
+  const auto gain = [&](const Step& of) {
+    return -of.free * (1 - of.free / 2) * (system.slope() + of.slope);
+  };
+  double damping = 0, best_damping = 0, most = gain(step);
   for (int k = 0; k < p.max_dampings && step.free < p.full_reach; ++k) {
     const double size = step.length * step.length;
     const double softest = size > 0 ? -(system.slope() + step.slope) / size : 0;
@@ -390,6 +408,15 @@ bool StepSolver::Work::lower_energy(CondensedSystem& system, double contact) {
         damping > 0 ? p.damping_factor * damping : softest / std::max(step.free, p.least_reach);
     if (!(damping > 0) || !system.solve(gradient_, damping))
       break;
+    system.choose_reach(led_ ? 0 : 1);
+    step = take_step(system);
+    if (gain(step) > most) {
+      most = gain(step);
+      best_damping = damping;
+    }
+  }
+  if (best_damping != damping) {
+    (void)system.solve(gradient_, best_damping);
     system.choose_reach(led_ ? 0 : 1);
     step = take_step(system);
   }
