@@ -130,7 +130,8 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
       return;
     for (std::size_t i = 0; i < k; ++i)
       for (std::size_t j = k; j < n; ++j)
-        if (vertices[i] == vertices[j] || surface.is_held(vertices[i], surface.owner[vertices[j]]) ||
+        if (vertices[i] == vertices[j] ||
+            surface.is_held(vertices[i], surface.owner[vertices[j]]) ||
             surface.is_held(vertices[j], surface.owner[vertices[i]]))
           return;
     const auto from = positions(x0, vertices), to = positions(x1, vertices);

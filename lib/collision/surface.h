@@ -26,7 +26,8 @@ struct CollisionSurface {
   /// owner. d_min of a pair is the sum of both sides'.
   std::vector<double> radius;
   std::vector<std::uint8_t> fixed; ///< by vertex: 1 if it never moves; empty: all move
-  /// By vertex: the owner that holds it, or no_owner; empty: none is held. What has a held vertex does not meet its holder.
+  /// By vertex: the owner that holds it, or no_owner; empty: none is held. What has a held vertex
+  /// does not meet its holder.
   std::vector<std::uint32_t> holder;
   // By complete_surface, as is what precedes where noted there:
   std::vector<std::uint32_t> lone_edges;  ///< numbers of edges of no triangle
@@ -34,7 +35,9 @@ struct CollisionSurface {
 
   std::size_t size() const noexcept { return rest.size(); }
   bool is_fixed(std::uint32_t vertex) const { return !fixed.empty() && fixed[vertex] != 0; }
-  bool is_held(std::uint32_t vertex, std::uint32_t by) const { return !holder.empty() && holder[vertex] == by; }
+  bool is_held(std::uint32_t vertex, std::uint32_t by) const {
+    return !holder.empty() && holder[vertex] == by;
+  }
 };
 
 /// Adds the edges of triangles, makes `edges` ascending and unique, `points` all vertices that are

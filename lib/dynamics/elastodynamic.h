@@ -105,7 +105,7 @@ private:
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
   CopyOnWrite<std::vector<NodeRow>> rows_, next_;
-  std::vector<Drive> drives_;             ///< by block; empty where nothing changes
+  std::vector<Drive> drives_; ///< by block; empty where nothing changes
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

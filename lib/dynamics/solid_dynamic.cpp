@@ -22,8 +22,8 @@ namespace {
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 /// In contact: of the surface's mean edge, for contact is not solved to rounding.
 constexpr double rest_in_contact = 1e-6;
-/// Length of a step, s, below which that is a speed: what begins to fall goes less than this far in a
-/// very short step.
+/// Length of a step, s, below which that is a speed: what begins to fall goes less than this far in
+/// a very short step.
 constexpr double rest_step = 1e-3;
 constexpr int quiet_steps = 2;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one

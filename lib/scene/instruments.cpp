@@ -13,7 +13,8 @@ namespace gewebe::simulation {
 
 namespace {
 
-/// Of its radius, by which an instrument may be inside: more than its shift (gewebe-contact(7), "Gap").
+/// Of its radius, by which an instrument may be inside: more than its shift (gewebe-contact(7),
+/// "Gap").
 constexpr double allowed_depth = 1e-3;
 
 void require_single(std::initializer_list<Vec3> all, double radius) {
@@ -110,8 +111,9 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
 
 namespace {
 
-/// Lets an instrument come to where it is from outside of what it would be in. It waits there since the last step, so that what
-/// moves or gives way in this one meets it, and takes no way from where it was.
+/// Lets an instrument come to where it is from outside of what it would be in. It waits there since
+/// the last step, so that what moves or gives way in this one meets it, and takes no way from where
+/// it was.
 void enter_from_outside(World& w, Instrument& i) {
   const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
   const double now = w.now.clock.time;
@@ -155,7 +157,8 @@ void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& 
     if (i.grips.empty())
       continue;
     const std::size_t dropped = std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
-      return grip.object == object && std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
+      return grip.object == object &&
+             std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
     });
     if (dropped > 0 && i.present && stands_inside(w, i))
       enter_from_outside(w, i); // it pushes what it held

@@ -24,7 +24,8 @@ std::vector<NodalContactForce> nodal_forces(std::span<const contact::IslandMembe
   return sums_of(std::move(all));
 }
 
-std::vector<contact::VertexForce> vertex_sums(std::span<const contact::IslandMember::Force> forces) {
+std::vector<contact::VertexForce>
+vertex_sums(std::span<const contact::IslandMember::Force> forces) {
   std::vector<contact::VertexForce> all;
   for (const contact::IslandMember::Force& f : forces)
     if (!all.empty() && all.back().vertex == f.vertex)
@@ -124,16 +125,21 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
   }
   object.statics->ahead = true;
   if (way_)
-    load_ = load_between(way_->from, way_->to, way_->stood, (to - way_->start) / (way_->end - way_->start));
+    load_ = load_between(way_->from, way_->to, way_->stood,
+                         (to - way_->start) / (way_->end - way_->start));
   else
     load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
-  StaticContactState state{&object.model(), &surface_.node, &load_, *object.shown.displacement, {},
+  StaticContactState state{&object.model(),
+                           &surface_.node,
+                           &load_,
+                           *object.shown.displacement,
+                           {},
                            [this, &object](std::span<const double> u) {
                              at_object(w_, object, [&] { require_bounded(object, u); });
                            }};
   for (const NodalContactForce& f : object.touching) {
-    const auto vertex = static_cast<std::uint32_t>(
-        std::ranges::lower_bound(surface_.node, f.node) - surface_.node.begin());
+    const auto vertex = static_cast<std::uint32_t>(std::ranges::lower_bound(surface_.node, f.node) -
+                                                   surface_.node.begin());
     if (!state.forces.empty() && state.forces.back().vertex == vertex)
       state.forces.back().force += f.force;
     else
@@ -241,8 +247,8 @@ std::vector<HeldNode> held_nodes(const World& w, const IslandParts& parts) {
   return all;
 }
 
-/// Tells a surface which of its vertices are held. \param offset  of the object's nodes in the surface's model
-/// \param first_instrument  piece of the island's first instrument
+/// Tells a surface which of its vertices are held. \param offset  of the object's nodes in the
+/// surface's model \param first_instrument  piece of the island's first instrument
 void hold_vertices(std::span<const HeldNode> held, std::size_t object, std::size_t offset,
                    std::span<const std::size_t> instruments, std::size_t first_instrument,
                    contact::ModelSurface& model) {
@@ -303,13 +309,13 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
     model.surface.pieces = static_cast<std::uint32_t>(body->parts.size());
     for (const std::uint32_t node : model.node) {
       std::uint32_t piece = 0;
-      while (piece + 1 < body->parts.size() &&
-             w.now.objects[body->parts[piece + 1]].offset <= node)
+      while (piece + 1 < body->parts.size() && w.now.objects[body->parts[piece + 1]].offset <= node)
         ++piece;
       model.surface.piece.push_back(piece);
     }
     for (const std::size_t part : body->parts)
-      hold_vertices(held, part, w.now.objects[part].offset, parts.instruments, first_instrument, model);
+      hold_vertices(held, part, w.now.objects[part].offset, parts.instruments, first_instrument,
+                    model);
     surfaces.push_back(&model.surface);
   }
   for (const std::size_t index : parts.statics) {
@@ -330,8 +336,8 @@ IslandCache& island_of(World& w, const IslandParts& parts) {
   made->held = std::move(held);
   made->used = latest + 1;
   if (w.islands.size() >= kept_islands)
-    w.islands.erase(std::ranges::min_element(
-        w.islands, {}, [](const auto& one) { return one->used; }));
+    w.islands.erase(
+        std::ranges::min_element(w.islands, {}, [](const auto& one) { return one->used; }));
   w.islands.push_back(std::move(made));
   return *w.islands.back();
 }
@@ -340,14 +346,14 @@ void make_members(World& w, const IslandParts& parts, const IslandCache& island,
                   std::span<const Pose> start, IslandMembers& members) {
   std::size_t model = 0;
   for (const auto& body : parts.bodies)
-    members.all.push_back(&members.bodies.emplace_back(w, *body, island.models[model++],
-                                                       island.instrument_of_piece));
+    members.all.push_back(
+        &members.bodies.emplace_back(w, *body, island.models[model++], island.instrument_of_piece));
   for (const std::size_t index : parts.statics)
     members.all.push_back(&members.statics.emplace_back(w, index, island.models[model++],
                                                         island.instrument_of_piece));
   for (std::size_t k = 0; k < parts.instruments.size(); ++k)
-    members.all.push_back(&members.instruments.emplace_back(w, parts.instruments[k],
-                                                            island.surfaces[k], start[k]));
+    members.all.push_back(
+        &members.instruments.emplace_back(w, parts.instruments[k], island.surfaces[k], start[k]));
 }
 
 void fail_contact(const World& w, const IslandParts& parts, const Error& error) {
@@ -379,9 +385,9 @@ Box3 box_between(const InstrumentShape& shape, const Pose& from, const Pose& to)
 
 std::size_t parts_of_way(const InstrumentShape& shape, const Pose& from, const Pose& to) {
   const double parts = path_length(shape, from, to) / (instrument_step * shape.radius);
-  return parts > 1 ? static_cast<std::size_t>(
-                         std::min(std::ceil(parts), static_cast<double>(most_parts)))
-                   : 1;
+  return parts > 1
+             ? static_cast<std::size_t>(std::min(std::ceil(parts), static_cast<double>(most_parts)))
+             : 1;
 }
 
 bool takes_instruments(World& w, Object& object) {

@@ -153,7 +153,8 @@ inline constexpr double instrument_step = 0.5;
 
 /// Between two loads; of prescribed displacements the way from where nodes stand.
 Load load_between(const Load& from, const Load& to, std::span<const double> shape, double part);
-/// The shape that is shown, as far as displaced nodes need it: of all nodes if one of them is inside.
+/// The shape that is shown, as far as displaced nodes need it: of all nodes if one of them is
+/// inside.
 std::vector<double> stood_shape(World& w, Object& object);
 /// \throw Error that names the island's objects
 [[noreturn]] void fail_contact(const World& w, const IslandParts& parts, const Error& error);

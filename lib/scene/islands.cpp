@@ -1,5 +1,5 @@
-// Islands: what may touch in a way of the scene steps together (contact/island.h), bodies that move,
-// elastostatic objects and instruments. What is far from everything moves by itself.
+// Islands: what may touch in a way of the scene steps together (contact/island.h), bodies that
+// move, elastostatic objects and instruments. What is far from everything moves by itself.
 
 #include "base/disjoint_sets.h"
 #include "base/vector_at.h"
@@ -98,9 +98,8 @@ struct Ways {
     const double fall = duration() * duration() * norm(w.now.gravity);
     if (b < objects) {
       const Extent other = of_object(b);
-      const double margin =
-          near_part * std::min(one.box.longest_side(), other.box.longest_side()) +
-          2 * duration() * (one.speed + other.speed) + fall;
+      const double margin = near_part * std::min(one.box.longest_side(), other.box.longest_side()) +
+                            2 * duration() * (one.speed + other.speed) + fall;
       return near(one.box, other.box, margin);
     }
     const double margin = near_part * one.box.longest_side() + 2 * duration() * one.speed + fall;
@@ -144,8 +143,7 @@ std::vector<IslandParts> islands_of(World& w, const Graph& graph, std::span<cons
   std::vector<IslandParts> islands;
   for (auto& [root, island] : by_root) {
     std::ranges::sort(island.instruments);
-    std::ranges::sort(island.bodies, {},
-                      [](const auto& body) { return body->parts[0]; });
+    std::ranges::sort(island.bodies, {}, [](const auto& body) { return body->parts[0]; });
     islands.push_back(std::move(island));
   }
   return islands;
@@ -322,9 +320,8 @@ std::vector<NodePair> advance_once(World& w, double to, const std::set<NodePair>
   std::vector<Body*> free;
   for (const auto& body : w.now.bodies)
     if (!in_island.contains(body.get())) {
-      if (std::ranges::any_of(body->parts, [&](std::size_t part) {
-            return !w.now.objects[part].touching.empty();
-          }))
+      if (std::ranges::any_of(
+              body->parts, [&](std::size_t part) { return !w.now.objects[part].touching.empty(); }))
         body->moving->wake(); // what touched it has gone
       body->moving->clear_contact();
       for (const std::size_t part : body->parts)
@@ -334,10 +331,10 @@ std::vector<NodePair> advance_once(World& w, double to, const std::set<NodePair>
   advance_freely(w, free, to);
   for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
     Instrument& i = w.now.instruments[k];
-    const bool with_statics = i.coupled && !i.stepped &&
-                              std::ranges::any_of(w.now.objects, [](const Object& object) {
-                                return object.method == Method::ffe;
-                              });
+    const bool with_statics =
+        i.coupled && !i.stepped && std::ranges::any_of(w.now.objects, [](const Object& object) {
+          return object.method == Method::ffe;
+        });
     if (i.coupled && !coupled.contains(k) && !with_statics)
       follow_hand(i, duration, to);
     if (!with_statics) {

@@ -94,8 +94,8 @@ struct Statics {
 
 /// What moves together: one elastodynamic object, or several that are attached to each other.
 struct Body {
-  std::vector<std::size_t> parts;         // objects
-  std::shared_ptr<const Model> model;     // of all parts
+  std::vector<std::size_t> parts;     // objects
+  std::shared_ptr<const Model> model; // of all parts
   std::unique_ptr<BodyMotion> moving;
   double safe = 0; // largest stable step
   bool changed = true;
@@ -140,7 +140,7 @@ struct Shown {
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
   std::shared_ptr<const DeferredShape>
-      deferred{};                          // what the displacement is, where it is not shaped
+      deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};
   double time = 0;
   bool posed = false;        // what is shown is a shape of ffe

@@ -234,8 +234,8 @@ void show(World& w, Object& object) {
     need_model(object);
   begin_showing(w, object);
   Shown& shown = object.shown;
-  const bool acted_on = object.statics->made() ||
-                        (!object.load->empty() && !is_held_altogether(object));
+  const bool acted_on =
+      object.statics->made() || (!object.load->empty() && !is_held_altogether(object));
   if (object.method == Method::ffe) {
     shown.contact.clear();
     object.touching.clear();

@@ -67,9 +67,8 @@ bool instrument_moves(const World& w, std::size_t k) {
 }
 
 bool touched_by(const Object& object, std::size_t instrument) {
-  return std::ranges::any_of(object.touching, [&](const NodalContactForce& f) {
-    return f.instrument == instrument;
-  });
+  return std::ranges::any_of(
+      object.touching, [&](const NodalContactForce& f) { return f.instrument == instrument; });
 }
 
 using ObjectPair = std::pair<std::size_t, std::size_t>;
@@ -140,9 +139,9 @@ std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
 
 bool needs_showing(World& w, const Group& group) {
   return group.moves || std::ranges::any_of(group.parts.statics, [&](std::size_t index) {
-    const Object& object = w.now.objects[index];
-    return !object.shown.valid || object.load->changes_until() > object.shown.time;
-  });
+           const Object& object = w.now.objects[index];
+           return !object.shown.valid || object.load->changes_until() > object.shown.time;
+         });
 }
 
 /// One group on its way through a step.
@@ -373,8 +372,8 @@ double winding(const contact::ModelSurface& surface, std::span<const Vec3> x, co
 }
 
 /// Whether an instrument is inside of a surface or passes it.
-bool is_inside(const InstrumentShape& shape, const Pose& pose,
-               const contact::ModelSurface& surface, std::span<const Vec3> x) {
+bool is_inside(const InstrumentShape& shape, const Pose& pose, const contact::ModelSurface& surface,
+               std::span<const Vec3> x) {
   const contact::BodySurface own = contact::instrument_surface(shape);
   std::vector<Vec3> y;
   Box3 box;

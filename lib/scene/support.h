@@ -17,17 +17,17 @@ enum class Way : std::uint8_t {
   two_step_stored, ///< its second stage known by its stiffness alone
   whole,
   cut,
-  solid,         ///< of tetrahedra, or with some
-  sprung,        ///< a solid with springs or central nodes beside its tetrahedra
-  net,           ///< of none
-  solid_motion,  ///< a solid that moves
-  warped,        ///< with large rotations
+  solid,        ///< of tetrahedra, or with some
+  sprung,       ///< a solid with springs or central nodes beside its tetrahedra
+  net,          ///< of none
+  solid_motion, ///< a solid that moves
+  warped,       ///< with large rotations
   filled        ///< a net that keeps the volume it encloses
 };
 inline constexpr std::array all_ways{
-    Way::explicit_motion, Way::implicit_motion, Way::attached,     Way::elastostatic,
-    Way::two_step,        Way::two_step_stored, Way::whole,        Way::cut,
-    Way::solid,           Way::sprung,          Way::net,          Way::solid_motion,
+    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
+    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
+    Way::solid,           Way::sprung,          Way::net,      Way::solid_motion,
     Way::warped,          Way::filled};
 
 /// What may act on an object, or be done to it.

@@ -31,8 +31,8 @@ struct World {
   Context context;
   SimulationOptions options;
   Scene now{};
-  bool saved = false;                 // under guard: a call that throws goes back
-  std::vector<std::size_t> renewed{}; // see Simulation::take_renewed
+  bool saved = false;                                  // under guard: a call that throws goes back
+  std::vector<std::size_t> renewed{};                  // see Simulation::take_renewed
   std::vector<std::shared_ptr<IslandCache>> islands{}; // surfaces of islands, see islands.cpp
 };
 

@@ -121,8 +121,7 @@ std::vector<Vec3> parting_directions(std::span<const SurfaceNode> group) {
   std::vector<Vec3> directions;
   for (const SurfaceNode& node : group) {
     const Vec3 off = normal - node.normal;
-    directions.push_back(
-        unit(norm(off) >= least_difference ? off : node.inward - inward));
+    directions.push_back(unit(norm(off) >= least_difference ? off : node.inward - inward));
   }
   return directions;
 }
@@ -165,7 +164,8 @@ void require_parted_holds(const World& w, const SetContact& c, const Motions& mo
       }
 }
 
-std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects, Motions& motions) {
+std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
+                                        Motions& motions) {
   SharedPlaces places(w, objects, motions);
   const double distance =
       moved_apart * contact::Parameters{}.activation_distance * places.median_edge();

@@ -64,7 +64,7 @@ private:
   std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
   bool all_still_ = false;
   bool stiffness_is_bound_ = false; ///< there are springs and no elements
-  bool alike_ = false; ///< the matrix is of nodes, and serves each axis
+  bool alike_ = false;              ///< the matrix is of nodes, and serves each axis
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;

@@ -41,8 +41,7 @@ bool DenseCholesky::factor(std::span<const double> matrix, std::size_t order, Cp
     return true;
   l_.resize(front_offset(order, order));
   for (std::size_t c = 0; c < order; ++c)
-    std::copy_n(matrix.data() + c * order + c, order - c,
-                front_column(l_.data(), order, c) + c);
+    std::copy_n(matrix.data() + c * order + c, order - c, front_column(l_.data(), order, c) + c);
   return eliminate({order, order, l_.data(), nullptr}, kernel_of(cpu), square_, strips_, least_);
 }
 

@@ -64,8 +64,9 @@ TEST(Coupled, AtRestSpringAndTissueShareTheWay) {
     // One balances the other; what moves still comes to rest, and tells means over steps.
     EXPECT_LE(norm(tool.force + k * lag), (method == Method::ffe ? 1e-4 : 1e-2) * norm(tool.force));
     EXPECT_LE(std::abs(depth(*led)), test::depth_allowed); // touches, but for d_hat
-    // Led there without a coupling it feels the same, but for the gap: the barrier's stiffness is of
-    // the forces on the way, so that gaps differ by some hundredths of d_hat, of 0.24 mm of dent.
+    // Led there without a coupling it feels the same, but for the gap: the barrier's stiffness is
+    // of the forces on the way, so that gaps differ by some hundredths of d_hat, of 0.24 mm of
+    // dent.
     held->apply(MoveInstrument{0, tool.pose.place, {}, 0.2});
     held->step(method == Method::ffe ? 0.2 : 1.5);
     held->step(0.1);

@@ -29,8 +29,9 @@ std::string fault(const Lines& lines) {
 
 TEST(SceneIntegration, WhatACutMakesElastodynamicChooses) {
   // Both sides of the hinge are held where the cut ends, so that no contact parts them.
-  const std::string refused = "error {}: nodes 17 of object a and 23 of object a stand at one place "
-                              "and are held there";
+  const std::string refused =
+      "error {}: nodes 17 of object a and 23 of object a stand at one place "
+      "and are held there";
   const auto error = [&](char line) {
     std::string text = refused;
     return text.replace(text.find("{}"), 2, 1, line);

@@ -330,10 +330,10 @@ TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
     for (const bool through : {false, true}) {
       Simulation s(one_thread(), {});
       s.add_object("bar", short_bar(false), method);
-      s.apply(CutObject{0, through ? slanted
-                                   : PlaneToCut{slanted.plane, nodes_where(s.model(0), [](const Vec3& p) {
-                                                  return p.z > 2;
-                                                })}});
+      s.apply(CutObject{
+          0, through ? slanted
+                     : PlaneToCut{slanted.plane,
+                                  nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
       const std::size_t last = s.object_count() - 1;
       ASSERT_EQ(last, through ? 1U : 0U);
       s.apply(SetContact{0, last, 0.8});
@@ -348,7 +348,8 @@ TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
       }
       EXPECT_FALSE(s.contact_forces(0).empty());
       if (through && method == Method::ela) { // else one tells means over its step
-        EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)), 1e-11 * norm(sum_of_forces(s, 0)));
+        EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)),
+                  1e-11 * norm(sum_of_forces(s, 0)));
       }
     }
 }

@@ -33,8 +33,8 @@ namespace {
 using namespace test;
 
 /// Part of the largest displacement to which shapes and forces agree: the forces at each vertex
-/// balance to force_tolerance of the largest one, which is but a tenth of what presses a face of ten
-/// or more vertices. With friction also its last change, all around the edge of a face alike.
+/// balance to force_tolerance of the largest one, which is but a tenth of what presses a face of
+/// ten or more vertices. With friction also its last change, all around the edge of a face alike.
 constexpr contact::Parameters contact_parameters;
 constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.force_tolerance;
 constexpr double friction_met =

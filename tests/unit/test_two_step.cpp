@@ -401,7 +401,8 @@ TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
       EXPECT_LT(difference(stages.shape(load), two.u), forces_met);
       ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
       for (std::size_t k = 0; k < two.forces.size(); ++k)
-        EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value), forces_met * largest);
+        EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
+                  forces_met * largest);
     }
 }
 
