@@ -87,8 +87,6 @@ public:
   /// C f at a cluster's nodes in their order, as add() adds it.
   std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
                              CpuLevel cpu) const;
-  /// By cluster, what no entry of C f there exceeds, by the largest entries that blocks may have.
-  std::vector<double> most(std::span<const ClusterLoad> loads) const;
 
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
@@ -122,7 +120,6 @@ private:
   std::vector<BlockPlace> at_;                                ///< of each block in its chunk
   std::vector<double> row_numbers_; ///< of a cluster's blocks with all others
   mutable std::vector<std::optional<Crosses>> chunks_;
-  mutable std::vector<double> most_; ///< by block: that no entry exceeds, of chunks that are read
   mutable std::uint64_t chunks_read_ = 0;
 };
 

@@ -56,7 +56,6 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
     fresh.resize(compliance_.rows());
   }
   weight_ = std::move(fresh);
-  weight_most_ = largest_size(weight_);
   weight_gravity_ = gravity;
   return weight_;
 }
@@ -152,26 +151,6 @@ void LoadAnswer::know_all() {
   for (std::size_t cluster = 0; cluster < part_->known.size(); ++cluster)
     know(cluster);
   part_.reset();
-}
-
-std::optional<NodeReach> LoadAnswer::reach(const Load& load) {
-  if (known(load) ? !part_ : !begin_part(load))
-    return std::nullopt;
-  NodeReach reach{part_->columns->cluster_of_node(), part_->columns->most(part_->loads)};
-  if (!weight_.empty())
-    for (double& most : reach.most)
-      most += weight_most_;
-  // Where forces act, by the answer itself: single entries are largest there, their sum isn't.
-  for (const ClusterLoad& own : part_->loads) {
-    know(own.cluster);
-    double most = 0;
-    for (const std::uint32_t node : part_->columns->layout().clusters.nodes(own.cluster))
-      for (std::size_t a = 0; a < 3; ++a)
-        most = std::max(most, std::abs(answer_[3 * std::size_t{node} + a]));
-    double& bound = reach.most[own.cluster];
-    bound = most <= bound ? most : bound;
-  }
-  return reach;
 }
 
 void LoadAnswer::copy_rows(const Load& load, std::span<const std::uint32_t> nodes,

@@ -6,7 +6,6 @@
 #include "compliance/compliance.h"
 #include "compliance/compressed_columns.h"
 #include "contact/load.h"
-#include "contact/node_reach.h"
 #include "model/model.h"
 
 #include <cmath>
@@ -35,9 +34,6 @@ public:
   bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
   /// The answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
-  /// Bounds of it, where it is a sum of compressed columns that nobody has asked for, so that some
-  /// rows take less than all; else none.
-  std::optional<NodeReach> reach(const Load& load);
   /// Its rows at these nodes, to their places in `u`: as whole() has them, to the bit.
   void copy_rows(const Load& load, std::span<const std::uint32_t> nodes, std::span<double> u);
   /// That to the weight alone; empty for none.
@@ -61,7 +57,6 @@ private:
   Compliance& compliance_;
   Vec3 weight_gravity_;
   std::vector<double> weight_;
-  double weight_most_ = 0;              ///< of its entries
   std::map<std::uint32_t, Vec3> force_; ///< that the answer is to
   Vec3 gravity_;
   std::vector<double> answer_;

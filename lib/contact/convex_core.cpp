@@ -20,7 +20,6 @@ constexpr double convex = 1e-5;
 constexpr double thin = 1e-3;
 constexpr double straight = 1e-9;
 constexpr double rounding = 1e-12;
-constexpr std::size_t in_block = 16;
 
 std::string text_of(const Vec3& p) {
   return rounded_text(p.x) + " " + rounded_text(p.y) + " " + rounded_text(p.z);

@@ -191,7 +191,7 @@ struct Object {
   CopyOnWrite<Load> load{};
   Stages stages;
   bool warp = false;                          // large rotations
-  bool meets = false;                         // one of the scene's meetings is of it
+  bool meets = false;                         // one of the scene's contacts is of it
   std::shared_ptr<const WarpedAnswer> warped; // the last one, that the next one starts from
   std::shared_ptr<Body> body;                 // of an elastodynamic object
   std::size_t offset = 0;                     // of its nodes in the body

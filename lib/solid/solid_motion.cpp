@@ -60,15 +60,10 @@ struct SolidMotion::State {
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
-  Numbers guess;                    ///< of the next step; empty: none
-  Numbers between;                  ///< of the load, among the body's nodes; empty: none
-  double slack = 0;                 ///< of energy, of these
-  double lent = 0, lent_before = 0; ///< of it so far, and when the last step began
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
   MotionRecovery recovery;
-  bool recovered = false; ///< since the last step
   /// A step in parts.
   struct Open {
     MotionObjective objective;
@@ -85,7 +80,7 @@ struct SolidMotion::State {
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
         energy(body, net, with), recovery(body, materials, net, with) {
     const std::size_t axes = body.axes();
-    now = {body.rest, Numbers(axes), Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
+    now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
   void take_over(SolidMotion& soft);
@@ -128,16 +123,11 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
 
 /// Speeds at the end of a step.
 void SolidMotion::State::limit(SolidStep& step) {
-  const double work = work_of_load(body, now.outer, now.place),
+  const double work = work_of_load(body, now.load, now.place),
                rounding =
                    energy.unsure_at_rest() + 1e-12 * (motion_energy(body, now.velocity) + elastic +
                                                       std::abs(allowed) + std::abs(work));
-  const double most = between.empty() ? allowed : allowed + std::max(0.0, slack - lent_before);
-  step.limited = limit_energy(body, now, elastic, most, rounding, between.empty());
-  const double growth = motion_energy(body, now.velocity) + elastic - work - allowed;
-  lent = between.empty() ? 0 : std::max(0.0, lent_before + growth);
-  if (const double left = growth + allowed - most; step.limited && !(left <= 2 * rounding))
-    step.excess = left;
+  step.limited = limit_energy(body, now, elastic, allowed, rounding);
 }
 
 /// What the body that moves meanwhile has come to.
@@ -151,12 +141,9 @@ void SolidMotion::State::take_over(SolidMotion& soft) {
 /// A step of recovery.
 SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   SolidMotion& soft = recovery.soft();
-  soft.set_load(now.load, {between, slack});
-  soft.set_tolerance(options.tolerance, options.max_rounds);
+  soft.set_load(now.load);
   if (std::exchange(moved, false))
     soft.move_held(target);
-  if (!guess.empty())
-    soft.guess(std::exchange(guess, {}));
   SolidStep step = soft.step(h, context);
   take_over(soft);
   last_step = h;
@@ -171,10 +158,6 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   quick.forget();
   forecast.clear();
   recovery.end();
-  recovered = true;
-  // It may never have taken a step: what is asked of one behind it is answered from here.
-  step.factorisations += quick.prepare(body, energy.springs(), now.held, h, options, context);
-  quick.turn(energy, context);
   return step;
 }
 
@@ -188,8 +171,6 @@ MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidSt
   if (last_step != h)
     forecast.clear();
   forecast.add_to(found.at, h * h, context);
-  if (!guess.empty())
-    found.at = std::exchange(guess, {});
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
     if (now.held[axis] != 0)
       found.at[axis] = moved ? body.rest[axis] + target[axis] : now.place[axis];
@@ -213,14 +194,8 @@ MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidSt
   return found;
 }
 
-void SolidMotion::set_load(std::span<const double> forces, const Between& between) {
-  State& s = *state_;
-  s.now.load.assign(forces.begin(), forces.end());
-  s.between.assign(between.forces.begin(), between.forces.end());
-  s.slack = between.slack;
-  s.now.outer = s.now.load;
-  if (!s.between.empty())
-    add(s.now.outer, -1, s.between);
+void SolidMotion::set_load(std::span<const double> forces) {
+  state_->now.load.assign(forces.begin(), forces.end());
 }
 
 void SolidMotion::hold(std::span<const std::uint8_t> held) {
@@ -250,14 +225,11 @@ SolidStep SolidMotion::step(double h, const Context& context) {
     return s.step_softly(h, context);
   SolidStep step;
   step.change = step.left = HUGE_VAL;
-  if (std::exchange(s.recovered, false))
-    ++step.factorisations; // another one answers again
   if (!s.options.reference)
     step.factorisations +=
         s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  s.lent_before = s.lent;
   s.allowed = motion_energy(s.body, s.now.velocity) + s.elastic -
-              work_of_load(s.body, s.now.outer, s.now.place);
+              work_of_load(s.body, s.now.load, s.now.place);
   const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
   MotionPoint found = s.search(objective, step, context);
   if (!std::isfinite(found.value))
@@ -280,10 +252,8 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(found.at);
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
-  if (!s.moved || !s.between.empty())
+  if (!s.moved)
     s.limit(step);
-  else
-    s.lent = 0;
   step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;
@@ -495,7 +465,6 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
   s.elastic = s.energy.elastic();
   s.last_step = h;
   s.moved = false;
-  s.lent = 0;
   open.counts.evaluations = open.objective.evaluations();
   open.counts.change = open.counts.left = 0;
   return open.counts;
@@ -528,116 +497,23 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
                           const Context& context) {
-  state_->quick.forget();
-  state_->recovery.end();
-  state_->lent_before = 0;
-  begin_again(places, velocity, context);
-}
-
-void SolidMotion::begin_again(std::span<const double> places, std::span<const double> velocity,
-                              const Context& context) {
   State& s = *state_;
+  s.quick.forget();
+  s.recovery.end();
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
   s.forecast.clear();
   s.energy.forget_bubbles();
   s.last_step = 0;
-  s.lent = s.lent_before;
-  if (s.recovery.on()) {
-    s.recovery.soft().begin_again(places, velocity, context);
-    s.elastic = s.recovery.elastic();
-    return;
-  }
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   s.energy.keep();
-}
-
-void SolidMotion::nudge(std::span<const double> displacement, const Context& context) {
-  State& s = *state_;
-  if (s.recovery.on()) {
-    s.recovery.soft().nudge(displacement, context);
-    s.take_over(s.recovery.soft());
-    return;
-  }
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0) {
-      s.now.place[axis] += displacement[axis];
-      s.now.velocity[axis] += displacement[axis] / s.last_step;
-    }
-  Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
-  s.energy.keep();
-}
-
-double SolidMotion::hold_back(std::span<const double> places, double part, const Context& context) {
-  State& s = *state_;
-  if (s.recovery.on()) {
-    const double excess = s.recovery.soft().hold_back(places, part, context);
-    s.take_over(s.recovery.soft());
-    return excess;
-  }
-  std::array<double, 3> mean{}; // way of the body as a whole
-  if (!s.now.any_held()) {
-    double mass = 0;
-    for (const double m : s.body.masses)
-      mass += m;
-    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-      mean[axis % 3] += s.body.masses[axis / 3] / mass * (s.now.place[axis] - places[axis]);
-  }
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0) {
-      const double whole = mean[axis % 3],
-                   way = whole + part * (s.now.place[axis] - places[axis] - whole);
-      s.now.place[axis] = places[axis] + way;
-      s.now.velocity[axis] = way / s.last_step;
-    }
-  Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
-  s.energy.keep();
-  s.forecast.clear();
-  SolidStep step;
-  s.limit(step);
-  return step.excess;
-}
-
-void SolidMotion::guess(std::span<const double> places) {
-  state_->guess.assign(places.begin(), places.end());
-}
-
-void SolidMotion::set_tolerance(double tolerance, int max_rounds) {
-  state_->options.tolerance = tolerance;
-  state_->options.max_rounds = max_rounds;
-}
-
-void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
-  if (state_->recovery.on()) {
-    state_->recovery.soft().respond(over_axes, context);
-    return;
-  }
-  Numbers all(over_axes.begin(), over_axes.end());
-  state_->quick.into_frames(all, context);
-  state_->quick.solve(all, context);
-  state_->quick.out_of_frames(all, context);
-  std::ranges::copy(all, over_axes.begin());
-}
-
-bool SolidMotion::take_tangent(const Context& context) {
-  State& s = *state_;
-  if (!s.quick.take_tangent(s.body, s.energy.springs(), s.now.place, context))
-    return false;
-  s.quick.fill(s.energy.volumes(), context);
-  return true;
-}
-
-void SolidMotion::drop_tangent() {
-  state_->quick.drop_tangent();
 }
 
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   if (s.recovery.on()) {
-    s.recovery.soft().set_load(s.now.load, {s.between, s.slack});
+    s.recovery.soft().set_load(s.now.load);
     s.recovery.soft().find_reactions(context);
     s.take_over(s.recovery.soft());
     return;
@@ -658,7 +534,7 @@ double SolidMotion::elastic_energy() const {
   return state_->elastic;
 }
 double SolidMotion::potential_energy() const {
-  return state_->elastic - work_of_load(state_->body, state_->now.outer, state_->now.place);
+  return state_->elastic - work_of_load(state_->body, state_->now.load, state_->now.place);
 }
 
 } // namespace gewebe

@@ -3,7 +3,6 @@
 #include "base/vector_at.h"
 #include "contact/instrument_surface.h"
 #include "contact/load.h"
-#include "contact/node_reach.h"
 #include "larger.h"
 #include "sim_models.h"
 
