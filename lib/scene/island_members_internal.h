@@ -167,7 +167,7 @@ std::size_t parts_of_way(const InstrumentShape& shape, const Pose& from, const P
 bool takes_instruments(World& w, Object& object);
 /// A coupled instrument that touches nothing follows its hand.
 void follow_hand(Instrument& i, double duration, double to);
-/// Box of the surface as it is shown.
-const Box3& shown_box(World& w, std::size_t object);
+/// Box of the surface of an object as it is shown.
+const Box3& shown_box(World& w, std::size_t index);
 
 } // namespace gewebe::simulation

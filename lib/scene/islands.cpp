@@ -252,9 +252,12 @@ void advance_island(World& w, IslandParts& island, double to) {
   const double h = duration / count;
   try {
     clear_jumps(w, island, *cache.motion, members, h);
-    for (double k = 0; k < count; ++k) {
-      const double end = k + 1 == count ? to : start + (k + 1) * h;
-      cache.motion->advance(members.all, start + k * h, end, w.context);
+    double taken = 0; // steps
+    while (taken < count) {
+      const double begin = start + taken * h;
+      ++taken;
+      const double end = taken == count ? to : start + taken * h;
+      cache.motion->advance(members.all, begin, end, w.context);
       if (end < to && has_come_to_rest(w, island, end, to)) {
         sleep_on(w, island, to - end);
         break;
