@@ -114,17 +114,16 @@ CompressedColumns::CompressedColumns(CompressedLayout layout, std::size_t nodes,
     : layout_(std::move(layout)), node_count_(nodes), reader_(std::move(reader)),
       place_(layout_.clusters.node.size()), at_(layout_.count.size()),
       row_numbers_(layout_.with_columns), chunks_(layout_.with_columns) {
-  std::vector<std::uint32_t> cluster(place_.size());
+  cluster_.resize(place_.size());
   for (std::size_t a = 0; a < layout_.clusters.size(); ++a) {
     const auto members = layout_.clusters.nodes(a);
     for (std::size_t k = 0; k < members.size(); ++k) {
-      cluster[members[k]] = static_cast<std::uint32_t>(a);
+      cluster_[members[k]] = static_cast<std::uint32_t>(a);
       place_[members[k]] = static_cast<std::uint32_t>(k);
     }
     if (a < layout_.with_columns)
       nodes_.insert(nodes_.end(), members.begin(), members.end());
   }
-  cluster_ = std::make_shared<const std::vector<std::uint32_t>>(std::move(cluster));
   std::sort(nodes_.begin(), nodes_.end());
   for (std::size_t a = 0; a < layout_.with_columns; ++a) {
     ChunkNumbers before;

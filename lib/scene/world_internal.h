@@ -217,13 +217,6 @@ void note_poses(World& w, std::optional<std::size_t> jumps = {});
 bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
-/// Whether what acts on it beside contact is other than shown. \pre shown.load is that of now
-bool acted_anew(const Object& object);
-inline bool touched_by_instruments(const Object& object) {
-  return std::ranges::any_of(object.shown.contact, [](const NodalContactForce& f) {
-    return f.instrument != other_surface;
-  });
-}
 void add_contact_forces(Object& object);
 
 // cuts.cpp: what they sever and what comes off

@@ -275,31 +275,6 @@ TEST(CompressedColumns, BlocksColumnsAndSumsAreOfOneMatrix) {
     EXPECT_NEAR(one[r], expected[r], 1e-13 * most);
 }
 
-TEST(CompressedColumns, ASumClusterByClusterIsTheWholeOne) {
-  for (const Body& body : {ball(1.5), net()})
-    for (const double relative : {1e-2, 1e-6}) {
-      const auto columns = compressed_columns(body.compress(relative), body.positions.size());
-      std::mt19937 random(5);
-      std::uniform_real_distribution<double> any(-1, 1);
-      std::vector<NodeVector> forces;
-      for (std::size_t k = 0; k < body.nodes.size(); k += 17)
-        forces.push_back({body.nodes[k], {any(random), any(random), 0}});
-      std::vector<double> whole(3 * body.positions.size());
-      columns->add(forces, {}, whole);
-      const std::vector<ClusterLoad> loads = columns->loads_of(forces);
-      const NodeClusters& clusters = columns->layout().clusters;
-      for (std::size_t b = 0; b < clusters.size(); ++b) {
-        const std::vector<double> own = columns->sum_at(b, loads, Context{}.cpu);
-        const auto members = clusters.nodes(b);
-        ASSERT_EQ(own.size(), 3 * members.size());
-        for (std::size_t k = 0; k < own.size(); ++k) {
-          EXPECT_EQ((*columns->cluster_of_node())[members[k / 3]], b);
-          EXPECT_EQ(own[k], whole[3 * std::size_t{members[k / 3]} + k % 3]);
-        }
-      }
-    }
-}
-
 /// Nothing is smooth here, so that every direction needs a cross.
 TEST(CompressedColumns, AnyMatrixIsWithinTheBound) {
   std::mt19937 random(4);

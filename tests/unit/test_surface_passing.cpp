@@ -23,8 +23,6 @@ namespace {
 
 using test::one_thread;
 
-constexpr double depth = 1e-4; ///< mm
-
 SolidModelOptions gel() {
   SolidModelOptions options;
   options.material.materials = {{"gel", 1e-3, 2e4, 1, 0.2, 0.4}};
