@@ -46,7 +46,9 @@ struct Parameters {
   /// times, by so many times more each time.
   int max_dampings = 6;
   double damping_factor = 6;
-  int max_lags = 30;          ///< renewals in one round
+  /// Renewals of friction's lag in one round where forces all but balance, then those between
+  /// solutions.
+  int max_way_lags = 100, max_lags = 30;
   int max_searches = 5;       ///< broad phases of one step, each with twice the margin
   int max_way_searches = 100; ///< ... where vertices leave what was searched
 

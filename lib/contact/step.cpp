@@ -143,6 +143,7 @@ private:
   double barrier_force_ = 0; ///< force at half of d_hat
   double last_step_ = 0;     ///< length of the last full step of Newton's method; else infinite
   bool rough_ = false;       ///< some pairs have friction
+  int way_lags_ = 0;         ///< renewals on the way
   bool led_ = false;         ///< some vertices go ways that nothing stops
   collision::Candidates candidates_;
   std::vector<std::uint32_t> vertices_;         ///< of candidates, and those with forces
@@ -459,10 +460,13 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
     return residual.difference <= tolerance * std::max(residual.largest, typical_force_);
   };
   // Normal forces that do not balance are none to hold anything by friction.
-  const bool lags = rough_ && iteration > 0 && balances(p.lag_tolerance);
+  const bool lags =
+      rough_ && iteration > 0 && way_lags_ < p.max_way_lags && balances(p.lag_tolerance);
   const bool stiffer = balances(p.way_tolerance) && raise_stiffness(residual.largest);
-  if (lags)
+  if (lags) {
     lag();
+    ++way_lags_;
+  }
   if (lags || stiffer) {
     std::ranges::fill(gradient_, Vec3{});
     contact = add_barrier_gradient(pairs_, at_, kappa_, gradient_) +
@@ -556,6 +560,7 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   if (converged)
     system->advance(1);
   int iteration = 0, lags = 0, searches = 0;
+  way_lags_ = 0;
   while (!converged) {
     if (iteration >= (led_ ? p.max_led_iterations : p.max_iterations))
       throw NotSolved("contact: Newton's method did not converge in " + std::to_string(iteration) +

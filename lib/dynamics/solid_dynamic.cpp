@@ -20,11 +20,9 @@ namespace gewebe {
 namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
-/// In contact: of the surface's mean edge, for contact is not solved to rounding.
-constexpr double rest_in_contact = 1e-6;
-/// Length of a step, s, below which that is a speed: what begins to fall goes less than this far in
-/// a very short step.
-constexpr double rest_step = 1e-3;
+/// In contact, mm/s: what sticks creeps with up to contact::Parameters::stick_speed, of which this
+/// is a twentieth.
+constexpr double rest_in_contact = 5e-3;
 constexpr int quiet_steps = 2;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
@@ -362,12 +360,6 @@ const contact::ModelSurface& SolidDynamic::collision_surface() {
   if (surface_)
     return *surface_;
   surface_ = contact::model_surface(model_);
-  double sum = 0;
-  for (const Triangle& t : model_.triangles)
-    for (std::size_t k = 0; k < 3; ++k)
-      sum += norm(model_.nodes[t[k]].position - model_.nodes[t[(k + 1) % 3]].position);
-  if (!model_.triangles.empty())
-    edge_ = sum / (3 * static_cast<double>(model_.triangles.size()));
   return *surface_;
 }
 
@@ -432,7 +424,7 @@ void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces
     take_over();
     return;
   }
-  const double room = rest_in_contact * edge_ * std::min(1.0, (to_ - from_) / rest_step);
+  const double room = rest_in_contact * (to_ - from_);
   settle(before, to_, forces.empty() ? 0 : room, context);
   take_over();
   state_.time = to_;

@@ -109,7 +109,6 @@ private:
   std::optional<SolidMotion> engine_;
   double last_step_ = 0; ///< of the engine
   std::optional<contact::ModelSurface> surface_;
-  double edge_ = 0;                              ///< mean of the surface's edges
   std::unique_ptr<SolidContactBody> body_;       ///< of the engine
   std::unique_ptr<contact::HeldBody> held_body_; ///< where all nodes are held
   std::vector<double> load_;                     ///< forces of the step, 3 n
