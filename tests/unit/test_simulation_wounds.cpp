@@ -167,11 +167,15 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
       }
       if (kind != Tool::sphere) // which reach out of the wound
         continue;
-      // Without the wound it is inside, where no surface is.
+      // Without the wound it would be inside: it enters from outside, and pushes the surface ahead.
       s.apply(Restore{0});
       for (int k = 0; k < 2; ++k)
         s.step(1.0 / 600);
-      EXPECT_TRUE(s.contact_forces(0).empty());
+      Vec3 pushed;
+      for (const NodeVector& f : s.contact_forces(0))
+        pushed += f.value;
+      EXPECT_GT(norm(pushed), 0);
+      EXPECT_LE(norm(pushed + s.instrument(0).force), 1e-9 * norm(pushed));
     }
 }
 
