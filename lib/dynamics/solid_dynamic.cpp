@@ -21,8 +21,8 @@ namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
 /// In contact, mm/s: what sticks creeps with up to contact::Parameters::stick_speed, of which this
-/// is a twentieth.
-constexpr double rest_in_contact = 5e-3;
+/// is a tenth.
+constexpr double rest_in_contact = 1e-2;
 constexpr int quiet_steps = 2;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
