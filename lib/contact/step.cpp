@@ -541,9 +541,15 @@ bool StepSolver::Work::move_alone(std::span<const Vec3> to) {
 bool StepSolver::Work::follow_bodies(double margin) {
   trial_.resize(count_);
   read_positions(trial_);
-  if (!covered(trial_, margin / 2))
-    search(trial_, d_hat_ + margin);
-  return collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+  if (covered(trial_, margin / 2))
+    return collision::collision_free_step(island_.surface, candidates_, at_, trial_,
+                                          {0, 0, d_hat_, 1000}) >= 1;
+  // From where all stood when it was searched: what was watched has gone on since, the rest has
+  // not.
+  at_.swap(swept_from_);
+  const std::vector<Vec3> from = at_;
+  search(trial_, d_hat_ + margin);
+  return collision::collision_free_step(island_.surface, candidates_, from, trial_,
                                         {0, 0, d_hat_, 1000}) >= 1;
 }
 
