@@ -37,19 +37,6 @@ struct Arguments {
   ResultChoice result;
 };
 
-/// Progress of the scene, where it is wanted. A scene that is typed has none: what is typed would
-/// stand behind the bar.
-void start_progress(std::optional<SceneProgress>& progress, cli::Run& run, const Arguments& in) {
-  cli::ProgressBar* const bar = run.progress_bar();
-  const bool typed = in.listen.empty() && in.scene == "-" && ::isatty(0) != 0;
-  if (bar == nullptr || (typed && !bar->always()))
-    return;
-  std::optional<double> end;
-  if (in.listen.empty()) // else clients make it last as long as they like
-    end = find_scene_end(in.scene);
-  progress.emplace(*bar, end);
-}
-
 void work(cli::Run& run, const Arguments& in) {
   if (!in.recover.empty())
     return report_recovered(run, recover_result(in.recover));
@@ -72,7 +59,7 @@ void work(cli::Run& run, const Arguments& in) {
   if (!in.latencies.empty())
     latency.log_to(in.latencies, run.output_options(false));
   std::optional<SceneProgress> progress;
-  start_progress(progress, run, in);
+  start_progress(progress, run.progress_bar(), in.scene, !in.listen.empty());
   std::optional<Input> input;
   if (reads)
     input.emplace(in.scene, false);

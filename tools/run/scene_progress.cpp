@@ -180,4 +180,12 @@ void SceneProgress::draw(double clock) {
   bar_.draw(left > 0 ? time_ / end : 1, figures);
 }
 
+void start_progress(std::optional<SceneProgress>& progress, cli::ProgressBar* bar,
+                    const std::string& scene, bool listens) {
+  const bool typed = !listens && scene == "-" && ::isatty(0) != 0;
+  if (bar == nullptr || (typed && !bar->always()))
+    return;
+  progress.emplace(*bar, listens ? std::nullopt : find_scene_end(scene));
+}
+
 } // namespace gewebe
