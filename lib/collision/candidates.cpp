@@ -130,7 +130,9 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
       return;
     for (std::size_t i = 0; i < k; ++i)
       for (std::size_t j = k; j < n; ++j)
-        if (vertices[i] == vertices[j])
+        if (vertices[i] == vertices[j] ||
+            surface.is_held(vertices[i], surface.owner[vertices[j]]) ||
+            surface.is_held(vertices[j], surface.owner[vertices[i]]))
           return;
     const auto from = positions(x0, vertices), to = positions(x1, vertices);
     const double distance = std::sqrt(squared_distance(feature_of(from, k), from));
@@ -228,8 +230,8 @@ std::vector<std::uint32_t> vertices_of(const Candidates& candidates) {
 
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
                            std::span<const Vec3> x0, std::span<const Vec3> x1,
-                           const Separation& separation) {
-  double step = 1;
+                           const Separation& separation, double t_max) {
+  double step = t_max;
   const auto shorten = [&](const auto& list, auto&& step_of) {
     for (const auto& vertices : list) {
       Separation of_pair = separation;

@@ -45,7 +45,8 @@ public:
   /// \pre complete_surface(surface)
   explicit BroadPhase(const CollisionSurface& surface);
 
-  /// Finds pairs of owners that may meet, without a vertex in common and not fixed as a whole,
+  /// Finds pairs of owners that may meet, without a vertex in common, not fixed as a whole and of
+  /// which none holds the other,
   /// whose distance at x0 exceeds d_min + reach by no more than their relative motion to x1.
   /// \param surface  the one of the constructor
   /// \param reach  mm
@@ -87,11 +88,11 @@ private:
 /// Vertices of all candidates, ascending, each once.
 std::vector<std::uint32_t> vertices_of(const Candidates& candidates);
 
-/// Largest step in [0, 1] along which all candidates keep their separation.
+/// Largest step in [0, t_max] along which all candidates keep their separation.
 /// \param separation  d_min is added to the sum of the pair's radii
 double collision_free_step(const CollisionSurface& surface, const Candidates& candidates,
                            std::span<const Vec3> x0, std::span<const Vec3> x1,
-                           const Separation& separation);
+                           const Separation& separation, double t_max = 1);
 
 /// d_min of a pair: the sum of both radii.
 inline double radius_sum(const CollisionSurface& surface, std::uint32_t first,

@@ -12,6 +12,8 @@
 
 namespace gewebe::collision {
 
+inline constexpr std::uint32_t no_owner = UINT32_MAX;
+
 /// A sphere is one point with a radius, a capsule one edge with a radius, a mesh its triangles.
 struct CollisionSurface {
   std::vector<Vec3> rest; ///< by vertex, mm
@@ -24,12 +26,18 @@ struct CollisionSurface {
   /// owner. d_min of a pair is the sum of both sides'.
   std::vector<double> radius;
   std::vector<std::uint8_t> fixed; ///< by vertex: 1 if it never moves; empty: all move
+  /// By vertex: the owner that holds it, or no_owner; empty: none is held. What has a held vertex
+  /// does not meet its holder.
+  std::vector<std::uint32_t> holder;
   // By complete_surface, as is what precedes where noted there:
   std::vector<std::uint32_t> lone_edges;  ///< numbers of edges of no triangle
   std::vector<std::uint32_t> lone_points; ///< points of no edge
 
   std::size_t size() const noexcept { return rest.size(); }
   bool is_fixed(std::uint32_t vertex) const { return !fixed.empty() && fixed[vertex] != 0; }
+  bool is_held(std::uint32_t vertex, std::uint32_t by) const {
+    return !holder.empty() && holder[vertex] == by;
+  }
 };
 
 /// Adds the edges of triangles, makes `edges` ascending and unique, `points` all vertices that are

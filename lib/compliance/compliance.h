@@ -78,9 +78,7 @@ public:
   /// that the tolerance allows are left out of sums of columns. \param forces ascending, of
   /// different nodes \param allowed mm, by which an entry may be wrong
   void add(std::span<const NodeVector> forces, double allowed, std::span<double> u);
-  /// Of which alone a sum with forces at these nodes would be; null: not of compressed ones.
-  const CompressedColumns* compressed_for(std::span<const std::uint32_t> nodes) const;
-  CpuLevel cpu() const noexcept { return context_.cpu; }
+
   /// u = C f in place, for right-hand sides over all axes one behind the other.
   void solve(std::span<double> over_axes, std::size_t columns = 1);
 
@@ -105,6 +103,8 @@ public:
   const ColumnCache& cache() const noexcept { return cache_; }
 
 private:
+  /// Of which alone a sum with forces at these nodes would be; null: not of compressed ones.
+  const CompressedColumns* compressed_for(std::span<const std::uint32_t> nodes) const;
   bool compressed(std::uint32_t node) const;
   std::size_t capacity() const noexcept; ///< nodes whose columns fit in memory, of the first m
   bool outer(std::uint32_t node) const noexcept { return 3 * std::size_t{node} < rows_; }

@@ -113,19 +113,17 @@ std::vector<std::uint8_t> bytes_of(const Crosses& chunk) {
 CompressedColumns::CompressedColumns(CompressedLayout layout, std::size_t nodes, ChunkReader reader)
     : layout_(std::move(layout)), node_count_(nodes), reader_(std::move(reader)),
       place_(layout_.clusters.node.size()), at_(layout_.count.size()),
-      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns),
-      most_(layout_.count.size()) {
-  std::vector<std::uint32_t> cluster(place_.size());
+      row_numbers_(layout_.with_columns), chunks_(layout_.with_columns) {
+  cluster_.resize(place_.size());
   for (std::size_t a = 0; a < layout_.clusters.size(); ++a) {
     const auto members = layout_.clusters.nodes(a);
     for (std::size_t k = 0; k < members.size(); ++k) {
-      cluster[members[k]] = static_cast<std::uint32_t>(a);
+      cluster_[members[k]] = static_cast<std::uint32_t>(a);
       place_[members[k]] = static_cast<std::uint32_t>(k);
     }
     if (a < layout_.with_columns)
       nodes_.insert(nodes_.end(), members.begin(), members.end());
   }
-  cluster_ = std::make_shared<const std::vector<std::uint32_t>>(std::move(cluster));
   std::sort(nodes_.begin(), nodes_.end());
   for (std::size_t a = 0; a < layout_.with_columns; ++a) {
     ChunkNumbers before;
@@ -161,8 +159,6 @@ const Crosses& CompressedColumns::chunk(std::size_t index) const {
       throw Error("compressed columns have a scale that is not finite");
   ++chunks_read_;
   kept.emplace(std::move(made));
-  for (std::size_t b = index; b < layout_.clusters.size(); ++b)
-    most_[first_block(layout_, index) + b - index] = largest_entry(view(index, b));
   return *kept;
 }
 
@@ -252,21 +248,6 @@ std::vector<double> CompressedColumns::sum_at(std::size_t cluster,
   for (const auto& [a, load] : loads)
     add_product(view(std::min(a, cluster), std::max(a, cluster)), a < cluster, load, cpu, sum);
   return sum;
-}
-
-std::vector<double> CompressedColumns::most(std::span<const ClusterLoad> loads) const {
-  constexpr double rounding = 1 + 1e-9;
-  std::vector<double> all(layout_.clusters.size());
-  for (const auto& [a, load] : loads) {
-    double size = 0;
-    for (const CrossLoad& f : load)
-      size += rounding * std::abs(f.value);
-    for (std::size_t b = 0; b < all.size(); ++b) {
-      const std::size_t low = std::min(a, b), high = std::max(a, b);
-      all[b] += size * most_[first_block(layout_, low) + high - low];
-    }
-  }
-  return all;
 }
 
 void CompressedColumns::read(std::size_t k, std::span<double> out) const {

@@ -18,7 +18,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -67,7 +66,7 @@ public:
   EntryBound bound() const override { return {layout_.relative, layout_.bound}; }
 
   bool has(std::uint32_t node) const {
-    return node < place_.size() && (*cluster_)[node] < layout_.with_columns;
+    return node < place_.size() && cluster_[node] < layout_.with_columns;
   }
   /// C between a node that has columns and any other of the first m, [axis][axis of the other];
   /// that of the two in the other order is its transpose, bit by bit.
@@ -77,18 +76,6 @@ public:
   /// u += C f over the first 3 m axes, for forces at nodes that have columns. The same bytes for
   /// any number of threads.
   void add(std::span<const NodeVector> forces, const Context& context, std::span<double> u) const;
-  // A sum like that cluster by cluster, for who needs few of them.
-  /// Of all nodes that columns have rows for.
-  const std::shared_ptr<const std::vector<std::uint32_t>>& cluster_of_node() const noexcept {
-    return cluster_;
-  }
-  /// The forces of a sum, by ascending clusters; reads what the sum needs.
-  std::vector<ClusterLoad> loads_of(std::span<const NodeVector> forces) const;
-  /// C f at a cluster's nodes in their order, as add() adds it.
-  std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
-                             CpuLevel cpu) const;
-  /// By cluster, what no entry of C f there exceeds, by the largest entries that blocks may have.
-  std::vector<double> most(std::span<const ClusterLoad> loads) const;
 
   /// Numbers that a sum with forces at these nodes takes from memory.
   double numbers(std::span<const std::uint32_t> nodes) const;
@@ -102,7 +89,12 @@ public:
   std::uint64_t chunks_read() const noexcept { return chunks_read_; }
 
 private:
-  std::uint32_t of(std::uint32_t node) const { return (*cluster_)[node]; }
+  std::uint32_t of(std::uint32_t node) const { return cluster_[node]; }
+  /// The forces of a sum, by ascending clusters; reads what the sum needs.
+  std::vector<ClusterLoad> loads_of(std::span<const NodeVector> forces) const;
+  /// C f at a cluster's nodes in their order.
+  std::vector<double> sum_at(std::size_t cluster, std::span<const ClusterLoad> loads,
+                             CpuLevel cpu) const;
   /// C is taken with the first of two nodes first, so that both orders have the same bits.
   bool is_before(std::uint32_t a, std::uint32_t b) const {
     return of(a) < of(b) || (of(a) == of(b) && place_[a] < place_[b]);
@@ -116,13 +108,12 @@ private:
   CompressedLayout layout_;
   std::size_t node_count_;
   ChunkReader reader_;
-  std::vector<std::uint32_t> nodes_;                          ///< that have columns
-  std::shared_ptr<const std::vector<std::uint32_t>> cluster_; ///< of a node
-  std::vector<std::uint32_t> place_;                          ///< of a node in its cluster
-  std::vector<BlockPlace> at_;                                ///< of each block in its chunk
-  std::vector<double> row_numbers_; ///< of a cluster's blocks with all others
+  std::vector<std::uint32_t> nodes_;   ///< that have columns
+  std::vector<std::uint32_t> cluster_; ///< of a node
+  std::vector<std::uint32_t> place_;   ///< of a node in its cluster
+  std::vector<BlockPlace> at_;         ///< of each block in its chunk
+  std::vector<double> row_numbers_;    ///< of a cluster's blocks with all others
   mutable std::vector<std::optional<Crosses>> chunks_;
-  mutable std::vector<double> most_; ///< by block: that no entry exceeds, of chunks that are read
   mutable std::uint64_t chunks_read_ = 0;
 };
 

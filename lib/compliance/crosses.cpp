@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 namespace gewebe {
@@ -275,25 +274,6 @@ void add_product_of(const CrossView& b, const T* from, const double* scale, std:
   }
 }
 
-/// Largest sizes of a triangle's numbers, times their scale; of crosses, the most that their type
-/// holds for both vectors, for so they are scaled.
-template <class T>
-double largest_of(const CrossView& b, const T* from, const double* scale, std::size_t count) {
-  constexpr double most = -static_cast<double>(std::numeric_limits<T>::min());
-  double sum = 0;
-  for (std::size_t k = 0; k < count; ++k, from += b.stride()) {
-    double size = most * most;
-    if (b.symmetric) {
-      int widest = 0;
-      for (std::size_t i = 0; i < b.stride(); ++i)
-        widest = std::max(widest, std::abs(int{from[i]}));
-      size = widest;
-    }
-    sum += std::abs(scale[k]) * size;
-  }
-  return sum;
-}
-
 } // namespace
 
 CrossCount append_crosses(std::span<double> rest, std::size_t rows, bool symmetric, double bound,
@@ -308,11 +288,6 @@ void add_entries(const CrossView& block, std::size_t row, std::size_t column, st
   add_entries_of(block, block.wide, block.scale, block.count.wide, row, column, size, to);
   add_entries_of(block, block.narrow, block.scale + block.count.wide, block.count.narrow, row,
                  column, size, to);
-}
-
-double largest_entry(const CrossView& block) {
-  return largest_of(block, block.wide, block.scale, block.count.wide) +
-         largest_of(block, block.narrow, block.scale + block.count.wide, block.count.narrow);
 }
 
 void add_product(const CrossView& block, bool transposed, std::span<const CrossLoad> x,

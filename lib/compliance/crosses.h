@@ -64,9 +64,6 @@ struct CrossLoad {
 void add_entries(const CrossView& block, std::size_t row, std::size_t column, std::size_t size,
                  double* to);
 
-/// What no entry of the block exceeds.
-double largest_entry(const CrossView& block);
-
 /// y += B x, or Bᵀ x with `transposed`, for a vector x of few numbers.
 /// \pre y.size() is the number of rows, or of columns
 void add_product(const CrossView& block, bool transposed, std::span<const CrossLoad> x,

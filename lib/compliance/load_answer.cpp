@@ -56,7 +56,6 @@ const std::vector<double>& LoadAnswer::weight(const Vec3& gravity) {
     fresh.resize(compliance_.rows());
   }
   weight_ = std::move(fresh);
-  weight_most_ = largest_size(weight_);
   weight_gravity_ = gravity;
   return weight_;
 }
@@ -89,16 +88,13 @@ bool LoadAnswer::follows(const Load& load, std::size_t changed) const {
 }
 
 const std::vector<double>& LoadAnswer::whole(const Load& load) {
-  if (known(load)) {
-    know_all();
+  if (known(load))
     return answer_;
-  }
   (void)weight(load.gravity);
   const std::vector<NodeVector> changed =
       load.gravity == gravity_ ? changed_forces(load.force) : std::vector<NodeVector>{};
   std::vector<double> fresh;
   if (follows(load, changed.size())) {
-    know_all();
     fresh = std::move(answer_);
     forget(); // should the sum fail
     compliance_.add(changed, 0, fresh);
@@ -110,80 +106,9 @@ const std::vector<double>& LoadAnswer::whole(const Load& load) {
     increments_ = 0;
   }
   answer_ = std::move(fresh);
-  part_.reset();
   gravity_ = load.gravity;
   force_ = load.force;
   return answer_;
-}
-
-/// The answer to this load with nothing of it known. \return whether it is found so
-bool LoadAnswer::begin_part(const Load& load) {
-  const CompressedColumns* const columns = compliance_.compressed_for(nodes_of(load.force));
-  if (columns == nullptr ||
-      (load.gravity == gravity_ && follows(load, changed_forces(load.force).size())))
-    return false;
-  (void)weight(load.gravity);
-  Part part{columns, columns->loads_of(as_vectors(load.force)), {}};
-  part.known.assign(columns->layout().clusters.size(), 0);
-  part_ = std::move(part);
-  answer_.resize(compliance_.rows());
-  increments_ = 0;
-  gravity_ = load.gravity;
-  force_ = load.force;
-  return true;
-}
-
-void LoadAnswer::know(std::size_t cluster) {
-  if (part_->known[cluster] != 0)
-    return;
-  const std::vector<double> sum = part_->columns->sum_at(cluster, part_->loads, compliance_.cpu());
-  const auto members = part_->columns->layout().clusters.nodes(cluster);
-  for (std::size_t k = 0; k < members.size(); ++k)
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::size_t row = 3 * std::size_t{members[k]} + a;
-      answer_[row] = (weight_.empty() ? 0 : weight_[row]) + sum[3 * k + a];
-    }
-  part_->known[cluster] = 1;
-}
-
-void LoadAnswer::know_all() {
-  if (!part_)
-    return;
-  for (std::size_t cluster = 0; cluster < part_->known.size(); ++cluster)
-    know(cluster);
-  part_.reset();
-}
-
-std::optional<NodeReach> LoadAnswer::reach(const Load& load) {
-  if (known(load) ? !part_ : !begin_part(load))
-    return std::nullopt;
-  NodeReach reach{part_->columns->cluster_of_node(), part_->columns->most(part_->loads)};
-  if (!weight_.empty())
-    for (double& most : reach.most)
-      most += weight_most_;
-  // Where forces act, by the answer itself: single entries are largest there, their sum isn't.
-  for (const ClusterLoad& own : part_->loads) {
-    know(own.cluster);
-    double most = 0;
-    for (const std::uint32_t node : part_->columns->layout().clusters.nodes(own.cluster))
-      for (std::size_t a = 0; a < 3; ++a)
-        most = std::max(most, std::abs(answer_[3 * std::size_t{node} + a]));
-    double& bound = reach.most[own.cluster];
-    bound = most <= bound ? most : bound;
-  }
-  return reach;
-}
-
-void LoadAnswer::copy_rows(const Load& load, std::span<const std::uint32_t> nodes,
-                           std::span<double> u) {
-  if (!known(load) && !begin_part(load))
-    (void)whole(load);
-  for (const std::uint32_t node : nodes) {
-    if (part_)
-      know((*part_->columns->cluster_of_node())[node]);
-    for (int a = 0; a < 3; ++a)
-      u[axis_of(node, a)] = answer_[axis_of(node, a)];
-  }
 }
 
 /// The answer over all axes, by a solve.

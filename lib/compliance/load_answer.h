@@ -4,16 +4,13 @@
 // a solid, behind the rows that the compliance's sums have, is solved for when it is asked for.
 
 #include "compliance/compliance.h"
-#include "compliance/compressed_columns.h"
 #include "contact/load.h"
-#include "contact/node_reach.h"
 #include "model/model.h"
 
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,11 +32,6 @@ public:
   bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
   /// The answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
-  /// Bounds of it, where it is a sum of compressed columns that nobody has asked for, so that some
-  /// rows take less than all; else none.
-  std::optional<NodeReach> reach(const Load& load);
-  /// Its rows at these nodes, to their places in `u`: as whole() has them, to the bit.
-  void copy_rows(const Load& load, std::span<const std::uint32_t> nodes, std::span<double> u);
   /// That to the weight alone; empty for none.
   const std::vector<double>& weight(const Vec3& gravity);
   /// Rows of the answer at all axes. The same bits whatever answers were asked for.
@@ -52,26 +44,15 @@ private:
   std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const;
   const std::vector<double>& everywhere(const Load& load);
   bool follows(const Load& load, std::size_t changed) const;
-  bool begin_part(const Load& load);
-  void know(std::size_t cluster);
-  void know_all();
   void forget() { gravity_ = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
 
   const Model& model_;
   Compliance& compliance_;
   Vec3 weight_gravity_;
   std::vector<double> weight_;
-  double weight_most_ = 0;              ///< of its entries
   std::map<std::uint32_t, Vec3> force_; ///< that the answer is to
   Vec3 gravity_;
   std::vector<double> answer_;
-  /// Of an answer that is known at some clusters of compressed columns alone.
-  struct Part {
-    const CompressedColumns* columns = nullptr;
-    std::vector<ClusterLoad> loads;
-    std::vector<std::uint8_t> known; ///< by cluster
-  };
-  std::optional<Part> part_;     ///< none: all of it is known
   std::uint64_t increments_ = 0; ///< by which it came to be
   Load solved_;                  ///< whose answer over all axes is known
   std::vector<double> everywhere_;

@@ -20,7 +20,6 @@ constexpr double convex = 1e-5;
 constexpr double thin = 1e-3;
 constexpr double straight = 1e-9;
 constexpr double rounding = 1e-12;
-constexpr std::size_t in_block = 16;
 
 std::string text_of(const Vec3& p) {
   return rounded_text(p.x) + " " + rounded_text(p.y) + " " + rounded_text(p.z);
@@ -215,19 +214,6 @@ std::array<double, 2> weights_on_segment(const Vec3& p, const Vec3& a, const Vec
   return {1 - along / square, along / square};
 }
 
-ConvexCore::Blocks::Blocks(std::vector<Box3> boxes) : own(std::move(boxes)) {
-  std::vector<Vec3> middle;
-  for (const Box3& b : own)
-    middle.push_back(b.min + b.max);
-  blocks = block_order(middle, in_block);
-  around.resize(blocks.first.size() - 1);
-  for (std::size_t b = 0; b < around.size(); ++b)
-    for (std::size_t k = blocks.first[b]; k < blocks.first[b + 1]; ++k) {
-      around[b].add(own[blocks.order[k]].min);
-      around[b].add(own[blocks.order[k]].max);
-    }
-}
-
 ConvexCore::ConvexCore(const TriangleMesh& mesh) {
   const Triangles triangles(mesh);
   const double size = triangles.size();
@@ -287,19 +273,10 @@ ConvexCore::ConvexCore(const TriangleMesh& mesh) {
     const bool forward = (at + 1 == loop.end() ? loop.front() : *(at + 1)) == ends[1];
     edges_.push_back({ends[0], ends[1], both[forward ? 0 : 1], both[forward ? 1 : 0]});
   }
-  std::vector<Box3> corner_boxes, edge_boxes;
   for (const Vec3& p : corners_) {
     box_.add(p);
     reach_ = std::max(reach_, norm(p));
-    corner_boxes.push_back({p, p});
   }
-  for (const Edge& e : edges_) {
-    Box3& box = edge_boxes.emplace_back();
-    box.add(corners_[e.a]);
-    box.add(corners_[e.b]);
-  }
-  corner_blocks_ = Blocks(std::move(corner_boxes));
-  edge_blocks_ = Blocks(std::move(edge_boxes));
 }
 
 ConvexCore::Nearest ConvexCore::nearest(const Vec3& p) const {
@@ -335,44 +312,6 @@ ConvexCore::Nearest ConvexCore::nearest(const Vec3& p) const {
     }
   }
   return found;
-}
-
-bool ConvexCore::meets(const std::array<Vec3, 3>& triangle) const {
-  Box3 box;
-  for (const Vec3& p : triangle)
-    box.add(p);
-  if (!near(box, box_))
-    return false;
-  // What is left of it behind each plane (I. Sutherland, G. Hodgman, Reentrant polygon clipping,
-  // 1974), a hair inside.
-  const double hair = rounding * size();
-  std::vector<Vec3> left(triangle.begin(), triangle.end()), next;
-  for (const Face& f : faces_) {
-    const auto height = [&](const Vec3& p) { return dot(f.normal, p) - f.offset + hair; };
-    next.clear();
-    for (std::size_t k = 0; k < left.size(); ++k) {
-      const Vec3 &a = left[k], &b = left[(k + 1) % left.size()];
-      const double ha = height(a), hb = height(b);
-      if (ha < 0)
-        next.push_back(a);
-      if ((ha < 0) != (hb < 0))
-        next.push_back(a + ha / (ha - hb) * (b - a));
-    }
-    left.swap(next);
-    if (left.empty())
-      return false;
-  }
-  return true;
-}
-
-bool ConvexCore::leads_in_from_corner(std::uint32_t corner, const Vec3& way) const {
-  return std::ranges::all_of(faces_at_[corner],
-                             [&](std::uint32_t f) { return dot(faces_[f].normal, way) < 0; });
-}
-
-bool ConvexCore::leads_in_from_edge(std::uint32_t edge, const Vec3& way) const {
-  return dot(faces_[edges_[edge].left].normal, way) < 0 &&
-         dot(faces_[edges_[edge].right].normal, way) < 0;
 }
 
 } // namespace gewebe

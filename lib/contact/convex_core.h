@@ -4,7 +4,6 @@
 
 #include "base/mesh.h"
 #include "base/vec3.h"
-#include "contact/box_blocks.h"
 #include "contact/instrument.h"
 
 #include <array>
@@ -48,49 +47,17 @@ public:
   double reach() const noexcept { return reach_; }
 
   Nearest nearest(const Vec3& p) const;
-  /// Whether a triangle comes into it, deeper than rounding.
-  bool meets(const std::array<Vec3, 3>& triangle) const;
-  /// Whether a way from a corner or from the midst of an edge leads inside.
-  bool leads_in_from_corner(std::uint32_t corner, const Vec3& way) const;
-  bool leads_in_from_edge(std::uint32_t edge, const Vec3& way) const;
-
-  /// Call visit(number) for all corners, or edges, that may be in the box.
-  template <class Visit>
-  void visit_corners(const Box3& box, Visit&& visit) const {
-    corner_blocks_.visit(box, visit);
-  }
-  template <class Visit>
-  void visit_edges(const Box3& box, Visit&& visit) const {
-    edge_blocks_.visit(box, visit);
-  }
-
   bool operator==(const ConvexCore& other) const {
     return corners_ == other.corners_ && faces_ == other.faces_;
   }
 
 private:
-  struct Blocks {
-    BlockOrder blocks;
-    std::vector<Box3> around, own; ///< of each block, of each thing
-
-    explicit Blocks(std::vector<Box3> boxes = {});
-    template <class Visit>
-    void visit(const Box3& box, Visit&& visit) const {
-      for (std::size_t b = 0; b < around.size(); ++b)
-        if (near(box, around[b]))
-          for (std::size_t k = blocks.first[b]; k < blocks.first[b + 1]; ++k)
-            if (near(box, own[blocks.order[k]]))
-              visit(blocks.order[k]);
-    }
-  };
-
   std::vector<Vec3> corners_;
   std::vector<Face> faces_;
   std::vector<Edge> edges_;
   std::vector<std::vector<std::uint32_t>> faces_at_; ///< by corner
   Box3 box_;
   double reach_ = 0;
-  Blocks corner_blocks_, edge_blocks_;
 };
 
 /// Weights of a and b at the point between them that is nearest to p.

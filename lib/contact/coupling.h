@@ -38,26 +38,6 @@ struct CouplingStep {
   Vec3 lag(const Vec3& force) const { return free - compliance * force; }
 };
 
-/// An instrument that a hand leads so, while something moves.
-struct LedInstrument {
-  Coupling coupling;
-  Vec3 place;  ///< of the instrument now
-  Vec3 lag;    ///< e behind the last step
-  Vec3 force;  ///< on it in the last step, of what moves
-  Vec3 others; ///< of all else, which stays
-
-  /// Where it is behind a step, with the hand at `hand`, if it feels what it felt.
-  Vec3 guess(const Vec3& hand, double h) const {
-    return hand - CouplingStep(coupling, lag, h).lag(force + others);
-  }
-  /// It felt this force instead.
-  void settle(const Vec3& hand, double h, const Vec3& felt) {
-    force = felt;
-    lag = CouplingStep(coupling, lag, h).lag(force + others);
-    place = hand - lag;
-  }
-};
-
 /// Of the radius: an instrument that is led no further in a step has come to rest.
 inline constexpr double led_to_rest = 1e-9;
 

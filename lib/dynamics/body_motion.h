@@ -4,12 +4,10 @@
 
 #include "base/context.h"
 #include "base/error.h"
+#include "contact/contact_body.h"
+#include "contact/island.h"
 #include "contact/load.h"
-#include "contact/surface_pairs.h"
-#include "dynamics/dynamic_contact.h"
 #include "dynamics/spring_force.h"
-#include "dynamics/standing.h"
-#include "statics/static_contact.h"
 
 #include <any>
 #include <cstdint>
@@ -40,7 +38,6 @@ struct SolidStepCounts {
   std::uint64_t unfinished = 0; ///< steps whose rounds ran out
   std::uint64_t limited = 0;    ///< steps whose speeds were lowered, see SolidMotion::step
   double seconds = 0;           ///< by the clock
-  TouchCounts touches;
 };
 
 struct MotionEnergies {
@@ -86,31 +83,21 @@ public:
   /// axes that the model holds.
   virtual std::vector<NodeVector> contact_forces() const = 0;
 
-  /// Instruments during the advances to come, by number; none of them: no cost. Wakes nobody.
-  virtual void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) = 0;
-  /// One that is led, behind the last advance.
-  virtual std::optional<LedInstrument> led(std::size_t instrument) const = 0;
-  /// Parts whose surfaces may touch each other, or themselves, from now on. Wakes nobody.
-  /// \pre it moves by the steps of solids, or there are none
-  virtual void set_meetings(std::vector<SurfaceMeeting> meetings) = 0;
-  /// Elastostatic objects that it may touch stand beside it from now on; their nodes come behind
-  /// its own wherever something touches. \pre before set_meetings, once, by the steps of solids
-  virtual void stand_beside(const StandingStart& start) { (void)start; }
-  /// How they stand during the advances to come. \pre some stand beside it; lives that long
-  virtual void set_standing(Standing* beside) { (void)beside; }
-  /// Displacements of their nodes behind the last advance.
-  virtual std::span<const double> standing_shape() const { return {}; }
-  /// What touched them in the last step, by their own numbers.
-  virtual std::vector<NodeTouch> standing_touches() const { return {}; }
-  /// That it rests for `duration` s more, in place of an advance. \pre resting()
-  virtual void rest_on(double duration) = 0;
-  /// Impulses (forces times s) of the instruments since the last call, by ascending node and
-  /// instrument.
-  virtual std::vector<NodeTouch> take_impulses() = 0;
-  /// Whether the forces of instruments in implicit steps so far meet the conditions.
-  virtual bool touches_exact() const = 0;
-  /// The forces of the instruments, if it rested for these last `duration` s, all since that call.
-  virtual std::optional<std::vector<NodeTouch>> held_touches(double duration) const = 0;
+  // ---- contact
+
+  /// Whether it can make steps with contact.
+  virtual bool has_contact_steps() const { return false; }
+  /// Its collision surface, by nodes of the model. \pre has_contact_steps()
+  virtual const contact::ModelSurface& collision_surface();
+  /// Begins a step with contact. A step that was begun and not ended leaves no trace.
+  /// \return valid until the step ends \pre has_contact_steps(), to > from \throw as advance
+  virtual contact::ContactBody& begin_contact_step(double from, double to, const Context& context);
+  /// Ends it. \param forces  contact forces on vertices, by ascending vertex
+  /// \param still  velocities stay as they were, and so does the time
+  virtual void end_contact_step(std::span<const contact::VertexForce> forces, bool still,
+                                const Context& context);
+  /// A step without contact came behind steps with it.
+  virtual void clear_contact() {}
 
   /// Of what moves by the steps of solids, since the last call.
   virtual SolidStepCounts take_counts() { return {}; }

@@ -17,7 +17,7 @@ namespace gewebe {
 
 namespace {
 
-constexpr double rest_tolerance = 1e-15, same_duration = 1e-9;
+constexpr double rest_tolerance = 1e-15;
 constexpr double max_steps = 1e9;
 // Springs times steps, and springs, below which a thread costs more than it gains.
 constexpr double pulls_of_a_thread = 2e6;
@@ -166,8 +166,7 @@ void Elastodynamic::set_motion(std::span<const NodeMotion> motion) {
 }
 
 Elastodynamic::State Elastodynamic::state() const {
-  return {load_, time_,    loaded_,
-          rows_, resting_, touch_ ? std::optional(touch_->state()) : std::nullopt};
+  return {load_, time_, loaded_, rows_, resting_};
 }
 
 void Elastodynamic::restore(const State& state) {
@@ -178,10 +177,6 @@ void Elastodynamic::restore(const State& state) {
   }
   time_ = state.time;
   resting_ = state.resting;
-  if (!state.touch)
-    touch_.reset();
-  else
-    touch_->restore(*state.touch);
   rows_ = state.rows;
   copy_held_rows();
   motion_shown_ = false;
@@ -218,35 +213,25 @@ Vec3 Elastodynamic::outer_force(std::uint32_t node, double time) const {
   return vector_of(traits_[row].constant);
 }
 
-bool Elastodynamic::found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const {
-  if (load_->changes_until() > time || (touch_ && !touch_->still(time, h)))
+bool Elastodynamic::found_at_rest(double h, double time) const {
+  if (load_->changes_until() > time)
     return false;
   const double speed = rest_tolerance * size_ / h, acceleration = speed / h;
   for (const NodeRow& row : *rows_)
     if (!within(vector_of(row.v), speed))
       return false;
   const std::span<const NodeMotion> now = motion();
-  std::vector<Vec3> left(layout_.movable);
-  bool balanced = true;
-  for (std::uint32_t row = 0; row < layout_.movable && (balanced || touch_); ++row) {
+  for (std::uint32_t row = 0; row < layout_.movable; ++row) {
     const Vec3 inverse = vector_of(traits_[row].inverse_mass);
     if (inverse == Vec3{})
       continue;
     const std::uint32_t node = layout_.node_of_row[row];
     const Vec3 outer = drives_.empty() ? vector_of(traits_[row].constant) : outer_force(node, time);
     const Vec3 force = spring_force(network_, now, node) + outer;
-    const Vec3 a{force.x * inverse.x, force.y * inverse.y, force.z * inverse.z};
-    left[row] = a;
-    balanced = balanced && within(a, acceleration);
+    if (!within({force.x * inverse.x, force.y * inverse.y, force.z * inverse.z}, acceleration))
+      return false;
   }
-  if (touch_ && touch_->inside(traits_, *rows_))
-    return false;
-  if (balanced)
-    return true;
-  if (!touch_)
-    return false;
-  touch_->balance(traits_, *rows_, left, touches);
-  return std::ranges::all_of(left, [&](const Vec3& a) { return within(a, acceleration); });
+  return true;
 }
 
 std::uint64_t Elastodynamic::advance(double duration, double largest_step, const Context& context,
@@ -259,12 +244,7 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
     throw Error("a step of this length takes over 1e9 integration steps, expected fewer");
   const double count = std::max(1.0, std::ceil(exact));
   const double h = duration / count;
-  std::vector<NodeTouch> touches;
-  if (found_at_rest(h, start, touches)) {
-    if (touch_) {
-      touch_->hold(std::move(touches));
-      touch_->stay(duration);
-    }
+  if (found_at_rest(h, start)) {
     for (NodeRow& row : rows_.write())
       std::fill(std::begin(row.v), std::end(row.v), 0.0);
     motion_shown_ = false;
@@ -273,8 +253,6 @@ std::uint64_t Elastodynamic::advance(double duration, double largest_step, const
   }
   const auto steps = static_cast<std::uint64_t>(count);
   motion_shown_ = false;
-  if (touch_)
-    touch_->hold({});
   run_steps(steps, h, start, context);
   time_ = start + duration;
   return steps;
@@ -301,8 +279,6 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
     std::uint64_t s = 0;
     for (bool stop = false; s < steps && !stop; ++s) {
       const double time = start + static_cast<double>(s) * h;
-      const ContactMoment moment = touch_ ? touch_->moment(s, steps, time, h) : ContactMoment{};
-      const bool look = touch_ && touch_->due(moment);
       for (std::size_t b = first; b < last; ++b) {
         if (!step_block(b, now, next, h, time, context.cpu))
           odd[s % 2].store(true, std::memory_order_relaxed);
@@ -310,12 +286,6 @@ void Elastodynamic::run_steps(std::uint64_t steps, double h, double start, const
       if (thread == 0 && context.cancelled && context.cancelled())
         cancelled[s % 2].store(true, std::memory_order_relaxed);
       point.meet(round);
-      if (look) {
-        if (thread == 0)
-          touch_->keep_out(moment, traits_, {now, layout_.rest.size()},
-                           {next, layout_.rest.size()});
-        point.meet(round);
-      }
       stop = odd[s % 2].load(std::memory_order_relaxed) ||
              cancelled[s % 2].load(std::memory_order_relaxed);
       std::swap(now, next);
@@ -353,37 +323,6 @@ bool Elastodynamic::step_block(std::size_t block, const NodeRow* now, NodeRow* n
       put(u, next[row].u);
     }
   return finite;
-}
-
-void Elastodynamic::set_instruments(std::vector<std::optional<MovingInstrument>> instruments) {
-  if (!touch_ && !instruments.empty())
-    touch_ = std::make_unique<DynamicContact>(model_, layout_);
-  if (touch_)
-    touch_->begin(std::move(instruments));
-}
-
-std::optional<LedInstrument> Elastodynamic::led(std::size_t instrument) const {
-  return touch_ ? touch_->led(instrument) : std::nullopt;
-}
-
-void Elastodynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
-  if (!meetings.empty())
-    throw Error("moves by explicit steps, expected integration=implicit or auto for contact");
-}
-
-void Elastodynamic::rest_on(double duration) {
-  if (touch_)
-    touch_->stay(duration);
-}
-
-std::vector<NodeTouch> Elastodynamic::take_impulses() {
-  return touch_ ? touch_->take() : std::vector<NodeTouch>{};
-}
-
-std::optional<std::vector<NodeTouch>> Elastodynamic::held_touches(double duration) const {
-  if (!touch_ || !(touch_->held_time() >= duration * (1 - same_duration)))
-    return std::nullopt;
-  return touch_->held();
 }
 
 void Elastodynamic::fail(double time, const char* what) const {

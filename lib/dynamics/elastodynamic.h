@@ -13,7 +13,6 @@
 #include "base/copy_on_write.h"
 #include "contact/load.h"
 #include "dynamics/body_motion.h"
-#include "dynamics/dynamic_contact.h"
 #include "dynamics/spring_force.h"
 #include "dynamics/spring_layout.h"
 #include "model/model.h"
@@ -56,7 +55,6 @@ public:
     double time = 0, loaded = 0;
     CopyOnWrite<std::vector<NodeRow>> rows;
     bool resting = false;
-    std::optional<DynamicContact::State> touch;
   };
   /// Rows are shared until a step writes them.
   State state() const;
@@ -69,14 +67,6 @@ public:
   void renew() override {} // nothing is kept
 
   std::vector<NodeVector> contact_forces() const override;
-
-  void set_instruments(std::vector<std::optional<MovingInstrument>> instruments) override;
-  std::optional<LedInstrument> led(std::size_t instrument) const override;
-  void set_meetings(std::vector<SurfaceMeeting> meetings) override;
-  void rest_on(double duration) override;
-  std::vector<NodeTouch> take_impulses() override;
-  bool touches_exact() const override { return true; } // each step's are
-  std::optional<std::vector<NodeTouch>> held_touches(double duration) const override;
 
 private:
   /// A row whose force changes with time or shape.
@@ -98,7 +88,7 @@ private:
 
   void apply_load();
   void copy_held_rows();
-  bool found_at_rest(double h, double time, std::vector<NodeTouch>& touches) const;
+  bool found_at_rest(double h, double time) const;
   template <class At>
   Vec3 outer_force(const Driven& driven, double time, const At& position) const;
   void run_steps(std::uint64_t steps, double h, double start, const Context& context);
@@ -115,8 +105,7 @@ private:
   double loaded_ = 0; ///< when the load was last applied
   std::vector<NodeTraits> traits_;
   CopyOnWrite<std::vector<NodeRow>> rows_, next_;
-  std::vector<Drive> drives_;             ///< by block; empty where nothing changes
-  std::unique_ptr<DynamicContact> touch_; ///< while there are instruments
+  std::vector<Drive> drives_; ///< by block; empty where nothing changes
   mutable std::vector<NodeMotion> motion_;
   mutable bool motion_shown_ = false; ///< motion_ is that of rows_
   double size_ = 0;                   ///< longest side of the box at rest

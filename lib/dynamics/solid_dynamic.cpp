@@ -20,11 +20,10 @@ namespace gewebe {
 namespace {
 
 constexpr double rest_tolerance = 1e-9, rest_rounding = 1e-13;
+/// In contact, mm/s: what sticks creeps with up to contact::Parameters::stick_speed, of which this
+/// is a tenth.
+constexpr double rest_in_contact = 1e-2;
 constexpr int quiet_steps = 2;
-constexpr int max_halvings = 8; ///< of a step whose forces of contact are not found
-/// Steps in vain that halves may cost at once, and in each step on average: where forces are never
-/// found a scene goes on nevertheless.
-constexpr int max_tries = 24, more_tries = 4;
 constexpr double same_step = 1e-9; ///< lengths that differ by less are one
 constexpr double max_steps = 1e9;
 constexpr double largest_force = 1e38; ///< squares of what it does are finite
@@ -239,8 +238,8 @@ void SolidDynamic::go_back(const std::any& snapshot) {
 }
 
 void SolidDynamic::renew() {
+  body_.reset();
   engine_.reset();
-  contact_.reset();
   last_step_ = 0;
 }
 
@@ -267,12 +266,9 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
     return step == steps ? start + duration : start + static_cast<double>(step) * h;
   };
   while (taken < steps && !state_.resting) {
-    state_.tries = std::min(max_tries, state_.tries + more_tries);
-    step_in_parts(h, at(taken), at(taken + 1), taken == 0, max_halvings, context);
+    step(h, at(taken), at(taken + 1), context);
     ++taken;
   }
-  if (state_.resting)
-    state_.held_time += start + duration - at(taken);
   take_over();
   state_.time = start + duration;
   counts_.steps += taken;
@@ -281,55 +277,47 @@ std::uint64_t SolidDynamic::advance(double duration, double largest_step, const 
   return taken;
 }
 
-/// \return whether surfaces touch as they should
-bool SolidDynamic::step(double h, double from, double to, bool first, const Context& context) {
+/// Forces, and where held axes go: the target, or nothing where they stay.
+std::vector<double> SolidDynamic::begin_step(double from, double to) {
   SolidMotion& moving = *engine_;
-  const Began start = began(from);
-  const std::vector<double>& before = start.places;
   const std::vector<double> forces = forces_at(to);
-  bool met = true;
   for (std::size_t axis = 0; axis < forces.size(); ++axis)
     if (!(std::abs(forces[axis]) <= largest_force))
       throw MotionError(static_cast<std::uint32_t>(axis / 3), to,
                         "is under a force beyond single precision, expected a smaller one");
   moving.set_load(forces);
+  load_ = forces;
   const auto& ramps = state_.load->ramp;
-  const bool led = std::ranges::any_of(ramps, [&](const auto& r) { return from < r.second.end; });
-  std::vector<double> target; // where held axes go
-  if (led || all_held_) {
-    target.resize(before.size());
-    for (const auto& [node, displacement] : state_.load->displacement) {
-      const Vec3 u = held_at(node, to);
-      for (int a = 0; a < 3; ++a)
-        target[axis_of(node, a)] = u[a];
+  const bool moves = std::ranges::any_of(ramps, [&](const auto& r) { return from < r.second.end; });
+  std::vector<double> target;
+  if (!moves && !all_held_)
+    return target;
+  target.resize(forces.size());
+  for (const auto& [node, displacement] : state_.load->displacement) {
+    const Vec3 u = held_at(node, to);
+    for (int a = 0; a < 3; ++a)
+      target[axis_of(node, a)] = u[a];
+  }
+  return target;
+}
+
+/// A step of a body that is held everywhere.
+void SolidDynamic::hold_all(std::span<const double> target, double h, const Context& context) {
+  std::vector<double> places(target.begin(), target.end()), velocity(target.size());
+  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      double& place = places[axis_of(i, a)];
+      place += model_.nodes[i].position[a];
+      velocity[axis_of(i, a)] = (place - engine_->places()[axis_of(i, a)]) / h;
     }
-  }
-  if (all_held_ && standing_ != nullptr)
-    throw MotionError(0, to,
-                      "is held as all others of its object are, expected some that are free beside "
-                      "an elastostatic one that it may touch");
-  if (all_held_) {
-    std::vector<double> velocity(before.size());
-    for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
-      for (int a = 0; a < 3; ++a) {
-        double& place = target[axis_of(i, a)];
-        place += model_.nodes[i].position[a];
-        velocity[axis_of(i, a)] = (place - before[axis_of(i, a)]) / h;
-      }
-    moving.restore(target, velocity, context);
-    moving.find_reactions(context);
-    lead_instruments(to, h);
-  } else {
-    const auto [took, as_it_should, exact] = push(forces, target, h, from, to, first, context);
-    const bool jumped = first && std::ranges::any_of(state_.instruments, [&](const auto& i) {
-                          return i && i->jumped(from);
-                        });
-    met = as_it_should && (exact || !target.empty() || jumped || !thrown(start, forces, to));
-    counts_.rounds += static_cast<std::uint64_t>(took.rounds);
-    counts_.factors += static_cast<std::uint64_t>(took.factorisations);
-    counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
-    counts_.limited += took.limited ? 1 : 0;
-  }
+  engine_->restore(places, velocity, context);
+  engine_->find_reactions(context);
+}
+
+/// Behind a step: whether it has come to rest. \param room  mm, that counts as no motion
+void SolidDynamic::settle(std::span<const double> before, double to, double room,
+                          const Context& context) {
+  SolidMotion& moving = *engine_;
   double moved = 0, largest = 0;
   for (std::uint32_t i = 0; i < model_.nodes.size(); ++i)
     for (int a = 0; a < 3; ++a) {
@@ -338,18 +326,132 @@ bool SolidDynamic::step(double h, double from, double to, bool first, const Cont
       moved = larger(moved, by);
       largest = std::max(largest, std::abs(before[axis] - model_.nodes[i].position[a]));
     }
-  moved = larger(moved, moved_beside(start));
-  const bool quiet = met && moved <= std::max(rest_tolerance * largest, rest_rounding * size_) &&
-                     !moving.recovering() && !(state_.load->changes_until() > to) &&
-                     !(standing_ != nullptr && standing_->changes(from, to)) &&
-                     !instruments_move(first, from, to);
+  const bool quiet = moved <= std::max({rest_tolerance * largest, rest_rounding * size_, room}) &&
+                     !moving.recovering() && !(state_.load->changes_until() > to);
   state_.quiet = quiet ? state_.quiet + 1 : 0;
   if (state_.quiet < quiet_steps)
-    return met;
+    return;
   state_.resting = true;
   moving.restore(std::vector<double>(moving.places().begin(), moving.places().end()),
                  std::vector<double>(before.size()), context);
-  return met;
+}
+
+void SolidDynamic::step(double h, double from, double to, const Context& context) {
+  SolidMotion& moving = *engine_;
+  const std::vector<double> before(moving.places().begin(), moving.places().end());
+  const std::vector<double> target = begin_step(from, to);
+  if (all_held_) {
+    hold_all(target, h, context);
+  } else {
+    if (!target.empty())
+      moving.move_held(target);
+    const SolidStep took = moving.step(h, context);
+    counts_.rounds += static_cast<std::uint64_t>(took.rounds);
+    counts_.factors += static_cast<std::uint64_t>(took.factorisations);
+    counts_.unfinished += took.left <= options_.tolerance ? 0 : 1;
+    counts_.limited += took.limited ? 1 : 0;
+  }
+  settle(before, to, 0, context);
+}
+
+// ---- contact
+
+const contact::ModelSurface& SolidDynamic::collision_surface() {
+  if (surface_)
+    return *surface_;
+  surface_ = contact::model_surface(model_);
+  return *surface_;
+}
+
+contact::ContactBody& SolidDynamic::begin_contact_step(double from, double to,
+                                                       const Context& context) {
+  SolidMotion& moving = engine(context);
+  double h = to - from;
+  if (std::abs(h - last_step_) <= same_step * last_step_)
+    h = last_step_; // so that the factor serves on
+  last_step_ = h;
+  from_ = from;
+  to_ = to;
+  if (!body_)
+    body_ =
+        std::make_unique<SolidContactBody>(moving, collision_surface().node, model_.nodes.size());
+  std::vector<double> target = begin_step(from, to);
+  if (all_held_) {
+    std::vector<Vec3> before, behind;
+    for (const std::uint32_t node : collision_surface().node) {
+      before.push_back(vector_at(moving.places(), node));
+      behind.push_back(model_.nodes[node].position +
+                       vector_at(std::span<const double>(target), node));
+    }
+    target_ = std::move(target);
+    held_body_ = std::make_unique<contact::HeldBody>(std::move(before), std::move(behind));
+    return *held_body_;
+  }
+  if (!target.empty())
+    moving.move_held(target);
+  moving.begin_step(h, context);
+  if (!typical_)
+    typical_ = contact::typical_contact(model_);
+  contact::TypicalContact typical = *typical_;
+  typical.force = typical_force(h, typical.force);
+  body_->begin(h, state_.contact, typical, context);
+  return *body_;
+}
+
+void SolidDynamic::end_contact_step(std::span<const contact::VertexForce> forces, bool still,
+                                    const Context& context) {
+  SolidMotion& moving = *engine_;
+  const std::vector<double> before(moving.places().begin(), moving.places().end());
+  SolidStep took;
+  if (all_held_) {
+    std::vector<double> all = load_;
+    for (const contact::VertexForce& f : forces)
+      for (int a = 0; a < 3; ++a)
+        all[axis_of(collision_surface().node[f.vertex], a)] += f.force[a];
+    moving.set_load(all);
+    hold_all(target_, to_ - from_, context);
+  } else {
+    took = moving.end_step(body_->forces(), context);
+  }
+  state_.contact.assign(forces.begin(), forces.end());
+  state_.version = ++versions_;
+  state_.resting = false;
+  motion_shown_ = false;
+  ++counts_.steps;
+  counts_.rounds += static_cast<std::uint64_t>(took.rounds);
+  counts_.factors += static_cast<std::uint64_t>(took.factorisations);
+  if (still) {
+    const std::vector<double> places(moving.places().begin(), moving.places().end());
+    moving.restore(places, *state_.velocity, context);
+    take_over();
+    return;
+  }
+  const double room = rest_in_contact * (to_ - from_);
+  settle(before, to_, forces.empty() ? 0 : room, context);
+  take_over();
+  state_.time = to_;
+}
+
+/// An eighth of the load of a body, or of the force that would stop a free one in a step; else
+/// `strained`.
+double SolidDynamic::typical_force(double h, double strained) const {
+  if (all_held_)
+    return 0;
+  Vec3 load, momentum;
+  for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
+    load += vector_at(std::span<const double>(load_), i);
+    momentum += engine_->masses()[i] * vector_at(engine_->velocity(), i);
+  }
+  if (norm(load) > 0)
+    return norm(load) / 8;
+  const bool free = std::ranges::none_of(held_, [](std::uint8_t held) { return held != 0; });
+  if (free && norm(momentum) > 0)
+    return norm(momentum) / (8 * h);
+  return strained;
+}
+
+void SolidDynamic::clear_contact() {
+  state_.contact.clear();
 }
 
 /// The engine's state, to be kept.
@@ -374,52 +476,6 @@ std::vector<NodeVector> SolidDynamic::contact_forces() const {
     forces.push_back({node, force});
   }
   return forces;
-}
-
-void SolidDynamic::set_instruments(std::vector<std::optional<MovingInstrument>> instruments) {
-  state_.instruments = std::move(instruments);
-}
-
-std::optional<LedInstrument> SolidDynamic::led(std::size_t instrument) const {
-  return instrument < state_.instruments.size() && state_.instruments[instrument]
-             ? state_.instruments[instrument]->led
-             : std::nullopt;
-}
-
-void SolidDynamic::set_meetings(std::vector<SurfaceMeeting> meetings) {
-  if (meetings == meetings_)
-    return;
-  meetings_ = std::move(meetings);
-  state_.pushes.clear();
-  contact_.reset();
-}
-
-void SolidDynamic::stand_beside(const StandingStart& start) {
-  beside_model_ = start.model;
-  state_.stands.replace() = start.shape;
-  state_.touched.insert(state_.touched.end(), start.touches.begin(), start.touches.end());
-  contact_.reset();
-}
-
-void SolidDynamic::rest_on(double duration) {
-  state_.held_time += duration;
-}
-
-std::vector<NodeTouch> SolidDynamic::take_impulses() {
-  std::vector<NodeTouch> all = std::exchange(state_.impulses, {});
-  for (NodeTouch t : state_.touched) {
-    t.force *= state_.held_time;
-    if (state_.held_time > 0)
-      all.push_back(t);
-  }
-  state_.held_time = 0;
-  return sums_of_touches(std::move(all));
-}
-
-std::optional<std::vector<NodeTouch>> SolidDynamic::held_touches(double duration) const {
-  if (!(state_.held_time >= duration * (1 - same_step)))
-    return std::nullopt;
-  return state_.touched;
 }
 
 SolidStepCounts SolidDynamic::take_counts() {

@@ -83,6 +83,8 @@ void add_ties(const World& w, const std::vector<std::size_t>& parts,
   }
 }
 
+} // namespace
+
 double integration_step(World& w, Body& body) {
   const std::optional<double> wish = w.now.settings.timestep;
   if (moves_implicitly(w.now.objects[body.parts[0]]))
@@ -100,7 +102,6 @@ double integration_step(World& w, Body& body) {
   return usual;
 }
 
-/// What acts on all parts, to their body.
 void load_body(const World& w, Body& body) {
   Load load;
   for (const std::size_t part : body.parts) {
@@ -121,8 +122,7 @@ void load_body(const World& w, Body& body) {
   body.changed = false;
 }
 
-/// What ended a body's motion, with its object's name.
-[[noreturn]] void raise(const World& w, const Body& body) {
+void raise(const World& w, const Body& body) {
   const auto owner = [&](std::uint32_t node) {
     std::size_t found = body.parts[0];
     for (const std::size_t part : body.parts)
@@ -145,8 +145,6 @@ void load_body(const World& w, Body& body) {
                 number_text(w.now.clock.time) + " s: " + error.what());
   }
 }
-
-} // namespace
 
 std::span<const NodeMotion> motion_of(const Object& object) {
   return object.body->moving->motion().subspan(object.offset, object.model().nodes.size());
@@ -247,11 +245,7 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
     w.now.objects[parts[k]].body = body;
     w.now.objects[parts[k]].offset = offset[k];
   }
-  std::vector<std::size_t> beside = near_beside(w, parts);
   body->parts = std::move(parts);
-  if (!beside.empty())
-    stand_beside(w, body, std::move(beside));
-  body->moving->set_meetings(meetings_of(w, *body));
   return body;
 }
 
@@ -270,65 +264,42 @@ void add_counts(SolidStepCounts& sum, const SolidStepCounts& more) {
   sum.unfinished += more.unfinished;
   sum.limited += more.limited;
   sum.seconds += more.seconds;
-  sum.touches.add(more.touches);
 }
 
 void drop_body(World& w, const Body* body) {
   std::erase_if(w.now.bodies, [&](const auto& one) { return one.get() == body; });
 }
 
-namespace {
+void make_implicit(World& w, std::shared_ptr<Body>& body) {
+  const std::shared_ptr<Body> before = body;
+  Motions motions;
+  for (const std::size_t part : before->parts) {
+    Object& object = w.now.objects[part];
+    const std::span<const NodeMotion> motion = motion_of(object);
+    motions[part].assign(motion.begin(), motion.end());
+    object.integration = Integration::implicit;
+  }
+  body = make_body(w, before->parts, &motions);
+  std::ranges::replace(w.now.bodies, before, body);
+}
 
-/// \param again those that are near stay so \return whether some met that were not near: all stand
-/// where they stood then, to move once more
-bool move_bodies(World& w, double to, bool again) {
+void advance_freely(World& w, std::span<Body* const> bodies, double to) {
   const double duration = to - w.now.clock.time;
-  for (std::size_t i = 0; i < w.now.objects.size(); ++i)
-    if (w.now.objects[i].method == Method::ela &&
-        (!w.now.objects[i].load->empty() || instruments_there(w)))
-      need_body(w, i);
-  Extents extents(w);
-  meet(w, to, extents, again);
-  for (const auto& body : w.now.bodies)
-    if (body->changed) {
-      load_body(w, *body);
-      for (const std::size_t part : body->parts)
-        extents.forget(part);
-    }
-  if (!(duration > 0))
-    return false;
-  note_extents(w, extents);
-  const bool some_may_meet =
-      std::ranges::any_of(w.now.meetings, [&](const Meeting& m) { return may_meet(w, m); });
-  lead_on(w, to, extents);
-  for (const auto& body : w.now.bodies)
-    wake_by_beside(w, *body);
-  std::vector<Body*> awake, resting;
-  std::vector<std::any> before;
+  std::vector<Body*> awake;
   std::vector<double> step;
-  for (const auto& body : w.now.bodies) {
-    body->taken = 0;
-    guide(w, *body, to, extents);
-    if (body->moving->resting()) {
-      resting.push_back(body.get());
+  for (Body* const body : bodies) {
+    if (body->moving->resting())
       continue;
-    }
     body->ahead = true;
     body->rest_extents.clear();
-    begin_standing(w, *body, to);
-    awake.push_back(body.get());
+    awake.push_back(body);
     step.push_back(integration_step(w, *body));
-    if (some_may_meet)
-      before.push_back(body->moving->snapshot());
   }
-  // One body has all threads, several have one each; but one after the other where elastostatic
-  // objects may read what they need.
-  Context context = w.context, calling = w.context;
-  if (std::ranges::any_of(awake, [](const Body* body) { return !body->beside.empty(); }))
-    calling.threads = 1;
-  else if (awake.size() > 1)
+  // One body has all threads, several have one each.
+  Context context = w.context;
+  if (awake.size() > 1)
     context.threads = 1;
-  parallel_blocks(calling, awake.size(), 1, [&](std::size_t k, std::size_t) {
+  parallel_blocks(w.context, awake.size(), 1, [&](std::size_t k, std::size_t) {
     try {
       awake[k]->taken = awake[k]->moving->advance(duration, step[k], context, w.now.clock.time);
     } catch (...) {
@@ -338,47 +309,6 @@ bool move_bodies(World& w, double to, bool again) {
   for (Body* const body : awake)
     if (body->failure)
       raise(w, *body);
-  Extents after(w);
-  if (const std::set<std::size_t> late =
-          some_may_meet ? met_late(w, extents, after) : std::set<std::size_t>();
-      !late.empty()) {
-    for (std::size_t k = 0; k < awake.size(); ++k)
-      awake[k]->moving->go_back(before[k]);
-    join_late(w, late);
-    return true;
-  }
-  for (Body* const body : resting)
-    body->moving->rest_on(duration);
-  for (Body* const body : awake)
-    end_standing(*body);
-  end_guiding(w, to);
-  SimulationCounts& counts = w.now.counts;
-  for (Body* const body : awake) {
-    const SolidStepCounts took = body->moving->take_counts();
-    add_counts(counts.solids, took);
-    if (took.unfinished > 0)
-      w.now.news.unfinished.insert(w.now.news.unfinished.end(), body->parts.begin(),
-                                   body->parts.end());
-  }
-  for (const Object& object : w.now.objects)
-    counts.resting += object.method == Method::ela && object.body == nullptr ? 1 : 0;
-  for (const auto& body : w.now.bodies) {
-    for (const std::size_t part : body->parts) {
-      counts.integration += body->taken;
-      counts.resting += body->taken == 0 ? 1 : 0;
-      counts.moving += body->taken == 0 ? 0 : 1;
-      Shown& shown = w.now.objects[part].shown;
-      shown.valid = shown.valid && body->taken == 0;
-    }
-  }
-  return false;
-}
-
-} // namespace
-
-void move_bodies(World& w, double to) {
-  for (bool again = false; move_bodies(w, to, again);)
-    again = true;
 }
 
 // ---- attachments
@@ -448,8 +378,6 @@ void Rule<Attach>::apply(World& w, const Attach& c) {
     parts.insert(parts.end(), b.body->parts.begin(), b.body->parts.end());
   std::sort(parts.begin(), parts.end());
   const std::shared_ptr<Body> first = a.body, second = b.body;
-  for (const auto& body : {first, second})
-    gather_impulses(w, *body);
   std::shared_ptr<Body> body;
   try {
     body = make_body(w, std::move(parts));

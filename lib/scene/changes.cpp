@@ -57,10 +57,6 @@ void announce(World& w, const Change& change) {
 }
 
 void apply(World& w, const Change& change) {
-  if (!std::holds_alternative<MoveInstrument>(change))
-    for (Object& object : w.now.objects) // who looks at a shape finds all of it
-      if (object.shown.part)
-        shape_in_step(w, object);
   std::visit(
       [&]<class Kind>(const Kind& c) {
         Rule<Kind>::check(w, c);
@@ -229,7 +225,7 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
 void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
-  begin_anew(w, c.object);
+  renew(w.now.objects.at(c.object));
   object.warped = nullptr;
   touch(object);
 }

@@ -144,7 +144,7 @@ void carry_out(World& w, std::size_t index, CutModel cut) {
   // Where parts start, and what instruments refer to. Without them it may never be asked for.
   const bool deferred = ffe && !old.shown.shaped && free.parts.empty() &&
                         w.now.instruments.empty() && old.matter->known && !old.stages.options &&
-                        !old.warp;
+                        !old.warp && !old.meets;
   if (ffe && !deferred)
     (void)whole_shape_in_step(w, old);
   const Moves moves = moves_of(w, index, cut, free);
@@ -321,7 +321,7 @@ void sweep_blades(World& w) {
     });
   }
   if (w.now.counts.cuts != cuts)
-    move_bodies(w, w.now.clock.time); // that new bodies know their loads
+    advance_bodies(w, w.now.clock.time); // that new bodies know their loads
 }
 
 // ---- what hangs together but can move freely
@@ -352,7 +352,6 @@ void find_free_motion(World& w, std::size_t index) {
                    w.now.news.cuttings.back().text);
   if (object.shown.deferred)
     shape_in_step(w, object);
-  object.contact = nullptr;
   Motions motions;
   std::vector<NodeMotion>& motion = motions[index];
   motion.resize(object.model().nodes.size());
@@ -364,7 +363,7 @@ void find_free_motion(World& w, std::size_t index) {
   object.method = Method::ela;
   object.shown.valid = false;
   renew_bodies(w, motions);
-  move_bodies(w, w.now.clock.time);
+  advance_bodies(w, w.now.clock.time);
 }
 
 // ---- changes
@@ -470,6 +469,10 @@ void Rule<Restore>::apply(World& w, const Restore& c) {
                                  .time = w.now.clock.time,
                                  .text = {}});
   move_all(w, c.object, moves, std::move(pieces));
+  for (const ContactRule& rule : w.now.contacts) // parts that came off may be where it is whole
+    if (rule.object == c.object || rule.other == c.object)
+      require_apart(w, rule);
+  let_instruments_enter(w);
 }
 
 } // namespace gewebe::simulation

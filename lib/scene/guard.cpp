@@ -10,7 +10,6 @@ namespace gewebe::simulation {
 
 void Body::restore(const Snapshot& was) {
   changed = was.changed;
-  touched = was.touched;
   rest_extents = was.rest_extents;
   moving->go_back(was.motion);
   failure = nullptr;
@@ -35,14 +34,6 @@ void put_back(World& w, Saved&& saved) {
       object.shown.displacement.replace().assign(3 * object.model().nodes.size(), 0);
 }
 
-/// As it was, with what it touched.
-void restart_contact(Object& object) {
-  if (object.contact)
-    object.contact = std::make_shared<StaticContact>(
-        object.model(), *object.shown.displacement, object.shown.touches, object.shown.points,
-        object.shown.part ? object.shown.part->part : PartOfShape{});
-}
-
 } // namespace
 
 Saved save(World& w) {
@@ -56,10 +47,6 @@ Saved save(World& w) {
 
 void take_back_again(World& w, Saved&& saved) noexcept {
   put_back(w, std::move(saved));
-  for (Object& object : w.now.objects)
-    restart_contact(object);
-  for (StaticGroup& group : w.now.static_groups)
-    group.meeting = nullptr;
 }
 
 /// What is kept to be quick depends on the shapes that were asked of it, so it is renewed where one
@@ -72,17 +59,9 @@ void take_back(World& w, Saved&& saved) noexcept {
     const bool ahead = object.body != nullptr && object.body->ahead && moves_implicitly(object);
     if (!ahead && !object.statics->ahead)
       continue;
-    begin_anew(w, i);
+    renew(object);
     w.renewed.push_back(i);
   }
-}
-
-void begin_anew(World& w, std::size_t number) {
-  Object& object = w.now.objects[number];
-  renew(object);
-  restart_contact(object);
-  if (StaticGroup* const group = static_group_of(w, number))
-    group->meeting = nullptr; // it is made anew from what is shown
 }
 
 } // namespace gewebe::simulation

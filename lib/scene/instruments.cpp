@@ -13,6 +13,10 @@ namespace gewebe::simulation {
 
 namespace {
 
+/// Of its radius, by which an instrument may be inside: more than its shift (gewebe-contact(7),
+/// "Gap").
+constexpr double allowed_depth = 1e-3;
+
 void require_single(std::initializer_list<Vec3> all, double radius) {
   for (const Vec3& v : all)
     radius = std::max({radius, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -82,7 +86,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
     return report;
   if (i.coupled) {
     report.hand = i.way.at(w.now.clock.time).place;
-    report.coupling = i.coupled->led.coupling;
+    report.coupling = i.coupled->coupling;
   }
   const auto add = [&](const Vec3& at, const Vec3& force) {
     report.force -= force;
@@ -90,7 +94,7 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
     ++report.nodes;
   };
   for (const Object& object : w.now.objects)
-    for (const NodeTouch& t : object.shown.touches)
+    for (const NodalContactForce& t : object.shown.contact)
       if (t.instrument == instrument)
         add(object.model().nodes[t.node].position + vector_at(*object.shown.displacement, t.node),
             t.force);
@@ -105,13 +109,60 @@ InstrumentReport report_of(const World& w, std::size_t instrument) {
   return report;
 }
 
-void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
+namespace {
+
+/// Lets an instrument come to where it is from outside of what it would be in. It waits there since
+/// the last step, so that what moves or gives way in this one meets it, and takes no way from where
+/// it was.
+void enter_from_outside(World& w, Instrument& i) {
+  const auto number = static_cast<std::size_t>(&i - w.now.instruments.data());
+  const double now = w.now.clock.time;
+  const PoseWay way = i.way;
+  const Pose start = entry_pose(w, i.shape, i.pose(now));
+  if (i.coupled) { // its hand draws it back
+    i.coupled->place = start.place;
+    i.coupled->lag = way.at(now).place - start.place;
+    i.changed = true;
+    return;
+  }
+  i.before = start;
+  i.changed = true;
+  i.way = {start, start, now, now};
+  note_poses(w);
+  for (std::size_t p = 0; p < w.now.poses.size(); ++p)
+    if (number < w.now.poses[p].size())
+      w.now.poses[p][number] = p > 0 ? std::optional(start) : std::nullopt;
+  i.way = way;
+  note_poses(w);
+}
+
+/// Whether it is in an object by more than contact allows.
+bool stands_inside(World& w, const Instrument& i) {
+  InstrumentShape thinner = i.shape;
+  thinner.radius *= 1 - allowed_depth;
+  const Pose pose = i.pose(w.now.clock.time);
+  return entry_pose(w, thinner, pose) != pose;
+}
+
+} // namespace
+
+void let_instruments_enter(World& w) {
   for (Instrument& i : w.now.instruments)
-    if (!i.grips.empty())
-      std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
-        return grip.object == object &&
-               std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
-      });
+    if (i.present && !i.shape.blade && stands_inside(w, i))
+      enter_from_outside(w, i);
+}
+
+void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes) {
+  for (Instrument& i : w.now.instruments) {
+    if (i.grips.empty())
+      continue;
+    const std::size_t dropped = std::erase_if(i.grips, [&](const Instrument::Grip& grip) {
+      return grip.object == object &&
+             std::find(nodes.begin(), nodes.end(), grip.node) != nodes.end();
+    });
+    if (dropped > 0 && i.present && stands_inside(w, i))
+      enter_from_outside(w, i); // it pushes what it held
+  }
 }
 
 /// Remembers where the instruments are. Where one jumps behind others that jumped just now, they
@@ -169,14 +220,18 @@ void Rule<SetInstrument>::apply(World& w, const SetInstrument& c) {
   let_go(w, c.instrument);
   i.changed = i.changed || !c.shape.blade || (i.present && !i.shape.blade);
   i.present = false;
-  note_poses(w); // it takes no way from where it was
+  note_poses(w);
   i.present = true;
   i.coupled.reset();
   i.path.clear();
   i.shape = c.shape;
-  i.way = {c.pose, c.pose, w.now.clock.time, w.now.clock.time};
+  const double now = w.now.clock.time;
   i.before = c.pose;
-  note_poses(w);
+  i.way = {c.pose, c.pose, now, now};
+  if (c.shape.blade)
+    note_poses(w);
+  else
+    enter_from_outside(w, i);
 }
 void Rule<SetInstrument>::announce(World& w, const SetInstrument& c) {
   if (c.shape.blade)
@@ -229,11 +284,9 @@ void Rule<SetCoupling>::apply(World& w, const SetCoupling& c) {
   if (!c.coupling) { // at once to where the hand is
     i.coupled.reset();
   } else if (i.coupled) {
-    i.coupled->led.coupling = i.coupled->shown.coupling = *c.coupling;
+    i.coupled->coupling = *c.coupling;
   } else {
-    Instrument::Coupled& led = i.coupled.emplace();
-    led.led = {.coupling = *c.coupling, .place = hand.place, .lag = {}, .force = {}, .others = {}};
-    led.shown = led.led;
+    i.coupled = Instrument::Coupled{*c.coupling, hand.place, {}, {}};
   }
   note_poses(w);
 }

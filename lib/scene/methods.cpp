@@ -15,15 +15,22 @@ namespace {
 /// The elastostatic shape under what acts now; empty: nothing ever touched the object.
 std::span<const double> shape_now(World& w, Object& object) {
   std::span<const double> u;
-  if (object.statics->made() || !object.load->empty()) {
+  if (object.statics->made() || (!object.load->empty() && !is_held_altogether(object))) {
     update_solver(w, object, load_at(*object.load, object.model(), w.now.clock.time));
     u = static_shape(object);
     require_bounded(object, u);
   }
-  const Shown& shown = object.shown;
-  if (!shown.touches.empty() && object.method == Method::ffe && shown.valid && shown.shaped)
-    u = whole_shape(w, object); // instruments among what acts
+  if (!object.shown.contact.empty() && object.method == Method::ffe)
+    u = whole_shape(w, object); // where contact has it
   return u;
+}
+
+/// Instruments that touch the object go from where they stood when it was shown.
+void stand_back(World& w, const Object& object) {
+  for (const NodalContactForce& f : object.shown.contact)
+    if (f.instrument < w.now.instruments.size())
+      if (const std::optional<Pose> stood = pose_at(w, 0, f.instrument))
+        w.now.instruments[f.instrument].before = *stood;
 }
 
 Vec3 at(std::span<const double> shape, std::size_t i) {
@@ -48,7 +55,6 @@ double stop(World& w, Object& object, std::span<const double> u) {
   double jump = 0;
   if (object.body == nullptr)
     return jump;
-  gather_impulses(w, *object.body);
   const std::span<const NodeMotion> motion = object.body->moving->motion();
   for (std::size_t i = 0; i < motion.size(); ++i)
     jump = std::max(jump, norm((u.empty() ? Vec3{} : at(u, i)) - motion[i].displacement));
@@ -65,9 +71,10 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
     return;
   require_support(w, object, Feature::method);
   const std::span<const double> u = shape_now(w, object);
-  object.contact = nullptr;
+  object.touching.clear();
   if (c.method == Method::ela) {
     set_going(w, c.object, u);
+    stand_back(w, object);
   } else {
     const double jump = stop(w, object, u);
     w.now.news.jumps.push_back({c.object, jump});
@@ -75,6 +82,7 @@ void Rule<SetMethod>::apply(World& w, const SetMethod& c) {
   }
   object.method = c.method;
   object.shown.valid = false;
+  let_instruments_enter(w); // those that were placed since the last step
 }
 
 void Rule<SetMethod>::log(const World& w, const SetMethod& c, ChangeRow& row) {

@@ -54,8 +54,8 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
                 .time = old.shown.time,
                 .posed = old.shown.posed};
   next.came = {.load = gravity_of(*old.came.load), .duration = old.came.duration};
-  next.contact = next.contact_ahead = nullptr;
   next.impulses.clear();
+  next.touching.clear();
   next.cut = {.tear = old.cut.tear, .limit = old.cut.limit};
   return next;
 }
@@ -211,14 +211,18 @@ void move_shown(const Object& old, const Moves& moves, std::deque<Object>& piece
   for (const auto& [index, all] : forces)
     for (const auto& [node, value] : all)
       piece({.object = index}).shown.forces.write().push_back({node, value});
-  for (const NodeTouch& t : old.shown.touches)
+  for (const NodalContactForce& t : old.shown.contact)
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
-        piece(to).shown.touches.push_back({to.node, t.instrument, t.force});
-  for (const NodeTouch& t : old.impulses)
+        piece(to).shown.contact.push_back({to.node, t.instrument, t.force});
+  for (const NodalContactForce& t : old.impulses)
     for (const Moves::To& to : moves.of(t.node))
       if (to.main)
         piece(to).impulses.push_back({to.node, t.instrument, t.force});
+  for (const NodalContactForce& t : old.touching)
+    for (const Moves::To& to : moves.of(t.node))
+      if (to.main)
+        piece(to).touching.push_back({to.node, t.instrument, t.force});
   const std::span<const double> shape = known_shape(old);
   for (std::uint32_t i = 0; old.shown.shaped && i < old.model().nodes.size(); ++i) {
     const Vec3 u = vector_at(shape, i);
@@ -438,16 +442,12 @@ Motions motions_of(const World& w, std::size_t index, const Moves& moves,
 
 } // namespace
 
-/// Bodies anew for these objects and those tied to them, or near to them if they may touch, with
-/// the motions given.
+/// Bodies anew for these objects and those tied to them, with the motions given.
 /// \pre objects that are in a body have a motion
 void renew_bodies(World& w, const Motions& motions) {
   DisjointSets sets(w.now.objects.size());
   for (const Tie& tie : w.now.ties)
     sets.join(static_cast<std::uint32_t>(tie.object), static_cast<std::uint32_t>(tie.other));
-  for (const Meeting& m : w.now.meetings)
-    if (m.near)
-      sets.join(static_cast<std::uint32_t>(m.object), static_cast<std::uint32_t>(m.other));
   std::map<std::uint32_t, std::vector<std::size_t>> groups;
   for (const auto& [object, motion] : motions)
     groups[sets.find(static_cast<std::uint32_t>(object))].push_back(object);
@@ -465,10 +465,8 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   add_counts(spent, old.statics->spent);
   if (old.statics->solver)
     add_counts(spent, old.statics->solver->counts());
-  if (old.body != nullptr)
-    gather_impulses(w, *old.body);
   move_shown(w.now.objects[index], moves, pieces);
-  const Motions motions = motions_of(w, index, moves, pieces, velocity);
+  Motions motions = motions_of(w, index, moves, pieces, velocity);
   if (old.body != nullptr) {
     drop_body(w, old.body.get());
     for (const std::size_t part : old.body->parts)
@@ -481,8 +479,12 @@ void move_all(World& w, std::size_t index, const Moves& moves, std::deque<Object
   }
   move_grips(w, index, moves);
   move_ties(w, index, moves);
-  move_meetings(w, index, moves);
+  move_contacts(w, index, moves);
   move_events(w, index, moves);
+  if (std::ranges::any_of(w.now.contacts, [&](const ContactRule& rule) {
+        return rule.object == index && rule.other == index;
+      }))
+    separate_walls(w, moves.objects, motions);
   renew_bodies(w, motions);
 }
 

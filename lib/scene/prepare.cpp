@@ -3,8 +3,6 @@
 
 #include "scene/rules_internal.h"
 
-#include <memory>
-
 namespace gewebe::simulation {
 
 void Rule<Prepare>::check(World& w, const Prepare& c) {
@@ -23,6 +21,8 @@ void Rule<Prepare>::check(World& w, const Prepare& c) {
 void Rule<Prepare>::apply(World& w, const Prepare& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
+  if (is_held_altogether(object))
+    return;
   object.statics->ahead = true;
   if (object.warp) {
     (void)warped_of(w, object);
@@ -34,9 +34,6 @@ void Rule<Prepare>::apply(World& w, const Prepare& c) {
       solver.read_compressed();
     solver.prepare(c.nodes_ahead);
   }
-  if (c.contact && !object.contact && !object.contact_ahead)
-    object.contact_ahead =
-        std::make_shared<StaticContact>(object.model(), std::span<const double>{});
   if (c.cut)
     announce_cut(w, c.object);
 }

@@ -161,11 +161,10 @@ struct Rule<Withdraw> : Plain<Withdraw> {
   static void log(const World&, const Withdraw&, ChangeRow& row) { row.what = "withdraw"; }
 };
 
-// meetings.cpp
+// islands.cpp
 template <>
 struct Rule<SetContact> : Plain<SetContact> {
   static void check(World& w, const SetContact& c);
-  static void enter(World& w, const SetContact& c);
   static constexpr bool may_fail = true;
   static void apply(World& w, const SetContact& c);
   static void log(const World& w, const SetContact& c, ChangeRow& row);

@@ -4,14 +4,14 @@
 // (factors, columns, running sums) stands beside it: see Statics and Body.
 
 #include "base/copy_on_write.h"
+#include "contact/coupling.h"
+#include "contact/nodal_contact_force.h"
 #include "cutting/cut_stiffness.h"
 #include "dynamics/body_motion.h"
 #include "dynamics/solid_dynamic.h"
 #include "scene/extents.h"
 #include "scene/simulation.h"
 #include "scene/support.h"
-#include "statics/static_contact.h"
-#include "statics/static_meeting.h"
 #include "statics/warped_statics.h"
 
 #include <any>
@@ -92,18 +92,13 @@ struct Statics {
   bool made() const { return solver || warped; }
 };
 
-class BesideBody;
-
 /// What moves together: one elastodynamic object, or several that are attached to each other.
 struct Body {
-  std::vector<std::size_t> parts;         // objects
-  std::vector<std::size_t> beside{};      // elastostatic ones that its steps meet, see beside.cpp
-  std::shared_ptr<BesideBody> standing{}; // these; null: none
-  std::shared_ptr<const Model> model;     // of all parts
+  std::vector<std::size_t> parts;     // objects
+  std::shared_ptr<const Model> model; // of all parts
   std::unique_ptr<BodyMotion> moving;
   double safe = 0; // largest stable step
   bool changed = true;
-  bool touched = false;                         // by an instrument, in the last step
   std::map<std::size_t, Extent> rest_extents{}; // by part, while at rest: see Extents
   bool ahead = false;                           // it has moved on since the scene was saved
   bool warned_step = false;
@@ -111,11 +106,11 @@ struct Body {
   std::exception_ptr failure;
 
   struct Snapshot {
-    bool changed = true, touched = false;
+    bool changed = true;
     std::map<std::size_t, Extent> rest_extents{};
     std::any motion;
   };
-  Snapshot snapshot() const { return {changed, touched, rest_extents, moving->snapshot()}; }
+  Snapshot snapshot() const { return {changed, rest_extents, moving->snapshot()}; }
   void restore(const Snapshot& was);
 };
 
@@ -135,25 +130,17 @@ struct DeferredShape {
   std::vector<std::shared_ptr<const Moves>> moves; // since, one cut each
 };
 
-/// A shape that nobody has asked for, as far as instruments looked at it.
-struct PartShown {
-  PartOfShape part;
-  std::shared_ptr<const Load> under; ///< all that acts
-};
-
 /// The picture of an object.
 struct Shown {
   /// Of all nodes, or of the first ones if a solid's solver has rows for its surface alone; and of
   /// all where that was asked for, else empty.
   CopyOnWrite<std::vector<double>> displacement{}, whole{};
   CopyOnWrite<std::vector<NodeVector>> forces{};
-  std::vector<NodeTouch> touches{};
-  std::vector<PointTouch> points{}; ///< of these, of an elastostatic object
+  std::vector<NodalContactForce> contact{}; ///< of an elastodynamic object means over the step
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
   std::shared_ptr<const DeferredShape>
-      deferred{};                          // what the displacement is, where it is not shaped
-  std::shared_ptr<const PartShown> part{}; ///< what of the displacement is known, where that is
+      deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};
   double time = 0;
   bool posed = false;        // what is shown is a shape of ffe
@@ -204,18 +191,16 @@ struct Object {
   CopyOnWrite<Load> load{};
   Stages stages;
   bool warp = false;                          // large rotations
-  bool meets = false;                         // one of the scene's meetings is of it
+  bool meets = false;                         // one of the scene's contacts is of it
   std::shared_ptr<const WarpedAnswer> warped; // the last one, that the next one starts from
   std::shared_ptr<Body> body;                 // of an elastodynamic object
   std::size_t offset = 0;                     // of its nodes in the body
-  std::shared_ptr<Body> beside;               // that meets it in its steps, of ffe, see beside.cpp
-  std::shared_ptr<const Load> stood_under;    // its load behind the last way of that in this step
   Shown shown;
   CameFrom came;
   RangeWatch range;
-  std::shared_ptr<StaticContact> contact;       // of ffe, once there are instruments
-  std::shared_ptr<StaticContact> contact_ahead; // of the model at rest, made before that
-  std::vector<NodeTouch> impulses; // in this step so far, from bodies it has left: 1e-6 N s
+  std::vector<NodalContactForce> impulses; // of contact in this step so far: 1e-6 N s
+  std::vector<NodalContactForce> touching; // contact forces now
+  bool in_motion = false; // of ffe: bodies that move touch it in this step, see islands.cpp
   CutState cut;
 
   const Model& model() const { return *matter->model; }
@@ -229,21 +214,9 @@ struct Tie {
 };
 
 /// Objects that may touch each other, or one that may touch itself.
-struct Meeting {
+struct ContactRule {
   std::size_t object = 0, other = 0;
   double friction = 0;
-  bool near = false;  // they are in one body, or beside it, or in one StaticGroup
-  bool stays = false; // near for all of this step
-};
-
-/// Elastostatic objects that are near each other, or one that may touch itself: their shapes are
-/// found together.
-struct StaticGroup {
-  std::vector<std::size_t> parts;         // objects, ascending
-  std::vector<SurfacePush> pushes;        // by nodes of all, part behind part
-  bool settled = false;                   // nothing is to be done while nothing moves
-  int tries = 0;                          // that are left for steps whose forces aren't found
-  std::shared_ptr<StaticMeeting> meeting; // what is kept to be quick; null: not yet
 };
 
 struct Instrument {
@@ -260,19 +233,20 @@ struct Instrument {
   std::vector<Pose> path; // of a blade: what it has passed in this step
   Pose before;            // where elastodynamic objects last met it
   bool changed = false;   // since then put or withdrawn
-  /// Led by a hand, whose way it is then, see coupled.cpp.
+  bool stepped = false;   // in this step an island with what moves has taken it along
+  /// Under a virtual coupling: the way is the hand's.
   struct Coupled {
-    LedInstrument led;                // as it goes on from its objects' last steps
-    LedInstrument shown;              // behind the last step of the scene
-    Pose end;                         // of the way that bodies meet it on
-    std::optional<std::size_t> giver; // the object that it gives way to in a step's course
+    Coupling coupling;
+    Vec3 place; // of the instrument
+    Vec3 lag;   // from it to the hand
+    Vec3 force; // on it
   };
   std::optional<Coupled> coupled;
 
   Pose pose(double time) const {
     Pose pose = way.at(time);
     if (coupled)
-      pose.place = coupled->led.place;
+      pose.place = coupled->place;
     return pose;
   }
 };
@@ -294,8 +268,7 @@ struct Scene {
   std::deque<Object> objects; // references last while others come
   std::vector<std::shared_ptr<Body>> bodies;
   std::vector<Tie> ties;
-  std::vector<Meeting> meetings;
-  std::vector<StaticGroup> static_groups;
+  std::vector<ContactRule> contacts;
   std::vector<Instrument> instruments;
   /// In this step: where the instruments stood, one after the other.
   std::vector<std::vector<std::optional<Pose>>> poses;

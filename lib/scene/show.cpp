@@ -136,19 +136,6 @@ void warn_of_range(World& w, Object& object) {
        ", the shape is not to be trusted there");
 }
 
-namespace {
-
-/// What was known stays: there instruments have nodes where they keep them.
-void complete(std::span<const std::uint8_t> known, std::span<const double> u,
-              std::vector<double>& shape) {
-  for (std::size_t node = 0; node < known.size(); ++node)
-    if (known[node] == 0)
-      std::copy_n(u.begin() + std::ptrdiff_t{3} * static_cast<std::ptrdiff_t>(node), 3,
-                  shape.begin() + std::ptrdiff_t{3} * static_cast<std::ptrdiff_t>(node));
-}
-
-} // namespace
-
 void shape(World& w, Object& object) {
   Shown& shown = object.shown;
   if (shown.shaped)
@@ -159,15 +146,11 @@ void shape(World& w, Object& object) {
   }
   at_object(w, object, [&] {
     // As it is, but where a change of method looked ahead.
-    update_stages(w, object, shown.part ? *shown.part->under : *shown.load);
+    update_stages(w, object, acting_load(shown));
     const std::span<const double> u = static_surface(object);
     require_bounded(object, u);
-    if (shown.part)
-      complete(shown.part->part.known, u, shown.displacement.write());
-    else
-      shown.displacement.replace().assign(u.begin(), u.end());
+    shown.displacement.replace().assign(u.begin(), u.end());
   });
-  shown.part.reset();
   shown.box.reset();
   shown.shaped = true;
   warn_of_range(w, object);
@@ -182,8 +165,9 @@ void shape_in_step(World& w, Object& object) {
 
 Load acting_load(const Shown& shown) {
   Load load = *shown.load;
-  for (const NodeTouch& t : shown.touches)
-    load.force[t.node] += t.force;
+  for (const NodalContactForce& f : shown.contact)
+    if (!load.displacement.contains(f.node))
+      load.force[f.node] += f.force;
   return load;
 }
 
@@ -228,59 +212,36 @@ void load_shown(const World& w, Object& object) {
 }
 
 void end_showing(World& w, Object& object) {
-  add_touches(object);
+  add_contact_forces(object);
   require_bounded(object);
   object.shown.time = w.now.clock.time;
   object.shown.valid = true;
 }
 
-namespace {
-
-/// Whether nobody needs all of a shape that instruments are in.
-bool may_stay_unknown(const World& w, const Object& object) {
-  return object.range.warned && !object.warp && !object.stages.options && object.cut.tear == 0 &&
-         object.load->displacement.empty() && w.now.meetings.empty() && !w.options.shapes &&
-         !w.options.surfaces && !w.now.settings.emits.any_shapes() &&
-         std::ranges::none_of(w.now.instruments,
-                              [](const Instrument& i) { return i.present && i.shape.blade; });
+void show_in_motion(World& w, Object& object) {
+  begin_showing(w, object);
+  load_shown(w, object);
+  object.shown.contact = object.touching;
+  object.shown.shaped = true;
+  warn_of_range(w, object);
+  if (object.statics->made())
+    object.shown.forces = static_forces(object);
+  end_showing(w, object);
 }
-
-/// Whether no node can be displaced further.
-bool within(const PartShown& shown, double limit) {
-  return std::ranges::all_of(shown.part.reach.most, [&](double most) { return most <= limit; });
-}
-
-} // namespace
 
 void show(World& w, Object& object) {
   if (object.body != nullptr || !object.load->empty())
     need_model(object);
-  const bool near = object.method == Method::ffe && (object.contact || instruments_there(w));
-  const bool meets = near && feels(w, object, Feature::touch);
-  const bool in_part = meets && may_stay_unknown(w, object);
-  if (meets && !(in_part && object.shown.part))
-    shape_in_step(w, object); // that it comes from
-  const std::shared_ptr<const PartShown> before = std::exchange(object.shown.part, nullptr);
   begin_showing(w, object);
   Shown& shown = object.shown;
-  const bool acted_on = object.statics->made() || !object.load->empty();
-  if (object.method == Method::ffe && (meets || acted_on))
+  const bool acted_on =
+      object.statics->made() || (!object.load->empty() && !is_held_altogether(object));
+  if (object.method == Method::ffe) {
+    shown.contact.clear();
+    object.touching.clear();
+  }
+  if (object.method == Method::ffe && acted_on) {
     load_shown(w, object);
-  if (meets) {
-    std::shared_ptr<PartShown> part;
-    if (in_part)
-      part = before ? std::make_shared<PartShown>(*before) : std::make_shared<PartShown>();
-    follow_instruments(w, object, part.get());
-    if (part && !part->part.known.empty())
-      shown.part = std::move(part);
-    shown.shaped = shown.part == nullptr;
-    if (shown.shaped)
-      warn_of_range(w, object);
-    else if (!within(*shown.part, displacement_limit(object)))
-      shape(w, object);
-    if (object.statics->made())
-      shown.forces = static_forces(object);
-  } else if (object.method == Method::ffe && acted_on) {
     update_in_time(w, object);
     shown.forces = static_forces(object);
     shown.shaped = false; // until somebody asks for it
@@ -294,6 +255,24 @@ void show(World& w, Object& object) {
     show_motion(object);
   }
   end_showing(w, object);
+}
+
+/// Among the forces that are shown. What holds a displaced node has contact among it.
+void add_contact_forces(Object& object) {
+  if (object.shown.contact.empty())
+    return;
+  std::vector<NodeVector>& forces = object.shown.forces.write();
+  for (const NodalContactForce& f : object.shown.contact) {
+    if (object.method == Method::ffe && object.shown.load->displacement.contains(f.node))
+      continue;
+    const auto at =
+        std::lower_bound(forces.begin(), forces.end(), f.node,
+                         [](const NodeVector& v, std::uint32_t node) { return v.node < node; });
+    if (at != forces.end() && at->node == f.node)
+      at->value += f.force;
+    else
+      forces.insert(at, {f.node, f.force});
+  }
 }
 
 } // namespace gewebe::simulation

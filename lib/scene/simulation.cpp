@@ -75,7 +75,7 @@ void Simulation::add_object(const std::string& name, Model model, Method method,
   object.method = method;
   need_model(object);
   object.matter->source = {};
-  if (method == Method::ffe)
+  if (method == Method::ffe && !is_held_altogether(object))
     make_solver(w, object, std::move(source));
   insert(w, std::move(object));
   if (method == Method::ffe)
@@ -112,7 +112,7 @@ ObjectFacts Simulation::object(std::size_t object) const {
   return {one.name(),
           one.method,
           one.matter->known,
-          one.matter->known && (shown.shaped || shown.part) && whole(),
+          one.matter->known && shown.shaped && whole(),
           one.body != nullptr && !one.body->moving->resting(),
           one.stages.model != nullptr,
           one.warp,

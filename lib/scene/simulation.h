@@ -5,6 +5,7 @@
 #include "base/context.h"
 #include "contact/instrument.h"
 #include "contact/load.h"
+#include "contact/step.h"
 #include "dynamics/elastodynamic.h"
 #include "dynamics/solid_dynamic.h"
 #include "model/cut.h"
@@ -82,7 +83,7 @@ struct SimulationCounts {
   std::uint64_t moving = 0;        ///< advances that moved one
   ElastostaticCounts elastostatic; ///< of all objects: sums, largest errors
   SolidStepCounts solids;          ///< of all that move
-  TouchCounts touches;             ///< of elastostatic objects
+  contact::StepReport contact;     ///< of all steps with contact
   double largest_jump = 0;         ///< mm, see MethodJump
   std::uint64_t cuts = 0;          ///< that changed a model
   /// Of elastostatic objects: how their stiffness followed, see CutWay.

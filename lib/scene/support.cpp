@@ -44,13 +44,6 @@ bool goes(const Object& object, Way way) {
     return object.warp;
   case Way::filled:
     return object.matter->solid.bulk.has_value();
-  case Way::explicit_net:
-    return moves && object.integration == Integration::semi_implicit && object.matter->known &&
-           !is_solid(object);
-  case Way::meeting:
-    return object.meets;
-  case Way::static_meeting:
-    return object.meets && !moves;
   }
   return false;
 }

@@ -17,22 +17,18 @@ enum class Way : std::uint8_t {
   two_step_stored, ///< its second stage known by its stiffness alone
   whole,
   cut,
-  solid,         ///< of tetrahedra, or with some
-  sprung,        ///< a solid with springs or central nodes beside its tetrahedra
-  net,           ///< of none
-  solid_motion,  ///< a solid that moves
-  warped,        ///< with large rotations
-  filled,        ///< a net that keeps the volume it encloses
-  explicit_net,  ///< that moves
-  meeting,       ///< its surface may touch another, or itself
-  static_meeting ///< as long as it is elastostatic
+  solid,        ///< of tetrahedra, or with some
+  sprung,       ///< a solid with springs or central nodes beside its tetrahedra
+  net,          ///< of none
+  solid_motion, ///< a solid that moves
+  warped,       ///< with large rotations
+  filled        ///< a net that keeps the volume it encloses
 };
 inline constexpr std::array all_ways{
-    Way::explicit_motion, Way::implicit_motion, Way::attached,     Way::elastostatic,
-    Way::two_step,        Way::two_step_stored, Way::whole,        Way::cut,
-    Way::solid,           Way::sprung,          Way::net,          Way::solid_motion,
-    Way::warped,          Way::filled,          Way::explicit_net, Way::meeting,
-    Way::static_meeting};
+    Way::explicit_motion, Way::implicit_motion, Way::attached, Way::elastostatic,
+    Way::two_step,        Way::two_step_stored, Way::whole,    Way::cut,
+    Way::solid,           Way::sprung,          Way::net,      Way::solid_motion,
+    Way::warped,          Way::filled};
 
 /// What may act on an object, or be done to it.
 enum class Feature : std::uint8_t {
@@ -106,33 +102,10 @@ inline constexpr std::array gaps{
         "is elastodynamic (ela), expected an elastostatic one for prepare"},
     Gap{Way::two_step, Feature::warp, true,
         "goes on by two steps, expected none for rotation=warp"},
-    Gap{Way::static_meeting, Feature::warp, true,
-        "may touch other surfaces (contact), expected none for rotation=warp"},
-    Gap{Way::warped, Feature::contact, true,
-        "has large rotations (rotation=warp), expected one without for contact"},
-    Gap{Way::warped, Feature::self_contact, true,
-        "has large rotations (rotation=warp), expected one without for contact"},
     Gap{Way::net, Feature::warp, true, "has no tetrahedra, expected a solid for rotation=warp"},
     Gap{Way::cut, Feature::two_step, true,
         "is cut and its second stage is not, expected one that is whole"},
-    Gap{Way::static_meeting, Feature::restore, true,
-        "may touch other surfaces (contact) and is elastostatic, expected an ela object to "
-        "restore"},
     Gap{Way::whole, Feature::restore, true, "is as it came, expected one that was cut"},
-    Gap{Way::explicit_net, Feature::contact, true,
-        "moves by explicit steps, expected integration=implicit or auto for contact"},
-    Gap{Way::explicit_net, Feature::self_contact, true,
-        "moves by explicit steps, expected integration=implicit or auto for contact"},
-    Gap{Way::filled, Feature::contact, true,
-        "keeps the volume it encloses (bulk=), expected none to touch another object"},
-    Gap{Way::meeting, Feature::method, true,
-        "may touch other surfaces (contact) by the method that it has, expected none for method"},
-    Gap{Way::static_meeting, Feature::cut, true,
-        "may touch other surfaces (contact) and is elastostatic, expected an ela object to cut"},
-    Gap{Way::static_meeting, Feature::blade, false,
-        "may touch other surfaces (contact) and is elastostatic: it is not cut"},
-    Gap{Way::static_meeting, Feature::tear, false,
-        "may touch other surfaces (contact) and is elastostatic: it does not tear"},
     Gap{Way::attached, Feature::method, true,
         "is attached to * and moves with it, expected one that is attached to none"},
 };

@@ -63,31 +63,9 @@ void require_bounded_instruments(const World& w) {
   }
 }
 
-/// Those first that instruments give way to: the others meet them where they have gone.
-std::vector<std::size_t> order_of_showing(const World& w) {
-  std::vector<std::size_t> order(w.now.objects.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_partition(order, [&](std::size_t k) {
-    return std::ranges::any_of(w.now.instruments, [&](const Instrument& i) {
-      return gives_way_to(w, i, w.now.objects[k]);
-    });
-  });
-  return order;
-}
-
-bool needs_showing(World& w, Object& object) {
+bool needs_showing(const Object& object) {
   return !object.shown.valid ||
-         (object.method == Method::ffe && object.load->changes_until() > object.shown.time) ||
-         touched_anew(w, object);
-}
-
-/// Of a group, by any of its objects. An instrument is looked for near all of them at once.
-bool needs_showing(World& w, StaticGroup& group) {
-  return !group.settled || std::ranges::any_of(group.parts, [&](std::size_t part) {
-    const Object& object = w.now.objects[part];
-    return !object.shown.valid || object.load->changes_until() > object.shown.time ||
-           touched_by_instruments(object);
-  }) || (w.now.poses.size() > 1 && passed_by_instruments(w, group_box(w, group), false));
+         (object.method == Method::ffe && object.load->changes_until() > object.shown.time);
 }
 
 /// Now, so that a failure is one of this step.
@@ -99,35 +77,29 @@ void find_shapes(World& w, Object& object) {
 }
 
 void show_all(World& w) {
-  group_statics(w);
-  const StaticsBefore before = note_statics(w);
-  std::set<const StaticGroup*> looked_at;
-  for (const std::size_t number : order_of_showing(w)) {
+  const std::vector<std::uint8_t> in_contact = show_static_contacts(w);
+  for (std::size_t number = 0; number < w.now.objects.size(); ++number) {
     Object& object = w.now.objects[number];
     if (w.now.settings.emits.any_shapes())
       need_model(object);
-    if (object.beside != nullptr) {
-      if (has_stood(object))
-        at_object(w, object, [&] { show_standing(w, object); });
-    } else if (StaticGroup* const group = static_group_of(w, number)) {
-      if (looked_at.insert(group).second && needs_showing(w, *group))
-        show_group(w, *group);
-    } else if (needs_showing(w, object)) {
+    if (object.in_motion)
+      at_object(w, object, [&] { show_in_motion(w, object); });
+    else if (in_contact[number] == 0 && needs_showing(object))
       at_object(w, object, [&] { show(w, object); });
-    }
     find_shapes(w, object);
   }
-  for (const std::size_t number : show_late_groups(w, before))
-    find_shapes(w, w.now.objects[number]);
 }
 
-void advance_once(World& w, double to) {
+} // namespace
+
+void advance(World& w, double to) {
   require_few_events(w, to);
+  begin_contact(w);
   Clock& clock = w.now.clock;
   const double start = clock.time;
   const double slack = same_time * (to - start);
   const auto move_to = [&](double time) {
-    move_bodies(w, time);
+    advance_bodies(w, time);
     clock.time = std::max(clock.time, time);
   };
   while (!w.now.events->empty() && w.now.events->begin()->first <= to + slack) {
@@ -136,12 +108,11 @@ void advance_once(World& w, double to) {
   }
   move_to(to);
   note_poses(w);
-  take_touches(w, clock.time - start);
+  end_contact(w, clock.time - start);
   sweep_blades(w);
   for (std::size_t i = 0; i < w.now.objects.size(); ++i)
     at_object(w, w.now.objects[i], [&] { find_free_motion(w, i); });
   show_all(w);
-  end_leading(w);
   if (w.now.poses.size() > 1)
     w.now.poses.erase(w.now.poses.begin(), w.now.poses.end() - 1);
   clock.shown = clock.time;
@@ -149,26 +120,6 @@ void advance_once(World& w, double to) {
     require_bounded_instruments(w);
   tear(w);
   ++w.now.counts.steps;
-}
-
-} // namespace
-
-/// Where an elastostatic object and what moves have come together that were not near, the step is
-/// taken once more with them as one.
-void advance(World& w, double to) {
-  for (;;) {
-    const std::map<std::size_t, Box3> before = note_mixed(w);
-    std::optional<Saved> saved;
-    if (!before.empty())
-      saved = saved_now(w);
-    advance_once(w, to);
-    const std::vector<std::size_t> late = mixed_met_late(w, before);
-    if (late.empty())
-      break;
-    take_back_again(w, std::move(*saved));
-    join_mixed(w, late);
-  }
-  end_mixed(w);
 }
 
 } // namespace gewebe::simulation

@@ -25,7 +25,7 @@ void leave_shown(World& w, Object& object) {
                 .touched = {},
                 .duration = shown.posed && posed ? now - before : 0,
                 .velocity = {}};
-  for (const NodeTouch& t : shown.touches)
+  for (const NodalContactForce& t : shown.contact)
     if (posed)
       came.touched[t.node] = vector_at(*shown.displacement, t.node);
   object.came = std::move(came);
@@ -51,7 +51,7 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh) {
   // Nodes that instruments push are where they are.
   for (const auto& [node, u] : object.came.touched)
     load.displacement[node] = u;
-  for (const NodeTouch& t : object.shown.touches)
+  for (const NodalContactForce& t : object.shown.contact)
     now.displacement[t.node] = vector_at(*object.shown.displacement, t.node);
   std::vector<Vec3> velocity;
   const auto between = [&](std::span<const double> before, std::span<const double> after) {

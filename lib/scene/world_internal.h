@@ -25,12 +25,15 @@ using gewebe::number_text;
 /// Of what is told in single precision too, with room for sums.
 inline constexpr double largest_number = 1e38;
 
+struct IslandCache;
+
 struct World {
   Context context;
   SimulationOptions options;
   Scene now{};
-  bool saved = false;                 // under guard: a call that throws goes back
-  std::vector<std::size_t> renewed{}; // see Simulation::take_renewed
+  bool saved = false;                                  // under guard: a call that throws goes back
+  std::vector<std::size_t> renewed{};                  // see Simulation::take_renewed
+  std::vector<std::shared_ptr<IslandCache>> islands{}; // surfaces of islands, see islands.cpp
 };
 
 // guard.cpp: a call that fails leaves the scene as it was
@@ -40,7 +43,7 @@ struct Saved {
 };
 Saved save(World& w);
 void take_back(World& w, Saved&& saved) noexcept;
-/// For who goes the same way once more, whoever else has saved: what is kept to be quick stays.
+/// Rolls back so that the same step can be repeated. Caches stay valid, even within guarded().
 Saved saved_now(const World& w);
 void take_back_again(World& w, Saved&& saved) noexcept;
 
@@ -64,6 +67,12 @@ void guarded(World& w, Work&& work) {
 // objects.cpp: what they consist of
 void insert(World& w, Object object);
 void need_model(Object& object);
+
+/// Whether the model holds all of its nodes. \pre its model is known
+inline bool is_held_altogether(const Object& object) {
+  return std::ranges::all_of(object.model().nodes,
+                             [](const Node& node) { return node.fixed == fixed_all; });
+}
 
 /// What is shown of it, or moves it, is no longer right.
 inline void touch(Object& object) {
@@ -107,9 +116,6 @@ void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSourc
 void update_solver(World& w, Object& object, const Load& load);
 /// Forgets what is kept to be quick.
 void renew(Object& object);
-/// What taking back does to an object whose shapes were asked of meanwhile, and Renew, which stands
-/// for it in a record: renew, and contact from what is shown alone.
-void begin_anew(World& w, std::size_t number);
 /// Counts add up, errors are the larger ones.
 void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more);
 void add_counts(SolidStepCounts& sum, const SolidStepCounts& more);
@@ -131,10 +137,18 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
                    std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
+/// The same body by implicit steps.
+void make_implicit(World& w, std::shared_ptr<Body>& body);
+double integration_step(World& w, Body& body);
+/// What acts on all parts, to their body.
+void load_body(const World& w, Body& body);
+/// \throw what ended its motion, with the name of its object
+[[noreturn]] void raise(const World& w, const Body& body);
+/// Joint steps without contact.
+void advance_freely(World& w, std::span<Body* const> bodies, double to);
 void drop_body(World& w, const Body* body);
 /// Solids that move as one have elements of one order and are moved alike. \throw Error
 void require_like_solids(const World& w, std::span<const std::size_t> objects);
-void move_bodies(World& w, double to);
 /// Of tetrahedra, or with some. \pre its model is known
 inline bool is_solid(const Object& object) {
   return !object.model().tetrahedra.empty();
@@ -146,86 +160,30 @@ inline bool moves_implicitly(const Object& object) {
 /// How an object's nodes move. \pre it has a body
 std::span<const NodeMotion> motion_of(const Object& object);
 
-// meetings.cpp: whose surfaces touch
-void meet(World& w, double to, Extents& extents, bool stay = false);
-/// Whether moving objects that aren't near may come to be.
-bool may_meet(const World& w, const Meeting& m);
-/// One moves, or meets what moves, and the other is elastostatic.
-bool is_mixed(const World& w, const Meeting& m);
-/// Before a step of the scene: where those are that are mixed and not near.
-std::map<std::size_t, Box3> note_mixed(World& w);
-/// Behind it: which meetings are of such as have come together.
-std::vector<std::size_t> mixed_met_late(World& w, const std::map<std::size_t, Box3>& before);
-/// They are near from now on, until end_mixed at least. \pre the scene is as before the step
-void join_mixed(World& w, std::span<const std::size_t> late);
-void end_mixed(World& w);
-void note_extents(const World& w, Extents& extents);
-std::set<std::size_t> met_late(const World& w, Extents& before, Extents& after);
-void join_late(World& w, const std::set<std::size_t>& objects);
-std::vector<SurfaceMeeting> meetings_of(const World& w, std::span<const std::size_t> parts,
-                                        std::span<const std::size_t> offset);
-void move_meetings(World& w, std::size_t index, const Moves& moves);
-/// Objects that may come to move as one with this one, by ties and meetings, itself among them.
+// islands.cpp: whose surfaces touch, and what moves together for it
+/// A way of all that moves, through contact.
+void advance_bodies(World& w, double to);
+/// Before a step of the scene.
+void begin_contact(World& w);
+/// Behind a step: contact forces on what moves, means over its time.
+void end_contact(World& w, double duration);
+/// What bodies did to contact forces so far goes to their objects.
+void move_contacts(World& w, std::size_t index, const Moves& moves);
+/// Elastostatic objects that are in contact, or may come to be: shows those of them that need it.
+/// \return by object, whether it was shown here
+std::vector<std::uint8_t> show_static_contacts(World& w);
+/// Objects that may come to move as one with this one, by ties and contact, itself among them.
 std::vector<std::size_t> together(const World& w, std::size_t object);
-
-// beside.cpp: elastostatic objects that may touch what moves
-/// Those that are near to these, or to each other and these.
-std::vector<std::size_t> near_beside(const World& w, std::span<const std::size_t> parts);
-/// They stand beside the body from now on, as they are. \pre nothing stands beside it yet
-void stand_beside(World& w, const std::shared_ptr<Body>& body, std::vector<std::size_t> objects);
-/// Its objects, and those beside it: the order of nodes where both are one.
-std::vector<std::size_t> all_of(const Body& body);
-/// It stands beside none any more.
-void leave_body(World& w, Object& object);
-std::vector<SurfaceMeeting> meetings_of(const World& w, const Body& body);
-/// Before a way of a body: wakes it where something else acts on them.
-void wake_by_beside(const World& w, Body& body);
-void begin_standing(World& w, Body& body, double to);
-void end_standing(Body& body);
-/// Whether its body has moved in this step.
-inline bool has_stood(const Object& object) {
-  return object.stood_under != nullptr;
-}
-void show_standing(World& w, Object& object);
-/// What its body's steps meet it in, or move it. Null: none.
-inline const Body* body_of(const Object& object) {
-  return object.body != nullptr ? object.body.get() : object.beside.get();
-}
-
-// static_meetings.cpp: elastostatic objects whose surfaces touch
-/// Whether all that it is of is elastostatic, and beside no body.
-bool is_static(const World& w, const Meeting& m);
-/// The groups by who is near now.
-void regroup_statics(World& w);
-/// Before objects are shown: those that are near become one group.
-void group_statics(World& w);
-StaticGroup* static_group_of(World& w, std::size_t object);
-/// Whether both go on as one, in one body or one group.
-bool as_one(const World& w, std::size_t object, std::size_t other);
-/// Where its surface is as it is shown, at most.
-const Box3& shown_box(World& w, std::size_t index);
-void show_group(World& w, StaticGroup& group);
-/// Of the surfaces of all its objects, as they are shown.
-const Box3& group_box(World& w, StaticGroup& group);
-/// What those need that may yet turn out to have come near each other: to go back to.
-struct StaticsBefore {
-  struct One {
-    std::size_t object = 0;
-    Shown shown; ///< without its shape
-    CameFrom came;
-    Box3 box;
-  };
-  std::vector<One> all;
-  std::vector<std::optional<Pose>> poses;
-};
-StaticsBefore note_statics(World& w);
-/// Behind the showing of all: those that were not near but have come, or passed each other, are
-/// shown again as one. \return these
-std::vector<std::size_t> show_late_groups(World& w, const StaticsBefore& before);
+/// Where an instrument that appears comes from: out of all objects.
+Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose);
+/// \throw Error naming objects and the place where surfaces that may touch pass each other
+void require_apart(World& w, const ContactRule& rule);
 
 // time.cpp: steps through events; show.cpp: the picture at their end
 void advance(World& w, double to);
 void show(World& w, Object& object);
+/// Of an elastostatic object that took part in steps of what moves.
+void show_in_motion(World& w, Object& object);
 void begin_showing(World& w, Object& object);
 void end_showing(World& w, Object& object);
 /// What acts on it now will be shown.
@@ -252,45 +210,14 @@ std::vector<Vec3> shape_velocity(World& w, Object& object, bool afresh);
 std::size_t instrument_place(const World& w, const std::string& name) noexcept;
 std::size_t add_instrument(World& w, const std::string& name);
 InstrumentReport report_of(const World& w, std::size_t instrument);
+/// Those that stand in an object whose shape is another one come to where they are from outside.
+void let_instruments_enter(World& w);
 void drop_grips(World& w, std::size_t object, const std::vector<std::uint32_t>& nodes);
 void note_poses(World& w, std::optional<std::size_t> jumps = {});
 bool instruments_there(const World& w);
 std::optional<Pose> pose_at(const World& w, std::size_t moment, std::size_t instrument);
 
-// coupled.cpp: instruments that hands lead through a spring
-void lead_on(World& w, double to, Extents& extents);
-void follow_hands(World& w, double to);
-bool gives_way_to(const World& w, const Instrument& instrument, const Object& object);
-MovedInstrument led_here(const World& w, const Instrument& instrument, const MovedInstrument& way);
-void settle(World& w, std::size_t instrument, std::span<Object* const> objects);
-void end_leading(World& w);
-
-// contact.cpp: whom they touch
-void guide(World& w, Body& body, double to, Extents& extents);
-void end_guiding(World& w, double to);
-void take_touches(World& w, double duration);
-void gather_impulses(World& w, Body& body);
-bool touched_anew(World& w, Object& object);
-bool passed_by_instruments(const World& w, const Box3& box, bool first);
-void follow_instruments(World& w, Object& object, PartShown* part);
-/// Instruments over a short part of their ways since the scene was shown.
-struct ShortWay {
-  std::vector<std::optional<MovedInstrument>> instruments;
-  bool last = false;
-};
-/// \param objects some that one of them gives way to, maybe
-std::vector<ShortWay> short_ways(const World& w, std::span<Object* const> objects);
-/// Whether what acts on it beside contact is other than shown. \pre shown.load is that of now
-bool acted_anew(const Object& object);
-/// Behind an update of their contact.
-void settle_led(World& w, std::span<Object* const> objects);
-void tell_stuck(World& w, Object& object, const NodeTouch& stuck);
-void warn_inexact(World& w, Object& object);
-inline bool touched_by_instruments(const Object& object) {
-  return std::ranges::any_of(object.shown.touches,
-                             [](const NodeTouch& t) { return t.instrument != other_surface; });
-}
-void add_touches(Object& object);
+void add_contact_forces(Object& object);
 
 // cuts.cpp: what they sever and what comes off
 void announce_cut(World& w, std::size_t index);
@@ -322,6 +249,16 @@ CutModel plane_through(const World& w, std::size_t index, const PlaneToCut& plan
 std::optional<CutModel> cut_by_plane(const World& w, std::size_t index, const PlaneToCut& plane,
                                      bool skin_too = true);
 void sweep_solid(World& w, std::size_t index, std::span<const BladeArea> areas);
+
+// wound_walls.cpp: walls of cuts in contact
+/// \throw Error where surfaces that are to touch share a place at nodes that are held: no contact
+/// force can part them
+void require_parted_holds(const World& w, const SetContact& c, const Motions& motions);
+/// Moves nodes of these objects' surfaces apart that stand at one place, so that contact can begin.
+/// \param motions  of bodies' objects; elastodynamic objects that are moved are among them then
+/// \return objects that were moved
+std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
+                                        Motions& motions);
 
 // tears.cpp: what gives way at the end of a step
 void tear(World& w);

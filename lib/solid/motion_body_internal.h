@@ -28,7 +28,6 @@ struct MotionBody {
 /// Numbers on the 3 n axes.
 struct MotionState {
   Numbers place, velocity, load;
-  Numbers outer; ///< of the load, what isn't between nodes of the body
   std::vector<std::uint8_t> held;
 
   bool any_held() const;

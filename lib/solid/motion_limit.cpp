@@ -48,10 +48,10 @@ void rigid_parts(const MotionBody& body, const MotionState& state, Numbers& movi
 } // namespace
 
 bool limit_energy(const MotionBody& body, MotionState& state, double elastic, double before,
-                  double rounding, bool all) {
+                  double rounding) {
   const double kinetic_now = motion_energy(body, state.velocity),
                excess =
-                   kinetic_now + elastic - work_of_load(body, state.outer, state.place) - before;
+                   kinetic_now + elastic - work_of_load(body, state.load, state.place) - before;
   if (!(excess > rounding))
     return false;
   Numbers moving(body.axes()), turning(body.axes());
@@ -71,9 +71,8 @@ bool limit_energy(const MotionBody& body, MotionState& state, double elastic, do
     return energy > 0 ? std::sqrt(std::max(0.0, 1 - taken / energy)) : 0;
   };
   double left = excess;
-  const double of_inner = take(inner_energy, left),
-               of_turning = all ? take(turning_energy, left) : 1,
-               of_body = all ? take(motion_energy(body, moving), left) : 1;
+  const double of_inner = take(inner_energy, left), of_turning = take(turning_energy, left),
+               of_body = take(motion_energy(body, moving), left);
   for (std::size_t axis = 0; axis < body.axes(); ++axis)
     state.velocity[axis] =
         of_inner * inner[axis] + of_turning * turning[axis] + of_body * moving[axis] + held[axis];

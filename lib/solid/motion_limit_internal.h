@@ -5,11 +5,11 @@
 
 namespace gewebe {
 
-/// Speeds such that energy (of motion, `elastic`, and of the outer load) is `before` at most,
-/// `rounding` left aside; true if they had to be lowered, those of held axes never. Taken first
-/// from what neither moves nor turns the body as a whole (a held one has no such parts), then from
-/// what turns it, then from the rest: from these two only if `all`.
+/// Lowers speeds such that energy (of motion, `elastic`, and of the load) is `before` at most,
+/// `rounding` left aside; those of held axes stay. Lowers first what neither moves nor turns the
+/// body as a whole (a held body has no other parts), then what turns it, then the rest.
+/// \return whether speeds were lowered
 bool limit_energy(const MotionBody& body, MotionState& state, double elastic, double before,
-                  double rounding, bool all);
+                  double rounding);
 
 } // namespace gewebe

@@ -46,15 +46,24 @@ double MotionObjective::value_of_shape(const Numbers& at, double elastic) const 
   return value;
 }
 
-void MotionObjective::keep_momentum(MotionPoint& point) const {
+std::array<double, 3> MotionObjective::momentum_off(std::span<const double> at,
+                                                    std::span<const double> more) const {
   std::array<double, 3> off{};
   double mass = 0; // times inertia
   for (std::size_t i = 0; i < body_.nodes(); ++i)
     mass += mass_[i];
   for (std::size_t axis = 0; axis < body_.axes(); ++axis)
-    off[axis % 3] += mass_[axis / 3] * (point.at[axis] - ahead_[axis]) - state_.load[axis];
+    off[axis % 3] += mass_[axis / 3] * (at[axis] - ahead_[axis]) - state_.load[axis] -
+                     (more.empty() ? 0 : more[axis]);
+  for (double& of : off)
+    of /= mass;
+  return off;
+}
+
+void MotionObjective::keep_momentum(MotionPoint& point) const {
+  const std::array<double, 3> off = momentum_off(point.at, {});
   for (std::size_t axis = 0; axis < body_.axes(); ++axis)
-    point.at[axis] -= off[axis % 3] / mass;
+    point.at[axis] -= off[axis % 3];
 }
 
 } // namespace gewebe

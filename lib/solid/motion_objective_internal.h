@@ -5,6 +5,7 @@
 #include "solid/motion_body_internal.h"
 #include "solid/solid_energy_internal.h"
 
+#include <array>
 #include <cmath>
 
 namespace gewebe {
@@ -28,6 +29,10 @@ public:
   void evaluate(MotionPoint& point, const Context& context, bool turns = false) const;
   /// The value of the state's shape, moved without a turn to `at`, its elastic energy given.
   double value_of_shape(const Numbers& at, double elastic) const;
+  /// Displacement by which a free body at `at` is off the motion that its momentum, the load and
+  /// further forces give it. \param more  3 n, or none
+  std::array<double, 3> momentum_off(std::span<const double> at,
+                                     std::span<const double> more) const;
   /// A free body goes on with its momentum and the load's: moves it by what unfinished rounds took
   /// or gave.
   void keep_momentum(MotionPoint& point) const;

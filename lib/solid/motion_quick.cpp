@@ -59,6 +59,7 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
     stiffness_ =
         alike_ ? no_stiffness(held) : solid_stiffness(body.mesh, body.elements, held, context);
   }
+  stiffness_is_bound_ = body.mesh.tetrahedra.empty() && !springs.empty();
   StiffnessMatrix a = stiffness_;
   for (double& value : a.value)
     value *= scale;
@@ -116,6 +117,13 @@ void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
     if (still_[i] != 0)
       for (std::size_t k = 0; k < 9; ++k)
         rotations_[9 * i + k] = k % 4 == 0 ? 1 : 0;
+}
+
+std::array<double, 9> MotionQuick::frame_of(std::size_t node) const {
+  std::array<double, 9> frame{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  if (!all_still_)
+    std::copy_n(rotations_.begin() + static_cast<std::ptrdiff_t>(9 * node), 9, frame.begin());
+  return frame;
 }
 
 void MotionQuick::forget() {

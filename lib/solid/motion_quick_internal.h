@@ -9,6 +9,7 @@
 #include "solve/single_factor.h"
 #include "solve/stiffness.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -34,6 +35,10 @@ public:
   bool take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
                     const Context& context);
   void drop_tangent() noexcept;
+  /// A net without elements: the bound of its springs is a poor model.
+  bool wants_tangent() const noexcept { return all_still_ && stiffness_is_bound_; }
+  /// Rotation of a node's frame, row-major. \pre turned
+  std::array<double, 9> frame_of(std::size_t node) const;
   /// Frames as in the last evaluation; those of nodes held along an axis, or of no tetrahedron,
   /// don't turn.
   /// \pre prepared
@@ -58,7 +63,8 @@ private:
   double step_ = 0;
   std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
   bool all_still_ = false;
-  bool alike_ = false; ///< the matrix is of nodes, and serves each axis
+  bool stiffness_is_bound_ = false; ///< there are springs and no elements
+  bool alike_ = false;              ///< the matrix is of nodes, and serves each axis
   StiffnessMatrix stiffness_;
   std::optional<Factor> factor_;
   std::optional<SingleFactor> single_;

@@ -1,6 +1,7 @@
 #include "solid/solid_motion.h"
 
 #include "base/error.h"
+#include "base/unique_number.h"
 #include "solid/assembly_internal.h"
 #include "solid/motion_body_internal.h"
 #include "solid/motion_descent_internal.h"
@@ -59,27 +60,58 @@ struct SolidMotion::State {
   double last_step = 0;
   Numbers target; ///< of held axes in the next step: displacements
   bool moved = false;
-  Numbers guess;                    ///< of the next step; empty: none
-  Numbers between;                  ///< of the load, among the body's nodes; empty: none
-  double slack = 0;                 ///< of energy, of these
-  double lent = 0, lent_before = 0; ///< of it so far, and when the last step began
   Numbers reactions;
   MotionQuick quick;
   MotionTangent tangent;
   MotionRecovery recovery;
-  bool recovered = false; ///< since the last step
+  /// A step in parts.
+  struct Open {
+    MotionObjective objective;
+    MotionPoint found;               ///< the iterate
+    Numbers base, step;              ///< where it was linearised, and the model's step from there
+    bool fresh = true;               ///< nothing was linearised yet
+    Numbers change;                  ///< of the iterate in the round before
+    double relaxation = 1, most = 1; ///< ... at most
+
+    /// Chooses the relaxation of the next round. Where a round undid more than a part of the one
+    /// before, the matrix is too soft by 1 - rho, with that part -rho: one round is shorter by as
+    /// much, the next is whole again. Where rounds grow otherwise, all are made shorter.
+    void relax() {
+      constexpr double undone = 0.3, least = 0.1;
+      Numbers latest(fresh ? 0 : base.size());
+      double along = 0, square = 0, grown = 0;
+      for (std::size_t axis = 0; axis < latest.size(); ++axis) {
+        latest[axis] = found.at[axis] - base[axis];
+        if (!change.empty()) {
+          along += latest[axis] * change[axis];
+          square += change[axis] * change[axis];
+          grown += latest[axis] * latest[axis];
+        }
+      }
+      const double rho = square > 0 ? along / square : 0;
+      if (square > 0)
+        most = grown > square ? std::max(least, most / 2) : std::min(1.0, 2 * most);
+      relaxation = relaxation >= most && rho < -undone ? std::max(least, 1 / (1 - rho)) : 1;
+      relaxation = std::min(relaxation, most);
+      change = std::move(latest);
+    }
+    SolidStep counts{};
+  };
+  std::optional<Open> open;
+  std::uint64_t matrix_version = 0;
 
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
       : options(with), body(body_of(mesh, materials, net, with.drag, context)),
         energy(body, net, with), recovery(body, materials, net, with) {
     const std::size_t axes = body.axes();
-    now = {body.rest, Numbers(axes), Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
+    now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
   void take_over(SolidMotion& soft);
   void limit(SolidStep& step);
   SolidStep step_softly(double h, const Context& context);
+  MotionPoint search(const MotionObjective& objective, SolidStep& step, const Context& context);
 };
 
 SolidMotion::~SolidMotion() = default;
@@ -116,16 +148,11 @@ SolidMotion::SolidMotion(const TetMesh& mesh, std::span<const SolidMaterial> mat
 
 /// Speeds at the end of a step.
 void SolidMotion::State::limit(SolidStep& step) {
-  const double work = work_of_load(body, now.outer, now.place),
+  const double work = work_of_load(body, now.load, now.place),
                rounding =
                    energy.unsure_at_rest() + 1e-12 * (motion_energy(body, now.velocity) + elastic +
                                                       std::abs(allowed) + std::abs(work));
-  const double most = between.empty() ? allowed : allowed + std::max(0.0, slack - lent_before);
-  step.limited = limit_energy(body, now, elastic, most, rounding, between.empty());
-  const double growth = motion_energy(body, now.velocity) + elastic - work - allowed;
-  lent = between.empty() ? 0 : std::max(0.0, lent_before + growth);
-  if (const double left = growth + allowed - most; step.limited && !(left <= 2 * rounding))
-    step.excess = left;
+  step.limited = limit_energy(body, now, elastic, allowed, rounding);
 }
 
 /// What the body that moves meanwhile has come to.
@@ -139,12 +166,9 @@ void SolidMotion::State::take_over(SolidMotion& soft) {
 /// A step of recovery.
 SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   SolidMotion& soft = recovery.soft();
-  soft.set_load(now.load, {between, slack});
-  soft.set_tolerance(options.tolerance, options.max_rounds);
+  soft.set_load(now.load);
   if (std::exchange(moved, false))
     soft.move_held(target);
-  if (!guess.empty())
-    soft.guess(std::exchange(guess, {}));
   SolidStep step = soft.step(h, context);
   take_over(soft);
   last_step = h;
@@ -159,21 +183,44 @@ SolidStep SolidMotion::State::step_softly(double h, const Context& context) {
   quick.forget();
   forecast.clear();
   recovery.end();
-  recovered = true;
-  // It may never have taken a step: what is asked of one behind it is answered from here.
-  step.factorisations += quick.prepare(body, energy.springs(), now.held, h, options, context);
-  quick.turn(energy, context);
   return step;
 }
 
-void SolidMotion::set_load(std::span<const double> forces, const Between& between) {
-  State& s = *state_;
-  s.now.load.assign(forces.begin(), forces.end());
-  s.between.assign(between.forces.begin(), between.forces.end());
-  s.slack = between.slack;
-  s.now.outer = s.now.load;
-  if (!s.between.empty())
-    add(s.now.outer, -1, s.between);
+/// Where a step ends under the load.
+MotionPoint SolidMotion::State::search(const MotionObjective& objective, SolidStep& step,
+                                       const Context& context) {
+  const double h = objective.step();
+  MotionPoint found;
+  found.at = now.place;
+  add(found.at, h, now.velocity);
+  if (last_step != h)
+    forecast.clear();
+  forecast.add_to(found.at, h * h, context);
+  for (std::size_t axis = 0; axis < body.axes(); ++axis)
+    if (now.held[axis] != 0)
+      found.at[axis] = moved ? body.rest[axis] + target[axis] : now.place[axis];
+  objective.evaluate(found, context, true);
+  // The shape of now, moved as its momentum has it: what rounds get below leaves speeds of the body
+  // as a whole to themselves.
+  MotionPoint stiff;
+  stiff.at = now.place;
+  if (!now.any_held())
+    objective.keep_momentum(stiff);
+  if (!(found.value <= objective.value_of_shape(stiff.at, elastic))) {
+    for (std::size_t axis = 0; axis < body.axes(); ++axis)
+      if (now.held[axis] == 0)
+        found.at[axis] = stiff.at[axis];
+    objective.evaluate(found, context, true);
+  }
+  if (options.reference)
+    descend_as_reference(objective, found, tangent, step, context);
+  else
+    descend_quickly(objective, found, quick, options, step, context);
+  return found;
+}
+
+void SolidMotion::set_load(std::span<const double> forces) {
+  state_->now.load.assign(forces.begin(), forces.end());
 }
 
 void SolidMotion::hold(std::span<const std::uint8_t> held) {
@@ -203,43 +250,13 @@ SolidStep SolidMotion::step(double h, const Context& context) {
     return s.step_softly(h, context);
   SolidStep step;
   step.change = step.left = HUGE_VAL;
-  if (std::exchange(s.recovered, false))
-    ++step.factorisations; // another one answers again
   if (!s.options.reference)
     step.factorisations +=
         s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  s.lent_before = s.lent;
   s.allowed = motion_energy(s.body, s.now.velocity) + s.elastic -
-              work_of_load(s.body, s.now.outer, s.now.place);
+              work_of_load(s.body, s.now.load, s.now.place);
   const MotionObjective objective(s.body, s.now, s.energy, h, s.options);
-  MotionPoint found;
-  found.at = s.now.place;
-  add(found.at, h, s.now.velocity);
-  if (s.last_step != h)
-    s.forecast.clear();
-  s.forecast.add_to(found.at, h * h, context);
-  if (!s.guess.empty())
-    found.at = std::exchange(s.guess, {});
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] != 0)
-      found.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
-  objective.evaluate(found, context, true);
-  // The shape of now, moved as its momentum has it: what rounds get below leaves speeds of the body
-  // as a whole to themselves.
-  MotionPoint stiff;
-  stiff.at = s.now.place;
-  if (!s.now.any_held())
-    objective.keep_momentum(stiff);
-  if (!(found.value <= objective.value_of_shape(stiff.at, s.elastic))) {
-    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-      if (s.now.held[axis] == 0)
-        found.at[axis] = stiff.at[axis];
-    objective.evaluate(found, context, true);
-  }
-  if (s.options.reference)
-    descend_as_reference(objective, found, s.tangent, step, context);
-  else
-    descend_quickly(objective, found, s.quick, s.options, step, context);
+  MotionPoint found = s.search(objective, step, context);
   if (!std::isfinite(found.value))
     throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
 
@@ -260,14 +277,233 @@ SolidStep SolidMotion::step(double h, const Context& context) {
   s.forecast.add(std::move(acceleration), s.body.masses, context);
   s.now.place = std::move(found.at);
   s.elastic = s.energy.elastic(); // of the last evaluation, momentum kept by a translation alone
-  if (!s.moved || !s.between.empty())
+  if (!s.moved)
     s.limit(step);
-  else
-    s.lent = 0;
   step.evaluations = objective.evaluations();
   s.last_step = h;
   s.moved = false;
   return step;
+}
+
+void SolidMotion::begin_step(double h, const Context& context) {
+  State& s = *state_;
+  s.open.reset();
+  s.recovery.look(s.body, s.now, s.elastic, h, s.options, context);
+  if (s.recovery.on()) {
+    SolidMotion& soft = s.recovery.soft();
+    soft.set_load(s.now.load);
+    if (s.moved)
+      soft.move_held(s.target);
+    soft.begin_step(h, context);
+    return;
+  }
+  const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
+  if (made > 0)
+    s.matrix_version = unique_number();
+  s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.energy, h, s.options),
+                             .found = {},
+                             .base = {},
+                             .step = {},
+                             .change = {}});
+  State::Open& open = *s.open;
+  open.found.at = s.now.place;
+  open.counts.factorisations = made;
+}
+
+void SolidMotion::linearise_step(std::span<double> step, std::span<const double> forces,
+                                 const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().linearise_step(step, forces, context);
+    return;
+  }
+  State::Open& open = *s.open;
+  open.relax();
+  open.base = open.found.at;
+  MotionPoint point;
+  point.at = open.base;
+  if (open.fresh)
+    add(point.at, open.objective.step(), s.now.velocity);
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] != 0)
+      point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
+  open.objective.evaluate(point, context, true);
+  if (s.quick.wants_tangent() &&
+      s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
+    s.matrix_version = unique_number();
+  s.quick.turn(s.energy, context);
+  s.quick.fill(s.energy.volumes(), context);
+  if (!s.energy.volumes().empty())
+    s.matrix_version = unique_number();
+  Numbers direction = point.gradient;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    if (s.now.held[axis] == 0)
+      direction[axis] -= forces[axis];
+  s.quick.into_frames(direction, context);
+  s.quick.solve(direction, context);
+  s.quick.out_of_frames(direction, context);
+  ++open.counts.rounds;
+  open.step.resize(s.body.axes());
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    open.step[axis] = point.at[axis] -
+                      (s.now.held[axis] != 0 ? 0 : open.relaxation * direction[axis]) -
+                      open.base[axis];
+  open.fresh = false;
+  std::ranges::copy(open.step, step.begin());
+}
+
+void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
+                                 const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().unit_responses(node, columns, context);
+    return;
+  }
+  Numbers column;
+  for (std::size_t a = 0; a < 3; ++a) {
+    column.assign(s.body.axes(), 0);
+    const std::size_t axis = 3 * std::size_t{node} + a;
+    if (s.now.held[axis] == 0) {
+      column[axis] = 1;
+      s.quick.solve(column, context);
+    }
+    std::ranges::copy(column, columns.begin() + static_cast<std::ptrdiff_t>(a * s.body.axes()));
+  }
+}
+
+std::uint64_t SolidMotion::matrix_version() const noexcept {
+  return state_->recovery.on() ? state_->recovery.soft().matrix_version() : state_->matrix_version;
+}
+
+std::array<double, 9> SolidMotion::frame_of(std::uint32_t node) const {
+  return state_->recovery.on() ? state_->recovery.soft().frame_of(node)
+                               : state_->quick.frame_of(node);
+}
+
+void SolidMotion::move_iterate(double share, std::span<const double> change,
+                               const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().move_iterate(share, change, context);
+    return;
+  }
+  State::Open& open = *s.open;
+  open.found.at = open.base;
+  add(open.found.at, 1 - share, open.step);
+  if (!std::ranges::all_of(change, [](double f) { return f == 0; })) {
+    Numbers answer(change.begin(), change.end());
+    s.quick.into_frames(answer, context);
+    s.quick.solve(answer, context);
+    s.quick.out_of_frames(answer, context);
+    ++open.counts.rounds;
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      if (s.now.held[axis] == 0)
+        open.found.at[axis] += open.relaxation * answer[axis];
+  }
+}
+
+double SolidMotion::relaxation() const noexcept {
+  return state_->recovery.on() ? state_->recovery.soft().relaxation() : state_->open->relaxation;
+}
+
+bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
+  State& s = *state_;
+  if (s.recovery.on())
+    return s.recovery.soft().keep_momentum(forces, room);
+  if (s.now.any_held())
+    return true;
+  State::Open& open = *s.open;
+  const std::array<double, 3> off = open.objective.momentum_off(open.found.at, forces);
+  if (!(std::hypot(off[0], off[1], off[2]) <= room))
+    return false;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+    open.found.at[axis] -= off[axis % 3];
+  return true;
+}
+
+void SolidMotion::solve_alone(const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().solve_alone(context);
+    return;
+  }
+  State::Open& open = *s.open;
+  const int made = open.counts.factorisations;
+  open.found = s.search(open.objective, open.counts, context);
+  open.counts.factorisations = made;
+  if (!s.now.any_held())
+    open.objective.keep_momentum(open.found);
+}
+
+void SolidMotion::begin_iterate_again() {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    s.recovery.soft().begin_iterate_again();
+    return;
+  }
+  s.open->found = {};
+  s.open->found.at = s.now.place;
+  s.open->fresh = true;
+  s.open->change.clear();
+}
+
+bool SolidMotion::moves_held() const noexcept {
+  return state_->moved;
+}
+
+std::span<const double> SolidMotion::iterate() const noexcept {
+  return state_->recovery.on() ? state_->recovery.soft().iterate()
+                               : std::span<const double>(state_->open->found.at);
+}
+
+SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on()) {
+    SolidMotion& soft = s.recovery.soft();
+    SolidStep step = soft.end_step(forces, context);
+    s.take_over(soft);
+    s.moved = false;
+    if (MotionRecovery::is_right(s.body, s.now.place)) {
+      Numbers own(s.body.axes());
+      const double whole = s.energy.evaluate(s.now.place, {}, own, context, true);
+      if (whole <= s.elastic) {
+        s.elastic = whole;
+        s.energy.keep();
+        s.quick.forget();
+        s.forecast.clear();
+        s.recovery.end();
+      }
+    }
+    return step;
+  }
+  State::Open open = std::move(*s.open);
+  s.open.reset();
+  const double h = open.objective.step();
+  open.objective.evaluate(open.found, context);
+  if (!std::isfinite(open.found.value))
+    throw Error("the motion of a solid is no longer finite, expected a smaller load or timestep");
+  s.energy.keep();
+  s.reactions = open.found.forces;
+  Numbers acceleration(s.body.axes());
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
+    if (s.now.held[axis] == 0)
+      s.reactions[axis] = 0;
+    else
+      s.reactions[axis] -= forces.empty() ? 0 : forces[axis];
+    const double speed = (open.found.at[axis] - s.now.place[axis]) / h;
+    acceleration[axis] = (speed - s.now.velocity[axis]) / h;
+    s.now.velocity[axis] = speed;
+  }
+  if (s.last_step != h)
+    s.forecast.clear();
+  s.forecast.add(std::move(acceleration), s.body.masses, context);
+  s.now.place = std::move(open.found.at);
+  s.elastic = s.energy.elastic();
+  s.last_step = h;
+  s.moved = false;
+  open.counts.evaluations = open.objective.evaluations();
+  open.counts.change = open.counts.left = 0;
+  return open.counts;
 }
 
 std::span<const double> SolidMotion::places() const noexcept {
@@ -297,116 +533,23 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
                           const Context& context) {
-  state_->quick.forget();
-  state_->recovery.end();
-  state_->lent_before = 0;
-  begin_again(places, velocity, context);
-}
-
-void SolidMotion::begin_again(std::span<const double> places, std::span<const double> velocity,
-                              const Context& context) {
   State& s = *state_;
+  s.quick.forget();
+  s.recovery.end();
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());
   s.forecast.clear();
   s.energy.forget_bubbles();
   s.last_step = 0;
-  s.lent = s.lent_before;
-  if (s.recovery.on()) {
-    s.recovery.soft().begin_again(places, velocity, context);
-    s.elastic = s.recovery.elastic();
-    return;
-  }
   Numbers forces(s.body.axes());
   s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
   s.energy.keep();
-}
-
-void SolidMotion::nudge(std::span<const double> displacement, const Context& context) {
-  State& s = *state_;
-  if (s.recovery.on()) {
-    s.recovery.soft().nudge(displacement, context);
-    s.take_over(s.recovery.soft());
-    return;
-  }
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0) {
-      s.now.place[axis] += displacement[axis];
-      s.now.velocity[axis] += displacement[axis] / s.last_step;
-    }
-  Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
-  s.energy.keep();
-}
-
-double SolidMotion::hold_back(std::span<const double> places, double part, const Context& context) {
-  State& s = *state_;
-  if (s.recovery.on()) {
-    const double excess = s.recovery.soft().hold_back(places, part, context);
-    s.take_over(s.recovery.soft());
-    return excess;
-  }
-  std::array<double, 3> mean{}; // way of the body as a whole
-  if (!s.now.any_held()) {
-    double mass = 0;
-    for (const double m : s.body.masses)
-      mass += m;
-    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-      mean[axis % 3] += s.body.masses[axis / 3] / mass * (s.now.place[axis] - places[axis]);
-  }
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] == 0) {
-      const double whole = mean[axis % 3],
-                   way = whole + part * (s.now.place[axis] - places[axis] - whole);
-      s.now.place[axis] = places[axis] + way;
-      s.now.velocity[axis] = way / s.last_step;
-    }
-  Numbers forces(s.body.axes());
-  s.elastic = s.energy.evaluate(s.now.place, {}, forces, context);
-  s.energy.keep();
-  s.forecast.clear();
-  SolidStep step;
-  s.limit(step);
-  return step.excess;
-}
-
-void SolidMotion::guess(std::span<const double> places) {
-  state_->guess.assign(places.begin(), places.end());
-}
-
-void SolidMotion::set_tolerance(double tolerance, int max_rounds) {
-  state_->options.tolerance = tolerance;
-  state_->options.max_rounds = max_rounds;
-}
-
-void SolidMotion::respond(std::span<double> over_axes, const Context& context) {
-  if (state_->recovery.on()) {
-    state_->recovery.soft().respond(over_axes, context);
-    return;
-  }
-  Numbers all(over_axes.begin(), over_axes.end());
-  state_->quick.into_frames(all, context);
-  state_->quick.solve(all, context);
-  state_->quick.out_of_frames(all, context);
-  std::ranges::copy(all, over_axes.begin());
-}
-
-bool SolidMotion::take_tangent(const Context& context) {
-  State& s = *state_;
-  if (!s.quick.take_tangent(s.body, s.energy.springs(), s.now.place, context))
-    return false;
-  s.quick.fill(s.energy.volumes(), context);
-  return true;
-}
-
-void SolidMotion::drop_tangent() {
-  state_->quick.drop_tangent();
 }
 
 void SolidMotion::find_reactions(const Context& context) {
   State& s = *state_;
   if (s.recovery.on()) {
-    s.recovery.soft().set_load(s.now.load, {s.between, s.slack});
+    s.recovery.soft().set_load(s.now.load);
     s.recovery.soft().find_reactions(context);
     s.take_over(s.recovery.soft());
     return;
@@ -427,7 +570,7 @@ double SolidMotion::elastic_energy() const {
   return state_->elastic;
 }
 double SolidMotion::potential_energy() const {
-  return state_->elastic - work_of_load(state_->body, state_->now.outer, state_->now.place);
+  return state_->elastic - work_of_load(state_->body, state_->now.load, state_->now.place);
 }
 
 } // namespace gewebe

@@ -48,6 +48,7 @@
 #include "solid/hyperelastic.h"
 #include "tetrahedra/tet_mesh.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -110,7 +111,6 @@ struct SolidStep {
   double left = 0;
   int factorisations = 0; ///< made for this step
   bool limited = false;   ///< speeds were lowered, see SolidMotion::step
-  double excess = 0;      ///< of energy, where there were no speeds left to lower
 };
 
 /// Damping per stiffness that lets a motion of this frequency (Hz) decay by `ratio` of the critical
@@ -131,15 +131,8 @@ public:
   SolidMotion(SolidMotion&&) noexcept;
   SolidMotion& operator=(SolidMotion&&) noexcept;
 
-  /// Forces that the body's own nodes push each other with, on the 3 n axes.
-  struct Between {
-    std::span<const double> forces{}; ///< or none
-    double slack = 0;                 ///< energy that they may add, in all steps together
-  };
-  /// Forces on the 3 n axes from now on, which keep their direction. \param between the part of
-  /// them that is such \pre 3 n, finite
-  void set_load(std::span<const double> forces, const Between& between);
-  void set_load(std::span<const double> forces) { set_load(forces, {}); }
+  /// Forces on the 3 n axes from now on, which keep their direction. \pre 3 n, finite
+  void set_load(std::span<const double> forces);
   /// The axes held from now on; they stay where they are. \pre 3 n flags
   void hold(std::span<const std::uint8_t> held);
   /// Where held axes stand at the end of the next step, which moves them there: displacements on
@@ -148,11 +141,9 @@ public:
 
   /// On by h seconds. Where nothing is held and moved during the step, energy (of motion, of
   /// elements and of the load) doesn't grow: what the nonlinearity or unfinished rounds would add
-  /// is taken from the speeds, but for those of the body as a whole. With forces between its own
-  /// nodes, which have no energy, it grows by no more than their slack and what held axes are moved
-  /// with, as long as there are speeds to take it from that neither move nor turn it as a whole. A
-  /// body that is held nowhere keeps its momentum but for the load's; its angular momentum to first
-  /// order in h. \pre h > 0 \throw Error if the state is no longer finite, or as Factor; Cancelled
+  /// is taken from the speeds, at last from those of the body as a whole. A body that is held
+  /// nowhere keeps its momentum but for the load's; its angular momentum to first order in h.
+  /// \pre h > 0 \throw Error if the state is no longer finite, or as Factor; Cancelled
   SolidStep step(double h, const Context& context);
 
   std::span<const double> places() const noexcept;   ///< of nodes, 3 n, mm
@@ -164,33 +155,50 @@ public:
   /// As set_state, with the places of nodes, as places() and velocity() told them: to the bit.
   void restore(std::span<const double> places, std::span<const double> velocity,
                const Context& context = {});
-  /// The same where the last step began, to take it once more under another load: what its rounds
-  /// learned of the body serves on, so that results depend on what was tried before, within the
-  /// tolerance.
-  void begin_again(std::span<const double> places, std::span<const double> velocity,
-                   const Context& context = {});
-  /// The end of the last step is moved by these displacements, held axes not, and the speeds that
-  /// led there with it: for what stands beyond the tolerance of a step. \pre 3 n, a step was taken
-  void nudge(std::span<const double> displacement, const Context& context = {});
-  /// The end of the last step is taken back to a part of its way from `places`, but for that of the
-  /// body as a whole if nothing is held, and the speeds with it; energy is then no more than the
-  /// step allows. \pre 3 n, where the last step began; 0 <= part <= 1
-  /// \return the excess of energy that is left
-  double hold_back(std::span<const double> places, double part, const Context& context = {});
-  /// The next step is sought from these places on, in place of where the motion leads. \pre 3 n
-  void guess(std::span<const double> places);
-  /// From now on, in place of the options'.
-  void set_tolerance(double tolerance, int max_rounds);
-  /// What forces on the 3 n axes move by the constant matrix of the last step, in frames as it left
-  /// them, to single precision, in place; 0 on held axes. \pre a step was taken, the quick way
-  void respond(std::span<double> over_axes, const Context& context);
-  /// The constant matrix of a net without elements has the tangent of its springs where it stands,
-  /// in place of their bound, until a step of another length or drop_tangent: respond() is right to
-  /// first order then. \return whether it was made \pre a step was taken, the quick way
-  bool take_tangent(const Context& context);
-  void drop_tangent();
   /// From now on reactions() are those of the state as it stands still, until the next step.
   void find_reactions(const Context& context = {});
+
+  // A step in parts, for a caller that adds forces which depend on positions (lib/contact).
+  //
+  // The iterate is a position of all nodes. A part of the step builds the quadratic model
+  // 1/2 (x - x_free)^T A (x - x_free) of the step's energy around the iterate, with the constant
+  // matrix A in the frames of the iterate; the caller finds the forces f that act at
+  // x = x_free + A^-1 f, and moves there.
+
+  /// Begins a step of h; the iterate is the present position. An open step is abandoned without a
+  /// trace. \pre h > 0, set_load and move_held were called for this step \throw as step
+  void begin_step(double h, const Context& context);
+  /// Builds the model around the iterate, at first around where the motion leads.
+  /// \param forces  f_0 that act beside the load, 3 n
+  /// \param step  becomes x_free + A^-1 f_0 minus the iterate, 3 n; on held axes the way to their
+  /// targets
+  void linearise_step(std::span<double> step, std::span<const double> forces,
+                      const Context& context);
+  /// Response of the model to unit forces on the three axes of a node, in the frame of each node:
+  /// three columns of 3 n numbers. They are the same until matrix_version() changes.
+  void unit_responses(std::uint32_t node, std::span<double> columns, const Context& context);
+  std::uint64_t matrix_version() const noexcept;
+  /// Factor of these responses in the present round, 0.2 ... 1: less than 1 where the constant
+  /// matrix is too soft and rounds would undo each other.
+  double relaxation() const noexcept;
+  /// Rotation of a node's frame in the model, row-major.
+  std::array<double, 9> frame_of(std::uint32_t node) const;
+  /// Moves the iterate, from where it was linearised, by (1 - share) step + A^-1 (f - f_0).
+  /// \param change  f - f_0, 3 n
+  void move_iterate(double share, std::span<const double> change, const Context& context);
+  /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
+  /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not
+  /// quite by what its forces say. \param forces  f, 3 n \return whether the momentum is right
+  bool keep_momentum(std::span<const double> forces, double room);
+  /// Moves the iterate to where the step ends under the load alone, as step() finds it.
+  void solve_alone(const Context& context);
+  /// The iterate is where the step began, once more.
+  void begin_iterate_again();
+  std::span<const double> iterate() const noexcept; ///< 3 n
+  /// Whether the open step moves held axes.
+  bool moves_held() const noexcept;
+  /// Ends the step at the iterate. \param forces  that act there, 3 n
+  SolidStep end_step(std::span<const double> forces, const Context& context);
 
   /// Whether it was scrambled, and has not found back yet.
   bool recovering() const noexcept;

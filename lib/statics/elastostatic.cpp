@@ -1,6 +1,7 @@
 #include "statics/elastostatic.h"
 
 #include "base/error.h"
+#include "base/unique_number.h"
 #include "base/vector_at.h"
 #include "compliance/compliance.h"
 #include "compliance/forces_at.h"
@@ -30,9 +31,8 @@ struct Elastostatic::State {
   ForcesAt block;
   HeldContacts held;
   bool by_block = false; // how the present load is met
-  // C among the nodes that contact was last found at, most of which are the same the next time.
-  std::vector<std::uint32_t> asked;
-  std::vector<ComplianceBlock> between; // by rows of the upper triangle
+  std::uint64_t id = 0;  // of the compliance with these nodes held
+  std::vector<std::uint32_t> id_of;
 
   // The last load, its contact forces, and its shape, where that was asked for.
   Load load;
@@ -40,7 +40,6 @@ struct Elastostatic::State {
   std::vector<double> u;     // of the rows that sums have
   std::vector<double> whole; // over all axes, where these are more
   bool shape_known = true, whole_known = false;
-  bool counted = false; // among the shapes, as one of which a part is known
 
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
@@ -150,22 +149,11 @@ struct Elastostatic::State {
     if (shape_known)
       return;
     make_shape(options.tolerance);
-    counts.shapes += counted ? 0 : 1;
+    ++counts.shapes;
     require_finite(u);
     if (options.measure_error)
       measure();
     shape_known = true;
-  }
-
-  std::optional<NodeReach> reach() {
-    if (shape_known || options.tolerance > 0 || options.measure_error || !load.displacement.empty())
-      return std::nullopt;
-    std::optional<NodeReach> reach = answer.reach(load);
-    if (!reach || !std::ranges::all_of(reach->most, [](double d) { return std::isfinite(d); }))
-      return std::nullopt;
-    counts.shapes += counted ? 0 : 1;
-    counted = true;
-    return reach;
   }
 
   /// How far the shape is from another one at its rows, over the largest entry of that.
@@ -222,7 +210,7 @@ struct Elastostatic::State {
       ++counts.unchanged;
       return;
     }
-    shape_known = whole_known = counted = false;
+    shape_known = whole_known = false;
     std::vector<NodeVector> before = std::move(forces);
     forces.clear();
     try {
@@ -263,56 +251,19 @@ struct Elastostatic::State {
     shape_known = true;
   }
 
-  // ---- for who finds forces by conditions
+  // ---- contact
 
-  /// Blocks between these nodes, anew only of those that were not asked for last time.
-  /// \pre nodes ascending, whose columns are at hand
-  void ask_blocks(std::span<const std::uint32_t> nodes) {
-    if (std::ranges::equal(nodes, asked))
-      return;
-    const std::size_t before = asked.size();
-    std::vector<std::size_t> place; // among those asked before, or that many
-    for (const std::uint32_t node : nodes) {
-      const auto there = std::ranges::lower_bound(asked, node);
-      place.push_back(there != asked.end() && *there == node
-                          ? static_cast<std::size_t>(there - asked.begin())
-                          : before);
+  std::uint64_t compliance_id(const Load& now) {
+    std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
+    if (id == 0 || nodes != id_of) {
+      id = unique_number();
+      id_of = std::move(nodes);
     }
-    std::vector<ComplianceBlock> blocks;
-    blocks.reserve(nodes.size() * (nodes.size() + 1) / 2);
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      for (std::size_t j = i; j < nodes.size(); ++j) {
-        const std::size_t a = place[i], b = place[j];
-        blocks.push_back(a < before && b < before ? between[a * before - a * (a + 1) / 2 + b]
-                                                  : compliance.column_block(nodes[i], nodes[j]));
-      }
-    between = std::move(blocks);
-    asked.assign(nodes.begin(), nodes.end());
+    return id;
   }
 
-  DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
-    update(now);
-    DelassusOperator delassus;
-    delassus.nodes.assign(nodes.begin(), nodes.end());
-    std::vector<std::size_t> where;
-    for (const std::uint32_t node : nodes)
-      for (int a = 0; a < 3; ++a)
-        where.push_back(axis_of(node, a));
-    const std::size_t size = where.size();
-    delassus.compliance.resize(size * size);
-    const auto node_at = [&](std::size_t row) { return nodes[row / 3]; };
-    const auto axis_at = [&](std::size_t row) { return static_cast<int>(row % 3); };
-    if (!now.displacement.empty() && !by_block) {
-      const ColumnCache& columns = held.columns(nodes);
-      for (std::size_t c = 0; c < size; ++c)
-        for (std::size_t r = c; r < size; ++r)
-          delassus.compliance[c * size + r] = delassus.compliance[r * size + c] =
-              columns.entry(node_at(c), axis_at(c), where[r]);
-      const std::vector<double>& shape = need_whole();
-      for (const std::size_t axis : where)
-        delassus.free.push_back(shape[axis]);
-      return delassus;
-    }
+  /// Columns of these nodes and of displaced ones.
+  void need_columns(const Load& now, std::span<const std::uint32_t> nodes) {
     std::vector<std::uint32_t> all(nodes.begin(), nodes.end());
     for (const auto& entry : now.displacement)
       all.push_back(entry.first);
@@ -320,42 +271,83 @@ struct Elastostatic::State {
       throw Error("the columns of " + std::to_string(all.size()) +
                   " nodes in contact do not fit in memory, expected more of it or fewer contacts");
     compliance.need(all);
-    ask_blocks(nodes);
-    for (std::size_t i = 0, k = 0; i < nodes.size(); ++i)
-      for (std::size_t j = i; j < nodes.size(); ++j) {
-        const ComplianceBlock& own = between[k++];
-        for (std::size_t a = 0; a < 3; ++a)
-          for (std::size_t b = i == j ? a : 0; b < 3; ++b) {
-            const std::size_t c = 3 * i + a, r = 3 * j + b;
-            delassus.compliance[c * size + r] = delassus.compliance[r * size + c] = own[a][b];
-          }
+  }
+
+  void compliance_blocks(const Load& now, std::uint32_t node, std::span<const std::uint32_t> rows,
+                         std::span<std::array<double, 9>> blocks) {
+    if (!now.displacement.empty())
+      update(now);
+    if (now.displacement.empty() || by_block)
+      need_columns(now, std::span(&node, 1));
+    const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          to[3 * i + j] = from[j][i];
+    };
+    if (!now.displacement.empty() && !by_block) {
+      const ColumnCache& columns = held.columns(std::span(&node, 1));
+      for (std::size_t k = 0; k < rows.size(); ++k)
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j)
+            blocks[k][3 * i + j] =
+                columns.entry(node, static_cast<int>(j), 3 * std::size_t{rows[k]} + i);
+      return;
+    }
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      put(compliance.column_block(node, rows[k]), blocks[k]);
+    if (now.displacement.empty())
+      return;
+    // Held nodes give way to nothing: C - C_ch C_hh^-1 C_hc.
+    const std::vector<std::size_t> axes = block.axes();
+    std::vector<double> given(axes.size());
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t h = 0; h < axes.size(); ++h)
+        given[h] = compliance.entry(node, static_cast<int>(j), axes[h]);
+      block.solve(given);
+      for (std::size_t h = 0; h < axes.size(); ++h) {
+        const auto of = static_cast<std::uint32_t>(axes[h] / 3);
+        const auto axis = static_cast<int>(axes[h] % 3);
+        for (std::size_t k = 0; k < rows.size(); ++k)
+          for (std::size_t i = 0; i < 3; ++i)
+            blocks[k][3 * i + j] -=
+                given[h] * compliance.entry(of, axis, 3 * std::size_t{rows[k]} + i);
       }
+    }
+  }
+
+  DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
+    update(now);
+    const bool held_by_factor = !now.displacement.empty() && !by_block;
+    if (!held_by_factor)
+      need_columns(now, nodes); // rows of nodes inside, too
+    DelassusOperator delassus{{nodes.begin(), nodes.end()}, {}, {}};
+    const std::size_t size = 3 * nodes.size();
+    delassus.compliance.resize(size * size);
+    std::vector<std::array<double, 9>> blocks(nodes.size());
+    std::vector<std::size_t> where;
+    for (std::size_t c = 0; c < nodes.size(); ++c) {
+      compliance_blocks(now, nodes[c], nodes, blocks);
+      for (std::size_t k = 0; k < nodes.size(); ++k)
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j)
+            delassus.compliance[(3 * c + j) * size + 3 * k + i] = blocks[k][3 * i + j];
+      for (int a = 0; a < 3; ++a)
+        where.push_back(axis_of(nodes[c], a));
+    }
+    if (held_by_factor) {
+      const std::vector<double>& shape = need_whole();
+      for (const std::size_t axis : where)
+        delassus.free.push_back(shape[axis]);
+      return delassus;
+    }
     delassus.free = answer.at(now, where);
     if (now.displacement.empty())
       return delassus;
-    // The displaced nodes give way to nothing: C - C_ch C_hh⁻¹ C_hc.
-    const std::vector<std::size_t> held_axes = block.axes();
-    std::vector<double> across(held_axes.size() * size), given;
+    const std::vector<std::size_t> axes = block.axes();
     for (std::size_t c = 0; c < size; ++c)
-      for (std::size_t k = 0; k < held_axes.size(); ++k)
-        across[c * held_axes.size() + k] = compliance.entry(node_at(c), axis_at(c), held_axes[k]);
-    const auto column = [&](std::size_t c) {
-      return std::span(across).subspan(c * held_axes.size(), held_axes.size());
-    };
-    for (std::size_t c = 0; c < size; ++c) {
-      given.assign(column(c).begin(), column(c).end());
-      block.solve(given);
-      for (std::size_t r = c; r < size; ++r) {
-        double sum = 0;
-        for (std::size_t k = 0; k < given.size(); ++k)
-          sum += given[k] * column(r)[k];
-        delassus.compliance[c * size + r] -= sum;
-        if (r > c)
-          delassus.compliance[r * size + c] = delassus.compliance[c * size + r];
-      }
-      for (std::size_t k = 0; k < held_axes.size(); ++k)
-        delassus.free[c] += column(c)[k] * block.force()[k];
-    }
+      for (std::size_t h = 0; h < axes.size(); ++h)
+        delassus.free[c] +=
+            block.force()[h] * compliance.entry(nodes[c / 3], static_cast<int>(c % 3), axes[h]);
     return delassus;
   }
 };
@@ -379,17 +371,18 @@ std::span<const double> Elastostatic::surface_displacement() {
   return state_->u;
 }
 
-std::optional<NodeReach> Elastostatic::surface_reach() {
-  return state_->reach();
-}
-
-void Elastostatic::copy_surface(const Load& load, std::span<const std::uint32_t> nodes,
-                                std::span<double> shape) {
-  state_->answer.copy_rows(load, nodes, shape);
-}
-
 const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
   return state_->forces;
+}
+
+void Elastostatic::compliance_blocks(const Load& load, std::uint32_t node,
+                                     std::span<const std::uint32_t> rows,
+                                     std::span<std::array<double, 9>> blocks) {
+  state_->compliance_blocks(load, node, rows, blocks);
+}
+
+std::uint64_t Elastostatic::compliance_id(const Load& load) {
+  return state_->compliance_id(load);
 }
 
 DelassusOperator Elastostatic::delassus_operator(const Load& load,

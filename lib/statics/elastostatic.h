@@ -17,9 +17,9 @@
 
 #include "base/context.h"
 #include "contact/load.h"
-#include "contact/node_reach.h"
 #include "model/model.h"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -31,6 +31,13 @@
 namespace gewebe {
 
 class ComplianceSource;
+
+/// Displacements of some nodes under forces there: u = free + compliance f.
+struct DelassusOperator {
+  std::vector<std::uint32_t> nodes;
+  std::vector<double> compliance; ///< (3 m)^2, by columns; row 3 k + a is axis a of nodes[k]
+  std::vector<double> free;       ///< 3 m, under the load alone
+};
 
 /// How well a shape balances its forces: ‖Ku - f‖ / (‖K‖‖u‖ + ‖f‖), and by how much a surface that
 /// is found alone differs from that of the whole shape, over the largest entry.
@@ -76,14 +83,6 @@ struct ElastostaticOptions {
   double tolerance = 0;
 };
 
-/// What one must know to find forces at some nodes that have to meet conditions: u = free +
-/// compliance f.
-struct DelassusOperator {
-  std::vector<std::uint32_t> nodes;
-  std::vector<double> compliance; ///< (3 m)², by columns; row 3 k + a is axis a of nodes[k]
-  std::vector<double> free;       ///< 3 m
-};
-
 class Elastostatic {
 public:
   /// Keeps a reference to the model. \param source of its compliance; null: K is factorised
@@ -108,21 +107,18 @@ public:
   /// \throw as displacement
   std::span<const double> surface_displacement();
 
-  /// Bounds of surface_displacement() where some rows of it take less than all; none where all of
-  /// it is known or takes no more, or where errors are measured.
-  std::optional<NodeReach> surface_reach();
-  /// Rows of what surface_displacement() would be behind update(load), to their places in `shape`,
-  /// to the bit. The load of the last update stays. \pre nothing is displaced by the load, and its
-  /// shape is finite; the nodes are among those of the surface
-  void copy_surface(const Load& load, std::span<const std::uint32_t> nodes,
-                    std::span<double> shape);
-
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
-  /// What contact at these nodes needs: under `load`, its prescribed displacements held, u at
-  /// `nodes` is free + compliance f for forces f there. \pre as update; nodes ascending, none of
-  /// them displaced by the load   \throw Error as update, and if memory does not hold their columns
+  /// Compliance between `node` and each of `rows`, the nodes that `load` displaces held: the
+  /// displacement of a row under a force on the node, row-major. \pre as update; no node is
+  /// displaced by the load   \throw Error as update, and if memory does not hold the node's columns
+  void compliance_blocks(const Load& load, std::uint32_t node, std::span<const std::uint32_t> rows,
+                         std::span<std::array<double, 9>> blocks);
+
+  /// Number of the matrix that compliance_blocks has for this load, see base/unique_number.h.
+  std::uint64_t compliance_id(const Load& load);
+  /// \pre as update; the load displaces nothing; nodes ascending \throw as compliance_blocks
   DelassusOperator delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
 
   /// Solves for the columns of these nodes, unless they are stored, so that contacts there need

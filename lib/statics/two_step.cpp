@@ -385,22 +385,10 @@ void TwoStep::update(Elastostatic& first, const Load& load) {
   state.whole.known = state.surface.known = false;
 }
 
-DelassusOperator TwoStep::second_delassus_operator(const Load& load,
-                                                   std::span<const std::uint32_t> nodes) {
-  return state_->second.delassus_operator(load, nodes);
-}
-
-void TwoStep::settle(Load load, Answer answer) {
-  State& state = *state_;
-  if (!std::isfinite(answer.norm))
-    throw Error("the load is not finite, expected a smaller one");
-  state.total = std::move(answer.total);
-  state.forces = std::move(answer.forces);
-  state.s = answer.s;
-  state.norm = answer.norm;
-  state.largest = std::max(state.largest, answer.norm);
-  state.last = std::move(load);
-  state.whole.known = state.surface.known = false;
+void TwoStep::second_compliance_blocks(const Load& load, std::uint32_t node,
+                                       std::span<const std::uint32_t> rows,
+                                       std::span<std::array<double, 9>> blocks) {
+  state_->second.compliance_blocks(load, node, rows, blocks);
 }
 
 namespace {

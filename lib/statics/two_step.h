@@ -99,16 +99,10 @@ public:
   std::span<const double> surface_displacement(Elastostatic& first);
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
-  // ---- for contact, see two_step_contact.h
-  /// As Elastostatic::delassus_operator, of the second stage.
-  DelassusOperator second_delassus_operator(const Load& load, std::span<const std::uint32_t> nodes);
-  struct Answer {
-    Load total;                     ///< all forces, what holds displaced nodes among them
-    std::vector<NodeVector> forces; ///< of contact
-    double s = 1, norm = 0;
-  };
-  /// In place of an update: what was found for this load.
-  void settle(Load load, Answer answer);
+  /// As Elastostatic::compliance_blocks, of the second stage.
+  void second_compliance_blocks(const Load& load, std::uint32_t node,
+                                std::span<const std::uint32_t> rows,
+                                std::span<std::array<double, 9>> blocks);
 
   const TwoStepOptions& options() const noexcept;
   double threshold() const noexcept;

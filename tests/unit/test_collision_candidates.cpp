@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/larger.h"
 #include "collision/bvh.h"
+#include "collision/candidate_filter.h"
 #include "collision/distance.h"
 #include "collision/edge_triangle.h"
 #include "collision/inside.h"
@@ -18,6 +19,7 @@
 #include <limits>
 #include <random>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -385,6 +387,61 @@ TEST(Inside, WindingNumberOfAClosedSurface) {
     const double size = std::abs(p.x) + std::abs(p.y) + std::abs(p.z);
     EXPECT_NEAR(winding_number(triangles, x, p), size < 1 && size > 0.5 ? 1 : 0, 1e-12);
   }
+}
+
+/// Gap of a pair, from its closest features.
+template <std::size_t n>
+double gap_at(const CollisionSurface& surface, std::span<const Vec3> x,
+              const std::array<std::uint32_t, n>& vertices, bool edges) {
+  std::array<Vec3, n> y;
+  for (std::size_t k = 0; k < n; ++k)
+    y[k] = x[vertices[k]];
+  double square = 0;
+  if constexpr (n == 2)
+    square = dot(y[0] - y[1], y[0] - y[1]);
+  else if constexpr (n == 3)
+    square = point_edge_squared_distance(y);
+  else
+    square = edges ? edge_edge_squared_distance(y) : point_triangle_squared_distance(y);
+  return std::sqrt(square) - radius_sum(surface, vertices.front(), vertices.back());
+}
+
+TEST(CandidateFilter, SelectsWhatMeasuringAllSelects) {
+  const CollisionSurface surface = test::two_sheets(9, 0.3, 0.1, 0.4, 5);
+  AllowedPairs allowed(4, 1);
+  std::vector<Vec3> x = surface.rest;
+  Candidates all;
+  BroadPhase(surface).find(surface, x, x, 2, allowed, all);
+  const std::vector<std::uint32_t> vertices = vertices_of(all);
+  CandidateFilter filter;
+  filter.reset(all, vertices, x);
+  std::mt19937 random(3);
+  std::size_t selected = 0, calls = 0;
+  for (int step = 0; step < 200; ++step) {
+    const double size = step % 17 == 0 ? 0.3 : 1e-3; // far at times, so that the reference moves
+    for (Vec3& p : x)
+      p += size * random_point(random, 1);
+    const double range = step % 3 == 0 ? 0.5 : 0.05;
+    Candidates expected;
+    const auto look = [&](const auto& list, bool edges, auto& to) {
+      for (const auto& pair : list)
+        if (gap_at(surface, x, pair, edges) <= range)
+          to.push_back(pair);
+    };
+    look(all.point_point, false, expected.point_point);
+    look(all.point_edge, false, expected.point_edge);
+    look(all.edge_edge, true, expected.edge_edge);
+    look(all.point_triangle, false, expected.point_triangle);
+    const Candidates& near = filter.select(surface, x, range);
+    EXPECT_EQ(near.point_point, expected.point_point) << step;
+    EXPECT_EQ(near.point_edge, expected.point_edge) << step;
+    EXPECT_EQ(near.edge_edge, expected.edge_edge) << step;
+    EXPECT_EQ(near.point_triangle, expected.point_triangle) << step;
+    selected += near.size();
+    ++calls;
+  }
+  EXPECT_GT(selected, 10 * calls);
+  EXPECT_LT(selected, calls * all.size() / 2);
 }
 
 } // namespace

@@ -126,6 +126,22 @@ TEST(CollisionCcd, SlidesAlongAFaceInOneStep) {
   EXPECT_NEAR(point_triangle_step(x0, x1, {}) / 0.5e-6, 1, 1e-5);
 }
 
+/// Deep in contact a triangle turns by much more than the gap, about a point that goes along.
+TEST(CollisionCcd, FollowsAFaceThatTurnsByFewPlanes) {
+  for (const double gap : {1e-4, 1e-6}) {
+    const std::array<Vec3, 4> x0{{{3, 3, gap}, {0, 0, 0}, {9, 0, 0}, {0, 9, 0}}};
+    auto x1 = x0;
+    x1[1].z = -3e-3;
+    x1[2].z = 3e-3;
+    x1[3].z = 1e-3;
+    x1[0] = (x1[1] + x1[2] + x1[3]) / 3 + Vec3{0, 0, gap};
+    EXPECT_EQ(point_triangle_step(x0, x1, {.iterations = 8}), 1) << gap;
+    x1[0].z -= 0.8 * gap; // the gap may become half of what it was
+    const double t = point_triangle_step(x0, x1, {.iterations = 50});
+    EXPECT_NEAR(t, 0.5 / 0.8, 0.02) << gap;
+  }
+}
+
 TEST(CollisionCcd, NoStepWithoutAGapOrWithANaN) {
   std::array<Vec3, 4> x0{{{1, 1, 0}, {0, 0, 0}, {9, 0, 0}, {0, 9, 0}}}, x1 = x0;
   x1[0].z = -1;

@@ -42,8 +42,7 @@ std::unique_ptr<Simulation> scene(Method method, Integration integration, double
 
 double depth(const Simulation& s) {
   const InstrumentReport tool = s.instrument(0);
-  return test::surface_depth(s.model(0), s.displacement(0),
-                             PlacedInstrument(tool.shape, tool.pose));
+  return test::surface_depth(s.model(0), s.displacement(0), tool.shape, tool.pose);
 }
 
 TEST(Coupled, AtRestSpringAndTissueShareTheWay) {
@@ -64,13 +63,15 @@ TEST(Coupled, AtRestSpringAndTissueShareTheWay) {
     EXPECT_LT(-lag.z, 3.2);
     // One balances the other; what moves still comes to rest, and tells means over steps.
     EXPECT_LE(norm(tool.force + k * lag), (method == Method::ffe ? 1e-4 : 1e-2) * norm(tool.force));
-    EXPECT_LE(depth(*led), method == Method::ffe ? 1e-8 : 1e-6);
-    // Led there without a coupling it feels the same.
+    EXPECT_LE(std::abs(depth(*led)), test::depth_allowed); // touches, but for d_hat
+    // Led there without a coupling it feels the same, but for the gap: the barrier's stiffness is
+    // of the forces on the way, so that gaps differ by some hundredths of d_hat, of 0.24 mm of
+    // dent.
     held->apply(MoveInstrument{0, tool.pose.place, {}, 0.2});
     held->step(method == Method::ffe ? 0.2 : 1.5);
     held->step(0.1);
     EXPECT_LE(norm(held->instrument(0).force - tool.force),
-              (method == Method::ffe ? 1e-6 : 2e-2) * norm(tool.force));
+              (method == Method::ffe ? 1e-3 : 2e-2) * norm(tool.force));
   }
 }
 
@@ -110,7 +111,7 @@ TEST(Coupled, NeverGivesWhatItWasNotGiven) {
         last = to;
         least = test::smaller(least, given);
         most = larger(most, given);
-        EXPECT_LE(depth(*s), 1e-6);
+        EXPECT_LE(depth(*s), test::depth_allowed);
       }
       EXPECT_GT(most, 0);
       EXPECT_GE(least, -2e-3 * most) << friction << method_name(method);

@@ -1,11 +1,8 @@
 #include "contact/instrument.h"
-#include "contact/surface_point.h"
 
 #include "base/vector_at.h"
 #include "contact/instrument_surface.h"
 #include "contact/load.h"
-#include "contact/node_reach.h"
-#include "contact/surface_facets.h"
 #include "larger.h"
 #include "sim_models.h"
 
@@ -117,146 +114,6 @@ TEST(Instrument, ACarriedNodeFollowsTheTurn) {
   EXPECT_EQ(ramp.at(1), (Vec3{-2, 0, 2}));
   const Vec3 middle = rest + ramp.at(0.5);
   EXPECT_LT(norm(middle - Vec3{0, 1, 1}), 1e-15); // on the circle, not through its middle
-}
-
-TEST(Instrument, ACoreGoesThroughAPieceOrPastIt) {
-  const std::array<Vec3, 3> piece{Vec3{0, 0, 0}, Vec3{4, 0, 0}, Vec3{0, 4, 0}},
-      back{piece[0], piece[2], piece[1]};
-  const auto capsule = [](const Vec3& a, const Vec3& b) {
-    return PlacedInstrument({.radius = 0.1, .axis = b - a}, {a, {}});
-  };
-  for (const auto& corners : {piece, back}) {
-    EXPECT_TRUE(goes_through(capsule({1, 1, -5}, {1, 1, 5}), corners));
-    EXPECT_TRUE(goes_through(capsule({1, 1, 5}, {1.5, 1, -2}), corners));
-    EXPECT_FALSE(goes_through(capsule({1, 1, 0.5}, {1, 1, 5}), corners)); // ends before it
-    EXPECT_FALSE(goes_through(capsule({3, 3, -5}, {3, 3, 5}), corners));  // beside it
-    EXPECT_FALSE(goes_through(capsule({1, 1, 1}, {2, 1, 1}), corners));   // along it
-    EXPECT_FALSE(goes_through(capsule({1, 1, 0.01}, {1, 1, 0.01}), corners));
-  }
-}
-
-// Where it was told to look it looks as closely; elsewhere it may find more, but never less.
-TEST(SurfaceFacets, NearPlacesFindWhatTheWholeShapeFinds) {
-  const Model model = test::organ(3);
-  SurfaceFacets whole(model), near_places(model);
-  std::vector<double> u(3 * model.nodes.size());
-  for (std::size_t k = 0; k < u.size(); ++k)
-    u[k] = 4 * std::sin(static_cast<double>(k)) + (k % 3 == 0 ? 30 : k % 3 == 1 ? -20 : 5);
-  const auto box_at = [&](std::size_t i) {
-    const Vec3 c = model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
-    return Box3{c - Vec3{3, 3, 3}, c + Vec3{3, 3, 3}};
-  };
-  const std::vector<Box3> places{box_at(2), box_at(100)};
-  whole.set_shape(model, u);
-  near_places.set_shape_near(model, u, places);
-  const auto found = [](const SurfaceFacets& facets, const Box3& box) {
-    std::vector<std::uint32_t> pieces;
-    facets.visit_near(box, [&](std::uint32_t piece) { pieces.push_back(piece); });
-    return pieces;
-  };
-  std::size_t more = 0;
-  for (std::size_t i = 0; i < surface_count(model); i += 5) {
-    const auto all = found(whole, box_at(i)), some = found(near_places, box_at(i));
-    EXPECT_TRUE(std::ranges::includes(some, all));
-    more += some.size() - all.size();
-  }
-  EXPECT_GT(more, 0U);
-  for (const Box3& place : places) {
-    EXPECT_FALSE(found(whole, place).empty());
-    EXPECT_EQ(found(near_places, place), found(whole, place));
-  }
-  for (int a = 0; a < 3; ++a) {
-    EXPECT_LE(near_places.box().min[a], whole.box().min[a]);
-    EXPECT_GE(near_places.box().max[a], whole.box().max[a]);
-  }
-}
-
-// Of a shape that is known near some places alone: there it finds what is there, elsewhere it may
-// find more, but never less.
-TEST(SurfaceFacets, BoundsFindWhatTheWholeShapeFinds) {
-  const Model model = test::organ(3);
-  SurfaceFacets whole(model), bounded(model);
-  std::vector<double> u(3 * model.nodes.size());
-  auto group = std::make_shared<std::vector<std::uint32_t>>();
-  NodeReach reach{group, std::vector<double>(5)};
-  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
-    group->push_back(i / 7 % 5);
-    for (int a = 0; a < 3; ++a) {
-      double& d = u[axis_of(i, a)];
-      d = (1 + group->back()) * std::sin(static_cast<double>(3 * i) + a);
-      double& most = reach.most[group->back()];
-      most = test::larger(most, std::abs(d));
-    }
-  }
-  const std::uint32_t far = 40; // further than all bounds
-  u[axis_of(far, 2)] = 50;
-  const auto box_at = [&](std::size_t i) {
-    const Vec3 c = model.nodes[i].position + vector_at(u, i);
-    return Box3{c - Vec3{3, 3, 3}, c + Vec3{3, 3, 3}};
-  };
-  whole.set_shape(model, u);
-  bounded.set_reach(reach);
-  bounded.add_places(model, u, std::vector<std::uint32_t>{far});
-  const std::vector<Box3> places{box_at(2), box_at(100)};
-  const std::vector<std::size_t> near = bounded.blocks_near(places);
-  EXPECT_FALSE(near.empty());
-  bounded.set_boxes(model, u, near);
-  const auto found = [](const SurfaceFacets& facets, const Box3& box) {
-    std::vector<std::uint32_t> pieces;
-    facets.visit_near(box, [&](std::uint32_t piece) { pieces.push_back(piece); });
-    return pieces;
-  };
-  std::size_t more = 0;
-  for (std::size_t i = 0; i < surface_count(model); ++i) {
-    const auto all = found(whole, box_at(i)), some = found(bounded, box_at(i));
-    EXPECT_FALSE(all.empty());
-    EXPECT_TRUE(std::ranges::includes(some, all)) << i;
-    more += some.size() - all.size();
-  }
-  EXPECT_GT(more, 0U);
-  for (const Box3& place : places)
-    EXPECT_EQ(found(bounded, place), found(whole, place));
-  for (const std::size_t block : near)
-    for (const std::uint32_t node : bounded.nodes_of(block))
-      EXPECT_LT(node, surface_count(model));
-}
-
-TEST(SurfaceFacets, FindAllNodesInABox) {
-  const Model model = test::organ(3);
-  SurfaceFacets blocks(model);
-  std::vector<double> u(3 * model.nodes.size());
-  for (std::size_t k = 0; k < u.size(); ++k)
-    u[k] = std::sin(static_cast<double>(k));
-  for (const bool moved : {false, true}) {
-    if (moved)
-      blocks.set_shape(model, u);
-    const auto place = [&](std::size_t i) {
-      const Vec3 by{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
-      return model.nodes[i].position + (moved ? by : Vec3{});
-    };
-    std::size_t asked = 0;
-    for (std::uint32_t i = 0; i < surface_count(model); i += 7) {
-      const Vec3 c = place(i), r{1.5, 1.5, 1.5};
-      const Box3 box{c - r, c + r};
-      std::set<std::uint32_t> found;
-      std::set<std::uint32_t> pieces;
-      blocks.visit_near(box, [&](std::uint32_t piece) {
-        EXPECT_TRUE(pieces.insert(piece).second);
-        for (const std::uint32_t node : blocks.facets()[piece])
-          found.insert(node);
-      });
-      asked += found.size();
-      for (std::uint32_t j = 0; j < surface_count(model); ++j) {
-        const Vec3 p = place(j);
-        if (p.x >= box.min.x && p.x <= box.max.x && p.y >= box.min.y && p.y <= box.max.y &&
-            p.z >= box.min.z && p.z <= box.max.z) {
-          EXPECT_TRUE(found.contains(j));
-        }
-      }
-    }
-    EXPECT_LT(asked, surface_count(model) * surface_count(model) / 7 / 2); // and not all
-  }
-  blocks.visit_near({{1e6, 0, 0}, {2e6, 1, 1}}, [](std::uint32_t) { FAIL(); });
 }
 
 TEST(Instrument, ItsSurfaceIsClosedRoundAndItsOwn) {

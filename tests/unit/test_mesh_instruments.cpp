@@ -8,15 +8,12 @@
 #include "mesh_fixtures.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
-#include "statics/elastostatic.h"
-#include "statics/static_contact.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -119,9 +116,8 @@ TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
         s.apply(MoveInstrument{0, to, turn, 0.02});
         s.step(0.02);
         const InstrumentReport tool = s.instrument(0);
-        EXPECT_LT(
-            test::surface_depth(s.model(0), s.displacement(0), PlacedInstrument(shape, tool.pose)),
-            1e-6);
+        EXPECT_LT(test::surface_depth(s.model(0), s.displacement(0), shape, tool.pose),
+                  test::depth_allowed);
         Vec3 sum;
         double size = 0;
         for (const NodeVector& f : s.contact_forces(0)) {
@@ -144,9 +140,8 @@ TEST(MeshInstrument, ItIsKeptOutAndWhatItFeelsIsWhatItDoes) {
     }
 }
 
-TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
+TEST(MeshInstrument, SlidAlongItsForceIsContinuous) {
   const Model model = organ(3);
-  Elastostatic solver(model, nullptr, test::one_thread());
   double edges = 0;
   for (const Triangle& t : model.triangles)
     for (std::size_t k = 0; k < 3; ++k)
@@ -157,52 +152,29 @@ TEST(MeshInstrument, SlidAlongItsForceIsContinuousAndWithinTheCone) {
                           std::array{0.1, 0.02, 0.0}}) {
     const double radius = way[0], along = way[1], friction = way[2];
     const InstrumentShape shape = jaw(radius, friction);
-    std::vector<double> u(3 * model.nodes.size());
-    StaticContact contact(model, u);
-    Pose last{middle + Vec3{-1.5, 0.3, 30}, askew};
-    double before = HUGE_VAL, jump = 0, depth = 0, cone = 0, pull = 0;
-    const auto go = [&](const Pose& to, bool judged) {
-      const MovedInstrument moved{shape, last, to};
-      contact.update([&]() -> Elastostatic& { return solver; }, {},
-                     std::vector<std::optional<MovedInstrument>>{moved}, u);
-      EXPECT_TRUE(contact.solved());
-      last = to;
-      const PlacedInstrument placed(shape, to);
-      depth = test::larger(depth, test::surface_depth(model, u, placed));
-      double largest = 0;
-      Vec3 sum;
-      for (const PointTouch& t : contact.points()) {
-        largest = test::larger(largest, norm(t.force));
-        sum += t.force;
-      }
-      for (const PointTouch& t : contact.points()) {
-        Vec3 p;
-        for (std::size_t c = 0; c < 3; ++c) {
-          const std::size_t i = t.nodes[c];
-          p +=
-              t.weights[c] * (model.nodes[i].position + Vec3{u[3 * i], u[3 * i + 1], u[3 * i + 2]});
-        }
-        const Vec3 n = placed.normal(p);
-        if (norm(t.force) > 1e-9 * largest) {
-          EXPECT_NEAR(placed.distance(p), 0, 1e-6 * radius); // complementarity
-        }
-        const double push = dot(t.force, n);
-        pull = test::larger(pull, -push / largest);
-        cone = test::larger(cone, (norm(t.force - push * n) - friction * push) / largest);
-      }
+    Simulation s(test::one_thread(), {});
+    s.add_object("o", model, Method::ffe);
+    s.apply(SetInstrument{0, shape, {middle + Vec3{-1.5, 0.3, 30}, askew}});
+    s.step(0.01);
+    double before = HUGE_VAL, jump = 0, depth = 0;
+    const auto go = [&](const Vec3& to, bool judged) {
+      s.apply(MoveInstrument{0, to, {}, 0});
+      s.step(0.01);
+      depth = test::larger(
+          depth, test::surface_depth(model, s.displacement(0), shape, s.instrument(0).pose));
+      const Vec3 sum = s.instrument(0).force;
+      EXPECT_GE(sum.z, 0);
       if (judged && before < HUGE_VAL)
-        jump = test::larger(jump, std::abs(-sum.z - before) / std::min(-sum.z, before));
-      before = -sum.z;
+        jump = test::larger(jump, std::abs(sum.z - before) / std::min(sum.z, before));
+      before = sum.z;
     };
     for (double z = 30; z > 23.2; z -= 2.5 * along)
-      go({middle + Vec3{-1.5, 0.3, z}, askew}, false);
+      go(middle + Vec3{-1.5, 0.3, z}, false);
     EXPECT_GT(before, 0);
-    go({middle + Vec3{-1.5, 0.15, 23.2}, askew}, false);
+    go(middle + Vec3{-1.5, 0.15, 23.2}, false);
     for (double x = -1.5; x < 1.5; x += along)
-      go({middle + Vec3{x, 0.3 + 0.1 * x, 23.2}, askew}, true);
-    EXPECT_LT(depth, 1e-6);
-    EXPECT_LT(pull, 1e-9);
-    EXPECT_LT(cone, 1e-6);
+      go(middle + Vec3{x, 0.3 + 0.1 * x, 23.2}, true);
+    EXPECT_LT(depth, test::depth_allowed);
     if (radius > 0.2 * edge) {
       EXPECT_LT(jump, 0.02) << friction;
     }
@@ -262,9 +234,8 @@ TEST(MeshInstrument, AFastOneDoesNotPassThrough) {
     s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 20}, {}, 0});
     s.step(0.01);
     const InstrumentReport tool = s.instrument(0);
-    EXPECT_LT(
-        test::surface_depth(s.model(0), s.displacement(0), PlacedInstrument(shape, tool.pose)),
-        1e-6);
+    EXPECT_LT(test::surface_depth(s.model(0), s.displacement(0), shape, tool.pose),
+              test::depth_allowed);
     EXPECT_GT(tool.force.z, 0);
   }
 }

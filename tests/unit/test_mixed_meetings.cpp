@@ -23,6 +23,9 @@ namespace {
 using namespace test;
 
 constexpr double h = 1.0 / 600; ///< steps of one step of integration each
+/// Part of the largest displacement to which shapes and forces agree at rest, and while what moves
+/// is translated, by a small part of the gap, so that it has the momentum of its forces.
+constexpr double balance_met = 1e-5, balance_moving = 1e-2;
 
 /// A block that falls on an elastostatic one.
 void falls_on(Simulation& s, const Vec3& corner, double friction) {
@@ -46,20 +49,20 @@ TEST(MixedMeetings, ABlockThatMovesRestsOnAnElastostaticOne) {
     bool touched = false;
     for (int k = 0; k < 160; ++k) {
       s.step(h);
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << k;
       const Vec3 up = sum_of_forces(s, 1), down = sum_of_forces(s, 0);
       EXPECT_GE(up.z, 0) << k;
       EXPECT_LE(norm(up + down), 1e-12 * norm(up)) << k;
       EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z) << k;
-      EXPECT_LE(miss_of_balance(s, 0, weight_alone()), 1e-9) << k;
+      EXPECT_LE(miss_of_balance(s, 0, weight_alone()), balance_moving) << k;
       touched = touched || up.z > 0;
     }
     EXPECT_TRUE(touched);
     for (int k = 0; k < 200; ++k)
       s.step(h);
+    EXPECT_LE(miss_of_balance(s, 0, weight_alone()), balance_met);
     EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
-    EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
-    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+    EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
   }
 }
 
@@ -113,10 +116,12 @@ TEST(MixedMeetings, NothingJumpsThrough) {
       s.step(h);
       const Vec3 up = sum_of_forces(s, 1);
       touched = touched || up.z > 0;
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << k;
       // Steps that are taken in halves tell means of what moves.
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), (k > 15 ? 1e-12 : 2) * norm(up)) << k;
-      EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}), 1e-9) << k;
+      EXPECT_LE(static_jumps ? miss_of_balance(s, 1, push) : miss_of_balance(s, 0, {}),
+                balance_moving)
+          << k;
     }
     EXPECT_TRUE(touched);
   }
@@ -159,7 +164,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
         if (k < 45)
           s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.04 * (k + 1)}, {}, h});
         s.step(h);
-        EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+        EXPECT_GT(least_gap(s, 0, 1), 0) << k;
         const Vec3 on_ball = s.instrument(0).force;
         EXPECT_GE(on_ball.z, -1e-9 * norm(on_ball)) << k;
         EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + on_ball), 1e-11 * norm(on_ball))
@@ -170,7 +175,7 @@ TEST(MixedMeetings, AnInstrumentPressesOneOnAnother) {
       const InstrumentReport ball = s.instrument(0);
       EXPECT_GT(ball.force.z, 0) << beam_moves << led;
       EXPECT_LT(sum_of_forces(s, 0).z, 0) << beam_moves << led;
-      EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), 1e-6); // touched nodes as contact has
+      EXPECT_LE(miss_of_balance(s, beam_moves ? 0 : 1, {}), balance_met);
       if (led) { // at rest the spring bears what presses
         EXPECT_NEAR(1e5 * (ball.pose.place.z - ball.hand->z), ball.force.z, 1e-2 * ball.force.z);
       }
@@ -224,8 +229,8 @@ TEST(MixedMeetings, ThreeInARow) {
       const Vec3 sum = sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2);
       EXPECT_LE(norm(sum), 1e-12 * (norm(sum_of_forces(s, 2)) + norm(sum_of_forces(s, 0))))
           << moving << " " << k;
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3) << moving << " " << k;
-      EXPECT_GE(least_gap(s, 1, 2), -1e-3) << moving << " " << k;
+      EXPECT_GT(least_gap(s, 0, 1), 0) << moving << " " << k;
+      EXPECT_GT(least_gap(s, 1, 2), 0) << moving << " " << k;
     }
     EXPECT_GT(sum_of_forces(s, 2).z, 0) << moving;
     EXPECT_LT(sum_of_forces(s, 0).z, 0) << moving;
@@ -236,7 +241,8 @@ TEST(MixedMeetings, ThreeInARow) {
 /// threads.
 TEST(MixedMeetings, WhatFailsIsTakenBack) {
   std::vector<std::vector<double>> shapes;
-  for (const bool fails : {false, true})
+  std::vector<std::size_t> renewed;
+  for (const bool fails : {true, false})
     for (const int threads : {1, 2}) {
       Context context = one_thread();
       context.threads = threads;
@@ -250,9 +256,10 @@ TEST(MixedMeetings, WhatFailsIsTakenBack) {
             s.apply(SetForce{1, {0}, {1e39, 0, 0}}); // which is noticed in the step
             EXPECT_THROW(s.step(h), Error);
             s.apply(Release{1, {0}});
+            renewed = s.take_renewed();
           } else {
-            s.apply(Renew{0});
-            s.apply(Renew{1});
+            for (const std::size_t object : renewed)
+              s.apply(Renew{object});
           }
         }
         s.step(h);
@@ -278,7 +285,7 @@ TEST(MixedMeetings, WhoComesLateIsMet) {
   s.apply(SetDisplacement{1, lowest, {0, 0, -5}});
   s.step(h);
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
-  EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+  EXPECT_GT(least_gap(s, 0, 1), 0);
   for (const std::uint32_t node : lowest)
     EXPECT_EQ(s.displacement(1)[3 * std::size_t{node} + 2], -5);
 }
@@ -302,24 +309,37 @@ TEST(MixedMeetings, LoadsGoTheirWay) {
   EXPECT_NEAR(mean, 0.5 * end, 0.15 * end);
 }
 
-TEST(MixedMeetings, WhatIsHeldAltogetherIsRefused) {
-  Simulation s(one_thread(), {});
-  Model below = block(5, 5, 2, {}, true);
-  for (Node& node : below.nodes)
-    node.fixed = fixed_all;
-  const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
-  add(s, "floor", below);
-  add_static(s, "above", above);
-  s.apply(SetContact{0, 1, 0});
-  s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -20000}});
-  try {
-    s.step(h);
-    ADD_FAILURE() << "no error";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("held as all others of its object are"),
-              std::string::npos)
-        << error.what();
-  }
+/// An object that the model holds altogether is an obstacle, whatever its method.
+TEST(MixedMeetings, WhatIsHeldAltogetherIsAnObstacle) {
+  for (const bool floor_moves : {false, true})
+    for (const bool above_moves : {false, true}) {
+      Simulation s(one_thread(), {});
+      Model floor = block(5, 5, 2, {}, true);
+      for (Node& node : floor.nodes)
+        node.fixed = fixed_all;
+      const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.1});
+      if (floor_moves)
+        add(s, "floor", floor);
+      else
+        add_static(s, "floor", floor);
+      if (above_moves)
+        add(s, "above", above);
+      else
+        add_static(s, "above", above);
+      s.apply(SetContact{0, 1, 0});
+      s.apply(SetGravity{{0, 0, -9810}});
+      s.apply(SetForce{1, nodes_below(above, 9), {0, 0, -20000}});
+      for (int k = 0; k < 40; ++k) {
+        s.step(1.0 / 60);
+        EXPECT_GT(least_gap(s, 0, 1), 0) << k;
+      }
+      const Vec3 up = sum_of_forces(s, 1);
+      EXPECT_GT(up.z, 0) << floor_moves << above_moves;
+      EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
+      EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
+      for (const double u : s.displacement(0))
+        EXPECT_EQ(u, 0);
+    }
 }
 
 } // namespace

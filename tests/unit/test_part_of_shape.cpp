@@ -11,8 +11,6 @@
 #include "solve/condition.h"
 #include "solve/factor.h"
 #include "statics/elastostatic.h"
-#include "statics/elastostatic_yielding.h"
-#include "statics/static_contact.h"
 #include "stiffness_models.h"
 
 #include <array>
@@ -81,55 +79,6 @@ Context of_threads(int threads) {
   return context;
 }
 
-/// Over the organ by steps as wide as five of its radii, at which it looks at once.
-TEST(PartOfShape, IsThatOfTheWholeOneWhereverItIsLookedAt) {
-  const StoredOrgan organ;
-  Elastostatic one(organ.model, organ.stiffness(), of_threads(1), {}),
-      other(organ.model, organ.stiffness(), of_threads(1), {});
-  std::vector<double> whole(3 * organ.model.nodes.size()), some(whole);
-  StaticContact all(organ.model, whole);
-  std::optional<StaticContact> near;
-  near.emplace(organ.model, some);
-  const Load none;
-  ElastostaticYielding whole_object([&]() -> Elastostatic& { return one; }, none);
-  PartOfShape part;
-  auto under = std::make_shared<const Load>();
-  const InstrumentShape shape{1.5, {}, 0};
-  Pose before{middle + Vec3{0, 0, 26}, {}};
-  std::size_t unknown = 0, known = 0;
-  for (int step = 0; step < 40; ++step) {
-    const double a = (step % 4 == 0 ? 0.35 : 0.02) * step;
-    const double high = step % 8 == 4 ? 19 - 0.25 * step : 20.8;
-    const Pose now{middle + high * Vec3{std::sin(a), 0.1, std::cos(a)}, {}};
-    const std::array moved{std::optional(MovedInstrument{shape, before, now})};
-    before = now;
-    all.update(whole_object, {}, moved, whole);
-    ElastostaticYielding object([&]() -> Elastostatic& { return other; }, none);
-    object.set_before(under);
-    if (step % 8 == 4) // goes on from what is known
-      near.emplace(organ.model, some, std::vector(near->touches()), std::vector(near->points()),
-                   part);
-    near->update(object, {}, moved, some, true, &part);
-    under = object.acting();
-    EXPECT_EQ(near->touches(), all.touches()) << step;
-    ASSERT_EQ(some.size(), whole.size());
-    for (std::uint32_t i = 0; i < part.known.size(); ++i) {
-      known += part.known[i];
-      unknown += 1 - part.known[i];
-      if (part.known[i] != 0) {
-        EXPECT_EQ(vector_at(some, i), vector_at(whole, i)) << i;
-      } else {
-        for (int axis = 0; axis < 3; ++axis) { // who reads it finds out
-          EXPECT_LE(std::abs(whole[axis_of(i, axis)]), part.reach.most[(*part.reach.group)[i]]);
-          some[axis_of(i, axis)] = std::numeric_limits<double>::quiet_NaN();
-        }
-      }
-    }
-  }
-  EXPECT_GT(known, 0);
-  EXPECT_GT(unknown, 2 * known);
-}
-
 /// Two spheres over the organ, with forces that change in between. \param ask of what is asked in
 /// each step
 std::vector<double> told_on_the_way(const StoredOrgan& organ, int threads, int ask) {
@@ -139,7 +88,8 @@ std::vector<double> told_on_the_way(const StoredOrgan& organ, int threads, int a
   s.apply(SetInstrument{1, {1, {}, 0}, {middle + Vec3{0, 25, 0}, {}}, "other"});
   std::vector<double> all;
   for (int step = 0; step < 60; ++step) {
-    const double a = step < 25 ? 0.02 * step : 0.23 * step; // to where nothing was looked at
+    // To where nothing was looked at, but not to fixed nodes, at the lower end.
+    const double a = step < 25 ? 0.02 * step : 1.9 * std::sin(0.23 * step);
     const double deep = step == 0 ? 3 : step % 20 == 19 ? -1 : 0.6 + 0.3 * std::sin(a);
     s.apply(
         MoveInstrument{0, middle + (21.5 - deep) * Vec3{std::sin(a), 0.1, std::cos(a)}, {}, 0.001});

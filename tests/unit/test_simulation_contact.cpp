@@ -2,7 +2,10 @@
 #include "compliance/column_compression.h"
 #include "compliance/compliance_columns.h"
 #include "compliance/compliance_source.h"
+#include "contact/convex_core.h"
+#include "contact/parameters.h"
 #include "contact_checks.h"
+#include "convex_meshes.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
@@ -40,9 +43,12 @@ SetInstrument sphere(double radius, const Vec3& at, double friction = 0) {
 /// Of the surface in the instrument, over its radius; what no force moves counts for nothing.
 double depth(const Simulation& s, std::size_t object, const InstrumentShape& shape,
              const Pose& pose) {
-  return test::surface_depth(s.model(object), s.displacement(object),
-                             PlacedInstrument(shape, pose));
+  return test::surface_depth(s.model(object), s.displacement(object), shape, pose);
 }
+
+/// Part of its radius by which a surface that touches an instrument may be outside: d_hat without
+/// the 0.6 that depth_allowed is of.
+constexpr double gap_allowed = 4e-4;
 
 /// Of all forces on nodes, as they are on points of the surface: norms.
 double sum_of_sizes(const std::vector<NodeVector>& forces) {
@@ -76,13 +82,21 @@ std::unique_ptr<Simulation> pressed(Method method, double friction, double by, d
 }
 
 TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
-  // Nodes that hang on three springs each, with no spring between them: u = f / k.
+  // Nodes that hang on three springs each, with no spring between them: u = f / k. Each is the top
+  // of a tent whose other corners are held, so that the sphere touches nodes alone.
   Model m;
   m.name = "sheet";
   m.materials.resize(1);
   m.materials[0].name = "m";
   const double k = 50;
+  constexpr std::uint32_t nodes = 49;
   std::vector<Node> held;
+  const auto hold = [&](Node n, const Vec3& at) {
+    n.position = at;
+    n.fixed = fixed_all;
+    held.push_back(n);
+    return static_cast<std::uint32_t>(nodes + held.size() - 1);
+  };
   for (int y = -3; y <= 3; ++y)
     for (int x = -3; x <= 3; ++x) {
       const auto node = static_cast<std::uint32_t>(m.nodes.size());
@@ -92,17 +106,23 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
       n.drag = 0.5;
       m.nodes.push_back(n);
       for (int a = 0; a < 3; ++a) {
-        Node end = n;
-        end.position[a] += 1000; // far: the direction does not turn
-        end.fixed = fixed_all;
-        held.push_back(end);
-        m.springs.push_back(
-            {node, static_cast<std::uint32_t>(49 + held.size() - 1), SpringKind::edge, k, 0, 1000});
+        Vec3 end = n.position;
+        end[a] += 1000; // far: the direction does not turn
+        m.springs.push_back({node, hold(n, end), SpringKind::edge, k, 0, 1000});
       }
+      std::array<std::uint32_t, 3> foot{};
+      for (std::size_t c = 0; c < 3; ++c)
+        foot[c] = hold(n, n.position +
+                              Vec3{c == 0 ? 0.3 : -0.15, c == 0 ? 0 : (c == 1 ? 0.26 : -0.26), -1});
+      for (std::size_t c = 0; c < 3; ++c)
+        m.triangles.push_back({node, foot[c], foot[(c + 1) % 3]});
     }
   m.nodes.insert(m.nodes.end(), held.begin(), held.end());
   check_model(m);
   const double radius = 5, down = 0.4;
+  // Nodes are pushed by up to 0.6 d_hat less or 0.4 d_hat more than out of the sphere; d_hat is of
+  // the slanted edges.
+  const double d_hat = 1e-3 * std::hypot(0.3, 1);
   for (const auto& [method, integration] : ways) {
     Simulation s({}, {});
     s.add_object("sheet", m, method, {}, integration);
@@ -115,29 +135,32 @@ TEST(SimulationContact, ASphereOnASheetOfKnownCompliance) {
     Vec3 sum;
     std::size_t touched = 0;
     const Vec3 c{0, 0, radius - down};
-    const double exact = method == Method::ffe ? 1e-9 : 1e-3; // of f/k; far springs turn a little
-    for (std::uint32_t i = 0; i < 49; ++i) {
+    // Of k down: the tolerance of forces; what moves still comes to rest, and far springs turn.
+    const double exact =
+        (method == Method::ffe ? contact::Parameters{}.force_tolerance : 1e-3) * k * down;
+    for (std::uint32_t i = 0; i < nodes; ++i) {
       const Vec3 rest = m.nodes[i].position;
       const double inside = radius - norm(rest - c);
       Vec3 force;
       if (inside > 0)
         force = k * inside / norm(rest - c) * (rest - c);
-      sum += force;
       const std::vector<NodeVector>& forces = s.contact_forces(0);
       const auto f = std::find_if(forces.begin(), forces.end(),
                                   [&](const NodeVector& v) { return v.node == i; });
       EXPECT_EQ(f != forces.end(), inside > 0) << i;
-      EXPECT_LT(norm(k * moved(s, 0, i) - force), exact * k * down) << i;
+      EXPECT_LT(norm(k * moved(s, 0, i) - force), inside > 0 ? exact + 0.6 * k * d_hat : exact)
+          << i;
       if (f == forces.end())
         continue;
       ++touched;
-      EXPECT_LT(norm(f->value - force), exact * k * down) << i;
+      sum += f->value;
+      EXPECT_LT(norm(f->value - k * moved(s, 0, i)), exact) << i;
     }
     EXPECT_EQ(touched, 9U);
     const InstrumentReport tool = s.instrument(0);
     EXPECT_EQ(tool.nodes, touched);
-    EXPECT_LT(norm(tool.force + sum), exact * norm(sum));
-    EXPECT_LT(norm(tool.torque), exact * norm(sum)); // all forces pass through the centre
+    EXPECT_LT(norm(tool.force + sum), 1e-12 * norm(sum));
+    EXPECT_LT(norm(tool.torque), 1e-9 * norm(sum)); // all forces pass through the centre
     EXPECT_GT(tool.force.z, 0);
   }
 }
@@ -146,16 +169,18 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
   for (const Method method : {Method::ffe, Method::ela}) {
     const auto s = pressed(method, 0, 3);
     const InstrumentReport tool = s->instrument(0);
-    EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), 1e-6);
-    EXPECT_GT(depth(*s, 0, {8, {}, 0}, tool.pose), -1e-6);  // touches
+    EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), test::depth_allowed);
+    EXPECT_GT(depth(*s, 0, {8, {}, 0}, tool.pose), -gap_allowed); // touches
     EXPECT_GT(depth(*s, 0, {8.1, {}, 0}, tool.pose), 1e-3); // a larger one would not be kept out
     Vec3 sum;
     const std::vector<NodeVector>& forces = s->contact_forces(0);
     ASSERT_GT(forces.size(), 3U);
+    double largest = 0;
     for (const NodeVector& f : forces) {
       const Vec3 n = (place(*s, 0, f.node) - tool.pose.place) / 8;
       EXPECT_GT(dot(f.value, n), 0);
       sum += f.value;
+      largest = test::larger(largest, norm(f.value));
     }
     // All forces pass through the centre.
     EXPECT_LT(norm(tool.torque), (method == Method::ffe ? 1e-9 : 3e-2) * 8 * norm(sum));
@@ -179,8 +204,10 @@ TEST(SimulationContact, FrictionlessForcesAreNormalAndBalance) {
           wrong = test::larger(
               wrong, std::abs(f[3 * std::size_t{i} + static_cast<std::size_t>(a)] - outer));
         }
-    EXPECT_LT(wrong, 1e-9 * norm(sum)); // K u = f
-    EXPECT_LT(norm(supports + sum), 1e-9 * norm(sum));
+    // K u = f, but for what Newton's method leaves: of the largest force on a node.
+    const double met = contact::Parameters{}.force_tolerance * largest;
+    EXPECT_LT(wrong, met);
+    EXPECT_LT(norm(supports + sum), met * std::sqrt(static_cast<double>(forces.size())));
   }
 }
 
@@ -191,7 +218,7 @@ TEST(SimulationContact, BothMethodsAgreeAtRest) {
   moving->step(0.1);
   const Vec3 a = still->instrument(0).force, b = moving->instrument(0).force;
   EXPECT_LT(norm(a - b), 0.15 * norm(a)); // as the linear and the nonlinear organ do
-  EXPECT_LT(depth(*moving, 0, {8, {}, 0}, moving->instrument(0).pose), 1e-6);
+  EXPECT_LT(depth(*moving, 0, {8, {}, 0}, moving->instrument(0).pose), test::depth_allowed);
 }
 
 TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
@@ -201,12 +228,13 @@ TEST(SimulationContact, ImplicitStepsRestWhereExplicitOnesDo) {
     for (const int k : {0, 1}) {
       const auto s = pressed(Method::ela, friction, 2, 8, 3, 1,
                              k == 0 ? Integration::semi_implicit : Integration::implicit);
-      EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), 2e-9) << k; // on its way
-      s->step(6);
+      EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), test::depth_allowed)
+          << k; // on its way
+      s->step(0.5);
       s->step(0.1);
       force[k] = s->instrument(0).force;
       rest[k].assign(s->displacement(0).begin(), s->displacement(0).end());
-      EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), 1e-6);
+      EXPECT_LT(depth(*s, 0, {8, {}, friction}, s->instrument(0).pose), test::depth_allowed);
       double push = 0;
       for (const NodeVector& f : s->contact_forces(0)) {
         const Vec3 n = (place(*s, 0, f.node) - s->instrument(0).pose.place) / 8;
@@ -287,7 +315,7 @@ TEST(SimulationContact, FrictionHoldsUpToItsLimit) {
       s->apply(MoveInstrument{0, from + Vec3{1.5, 0, 0}, {}, 0.5});
       s->step(0.5);
       const InstrumentReport tool = s->instrument(0);
-      EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), 1e-6);
+      EXPECT_LT(depth(*s, 0, {8, {}, 0}, tool.pose), test::depth_allowed);
       Vec3 drag, went;
       double weight = 0;
       for (const NodeVector& f : s->contact_forces(0)) {
@@ -420,27 +448,49 @@ TEST(SimulationContact, ACutWithinAStepLeavesTheForceItsMean) {
 }
 
 TEST(SimulationContact, FrictionHoldsWhatRestsOnItAndNoMore) {
-  // Two masses on a capsule below them, weight and a pull along y of three tenths of it.
-  const double weight = 5000;
+  // A triangle of three masses on a box, weight and a pull along y of three tenths of it.
+  const double weight = 5000, total = 6 * weight;
+  Model m = test::two_masses(2);
+  m.nodes.push_back(m.nodes[0]);
+  m.nodes[2].position = {0, 2, 0};
+  m.triangles = {{0, 1, 2}};
+  for (const std::uint32_t node : {0U, 1U})
+    m.springs.push_back({node, 2, SpringKind::edge, 1, 0, std::sqrt(5.0)});
+  TriangleMesh box = test::divided_box({40, 40, 40}, 1);
+  for (Vec3& p : box.points)
+    p -= {20, 20, 41};
   for (const double friction : {0.2, 0.5}) {
     Simulation s(test::one_thread(), {});
-    s.add_object("o", test::two_masses(2), Method::ela);
-    s.apply(SetInstrument{0, {50, {20, 0, 0}, friction}, {{-10, 0, -50}, {}}});
+    s.add_object("o", m, Method::ela);
+    InstrumentShape shape{1, {}, friction};
+    shape.core = std::make_shared<const ConvexCore>(box);
+    s.apply(SetInstrument{0, shape, {{0, 0, -3e-3}, {}}});
     s.apply(SetGravity{{0, 0.3 * weight, -weight}});
     s.apply(SetTimestep{1e-4});
+    s.step(0.03); // it falls a little and comes to lie
     const double duration = 0.01;
-    s.step(duration);
-    const Vec3 force = s.instrument(0).force, slip = moved(s, 0, 0);
-    EXPECT_NEAR(force.z, -4 * weight, 1e-3 * weight);
-    if (friction > 0.3) { // at rest at once, under forces that balance
-      EXPECT_EQ(s.counts().integration, 0U);
-      EXPECT_EQ(slip, Vec3{});
-      EXPECT_NEAR(force.y, 4 * 0.3 * weight, 1e-9 * weight);
+    std::vector<Vec3> at{moved(s, 0, 0)}, force;
+    for (int k = 0; k < 2; ++k) {
+      s.step(duration);
+      at.push_back(moved(s, 0, 0));
+      force.push_back(s.instrument(0).force);
+      EXPECT_NEAR(force.back().z, -total, 1e-3 * total);
+      EXPECT_LT(std::abs(at.back().z - at.front().z), 1e-3); // d_hat
+      if (friction > 0.3)                                    // else it slides
+        EXPECT_NEAR(force.back().y, 0.3 * total, 1e-3 * total);
+      else
+        EXPECT_NEAR(force.back().y, friction * total, 1e-3 * total);
+    }
+    const double first = at[1].y - at[0].y, second = at[2].y - at[1].y;
+    if (friction > 0.3) {
+      // It creeps with eps_v (1 - sqrt(1 - q)), where it needs the share q of what friction holds.
+      const double creep =
+          contact::Parameters{}.stick_speed * (1 - std::sqrt(1 - 0.3 / friction)) * duration;
+      EXPECT_NEAR(first, creep, 0.05 * creep);
+      EXPECT_NEAR(second, creep, 0.05 * creep);
     } else {
-      EXPECT_GT(s.counts().integration, 0U);
-      const double way = 0.5 * (0.3 - friction) * weight * duration * duration;
-      EXPECT_NEAR(slip.y, way, 0.2 * way);
-      EXPECT_NEAR(force.y, 4 * friction * weight, 1e-2 * weight);
+      const double way = (0.3 - friction) * weight * duration * duration;
+      EXPECT_NEAR(second - first, way, 0.02 * way);
     }
   }
 }
@@ -457,7 +507,7 @@ TEST(SimulationContact, AFastInstrumentDoesNotPassThrough) {
       s.step(0.01);
       // What was above is now below it, not on the other side.
       EXPECT_GT(s.instrument(0).force.z, 0) << method_name(method) << over;
-      EXPECT_LT(depth(s, 0, {8, {}, 0}, s.instrument(0).pose), 1e-6);
+      EXPECT_LT(depth(s, 0, {8, {}, 0}, s.instrument(0).pose), test::depth_allowed);
       std::uint32_t top = 0;
       for (std::uint32_t i = 0; i < surface_count(s.model(0)); ++i)
         if (s.model(0).nodes[i].position.z > s.model(0).nodes[top].position.z)
@@ -566,7 +616,7 @@ TEST(SimulationContact, DrawnAlongALiver) {
           EXPECT_GE(dot(f.value, n), method == Method::ffe ? 0 : -1e-2 * norm(f.value));
         }
       }
-      EXPECT_LT(deepest, 1e-6);
+      EXPECT_LT(deepest, 6.01e-4 * radius); // as depth_allowed
       EXPECT_GT(touched, 50U);
       for (const std::string& w : warnings)
         EXPECT_EQ(w.find("not exact"), std::string::npos) << w;
@@ -578,6 +628,7 @@ TEST(SimulationContact, StrangeScenes) {
     const char* name;
     double radius;
     Vec3 at;
+    bool held = false; ///< it would have to pass fixed nodes
   };
   const Model model = organ();
   const std::uint32_t node = free_nodes(model)[5];
@@ -586,17 +637,26 @@ TEST(SimulationContact, StrangeScenes) {
     for (const Strange& strange :
          {Strange{"tiny, its centre at a node", 1e-4, at}, Strange{"its centre at a node", 4, at},
           Strange{"huge", 1e5, middle + Vec3{0, 0, 1e5 + 19}},
-          Strange{"around all of it", 50, middle}, Strange{"in the middle", 10, middle},
-          Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}}}) {
+          Strange{"around all of it", 50, middle, true}, Strange{"in the middle", 10, middle},
+          Strange{"on fixed nodes", 6, middle - Vec3{0, 0, 21}, true}}) {
       std::vector<std::string> warnings;
       Simulation s({}, {.warn = [&](const std::string& w) { warnings.push_back(w); }});
       s.add_object("o", model, method);
       s.apply(sphere(strange.radius, strange.at));
-      for (int k = 0; k < 3; ++k)
-        s.step(0.001);
+      std::string failure;
+      try {
+        for (int k = 0; k < 3; ++k)
+          s.step(0.001);
+      } catch (const Error& e) {
+        failure = e.what();
+      }
+      EXPECT_EQ(failure.find("a prescribed motion meets fixed nodes") != std::string::npos, strange.held)
+          << strange.name << failure;
+      if (!failure.empty())
+        continue;
       for (const double u : s.displacement(0))
         ASSERT_TRUE(std::isfinite(u)) << strange.name;
-      EXPECT_LT(depth(s, 0, {strange.radius, {}, 0}, {strange.at, {}}), 1e-6)
+      EXPECT_LT(depth(s, 0, {strange.radius, {}, 0}, {strange.at, {}}), test::depth_allowed)
           << strange.name << " " << method_name(method);
       for (const NodeVector& f : s.contact_forces(0))
         EXPECT_GE(dot(f.value, place(s, 0, f.node) - strange.at), 0) << strange.name;
@@ -617,7 +677,7 @@ TEST(SimulationContact, TwoInstrumentsAtOneNode) {
       for (int k = 0; k < 3; ++k)
         s.step(0.001);
       for (const std::size_t k : {0U, 1U}) {
-        EXPECT_LT(depth(s, 0, {6, {}, 0}, s.instrument(k).pose), 1e-6)
+        EXPECT_LT(depth(s, 0, {6, {}, 0}, s.instrument(k).pose), test::depth_allowed)
             << method_name(method) << apart;
       }
       EXPECT_FALSE(s.contact_forces(0).empty());
@@ -633,13 +693,13 @@ TEST(SimulationContact, InstrumentsMovedAtOnceGoTogether) {
     s.apply(SetInstrument{0, {5, {}, 0.4}, {left, {}}, "left"});
     s.apply(SetInstrument{1, {5, {}, 0.4}, {right, {}}, "right"});
     s.step(0.001);
-    const std::uint64_t before = s.counts().touches.problems;
+    const std::uint64_t before = s.counts().contact.steps;
     for (std::size_t k = 0; k < 2; ++k) {
       const std::size_t i = other_first ? 1 - k : k;
       s.apply(MoveInstrument{i, (i == 0 ? left : right) - Vec3{0.3, 0, 0.5}, {}, 0});
     }
     s.step(0.001);
-    EXPECT_EQ(s.counts().touches.problems - before, 1);
+    EXPECT_EQ(s.counts().contact.steps - before, 1);
     return std::pair(s.instrument(0).force, s.instrument(1).force);
   };
   const auto one = led(false);

@@ -4,7 +4,6 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/vector_at.h"
-#include "contact/surface_pairs.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
@@ -40,16 +39,16 @@ TEST(SimulationMeetings, ABlockRestsOnAnother) {
     s.apply(SetContact{0, 1, friction});
     for (int k = 0; k < 16; ++k) {
       s.step(1.0 / 60);
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      EXPECT_GT(least_gap(s, 0, 1), 0);
       const Vec3 up = sum_of_forces(s, 1), sum = up + sum_of_forces(s, 0);
       EXPECT_GE(up.z, 0);
       EXPECT_LE(norm(sum), 1e-12 * norm(up));
       EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.05) * up.z); // it isn't quite even
     }
-    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-5 * weight_of(s, 1));
-    EXPECT_NEAR(least_gap(s, 0, 1), 0, 1e-6);
-    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
-    EXPECT_EQ(s.state().kinetic_energy<1e-9, friction> 0) << "it slides where nothing rubs";
+    EXPECT_NEAR(sum_of_forces(s, 1).z, weight_of(s, 1), 1e-4 * weight_of(s, 1));
+    EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
+    // 1e-5 g mm^2/s^2 is a speed of 0.004 mm/s, of 0.1 mm/s at which what sticks may creep.
+    EXPECT_EQ(s.state().kinetic_energy<1e-5, friction> 0) << "it slides where nothing rubs";
   }
 }
 
@@ -85,7 +84,7 @@ TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
   s.apply(Release{0, nodes_of(fast)});
   s.step(h);
   const Vec3 before = momentum(s, h);
-  double pushed = 0, least = 0;
+  double pushed = 0, least = HUGE_VAL;
   for (int k = 0; k < 100; ++k) {
     const Vec3 now = momentum(s, h);
     EXPECT_LE(norm(now - before), 1e-9 * norm(before)) << k;
@@ -94,8 +93,7 @@ TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
     least = test::smaller(least, least_gap(s, 0, 1));
   }
   EXPECT_GT(pushed, 0);
-  EXPECT_GE(least, -1e-3);
-  EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
+  EXPECT_GT(least, 0);
 }
 
 /// A ball of 10 mm radius on tetrahedra that meet in its middle.
@@ -119,7 +117,7 @@ TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
   add(s, "ball", solid_ball({11.3, 12.1, 15}));
   s.apply(SetGravity{{0, 0, -9810}});
   s.apply(SetContact{1, 0, 0.5});
-  double least = 0, hardest = 0, mean = 0;
+  double least = HUGE_VAL, hardest = 0, mean = 0;
   for (int k = 0; k < 30; ++k) {
     s.step(1.0 / 60);
     least = test::smaller(least, least_gap(s, 0, 1));
@@ -128,10 +126,9 @@ TEST(SimulationMeetings, ABallFallsOnAHeldPlate) {
     mean += k < 15 ? 0 : up.z / 15;
     EXPECT_GE(up.z, 0);
   }
-  EXPECT_GE(least, -1e-3);
+  EXPECT_GT(least, 0);
   EXPECT_GT(hardest, 2 * weight_of(s, 1)) << "it falls";
   EXPECT_NEAR(mean, weight_of(s, 1), 1e-2 * weight_of(s, 1));
-  EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
 }
 
 /// Two arms along x, one element apart, held at their lower side.
@@ -191,14 +188,13 @@ TEST(SimulationMeetings, TheArmsOfAClampTouch) {
       s.step(1.0 / 60);
       least = test::smaller(least, least_gap(s, 0, 0));
     }
-    EXPECT_LE(s.counts().solids.touches.unsolved, 1U) << "of 200 steps, as the tips meet";
     EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-9) << "what it does to itself, of some 1e4";
     if (meets) {
-      EXPECT_GE(least, -1e-3);
-      EXPECT_NEAR(least_gap(s, 0, 0), 0, 1e-3);
+      EXPECT_GT(least, 0);
+      EXPECT_LE(least_gap(s, 0, 0), gap_allowed);
       EXPECT_GE(s.contact_forces(0).size(), 4U);
     } else {
-      EXPECT_LE(least, -0.1) << "they pass each other where nobody says otherwise";
+      EXPECT_LT(least, 0) << "they pass each other where nobody says otherwise";
     }
   }
 }
@@ -219,20 +215,19 @@ TEST(SimulationMeetings, AnInstrumentPressesOneObjectOntoAnother) {
     s.apply(MoveInstrument{0, {7.7, 8.1, 13.1}, {}, 0.1});
     for (int k = 0; k < 12; ++k) {
       s.step(1.0 / 60);
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      EXPECT_GT(least_gap(s, 0, 1), 0);
       double depth = 0;
       const PlacedInstrument probe(s.instrument(0).shape, s.instrument(0).pose);
       const std::vector<double> u = test::shape(s, 1);
       for (std::size_t i = 0; i < s.model(1).nodes.size(); ++i)
         depth =
             test::larger(depth, -probe.distance(s.model(1).nodes[i].position + vector_at(u, i)));
-      EXPECT_LE(depth, 1e-6 * 6);
+      EXPECT_LE(depth, depth_allowed * 6);
     }
     // What the probe presses with goes through to the lower block.
     const Vec3 probe = s.instrument(0).force, below = sum_of_forces(s, 0);
     EXPECT_GT(probe.z, 1e4);
     EXPECT_LE(norm(probe + below), 1e-4 * norm(probe));
-    EXPECT_EQ(s.counts().solids.touches.unsolved, 0U);
   }
 }
 
@@ -246,7 +241,7 @@ TEST(SimulationMeetings, WhatIsFarApartMovesAlone) {
       s.apply(SetContact{0, 1, 0.2});
     for (int k = 0; k < 5; ++k)
       s.step(1.0 / 60);
-    EXPECT_EQ(s.counts().solids.touches.problems > 0, meets && away == 0);
+    EXPECT_EQ(s.counts().contact.steps > 0, meets && away == 0);
     return std::pair(s.counts().solids.rounds, s.counts().integration);
   };
   EXPECT_EQ(rounds(true, 500), rounds(false, 500));
@@ -270,7 +265,7 @@ TEST(SimulationMeetings, AStepThatFailsIsTakenBack) {
       }
       s.step(1.0 / 60);
     }
-    EXPECT_GT(s.counts().solids.touches.problems, 0U);
+    EXPECT_GT(s.counts().contact.steps, 0U);
     return test::shape(s, 1);
   };
   const std::vector<double> once = run(false), again = run(true);
@@ -297,28 +292,8 @@ TEST(SimulationMeetings, WhatIsCutOffTouchesStill) {
     s.step(1.0 / 120);
   const Vec3 plate = sum_of_forces(s, 1);
   EXPECT_GT(plate.z, 0) << "it lies on what came off";
-  EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+  EXPECT_GT(least_gap(s, 1, 2), 0);
   EXPECT_LE(norm(plate + sum_of_forces(s, 0) + sum_of_forces(s, 2)), 1e-10 * norm(plate));
-}
-
-TEST(SimulationMeetings, WhatCannotBeServedIsRefused) {
-  const auto message = [](const SetContact& contact, Method method, Integration integration) {
-    Simulation s(one_thread(), {});
-    s.add_object("o", test::organ(2), method, {}, integration);
-    add(s, "p", test::organ(2));
-    try {
-      s.apply(contact);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  const char* const steps = "object o moves by explicit steps, expected integration=implicit or "
-                            "auto for contact";
-  EXPECT_EQ(message({1, 0, 0}, Method::ela, Integration::semi_implicit), steps);
-  EXPECT_EQ(message({0, 0, 0}, Method::ela, Integration::semi_implicit), steps);
-  EXPECT_EQ(message({0, 1, 0}, Method::ffe, Integration::implicit), "");
-  EXPECT_EQ(message({0, 1, 0}, Method::ela, Integration::implicit), "");
 }
 
 } // namespace

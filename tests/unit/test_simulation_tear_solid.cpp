@@ -395,7 +395,7 @@ TEST(SolidTearScenes, AWoundUnderAnInstrumentHasWallsForIt) {
         const std::vector<double> u = shape(s, k);
         for (const double one : u)
           ASSERT_TRUE(std::isfinite(one));
-        EXPECT_LT(test::surface_depth(model, u, PlacedInstrument(ball, tool.pose)), 1e-6);
+        EXPECT_LT(test::surface_depth(model, u, ball, tool.pose), test::depth_allowed);
         for (const NodeVector& f : s.contact_forces(k)) {
           EXPECT_TRUE(std::isfinite(norm(f.value)));
           const Vec3& rest = model.nodes[f.node].position;
@@ -407,20 +407,38 @@ TEST(SolidTearScenes, AWoundUnderAnInstrumentHasWallsForIt) {
     };
     while (norm(s.instrument(0).force) == 0 && place.z > side)
       step(place - Vec3{0, 0, 0.1}, 0);
+    // Chips may come off before the ends do.
+    const auto severed = [&] {
+      for (std::size_t k = 0; k < s.object_count(); ++k)
+        if (const Model& m = s.model(k);
+            !end_of(m).empty() &&
+            std::ranges::any_of(m.nodes, [](const Node& n) { return n.fixed == fixed_all; }))
+          return false;
+      return true;
+    };
     double pressed = 0; // when it tears
-    for (int k = 1; k <= 60 && s.object_count() == 1; ++k) {
+    for (int k = 1; k <= 60 && !severed(); ++k) {
       if (count(s, Cutting::Kind::cut) == 0)
         pressed = s.instrument(0).force.z;
       step(place, (0.6 + 0.02 * k) * stretch);
     }
     EXPECT_GT(pressed, 0) << method_name(method);
-    ASSERT_EQ(s.object_count(), 2U) << method_name(method);
+    ASSERT_TRUE(severed()) << method_name(method);
+    for (std::size_t k = 0; k < s.object_count(); ++k)
+      s.apply(SetTear{k, 0}); // the ball would tear off more
     EXPECT_EQ(on_wall, 0) << method_name(method);
-    for (int k = 0; k < 10; ++k)
+    for (int k = 0; k < 16; ++k)
       step(place, pulled + 0.5); // the wound opens
-    for (int k = 0; k < 10; ++k)
-      step(place - Vec3{0, 0, 0.5}, pulled);
-    for (int k = 0; k < 10 && on_wall == 0; ++k)
+    double wall = 0;             // how far what is left at the fixed end reaches
+    for (std::size_t k = 0; k < s.object_count(); ++k)
+      if (end_of(s.model(k)).empty())
+        for (std::size_t i = 0; i < s.model(k).nodes.size(); ++i)
+          wall = test::larger(wall, s.model(k).nodes[i].position.x + shape(s, k)[3 * i]);
+    for (const Vec3& way : {Vec3{0, 0, side + 2 * radius - place.z},
+                            Vec3{wall + radius + 0.5 - place.x, 0, 0}, Vec3{0, 0, -side}})
+      for (int k = 0; k < 10; ++k)
+        step(place + 0.1 * way, pulled);
+    for (int k = 0; k < 20 && on_wall == 0; ++k)
       step(place - Vec3{0.4, 0, 0}, pulled);
     EXPECT_TRUE(place.z > 0 && place.z < side);                   // where nothing but a wall is
     EXPECT_GT(s.instrument(0).force.x, 0) << method_name(method); // it is pushed back

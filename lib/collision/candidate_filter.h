@@ -1,0 +1,40 @@
+#pragma once
+// Filter of candidates: those that may be within a distance of each other now.
+
+#include "base/vec3.h"
+#include "collision/candidates.h"
+#include "collision/surface.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gewebe::collision {
+
+/// Selects from the candidates of one broad phase the pairs that may be near.
+///
+/// Keeps for each candidate a lower bound of its gap at reference positions. Vertices that moved by
+/// at most s since then have a gap of at least that bound minus 2 s, so that most pairs need no
+/// measurement while vertices move little.
+class CandidateFilter {
+public:
+  /// Begins anew: no gap is known. \param candidates, vertices  of the broad phase; both outlive
+  /// this \param vertices  those of all candidates, or more
+  void reset(const Candidates& candidates, std::span<const std::uint32_t> vertices,
+             std::span<const Vec3> x);
+  /// Pairs whose gap at x (distance minus the sum of radii) may be `range` or less, in the order of
+  /// the candidates. \return valid until the next call
+  const Candidates& select(const CollisionSurface& surface, std::span<const Vec3> x, double range);
+
+private:
+  const Candidates* candidates_ = nullptr;
+  std::span<const std::uint32_t> vertices_;
+  std::vector<Vec3> reference_; ///< by place in vertices_
+  std::vector<double> gap_;     ///< lower bounds at the reference, by candidate
+  std::vector<std::pair<std::size_t, double>> measured_; ///< candidate, its gap
+  Candidates near_;
+};
+
+} // namespace gewebe::collision

@@ -1,0 +1,567 @@
+#include "contact/condensed_system.h"
+
+#include "base/error.h"
+#include "solve/dense_cholesky.h"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <list>
+#include <utility>
+
+namespace gewebe::contact {
+
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+constexpr std::uint32_t none = UINT32_MAX;
+/// An axis with less compliance than this part of the body's largest cannot move.
+constexpr double immovable = 1e-13;
+
+/// Translation of a deformable body's vertex, or of a whole rigid body.
+struct Node {
+  std::uint32_t body = 0, vertex = 0; ///< the vertex by its number in the body
+  std::uint32_t place = 0;            ///< among the body's nodes
+  std::uint32_t active = none;        ///< among active nodes
+};
+
+struct ActiveNode {
+  std::uint32_t node = 0;
+  std::array<std::int32_t, 3> unknown{-1, -1, -1};
+};
+
+constexpr std::size_t most_inverses = 32;
+
+/// What belongs to one body.
+struct Part {
+  std::vector<std::uint32_t> nodes;         ///< ascending vertices
+  std::vector<std::uint32_t> rows;          ///< their vertices in the body
+  std::vector<std::uint32_t> active;        ///< active nodes, by ascending node
+  std::vector<std::vector<Block3>> columns; ///< by active node: W(row, it)
+  std::vector<Index> unknowns;              ///< of the system
+  MatrixXd inverse;                         ///< W_aa^-1 over them, in the world's frame
+  VectorXd start;                           ///< W_aa^-1 R0_a
+};
+
+/// Solution of Newton's system for one right-hand side.
+struct Direction {
+  VectorXd p;
+  std::vector<Vec3> change, response; ///< as in CondensedSystem::State
+};
+
+Vec3 times(const Block3& b, const Vec3& v) {
+  return {b[0] * v.x + b[1] * v.y + b[2] * v.z, b[3] * v.x + b[4] * v.y + b[5] * v.z,
+          b[6] * v.x + b[7] * v.y + b[8] * v.z};
+}
+
+Vec3 times_transposed(const Block3& b, const Vec3& v) {
+  return {b[0] * v.x + b[3] * v.y + b[6] * v.z, b[1] * v.x + b[4] * v.y + b[7] * v.z,
+          b[2] * v.x + b[5] * v.y + b[8] * v.z};
+}
+
+} // namespace
+
+struct InverseCache::State {
+  struct Inverse {
+    std::uint64_t id = 0;
+    std::vector<std::uint32_t> key; ///< axes of vertices
+    MatrixXd inverse;               ///< in the vertices' frames
+  };
+  std::list<Inverse> inverses; ///< last used first
+};
+
+InverseCache::InverseCache() : state_(std::make_unique<State>()) {}
+InverseCache::~InverseCache() = default;
+
+struct CondensedSystem::State {
+  const BodyTable& table;
+  double ridge;
+  InverseCache& cache;
+  std::vector<std::uint32_t> vertices;
+  std::vector<std::uint32_t> node_of; ///< by place of a vertex
+  std::vector<std::uint32_t> place_of_vertex;
+  std::vector<Node> nodes;
+  std::vector<Block3> frames; ///< by node
+  std::vector<Part> parts;
+  std::vector<ActiveNode> active;
+  std::vector<Vec3> start;            ///< R0 by place
+  std::vector<Vec3> force;            ///< F by active node
+  std::vector<Vec3> pushed;           ///< W F by node
+  std::vector<Vec3> change;           ///< q by active node
+  std::vector<Vec3> response;         ///< W q by node
+  std::vector<Vec3> step;             ///< by place
+  std::array<Direction, 2> direction; ///< at the same share c, by all of it
+  double reach = 1;                   ///< part of c that the step is to take
+  double c = 1, way_energy = 0;
+  CpuLevel cpu;
+  DenseCholesky cholesky;
+  MatrixXd hessian, matrix;
+  VectorXd carried; ///< H_af p_f of immovable vertices
+  VectorXd p;
+  // Of energy(): quadratic in c, F and q.
+  double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
+
+  State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
+      : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
+
+  std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
+  Index matrix_order = 0;
+
+  std::uint32_t body_of(std::uint32_t vertex) const {
+    const auto next = std::ranges::upper_bound(table.first, vertex);
+    return static_cast<std::uint32_t>(next - table.first.begin()) - 1;
+  }
+
+  void make_nodes() {
+    parts.resize(table.bodies.size());
+    place_of_vertex.assign(table.vertex_count(), none);
+    std::vector<std::uint32_t> of_rigid(table.bodies.size(), none);
+    for (std::size_t place = 0; place < vertices.size(); ++place) {
+      const std::uint32_t vertex = vertices[place], body = body_of(vertex);
+      place_of_vertex[vertex] = static_cast<std::uint32_t>(place);
+      const bool rigid = table.bodies[body]->is_rigid();
+      if (rigid && of_rigid[body] != none) {
+        node_of.push_back(of_rigid[body]);
+        continue;
+      }
+      const auto node = static_cast<std::uint32_t>(nodes.size());
+      of_rigid[body] = node;
+      node_of.push_back(node);
+      Part& part = parts[body];
+      nodes.push_back(
+          {body, vertex - table.first[body], static_cast<std::uint32_t>(part.nodes.size()), none});
+      part.nodes.push_back(node);
+      part.rows.push_back(vertex - table.first[body]);
+    }
+    for (const Node& node : nodes)
+      frames.push_back(table.bodies[node.body]->frame(node.vertex));
+    pushed.resize(nodes.size());
+    response.resize(nodes.size());
+    step.resize(vertices.size());
+  }
+
+  /// Of vectors on all vertices, over the unknowns.
+  VectorXd condensed(std::span<const Vec3> by_vertex) const {
+    VectorXd all = VectorXd::Zero(matrix_order);
+    for (std::size_t place = 0; place < vertices.size(); ++place) {
+      const Node& node = nodes[node_of[place]];
+      if (node.active == none)
+        continue;
+      const ActiveNode& one = active[node.active];
+      for (int a = 0; a < 3; ++a)
+        if (const std::int32_t u = one.unknown[static_cast<std::size_t>(a)]; u >= 0)
+          all[u] += by_vertex[vertices[place]][a];
+    }
+    return all;
+  }
+
+  /// Solves for a direction, whose p is the right-hand side up to now, and finds its part of
+  /// q = -(F + c W^-1 R0 + W^-1 p).
+  void finish(Direction& d, bool forces, bool moves) {
+    if (matrix_order > 0)
+      cholesky.solve({d.p.data(), size()});
+    d.change.assign(active.size(), {});
+    d.response.resize(nodes.size());
+    for (const Part& part : parts) {
+      const auto count = static_cast<Index>(part.unknowns.size());
+      VectorXd own(count);
+      for (Index i = 0; i < count; ++i)
+        own[i] = d.p[part.unknowns[static_cast<std::size_t>(i)]];
+      VectorXd q = -(part.inverse * own);
+      if (moves)
+        q -= c * part.start;
+      Index i = 0;
+      for (const std::uint32_t k : part.active)
+        for (int a = 0; a < 3; ++a)
+          if (active[k].unknown[static_cast<std::size_t>(a)] >= 0)
+            d.change[k][a] = q[i++] - (forces ? force[k][a] : 0);
+    }
+    respond(d.change, d.response);
+  }
+
+  Vec3 start_of(std::uint32_t node) const { // R0 of a node's vertex
+    const Node& n = nodes[node];
+    return start[place_of_vertex[table.first[n.body] + n.vertex]];
+  }
+
+  /// Inverse of a body's W_aa, behind new columns.
+  void renew(Part& part) {
+    const auto count = static_cast<Index>(part.active.size());
+    double largest = 0;
+    for (Index k = 0; k < count; ++k) {
+      const Block3& own = block(part, k, k);
+      for (std::size_t a = 0; a < 3; ++a)
+        largest = std::max(largest, own[4 * a]);
+    }
+    Axes axes;
+    for (Index k = 0; k < count; ++k) {
+      ActiveNode& node = active[part.active[static_cast<std::size_t>(k)]];
+      for (int a = 0; a < 3; ++a) {
+        if (!(block(part, k, k)[static_cast<std::size_t>(4 * a)] > immovable * largest))
+          continue;
+        axes.emplace_back(k, a);
+        std::int32_t& unknown = node.unknown[static_cast<std::size_t>(a)];
+        if (unknown < 0)
+          unknown = static_cast<std::int32_t>(matrix_order++);
+      }
+    }
+    const auto order = static_cast<Index>(axes.size());
+    part.unknowns.clear();
+    VectorXd r0(order);
+    for (Index j = 0; j < order; ++j) {
+      const auto [kj, aj] = axes[static_cast<std::size_t>(j)];
+      const ActiveNode& node = active[part.active[static_cast<std::size_t>(kj)]];
+      part.unknowns.push_back(node.unknown[static_cast<std::size_t>(aj)]);
+      r0[j] = start_of(node.node)[aj];
+    }
+    part.inverse = turned(part, axes, inverse_of(part, axes, largest));
+    part.start = part.inverse * r0;
+  }
+
+  using Axes = std::vector<std::pair<Index, int>>; ///< active node of the part, axis
+
+  /// W_aa^-1 in the vertices' frames.
+  const MatrixXd& inverse_of(const Part& part, const Axes& axes, double largest) {
+    InverseCache::State& all = *cache.state_;
+    const std::uint64_t id = table.bodies[nodes[part.nodes[0]].body]->matrix_id();
+    std::vector<std::uint32_t> key;
+    for (const auto& [k, a] : axes)
+      key.push_back(3 * nodes[active[part.active[static_cast<std::size_t>(k)]].node].vertex +
+                    static_cast<std::uint32_t>(a));
+    if (id != 0)
+      for (auto one = all.inverses.begin(); one != all.inverses.end(); ++one)
+        if (one->id == id && one->key == key) {
+          all.inverses.splice(all.inverses.begin(), all.inverses, one);
+          return one->inverse;
+        }
+    const auto order = static_cast<Index>(axes.size());
+    MatrixXd w(order, order);
+    for (Index j = 0; j < order; ++j) {
+      const auto [kj, aj] = axes[static_cast<std::size_t>(j)];
+      for (Index i = 0; i < order; ++i) {
+        const auto [ki, ai] = axes[static_cast<std::size_t>(i)];
+        w(i, j) = block(part, ki, kj)[static_cast<std::size_t>(3 * ai + aj)];
+      }
+    }
+    w = (0.5 * (w + w.transpose())).eval();
+    double shift = 0;
+    for (;;) {
+      MatrixXd shifted = w;
+      shifted.diagonal().array() += shift;
+      if (invert({shifted.data(), static_cast<std::size_t>(shifted.size())},
+                 static_cast<std::size_t>(order), cpu) &&
+          shifted.allFinite()) {
+        w = std::move(shifted);
+        break;
+      }
+      shift = shift > 0 ? 10 * shift : ridge * largest;
+      if (!std::isfinite(shift) || !(shift <= largest))
+        throw Error("contact: the compliance of a body is not positive");
+    }
+    all.inverses.push_front({id, std::move(key), std::move(w)});
+    if (all.inverses.size() > most_inverses)
+      all.inverses.pop_back();
+    return all.inverses.front().inverse;
+  }
+
+  /// From the vertices' frames into the world's.
+  MatrixXd turned(const Part& part, const Axes& axes, const MatrixXd& inverse) const {
+    const ContactBody& body = *table.bodies[nodes[part.nodes[0]].body];
+    const std::size_t count = part.active.size();
+    std::vector<Index> first(count, -1); // unknown of a node with all three axes
+    bool turns = false;
+    std::vector<Eigen::Matrix3d> frame(count, Eigen::Matrix3d::Identity());
+    for (std::size_t n = 0; n < axes.size(); ++n)
+      if (axes[n].second == 0 && n + 2 < axes.size() && axes[n + 2].first == axes[n].first)
+        first[static_cast<std::size_t>(axes[n].first)] = static_cast<Index>(n);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Block3 of = body.frame(nodes[active[part.active[k]].node].vertex);
+      frame[k] = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(of.data());
+      turns = turns || (first[k] >= 0 && frame[k] != Eigen::Matrix3d::Identity());
+    }
+    MatrixXd result = inverse;
+    if (!turns)
+      return result;
+    for (std::size_t k = 0; k < count; ++k)
+      if (first[k] >= 0)
+        result.middleRows<3>(first[k]) = (frame[k] * result.middleRows<3>(first[k])).eval();
+    for (std::size_t k = 0; k < count; ++k)
+      if (first[k] >= 0)
+        result.middleCols<3>(first[k]) =
+            (result.middleCols<3>(first[k]) * frame[k].transpose()).eval();
+    return result;
+  }
+
+  /// W(active node i, active node j) of a part.
+  const Block3& block(const Part& part, Index i, Index j) const {
+    const Node& row = nodes[active[part.active[static_cast<std::size_t>(i)]].node];
+    return part.columns[static_cast<std::size_t>(j)][row.place];
+  }
+
+  /// W v at all nodes, v by active node.
+  void respond(const std::vector<Vec3>& v, std::vector<Vec3>& to) const {
+    std::ranges::fill(to, Vec3{});
+    for (const Part& part : parts) {
+      if (part.active.empty())
+        continue;
+      for (std::size_t k = 0; k < part.active.size(); ++k) {
+        const ActiveNode& node = active[part.active[k]];
+        if (v[part.active[k]] == Vec3{})
+          continue;
+        const Vec3 f = times_transposed(frames[node.node], v[part.active[k]]);
+        const std::vector<Block3>& column = part.columns[k];
+        for (std::size_t row = 0; row < part.nodes.size(); ++row)
+          to[part.nodes[row]] += times(column[row], f);
+      }
+      for (const std::uint32_t node : part.nodes)
+        to[node] = times(frames[node], to[node]);
+    }
+  }
+};
+
+CondensedSystem::CondensedSystem(const BodyTable& table, std::vector<std::uint32_t> vertices,
+                                 std::span<const Vec3> start,
+                                 std::span<const std::vector<VertexForce>> forces, double energy,
+                                 double share, double ridge, InverseCache& cache, CpuLevel cpu)
+    : state_(std::make_unique<State>(table, ridge, cache, cpu)) {
+  State& s = *state_;
+  s.way_energy = energy;
+  s.c = share;
+  s.vertices = std::move(vertices);
+  s.make_nodes();
+  for (const std::uint32_t vertex : s.vertices)
+    s.start.push_back(start[vertex]);
+  std::vector<std::uint32_t> pushed;
+  for (std::size_t body = 0; body < forces.size(); ++body)
+    for (const VertexForce& f : forces[body])
+      pushed.push_back(table.first[body] + f.vertex);
+  activate(pushed);
+  for (std::size_t body = 0; body < forces.size(); ++body)
+    for (const VertexForce& f : forces[body]) {
+      const std::uint32_t place = s.place_of_vertex[table.first[body] + f.vertex];
+      s.force[s.nodes[s.node_of[place]].active] += f.force;
+    }
+  s.respond(s.force, s.pushed);
+}
+
+CondensedSystem::~CondensedSystem() = default;
+
+std::span<const std::uint32_t> CondensedSystem::vertices() const {
+  return state_->vertices;
+}
+
+std::size_t CondensedSystem::unknowns() const {
+  return state_->size();
+}
+
+void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
+  State& s = *state_;
+  std::vector<std::uint8_t> changed(s.parts.size());
+  for (const std::uint32_t vertex : vertices) {
+    const std::uint32_t node = s.node_of[s.place_of_vertex[vertex]];
+    Node& n = s.nodes[node];
+    if (n.active != none)
+      continue;
+    n.active = static_cast<std::uint32_t>(s.active.size());
+    s.active.push_back({node, {-1, -1, -1}});
+    Part& part = s.parts[n.body];
+    const auto place = std::ranges::lower_bound(part.active, node, {},
+                                                [&](std::uint32_t k) { return s.active[k].node; });
+    const auto column = part.columns.begin() + (place - part.active.begin());
+    std::vector<Block3> blocks(part.rows.size());
+    s.table.bodies[n.body]->compliance(n.vertex, part.rows, blocks);
+    part.columns.insert(column, std::move(blocks));
+    part.active.insert(place, n.active);
+    changed[n.body] = 1;
+  }
+  for (std::size_t b = 0; b < s.parts.size(); ++b)
+    if (changed[b] != 0)
+      s.renew(s.parts[b]);
+  s.force.resize(s.active.size());
+  s.change.resize(s.active.size());
+}
+
+void CondensedSystem::clear_hessian() {
+  State& s = *state_;
+  s.hessian.setZero(s.matrix_order, s.matrix_order);
+  s.carried.setZero(s.matrix_order);
+}
+
+void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
+                                  std::span<const double> block) {
+  State& s = *state_;
+  std::array<std::int32_t, 12> unknown{};
+  std::array<double, 12> way{}; // of axes that are carried to their targets
+  const std::size_t order = 3 * of.size();
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    const std::uint32_t place = s.place_of_vertex[of[k]];
+    const Node& node = s.nodes[s.node_of[place]];
+    const Vec3 carried = -s.c * s.start[place];
+    for (std::size_t a = 0; a < 3; ++a) {
+      unknown[3 * k + a] = node.active == none ? -1 : s.active[node.active].unknown[a];
+      way[3 * k + a] = unknown[3 * k + a] < 0 ? carried[static_cast<int>(a)] : 0;
+    }
+  }
+  for (std::size_t i = 0; i < order; ++i) {
+    if (unknown[i] < 0)
+      continue;
+    double carried = 0;
+    for (std::size_t j = 0; j < order; ++j) {
+      const double h = block[order * i + j];
+      if (unknown[j] < 0)
+        carried += h * way[j];
+      else
+        s.hessian(unknown[i], unknown[j]) += h;
+    }
+    s.carried[unknown[i]] += carried;
+  }
+}
+
+bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
+  State& s = *state_;
+  const Index order = s.matrix_order;
+  s.matrix = s.hessian;
+  s.matrix.diagonal().array() += damping;
+  auto& [still, whole] = s.direction;
+  whole.p = -s.carried;
+  for (const Part& part : s.parts) {
+    const auto count = static_cast<Index>(part.unknowns.size());
+    for (Index j = 0; j < count; ++j) {
+      const Index column = part.unknowns[static_cast<std::size_t>(j)];
+      whole.p[column] -= s.c * part.start[j];
+      for (Index i = 0; i < count; ++i)
+        s.matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
+    }
+  }
+  still.p = -s.condensed(gradient);
+  for (const ActiveNode& active : s.active)
+    for (int a = 0; a < 3; ++a)
+      if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
+        still.p[u] -= s.force[s.nodes[active.node].active][a];
+  if (order > 0 && !s.cholesky.factor({s.matrix.data(), static_cast<std::size_t>(s.matrix.size())},
+                                      static_cast<std::size_t>(order), s.cpu))
+    return false;
+  s.finish(still, true, false);
+  s.finish(whole, false, true);
+  choose_reach(1);
+  return still.p.allFinite() && whole.p.allFinite();
+}
+
+void CondensedSystem::choose_reach(double reach) {
+  State& s = *state_;
+  s.reach = s.c > 0 ? reach : 1;
+  const auto& [still, whole] = s.direction;
+  s.p = still.p + s.reach * whole.p;
+  const auto combine = [&](auto of, std::vector<Vec3>& to) {
+    for (std::size_t k = 0; k < to.size(); ++k)
+      to[k] = (still.*of)[k] + s.reach * (whole.*of)[k];
+  };
+  combine(&Direction::change, s.change);
+  combine(&Direction::response, s.response);
+  for (std::size_t place = 0; place < s.vertices.size(); ++place) {
+    const std::uint32_t node = s.node_of[place];
+    s.step[place] = -s.reach * s.c * s.start[place] - s.pushed[node] - s.response[node];
+  }
+  s.ff = s.fq = s.qq = s.rf = s.rq = 0;
+  for (std::size_t k = 0; k < s.active.size(); ++k) {
+    const std::uint32_t node = s.active[k].node;
+    const Vec3 r0 = s.start_of(node);
+    s.rf += dot(r0, s.force[k]);
+    s.rq += dot(r0, s.change[k]);
+    s.ff += dot(s.force[k], s.pushed[node]);
+    s.fq += dot(s.force[k], s.response[node]);
+    s.qq += dot(s.change[k], s.response[node]);
+  }
+}
+
+const Vec3& CondensedSystem::step(std::size_t place) const {
+  return state_->step[place];
+}
+
+double CondensedSystem::energy(double part) const {
+  const State& s = *state_;
+  const double stay = 1 - part;
+  double energy = 0.5 * (stay * stay * s.ff - 2 * stay * part * s.fq + part * part * s.qq);
+  if (s.reach > 0) {
+    const double c = stay * s.c;
+    energy += c * (stay * s.rf - part * s.rq) + 0.5 * s.way_energy * c * c;
+  }
+  return energy;
+}
+
+double CondensedSystem::slope() const {
+  const State& s = *state_;
+  double slope = -s.ff - s.fq;
+  if (s.reach > 0)
+    slope -= s.c * (2 * s.rf + s.rq) + s.way_energy * s.c * s.c;
+  return slope;
+}
+
+void CondensedSystem::require_descent(double contact_slope) {
+  State& s = *state_;
+  // Newton's decrement that the step would have without the way.
+  const double descent = s.p.dot(s.hessian * s.p) + s.qq, total = slope() + contact_slope;
+  if (s.c > 0 && s.reach > 0 && !(total <= -0.5 * descent))
+    s.way_energy += (total + descent) / (s.c * s.c);
+}
+
+void CondensedSystem::advance(double part) {
+  State& s = *state_;
+  s.c = part * s.reach < 1 ? (1 - part * s.reach) * s.c : 0;
+  for (std::size_t k = 0; k < s.active.size(); ++k)
+    s.force[k] = (1 - part) * s.force[k] - part * s.change[k];
+  for (std::size_t node = 0; node < s.nodes.size(); ++node)
+    s.pushed[node] = (1 - part) * s.pushed[node] - part * s.response[node];
+}
+
+CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradient) const {
+  const State& s = *state_;
+  std::vector<Vec3> sum(s.nodes.size());
+  for (std::size_t place = 0; place < s.vertices.size(); ++place)
+    sum[s.node_of[place]] -= gradient[s.vertices[place]];
+  Residual result;
+  for (std::size_t node = 0; node < s.nodes.size(); ++node) {
+    const std::uint32_t active = s.nodes[node].active;
+    if (active == none && sum[node] == Vec3{})
+      continue;
+    Vec3 force;
+    std::array<bool, 3> moves{};
+    if (active != none) {
+      force = s.force[active];
+      for (std::size_t a = 0; a < 3; ++a)
+        moves[a] = s.active[active].unknown[a] >= 0;
+    }
+    Vec3 difference = force - sum[node];
+    for (int a = 0; a < 3; ++a)
+      if (active != none && !moves[static_cast<std::size_t>(a)])
+        difference[a] = 0; // carried to its target
+    if (const double size = norm(difference); !(size <= result.difference))
+      result.difference = size;
+    result.largest = std::max(result.largest, norm(force));
+  }
+  return result;
+}
+
+double CondensedSystem::largest_force() const {
+  double largest = 0;
+  for (const Vec3& f : state_->force)
+    largest = std::max(largest, norm(f));
+  return largest;
+}
+
+double CondensedSystem::share() const {
+  return state_->c;
+}
+
+std::vector<VertexForce> CondensedSystem::forces(std::size_t body) const {
+  const State& s = *state_;
+  std::vector<VertexForce> all;
+  for (const std::uint32_t k : s.parts[body].active)
+    all.push_back({s.nodes[s.active[k].node].vertex, s.force[k]});
+  std::ranges::sort(all, {}, &VertexForce::vertex);
+  return all;
+}
+
+} // namespace gewebe::contact

@@ -1,0 +1,246 @@
+#include "contact/island.h"
+
+#include "collision/bvh.h"
+#include "contact/convex_core.h"
+#include "contact/fit_radii.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace gewebe::contact {
+
+namespace {
+
+constexpr int max_halvings = 8;
+
+/// Part of d_hat by which d_min of a radius is less than it, so that a typical force acts where the
+/// surfaces just touch.
+constexpr double radius_offset = 0.6;
+
+constexpr double typical_strain = 1e-2;
+
+double median_edge(const collision::CollisionSurface& surface) {
+  std::vector<double> lengths;
+  for (const auto& [a, b] : surface.edges)
+    if (surface.radius[a] == 0)
+      lengths.push_back(norm(surface.rest[a] - surface.rest[b]));
+  if (lengths.empty())
+    return 0;
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::ranges::nth_element(lengths, middle);
+  return *middle;
+}
+
+/// Whether the segment pq passes the inside of a triangle; touching is no passing.
+bool passes(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const auto volume = [](const Vec3& u, const Vec3& v, const Vec3& s, const Vec3& t) {
+    return dot(cross(v - u, s - u), t - u);
+  };
+  const double up = volume(a, b, c, p), uq = volume(a, b, c, q);
+  if (!(up * uq < 0))
+    return false;
+  const double ab = volume(p, q, a, b), bc = volume(p, q, b, c), ca = volume(p, q, c, a);
+  return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
+}
+
+} // namespace
+
+ModelSurface model_surface(const Model& model) {
+  ModelSurface all;
+  std::vector<std::uint32_t> vertex(model.nodes.size(), UINT32_MAX);
+  for (const Triangle& t : model.triangles)
+    for (const std::uint32_t corner : t)
+      vertex[corner] = 0;
+  for (std::uint32_t node = 0; node < vertex.size(); ++node) {
+    if (vertex[node] == UINT32_MAX)
+      continue;
+    vertex[node] = static_cast<std::uint32_t>(all.node.size());
+    all.node.push_back(node);
+    all.surface.rest.push_back(model.nodes[node].position);
+    all.surface.fixed.push_back(model.nodes[node].fixed == fixed_all ? 1 : 0);
+  }
+  for (const Triangle& t : model.triangles)
+    all.surface.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
+  return all;
+}
+
+TypicalContact typical_contact(const Model& model) {
+  double edges = 0;
+  std::size_t count = 0;
+  for (const Triangle& t : model.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges += norm(model.nodes[t[k]].position - model.nodes[t[(k + 1) % 3]].position);
+      ++count;
+    }
+  if (count == 0)
+    return {};
+  const double edge = edges / static_cast<double>(count);
+  double stiffness = HUGE_VAL; // of a piece of the size of an edge
+  if (!model.tetrahedra.empty())
+    for (const Material& m : model.materials)
+      stiffness = m.young > 0 ? std::min(stiffness, m.young * edge) : stiffness;
+  for (const Spring& spring : model.springs)
+    stiffness = spring.stiffness > 0 ? std::min(stiffness, spring.stiffness) : stiffness;
+  if (!std::isfinite(stiffness))
+    return {};
+  return {stiffness, typical_strain * stiffness * edge};
+}
+
+BodySurface instrument_surface(const InstrumentShape& shape) {
+  BodySurface surface;
+  surface.radius = shape.radius;
+  if (shape.core) {
+    surface.rest.assign(shape.core->corners().begin(), shape.core->corners().end());
+    for (const ConvexCore::Face& face : shape.core->faces())
+      for (std::size_t k = 2; k < face.corners.size(); ++k)
+        surface.triangles.push_back({face.corners[0], face.corners[k - 1], face.corners[k]});
+  } else if (shape.axis == Vec3{}) {
+    surface.rest = {Vec3{}};
+    surface.points = {0};
+  } else {
+    surface.rest = {Vec3{}, shape.axis};
+    surface.edges = {{0, 1}};
+  }
+  return surface;
+}
+
+IslandMotion::IslandMotion(std::span<const BodySurface* const> surfaces,
+                           const collision::OwnerTable<double>& friction,
+                           const Parameters& parameters)
+    : parameters_(parameters), island_(std::make_unique<Island>()) {
+  Island& island = *island_;
+  collision::CollisionSurface& all = island.surface;
+  double smallest_radius = std::numeric_limits<double>::infinity();
+  std::uint32_t pieces = 0;
+  for (const BodySurface* const one : surfaces) {
+    const BodySurface& own = *one;
+    const auto first = static_cast<std::uint32_t>(all.rest.size());
+    island.table.first.push_back(first);
+    all.rest.insert(all.rest.end(), own.rest.begin(), own.rest.end());
+    for (std::array<std::uint32_t, 3> t : own.triangles) {
+      for (std::uint32_t& v : t)
+        v += first;
+      all.triangles.push_back(t);
+    }
+    for (const auto& [a, b] : own.edges)
+      all.edges.push_back({a + first, b + first});
+    for (const std::uint32_t p : own.points)
+      all.points.push_back(p + first);
+    for (std::size_t v = 0; v < own.rest.size(); ++v)
+      all.owner.push_back(pieces + (own.piece.empty() ? 0 : own.piece[v]));
+    pieces += own.pieces;
+    all.radius.resize(all.rest.size(), own.radius);
+    all.fixed.insert(all.fixed.end(), own.fixed.begin(), own.fixed.end());
+    all.fixed.resize(all.rest.size(), 0);
+    all.holder.insert(all.holder.end(), own.holder.begin(), own.holder.end());
+    all.holder.resize(all.rest.size(), collision::no_owner);
+    if (own.radius > 0)
+      smallest_radius = std::min(smallest_radius, own.radius);
+  }
+  island.table.first.push_back(static_cast<std::uint32_t>(all.rest.size()));
+  island.allowed = collision::AllowedPairs(pieces, 0);
+  island.friction = collision::OwnerTable<double>(pieces, 0);
+  for (std::size_t m = 0; m < pieces; ++m)
+    for (std::size_t n = 0; n <= m; ++n)
+      if (friction.at(m, n) >= 0) {
+        island.allowed.set(m, n, 1);
+        island.friction.set(m, n, friction.at(m, n));
+      }
+  collision::complete_surface(all);
+  island.edge = median_edge(all);
+  if (!(island.edge > 0))
+    island.edge = std::isfinite(smallest_radius) ? smallest_radius : 1;
+  island.activation_distance = std::min(parameters_.activation_distance * island.edge,
+                                        parameters_.activation_over_radius * smallest_radius);
+  for (double& radius : all.radius)
+    if (radius > 0)
+      radius -= radius_offset * island.activation_distance;
+  solver_ = std::make_unique<StepSolver>(island);
+  radii_ = std::make_unique<RadiusFit>(island);
+}
+
+IslandMotion::~IslandMotion() = default;
+
+double IslandMotion::activation_distance() const noexcept {
+  return island_->activation_distance;
+}
+
+StepReport IslandMotion::take_report() {
+  return std::exchange(report_, {});
+}
+
+void IslandMotion::step(Members members, double from, double to, const Context& context) {
+  BodyTable& table = island_->table;
+  table.bodies.clear();
+  for (IslandMember* const member : members)
+    table.bodies.push_back(&member->begin(from, to, context));
+  std::vector<Vec3> x(table.vertex_count());
+  for (std::size_t b = 0; b < table.bodies.size(); ++b)
+    table.bodies[b]->positions(
+        std::span(x).subspan(table.first[b], table.first[b + 1] - table.first[b]));
+  radii_->fit(x);
+  report_.add(solver_->solve({to - from, parameters_}, context));
+  std::vector<std::vector<IslandMember::Force>> forces(members.size());
+  std::size_t body = 0;
+  for (const ContactForce& f : solver_->forces()) { // by ascending vertex
+    while (f.vertex >= table.first[body + 1])
+      ++body;
+    forces[body].push_back({f.vertex - table.first[body], f.from, f.normal + f.friction});
+  }
+  for (std::size_t m = 0; m < members.size(); ++m)
+    members[m]->end(forces[m], to - from, context);
+}
+
+void IslandMotion::advance_parts(Members members, double from, double to, int halvings,
+                                 const Context& context) {
+  try {
+    step(members, from, to, context);
+    return;
+  } catch (const IntersectsAtStart&) {
+    throw;
+  } catch (const NotSolved&) {
+    if (halvings == 0 || !(to > from))
+      throw;
+  }
+  ++report_.halvings;
+  const double middle = from + (to - from) / 2;
+  advance_parts(members, from, middle, halvings - 1, context);
+  advance_parts(members, middle, to, halvings - 1, context);
+}
+
+void IslandMotion::advance(Members members, double from, double to, const Context& context) {
+  advance_parts(members, from, to, max_halvings, context);
+}
+
+std::optional<std::array<std::uint32_t, 5>>
+IslandMotion::find_intersection(std::span<const Vec3> x) const {
+  const collision::CollisionSurface& surface = island_->surface;
+  std::vector<Box3> boxes;
+  for (const auto& t : surface.triangles) {
+    Box3& box = boxes.emplace_back();
+    for (const std::uint32_t v : t)
+      box.add(x[v]);
+  }
+  const collision::Bvh tree(boxes);
+  std::optional<std::array<std::uint32_t, 5>> found;
+  for (const auto& [a, b] : surface.edges) {
+    Box3 box;
+    box.add(x[a]);
+    box.add(x[b]);
+    tree.for_each_overlapping(box, [&](std::uint32_t number) {
+      const auto& t = surface.triangles[number];
+      if (found || island_->allowed.at(surface.owner[a], surface.owner[t[0]]) == 0 ||
+          std::ranges::any_of(t, [&](std::uint32_t v) { return v == a || v == b; }))
+        return;
+      if (passes(x[a], x[b], x[t[0]], x[t[1]], x[t[2]]))
+        found = {a, b, t[0], t[1], t[2]};
+    });
+    if (found)
+      break;
+  }
+  return found;
+}
+
+} // namespace gewebe::contact

@@ -1,0 +1,113 @@
+#pragma once
+// Bodies that may touch each other, stepped together.
+
+#include "base/context.h"
+#include "base/vec3.h"
+#include "collision/surface.h"
+#include "contact/contact_body.h"
+#include "contact/instrument.h"
+#include "contact/parameters.h"
+#include "contact/step.h"
+#include "model/model.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace gewebe::contact {
+
+/// Collision surface of one body, by its own vertices.
+struct BodySurface {
+  std::vector<Vec3> rest; ///< by vertex, mm
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::array<std::uint32_t, 2>> edges; ///< beside those of triangles
+  std::vector<std::uint32_t> points;               ///< beside those of edges
+  std::vector<std::uint8_t> fixed;                 ///< by vertex: 1 if it never moves
+  /// By vertex: the piece that holds it, counted over all surfaces of the island, or
+  /// collision::no_owner; empty: none is held.
+  std::vector<std::uint32_t> holder;
+  /// By vertex: which of the surface's pieces it is of, for who may meet; empty: all of the first.
+  std::vector<std::uint32_t> piece;
+  std::uint32_t pieces = 1;
+  double radius = 0; ///< the surface lies so far outside, mm
+};
+
+/// Surface of a model: its triangles, with nodes of the model as vertices.
+struct ModelSurface {
+  BodySurface surface;
+  std::vector<std::uint32_t> node; ///< by vertex, ascending
+};
+ModelSurface model_surface(const Model& model);
+/// What is typical for contacts of a solid or a net; 0 without material, springs or triangles.
+struct TypicalContact {
+  double stiffness = 0; ///< of a piece of the size of an edge, 1e-6 N/mm
+  double force = 0;     ///< strains such a piece by a hundredth, 1e-6 N
+};
+TypicalContact typical_contact(const Model& model);
+/// A point, an edge or the triangles of a convex core, at its own pose. \pre no blade
+BodySurface instrument_surface(const InstrumentShape& shape);
+
+/// Makes a ContactBody for each step of something that goes on in time.
+class IslandMember {
+public:
+  IslandMember() = default;
+  IslandMember(const IslandMember&) = delete;
+  IslandMember& operator=(const IslandMember&) = delete;
+  virtual ~IslandMember() = default;
+
+  /// Begins a step. A step that was begun and not ended leaves no trace when another one begins.
+  /// \param from, to  times, s; both the same: at rest
+  /// \return valid until the end of the step
+  virtual ContactBody& begin(double from, double to, const Context& context) = 0;
+  struct Force {
+    std::uint32_t vertex = 0; ///< of the member
+    std::uint32_t from = 0;   ///< piece of the island
+    Vec3 force;
+  };
+  /// Ends the step of `h` s with these forces on the member's vertices, by ascending vertex.
+  virtual void end(std::span<const Force> forces, double h, const Context& context) = 0;
+};
+
+class RadiusFit;
+
+class IslandMotion {
+public:
+  /// \param surfaces  of the members; their pieces are numbered one behind the other
+  /// \param friction  Coulomb's coefficient of two pieces; < 0: they do not touch
+  IslandMotion(std::span<const BodySurface* const> surfaces,
+               const collision::OwnerTable<double>& friction, const Parameters& parameters = {});
+  ~IslandMotion();
+
+  /// Steps from one time to the other, in halves where contact is not solved. \param members  one
+  /// for each surface
+  /// \throw NotSolved where the shortest step is not solved either: nothing has been ended since
+  /// the last step that was; the caller rolls back
+  void advance(std::span<IslandMember* const> members, double from, double to,
+               const Context& context);
+
+  /// Positions of all vertices as members stand at `from`, and which edges pass triangles there:
+  /// the vertices of the first such pair, or nothing.
+  std::optional<std::array<std::uint32_t, 5>> find_intersection(std::span<const Vec3> x) const;
+  const Island& island() const noexcept { return *island_; }
+
+  /// What has been done since the last call.
+  StepReport take_report();
+  double activation_distance() const noexcept;
+
+private:
+  using Members = std::span<IslandMember* const>;
+  void step(Members members, double from, double to, const Context& context);
+  void advance_parts(Members members, double from, double to, int halvings, const Context& context);
+
+  Parameters parameters_;
+  std::unique_ptr<Island> island_;
+  std::unique_ptr<StepSolver> solver_;
+  std::unique_ptr<RadiusFit> radii_;
+  StepReport report_;
+};
+
+} // namespace gewebe::contact

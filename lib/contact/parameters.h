@@ -1,0 +1,87 @@
+#pragma once
+// Parameters of the contact solver: the one place where their defaults stand, each with its reason.
+
+namespace gewebe::contact {
+
+struct Parameters {
+  // ---- lengths, over the median edge of the collision surfaces
+  /// Activation distance d_hat of the barrier. Surfaces at rest on each other stand apart by less.
+  /// Hertz: the force is off by 0.3 % with 1e-3 where the offset of d_min is used.
+  double activation_distance = 1e-3;
+  /// ... but at most this part of an instrument's radius.
+  double activation_over_radius = 1e-3;
+  /// Margin of the broad phase, so that one set of candidates serves for a step.
+  double margin = 0.2;
+  /// At rest: displacement below which friction is not yet fully developed.
+  double stick_length = 1e-3;
+
+  /// Slip speed below which friction is not yet fully developed, mm/s. A body that sticks creeps
+  /// with at most this speed.
+  double stick_speed = 0.1;
+
+  /// Typical force of an impact, over the force that would stop the bodies within the step.
+  double stop_share = 0.125;
+
+  /// ... over the largest force of the last step: gaps stay a good part of d_hat.
+  double last_share = 0.25;
+  /// The barrier becomes stiffer within a step where that share of a force is larger than the
+  /// typical force, by at most this factor at a time: deep in the barrier surfaces that slide on
+  /// each other move only by about the root of gap times radius.
+  double stiffness_factor = 16;
+
+  // ---- iterations
+  /// Newton iterations of one round, then the step fails: models of bodies are not right far from
+  /// where they were made. ... where vertices are led past curved surfaces, which each goes by but
+  /// about the root of gap times radius.
+  int max_iterations = 100, max_led_iterations = 1000;
+  int max_rounds = 40; ///< linearisations of bodies that are not linear
+  /// Behind so many rounds, one that changes positions by so many times the smallest change of a
+  /// round fails the step: rounds diverge.
+  int sure_rounds = 4;
+  double divergence = 20;
+  int gauss_newton = 12; ///< iterations before the projected Hessian takes over
+  /// A step of which collision detection allows less than this part is taken again by a smaller
+  /// part of the way, at most so many times and not below the least part.
+  double full_reach = 0.5, least_reach = 1e-4;
+  int max_reaches = 3;
+  /// Longest step over an edge, by which less of the way is taken.
+  double longest_step = 0.25;
+  /// Steps of which collision detection allows less than full_reach are damped, at most so many
+  /// times, by so many times more each time.
+  int max_dampings = 6;
+  double damping_factor = 6;
+  /// Renewals of friction's lag in one round where forces all but balance, then those between
+  /// solutions.
+  int max_way_lags = 100, max_lags = 30;
+  int max_searches = 5;       ///< broad phases of one step, each with twice the margin
+  int max_way_searches = 100; ///< ... where vertices leave what was searched
+
+  // ---- tolerances
+  /// Largest last step of Newton's method, over the smaller of d_hat and the stick length.
+  double step_tolerance = 1e-2;
+  /// Largest difference of a force on a vertex from those of its pairs, over the largest force.
+  /// Deep in the barrier steps are short long before forces balance.
+  double force_tolerance = 1e-5;
+  /// Forces below this part of the typical one count as that part of it: they may vanish.
+  double small_force = 1e-2;
+  /// Largest change of a friction force by its last lag, over the largest pair force.
+  double friction_tolerance = 1e-3;
+  /// The same, where bodies still are on their ways: what suffices for the next part of them.
+  double way_tolerance = 0.2;
+  /// The same, behind which friction takes the normal forces of its limits anew: those that do not
+  /// balance mislead it.
+  double lag_tolerance = 5e-3;
+  /// Largest last change of a round, over d_hat.
+  double round_tolerance = 0.5;
+  /// Part of the smallest gap (at most of d_hat) by which bodies may be translated at the end, so
+  /// that momentum is exact; forces change by twice as much.
+  double momentum_room = 2e-3;
+  /// Part of the gap (at most of d_hat) that a step may not use up: it would land deep in the
+  /// barrier.
+  double kept_gap = 0.5;
+  /// Compliance that is added to the diagonal where rounding has made W indefinite, over its
+  /// largest entry.
+  double ridge = 1e-7;
+};
+
+} // namespace gewebe::contact

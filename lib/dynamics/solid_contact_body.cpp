@@ -1,0 +1,91 @@
+#include "dynamics/solid_contact_body.h"
+
+#include "base/vector_at.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace gewebe {
+
+using contact::Block3, contact::VertexForce;
+
+void SolidContactBody::begin(double h, std::vector<VertexForce> last,
+                             const contact::TypicalContact& typical, const Context& context) {
+  h_ = h;
+  context_ = context;
+  last_ = std::move(last);
+  typical_force_ = typical.force;
+  double lightest = 0;
+  for (const std::uint32_t node : vertices_)
+    if (const double mass = motion_.masses()[node]; mass > 0)
+      lightest = lightest > 0 ? std::min(lightest, mass) : mass;
+  stiffness_ = typical.stiffness + lightest / (h * h);
+  forces_.assign(axes_, 0);
+}
+
+void SolidContactBody::positions(std::span<Vec3> x) {
+  const std::span<const double> at = motion_.iterate();
+  for (std::size_t k = 0; k < vertices_.size(); ++k)
+    x[k] = vector_at(at, vertices_[k]);
+}
+
+void SolidContactBody::spread(std::span<const VertexForce> forces) {
+  forces_.assign(axes_, 0);
+  for (const VertexForce& f : forces)
+    for (std::size_t a = 0; a < 3; ++a)
+      forces_[3 * std::size_t{vertices_[f.vertex]} + a] += f.force[static_cast<int>(a)];
+}
+
+double SolidContactBody::linearise(std::span<const VertexForce> forces, std::span<Vec3> step) {
+  spread(forces);
+  linearised_ = forces_;
+  step_.resize(axes_);
+  motion_.linearise_step(step_, forces_, context_);
+  if (motion_.matrix_version() != version_) {
+    columns_.clear();
+    version_ = motion_.matrix_version();
+  }
+  for (std::size_t k = 0; k < vertices_.size(); ++k)
+    step[k] = vector_at(std::span<const double>(step_), vertices_[k]);
+  double energy = 0; // of inertia alone
+  for (std::size_t axis = 0; axis < axes_; ++axis)
+    energy += motion_.masses()[axis / 3] * step_[axis] * step_[axis];
+  return energy / (h_ * h_);
+}
+
+void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
+                                  std::span<Block3> blocks) {
+  auto found = columns_.find(vertex);
+  if (found == columns_.end()) {
+    std::vector<double> whole(3 * axes_);
+    motion_.unit_responses(vertices_[vertex], whole, context_);
+    std::vector<double> kept;
+    kept.reserve(9 * vertices_.size());
+    for (const std::uint32_t node : vertices_)
+      for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t column = 0; column < 3; ++column)
+          kept.push_back(whole[column * axes_ + 3 * std::size_t{node} + a]);
+    found = columns_.emplace(vertex, std::move(kept)).first;
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    for (std::size_t a = 0; a < 9; ++a)
+      blocks[k][a] = motion_.relaxation() * found->second[9 * std::size_t{rows[k]} + a];
+}
+
+bool SolidContactBody::solve_alone() {
+  forces_.assign(axes_, 0);
+  motion_.solve_alone(context_);
+  return true;
+}
+
+void SolidContactBody::move(double share, std::span<const VertexForce> forces) {
+  spread(forces);
+  std::vector<double> change = forces_;
+  for (std::size_t axis = 0; axis < axes_; ++axis)
+    change[axis] -= linearised_[axis];
+  motion_.move_iterate(share, change, context_);
+}
+
+} // namespace gewebe

@@ -1,0 +1,69 @@
+#pragma once
+// A solid or a net that moves implicitly, in a step of contact: the compliance of the constant
+// matrix of solid/solid_motion.h, in frames that turn with the nodes.
+
+#include "base/context.h"
+#include "contact/contact_body.h"
+#include "contact/island.h"
+#include "solid/solid_motion.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+class SolidContactBody final : public contact::ContactBody {
+public:
+  /// \param vertices  nodes of the collision surface, ascending. Keeps references to all.
+  SolidContactBody(SolidMotion& motion, const std::vector<std::uint32_t>& vertices,
+                   std::size_t nodes)
+      : motion_(motion), vertices_(vertices), axes_(3 * nodes) {}
+
+  /// A step begins. \pre SolidMotion::begin_step \param last  forces at the end of the last step
+  /// \param typical  force, and stiffness without inertia, see ContactBody
+  void begin(double h, std::vector<contact::VertexForce> last,
+             const contact::TypicalContact& typical, const Context& context);
+  /// The step's contact forces over the 3 n axes.
+  std::span<const double> forces() const { return forces_; }
+
+  std::size_t vertex_count() const override { return vertices_.size(); }
+  void positions(std::span<Vec3> x) override;
+  double linearise(std::span<const contact::VertexForce> forces, std::span<Vec3> step) override;
+  std::vector<contact::VertexForce> last_forces() const override { return last_; }
+  void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
+                  std::span<contact::Block3> blocks) override;
+  contact::Block3 frame(std::uint32_t vertex) const override {
+    return motion_.frame_of(vertices_[vertex]);
+  }
+  std::uint64_t matrix_id() const override {
+    return motion_.relaxation() == 1 ? motion_.matrix_version() : 0;
+  }
+  void move(double share, std::span<const contact::VertexForce> forces) override;
+  bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
+  bool solve_alone() override;
+  void begin_again() override { motion_.begin_iterate_again(); }
+  bool is_led() const override { return motion_.moves_held(); }
+  bool is_linear() const override { return false; }
+  double typical_force() const override { return typical_force_; }
+  double vertex_stiffness() const override { return stiffness_; }
+
+private:
+  void spread(std::span<const contact::VertexForce> forces);
+
+  SolidMotion& motion_;
+  const std::vector<std::uint32_t>& vertices_;
+  std::size_t axes_;
+  Context context_;
+  double h_ = 0, typical_force_ = 0, stiffness_ = 0;
+  std::vector<contact::VertexForce> last_;
+  std::vector<double> step_, forces_;
+  std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n
+  std::uint64_t version_ = 0;
+  /// By vertex: its unit responses at all vertices in their frames, three columns of 3 numbers.
+  std::map<std::uint32_t, std::vector<double>> columns_;
+};
+
+} // namespace gewebe

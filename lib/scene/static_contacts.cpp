@@ -1,0 +1,495 @@
+// Contact of elastostatic objects with each other, with themselves and with instruments: at the end
+// of a step of the scene the objects that may touch stand where their loads and contact balance.
+// Friction counts from where they stood.
+
+#include "base/disjoint_sets.h"
+#include "base/vector_at.h"
+#include "collision/distance.h"
+#include "scene/island_members_internal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <utility>
+
+namespace gewebe::simulation {
+
+namespace {
+
+constexpr double near_part = 0.01; ///< of an object's size: so near an instrument takes part
+constexpr int max_halvings = 8;    ///< of a part of a way
+
+bool is_static(const Object& object) {
+  return object.method == Method::ffe && !object.in_motion;
+}
+
+/// Whether contact of the object has something to do with instruments.
+bool near_instrument(World& w, std::size_t object, std::size_t k) {
+  const Box3& box = shown_box(w, object);
+  const InstrumentShape& shape = w.now.instruments[k].shape;
+  const double margin = near_part * box.longest_side();
+  for (std::size_t p = 0; p < w.now.poses.size(); ++p) {
+    const std::optional<Pose> now = pose_at(w, p, k);
+    if (!now)
+      continue;
+    const Pose before = p > 0 ? pose_at(w, p - 1, k).value_or(*now) : *now;
+    if (near(box_between(shape, before, *now), box, margin))
+      return true;
+  }
+  const Instrument& i = w.now.instruments[k];
+  return i.present && !i.shape.blade && i.coupled &&
+         near(box_between(shape, {i.coupled->place, i.way.at(w.now.clock.time).turn},
+                          i.way.at(w.now.clock.time)),
+              box, margin);
+}
+
+/// Objects whose shapes are found together.
+struct Group {
+  IslandParts parts;
+  bool moves = false; ///< an instrument of it moves, comes or goes
+};
+
+bool instrument_moves(const World& w, std::size_t k) {
+  for (std::size_t p = 1; p < w.now.poses.size(); ++p)
+    if (pose_at(w, p, k) != pose_at(w, p - 1, k))
+      return true;
+  const Instrument& i = w.now.instruments[k];
+  if (!i.coupled || !i.present)
+    return false;
+  const Instrument::Coupled& c = *i.coupled;
+  const CouplingStep step(c.coupling, c.lag, w.now.clock.time - w.now.clock.shown);
+  return !(norm(i.way.at(w.now.clock.time).place - step.lag(c.force) - c.place) <=
+           led_to_rest * i.shape.radius);
+}
+
+bool touched_by(const Object& object, std::size_t instrument) {
+  return std::ranges::any_of(
+      object.touching, [&](const NodalContactForce& f) { return f.instrument == instrument; });
+}
+
+using ObjectPair = std::pair<std::size_t, std::size_t>;
+
+/// Whether two objects, or one and itself, may touch where nothing moves far.
+bool are_near(World& w, const ObjectPair& pair) {
+  if (pair.first == pair.second)
+    return true;
+  const Box3 &one = shown_box(w, pair.first), &other = shown_box(w, pair.second);
+  return near(one, other, near_part * std::min(one.longest_side(), other.longest_side()));
+}
+
+/// \param late  pairs that count as near \param apart  becomes those that are not near
+std::vector<Group> groups_of(World& w, const std::set<ObjectPair>& late,
+                             std::vector<ObjectPair>& apart) {
+  const std::size_t objects = w.now.objects.size(), instruments = w.now.instruments.size();
+  DisjointSets sets(objects + instruments);
+  const auto join = [&](std::size_t a, std::size_t b) {
+    sets.join(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+  };
+  std::vector<std::uint8_t> takes_part(objects);
+  for (const ContactRule& rule : w.now.contacts)
+    if (is_static(w.now.objects[rule.object]) && is_static(w.now.objects[rule.other])) {
+      const ObjectPair pair(rule.object, rule.other);
+      if (late.contains(pair) || are_near(w, pair))
+        join(rule.object, rule.other);
+      else
+        apart.push_back(pair);
+      takes_part[rule.object] = takes_part[rule.other] = 1;
+    }
+  std::vector<std::pair<std::size_t, std::size_t>> near; // object, instrument
+  for (std::size_t o = 0; o < objects; ++o) {
+    Object& object = w.now.objects[o];
+    if (!is_static(object) || w.now.instruments.empty())
+      continue;
+    if (object.touching.empty() && !instruments_there(w))
+      continue;
+    if (!takes_instruments(w, object))
+      continue;
+    for (std::size_t k = 0; k < instruments; ++k) {
+      const Instrument& i = w.now.instruments[k];
+      if (i.shape.blade || (!touched_by(object, k) && !near_instrument(w, o, k)))
+        continue;
+      near.emplace_back(o, k);
+      takes_part[o] = 1;
+      if (i.coupled && !i.stepped)
+        join(o, objects + k);
+    }
+  }
+  std::map<std::uint32_t, Group> by_root;
+  for (std::size_t o = 0; o < objects; ++o)
+    if (takes_part[o] != 0)
+      by_root[sets.find(static_cast<std::uint32_t>(o))].parts.statics.push_back(o);
+  for (const auto& [o, k] : near) {
+    Group& group = by_root[sets.find(static_cast<std::uint32_t>(o))];
+    std::vector<std::size_t>& all = group.parts.instruments;
+    if (std::ranges::find(all, k) == all.end())
+      all.push_back(k);
+    group.moves = group.moves || instrument_moves(w, k);
+  }
+  std::vector<Group> groups;
+  for (auto& [root, group] : by_root) {
+    std::ranges::sort(group.parts.instruments);
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+bool needs_showing(World& w, const Group& group) {
+  return group.moves || std::ranges::any_of(group.parts.statics, [&](std::size_t index) {
+           const Object& object = w.now.objects[index];
+           return !object.shown.valid || object.load->changes_until() > object.shown.time;
+         });
+}
+
+/// One group on its way through a step.
+class GroupStep {
+public:
+  GroupStep(World& w, const Group& group) : w_(w), group_(group) {
+    for (const std::size_t index : group.parts.statics) {
+      Object& object = w.now.objects[index];
+      before_.push_back(*object.shown.load);
+      shape_.push_back(stood_shape(w, object));
+      begin_showing(w, object);
+      load_shown(w, object);
+    }
+  }
+
+  void run() {
+    const std::size_t moments = std::max<std::size_t>(w_.now.poses.size(), 2) - 1;
+    for (std::size_t p = 1; p <= moments; ++p)
+      pass(p, static_cast<double>(p - 1) / static_cast<double>(moments),
+           static_cast<double>(p) / static_cast<double>(moments));
+    for (const std::size_t index : group_.parts.statics) {
+      Object& object = w_.now.objects[index];
+      Shown& shown = object.shown;
+      shown.contact = object.touching;
+      shown.shaped = true;
+      warn_of_range(w_, object);
+      if (object.statics->made())
+        shown.forces = static_forces(object);
+      at_object(w_, object, [&] { end_showing(w_, object); });
+    }
+  }
+
+private:
+  /// One instrument on the way between two moments.
+  struct Leg {
+    Pose from, to;
+    double duration = 0; ///< of a coupled one
+  };
+
+  /// From one moment of the poses to the next. \param begin, end  shares of the load's way
+  void pass(std::size_t moment, double begin, double end) {
+    IslandParts parts{{}, group_.parts.statics, {}};
+    legs_.clear();
+    const double duration = (w_.now.clock.time - w_.now.clock.shown) * (end - begin);
+    std::size_t count = 1;
+    for (const std::size_t k : group_.parts.instruments) {
+      const Instrument& i = w_.now.instruments[k];
+      Leg leg;
+      if (i.coupled && i.present && !i.stepped) {
+        const double t0 = w_.now.clock.shown;
+        leg = {i.way.at(t0 + begin * (w_.now.clock.time - t0)),
+               i.way.at(t0 + end * (w_.now.clock.time - t0)), duration};
+      } else {
+        const std::size_t last = std::min(moment, w_.now.poses.size() - 1);
+        const std::optional<Pose> now = pose_at(w_, last, k);
+        if (!now)
+          continue;
+        leg = {pose_at(w_, last > 0 ? last - 1 : 0, k).value_or(*now), *now, 0};
+        if (last < moment)
+          leg.from = leg.to;
+      }
+      parts.instruments.push_back(k);
+      legs_.push_back(leg);
+      count = std::max(count, parts_of_way(i.shape, leg.from, leg.to));
+    }
+    IslandCache& cache = island_of(w_, parts);
+    for (std::size_t n = 0; n < count; ++n) {
+      const auto at = [&](std::size_t m) {
+        return static_cast<double>(m) / static_cast<double>(count);
+      };
+      go(parts, cache, at(n), at(n + 1), begin, end, max_halvings);
+    }
+  }
+
+  /// A part of that way, in halves where contact is not solved.
+  void go(const IslandParts& parts, IslandCache& cache, double from, double to, double begin,
+          double end, int halvings) {
+    std::vector<Pose> start;
+    for (std::size_t n = 0; n < legs_.size(); ++n) {
+      const Instrument& i = w_.now.instruments[parts.instruments[n]];
+      const Pose pose = between(legs_[n].from, legs_[n].to, from);
+      start.push_back(i.coupled && !i.stepped ? Pose{i.coupled->place, pose.turn} : pose);
+    }
+    IslandMembers members;
+    make_members(w_, parts, cache, start, members);
+    for (std::size_t n = 0; n < legs_.size(); ++n)
+      members.instruments[n].set_target(between(legs_[n].from, legs_[n].to, to),
+                                        legs_[n].duration * (to - from));
+    const double share = begin + to * (end - begin);
+    for (std::size_t k = 0; k < parts.statics.size(); ++k)
+      members.statics[k].set_load(
+          load_between(before_[k], *w_.now.objects[parts.statics[k]].shown.load, shape_[k], share));
+    const double now = w_.now.clock.time;
+    try {
+      cache.motion->advance(members.all, now, now, w_.context);
+      count_contact(w_, cache.motion->take_report());
+      return;
+    } catch (const contact::NotSolved& error) {
+      count_contact(w_, cache.motion->take_report());
+      if (halvings == 0 || dynamic_cast<const contact::IntersectsAtStart*>(&error) != nullptr)
+        fail_contact(w_, parts, error);
+    }
+    ++w_.now.counts.contact.halvings;
+    const double middle = from + (to - from) / 2;
+    go(parts, cache, from, middle, begin, end, halvings - 1);
+    go(parts, cache, middle, to, begin, end, halvings - 1);
+  }
+
+  World& w_;
+  const Group& group_;
+  std::vector<Load> before_;
+  std::vector<std::vector<double>> shape_;
+  std::vector<Leg> legs_;
+};
+
+} // namespace
+
+const Box3& shown_box(World& w, std::size_t index) {
+  Object& object = w.now.objects[index];
+  need_model(object);
+  shape_in_step(w, object);
+  if (object.shown.box)
+    return *object.shown.box;
+  Box3& box = object.shown.box.emplace();
+  const std::size_t count = surface_count(object.model());
+  const std::span<const double> u = *object.shown.displacement;
+  for (std::size_t i = 0; i < count; ++i)
+    box.add(object.model().nodes[i].position + vector_at(u, i));
+  return box;
+}
+
+namespace {
+
+/// Shows objects in contact where pairs of objects are near, or late.
+/// \param shown, followed  by object and instrument: become 1 \return pairs that passed each
+/// other's boxes unseen
+std::vector<ObjectPair> show_groups(World& w, const std::set<ObjectPair>& late,
+                                    std::vector<std::uint8_t>& shown,
+                                    std::vector<std::uint8_t>& followed) {
+  std::vector<ObjectPair> apart;
+  const std::vector<Group> groups = groups_of(w, late, apart);
+  std::map<std::size_t, Box3> swept;
+  for (const auto& [a, b] : apart)
+    for (const std::size_t index : {a, b})
+      swept[index] = shown_box(w, index);
+  for (const Group& group : groups) {
+    for (const std::size_t index : group.parts.statics) {
+      shape_in_step(w, w.now.objects[index]);
+      shown[index] = 1;
+    }
+    for (const std::size_t k : group.parts.instruments)
+      followed[k] = 1;
+    if (needs_showing(w, group)) {
+      GroupStep step(w, group);
+      step.run();
+    }
+  }
+  for (auto& [index, box] : swept) {
+    const Box3& now = shown_box(w, index);
+    box.add(now.min);
+    box.add(now.max);
+  }
+  std::erase_if(apart, [&](const ObjectPair& pair) {
+    return !near(swept.at(pair.first), swept.at(pair.second));
+  });
+  return apart;
+}
+
+} // namespace
+
+std::vector<std::uint8_t> show_static_contacts(World& w) {
+  std::vector<std::uint8_t> shown(w.now.objects.size());
+  std::vector<std::uint8_t> followed(w.now.instruments.size());
+  std::set<ObjectPair> late;
+  while (!w.now.contacts.empty() || !w.now.instruments.empty()) {
+    std::optional<Saved> saved;
+    if (!w.now.contacts.empty())
+      saved = saved_now(w);
+    const std::vector<ObjectPair> met = show_groups(w, late, shown, followed);
+    if (met.empty())
+      break;
+    take_back_again(w, std::move(*saved));
+    late.insert(met.begin(), met.end());
+  }
+  for (std::size_t k = 0; k < w.now.instruments.size(); ++k) {
+    Instrument& i = w.now.instruments[k];
+    if (i.coupled && i.present && !i.stepped && followed[k] == 0)
+      follow_hand(i, w.now.clock.time - w.now.clock.shown, w.now.clock.time);
+    i.before = i.pose(w.now.clock.time);
+    i.changed = false;
+  }
+  return shown;
+}
+
+// ---- where surfaces are to begin with
+
+namespace {
+
+/// Positions of a surface's vertices as an object is shown.
+std::vector<Vec3> shown_positions(World& w, std::size_t index, const contact::ModelSurface& of) {
+  Object& object = w.now.objects[index];
+  std::vector<Vec3> x;
+  x.reserve(of.node.size());
+  if (object.body != nullptr) {
+    const std::span<const NodeMotion> motion = motion_of(object);
+    for (const std::uint32_t node : of.node)
+      x.push_back(object.model().nodes[node].position + motion[node].displacement);
+    return x;
+  }
+  shape_in_step(w, object);
+  const std::span<const double> u = *object.shown.displacement;
+  for (const std::uint32_t node : of.node)
+    x.push_back(object.model().nodes[node].position + vector_at(u, node));
+  return x;
+}
+
+/// Solid angle of a closed surface seen from p, over 4 pi: 1 inside, 0 outside (A. van Oosterom,
+/// J. Strackee, IEEE Trans. Biomed. Eng. 30(2), 1983).
+double winding(const contact::ModelSurface& surface, std::span<const Vec3> x, const Vec3& p) {
+  double sum = 0;
+  for (const auto& t : surface.surface.triangles) {
+    const Vec3 a = x[t[0]] - p, b = x[t[1]] - p, c = x[t[2]] - p;
+    const double la = norm(a), lb = norm(b), lc = norm(c);
+    sum += std::atan2(dot(a, cross(b, c)),
+                      la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return sum / (2 * std::numbers::pi);
+}
+
+/// Whether an instrument is inside of a surface or passes it.
+bool is_inside(const InstrumentShape& shape, const Pose& pose, const contact::ModelSurface& surface,
+               std::span<const Vec3> x) {
+  const contact::BodySurface own = contact::instrument_surface(shape);
+  std::vector<Vec3> y;
+  Box3 box;
+  for (const Vec3& r : own.rest) {
+    y.push_back(pose(r));
+    box.add(y.back());
+  }
+  const double reach = shape.radius;
+  const auto close = [&](std::span<const std::uint32_t> of) {
+    Box3 other;
+    for (const std::uint32_t v : of)
+      other.add(x[v]);
+    return near(box, other, reach);
+  };
+  std::vector<std::array<std::uint32_t, 2>> edges = own.edges;
+  for (const auto& t : own.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (t[k] < t[(k + 1) % 3])
+        edges.push_back({t[k], t[(k + 1) % 3]});
+  for (const auto& t : surface.surface.triangles) {
+    if (!close(t))
+      continue;
+    for (const Vec3& p : y)
+      if (!(collision::point_triangle_squared_distance(std::array{p, x[t[0]], x[t[1]], x[t[2]]}) >
+            reach * reach))
+        return true;
+    for (const auto& [a, b] : edges)
+      for (std::size_t k = 0; k < 3; ++k)
+        if (!(collision::edge_edge_squared_distance(
+                  std::array{y[a], y[b], x[t[k]], x[t[(k + 1) % 3]]}) > reach * reach))
+          return true;
+    for (const auto& o : own.triangles)
+      for (const std::uint32_t v : t)
+        if (!(collision::point_triangle_squared_distance(
+                  std::array{x[v], y[o[0]], y[o[1]], y[o[2]]}) > reach * reach))
+          return true;
+  }
+  return winding(surface, x, y[0]) > 0.5;
+}
+
+} // namespace
+
+Pose entry_pose(World& w, const InstrumentShape& shape, const Pose& pose) {
+  Pose start = pose;
+  if (shape.blade)
+    return start;
+  for (std::size_t o = 0; o < w.now.objects.size(); ++o) {
+    Object& object = w.now.objects[o];
+    if (!object.matter->known && object.load->empty())
+      need_model(object);
+    if (!takes_instruments(w, object))
+      continue;
+    const contact::ModelSurface surface = contact::model_surface(object.model());
+    const std::vector<Vec3> x = shown_positions(w, o, surface);
+    Box3 box;
+    for (const Vec3& p : x)
+      box.add(p);
+    if (!near(box, PlacedInstrument(shape, start).box()) || !is_inside(shape, start, surface, x))
+      continue;
+    // Out along its own axis, or by the nearest point of the surface.
+    Vec3 way = norm(shape.axis) > 0 ? rotated(start.turn, shape.axis) : Vec3{};
+    if (way == Vec3{}) {
+      double best = HUGE_VAL;
+      for (const Vec3& p : x)
+        if (const double d = norm(p - start.place); d < best) {
+          best = d;
+          way = p - start.place;
+        }
+      if (!(winding(surface, x, start.place) > 0.5))
+        way = -way;
+      if (!(norm(way) > 0))
+        way = {0, 0, 1};
+    }
+    const double size = norm(box.size()) + 2 * (shape.radius + reach_of(shape));
+    way = way / norm(way);
+    double inside = 0, outside = size;
+    while (is_inside(shape, {start.place + outside * way, start.turn}, surface, x) &&
+           outside < 16 * size)
+      outside *= 2;
+    for (int k = 0; k < 12; ++k) {
+      const double middle = (inside + outside) / 2;
+      (is_inside(shape, {start.place + middle * way, start.turn}, surface, x) ? inside : outside) =
+          middle;
+    }
+    start.place += (outside + 1e-3 * shape.radius) * way;
+  }
+  return start;
+}
+
+void require_apart(World& w, const ContactRule& rule) {
+  std::vector<std::size_t> objects{rule.object};
+  if (rule.other != rule.object)
+    objects.push_back(rule.other);
+  std::deque<contact::ModelSurface> models;
+  std::vector<const contact::BodySurface*> surfaces;
+  std::vector<Vec3> x;
+  for (const std::size_t index : objects) {
+    models.push_back(contact::model_surface(w.now.objects[index].model()));
+    surfaces.push_back(&models.back().surface);
+    const std::vector<Vec3> own = shown_positions(w, index, models.back());
+    x.insert(x.end(), own.begin(), own.end());
+  }
+  collision::OwnerTable<double> table(objects.size(), -1);
+  table.set(0, objects.size() - 1, 0);
+  const contact::IslandMotion motion(surfaces, table);
+  const auto found = motion.find_intersection(x);
+  if (!found)
+    return;
+  const Vec3 at = (x[(*found)[0]] + x[(*found)[1]]) / 2;
+  const std::string& one = w.now.objects[rule.object].name();
+  throw Error((rule.object == rule.other
+                   ? "the surface of object " + one + " passes itself"
+                   : "surfaces of objects " + one + " and " + w.now.objects[rule.other].name() +
+                         " pass each other") +
+              " near " + number_text(at.x) + " " + number_text(at.y) + " " + number_text(at.z) +
+              ", expected surfaces that stand apart for contact");
+}
+
+} // namespace gewebe::simulation

@@ -1,0 +1,193 @@
+// New walls of cuts and tears in contact: both sides of a cut begin at the same place, where no
+// barrier can part them. Their nodes are moved apart by a small part of an edge.
+
+#include "base/error.h"
+#include "base/vector_at.h"
+#include "contact/parameters.h"
+#include "scene/world_internal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace gewebe::simulation {
+
+namespace {
+
+/// Distance by which each side is moved, over the activation distance of contact: together they
+/// stand apart by a bit more than a half of it.
+constexpr double moved_apart = 0.3;
+/// Difference of two unit normals below which both sides face alike: sheets.
+constexpr double least_difference = 0.1;
+
+/// A node of a surface.
+struct SurfaceNode {
+  std::size_t object = 0;
+  std::uint32_t node = 0;
+  Vec3 normal; ///< unit, outward
+  Vec3 inward; ///< unit, towards the triangles around
+  bool held = false;
+  bool beside_free = false; ///< a triangle around has a node that is not held
+};
+
+Vec3 unit(const Vec3& v) {
+  const double length = norm(v);
+  return length > 0 ? v / length : Vec3{};
+}
+
+Vec3 displacement_of(const Object& object, const Motions& motions, std::size_t index,
+                     std::uint32_t node) {
+  if (const auto own = motions.find(index); own != motions.end())
+    return own->second[node].displacement;
+  return vector_at(*object.shown.displacement, node);
+}
+
+/// Nodes at one place by that place, and the median edge of all surfaces.
+class SharedPlaces {
+public:
+  SharedPlaces(const World& w, std::span<const std::size_t> objects, const Motions& motions) {
+    for (const std::size_t index : objects)
+      add(w.now.objects[index], index, motions);
+  }
+
+  std::vector<std::vector<SurfaceNode>> groups() {
+    std::vector<std::vector<SurfaceNode>> shared;
+    for (auto& [place, group] : by_place_)
+      if (group.size() > 1)
+        shared.push_back(std::move(group));
+    return shared;
+  }
+  double median_edge() {
+    if (edges_.empty())
+      return 0;
+    const auto middle = edges_.begin() + static_cast<std::ptrdiff_t>(edges_.size() / 2);
+    std::ranges::nth_element(edges_, middle);
+    return *middle;
+  }
+
+private:
+  void add(const Object& object, std::size_t index, const Motions& motions) {
+    const Model& model = object.model();
+    std::map<std::uint32_t, SurfaceNode> nodes;
+    const auto place = [&](std::uint32_t node) {
+      return model.nodes[node].position + displacement_of(object, motions, index, node);
+    };
+    const auto is_held = [&](std::uint32_t node) {
+      return model.nodes[node].fixed == fixed_all || object.load->displacement.contains(node);
+    };
+    for (const Triangle& t : model.triangles) {
+      const bool has_free = !std::ranges::all_of(t, is_held);
+      const std::array<Vec3, 3> x{place(t[0]), place(t[1]), place(t[2])};
+      const Vec3 area = cross(x[1] - x[0], x[2] - x[0]);
+      const Vec3 middle = (x[0] + x[1] + x[2]) / 3;
+      for (std::size_t k = 0; k < 3; ++k) {
+        SurfaceNode& node = nodes[t[k]];
+        node.normal += area;
+        node.inward += norm(area) * unit(middle - x[k]);
+        node.beside_free = node.beside_free || has_free;
+        edges_.push_back(norm(model.nodes[t[(k + 1) % 3]].position - model.nodes[t[k]].position));
+      }
+    }
+    for (auto& [number, node] : nodes) {
+      node.object = index;
+      node.node = number;
+      node.normal = unit(node.normal);
+      node.inward = unit(node.inward);
+      node.held = is_held(number);
+      const Vec3 x = place(number);
+      by_place_[{x.x, x.y, x.z}].push_back(node);
+    }
+  }
+
+  std::map<std::tuple<double, double, double>, std::vector<SurfaceNode>> by_place_;
+  std::vector<double> edges_;
+};
+
+/// Directions in which nodes at one place part.
+std::vector<Vec3> parting_directions(std::span<const SurfaceNode> group) {
+  const auto count = static_cast<double>(group.size());
+  Vec3 normal, inward;
+  for (const SurfaceNode& node : group) {
+    normal += node.normal / count;
+    inward += node.inward / count;
+  }
+  std::vector<Vec3> directions;
+  for (const SurfaceNode& node : group) {
+    const Vec3 off = normal - node.normal;
+    directions.push_back(unit(norm(off) >= least_difference ? off : node.inward - inward));
+  }
+  return directions;
+}
+
+void displace(World& w, std::size_t index, std::uint32_t node, Vec3 by, Motions& motions) {
+  Object& object = w.now.objects[index];
+  for (int a = 0; a < 3; ++a)
+    if (is_fixed(object.model(), node, a))
+      by[a] = 0;
+  if (object.method == Method::ela) {
+    std::vector<NodeMotion>& motion = motions[index];
+    motion.resize(object.model().nodes.size());
+    motion[node].displacement += by;
+    return;
+  }
+  std::vector<double>& u = object.shown.displacement.write();
+  for (int a = 0; a < 3; ++a)
+    u[axis_of(node, a)] += by[a];
+}
+
+} // namespace
+
+void require_parted_holds(const World& w, const SetContact& c, const Motions& motions) {
+  std::vector<std::size_t> objects{c.object};
+  if (c.other != c.object)
+    objects.push_back(c.other);
+  SharedPlaces places(w, objects, motions);
+  const auto name = [&](const SurfaceNode& node) {
+    return std::to_string(node.node) + " of object " + w.now.objects[node.object].name();
+  };
+  for (const std::vector<SurfaceNode>& group : places.groups())
+    for (std::size_t k = 1; k < group.size(); ++k)
+      for (std::size_t j = 0; j < k; ++j) {
+        const SurfaceNode &a = group[j], &b = group[k];
+        if (a.held && b.held && (a.beside_free || b.beside_free) &&
+            (a.object != b.object || c.object == c.other))
+          throw Error("nodes " + name(a) + " and " + name(b) +
+                      " stand at one place and are held there, expected nodes that can move apart "
+                      "for contact");
+      }
+}
+
+std::vector<std::size_t> separate_walls(World& w, std::span<const std::size_t> objects,
+                                        Motions& motions) {
+  SharedPlaces places(w, objects, motions);
+  const double distance =
+      moved_apart * contact::Parameters{}.activation_distance * places.median_edge();
+  std::set<std::size_t> moved;
+  for (const std::vector<SurfaceNode>& group : places.groups()) {
+    const std::vector<Vec3> directions = parting_directions(group);
+    const auto free = std::ranges::count(group, false, &SurfaceNode::held);
+    const double way = free < std::ssize(group) ? 2 * distance : distance;
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      if (group[k].held)
+        continue;
+      displace(w, group[k].object, group[k].node, way * directions[k], motions);
+      moved.insert(group[k].object);
+    }
+  }
+  for (const std::size_t index : moved) {
+    Shown& shown = w.now.objects[index].shown;
+    shown.valid = false;
+    shown.whole = {};
+    shown.box.reset();
+  }
+  return {moved.begin(), moved.end()};
+}
+
+} // namespace gewebe::simulation

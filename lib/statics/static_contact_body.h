@@ -1,0 +1,126 @@
+#pragma once
+// Elastostatic objects in a step of contact (contact/step.h): x_free is the shape under the load
+// alone, W the compliance C between vertices.
+
+#include "contact/contact_body.h"
+#include "contact/island.h"
+#include "contact/load.h"
+#include "model/model.h"
+#include "statics/elastostatic.h"
+#include "statics/two_step.h"
+#include "statics/warped_statics.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+
+/// Where an object is, and what acts on it.
+struct StaticContactState {
+  const Model* model = nullptr;
+  const std::vector<std::uint32_t>* vertices = nullptr; ///< nodes of the collision surface
+  const Load* load = nullptr;                           ///< at the end of the step
+  std::span<const double> displacement{};               ///< at its beginning, of the surface
+  std::vector<contact::VertexForce> forces{};           ///< contact forces then
+  /// Throws where a shape before contact is none: so far off that no contact could be found.
+  std::function<void(std::span<const double>)> require_shape{};
+};
+
+/// What the methods of statics have in common. Bodies that are not linear move by their quadratic
+/// models, so that they pass nothing, until these agree with the shape under the forces.
+class StaticContactBody : public contact::ContactBody {
+public:
+  explicit StaticContactBody(StaticContactState state);
+
+  std::size_t vertex_count() const override { return state_.vertices->size(); }
+  void positions(std::span<Vec3> x) override;
+  double linearise(std::span<const contact::VertexForce> forces, std::span<Vec3> step) override;
+  std::vector<contact::VertexForce> last_forces() const override { return state_.forces; }
+  void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
+                  std::span<contact::Block3> blocks) override;
+  void move(double share, std::span<const contact::VertexForce> forces) override;
+  bool keep_momentum(double room) override;
+  bool is_led() const override { return !state_.load->displacement.empty(); }
+  double typical_force() const override { return typical_.force; }
+  double vertex_stiffness() const override { return typical_.stiffness; }
+
+  /// Displacement of the surface's nodes, and all that acts.
+  std::span<const double> displacement() const { return displacement_; }
+  const Load& acting() const { return acting_; }
+
+protected:
+  const Load& load() const { return *state_.load; }
+  const Model& model() const { return *state_.model; }
+
+private:
+  /// Shape under a load, of the surface's nodes at least.
+  virtual std::span<const double> shape_under(const Load& load) = 0;
+  /// Error of that over the largest displacement.
+  virtual double shape_tolerance() const { return 0; }
+  /// Blocks [row][force] of the compliance near the last shape. \param nodes  rows
+  virtual void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
+                         std::span<contact::Block3> blocks) = 0;
+  void act(std::span<const contact::VertexForce> forces);
+
+  StaticContactState state_;
+  contact::TypicalContact typical_;
+  Load acting_;
+  std::vector<double> displacement_, begin_, step_;
+  // Of the quadratic model.
+  std::vector<double> shape_; ///< under `forces_`
+  std::vector<contact::VertexForce> forces_;
+  std::vector<std::uint32_t> rows_; ///< vertices that the compliance was asked for
+};
+
+/// The linear method.
+class ElastostaticContactBody final : public StaticContactBody {
+public:
+  /// \param solver  asked for when needed
+  ElastostaticContactBody(StaticContactState state, std::function<Elastostatic&()> solver)
+      : StaticContactBody(std::move(state)), solver_(std::move(solver)) {}
+  bool is_linear() const override { return true; }
+  std::uint64_t matrix_id() const override { return solver_().compliance_id(load()); }
+
+private:
+  std::span<const double> shape_under(const Load& load) override;
+  void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
+                 std::span<contact::Block3> blocks) override;
+  std::function<Elastostatic&()> solver_;
+};
+
+/// The two-step method: linear for a given share of both stages.
+class TwoStepContactBody final : public StaticContactBody {
+public:
+  using Stages = std::function<std::pair<Elastostatic&, TwoStep&>()>;
+  TwoStepContactBody(StaticContactState state, Stages stages)
+      : StaticContactBody(std::move(state)), stages_(std::move(stages)) {}
+  bool is_linear() const override { return false; }
+
+private:
+  std::span<const double> shape_under(const Load& load) override;
+  void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
+                 std::span<contact::Block3> blocks) override;
+  Stages stages_;
+};
+
+/// Large rotations.
+class WarpedContactBody final : public StaticContactBody {
+public:
+  WarpedContactBody(StaticContactState state, std::function<WarpedStatics&()> solver)
+      : StaticContactBody(std::move(state)), solver_(std::move(solver)) {}
+  bool is_linear() const override { return false; }
+
+private:
+  std::span<const double> shape_under(const Load& load) override;
+  double shape_tolerance() const override { return warp_tolerance; }
+  void blocks_of(std::uint32_t node, std::span<const std::uint32_t> nodes,
+                 std::span<contact::Block3> blocks) override;
+  std::function<WarpedStatics&()> solver_;
+  std::vector<std::uint32_t> touched_;
+  std::vector<double> compliance_; ///< between these
+};
+
+} // namespace gewebe
