@@ -1,6 +1,7 @@
 #include "collision/candidate_filter.h"
 
 #include "collision/distance.h"
+#include "collision/pair_feature.h"
 
 #include <array>
 #include <cmath>
@@ -21,12 +22,7 @@ double gap_of(const CollisionSurface& surface, std::span<const Vec3> x,
   std::array<Vec3, n> y;
   for (std::size_t k = 0; k < n; ++k)
     y[k] = x[vertices[k]];
-  ClosestFeature feature{DistanceType::point_point, {0, 1, 0, 0}};
-  if constexpr (n == 3)
-    feature = point_edge_feature(y);
-  else if constexpr (n == 4)
-    feature = first == 1 ? point_triangle_feature(y) : edge_edge_feature(y);
-  return std::sqrt(squared_distance(feature, y)) -
+  return std::sqrt(squared_distance(closest_feature(y, first), y)) -
          radius_sum(surface, vertices.front(), vertices.back());
 }
 

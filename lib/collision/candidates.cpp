@@ -4,6 +4,7 @@
 #include "base/larger.h"
 #include "collision/distance.h"
 #include "collision/edge_triangle.h"
+#include "collision/pair_feature.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,16 +21,6 @@ std::array<Vec3, n> positions(std::span<const Vec3> x, const std::array<std::uin
   for (std::size_t k = 0; k < n; ++k)
     y[k] = x[vertex[k]];
   return y;
-}
-
-template <std::size_t n>
-ClosestFeature feature_of(const std::array<Vec3, n>& x, std::size_t first) {
-  if constexpr (n == 2)
-    return {DistanceType::point_point, {0, 1, 0, 0}};
-  else if constexpr (n == 3)
-    return point_edge_feature(x);
-  else
-    return first == 1 ? point_triangle_feature(x) : edge_edge_feature(x);
 }
 
 Box3 inflated(Box3 box, double by) {
@@ -135,7 +126,7 @@ void BroadPhase::find(const CollisionSurface& surface, std::span<const Vec3> x0,
             surface.is_held(vertices[j], surface.owner[vertices[i]]))
           return;
     const auto from = positions(x0, vertices), to = positions(x1, vertices);
-    const double distance = std::sqrt(squared_distance(feature_of(from, k), from));
+    const double distance = std::sqrt(squared_distance(closest_feature(from, k), from));
     const double most =
         radius_sum(surface, vertices[0], vertices[n - 1]) + reach + motion_bound(from, to, k);
     if (!(distance > most)) // NaN stays

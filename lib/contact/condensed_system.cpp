@@ -544,13 +544,6 @@ CondensedSystem::Residual CondensedSystem::residual(std::span<const Vec3> gradie
   return result;
 }
 
-double CondensedSystem::largest_force() const {
-  double largest = 0;
-  for (const Vec3& f : state_->force)
-    largest = std::max(largest, norm(f));
-  return largest;
-}
-
 double CondensedSystem::share() const {
   return state_->c;
 }

@@ -95,7 +95,6 @@ public:
   struct Residual {
     double difference = 0, largest = 0;
   };
-  double largest_force() const; ///< of F
   Residual residual(std::span<const Vec3> gradient) const;
   /// Forces F on the vertices of a body.
   std::vector<VertexForce> forces(std::size_t body) const;

@@ -1,5 +1,7 @@
 #include "contact/contact_pairs.h"
 
+#include "collision/pair_feature.h"
+
 #include <algorithm>
 #include <cstddef>
 #include <tuple>
@@ -30,16 +32,6 @@ bool are_apart(const std::array<Vec3, n>& x, std::size_t first, double range) {
       return true;
   }
   return false;
-}
-
-template <std::size_t n>
-ClosestFeature feature_of(const std::array<Vec3, n>& x, std::size_t first) {
-  if constexpr (n == 2)
-    return {DistanceType::point_point, {0, 1, 0, 0}};
-  else if constexpr (n == 3)
-    return collision::point_edge_feature(x);
-  else
-    return first == 1 ? collision::point_triangle_feature(x) : collision::edge_edge_feature(x);
 }
 
 /// The pair of closest features, its vertices in an order that depends on them alone.
@@ -78,7 +70,7 @@ void find_active_pairs(const collision::CollisionSurface& surface,
         y[k] = x[vertices[k]];
       if (are_apart(y, first, range))
         continue;
-      const ClosestFeature feature = feature_of(y, first);
+      const ClosestFeature feature = collision::closest_feature(y, first);
       if (!(collision::squared_distance(feature, y) < range * range))
         continue;
       ContactPair pair;
