@@ -650,7 +650,8 @@ TEST(SimulationContact, StrangeScenes) {
       } catch (const Error& e) {
         failure = e.what();
       }
-      EXPECT_EQ(failure.find("a prescribed motion meets fixed nodes") != std::string::npos, strange.held)
+      EXPECT_EQ(failure.find("a prescribed motion meets fixed nodes") != std::string::npos,
+                strange.held)
           << strange.name << failure;
       if (!failure.empty())
         continue;
