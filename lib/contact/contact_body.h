@@ -63,6 +63,11 @@ public:
   /// Moves to x_free + A^-1 S^T f, less `share` of `step`. \param forces  f by ascending vertex
   virtual void move(double share, std::span<const VertexForce> forces) = 0;
 
+  /// Whether the body's energy is, where it has moved to, what its model promised; else the next
+  /// model is a stiffer one. \pre moved by all of the step
+  virtual bool model_holds() { return true; }
+  /// The next models of this step may cost more and are better: rounds converge slowly.
+  virtual void sharpen() {}
   /// Translates a free body that has moved so that it has the momentum which its forces give it,
   /// where that takes at most `room`; one at rest takes the shape that belongs to its forces. Exact
   /// models leave nothing to do.

@@ -1,6 +1,8 @@
 #pragma once
 // Parameters of the contact solver: the one place where their defaults stand, each with its reason.
 
+#include <cstdint>
+
 namespace gewebe::contact {
 
 struct Parameters {
@@ -19,7 +21,7 @@ struct Parameters {
   /// with at most this speed.
   double stick_speed = 0.1;
 
-  /// Typical force of an impact, over the force that would stop the bodies within the step.
+  /// Typical force of an impact, over the force that would stop a vertex within the step.
   double stop_share = 0.125;
 
   /// ... over the largest force of the last step: gaps stay a good part of d_hat.
@@ -30,15 +32,13 @@ struct Parameters {
   double stiffness_factor = 16;
 
   // ---- iterations
-  /// Newton iterations of one round, then the step fails: models of bodies are not right far from
-  /// where they were made. ... where vertices are led past curved surfaces, which each goes by but
-  /// about the root of gap times radius.
-  int max_iterations = 100, max_led_iterations = 1000;
+  /// Newton iterations of one round that is at the end of all ways, then bodies are linearised
+  /// anew; those of a step, then it fails.
+  int round_iterations = 100;
+  std::uint64_t max_iterations = 300;
   int max_rounds = 40; ///< linearisations of bodies that are not linear
-  /// Behind so many rounds, one that changes positions by so many times the smallest change of a
-  /// round fails the step: rounds diverge.
-  int sure_rounds = 4;
-  double divergence = 20;
+  /// Where more rounds than this are still to be expected, bodies are linearised by better models.
+  double slow_rounds = 8;
   int gauss_newton = 12; ///< iterations before the projected Hessian takes over
   /// A step of which collision detection allows less than this part is taken again by a smaller
   /// part of the way, at most so many times and not below the least part.
@@ -53,6 +53,7 @@ struct Parameters {
   /// Renewals of friction's lag in one round where forces all but balance, then those between
   /// solutions.
   int max_way_lags = 100, max_lags = 30;
+  int whole_lags = 4;         ///< behind so many of each, normal forces take half of their changes
   int max_searches = 5;       ///< broad phases of one step, each with twice the margin
   int max_way_searches = 100; ///< ... where vertices leave what was searched
 

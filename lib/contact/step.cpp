@@ -89,7 +89,7 @@ private:
   void read_positions(std::vector<Vec3>& x);
   double longest_way() const;
   bool raise_stiffness(double force);
-  void set_stiffness(double energy, std::span<const Vec3> to);
+  void set_stiffness(std::span<const Vec3> to);
   void search(std::span<const Vec3> to, double reach);
   double free_part(std::span<const Vec3> to, double longest);
   void find_pairs(std::span<const Vec3> x) {
@@ -103,6 +103,7 @@ private:
   }
   double energy_at(std::span<const Vec3> x);
   void lag();
+  void damp_lag(std::span<const FrictionPair> before);
   bool lag_changes();
   void minimise();
   bool solve_system(CondensedSystem& system, HessianMode mode);
@@ -127,6 +128,9 @@ private:
   };
   bool follow_bodies(double margin);
   bool solve_round(const Round& round, double margin, bool& exact);
+  void sharpen(double change);
+  void go_back(const Round& round, std::span<const Vec3> begin);
+  bool is_free(std::span<const Vec3> to);
   bool move_alone(std::span<const Vec3> to);
   bool covered(std::uint32_t vertex, const Vec3& x, double room) const {
     return distance_to_segment(x, swept_from_[vertex], swept_[vertex]) <= room;
@@ -153,8 +157,11 @@ private:
   double barrier_force_ = 0; ///< force at half of d_hat
   double last_step_ = 0;     ///< length of the last full step of Newton's method; else infinite
   bool rough_ = false;       ///< some pairs have friction
-  int way_lags_ = 0;         ///< renewals on the way
-  bool led_ = false;         ///< some vertices go ways that nothing stops
+  int way_lags_ = 0, round_lags_ = 0; ///< renewals on the way, and behind solutions
+  bool led_ = false;                  ///< some vertices go ways that nothing stops
+  std::vector<double> changes_;       ///< of positions, by rounds
+  bool settled_ = true;               ///< the last round ended with balanced forces
+  bool models_hold_ = true;           ///< of all bodies, in the last round
   collision::Candidates candidates_;
   collision::CandidateFilter filter_;           ///< of the candidates
   std::vector<std::uint32_t> vertices_;         ///< of candidates, and those with forces
@@ -182,9 +189,10 @@ double StepSolver::Work::longest_way() const {
 }
 
 /// Scales the barrier by a typical contact force: that of the bodies, a part of the largest of the
-/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops
-/// them within the step. \param energy  R^T A R of the ways R
-void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
+/// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops a
+/// vertex within the step. What turns out larger makes it stiffer (raise_stiffness); one that is too
+/// stiff is a wall that Newton's steps bounce off.
+void StepSolver::Work::set_stiffness(std::span<const Vec3> to) {
   const Parameters& p = options_.parameters;
   double force = std::numeric_limits<double>::infinity();
   for (const ContactBody* const body : island_.table.bodies)
@@ -203,7 +211,7 @@ void StepSolver::Work::set_stiffness(double energy, std::span<const Vec3> to) {
     stiffness = 0;
   force = std::max(force, d_hat_ * stiffness);
   if (const double longest = longest_way(); longest > 0) {
-    const double stop = p.stop_share * std::max(energy / longest, stiffness * longest);
+    const double stop = p.stop_share * stiffness * longest;
     if (stop > force && collision::collision_free_step(island_.surface, candidates_, at_, to,
                                                        {0, p.kept_gap, d_hat_, 1000}) < 1)
       force = stop;
@@ -299,6 +307,21 @@ void StepSolver::Work::lag() {
   ++report_.lags;
 }
 
+/// Halves the change of the lag's normal forces: where friction itself brings them forth, whole
+/// changes may alternate for ever. \param before  the lag before this one
+void StepSolver::Work::damp_lag(std::span<const FrictionPair> before) {
+  const auto key = [](const FrictionPair& pair) { return std::pair(pair.count, pair.vertex); };
+  std::map<std::pair<std::uint8_t, std::array<std::uint32_t, 4>>, double> forces;
+  for (const FrictionPair& pair : before)
+    forces[key(pair)] = pair.normal_force;
+  for (FrictionPair& pair : friction_) {
+    const auto found = forces.find(key(pair));
+    const double part = (1 + (found == forces.end() ? 0 : found->second) / pair.normal_force) / 2;
+    pair.normal_force *= part;
+    pair.limit *= part;
+  }
+}
+
 /// Takes a new lag where that changes forces by more than the tolerance, and tells whether it did:
 /// the forces that balance are those of the lag that stays.
 bool StepSolver::Work::lag_changes() {
@@ -319,8 +342,11 @@ bool StepSolver::Work::lag_changes() {
   for (const std::uint32_t v : vertices_)
     change = std::max(change, norm(now[v] - friction_before_[v]));
   report_.friction_residual = largest > 0 ? change / largest : 0;
-  if (!(report_.friction_residual <= options_.parameters.friction_tolerance))
+  if (!(report_.friction_residual <= options_.parameters.friction_tolerance)) {
+    if (round_lags_ >= options_.parameters.whole_lags)
+      damp_lag(before);
     return true;
+  }
   friction_ = std::move(before);
   return false;
 }
@@ -502,8 +528,10 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
       rough_ && iteration > 0 && way_lags_ < p.max_way_lags && balances(p.lag_tolerance);
   const bool stiffer = balances(p.way_tolerance) && raise_stiffness(residual.largest);
   if (lags) {
+    const std::vector<FrictionPair> before = friction_;
     lag();
-    ++way_lags_;
+    if (way_lags_++ >= p.whole_lags)
+      damp_lag(before);
   }
   if (lags || stiffer) {
     std::ranges::fill(gradient_, Vec3{});
@@ -535,9 +563,23 @@ bool StepSolver::Work::move_bodies(const CondensedSystem& system, bool ends) {
     ContactBody& body = *island_.table.bodies[b];
     force_[b] = system.forces(b);
     body.move(system.share(), force_[b]);
-    exact = (!ends || body.keep_momentum(room)) && exact;
+    if (!ends)
+      continue;
+    models_hold_ = body.model_holds() && models_hold_;
+    exact = body.keep_momentum(room) && exact;
   }
   return exact;
+}
+
+/// Whether the way from here to `to` is free, and nothing touches there.
+bool StepSolver::Work::is_free(std::span<const Vec3> to) {
+  if (vertices_.empty())
+    return true;
+  if (collision::collision_free_step(island_.surface, candidates_, at_, to, {0, 0, d_hat_, 1000}) <
+      1)
+    return false;
+  find_pairs(to);
+  return pairs_.pairs.empty();
 }
 
 /// The step of bodies that meet nothing on their ways. \param to  ends of the ways of linear bodies
@@ -559,7 +601,7 @@ bool StepSolver::Work::move_alone(std::span<const Vec3> to) {
   }
   if (alone) {
     search(trial_, d_hat_);
-    alone = vertices_.empty();
+    alone = is_free(trial_);
   }
   if (!alone) {
     for (const std::size_t b : moved)
@@ -603,12 +645,18 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   bool converged = vertices_.empty();
   if (converged)
     system->advance(1);
-  int iteration = 0, lags = 0, searches = 0;
-  way_lags_ = 0;
+  int iteration = 0, searches = 0;
+  way_lags_ = round_lags_ = 0;
+  settled_ = true;
   while (!converged) {
-    if (iteration >= (led_ ? p.max_led_iterations : p.max_iterations))
-      throw NotSolved("contact: Newton's method did not converge in " + std::to_string(iteration) +
-                      " iterations");
+    // Better models serve more than the end of this one.
+    if (system->share() == 0 && iteration >= p.round_iterations) {
+      settled_ = false;
+      break;
+    }
+    if (report_.iterations + static_cast<std::uint64_t>(iteration) >= p.max_iterations)
+      throw NotSolved("contact: Newton's method did not converge in " +
+                      std::to_string(p.max_iterations) + " iterations");
     bool done = false;
     const bool gained = iterate(*system, iteration, done);
     ++iteration;
@@ -621,8 +669,9 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
       throw NotSolved("contact: no descent");
     }
     if (done) {
-      converged = lags >= p.max_lags || !lag_changes();
-      ++lags;
+      converged = !lag_changes();
+      if (!converged && ++round_lags_ > p.max_lags)
+        throw NotSolved("contact: friction did not settle");
     } else if (!std::ranges::all_of(
                    vertices_, [&](std::uint32_t v) { return covered(v, at_[v], margin / 2); })) {
       if (++searches > p.max_way_searches)
@@ -640,8 +689,33 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   }
   report_.iterations += static_cast<std::uint64_t>(iteration);
   report_.vertices = std::max(report_.vertices, system->unknowns() / 3);
+  models_hold_ = true;
   exact = move_bodies(*system, true);
   return follow_bodies(margin);
+}
+
+/// Takes better models where rounds converge slowly. \param change  of positions by the last round
+void StepSolver::Work::sharpen(double change) {
+  const Parameters& p = options_.parameters;
+  changes_.push_back(change);
+  if (changes_.size() < 3)
+    return;
+  // Rounds may alternate.
+  const double rate = std::sqrt(change / changes_[changes_.size() - 3]);
+  const double rounds = std::log(p.round_tolerance * d_hat_ / change) / std::log(rate);
+  if (!(rate < 1) || rounds > p.slow_rounds)
+    for (ContactBody* const body : island_.table.bodies)
+      body->sharpen();
+}
+
+/// Undoes a round whose models did not hold.
+void StepSolver::Work::go_back(const Round& round, std::span<const Vec3> begin) {
+  force_ = round.force;
+  for (std::size_t b = 0; b < island_.table.bodies.size(); ++b)
+    island_.table.bodies[b]->move(1, force_[b]);
+  at_.assign(begin.begin(), begin.end());
+  find_pairs(at_);
+  lag();
 }
 
 StepReport StepSolver::Work::run() {
@@ -654,7 +728,6 @@ StepReport StepSolver::Work::run() {
   led_ = std::ranges::any_of(table.bodies, [](const ContactBody* b) { return b->is_led(); });
   double margin = margin_;
   bool may_be_alone = options_.h > 0 && !linear;
-  double least_change = std::numeric_limits<double>::infinity();
   for (int number = 0; number < p.max_rounds; ++number) {
     if (context_.cancelled && context_.cancelled())
       throw Cancelled();
@@ -670,14 +743,15 @@ StepReport StepSolver::Work::run() {
     const std::vector<Vec3> round_begin = at_;
     if (number == 0) {
       search(round.to, d_hat_ + margin);
-      if (vertices_.empty() && may_be_alone) {
+      if (may_be_alone && std::ranges::all_of(force_, &std::vector<VertexForce>::empty) &&
+          is_free(round.to)) {
         if (move_alone(round.to))
           break;
         may_be_alone = false;
         number = -1; // with new models
         continue;
       }
-      set_stiffness(round.energy, round.to);
+      set_stiffness(round.to);
       find_pairs(at_);
       require_apart();
       lag();
@@ -698,12 +772,14 @@ StepReport StepSolver::Work::run() {
       round.to = trial_;
     }
     const double change = largest_distance(trial_, round_begin);
-    at_.swap(trial_);
-    if (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_))
-      break;
-    least_change = std::min(least_change, change);
-    if (number >= p.sure_rounds && !(change <= p.divergence * least_change))
-      throw NotSolved("contact: bodies that are not linear diverge");
+    if (models_hold_) {
+      at_.swap(trial_);
+      if (settled_ && (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_)))
+        break;
+      sharpen(change);
+    } else {
+      go_back(round, round_begin);
+    }
     if (number + 1 == p.max_rounds)
       throw NotSolved("contact: bodies that are not linear did not come to rest in " +
                       std::to_string(number + 1) + " rounds");

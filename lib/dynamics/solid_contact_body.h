@@ -1,6 +1,6 @@
 #pragma once
-// A solid or a net that moves implicitly, in a step of contact: the compliance of the constant
-// matrix of solid/solid_motion.h, in frames that turn with the nodes.
+// A solid or a net that moves implicitly, in a step of contact: the compliance of the models of
+// solid/solid_motion.h, in frames that turn with the nodes or that of space.
 
 #include "base/context.h"
 #include "contact/contact_body.h"
@@ -43,6 +43,8 @@ public:
   }
   void move(double share, std::span<const contact::VertexForce> forces) override;
   bool keep_momentum(double room) override { return motion_.keep_momentum(forces_, room); }
+  bool model_holds() override { return motion_.model_holds(forces_, context_); }
+  void sharpen() override { motion_.sharpen(); }
   bool solve_alone() override;
   void begin_again() override { motion_.begin_iterate_again(); }
   bool is_led() const override { return motion_.moves_held(); }

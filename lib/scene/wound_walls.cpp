@@ -13,7 +13,6 @@
 #include <set>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -31,6 +30,7 @@ constexpr double least_difference = 0.1;
 struct SurfaceNode {
   std::size_t object = 0;
   std::uint32_t node = 0;
+  Vec3 place;
   Vec3 normal; ///< unit, outward
   Vec3 inward; ///< unit, towards the triangles around
   bool held = false;
@@ -49,7 +49,11 @@ Vec3 displacement_of(const Object& object, const Motions& motions, std::size_t i
   return vector_at(*object.shown.displacement, node);
 }
 
-/// Nodes at one place by that place, and the median edge of all surfaces.
+/// Nodes nearer than this part of the median edge are at one place: rounding parts the middles of
+/// edges of both sides.
+constexpr double same_place = 1e-9;
+
+/// Nodes at one place, and the median edge of all surfaces.
 class SharedPlaces {
 public:
   SharedPlaces(const World& w, std::span<const std::size_t> objects, const Motions& motions) {
@@ -57,12 +61,29 @@ public:
       add(w.now.objects[index], index, motions);
   }
 
+  /// Each with nodes of ascending object and number.
   std::vector<std::vector<SurfaceNode>> groups() {
-    std::vector<std::vector<SurfaceNode>> shared;
-    for (auto& [place, group] : by_place_)
-      if (group.size() > 1)
-        shared.push_back(std::move(group));
-    return shared;
+    const double room = same_place * median_edge();
+    std::ranges::stable_sort(nodes_, {}, [](const SurfaceNode& node) { return node.place.x; });
+    std::vector<std::vector<SurfaceNode>> all;
+    std::size_t first = 0; // of the groups that are near along x
+    for (const SurfaceNode& node : nodes_) {
+      while (first < all.size() && all[first].back().place.x < node.place.x - room)
+        ++first;
+      const auto found = std::find_if(all.begin() + static_cast<std::ptrdiff_t>(first), all.end(),
+                                      [&](const std::vector<SurfaceNode>& group) {
+                                        return norm(group.front().place - node.place) <= room;
+                                      });
+      if (found != all.end())
+        found->push_back(node);
+      else
+        all.push_back({node});
+    }
+    std::erase_if(all, [](const std::vector<SurfaceNode>& group) { return group.size() < 2; });
+    for (std::vector<SurfaceNode>& group : all)
+      std::ranges::sort(group, {},
+                        [](const SurfaceNode& node) { return std::pair(node.object, node.node); });
+    return all;
   }
   double median_edge() {
     if (edges_.empty())
@@ -101,12 +122,12 @@ private:
       node.normal = unit(node.normal);
       node.inward = unit(node.inward);
       node.held = is_held(number);
-      const Vec3 x = place(number);
-      by_place_[{x.x, x.y, x.z}].push_back(node);
+      node.place = place(number);
+      nodes_.push_back(node);
     }
   }
 
-  std::map<std::tuple<double, double, double>, std::vector<SurfaceNode>> by_place_;
+  std::vector<SurfaceNode> nodes_;
   std::vector<double> edges_;
 };
 

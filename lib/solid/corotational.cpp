@@ -121,6 +121,12 @@ struct Groups {
     sums.make(groups, mesh.points.size());
   }
 
+  void note_all() {
+    strains.resize(groups.size());
+    before.resize(groups.size());
+    rotations.resize(groups.size());
+  }
+
   double evaluate(CorotationalEvaluate<Nodes> kernel, std::span<const double> x,
                   const CorotationalWeights& weights, std::span<double> forces,
                   const Context& context, bool with_turns) {
@@ -245,6 +251,10 @@ void CorotationalSolid::node_rotations(std::span<double> rotations, const Contex
         rotations[9 * i + c] = sums[i / 4][c][i % 4];
   };
   parallel_blocks_if(sums.size() >= worth_threads_turns, context, sums.size(), 256, turn);
+}
+
+void CorotationalSolid::note_all() {
+  state_->with([](auto& of) { of.note_all(); });
 }
 
 ElementFrame CorotationalSolid::frame(std::size_t t) const {

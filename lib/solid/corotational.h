@@ -72,6 +72,8 @@ public:
   /// Of each node the rotation nearest to the mean of its elements', by rows, 9 n: as in the last
   /// evaluate() with turns. That of a node of no element is none.
   void node_rotations(std::span<double> rotations, const Context& context);
+  /// All is noted from the next evaluate() on.
+  void note_all();
   /// Of element t, as in the last evaluate(). \pre both are noted, or frames, if only they are read
   ElementFrame frame(std::size_t t) const;
 

@@ -42,6 +42,7 @@ public:
   double unsure_at_rest() const noexcept { return unsure_at_rest_; }
   const MotionSprings& springs() const noexcept { return springs_; }
   MotionVolumes& volumes() noexcept { return volumes_; }
+  const MotionVolumes& volumes() const noexcept { return volumes_; }
 
   // As in the last evaluation.
   double elastic() const noexcept { return elastic_; }
@@ -49,7 +50,9 @@ public:
   void node_rotations(std::span<double> rotations, const Context& context) {
     frames_.node_rotations(rotations, context);
   }
-  /// \pre the law is Neo-Hookean, or the way is that of the reference
+  /// From the next evaluation on frame() is known.
+  void note_frames() { frames_.note_all(); }
+  /// \pre note_frames(), or the law is Neo-Hookean, or the way is that of the reference
   ElementFrame frame(std::size_t t) const { return frames_.frame(t); }
   Vec3 bubble(std::size_t t) const { return new_bubbles_.empty() ? Vec3{} : new_bubbles_[t]; }
   /// Of the nodes of tetrahedron t.

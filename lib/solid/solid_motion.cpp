@@ -45,6 +45,12 @@ MotionBody body_of(const TetMesh& mesh, std::span<const SolidMaterial> materials
 
 } // namespace
 
+/// An energy above that of the model by more than this part of the model's quadratic part is not
+/// what the model promised: with less, rounds lower the energy by a part of that at least.
+constexpr double energy_excess = 0.9;
+/// A matrix becomes stiffer by no more than 1 over this from round to round.
+constexpr double least_factor = 0.1;
+
 double damping_per_stiffness(double ratio, double frequency) {
   return ratio / (std::numbers::pi * frequency);
 }
@@ -67,34 +73,15 @@ struct SolidMotion::State {
   /// A step in parts.
   struct Open {
     MotionObjective objective;
-    MotionPoint found;               ///< the iterate
-    Numbers base, step;              ///< where it was linearised, and the model's step from there
-    bool fresh = true;               ///< nothing was linearised yet
-    Numbers change;                  ///< of the iterate in the round before
-    double relaxation = 1, most = 1; ///< ... at most
-
-    /// Chooses the relaxation of the next round. Where a round undid more than a part of the one
-    /// before, the matrix is too soft by 1 - rho, with that part -rho: one round is shorter by as
-    /// much, the next is whole again. Where rounds grow otherwise, all are made shorter.
-    void relax() {
-      constexpr double undone = 0.3, least = 0.1;
-      Numbers latest(fresh ? 0 : base.size());
-      double along = 0, square = 0, grown = 0;
-      for (std::size_t axis = 0; axis < latest.size(); ++axis) {
-        latest[axis] = found.at[axis] - base[axis];
-        if (!change.empty()) {
-          along += latest[axis] * change[axis];
-          square += change[axis] * change[axis];
-          grown += latest[axis] * latest[axis];
-        }
-      }
-      const double rho = square > 0 ? along / square : 0;
-      if (square > 0)
-        most = grown > square ? std::max(least, most / 2) : std::min(1.0, 2 * most);
-      relaxation = relaxation >= most && rho < -undone ? std::max(least, 1 / (1 - rho)) : 1;
-      relaxation = std::min(relaxation, most);
-      change = std::move(latest);
-    }
+    MotionPoint point; ///< where the model was built
+    MotionPoint found; ///< the iterate; its value and forces are known if evaluated
+    bool evaluated = false;
+    Numbers base, step; ///< the iterate when it was linearised, and the model's step from there
+    /// Nothing was linearised yet, now and when it was linearised last.
+    bool fresh = true, was_fresh = true;
+    bool exact = false;    ///< the matrix is the tangent
+    double relaxation = 1; ///< the matrix is over this
+    double share = 1;      ///< of the step that the iterate lacks
     SolidStep counts{};
   };
   std::optional<Open> open;
@@ -108,6 +95,9 @@ struct SolidMotion::State {
     now = {body.rest, Numbers(axes), Numbers(axes), std::vector<std::uint8_t>(axes)};
     target = reactions = Numbers(axes);
   }
+  bool take_tangent();
+  void renew_matrix(const Context& context);
+  void solve_open(Numbers& v, const Context& context);
   void take_over(SolidMotion& soft);
   void limit(SolidStep& step);
   SolidStep step_softly(double h, const Context& context);
@@ -153,6 +143,45 @@ void SolidMotion::State::limit(SolidStep& step) {
                    energy.unsure_at_rest() + 1e-12 * (motion_energy(body, now.velocity) + elastic +
                                                       std::abs(allowed) + std::abs(work));
   step.limited = limit_energy(body, now, elastic, allowed, rounding);
+}
+
+/// The matrices of the open step are tangents from now on. \return whether there are any
+bool SolidMotion::State::take_tangent() {
+  if (!energy.volumes().empty() || quick.wants_tangent())
+    return false;
+  if (std::exchange(open->exact, true))
+    return true;
+  energy.note_frames();
+  open->evaluated = false;
+  open->relaxation = 1;
+  return true;
+}
+
+/// Makes the matrix of a model at the point of the last evaluation. \pre open
+void SolidMotion::State::renew_matrix(const Context& context) {
+  if (open->exact) {
+    tangent.make(open->objective, open->point.at, context);
+    ++open->counts.factorisations;
+    matrix_version = unique_number();
+    return;
+  }
+  if (quick.wants_tangent() && quick.take_tangent(body, energy.springs(), open->point.at, context))
+    matrix_version = unique_number();
+  quick.turn(energy, context);
+  quick.fill(energy.volumes(), context);
+  if (!energy.volumes().empty())
+    matrix_version = unique_number();
+}
+
+/// Solves with the matrix of the model, in place. \pre open, linearised
+void SolidMotion::State::solve_open(Numbers& v, const Context& context) {
+  if (open->exact) {
+    tangent.solve(v);
+    return;
+  }
+  quick.into_frames(v, context);
+  quick.solve(v, context);
+  quick.out_of_frames(v, context);
 }
 
 /// What the body that moves meanwhile has come to.
@@ -301,10 +330,10 @@ void SolidMotion::begin_step(double h, const Context& context) {
   if (made > 0)
     s.matrix_version = unique_number();
   s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.energy, h, s.options),
+                             .point = {},
                              .found = {},
                              .base = {},
-                             .step = {},
-                             .change = {}});
+                             .step = {}});
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
@@ -318,37 +347,32 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
     return;
   }
   State::Open& open = *s.open;
-  open.relax();
   open.base = open.found.at;
-  MotionPoint point;
-  point.at = open.base;
-  if (open.fresh)
-    add(point.at, open.objective.step(), s.now.velocity);
-  for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
-    if (s.now.held[axis] != 0)
-      point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
-  open.objective.evaluate(point, context, true);
-  if (s.quick.wants_tangent() &&
-      s.quick.take_tangent(s.body, s.energy.springs(), point.at, context))
-    s.matrix_version = unique_number();
-  s.quick.turn(s.energy, context);
-  s.quick.fill(s.energy.volumes(), context);
-  if (!s.energy.volumes().empty())
-    s.matrix_version = unique_number();
+  MotionPoint& point = open.point;
+  if (open.evaluated) {
+    point = open.found;
+  } else {
+    point.at = open.base;
+    if (open.fresh)
+      add(point.at, open.objective.step(), s.now.velocity);
+    for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
+      if (s.now.held[axis] != 0)
+        point.at[axis] = s.moved ? s.body.rest[axis] + s.target[axis] : s.now.place[axis];
+    open.objective.evaluate(point, context, true);
+  }
+  s.renew_matrix(context);
   Numbers direction = point.gradient;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     if (s.now.held[axis] == 0)
       direction[axis] -= forces[axis];
-  s.quick.into_frames(direction, context);
-  s.quick.solve(direction, context);
-  s.quick.out_of_frames(direction, context);
+  s.solve_open(direction, context);
   ++open.counts.rounds;
   open.step.resize(s.body.axes());
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     open.step[axis] = point.at[axis] -
                       (s.now.held[axis] != 0 ? 0 : open.relaxation * direction[axis]) -
                       open.base[axis];
-  open.fresh = false;
+  open.was_fresh = std::exchange(open.fresh, false);
   std::ranges::copy(open.step, step.begin());
 }
 
@@ -365,7 +389,10 @@ void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
     const std::size_t axis = 3 * std::size_t{node} + a;
     if (s.now.held[axis] == 0) {
       column[axis] = 1;
-      s.quick.solve(column, context);
+      if (s.open->exact)
+        s.tangent.solve(column);
+      else
+        s.quick.solve(column, context);
     }
     std::ranges::copy(column, columns.begin() + static_cast<std::ptrdiff_t>(a * s.body.axes()));
   }
@@ -376,8 +403,10 @@ std::uint64_t SolidMotion::matrix_version() const noexcept {
 }
 
 std::array<double, 9> SolidMotion::frame_of(std::uint32_t node) const {
-  return state_->recovery.on() ? state_->recovery.soft().frame_of(node)
-                               : state_->quick.frame_of(node);
+  State& s = *state_;
+  if (s.recovery.on())
+    return s.recovery.soft().frame_of(node);
+  return s.open->exact ? std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1} : s.quick.frame_of(node);
 }
 
 void SolidMotion::move_iterate(double share, std::span<const double> change,
@@ -388,13 +417,15 @@ void SolidMotion::move_iterate(double share, std::span<const double> change,
     return;
   }
   State::Open& open = *s.open;
+  open.evaluated = false;
+  open.share = share;
   open.found.at = open.base;
+  const bool still = std::ranges::all_of(change, [](double f) { return f == 0; });
+  open.fresh = open.was_fresh && still && share == 1;
   add(open.found.at, 1 - share, open.step);
-  if (!std::ranges::all_of(change, [](double f) { return f == 0; })) {
+  if (!still) {
     Numbers answer(change.begin(), change.end());
-    s.quick.into_frames(answer, context);
-    s.quick.solve(answer, context);
-    s.quick.out_of_frames(answer, context);
+    s.solve_open(answer, context);
     ++open.counts.rounds;
     for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
       if (s.now.held[axis] == 0)
@@ -404,6 +435,43 @@ void SolidMotion::move_iterate(double share, std::span<const double> change,
 
 double SolidMotion::relaxation() const noexcept {
   return state_->recovery.on() ? state_->recovery.soft().relaxation() : state_->open->relaxation;
+}
+
+bool SolidMotion::model_holds(std::span<const double> forces, const Context& context) {
+  State& s = *state_;
+  if (s.recovery.on())
+    return s.recovery.soft().model_holds(forces, context);
+  State::Open& open = *s.open;
+  if (open.share != 0)
+    return true;
+  open.objective.evaluate(open.found, context, true);
+  open.evaluated = true;
+  // The model's energy at the iterate, where its gradient is that of the forces, and what it is
+  // below that at the point.
+  double model = open.point.value, quadratic = 0;
+  for (std::size_t axis = 0; axis < s.body.axes(); ++axis) {
+    const double way = open.found.at[axis] - open.point.at[axis];
+    const double force = s.now.held[axis] != 0 ? 0 : forces[axis];
+    model += way * (force + open.point.gradient[axis]) / 2;
+    quadratic += way * (force - open.point.gradient[axis]) / 2;
+  }
+  const double off = open.found.value - model, unsure = open.found.unsure + open.point.unsure;
+  const bool holds = off <= energy_excess * std::max(quadratic, 0.0) + unsure;
+  if (!holds && !open.exact && s.take_tangent())
+    return false;
+  // The matrix that would have had the energy along this way.
+  const double factor = quadratic > unsure ? 1 / (1 + off / quadratic) : holds ? 1 : 0;
+  open.relaxation *= holds ? std::max(factor, least_factor) : std::clamp(factor, least_factor, 0.5);
+  open.relaxation = std::min(open.relaxation, 1.0);
+  return holds;
+}
+
+void SolidMotion::sharpen() {
+  State& s = *state_;
+  if (s.recovery.on())
+    s.recovery.soft().sharpen();
+  else
+    (void)s.take_tangent();
 }
 
 bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
@@ -418,6 +486,7 @@ bool SolidMotion::keep_momentum(std::span<const double> forces, double room) {
     return false;
   for (std::size_t axis = 0; axis < s.body.axes(); ++axis)
     open.found.at[axis] -= off[axis % 3];
+  open.evaluated = false;
   return true;
 }
 
@@ -430,6 +499,7 @@ void SolidMotion::solve_alone(const Context& context) {
   State::Open& open = *s.open;
   const int made = open.counts.factorisations;
   open.found = s.search(open.objective, open.counts, context);
+  open.evaluated = false;
   open.counts.factorisations = made;
   if (!s.now.any_held())
     open.objective.keep_momentum(open.found);
@@ -443,8 +513,8 @@ void SolidMotion::begin_iterate_again() {
   }
   s.open->found = {};
   s.open->found.at = s.now.place;
+  s.open->evaluated = false;
   s.open->fresh = true;
-  s.open->change.clear();
 }
 
 bool SolidMotion::moves_held() const noexcept {

@@ -162,8 +162,10 @@ public:
   //
   // The iterate is a position of all nodes. A part of the step builds the quadratic model
   // 1/2 (x - x_free)^T A (x - x_free) of the step's energy around the iterate, with the constant
-  // matrix A in the frames of the iterate; the caller finds the forces f that act at
-  // x = x_free + A^-1 f, and moves there.
+  // matrix A in the frames of the iterate, or the tangent there; the caller finds the forces f that
+  // act at x = x_free + A^-1 f, moves there, and asks whether the model holds there. Where it does,
+  // each round lowers the energy of all that takes part (majorisation and minimisation: Hunter,
+  // Lange, A tutorial on MM algorithms, The American Statistician 58(1), 2004).
 
   /// Begins a step of h; the iterate is the present position. An open step is abandoned without a
   /// trace. \pre h > 0, set_load and move_held were called for this step \throw as step
@@ -178,14 +180,18 @@ public:
   /// three columns of 3 n numbers. They are the same until matrix_version() changes.
   void unit_responses(std::uint32_t node, std::span<double> columns, const Context& context);
   std::uint64_t matrix_version() const noexcept;
-  /// Factor of these responses in the present round, 0.2 ... 1: less than 1 where the constant
-  /// matrix is too soft and rounds would undo each other.
+  /// Factor of these responses in the present round, at most 1: less where the matrix is too soft.
   double relaxation() const noexcept;
   /// Rotation of a node's frame in the model, row-major.
   std::array<double, 9> frame_of(std::uint32_t node) const;
   /// Moves the iterate, from where it was linearised, by (1 - share) step + A^-1 (f - f_0).
   /// \param change  f - f_0, 3 n
   void move_iterate(double share, std::span<const double> change, const Context& context);
+  /// Whether the energy at the iterate is what the model has there, but for half of the model's
+  /// quadratic part; else the next model is of the tangent, or stiffer. \param forces  f, 3 n
+  bool model_holds(std::span<const double> forces, const Context& context);
+  /// Models of this step are of the tangent from now on, where there is one.
+  void sharpen();
   /// Translates the iterate of a body that is held nowhere so that its momentum is that of load and
   /// forces, where that takes at most `room` mm: the constant matrix moves a strained body not
   /// quite by what its forces say. \param forces  f, 3 n \return whether the momentum is right
