@@ -74,7 +74,7 @@ PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
 STRESS_PYTHON := tests/stress/frames
-SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
+SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/* tests/golden/in/*.sh)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -333,7 +333,9 @@ lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(MAN_STAMPS) $(SHELL_ST
 $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	@mkdir -p $(@D)
 	@echo 'check-names'
-	@scripts/check-names $(filter-out tests/bench/% tests/stress/% tests/fuzz/% tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
+	@scripts/check-names $(filter-out $(addprefix tests/,bench/% stress/% fuzz/% validate/%),$(LINT_CXX) $(LINT_HEADERS)) \
+	  --alone $(filter $(addprefix tests/,bench/% stress/% fuzz/%),$(LINT_CXX) $(LINT_HEADERS))
+	@scripts/check-names $(filter-out tests/%,$(LINT_CXX) $(LINT_HEADERS)) $(filter tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
 
 $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@mkdir -p $(@D)
