@@ -60,10 +60,12 @@ LIB_SRC := $(wildcard lib/*/*.cpp formats/*/*.cpp)
 SHARED_SRC := $(wildcard tools/*/*.cpp)
 TOOL_SRC := $(wildcard tools/*.cpp)
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
-# Where threads work together; a test unit of each stage is enough for ThreadSanitizer.
+# The files of the tests that ThreadSanitizer runs, tests/sanitize/threads.
 ifeq ($(config),thread)
-UNIT_SRC := tests/unit/mesh_fixtures.cpp $(patsubst %,tests/unit/test_%.cpp,base column_sum csg density elastostatic \
-  frontal_factor marching_cubes render_raster snap_collapse store volume_file voxelize)
+UNIT_SRC := tests/unit/mesh_fixtures.cpp $(patsubst %,tests/unit/test_%.cpp,base column_sum corotational csg cut_stiffness \
+  density elastodynamic elastostatic frontal_factor hyperelastic marching_cubes mesh_instruments mixed_meetings render_raster \
+  scene_clients shared_shapes simulation simulation_cut_solid simulation_solid simulation_tear_solid \
+  snap_collapse solid_assembly solid_motion store volume_file voxelize warped_statics)
 endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)

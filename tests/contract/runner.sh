@@ -148,6 +148,16 @@ test_two_runs_wait_for_each_other() {
   cat first.txt said.txt | grep -q 'waits for another run' || fail 'nobody waited'
 }
 
+test_lists_of_the_sanitizers_name_tests() {
+  local list pattern
+  [[ -x $BUILD/unit ]] || skip "$BUILD/unit is not built"
+  for list in slow threads; do
+    while read -r pattern; do
+      "$BUILD/unit" --gtest_list_tests --gtest_filter="$pattern" | grep -q '^ ' || fail "tests/sanitize/$list: no test is $pattern"
+    done < <(sed 's/ *#.*//; /^$/d' "$GEWEBE_ROOT/tests/sanitize/$list")
+  done
+}
+
 test_no_expected_file_is_left_over() {
   local file
   for file in "$GEWEBE_ROOT"/tests/golden/expected/*; do
