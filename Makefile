@@ -60,10 +60,12 @@ LIB_SRC := $(wildcard lib/*/*.cpp formats/*/*.cpp)
 SHARED_SRC := $(wildcard tools/*/*.cpp)
 TOOL_SRC := $(wildcard tools/*.cpp)
 UNIT_SRC := $(wildcard tests/unit/*.cpp)
-# Where threads work together; a test unit of each stage is enough for ThreadSanitizer.
+# The files of the tests that ThreadSanitizer runs, tests/sanitize/threads.
 ifeq ($(config),thread)
-UNIT_SRC := tests/unit/mesh_fixtures.cpp $(patsubst %,tests/unit/test_%.cpp,base column_sum csg density elastostatic \
-  frontal_factor marching_cubes render_raster snap_collapse store volume_file voxelize)
+UNIT_SRC := tests/unit/mesh_fixtures.cpp $(patsubst %,tests/unit/test_%.cpp,base column_sum corotational csg cut_stiffness \
+  density elastodynamic elastostatic frontal_factor hyperelastic marching_cubes mesh_instruments mixed_meetings render_raster \
+  scene_clients shared_shapes simulation simulation_cut_solid simulation_solid simulation_tear_solid \
+  snap_collapse solid_assembly solid_motion store volume_file voxelize warped_statics)
 endif
 STRESS_SRC := $(wildcard tests/stress/*.cpp)
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.cpp)
@@ -74,7 +76,7 @@ PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
 STRESS_PYTHON := tests/stress/frames
-SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/*)
+SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/* tests/golden/in/*.sh)
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -333,7 +335,9 @@ lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(MAN_STAMPS) $(SHELL_ST
 $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	@mkdir -p $(@D)
 	@echo 'check-names'
-	@scripts/check-names $(filter-out tests/bench/% tests/stress/% tests/fuzz/% tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
+	@scripts/check-names $(filter-out $(addprefix tests/,bench/% stress/% fuzz/% validate/%),$(LINT_CXX) $(LINT_HEADERS)) \
+	  --alone $(filter $(addprefix tests/,bench/% stress/% fuzz/%),$(LINT_CXX) $(LINT_HEADERS))
+	@scripts/check-names $(filter-out tests/%,$(LINT_CXX) $(LINT_HEADERS)) $(filter tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
 
 $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@mkdir -p $(@D)

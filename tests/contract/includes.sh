@@ -80,13 +80,23 @@ test_no_name_is_defined_twice() {
     mkdir -p lib/a
     printf '%s\n' 'namespace gewebe {' "$1" '} // namespace gewebe' >lib/a/a.h
     printf '%s\n' 'namespace gewebe {' "$2" '} // namespace gewebe' >lib/a/b.cpp
-    CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/check-names" lib/a/a.h lib/a/b.cpp >said.txt 2>&1
+    CHECK_ROOT=$PWD "$GEWEBE_ROOT/scripts/check-names" lib/a/a.h "${@:3}" lib/a/b.cpp >said.txt 2>&1
   }
   twice 'struct Point {' 'struct Other {' || fail "$(<said.txt)"
   twice 'struct Point {' 'struct Point;' || fail "$(<said.txt)"
   twice 'inline int f(int a) {' 'inline int f(double a) {' || fail "$(<said.txt)"
   ! twice 'struct Point {' 'class Point final : public Base {' || fail 'a type in two files passed'
   ! twice 'inline int f(int a) {' 'inline int f(int a) {' || fail 'a function in two files passed'
+  ! twice 'struct Point {' $'struct Point final\n    : public Base {' || fail 'a type whose bases are below passed'
+  twice 'inline constexpr int count = 3;' 'constexpr int count = 3;' || fail "$(<said.txt)"
+  ! twice 'inline constexpr int count = 3;' 'inline constexpr double count = 3;' || fail 'a variable in two files passed'
+  twice $'template <class T>\nint f(T a) {' $'template <class T>\nint f(T a, int b) {' || fail "$(<said.txt)"
+  ! twice $'template <class T>\nint f(T a) {' $'template <class T>\nint f(T a) {' || fail 'a function template in two files passed'
+  # A program of its own.
+  ! twice 'struct Point {' 'struct Point {' --alone || fail 'a type of a program and of a header passed'
+  mkdir -p lib/b && cp lib/a/b.cpp lib/b/b.cpp
+  twice 'struct Other {' 'struct Point {' --alone lib/b/b.cpp || fail "$(<said.txt)"
+  ! twice 'struct Other {' 'struct Point {' lib/b/b.cpp || fail 'a type of two sources passed'
 }
 
 test_unity_units_have_no_clashes() {

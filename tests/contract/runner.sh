@@ -26,6 +26,21 @@ test_right_cases_pass() {
   must_pass 'g | 0 | text | echo hello | cat > out.ply; cat out.ply' hello
   # A command in lines of its own.
   must_pass $'h | 0 | text | \\\n  echo hello > out.ply\n  for k in 1; do\n    cat out.ply\n  done' hello
+  # A long message in a line of its own.
+  must_pass $'i | 1 | \\ | \\\n  x: no\n  echo "x: no" >&2\n  exit 1'
+  must_pass "j | 1 | \\ | \\"$'\n'"  x: $(printf '%0300d' 0)"$'\n  printf "x: %0300d\\n" 0 >&2; exit 1'
+}
+
+test_a_case_is_short() {
+  local long k
+  long=$(printf '%0200d' 0)
+  must_fail 'cases:1: a line of more than 200 characters' "a | 0 | - | : $long"
+  must_fail 'cases:3: a line of more than 200 characters' $'b | 0 | - | \\\n  :\n  : '"$long"
+  must_fail 'cases:1: a line of more than 200 characters' "c | 1 | x: $long | exit 1"
+  long=$'d | 0 | - | \\'
+  for k in {1..12}; do long+=$'\n  : '$k; done
+  must_pass "$long"
+  must_fail 'cases:14: a case of more than 12 lines' "$long"$'\n  : 13'
 }
 
 test_wrong_cases_fail() {
@@ -69,12 +84,14 @@ test_update_writes_what_changed() {
   echo old >golden/expected/text
   printf '%s\n' '# head' 'a | 0 | text | echo new | cat' 'b | 0 | digest:0 | echo "{\"digest\":\"00ff\"}" >&2' \
     'c | 1 | x: old | echo "x: new" >&2; exit 1' 'd | 1 | x: * | echo "x: free" >&2; exit 1' \
+    'm | 1 | \ | \' '  x: old' '  echo "x: new" >&2' '  exit 1' \
     'l | 0 | digest:0 | \' '  true' '  echo "{\"digest\":\"00ff\"}" >&2' >golden/cases
   update() { GOLDEN=$PWD/golden "$GEWEBE_ROOT/tests/golden/run" update --config "$(basename "$BUILD")"; }
   update >said.txt || fail 'update failed' "$(<said.txt)"
   [[ $(<golden/expected/text) == new ]] || fail 'expected/text was not written'
   grep -qxF 'b | 0 | digest:00ff | echo "{\"digest\":\"00ff\"}" >&2' golden/cases || fail 'the digest was not written'
   grep -qxF 'c | 1 | x: new | echo "x: new" >&2; exit 1' golden/cases || fail 'the message was not written'
+  grep -xF -A 2 'm | 1 | \ | \' golden/cases | cmp - <(printf '%s\n' 'm | 1 | \ | \' '  x: new' '  echo "x: new" >&2') || fail 'a message in a line of its own was not written'
   tail -3 golden/cases | cmp - <(printf '%s\n' 'l | 0 | digest:00ff | \' '  true' '  echo "{\"digest\":\"00ff\"}" >&2') || fail 'a case of several lines was not kept'
   grep -qxF 'd | 1 | x: * | echo "x: free" >&2; exit 1' golden/cases || fail 'a pattern that holds was changed'
   [[ $(head -1 golden/cases) == '# head' ]] || fail 'the head was lost'
@@ -131,10 +148,23 @@ test_two_runs_wait_for_each_other() {
   cat first.txt said.txt | grep -q 'waits for another run' || fail 'nobody waited'
 }
 
+test_lists_of_the_sanitizers_name_tests() {
+  local list pattern
+  [[ -x $BUILD/unit ]] || skip "$BUILD/unit is not built"
+  for list in slow threads; do
+    while read -r pattern; do
+      "$BUILD/unit" --gtest_list_tests --gtest_filter="$pattern" | grep -q '^ ' || fail "tests/sanitize/$list: no test is $pattern"
+    done < <(sed 's/ *#.*//; /^$/d' "$GEWEBE_ROOT/tests/sanitize/$list")
+  done
+}
+
 test_no_expected_file_is_left_over() {
   local file
   for file in "$GEWEBE_ROOT"/tests/golden/expected/*; do
     [[ -e $file ]] || continue
     grep -qF "| ${file##*/} " "$GEWEBE_ROOT/tests/golden/cases" || fail "no case expects ${file##*/}"
+  done
+  for file in "$GEWEBE_ROOT"/tests/golden/in/scenes/*; do
+    grep -qF "\$IN/scenes/${file##*/}" "$GEWEBE_ROOT/tests/golden/cases" || fail "no case runs ${file##*/}"
   done
 }

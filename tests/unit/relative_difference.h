@@ -3,6 +3,7 @@
 
 #include "tests/unit/larger.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -20,6 +21,14 @@ inline double relative_difference(std::span<const double> a, std::span<const dou
     size = larger(size, std::abs(b[k]));
   }
   return size > 0 ? max / size : max > 0 ? HUGE_VAL : max;
+}
+
+/// max|a - b|; infinite where sizes differ, NaN if a number is.
+inline double largest_difference(std::span<const double> a, std::span<const double> b) {
+  double most = a.size() == b.size() ? 0 : HUGE_VAL;
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k)
+    most = larger(most, std::abs(a[k] - b[k]));
+  return most;
 }
 
 } // namespace gewebe::test

@@ -41,7 +41,7 @@ inline GridInfo turned_axes(std::uint32_t seed) {
 }
 
 /// Exact distance to a ball, or to a torus about the z axis, in voxels of `size`.
-inline Grid ball(double radius, double size, const Vec3& center = {0.13, -0.21, 0.07}) {
+inline Grid ball_grid(double radius, double size, const Vec3& center = {0.13, -0.21, 0.07}) {
   const int reach = static_cast<int>(std::ceil(radius / size)) + 3;
   return sample(level_set(uniform_transform(size), 9), {-reach, -reach, -reach},
                 {reach, reach, reach}, [&](int i, int j, int k) {

@@ -15,6 +15,7 @@
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
 #include "tests/unit/larger.h"
+#include "tests/unit/stuffing_checks.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 
@@ -89,17 +90,8 @@ Body solid(const TetMesh& mesh, bool surface_only) {
 }
 
 /// A ball of tetrahedra, whose surface nodes come first.
-Body ball(double cell) {
-  GridInfo info;
-  info.transform = uniform_transform(cell);
-  info.level_set = true;
-  info.background = 9;
-  const int reach = static_cast<int>(std::ceil(5 / cell)) + 3;
-  const Grid grid = scenes::sample(info, {-reach, -reach, -reach}, {reach, reach, reach},
-                                   [&](int i, int j, int k) {
-                                     return norm(Vec3{i * cell, j * cell, k * cell}) - 5;
-                                   });
-  return solid(stuff({}, grid, {}), true);
+Body stuffed_ball(double cell) {
+  return solid(stuff({}, ball_grid(5, cell, {}), {}), true);
 }
 
 Body net() {
@@ -162,12 +154,12 @@ void expect_within(const char* name, const Body& body, std::initializer_list<dou
 }
 
 TEST(CompressedColumns, EveryEntryOfASolidIsWithinTheBound) {
-  expect_within("ball", ball(1.5), {1e-2, 1e-3, 1e-4, 1e-5, 1e-6});
+  expect_within("ball", stuffed_ball(1.5), {1e-2, 1e-3, 1e-4, 1e-5, 1e-6});
   expect_within("bar", bar(), {1e-3, 1e-5});
 }
 
 TEST(CompressedColumns, OfTheSurfaceAloneAreWithinTheBoundAndTakeLess) {
-  const Body body = ball(1.1);
+  const Body body = stuffed_ball(1.1);
   const std::size_t rows = body.nodes.size(), n = body.positions.size();
   ASSERT_LT(rows + 100, n);
   Collected exact;
@@ -196,14 +188,14 @@ TEST(CompressedColumns, TakeLessOfLargerSolids) {
     return static_cast<double>(bytes(body.compress(relative))) /
            static_cast<double>(36 * body.nodes.size() * body.positions.size());
   };
-  const Body small = ball(1.5), large = ball(1.1);
+  const Body small = stuffed_ball(1.5), large = stuffed_ball(1.1);
   EXPECT_LT(share(large, 1e-4), 0.8 * share(small, 1e-4));
   EXPECT_LT(share(large, 1e-4), 0.25);
   EXPECT_LT(share(large, 1e-2), 0.3 * share(large, 1e-4));
 }
 
 TEST(CompressedColumns, AnyNumberOfThreadsGivesTheSameBytes) {
-  for (const Body& body : {ball(1.5), net()}) {
+  for (const Body& body : {stuffed_ball(1.5), net()}) {
     const CompressedMade one = body.compress(1e-4, 1), five = body.compress(1e-4, 5);
     EXPECT_EQ(one.chunks, five.chunks);
     EXPECT_EQ(one.layout.count, five.layout.count);
@@ -239,7 +231,7 @@ TEST(CompressedColumns, AreSymmetricBitByBitAndZeroOnFixedAxes) {
 }
 
 TEST(CompressedColumns, BlocksColumnsAndSumsAreOfOneMatrix) {
-  const Body body = ball(1.5);
+  const Body body = stuffed_ball(1.5);
   const auto columns = compressed_columns(body.compress(1e-4), body.positions.size());
   const std::size_t axes = 3 * body.positions.size();
   std::vector<double> read(3 * axes), expected(axes, 0.25), one(expected), five(expected);

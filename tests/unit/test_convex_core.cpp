@@ -1,9 +1,9 @@
 #include "contact/convex_core.h"
 
-#include "base/error.h"
 #include "contact/instrument_surface.h"
 #include "convex_meshes.h"
 #include "larger.h"
+#include "tests/unit/complaint.h"
 
 #include <array>
 #include <cmath>
@@ -70,13 +70,8 @@ TEST(ConvexCore, FlatPartsBecomeOneFaceHoweverTheyAreDivided) {
 }
 
 TEST(ConvexCore, WhatIsNoConvexSolidIsRefusedByName) {
-  const auto complaint = [](const TriangleMesh& mesh) -> std::string {
-    try {
-      ConvexCore core(mesh);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto complaint = [](const TriangleMesh& mesh) {
+    return test::complaint([&] { return ConvexCore(mesh); });
   };
   const TriangleMesh box = test::divided_box({2, 3, 4}, 1);
   TriangleMesh open = box;

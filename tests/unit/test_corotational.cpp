@@ -5,6 +5,7 @@
 #include "solid/assembly.h"
 #include "solid/corotational.h"
 #include "tests/unit/larger.h"
+#include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/order.h"
 
@@ -81,13 +82,6 @@ double largest(const std::vector<double>& a) {
     most = test::larger(most, std::abs(value));
   return most;
 }
-double difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double most = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    most = test::larger(most, std::abs(a[k] - b[k]));
-  return most;
-}
-
 class Corotational : public testing::TestWithParam<bool> {};
 
 TEST_P(Corotational, ForcesAreTheDerivativeOfTheEnergy) {
@@ -132,7 +126,7 @@ TEST_P(Corotational, TangentAtRestIsThatOfSmallStrains) {
   const std::vector<double> other = body.forces(plus);
   for (std::size_t k = 0; k < rest.size(); ++k)
     found[k] = (found[k] - other[k]) / (2 * h);
-  EXPECT_LT(difference(found, linear), 1e-7 * largest(linear));
+  EXPECT_LT(test::largest_difference(found, linear), 1e-7 * largest(linear));
 }
 
 TEST_P(Corotational, TurnedBodiesFeelNothingAndForcesHaveNoSumOrMoment) {

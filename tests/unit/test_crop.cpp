@@ -16,7 +16,7 @@ using namespace scenes;
 constexpr double pi = std::numbers::pi;
 
 /// A ball about the origin whose density falls by 1 per mm at its surface, voxel `size`.
-Grid ball(double radius, double size, bool level_set = false) {
+Grid fraction_or_distance(double radius, double size, bool level_set = false) {
   GridInfo info;
   info.transform = uniform_transform(size);
   info.level_set = level_set;
@@ -38,8 +38,8 @@ TEST(Crop, FacesOfTheBoxLieWhereItIs) {
   const double radius = 12.3;
   for (const bool level_set : {false, true})
     for (const double z : {-3.0, 0.4, 2.25, 2.999}) {
-      const Grid grid = crop({}, ball(radius, 0.5, level_set), {{-99, -99, z}, {99, 99, 99}},
-                             level_set ? 0 : 0.5);
+      const Grid grid = crop({}, fraction_or_distance(radius, 0.5, level_set),
+                             {{-99, -99, z}, {99, 99, 99}}, level_set ? 0 : 0.5);
       const TriangleMesh mesh = marching_cubes({}, grid).mesh;
       const MeshReport report = meshed(grid);
       EXPECT_EQ(report.components, 1U);
@@ -123,7 +123,7 @@ TEST(Crop, TurnedLattice) {
 }
 
 TEST(Crop, BoxesOutsideAndRound) {
-  const Grid grid = ball(9, 1);
+  const Grid grid = fraction_or_distance(9, 1);
   EXPECT_EQ(crop({}, grid, {{50, 50, 50}, {60, 60, 60}}, 0.5).active_voxels(), 0U);
   EXPECT_EQ(crop({}, grid, {{-50, -50, -50}, {60, 60, 60}}, 0.5).digest(), grid.digest());
 }
@@ -138,7 +138,7 @@ TEST(Crop, SameForAnyThreadCount) {
 }
 
 TEST(Crop, Refuses) {
-  const Grid grid = ball(9, 1);
+  const Grid grid = fraction_or_distance(9, 1);
   EXPECT_THROW(crop({}, grid, {{0, 0, 0}, {-1, 1, 1}}, 0.5), Error);
   EXPECT_THROW(crop({}, grid, {{0, 0, 0}, {1, 1, 1}}, -0.5), Error); // background is inside
 }

@@ -39,7 +39,7 @@ Skin skin_of(const TriangleMesh& mesh) {
 }
 
 /// Of radius 1 about 0.
-Skin ball() {
+Skin ball_skin() {
   return skin_of(test::ball(4, 1, {0, 0, 0}));
 }
 
@@ -100,7 +100,7 @@ std::vector<std::vector<Vec3>> rows_down(double x, double high, double low, int 
 TEST(CutSkin, APlanePartsItInTwoClosedPieces) {
   for (const Vec3& normal : {Vec3{1, 0, 0}, Vec3{0.3, -1, 0.7}, Vec3{0, 0, 1}})
     for (const double off : {0.0, 0.3}) { // 0: through points and edges
-      const Skin skin = ball();
+      const Skin skin = ball_skin();
       const SkinCut cut =
           checked(skin, plane_sheet(skin, {off * normal / norm(normal), normal}, cell));
       EXPECT_EQ(examine_mesh(mesh_of(cut.skin)).components, 2U);
@@ -131,7 +131,7 @@ TEST(CutSkin, APlanePartsItInTwoClosedPieces) {
 }
 
 TEST(CutSkin, TextureCoordinatesStayWhereTheyAre) {
-  const Skin skin = ball();
+  const Skin skin = ball_skin();
   const SkinCut cut = checked(skin, plane_sheet(skin, {{0.11, 0, 0}, {1, 0.2, 0.4}}, cell));
   for (std::size_t t = 0; t < cut.skin.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -145,7 +145,7 @@ TEST(CutSkin, TextureCoordinatesStayWhereTheyAre) {
 
 TEST(CutSkin, AWoundThatEndsInsideLeavesItOnePiece) {
   for (const double half : {1.5, 0.4}) {
-    const Skin skin = ball();
+    const Skin skin = ball_skin();
     const SkinCut cut = checked(skin, strip_sheet(rows_down(0.123, 1.5, 0.1, 7, half, 0.01)));
     const MeshReport report = examine_mesh(mesh_of(cut.skin));
     EXPECT_EQ(report.components, 1U);
@@ -158,7 +158,7 @@ TEST(CutSkin, AWoundThatEndsInsideLeavesItOnePiece) {
 }
 
 TEST(CutSkin, GoesOnWhereItEnded) {
-  const Skin skin = ball();
+  const Skin skin = ball_skin();
   const std::vector<std::vector<Vec3>> rows = rows_down(0.123, 1.5, -1.5, 24, 1.5, 0.013);
   const Skin at_once = checked(skin, strip_sheet(rows)).skin;
   for (const std::size_t each : {1U, 3U, 8U}) {
@@ -179,7 +179,7 @@ TEST(CutSkin, GoesOnWhereItEnded) {
 }
 
 TEST(CutSkin, ABladeThatSawsGoesOnToo) {
-  Skin now = ball();
+  Skin now = ball_skin();
   std::vector<Vec3> start = rows_down(0.1, 1.5, 1.5, 1)[0];
   double z = 1.5;
   for (int n = 0; n < 30; ++n) {
@@ -194,7 +194,7 @@ TEST(CutSkin, ABladeThatSawsGoesOnToo) {
 }
 
 TEST(CutSkin, CutsOfCutsAreClosedToo) {
-  const Skin skin = ball();
+  const Skin skin = ball_skin();
   Skin now = skin;
   std::size_t pieces = 1;
   const std::vector<CutPlane> planes{
@@ -246,14 +246,14 @@ TEST(CutSkin, ASurfaceInsideIsCutByItself) {
 }
 
 TEST(CutSkin, ASheetBesideItChangesNothing) {
-  const Skin skin = ball();
+  const Skin skin = ball_skin();
   const SkinCut cut = cut_skin(skin, plane_sheet(skin, {{3, 0, 0}, {1, 0, 0}}, cell), cell, reach);
   EXPECT_EQ(cut.skin, skin);
   EXPECT_TRUE(walls_of(cut).triangles.empty());
 }
 
 TEST(CutSkin, WhatIsOpenIsRefused) {
-  Skin skin = ball();
+  Skin skin = ball_skin();
   skin.triangles.erase(skin.triangles.begin() + 5, skin.triangles.begin() + 900);
   skin.material.resize(skin.triangles.size());
   skin.texcoords.resize(skin.triangles.size());

@@ -1,12 +1,12 @@
 // Models of finite elements that a blade cuts: whole, as heavy as before, drawn as before but for
 // the wall, and weaker where they are cut.
 
-#include "base/error.h"
 #include "mesh/check.h"
 #include "solid/cut_solid.h"
 #include "solid/model_stiffness.h"
 #include "solid/solid_model.h"
 #include "solve/factor.h"
+#include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tet_cut_checks.h"
 #include "tet_fixtures.h"
@@ -15,7 +15,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -263,19 +262,10 @@ TEST_P(CutSolid, BendsMoreThanBefore) {
   EXPECT_LT(hinge, 1.15 * slit);
 }
 
-std::string complaint(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST_P(CutSolid, RefusesByName) {
   const Model model = box_model(GetParam());
   const auto refusal = [](const Model& of) {
-    return complaint([&] { cut_solid(of, half_way()); });
+    return test::complaint([&] { cut_solid(of, half_way()); });
   };
   EXPECT_EQ(refusal(model), "");
   Model other = model;

@@ -62,7 +62,7 @@ std::map<Int3, LeafView> by_origin(const Grid& grid) {
 }
 
 /// What is wrong with a band volume; empty if nothing is.
-std::string complaint(const Grid& plain, const Grid& band, double isovalue) {
+std::string fault_of_band(const Grid& plain, const Grid& band, double isovalue) {
   const auto all = by_origin(plain), kept = by_origin(band);
   const std::set<Int3> crossing = crossing_leaves(plain, isovalue);
   for (const Int3& origin : crossing) {
@@ -114,7 +114,7 @@ TEST(DensityBand, HoldsExactlyTheCrossingLeavesOfRandomScenes) {
     options.band = isovalue;
     DensityReport report;
     const Grid band = metaball_density({}, particles, options, &report);
-    EXPECT_EQ(complaint(plain, band, isovalue), "") << "scene " << scene;
+    EXPECT_EQ(fault_of_band(plain, band, isovalue), "") << "scene " << scene;
     crossings += band.leaves().size();
     skipped += report.leaves_skipped;
     const IsoSurface expected = marching_cubes({}, plain, isovalue);
@@ -140,7 +140,7 @@ TEST(DensityBand, ARegionThatEndsAtFacesOfLeavesHasItsSurfaceThere) {
       const Grid plain = metaball_density({}, particles, options);
       options.band = isovalue;
       const Grid band = metaball_density({}, particles, options);
-      EXPECT_EQ(complaint(plain, band, isovalue), "") << isovalue << ' ' << leaves;
+      EXPECT_EQ(fault_of_band(plain, band, isovalue), "") << isovalue << ' ' << leaves;
       const auto n = static_cast<std::size_t>(leaves), inner = n - 2;
       EXPECT_EQ(plain.leaves().size(), n * n * n);
       EXPECT_EQ(band.leaves().size(), n * n * n - inner * inner * inner);
@@ -155,7 +155,7 @@ TEST(DensityBand, CubesSeeTheParticlesBeyondTheirFaces) {
     const Particles particles = random_particles(1500, 80, 2.5 + scene, {}, 40 + scene, false);
     const Grid plain = metaball_density({}, particles, options_for(1));
     const Grid band = metaball_density({}, particles, options_for(1, 0.5));
-    EXPECT_EQ(complaint(plain, band, 0.5), "") << scene;
+    EXPECT_EQ(fault_of_band(plain, band, 0.5), "") << scene;
     EXPECT_TRUE(same_mesh(marching_cubes({}, band).mesh, marching_cubes({}, plain).mesh));
   }
 }
@@ -164,7 +164,7 @@ TEST(DensityBand, NegativeControlBoundsForAnotherIsovalueMissCrossings) {
   const Particles particles = random_particles(12, 8, 6, {}, 3);
   const Grid plain = metaball_density({}, particles, options_for(0.35));
   const Grid band = metaball_density({}, particles, options_for(0.35, 0.55));
-  EXPECT_EQ(complaint(plain, band, 0.5), "a crossing leaf is missing");
+  EXPECT_EQ(fault_of_band(plain, band, 0.5), "a crossing leaf is missing");
 }
 
 namespace {

@@ -6,6 +6,7 @@
 #include "model/build.h"
 #include "model/check.h"
 #include "model/primitive.h"
+#include "tests/unit/complaint.h"
 
 #include <gtest/gtest.h>
 
@@ -66,14 +67,10 @@ std::size_t line_of_section(const std::vector<std::string>& lines, std::string_v
 std::string complaint(const std::vector<std::string>& lines) {
   std::vector<std::string> said;
   for (const int threads : {1, 2})
-    try {
-      parse_ela(text_of(lines), "M", on_threads(threads));
-      said.emplace_back();
-    } catch (const Error& error) {
-      said.push_back(error.place().substr(2) + ": " + error.what());
-    }
+    said.push_back(
+        test::complaint([&] { return parse_ela(text_of(lines), "M", on_threads(threads)); }));
   EXPECT_EQ(said[0], said[1]);
-  return said[0];
+  return said[0].empty() ? said[0] : said[0].substr(2);
 }
 
 TEST(ElaLarge, ReadsWhatItWrites) {

@@ -127,7 +127,7 @@ TEST(ElastodynamicPhysics, EnergyOfAnUndampedNetStaysInABoundOverAMillionSteps) 
 }
 
 /// The largest difference of the two over the largest displacement.
-double difference(std::span<const NodeMotion> motion, std::span<const double> u) {
+double error_of_motion(std::span<const NodeMotion> motion, std::span<const double> u) {
   double error = 0, size = 0;
   for (std::size_t i = 0; i < motion.size(); ++i) {
     const Vec3 still{u[3 * i], u[3 * i + 1], u[3 * i + 2]};
@@ -164,9 +164,9 @@ TEST(ElastodynamicPhysics, ASmallForceEndsAtTheStaticSolution) {
     }
     return half;
   };
-  EXPECT_LT(difference(pulled(false, 1), u), 1e-6);
-  EXPECT_LT(difference(pulled(true, 1), u), 1e-6);
-  EXPECT_GT(difference(pulled(true, 2000), u), 1e-6); // not a small one
+  EXPECT_LT(error_of_motion(pulled(false, 1), u), 1e-6);
+  EXPECT_LT(error_of_motion(pulled(true, 1), u), 1e-6);
+  EXPECT_GT(error_of_motion(pulled(true, 2000), u), 1e-6); // not a small one
 }
 
 /// A strip of equilateral triangles of edge 1, `columns` wide and `rows` high, along y.

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "formats/volume/grey_volume.h"
 #include "formats/volume/label_volume.h"
+#include "tests/unit/complaint.h"
 #include "tests/unit/scratch.h"
 
 #include <gtest/gtest.h>
@@ -391,12 +392,8 @@ TEST(LabelVolume, AllLabelsAreNumbersOf31Bits) {
   const auto complaint = [](double value) {
     std::vector<double> values = voxels<double>();
     values[7] = value;
-    try {
-      (void)all_labels_from_bytes(nifti_2(raw(values), false), "test", {}, {});
-    } catch (const Error& error) {
-      return error.place() + ": " + error.what();
-    }
-    return std::string();
+    return test::complaint(
+        [&] { return all_labels_from_bytes(nifti_2(raw(values), false), "test", {}, {}); });
   };
   EXPECT_EQ(complaint(0x1p31 - 1), "");
   EXPECT_EQ(complaint(0x1p31), "test: has label 2147483648, expected 0 to 2147483647");

@@ -18,7 +18,8 @@ bool same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
 }
 
 /// Linear in the distance, so that crossings are exact along rays: a ball of radius r at `center`.
-Grid ball(const GridInfo& info, double radius, const Vec3& center, int n, bool prune = true) {
+Grid density_ball(const GridInfo& info, double radius, const Vec3& center, int n,
+                  bool prune = true) {
   return sample(
       info, {-n, -n, -n}, {n, n, n},
       [&](int i, int j, int k) {
@@ -35,7 +36,8 @@ TEST(MarchingCubes, SphereConvergesWithOrderTwo) {
   for (const int n : {8, 16, 32}) {
     GridInfo info;
     info.transform = uniform_transform(1.0 / n);
-    const IsoSurface surface = marching_cubes({}, ball(info, 1, {0.013, -0.021, 0.007}, n + 6));
+    const IsoSurface surface =
+        marching_cubes({}, density_ball(info, 1, {0.013, -0.021, 0.007}, n + 6));
     const MeshReport report = examine_mesh(surface.mesh);
     ASSERT_TRUE(is_sound(report));
     EXPECT_TRUE(report.outward());

@@ -6,6 +6,7 @@
 #include "model/model.h"
 #include "model_meshes.h"
 #include "statics/elastostatic.h"
+#include "tests/unit/complaint.h"
 
 #include <algorithm>
 #include <charconv>
@@ -26,12 +27,7 @@ BuiltModel build(const TriangleMesh& mesh, const BuildOptions& options = {}) {
 }
 
 std::string complaint(const Model& model) {
-  try {
-    check_model(model);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::complaint([&] { check_model(model); });
 }
 
 TEST(ModelBuild, ClosedSurfaceHasThreeHalvesEdgesPerFace) {

@@ -1,5 +1,5 @@
-#include "base/error.h"
 #include "formats/mesh/ply.h"
+#include "tests/unit/complaint.h"
 
 #include <gtest/gtest.h>
 
@@ -46,12 +46,7 @@ void expect_equal(const TriangleMesh& a, const TriangleMesh& b) {
 
 // "PLACE: WHAT" of the complaint, or "" if there is none.
 std::string complaint(const std::string& bytes) {
-  try {
-    check_mesh(read_ply(bytes, "m.ply"));
-  } catch (const Error& error) {
-    return error.place() + ": " + error.what();
-  }
-  return "";
+  return test::complaint([&] { check_mesh(read_ply(bytes, "m.ply")); });
 }
 
 std::string ascii_square(const std::string& face = "4 0 1 2 3", const std::string& tail = "") {

@@ -49,7 +49,7 @@ SolidTexture solid(const char* text) {
   return solid_texture_from_text(text);
 }
 
-TriangleMesh ball() {
+TriangleMesh round_body() {
   return test::sphere_mesh(4, 30, {100, -20, 7});
 }
 
@@ -158,7 +158,7 @@ void expect_equal(Case c, const std::string& name, double share = 0.85) {
 }
 
 TEST(RenderRest, TriplanarIsTheFormula) {
-  expect_equal(triplanar(ball()), "sphere");
+  expect_equal(triplanar(round_body()), "sphere");
   Case c = triplanar(torus(60, 30, false));
   expect_equal(c, "torus");
   c.scene.rest.sharpness = 7;
@@ -173,7 +173,7 @@ TEST(RenderRest, TriplanarIsTheFormula) {
 }
 
 TEST(RenderRest, NoiseIsTheFormula) {
-  expect_equal(noisy(ball()), "sphere");
+  expect_equal(noisy(round_body()), "sphere");
   expect_equal(noisy(torus(60, 30, false)), "torus");
   Case far = noisy(test::sphere_mesh(4, 30, {1e5, -2e4, 7e3}));
   expect_equal(far, "far away");
@@ -182,7 +182,7 @@ TEST(RenderRest, NoiseIsTheFormula) {
 }
 
 TEST(RenderRest, VeinsAreTheFormula) {
-  expect_equal(veiny(ball()), "sphere");
+  expect_equal(veiny(round_body()), "sphere");
   expect_equal(veiny(torus(60, 30, false)), "torus");
 }
 
@@ -249,7 +249,7 @@ bool equal_at_rest(const Drawing& a, const Drawing& b) {
 TEST(RenderRest, ASequenceIsTheSameAsDrawingsMadeAnew) {
   for (const double shade : {0.0, 0.5}) {
     std::vector<Surface> surfaces(2);
-    surfaces[0].mesh = ball();
+    surfaces[0].mesh = round_body();
     surfaces[1].mesh = test::sphere_mesh(2, 5, {140, 0, 0});
     surfaces[1].mesh.material.assign(surfaces[1].mesh.triangles.size(), 1);
     for (Surface& surface : surfaces)
@@ -304,20 +304,20 @@ TEST(RenderRest, OtherFormulasAreSeen) {
     change(c.scene);
     EXPECT_GT(test::compare(image, c.scene, camera).rms_rounded, 0.5);
   };
-  seen(triplanar(ball()), [](OracleScene& s) { s.rest.sharpness = 5; });
-  seen(triplanar(ball()), [](OracleScene& s) { s.offset = -s.offset; });
-  seen(triplanar(ball()), [](OracleScene& s) { s.rest.start.y += 1; });
-  seen(noisy(ball()), [](OracleScene& s) { s.solid_base->seed = 2; });
-  seen(noisy(ball()), [](OracleScene& s) { s.solid_structure->octaves = 1; });
-  seen(noisy(ball()), [](OracleScene& s) { s.offset = -s.offset; });
-  seen(veiny(ball()), [](OracleScene& s) { s.solid_base->width *= 1.5; });
-  Case fine = noisy(ball());
+  seen(triplanar(round_body()), [](OracleScene& s) { s.rest.sharpness = 5; });
+  seen(triplanar(round_body()), [](OracleScene& s) { s.offset = -s.offset; });
+  seen(triplanar(round_body()), [](OracleScene& s) { s.rest.start.y += 1; });
+  seen(noisy(round_body()), [](OracleScene& s) { s.solid_base->seed = 2; });
+  seen(noisy(round_body()), [](OracleScene& s) { s.solid_structure->octaves = 1; });
+  seen(noisy(round_body()), [](OracleScene& s) { s.offset = -s.offset; });
+  seen(veiny(round_body()), [](OracleScene& s) { s.solid_base->width *= 1.5; });
+  Case fine = noisy(round_body());
   fine.scene.solid_base->scale = 2;
   seen(fine, [](OracleScene& s) { s.solid_base->filtered = false; });
 }
 
 TEST(RenderRest, BytesDoNotDependOnTheProcessor) {
-  for (Case c : {triplanar(ball()), noisy(ball()), veiny(ball())}) {
+  for (Case c : {triplanar(round_body()), noisy(round_body()), veiny(round_body())}) {
     c.scene.mipmap = true;
     Camera camera;
     EXPECT_EQ(draw(c, Backend::cpu, camera, CpuLevel::baseline).values,
@@ -369,7 +369,8 @@ TEST(RenderRest, TriplanarOfAPlaneIsTheBoxMapping) {
 
 // Tissue that is turned as a whole keeps its look, when camera and light turn with it.
 TEST(RenderRest, ItStaysOnTissueThatMoves) {
-  for (const Case& still : {triplanar(ball()), noisy(ball()), veiny(torus(60, 30, false))}) {
+  for (const Case& still :
+       {triplanar(round_body()), noisy(round_body()), veiny(torus(60, 30, false))}) {
     Case c = still;
     Camera camera;
     const Image at_rest = draw(c, Backend::cpu, camera);
@@ -419,7 +420,7 @@ TEST(RenderRest, ItStaysOnTissueThatMoves) {
 }
 
 TEST(RenderRest, TurnsAreTheRotation) {
-  const TriangleMesh mesh = ball();
+  const TriangleMesh mesh = round_body();
   std::vector<Vec3> now = mesh.points;
   for (Vec3& p : now)
     p = rotated(p) * 1.5;
@@ -469,7 +470,7 @@ TEST(RenderRest, NoiseHasTheMomentsThatAreStated) {
 TEST(RenderRest, FixedFunctionsRefuseAndAutomaticDraws) {
   if (!has_gl())
     GTEST_SKIP() << "no OpenGL";
-  Case c = noisy(ball());
+  Case c = noisy(round_body());
   std::vector<Surface> surfaces(1);
   surfaces[0].mesh = c.scene.mesh;
   const Camera camera = make_camera({}, rest_box(surfaces), 60, 40);

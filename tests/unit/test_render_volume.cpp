@@ -67,7 +67,7 @@ Vec3 place(const VolumeView& view, std::size_t x, std::size_t y) {
          view.camera.up * (up * view.half_height);
 }
 
-double ball(const Vec3& p) {
+double ball_density(const Vec3& p) {
   return 0.5 + 6 - norm(p);
 }
 
@@ -80,7 +80,7 @@ double disc_radius(const VolumeView& view) {
 
 TEST(RenderVolume, SlicesOfABallAreDiscsOfKnownRadius) {
   for (const GridTransform& transform : {uniform_transform(0.5), rotated(0.5)}) {
-    const Grid grid = grid_of(ball, 24, transform);
+    const Grid grid = grid_of(ball_density, 24, transform);
     for (const VolumeAxis axis : {VolumeAxis::x, VolumeAxis::y, VolumeAxis::z, VolumeAxis::view}) {
       VolumeViewOptions options = options_of(VolumeMode::slice, axis, 200);
       options.camera.view = "iso";
@@ -246,7 +246,7 @@ TEST(RenderVolume, KnownFieldsHaveKnownProjections) {
 }
 
 TEST(RenderVolume, PicturesAreTheSameForAnyNumberOfThreads) {
-  const Grid grid = grid_of(ball, 16, rotated(0.5));
+  const Grid grid = grid_of(ball_density, 16, rotated(0.5));
   Context one, many;
   one.threads = 1;
   many.threads = 3;
@@ -266,9 +266,9 @@ TEST(RenderVolume, EmptyAndFarOnesAreBackground) {
     EXPECT_EQ(std::ranges::max(view_volume(Grid(), options, {}).values), 0.0F);
   }
   options.place = 1e300;
-  EXPECT_EQ(
-      std::ranges::max(view_volume(grid_of(ball, 8, uniform_transform(1)), options, {}).values),
-      0.0F);
+  EXPECT_EQ(std::ranges::max(
+                view_volume(grid_of(ball_density, 8, uniform_transform(1)), options, {}).values),
+            0.0F);
 }
 
 TEST(RenderVolume, RampsAreLinearAndEndAtTheirEnds) {
@@ -286,7 +286,7 @@ TEST(RenderVolume, RampsAreLinearAndEndAtTheirEnds) {
 }
 
 TEST(RenderVolume, TheLoadedLibrarySeesTheSameAndSaysWhatIsWrong) {
-  const Grid grid = grid_of(ball, 16, rotated(0.5));
+  const Grid grid = grid_of(ball_density, 16, rotated(0.5));
   const ScratchFile file(".vdb");
   Output output(file.path(), {});
   write_volume(output, grid, {});

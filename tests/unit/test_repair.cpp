@@ -19,13 +19,13 @@
 namespace gewebe {
 namespace {
 
-const TriangleMesh& ball() {
+const TriangleMesh& whole_sphere() {
   static const TriangleMesh mesh = test::sphere_mesh(3, 10, {3, -2, 1});
   return mesh;
 }
 
 TriangleMesh with_hole() {
-  TriangleMesh mesh = ball(); // without the faces at two neighbours
+  TriangleMesh mesh = whole_sphere(); // without the faces at two neighbours
   const std::uint32_t a = mesh.triangles[5][0], b = mesh.triangles[5][1];
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
     return std::any_of(t.begin(), t.end(), [&](std::uint32_t c) { return c == a || c == b; });
@@ -35,13 +35,13 @@ TriangleMesh with_hole() {
 }
 
 TriangleMesh with_flipped_face() {
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   std::swap(mesh.triangles[7][1], mesh.triangles[7][2]);
   return mesh;
 }
 
 TriangleMesh with_duplicate() {
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   const auto [a, b, c] = mesh.triangles[9];
   mesh.triangles.insert(mesh.triangles.begin() + 40, Triangle{b, c, a});
   return mesh;
@@ -49,7 +49,7 @@ TriangleMesh with_duplicate() {
 
 /// A face whose corners are on one line: a point on an edge that only the one side has.
 TriangleMesh with_flat_face(double away) {
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   const auto [a, b, c] = mesh.triangles[11];
   const auto m = static_cast<std::uint32_t>(mesh.points.size());
   mesh.points.push_back(mesh.points[a] * (1 - away) + mesh.points[b] * away);
@@ -61,7 +61,7 @@ TriangleMesh with_flat_face(double away) {
 
 /// A point that stands twice, a rounding apart.
 TriangleMesh with_crack() {
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   const std::uint32_t from = mesh.triangles[3][0];
   mesh.points.push_back(mesh.points[from] + Vec3{1e-6, -1e-6, 1e-6});
   mesh.triangles[3][0] = static_cast<std::uint32_t>(mesh.points.size() - 1);
@@ -100,7 +100,7 @@ std::vector<Fault> faults() {
 }
 
 TEST(Repair, EachWordMendsItsOwnFaultAndLeavesTheOthersAlone) {
-  expect_sound(ball(), "the ball");
+  expect_sound(whole_sphere(), "the ball");
   for (const Fault& fault : faults())
     for (const char* const word : {"weld", "duplicates", "orientation", "degenerate", "holes"}) {
       const std::string what = std::string(word) + " of " + fault.word;
@@ -155,7 +155,8 @@ TEST(Repair, AFilledHoleIsLikeItsSurroundings) {
   EXPECT_EQ(mesh.material, std::vector<std::int32_t>(mesh.triangles.size(), 2));
   for (const auto& st : mesh.texcoords)
     EXPECT_EQ(st, (std::array<float, 6>{0.25F, 0.5F, 0.25F, 0.5F, 0.25F, 0.5F}));
-  EXPECT_NEAR(signed_volume(mesh), signed_volume(ball()), 0.02 * signed_volume(ball()));
+  EXPECT_NEAR(signed_volume(mesh), signed_volume(whole_sphere()),
+              0.02 * signed_volume(whole_sphere()));
 }
 
 TEST(Repair, HolesAreFilledUpToTheirSize) {
@@ -276,19 +277,19 @@ TEST(Repair, SheetsThatMeetInAnEdgeStayJoinedAndAreNoHoles) {
 }
 
 TEST(Repair, WeldKeepsClosedPartsApartAndJoinsPatches) {
-  TriangleMesh two = ball();
-  test::append(two, ball());
+  TriangleMesh two = whole_sphere();
+  test::append(two, whole_sphere());
   two.part.assign(two.triangles.size(), 0);
-  std::fill(two.part.begin() + static_cast<std::ptrdiff_t>(ball().triangles.size()), two.part.end(),
-            1);
-  for (std::size_t p = ball().points.size(); p < two.points.size(); ++p)
+  std::fill(two.part.begin() + static_cast<std::ptrdiff_t>(whole_sphere().triangles.size()),
+            two.part.end(), 1);
+  for (std::size_t p = whole_sphere().points.size(); p < two.points.size(); ++p)
     two.points[p].x += 1e-7;
   TriangleMesh mesh = two;
   EXPECT_EQ(repair_mesh(mesh, parse_repair("weld"), Context{}).welded_points, 0U);
   EXPECT_EQ(examine_mesh(mesh).components, 2U);
 
   // One ball in two patches with points of their own, a rounding apart.
-  TriangleMesh patches = ball();
+  TriangleMesh patches = whole_sphere();
   patches.part.resize(patches.triangles.size());
   std::vector<std::uint32_t> copy(patches.points.size(), UINT32_MAX);
   for (std::size_t t = 0; t < patches.triangles.size(); ++t) {
@@ -317,7 +318,7 @@ TEST(Repair, WeldReachesAsFarAsItsDistance) {
     const double angle = 0.37 * seed, z = std::sin(1.7 * seed), r = std::sqrt(1 - z * z);
     const Vec3 out{r * std::cos(angle), r * std::sin(angle), z};
     for (const double part : {0.98, 1.02}) {
-      TriangleMesh mesh = ball();
+      TriangleMesh mesh = whole_sphere();
       const std::uint32_t from = mesh.triangles[3][0];
       mesh.points.push_back(mesh.points[from] + out * (0.01 * part));
       mesh.triangles[3][0] = static_cast<std::uint32_t>(mesh.points.size() - 1);
@@ -329,7 +330,7 @@ TEST(Repair, WeldReachesAsFarAsItsDistance) {
 
 TEST(Repair, WhatBelongsToFacesStaysWithThem) {
   // Two faces stand twice and one is turned; each face has its own numbers.
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   const auto mark = [](const TriangleMesh& m, const Triangle& t, std::size_t corner) {
     return static_cast<float>(m.points[t[corner]].x + 3 * m.points[t[corner]].z);
   };
@@ -350,7 +351,7 @@ TEST(Repair, WhatBelongsToFacesStaysWithThem) {
   const RepairReport report = repair_mesh(mesh, parse_repair("duplicates,orientation"), Context{});
   EXPECT_EQ(report.duplicate_faces, 2U);
   EXPECT_EQ(report.turned_faces, 2U);
-  ASSERT_EQ(mesh.triangles.size(), ball().triangles.size());
+  ASSERT_EQ(mesh.triangles.size(), whole_sphere().triangles.size());
   ASSERT_EQ(mesh.material.size(), mesh.triangles.size());
   ASSERT_EQ(mesh.texcoords.size(), mesh.triangles.size());
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
@@ -364,10 +365,10 @@ TEST(Repair, WhatBelongsToFacesStaysWithThem) {
 }
 
 TEST(Repair, OrientationTurnsWholePartsOutwardAndCavitiesInward) {
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   TriangleMesh inner = test::sphere_mesh(2, 5, {3, -2, 1});
   test::append(mesh, inner); // a cavity, but facing outward
-  const auto faces = static_cast<std::ptrdiff_t>(ball().triangles.size());
+  const auto faces = static_cast<std::ptrdiff_t>(whole_sphere().triangles.size());
   TriangleMesh one = mesh;
   EXPECT_EQ(repair_mesh(one, parse_repair("orientation"), Context{}).turned_faces,
             inner.triangles.size());
@@ -393,7 +394,7 @@ TEST(Repair, UnderstandsWordsAndRefusesOthers) {
        {"wled", "all,", ",all", "weld:", "weld:0", "weld:-1", "weld:nan", "weld:inf", "weld:1x",
         "holes:2.5", "holes:0", "all:3", "duplicates:1", "holes:1e300"})
     EXPECT_THROW((void)parse_repair(text), Error) << text;
-  TriangleMesh mesh = ball();
+  TriangleMesh mesh = whole_sphere();
   EXPECT_THROW((void)repair_mesh(mesh, parse_repair("weld:1e-300"), Context{}), Error);
 }
 

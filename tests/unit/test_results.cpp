@@ -10,6 +10,7 @@
 #include "sim_models.h"
 #include "solid/skin.h"
 #include "solid/solid_model.h"
+#include "tests/unit/complaint.h"
 #include "tet_fixtures.h"
 
 #include <algorithm>
@@ -19,7 +20,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <gtest/gtest.h>
 #include <iterator>
 #include <memory>
@@ -384,27 +384,18 @@ TEST(Results, ForcesAsCsv) {
                                         "1,b,7,-0.5,0,0.001\n");
 }
 
-std::string complaint(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.place() + ": " + error.what();
-  }
-  return "";
-}
-
 TEST(Results, ReadingNamesWhatIsMissing) {
   const ScratchFolder folder;
   const std::string path = folder / "run.h5";
   write(Kind::hdf5, path, textured(), test::two_masses());
   const auto of = [&](const std::string& object, std::size_t frame) {
-    return complaint([&] { (void)read_result_surface(path, object, frame); });
+    return test::complaint([&] { (void)read_result_surface(path, object, frame); });
   };
   EXPECT_EQ(of("b", 2), "");
   EXPECT_EQ(of("c", 0), path + ": there is no object 'c', expected one of z-a, b");
   EXPECT_EQ(of("b", 3), path + ": there is no frame 3, expected 0 to 2");
   EXPECT_NE(of("..", 0), "");
-  EXPECT_NE(complaint([&] { (void)read_result_index(folder / "none.h5"); }), "");
+  EXPECT_NE(test::complaint([&] { (void)read_result_index(folder / "none.h5"); }), "");
   {
     hdf5::File other = hdf5::File::create(folder / "other.h5");
     other.root().set("format", "stiffness_store");
@@ -414,9 +405,9 @@ TEST(Results, ReadingNamesWhatIsMissing) {
     newer.root().set("version", std::uint32_t{2});
     newer.close();
   }
-  EXPECT_EQ(complaint([&] { (void)read_result_index(folder / "other.h5"); }),
+  EXPECT_EQ(test::complaint([&] { (void)read_result_index(folder / "other.h5"); }),
             (folder / "other.h5") + ": holds no results, expected a file that ffe-run made");
-  EXPECT_EQ(complaint([&] { (void)read_result_index(folder / "newer.h5"); }),
+  EXPECT_EQ(test::complaint([&] { (void)read_result_index(folder / "newer.h5"); }),
             (folder / "newer.h5") + ": is of version 2, expected 1");
 }
 
@@ -427,7 +418,7 @@ TEST(Results, CutAndDamagedFilesAreErrors) {
   const std::string whole = bytes_of(path);
   for (std::size_t size = 0; size < whole.size(); size += 1 + size / 16) {
     std::ofstream(copy, std::ios::binary) << whole.substr(0, size);
-    EXPECT_NE(complaint([&] { (void)read_result_index(copy); }), "") << size;
+    EXPECT_NE(test::complaint([&] { (void)read_result_index(copy); }), "") << size;
   }
   // A byte changed anywhere: an error, or a result whose mesh is sound.
   std::size_t errors = 0;
@@ -435,7 +426,7 @@ TEST(Results, CutAndDamagedFilesAreErrors) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x15);
     std::ofstream(copy, std::ios::binary) << changed;
-    errors += complaint([&] {
+    errors += test::complaint([&] {
                 for (const std::string& object : read_result_index(copy).objects)
                   check_mesh(read_result_surface(copy, object, 1).mesh);
               }).empty()
@@ -525,7 +516,7 @@ TEST(Results, ShapesThatCutsChangeAreReadAsTheyWere) {
   }
   EXPECT_EQ(read_result_surface(path, "o.1", 4).mesh.points[0],
             run.part.nodes[0].position - Vec3(4, 4, 4));
-  EXPECT_EQ(complaint([&] { (void)read_result_surface(path, "o", 5); }),
+  EXPECT_EQ(test::complaint([&] { (void)read_result_surface(path, "o", 5); }),
             path + ": there is no frame 5, expected 0 to 4");
   const hdf5::File file = hdf5::File::open(path);
   const hdf5::Group cuts = file.root().group("objects").group("o").group("cuts");
@@ -615,11 +606,11 @@ TEST(Results, SolidsAreWrittenAndRead) {
       EXPECT_EQ(read.mesh.points[i], at_rest.points[i] + Vec3(k / 8, (k + 1) / 8, (k + 2) / 8));
     }
     EXPECT_EQ(read_result_solid(path, "z-a", 0).mesh.points, at_rest.points);
-    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "b", 1); }),
+    EXPECT_EQ(test::complaint([&] { (void)read_result_solid(path, "b", 1); }),
               path + ": object 'b' has no tetrahedra, expected a solid of them");
-    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "z-a", 3); }),
+    EXPECT_EQ(test::complaint([&] { (void)read_result_solid(path, "z-a", 3); }),
               path + ": there is no frame 3, expected 0 to 2");
-    EXPECT_EQ(complaint([&] { (void)read_result_solid(path, "none", 1); }),
+    EXPECT_EQ(test::complaint([&] { (void)read_result_solid(path, "none", 1); }),
               path + ": there is no object 'none', expected one of z-a, b");
     const std::string xdmf = bytes_of(folder / (quadratic ? "ten.xdmf" : "four.xdmf"));
     const std::string topology = "<Topology TopologyType=\"";
@@ -661,10 +652,10 @@ TEST(Results, FieldsBeginWhereTheyAreAskedFor) {
     for (std::size_t i = 0; i < n; ++i)
       EXPECT_EQ(values[i], static_cast<double>(frame * i));
   }
-  EXPECT_EQ(complaint([&] { (void)read_result_values(path, "o", 0, "von-mises"); }),
+  EXPECT_EQ(test::complaint([&] { (void)read_result_values(path, "o", 0, "von-mises"); }),
             path + ": object 'o' has no stress in frame 0, expected a scene with 'emit stress o' "
                    "before it");
-  EXPECT_EQ(complaint([&] { (void)read_result_values(path, "o", 3, "von-mises"); }),
+  EXPECT_EQ(test::complaint([&] { (void)read_result_values(path, "o", 3, "von-mises"); }),
             path + ": there is no frame 3, expected 1 to 2");
   EXPECT_EQ(read_result_values(path, "o", 0, "displacement"),
             std::vector<double>(n, norm(Vec3{0.5, 0.5, 0.5})));
@@ -717,7 +708,7 @@ TEST(Results, TetrahedraThatAreWrongAreNamed) {
   const std::string path = folder / "hand.h5";
   const auto of = [&](const HandMade& made) {
     made.write(path);
-    return complaint([&] { (void)read_result_solid(path, "o", 0); });
+    return test::complaint([&] { (void)read_result_solid(path, "o", 0); });
   };
   const std::vector<std::uint32_t> ten{0, 1, 2, 3, 0, 0, 0, 0, 0, 4};
   EXPECT_EQ(of({}), "");
@@ -746,8 +737,9 @@ TEST(Results, DamagedSolidsAreErrorsOrSound) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x15);
     std::ofstream(copy, std::ios::binary) << changed;
-    errors +=
-        complaint([&] { check_mesh(read_result_solid(copy, "z-a", 1).mesh); }).empty() ? 0 : 1;
+    errors += test::complaint([&] { check_mesh(read_result_solid(copy, "z-a", 1).mesh); }).empty()
+                  ? 0
+                  : 1;
   }
   EXPECT_GT(errors, 0U);
 }
@@ -798,7 +790,7 @@ TEST(Results, DamagedCutsAreErrors) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x15);
     std::ofstream(copy, std::ios::binary) << changed;
-    errors += complaint([&] {
+    errors += test::complaint([&] {
                 for (const std::string& object : read_result_index(copy).objects)
                   for (std::size_t frame = 0; frame < 5; ++frame)
                     check_mesh(read_result_surface(copy, object, frame).mesh);
@@ -815,7 +807,7 @@ TEST(Results, NumbersThatDoNotFitSinglePrecision) {
   const std::unique_ptr<ResultWriter> result = open_result(Kind::hdf5, folder / "r.h5", {});
   result->add_object("a", model);
   const std::vector<double> u{0, 0, 1e39, 0, 0, 0};
-  EXPECT_NE(complaint([&] {
+  EXPECT_NE(test::complaint([&] {
               result->add_frame(0, std::vector<FrameObject>{{u, {}}});
             }).find("does not fit single precision"),
             std::string::npos);

@@ -3,6 +3,7 @@
 #include "formats/scene/scene.h"
 #include "scratch.h"
 #include "sim_models.h"
+#include "tests/unit/complaint.h"
 #include "tools/run/scene_lines.h"
 #include "tools/run/scene_run.h"
 
@@ -17,14 +18,9 @@ namespace {
 using test::organ;
 
 std::string complaint(std::string_view line) {
-  try {
-    (void)parse_scene_line(line);
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
-    EXPECT_TRUE(error.place().empty());
-    return error.what();
-  }
-  return "";
+  const std::string said = test::complaint([&] { return parse_scene_line(line); });
+  EXPECT_EQ(said.find('\n'), std::string::npos);
+  return said;
 }
 
 template <class T>

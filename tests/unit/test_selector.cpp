@@ -2,6 +2,7 @@
 #include "model/build.h"
 #include "model/selector.h"
 #include "model_meshes.h"
+#include "tests/unit/complaint.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>
@@ -37,16 +38,6 @@ Nodes range(std::uint32_t first, std::uint32_t last) {
   return nodes;
 }
 
-template <class Call>
-std::string complaint(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return (error.place().empty() ? "" : error.place() + ": ") + error.what();
-  }
-  return "";
-}
-
 TEST(Selector, Atoms) {
   ASSERT_EQ(surface_count(model()), 26U);
   ASSERT_EQ(model().nodes.size(), 33U);
@@ -73,7 +64,7 @@ TEST(Selector, NearIsTheOneClosestNode) {
   EXPECT_EQ(select("near:1.2,1.1,0,1"), Nodes{6});
   EXPECT_EQ(select("near:1.5,1,0,1"), Nodes{6}); // as near as 7: the lower number
   EXPECT_EQ(select("near:1,1,0,0"), Nodes{6});
-  EXPECT_NE(complaint([] { select("near:1.2,1.1,0,0.1"); }).find("selects no node"),
+  EXPECT_NE(test::complaint([] { select("near:1.2,1.1,0,0.1"); }).find("selects no node"),
             std::string::npos);
   EXPECT_EQ(select("sphere:1.5,1,0,0.5"), (Nodes{6, 7})); // a sphere takes all within
 }
@@ -93,7 +84,7 @@ TEST(Selector, NumbersAloneAreWhatTheyAreInAnExpression) {
   for (const std::string numbers :
        {"8-9,3,3-5,4,32,0-1,8", "0", "0-32", "32,31,0", "5-7,6,7-8", "1-1,2"})
     EXPECT_EQ(select(numbers), select("not not (" + numbers + ")")) << numbers;
-  EXPECT_EQ(complaint([] { select("3,33"); }),
+  EXPECT_EQ(test::complaint([] { select("3,33"); }),
             "selector '3,33': node 33 does not exist, expected 0 to 32");
 }
 
@@ -133,16 +124,16 @@ TEST(Selector, FilesComeFromTheCaller) {
   };
   EXPECT_EQ(select("@grip", load), (Nodes{1, 2, 7, 8, 9, 12}));
   EXPECT_EQ(select("not (@grip)and @grip or @'a b.txt' or @\"a b.txt\"", load), Nodes{3});
-  EXPECT_EQ(complaint([&] { select("@bad", load); }).substr(0, 6), "bad:2:");
-  EXPECT_NE(complaint([&] { select("@far", load); }).find("node 99 does not exist"),
+  EXPECT_EQ(test::complaint([&] { select("@bad", load); }).substr(0, 6), "bad:2:");
+  EXPECT_NE(test::complaint([&] { select("@far", load); }).find("node 99 does not exist"),
             std::string::npos);
-  EXPECT_EQ(complaint([&] { select("@none", load); }).substr(0, 5), "none:");
-  EXPECT_EQ(complaint([&] { select("@lost", load); }).substr(0, 5), "lost:");
-  EXPECT_NE(complaint([&] { select("@grip"); }).find("no files"), std::string::npos);
-  EXPECT_NE(complaint([&] { parse_node_list("1 3-2", "L"); }), "");
-  EXPECT_NE(complaint([&] { parse_node_list("1-", "L"); }), "");
-  EXPECT_NE(complaint([&] { parse_node_list("4294967296", "L"); }), "");
-  EXPECT_NE(complaint([&] { parse_node_list("1;2", "L"); }), "");
+  EXPECT_EQ(test::complaint([&] { select("@none", load); }).substr(0, 5), "none:");
+  EXPECT_EQ(test::complaint([&] { select("@lost", load); }).substr(0, 5), "lost:");
+  EXPECT_NE(test::complaint([&] { select("@grip"); }).find("no files"), std::string::npos);
+  EXPECT_NE(test::complaint([&] { parse_node_list("1 3-2", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { parse_node_list("1-", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { parse_node_list("4294967296", "L"); }), "");
+  EXPECT_NE(test::complaint([&] { parse_node_list("1;2", "L"); }), "");
 }
 
 TEST(Selector, TruthTables) {
@@ -286,7 +277,7 @@ TEST(Selector, SyntaxErrorsNameTheColumn) {
                         {"all surface", 5},
                         {"All", 1},
                         {"z<3\x01", 4}}) {
-    const std::string text = complaint([&] { parse_selector(c.text); });
+    const std::string text = test::complaint([&] { parse_selector(c.text); });
     EXPECT_NE(text.find("column " + std::to_string(c.column) + ": "), std::string::npos)
         << c.text << " gives " << text;
     EXPECT_EQ(text.find('\n'), std::string::npos);
@@ -294,7 +285,7 @@ TEST(Selector, SyntaxErrorsNameTheColumn) {
   std::string deep;
   for (int i = 0; i < 100000; ++i)
     deep += '(';
-  EXPECT_NE(complaint([&] { parse_selector(deep); }).find("too deep"), std::string::npos);
+  EXPECT_NE(test::complaint([&] { parse_selector(deep); }).find("too deep"), std::string::npos);
   std::string nots;
   for (int i = 0; i < 100000; ++i)
     nots += "not ";
@@ -305,8 +296,8 @@ TEST(Selector, SyntaxErrorsNameTheColumn) {
 TEST(Selector, WhatTheModelLacksIsAnError) {
   for (const char* text : {"33", "0-33", "component:2", "component:4294967295", "z<-99",
                            "near:99,0,0,1", "1 and 2", "not surface"})
-    EXPECT_NE(complaint([&] { select(text); }), "") << text;
-  EXPECT_EQ(complaint([] { select("1 and 2"); }),
+    EXPECT_NE(test::complaint([&] { select(text); }), "") << text;
+  EXPECT_EQ(test::complaint([] { select("1 and 2"); }),
             "selector '1 and 2' selects no node, expected at least one; the model's box is -6,0,0 "
             "to 4,21,11");
 }

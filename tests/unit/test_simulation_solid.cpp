@@ -10,6 +10,7 @@
 #include "simulation_scenes.h"
 #include "solid/solid_model.h"
 #include "solid/stress.h"
+#include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"
 
 #include <gtest/gtest.h>
@@ -68,13 +69,6 @@ double largest(std::span<const double> values) {
   return most;
 }
 
-double difference(std::span<const double> a, std::span<const double> b) {
-  double most = a.size() == b.size() ? 0 : HUGE_VAL;
-  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k)
-    most = test::larger(most, std::abs(a[k] - b[k]));
-  return most;
-}
-
 std::unique_ptr<Simulation> scene(const Model& model, Method method, const SolidChoice& choice,
                                   SimulationOptions options = {}, Context context = one_thread()) {
   auto s = std::make_unique<Simulation>(context, std::move(options));
@@ -128,7 +122,7 @@ TEST_P(MovingSolid, RestsWhereStaticsSaysUnderSmallLoads) {
       settle(*moving);
       const Numbers expected = shape(*still, 0);
       EXPECT_GT(largest(expected), 1e-6);
-      EXPECT_LE(difference(shape(*moving, 0), expected), 1e-4 * largest(expected));
+      EXPECT_LE(test::largest_difference(shape(*moving, 0), expected), 1e-4 * largest(expected));
       const auto &a = still->contact_forces(0), &b = moving->contact_forces(0);
       ASSERT_EQ(a.size(), name == "displacement" ? 2U : 0U);
       ASSERT_EQ(b.size(), a.size());
@@ -265,13 +259,13 @@ TEST(SimulationSolid, ChangesItsMethodWithoutAJump) {
   EXPECT_GT(largest(before), 1e-4);
   s->apply(SetMethod{0, Method::ela});
   s->step(0);
-  EXPECT_LE(difference(shape(*s, 0), before), 1e-12 * 20);
+  EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-12 * 20);
   s->step(0.01);
-  EXPECT_LE(difference(shape(*s, 0), before), 1e-4 * largest(before));
+  EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-4 * largest(before));
   settle(*s);
   s->apply(SetMethod{0, Method::ffe});
   s->step(0.1);
-  EXPECT_LE(difference(shape(*s, 0), before), 1e-12 * 20);
+  EXPECT_LE(test::largest_difference(shape(*s, 0), before), 1e-12 * 20);
   ASSERT_EQ(s->news().jumps.size(), 1U);
   EXPECT_LE(s->news().jumps[0].size, 1e-4 * largest(before));
 }
@@ -479,7 +473,8 @@ TEST(SimulationSolid, AnInstrumentPressesAsStaticsSays) {
   EXPECT_GT(a.nodes, 0U);
   EXPECT_GT(a.force.z, 10);
   EXPECT_LE(norm(a.force - b.force), 0.03 * norm(a.force));
-  EXPECT_LE(difference(shape(*moving, 0), shape(*still, 0)), 0.03 * largest(shape(*still, 0)));
+  EXPECT_LE(test::largest_difference(shape(*moving, 0), shape(*still, 0)),
+            0.03 * largest(shape(*still, 0)));
   moving->apply(MoveInstrument{0, {18, 4, 40}, {}, 0});
   settle(*moving);
   EXPECT_EQ(moving->instrument(0).nodes, 0U);
@@ -550,7 +545,8 @@ TEST(SolidScene, FollowsALongPullAsSolvedStepsDo) {
   }
   double most = 0;
   for (std::size_t k = 0; k < path[0].size(); ++k)
-    most = test::larger(most, difference(path[0][k], path[1][k]) / largest(path[1][k]));
+    most =
+        test::larger(most, test::largest_difference(path[0][k], path[1][k]) / largest(path[1][k]));
   std::printf("a long pull: off by %.2e of the displacement at most\n", most);
   EXPECT_LT(most, 0.01);
 }

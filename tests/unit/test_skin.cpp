@@ -6,6 +6,7 @@
 #include "model_meshes.h"
 #include "solid/skin.h"
 #include "solid/solid_model.h"
+#include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
@@ -35,7 +36,7 @@ Model box_model(bool quadratic) {
 
 /// A ball about the box's middle with texture coordinates: of radius 0.8 inside it, of 1.3 in and
 /// out.
-TriangleMesh ball(double radius) {
+TriangleMesh textured_ball(double radius) {
   TriangleMesh mesh = test::ball(3, radius, {1, 1, 1});
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     mesh.texcoords.push_back({0.1F, 0, 1, 0.25F, 0.5F, static_cast<float>(t % 7)});
@@ -79,12 +80,12 @@ bool inside(const Vec3& p) {
 TEST(Skin, FollowsWhatElementsHoldExactly) {
   for (const bool quadratic : {false, true}) {
     Model model = box_model(quadratic);
-    EXPECT_LT(error_of(model, ball(0.8), affine), 1e-13) << quadratic;
-    EXPECT_LT(error_of(model, ball(1.3), affine), 1e-12) << quadratic; // outside too
+    EXPECT_LT(error_of(model, textured_ball(0.8), affine), 1e-13) << quadratic;
+    EXPECT_LT(error_of(model, textured_ball(1.3), affine), 1e-12) << quadratic; // outside too
     if (quadratic)
-      EXPECT_LT(error_of(model, ball(0.8), bent), 1e-12);
+      EXPECT_LT(error_of(model, textured_ball(0.8), bent), 1e-12);
     else
-      EXPECT_GT(error_of(model, ball(0.8), bent), 1e-2); // linear elements hold no bend
+      EXPECT_GT(error_of(model, textured_ball(0.8), bent), 1e-2); // linear elements hold no bend
   }
 }
 
@@ -113,7 +114,7 @@ TEST(Skin, GoesOnOutsideWithTheStrainThatItLeft) {
 TEST(Skin, PointsFollowTheNearestElementOfAll) {
   for (const double radius : {0.8, 1.3, 9.0}) {
     Model model = box_model(false);
-    const TriangleMesh surface = ball(radius);
+    const TriangleMesh surface = textured_ball(radius);
     const SkinReport report = add_skin(model, surface, {}, {});
     ASSERT_EQ(model.skin.points, surface.points);
     EXPECT_EQ(model.skin.triangles, surface.triangles);
@@ -182,9 +183,9 @@ TEST(Skin, IsTheSameOnAnyNumberOfThreads) {
   Model one = box_model(true), four = one;
   Context context;
   context.threads = 1;
-  (void)add_skin(one, ball(1.3), {}, context);
+  (void)add_skin(one, textured_ball(1.3), {}, context);
   context.threads = 4;
-  (void)add_skin(four, ball(1.3), {}, context);
+  (void)add_skin(four, textured_ball(1.3), {}, context);
   EXPECT_EQ(one, four);
 }
 
@@ -208,7 +209,7 @@ TEST(Skin, LeavesOutWhatIsNoSurface) {
 TEST(Skin, IsReadAsItIsWritten) {
   Model model = box_model(true);
   const std::string bare = model_digest(model);
-  TriangleMesh surface = ball(1.3);
+  TriangleMesh surface = textured_ball(1.3);
   const std::vector<std::int32_t> material(surface.triangles.size(), 1);
   (void)add_skin(model, surface, material, {});
   EXPECT_NE(model_digest(model), bare);
@@ -228,13 +229,9 @@ TEST(Skin, IsCheckedLineByLine) {
   const std::string elements = "tetrahedra 1\n0 1 2 3 0\n";
   const std::string skin = "skin 3\n0 0 0 0\n1 0 0 0\n0 1 0 0\nskin_triangles 1\n0 1 2 0\n"
                            "skin_texcoords 1\n0 0 1 0 0 1\n";
-  const auto complaint = [&](const std::string& text) -> std::string {
-    try {
-      (void)parse_ela(text, "M");
-    } catch (const Error& error) {
-      return error.place().substr(2) + ": " + error.what();
-    }
-    return "";
+  const auto complaint = [&](const std::string& text) {
+    const std::string said = test::complaint([&] { return parse_ela(text, "M"); });
+    return said.empty() ? said : said.substr(2);
   };
   EXPECT_EQ(complaint(head + elements + skin + "end\n"), "");
   EXPECT_EQ(complaint(head + skin + "end\n"),

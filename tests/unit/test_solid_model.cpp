@@ -1,7 +1,6 @@
 // Models of finite elements: made of meshes, their stiffness beside springs, loads, selectors, and
 // scenes of them against a solution made directly.
 
-#include "base/error.h"
 #include "contact/load.h"
 #include "formats/model/ela.h"
 #include "formats/store/stiffness_store.h"
@@ -12,6 +11,7 @@
 #include "solid/solid_model.h"
 #include "solve/condition.h"
 #include "solve/factor.h"
+#include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
@@ -57,12 +57,7 @@ double largest(const std::vector<double>& v) {
 }
 
 std::string complaint(TetMesh mesh, const SolidModelOptions& o) {
-  try {
-    (void)solid_model(std::move(mesh), o, {});
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::complaint([&] { return solid_model(std::move(mesh), o, {}); });
 }
 
 TEST(SolidModel, IsWholeAndHoldsTheSurfaceFirst) {

@@ -8,6 +8,7 @@
 #include "solve/factor.h"
 #include "tests/stress/motion_bodies.h"
 #include "tests/unit/larger.h"
+#include "tests/unit/relative_difference.h"
 #include "tests/unit/solid_bodies.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
@@ -72,14 +73,8 @@ double energy(const SolidMotion& body) {
   return body.kinetic_energy() + body.potential_energy();
 }
 
-double difference(const Numbers& a, const Numbers& b) {
-  double most = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    most = test::larger(most, std::abs(a[k] - b[k]));
-  return most;
-}
 double largest(const Numbers& a) {
-  return difference(a, Numbers(a.size()));
+  return test::largest_difference(a, Numbers(a.size()));
 }
 
 std::array<Vec3, 2> momentum(const SolidMotion& body) {
@@ -191,7 +186,7 @@ TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
     const Numbers u = rest(load.axes),
                   expected = hyperelastic_statics(m, elements, held, {}, load).displacement.axes;
     EXPECT_GT(largest(expected), 0.5);
-    EXPECT_LT(difference(u, expected), 1e-5 * largest(expected));
+    EXPECT_LT(test::largest_difference(u, expected), 1e-5 * largest(expected));
   }
   Numbers small(held.size());
   for (std::size_t axis = 2; axis < small.size(); axis += 3)
@@ -199,7 +194,7 @@ TEST_P(SolidMotionOf, ComesToRestWhereStaticsSays) {
   const StiffnessMatrix k = solid_stiffness(m, elements, held);
   Numbers expected(held.size());
   solve_axes(k, Factor(k, {}), small, expected);
-  EXPECT_LT(difference(rest(small), expected), 1e-5 * largest(expected));
+  EXPECT_LT(test::largest_difference(rest(small), expected), 1e-5 * largest(expected));
   // And what holds it carries the load.
   double carried = 0, weight = 0;
   for (std::size_t axis = 2; axis < small.size(); axis += 3) {
@@ -230,9 +225,10 @@ TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
     return moving.displacement();
   };
   const Numbers a = end(8, false, 1e-7), b = end(16, false, 1e-7), c = end(32, false, 1e-7);
-  EXPECT_NEAR(difference(a, b) / difference(b, c), 2, 0.3);
-  EXPECT_LT(difference(a, end(8, true, 0.1)), 1e-5 * largest(a));
-  EXPECT_LT(difference(a, end(8, false, SolidMotionOptions().tolerance)), 0.02 * largest(a));
+  EXPECT_NEAR(test::largest_difference(a, b) / test::largest_difference(b, c), 2, 0.3);
+  EXPECT_LT(test::largest_difference(a, end(8, true, 0.1)), 1e-5 * largest(a));
+  EXPECT_LT(test::largest_difference(a, end(8, false, SolidMotionOptions().tolerance)),
+            0.02 * largest(a));
 }
 
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
@@ -323,7 +319,7 @@ TEST_P(SolidMotionOf, HeldNodesAreMovedAndPullTheRest) {
   Numbers expected(held.size());
   for (std::size_t axis = 0; axis < held.size(); axis += 3)
     expected[axis] = 4;
-  EXPECT_LT(difference(moving.displacement(), expected), 1e-6);
+  EXPECT_LT(test::largest_difference(moving.displacement(), expected), 1e-6);
 }
 
 /// Secants of earlier steps must not influence the steps after set_state().
@@ -584,10 +580,10 @@ TEST(SolidMotion, EnergyLimitTakesDeformationThenRotationThenTranslation) {
     return state.velocity;
   };
   EXPECT_NEAR(motion_energy(body, speeds(1, 1, 1)), 102, 1e-12);
-  EXPECT_LT(difference(limited(101), speeds(std::sqrt(0.5), 1, 1)), 1e-12);
-  EXPECT_LT(difference(limited(84), speeds(0, 0.5 * std::sqrt(3.0), 1)), 1e-12);
+  EXPECT_LT(test::largest_difference(limited(101), speeds(std::sqrt(0.5), 1, 1)), 1e-12);
+  EXPECT_LT(test::largest_difference(limited(84), speeds(0, 0.5 * std::sqrt(3.0), 1)), 1e-12);
   EXPECT_NEAR(motion_energy(body, state.velocity), 84, 1e-12);
-  EXPECT_LT(difference(limited(9), speeds(0, 0, 0.5)), 1e-12);
+  EXPECT_LT(test::largest_difference(limited(9), speeds(0, 0, 0.5)), 1e-12);
   state.velocity = speeds(1, 1, 1);
   EXPECT_FALSE(limit_energy(body, state, 0, 102, 1e-9));
   EXPECT_EQ(state.velocity, speeds(1, 1, 1));

@@ -4,6 +4,7 @@
 #include "stuffing/materials.h"
 #include "stuffing/surface_distance.h"
 #include "stuffing/warp_internal.h"
+#include "tests/unit/complaint.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/stuffing_checks.h"
 #include "tests/unit/surface_scenes.h"
@@ -34,7 +35,7 @@ TEST(Stuffing, VolumeAndDistanceConvergeWithTheSquareOfTheCell) {
     double volume;
     std::int64_t euler;
   };
-  const std::vector<Shape> shapes{{ball(5, 0.125), 4 * pi / 3 * 125, 2},
+  const std::vector<Shape> shapes{{ball_grid(5, 0.125), 4 * pi / 3 * 125, 2},
                                   {torus(5, 2, 0.125), 2 * pi * pi * 5 * 4, 0}};
   for (const Shape& shape : shapes) {
     std::vector<double> errors, distances;
@@ -89,7 +90,7 @@ TEST(Stuffing, AnythingKeepsTheBoundsAndAManifold) {
 }
 
 TEST(Stuffing, AGradedSolidHasTheSameBoundaryAndCoarserCellsInside) {
-  const Grid grid = ball(5, 0.125);
+  const Grid grid = ball_grid(5, 0.125);
   StuffingReport fine;
   const TetMesh uniform = stuffed(grid, {{}, 0.2}, 1, &fine);
   const auto first = [&](const TetMesh& mesh) {
@@ -172,9 +173,9 @@ TEST(Stuffing, AGradedSolidKeepsRoundSinglePointsWhatIsThere) {
 
 TEST(Stuffing, BetweenLeavesAnglesAreOf45To120Degrees) {
   // All tetrahedra without a node on the boundary.
-  const TetMesh mesh = stuffed(ball(5, 0.125), {{}, 0.2, 3});
+  const TetMesh mesh = stuffed(ball_grid(5, 0.125), {{}, 0.2, 3});
   StuffingReport report;
-  stuff({}, ball(5, 0.125), {{}, 0.2, 3}, &report);
+  stuff({}, ball_grid(5, 0.125), {{}, 0.2, 3}, &report);
   TetMesh inner = mesh;
   std::erase_if(inner.tetrahedra, [&](const Tetrahedron& tetrahedron) {
     return *std::min_element(tetrahedron.begin(), tetrahedron.end()) < report.surface_nodes;
@@ -280,10 +281,10 @@ MaterialSource layers(const std::vector<Grid>& volumes) {
 }
 
 TEST(Stuffing, MaterialsFollowTheirVolumes) {
-  TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.5});
+  TetMesh mesh = stuffed(ball_grid(5, 0.25), {{}, 0.5});
   std::vector<Grid> volumes;
-  volumes.push_back(ball(2, 0.2, {0.3, 0, 0}));
-  volumes.push_back(ball(1, 0.3, {0.3, 0, 0}));
+  volumes.push_back(ball_grid(2, 0.2, {0.3, 0, 0}));
+  volumes.push_back(ball_grid(1, 0.3, {0.3, 0, 0}));
   set_materials({}, layers(volumes), mesh);
   ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
@@ -322,7 +323,7 @@ TEST(Stuffing, MaterialsAreTheLabelsOfTheNearestVoxels) {
   const Int3 size{6, 5, 7};
   const auto label = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 4; };
   const LabelRuns labels = labels_of(size, lattice, label);
-  TetMesh mesh = stuffed(ball(5, 0.25), {{}, 0.8});
+  TetMesh mesh = stuffed(ball_grid(5, 0.25), {{}, 0.8});
   set_materials({}, label_source(labels), mesh);
   ASSERT_EQ(mesh.material.size(), mesh.tetrahedra.size());
   std::array<int, 4> seen{};
@@ -355,7 +356,7 @@ TEST(Stuffing, MaterialsOfObliqueLabels) {
   lattice.m = {-1, 0.3, 0.1, 4, 0.2, 1.2, -0.2, -6, 0, 0.1, 1.1, -7};
   const LabelRuns labels =
       labels_of({12, 12, 14}, lattice, [](int i, int, int) { return i < 6 ? 1 : 2147483647; });
-  TetMesh mesh = stuffed(ball(3, 0.25), {{}, 0.5});
+  TetMesh mesh = stuffed(ball_grid(3, 0.25), {{}, 0.5});
   set_materials({}, label_source(labels), mesh);
   const Vec3 on_plane = lattice.to_world({5.5, 0, 0});
   const Vec3 across = cross({0.3, 1.2, 0.1}, {0.1, -0.2, 1.1});
@@ -383,7 +384,7 @@ TEST(Stuffing, MaterialsOfTheNearestLabel) {
     return (i * 7 + j * 5 + k * 3) % 29 == 0 ? 1 + (i + j) % 3 : 0;
   };
   const LabelRuns labels = labels_of(size, lattice, label);
-  const TetMesh mesh = stuffed(ball(7, 0.25), {{}, 1.5});
+  const TetMesh mesh = stuffed(ball_grid(7, 0.25), {{}, 1.5});
   for (const int reach : {0, 1, 2}) {
     TetMesh with = mesh;
     set_materials({}, label_source(labels, reach), with);
@@ -426,7 +427,7 @@ TEST(Stuffing, UnlabelledTissueIsNoBackground) {
     const double apart = norm(p - center);
     return apart > radius || apart < core ? 0 : p.x < 0 ? 1 : 2;
   });
-  const Grid solid = ball(radius, 0.25, center);
+  const Grid solid = ball_grid(radius, 0.25, center);
   TetMesh mesh = stuffed(solid, {{}, 0.4});
   const auto zeros = [&](double from, double to) {
     int count = 0;
@@ -469,12 +470,7 @@ TEST(Stuffing, EmptyAndTiles) {
 }
 
 std::string complaint(const Grid& grid, const StuffingOptions& options = {}) {
-  try {
-    stuff({}, grid, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::complaint([&] { return stuff({}, grid, options); });
 }
 
 TEST(Stuffing, WhatItCannotServeIsRefused) {
@@ -498,7 +494,7 @@ TEST(Stuffing, WhatItCannotServeIsRefused) {
   EXPECT_NE(complaint(cube({}, 1), {{}, 1e-12}).find("larger --cell"), std::string::npos);
   Context little;
   little.max_memory = 100000;
-  EXPECT_THROW(stuff(little, ball(5, 0.25), {}), Error);
+  EXPECT_THROW(stuff(little, ball_grid(5, 0.25), {}), Error);
 }
 
 } // namespace

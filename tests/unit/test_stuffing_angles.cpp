@@ -48,7 +48,7 @@ Bernstein<N + M> product(const Bernstein<N>& a, const Bernstein<M>& b) {
 
 /// a factor - b
 template <std::size_t N>
-Bernstein<N> difference(double factor, const Bernstein<N>& a, const Bernstein<N>& b) {
+Bernstein<N> weighted_difference(double factor, const Bernstein<N>& a, const Bernstein<N>& b) {
   Bernstein<N> result;
   for (std::size_t i = 0; i <= N; ++i)
     for (std::size_t j = 0; j <= N; ++j)
@@ -84,7 +84,7 @@ Bernstein<N> half(Bernstein<N> a, bool right) {
 
 /// Is `bounded` above 0 wherever `asked` is? Depth bounds the halves of halves.
 bool positive_where(const Bernstein<2>& asked, const Bernstein<4>& bounded, int depth) {
-  if (least(bounded) > 0 || least(difference(0, asked, asked)) >= 0)
+  if (least(bounded) > 0 || least(weighted_difference(0, asked, asked)) >= 0)
     return true;
   if (depth == 0)
     return false;
@@ -116,7 +116,8 @@ Bernstein<2> dot_product(const std::array<Bernstein<1>, 3>& a,
                          const std::array<Bernstein<1>, 3>& b) {
   Bernstein<2> result;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    result = difference(1, result, difference(-1, product(a[axis], b[axis]), Bernstein<2>{}));
+    result = weighted_difference(
+        1, result, weighted_difference(-1, product(a[axis], b[axis]), Bernstein<2>{}));
   return result;
 }
 
@@ -141,9 +142,9 @@ bool angles_are_within(const std::array<Range, 4>& nodes, double lowest, double 
         const Bernstein<2> inner = dot_product(n1, n2);
         const Bernstein<4> squares = product(dot_product(n1, n1), dot_product(n2, n2));
         const Bernstein<4> inner2 = product(inner, inner);
-        const Bernstein<2> opposite = difference(-1, inner, Bernstein<2>{});
-        if (!positive_where(inner, difference(low2, squares, inner2), 24) ||
-            !positive_where(opposite, difference(high2, squares, inner2), 24))
+        const Bernstein<2> opposite = weighted_difference(-1, inner, Bernstein<2>{});
+        if (!positive_where(inner, weighted_difference(low2, squares, inner2), 24) ||
+            !positive_where(opposite, weighted_difference(high2, squares, inner2), 24))
           return false;
       }
   }

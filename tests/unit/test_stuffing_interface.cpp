@@ -55,7 +55,7 @@ std::vector<Triangle> interface_of(const TetMesh& mesh) {
 }
 
 TEST(StuffingInterface, ABallInABallConvergesWithTheSquareOfTheCell) {
-  const Grid grid = ball(5, 0.25);
+  const Grid grid = ball_grid(5, 0.25);
   const Vec3 center{0.7, -0.4, 0.3};
   std::vector<double> errors, distances;
   for (const double cell : {1.0, 0.5, 0.25}) {
@@ -85,9 +85,9 @@ TEST(StuffingInterface, ABallInABallConvergesWithTheSquareOfTheCell) {
 
 TEST(StuffingInterface, AStaircaseHasTheMaterialOfTheCentroid) {
   StuffingOptions options{{}, 0.5};
-  const TetMesh bare = stuffed(ball(5, 0.25), options);
+  const TetMesh bare = stuffed(ball_grid(5, 0.25), options);
   options.materials = in_ball({0, 0, 0}, 3);
-  const TetMesh mesh = stuffed(ball(5, 0.25), options);
+  const TetMesh mesh = stuffed(ball_grid(5, 0.25), options);
   EXPECT_EQ(mesh.points, bare.points);
   EXPECT_EQ(mesh.tetrahedra, bare.tetrahedra);
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
@@ -96,12 +96,12 @@ TEST(StuffingInterface, AStaircaseHasTheMaterialOfTheCentroid) {
     ASSERT_EQ(mesh.material[n], norm(centroid) < 3 ? 1 : 0);
   }
   options.grade = 3;
-  const TetMesh graded = stuffed(ball(5, 0.25), options);
+  const TetMesh graded = stuffed(ball_grid(5, 0.25), options);
   EXPECT_EQ(interface_of(graded).size(), interface_of(mesh).size());
 }
 
 TEST(StuffingInterface, WhatCrossesTheBoundaryHasNoGap) {
-  const Grid grid = ball(5, 0.25);
+  const Grid grid = ball_grid(5, 0.25);
   const Vec3 center{4, 1, 0};
   for (const unsigned grade : {0U, 2U}) {
     StuffingOptions options{{}, 0.4, grade};
@@ -164,7 +164,7 @@ TEST(StuffingInterface, AnyMaterialsKeepTheBounds) {
 TEST(StuffingInterface, EachTetrahedronKeepsAnUnmovedCorner) {
   std::size_t refused = 0, beside_both = 0;
   for (const double depth : {0.2, 0.5, 0.8, 1.1}) {
-    const Grid grid = ball(3, 0.25);
+    const Grid grid = ball_grid(3, 0.25);
     const MaterialSource source = in_ball({0.2, -0.2, 0.1}, 3 - 0.6 * depth);
     const StuffingLattice lattice = stuffing_lattice(grid, {}, 0.6);
     StuffingBlocks blocks = stuffing_blocks({}, grid, lattice);

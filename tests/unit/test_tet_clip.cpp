@@ -5,6 +5,7 @@
 #include "mesh/check.h"
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
+#include "tests/unit/stuffing_checks.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
@@ -116,24 +117,12 @@ TetClip expect_closed(const TetMesh& mesh, const ClipPlane& plane) {
   return left;
 }
 
-Grid ball_volume(double radius, double size) {
-  GridInfo info;
-  info.transform = uniform_transform(size);
-  info.level_set = true;
-  info.background = 9;
-  const int reach = static_cast<int>(std::ceil(radius / size)) + 3;
-  return scenes::sample(info, {-reach, -reach, -reach}, {reach, reach, reach},
-                        [&](int i, int j, int k) {
-                          return norm(Vec3{i * size, j * size, k * size}) - radius;
-                        });
-}
-
-TetMesh ball() {
-  return stuff({}, ball_volume(5, 1), {});
+TetMesh stuffed_ball() {
+  return stuff({}, ball_grid(5, 1, {}), {});
 }
 
 TEST(TetClip, ABallIsClosedAndKeepsItsVolumeWhereverItIsCut) {
-  const TetMesh mesh = ball();
+  const TetMesh mesh = stuffed_ball();
   require_sound(examine_tetrahedra(mesh));
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -282,7 +271,7 @@ TEST(TetClip, TheCutHasTheMaterialOfItsTetrahedra) {
 }
 
 TEST(TetClip, APlaneThatMissesLeavesAllOrNothing) {
-  TetMesh mesh = ball();
+  TetMesh mesh = stuffed_ball();
   mesh.material.assign(mesh.tetrahedra.size(), 0);
   mesh.material[5] = 2;
   const TetBoundary whole = boundary(mesh);
@@ -324,7 +313,7 @@ TEST(TetClip, BodiesGoOneByOne) {
 
 // A cut point belongs to its edge alone, whichever tetrahedra come first.
 TEST(TetClip, PointsDoNotDependOnTheOrderOfTetrahedra) {
-  TetMesh mesh = ball();
+  TetMesh mesh = stuffed_ball();
   const ClipPlane plane{{0.3, -0.2, 0.1}, {1, 0.7, -0.4}};
   const TetClip one = clip_tetrahedra(mesh, plane);
   std::shuffle(mesh.tetrahedra.begin(), mesh.tetrahedra.end(), std::mt19937(5));

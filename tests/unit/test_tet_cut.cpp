@@ -2,9 +2,9 @@
 // planes (tetrahedra/clip.h, other code) say what comes out.
 
 #include "base/disjoint_sets.h"
-#include "base/error.h"
 #include "stuffing/stuffing.h"
 #include "surface_scenes.h"
+#include "tests/unit/complaint.h"
 #include "tet_cut_checks.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/clip.h"
@@ -70,7 +70,7 @@ FlatBlade random_flat(const TetMesh& mesh, double reach, std::mt19937& random) {
   return FlatBlade(at, u, v, reach * box.longest_side());
 }
 
-TetMesh ball() {
+TetMesh stuffed_metaballs() {
   return stuff(Context{}, scenes::metaballs(12, 1, 0.3), {});
 }
 
@@ -148,7 +148,7 @@ TEST(TetCut, PlanesThroughABox) {
 }
 
 TEST(TetCut, PlanesThroughDistortedAndRoundBodies) {
-  const TetMesh box = test::distorted_box(), round = ball();
+  const TetMesh box = test::distorted_box(), round = stuffed_metaballs();
   std::mt19937 random(2);
   int exact = 0;
   for (int n = 0; n < 25; ++n) {
@@ -189,7 +189,7 @@ TEST(TetCut, APlaneOfNodesSplitsNothing) {
 }
 
 TEST(TetCut, AnglesStayWithinTheirBound) {
-  const TetMesh mesh = ball();
+  const TetMesh mesh = stuffed_metaballs();
   std::mt19937 random(4);
   for (const double bound : {0.0, 4.0, 8.0, 10.0})
     for (int n = 0; n < 5; ++n) {
@@ -308,7 +308,7 @@ TEST(TetCut, AWoundedBodyFallsApartWhole) {
   std::uint64_t opened = 0;
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
-    TetMesh mesh = seed % 2 == 0 ? box_tetrahedra(7, 7, 7, 1.0 / 7) : ball();
+    TetMesh mesh = seed % 2 == 0 ? box_tetrahedra(7, 7, 7, 1.0 / 7) : stuffed_metaballs();
     for (int n = 0; n < 4; ++n)
       mesh = cut_tetrahedra(mesh, random_flat(mesh, 0.3, random).surface).mesh;
     const FlatBlade last = random_flat(mesh, 3, random);
@@ -451,21 +451,12 @@ TEST(TetCut, ComparesWhatIsNearTheBladeAlone) {
   EXPECT_LT(tested[0], 400U);
 }
 
-std::string complaint(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(TetCut, RefusesByName) {
   const TetMesh mesh = box_tetrahedra(2, 2, 2);
   const TriangleMesh blade = blade_strip({1, 1, 1.1}, {2, 0, 0}, {0, 2, 0});
   const auto refusal = [&](const TetMesh& solid, const TriangleMesh& surface,
                            const BladeCutOptions& options = {}) {
-    return complaint([&] { cut_tetrahedra(solid, surface, options); });
+    return test::complaint([&] { cut_tetrahedra(solid, surface, options); });
   };
   TetMesh curved = mesh;
   make_quadratic(curved);

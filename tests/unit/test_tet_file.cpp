@@ -5,6 +5,7 @@
 #include "formats/mesh/ply.h"
 #include "formats/tetrahedra/tet_file.h"
 #include "scratch.h"
+#include "tests/unit/complaint.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
@@ -32,26 +33,12 @@ using test::same_bytes;
 
 const std::vector<Kind> in_memory{Kind::ply, Kind::vtu, Kind::msh, Kind::msh4, Kind::medit};
 
-std::string with_place(const Error& error) {
-  return error.place() + ": " + error.what();
-}
-
 std::string complaint(const std::string& bytes, Kind kind) {
-  try {
-    (void)tet_mesh_from_bytes(bytes, "m", kind);
-  } catch (const Error& error) {
-    return with_place(error);
-  }
-  return "";
+  return test::complaint([&] { return tet_mesh_from_bytes(bytes, "m", kind); });
 }
 
 std::string complaint(const TetgenFiles& bytes) {
-  try {
-    (void)tet_mesh_from_tetgen(bytes, {"m.node", "m.ele"});
-  } catch (const Error& error) {
-    return with_place(error);
-  }
-  return "";
+  return test::complaint([&] { return tet_mesh_from_tetgen(bytes, {"m.node", "m.ele"}); });
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

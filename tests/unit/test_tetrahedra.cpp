@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "larger.h"
 #include "mesh/check.h"
+#include "tests/unit/complaint.h"
 #include "tet_fixtures.h"
 #include "tetrahedra/boundary.h"
 #include "tetrahedra/check.h"
@@ -63,12 +64,7 @@ TetMesh random_mesh(std::mt19937& random, std::size_t count, std::uint32_t point
 }
 
 std::string complaint(const TetMesh& mesh) {
-  try {
-    require_sound(examine_tetrahedra(mesh));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::complaint([&] { require_sound(examine_tetrahedra(mesh)); });
 }
 
 double volume_of(const TetMesh& mesh, std::size_t t) {

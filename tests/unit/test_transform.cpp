@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/space.h"
 #include "formats/model/ela.h"
+#include "tests/unit/complaint.h"
 #include "tools/shared/transform_option.h"
 
 #include <gtest/gtest.h>
@@ -15,12 +16,7 @@ namespace gewebe {
 namespace {
 
 std::string complaint(const std::string& text) {
-  try {
-    (void)parse_affine(text);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::complaint([&] { return parse_affine(text); });
 }
 
 void expect_near(const Vec3& a, const Vec3& b, double tolerance = 1e-12) {

@@ -7,6 +7,7 @@
 #include "statics/two_step.h"
 
 #include "compliance/compliance_source.h"
+#include "tests/unit/relative_difference.h"
 
 #include <algorithm>
 #include <cmath>
@@ -56,18 +57,6 @@ std::vector<double> compliance_times(const Model& model, const Load& load) {
   object.update(load);
   const std::span<const double> u = object.displacement();
   return {u.begin(), u.end()};
-}
-
-/// Largest difference over the largest of b.
-double difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double error = 0, size = 0;
-  EXPECT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double e = std::abs(a[i] - b[i]);
-    error = test::larger(error, e);
-    size = test::larger(size, std::abs(b[i]));
-  }
-  return error / size;
 }
 
 Load times(double factor, const Load& load) {
@@ -146,19 +135,24 @@ TEST(TwoStep, IsContinuousAndHasTheSlopesOfItsStages) {
   const std::vector<double> c1 = compliance_times(model, unit), c2 = compliance_times(stiff, unit);
   for (const bool series : {false, true}) {
     Stages s(model, stiff, {.threshold = f0, .series = series});
-    EXPECT_LT(difference(s.shape(times(0.5 * f0, unit)), combined(0.5 * f0, c1, 0, c2)), 1e-12);
+    EXPECT_LT(
+        test::relative_difference(s.shape(times(0.5 * f0, unit)), combined(0.5 * f0, c1, 0, c2)),
+        1e-12);
     EXPECT_EQ(s.two.second_counts().factors, 0U) << "the second stage is not needed yet";
     const std::vector<double> below = s.shape(times(f0 * (1 - 1e-9), unit));
     const std::vector<double> above = s.shape(times(f0 * (1 + 1e-9), unit));
-    EXPECT_LT(difference(above, below), 1e-8);
+    EXPECT_LT(test::relative_difference(above, below), 1e-8);
     const std::vector<double> rise =
         combined(1, s.shape(times(3 * f0, unit)), -1, s.shape(times(2 * f0, unit)));
-    EXPECT_LT(difference(rise, series ? combined(0, c1, f0, c2) : combined(f0, c1, -f0, c2)),
+    EXPECT_LT(test::relative_difference(rise, series ? combined(0, c1, f0, c2)
+                                                     : combined(f0, c1, -f0, c2)),
               1e-11);
     // The check sees another slope, and another threshold.
-    EXPECT_GT(difference(rise, combined(f0, c1, 0, c2)), 1e-3);
+    EXPECT_GT(test::relative_difference(rise, combined(f0, c1, 0, c2)), 1e-3);
     Stages other(model, stiff, {.threshold = f0 * (1 + 1e-6), .series = series});
-    EXPECT_GT(difference(other.shape(times(2 * f0, unit)), s.shape(times(2 * f0, unit))), 1e-8);
+    EXPECT_GT(
+        test::relative_difference(other.shape(times(2 * f0, unit)), s.shape(times(2 * f0, unit))),
+        1e-8);
   }
 }
 
@@ -185,7 +179,7 @@ TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
             held.force.erase(node);
         }
       const std::vector<double> again = s.shape(held);
-      EXPECT_LT(difference(again, u), 1e-10) << series << " " << size;
+      EXPECT_LT(test::relative_difference(again, u), 1e-10) << series << " " << size;
       EXPECT_NEAR(s.two.load(), size * f0, 1e-10 * size * f0);
       double error = 0;
       ASSERT_EQ(s.two.contact_forces().size(), force.size());
@@ -198,8 +192,8 @@ TEST(TwoStep, DisplacementGivesBackThePointOfTheCurve) {
       Load nearer = held;
       for (auto& [node, d] : nearer.displacement)
         d *= 1.001;
-      EXPECT_GT(difference(s.shape(nearer), u), 1e-5);
-      EXPECT_LT(difference(s.shape(held), u), 1e-10);
+      EXPECT_GT(test::relative_difference(s.shape(nearer), u), 1e-5);
+      EXPECT_LT(test::relative_difference(s.shape(held), u), 1e-10);
       (void)s.shape({});
       EXPECT_EQ(s.two.load(), 0);
     }
@@ -222,7 +216,7 @@ TEST(TwoStep, HalfHeldNodesAreGraspedAlongTheirFreeAxes) {
   Load held;
   held.displacement[half] = {at(u, half).x, at(u, half).y, 0};
   held.displacement[whole] = {};
-  EXPECT_LT(difference(s.shape(held), u), 1e-11);
+  EXPECT_LT(test::relative_difference(s.shape(held), u), 1e-11);
   for (const NodeVector& f : s.two.contact_forces())
     EXPECT_LT(norm(f.value - (f.node == half ? Vec3{30, -40, 0} : Vec3{})), 1e-9);
   // Nothing but what can't move: no force, no threshold.
@@ -254,7 +248,7 @@ TEST(TwoStep, RefusesAStageThatIsNotStiffer) {
   EXPECT_EQ(at(u, node).z, 1);
   Load pull;
   pull.force[node] = s.two.contact_forces()[0].value;
-  EXPECT_LT(difference(s.shape(pull), u), 1e-10);
+  EXPECT_LT(test::relative_difference(s.shape(pull), u), 1e-10);
   for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL})
     EXPECT_THROW(s.two.set({.threshold = bad}), Error);
 }
@@ -314,7 +308,7 @@ TEST(TwoStep, BelowItsThresholdInstrumentsMeetOneStage) {
       const Pressed one = pressed(model, stiff, {}, friction, displaced),
                     two = pressed(model, stiff, TwoStepOptions{1e9, true}, friction, displaced);
       EXPECT_GT(norm(one.tool), 0);
-      EXPECT_LT(difference(one.u, two.u), forces_met);
+      EXPECT_LT(test::relative_difference(one.u, two.u), forces_met);
       ASSERT_EQ(one.forces.size(), two.forces.size());
       for (std::size_t k = 0; k < one.forces.size(); ++k) {
         EXPECT_EQ(one.forces[k].node, two.forces[k].node);
@@ -341,7 +335,7 @@ TEST(TwoStep, BeyondItInstrumentsMeetThePointOfTheCurve) {
           largest = test::larger(largest, norm(f.value));
         }
         Stages stages(model, stiff, options);
-        EXPECT_LT(difference(stages.shape(load), two.u), forces_met);
+        EXPECT_LT(test::relative_difference(stages.shape(load), two.u), forces_met);
         ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
         for (std::size_t k = 0; k < two.forces.size(); ++k)
           EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
@@ -398,7 +392,7 @@ TEST(TwoStep, AnInstrumentPressesOnADisplacedNodeToo) {
         largest = test::larger(largest, norm(f.value));
       }
       Stages stages(model, stiff, options);
-      EXPECT_LT(difference(stages.shape(load), two.u), forces_met);
+      EXPECT_LT(test::relative_difference(stages.shape(load), two.u), forces_met);
       ASSERT_EQ(stages.two.contact_forces().size(), two.forces.size());
       for (std::size_t k = 0; k < two.forces.size(); ++k)
         EXPECT_LT(norm(stages.two.contact_forces()[k].value - two.forces[k].value),
@@ -500,10 +494,10 @@ TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
         Stages stages(one, two, options);
         Load load;
         load.force[node] = {0, 3, 1};
-        EXPECT_LT(difference(test::shape(s, 0), stages.shape(load)), 1e-9);
+        EXPECT_LT(test::relative_difference(test::shape(s, 0), stages.shape(load)), 1e-9);
         Stages uncut(one, one, {.threshold = 1e9}); // it would show
         if (threshold == 1) {
-          EXPECT_GT(difference(test::shape(s, 0), uncut.shape(load)), 1e-3);
+          EXPECT_GT(test::relative_difference(test::shape(s, 0), uncut.shape(load)), 1e-3);
         }
         EXPECT_NE(test::shape(s, 0), before);
         before = test::shape(s, 0);
@@ -514,7 +508,7 @@ TEST(TwoStep, ACutObjectFollowsTheStagesOfTheCutModels) {
       s.apply(SetTwoStep{0, options, {}});
       s.apply(Restore{0});
       s.step(0.1);
-      EXPECT_LT(difference(test::shape(s, 0), whole), 1e-12);
+      EXPECT_LT(test::relative_difference(test::shape(s, 0), whole), 1e-12);
     }
 }
 
@@ -569,7 +563,7 @@ TEST(TwoStep, InASimulationByEventsWithAWarning) {
   Load load;
   load.force[node] = {0, 3, 0};
   EXPECT_EQ(two, stages.shape(load));
-  EXPECT_GT(difference(two, one), 0.05);
+  EXPECT_GT(test::relative_difference(two, one), 0.05);
   s.warn_of_thresholds();
   EXPECT_TRUE(warnings.empty());
   s.apply(SetTwoStep{0, {.threshold = 10}, second});

@@ -5,6 +5,7 @@
 #include "formats/mesh/mesh_file.h"
 #include "formats/mesh/vtp.h"
 #include "formats/stream/kind.h"
+#include "tests/unit/complaint.h"
 #include "vtk_writer.h"
 
 #include <gtest/gtest.h>
@@ -81,12 +82,7 @@ std::string vtp(const Cube& cube, const test::VtkStyle& style) {
 }
 
 std::string complaint(const std::string& bytes) {
-  try {
-    (void)read_vtp(bytes, "m");
-  } catch (const Error& error) {
-    return error.place() + ": " + error.what();
-  }
-  return "";
+  return test::complaint([&] { return read_vtp(bytes, "m"); });
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

@@ -13,6 +13,7 @@
 #include "solid/stress.h"
 #include "statics/elastostatic.h"
 #include "statics/warped_statics.h"
+#include "tests/unit/relative_difference.h"
 #include "tet_fixtures.h"
 
 #include <Eigen/Dense>
@@ -58,13 +59,6 @@ double largest(std::span<const double> values) {
   for (const double x : values)
     most = test::larger(most, std::abs(x));
   return most;
-}
-
-double difference(std::span<const double> a, std::span<const double> b) {
-  double worst = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    worst = test::larger(worst, std::abs(a[k] - b[k]));
-  return worst / largest(b);
 }
 
 /// The same body, Neo-Hookean, converged; f and prescribed places as in the load.
@@ -114,11 +108,12 @@ TEST(WarpedStatics, UnderSmallLoadsItIsTheLinearMethod) {
   WarpedStatics warped(model, nullptr, test::one_thread());
   linear.update(load);
   warped.update(load);
-  EXPECT_LE(difference(warped.surface_displacement(),
-                       linear.surface_displacement().first(3 * surface_count(model))),
-            1e-3);
-  EXPECT_LE(difference(warped.displacement(), linear.displacement()), 1e-3);
-  EXPECT_LE(difference(warped.local_displacement(), linear.displacement()), 1e-3);
+  EXPECT_LE(
+      test::relative_difference(warped.surface_displacement(),
+                                linear.surface_displacement().first(3 * surface_count(model))),
+      1e-3);
+  EXPECT_LE(test::relative_difference(warped.displacement(), linear.displacement()), 1e-3);
+  EXPECT_LE(test::relative_difference(warped.local_displacement(), linear.displacement()), 1e-3);
   const auto forces = warped.holding_forces();
   ASSERT_EQ(forces.size(), held.size());
   for (std::size_t k = 0; k < forces.size(); ++k) {
@@ -160,8 +155,8 @@ TEST(WarpedStatics, LargeShapesAreNearHyperelasticOnes) {
     warped.update(c.load);
     linear.update(c.load);
     const Reference expected(model, c.load);
-    EXPECT_LE(difference(warped.displacement(), expected.u), c.error) << c.what;
-    EXPECT_GE(difference(linear.displacement(), expected.u), 3 * c.error) << c.what;
+    EXPECT_LE(test::relative_difference(warped.displacement(), expected.u), c.error) << c.what;
+    EXPECT_GE(test::relative_difference(linear.displacement(), expected.u), 3 * c.error) << c.what;
     EXPECT_LE(warped.counts().change, 1e-3) << c.what;
     for (const auto& [node, d] : c.load.displacement)
       EXPECT_EQ(vector_at(warped.displacement(), node), d);
@@ -271,12 +266,12 @@ TEST(WarpedStatics, AnInstrumentPressesTheBarDown) {
                 6 * (1 - test::depth_allowed));
     // These forces press a Neo-Hookean bar as far.
     const Reference expected(pressed.model(), load);
-    EXPECT_LE(difference(u, std::span(expected.u).first(u.size())), 0.03) << z;
+    EXPECT_LE(test::relative_difference(u, std::span(expected.u).first(u.size())), 0.03) << z;
   }
   Pressed linear(false);
   for (const double z : {13.0, 9.0, 4.0, 0.0})
     linear.press(z);
-  EXPECT_GE(difference(pressed.shape(), linear.shape()), 0.1);
+  EXPECT_GE(test::relative_difference(pressed.shape(), linear.shape()), 0.1);
 }
 
 TEST(WarpedStatics, ThreadsDoNotMatterAndWhatIsTakenBackLeavesNoTrace) {

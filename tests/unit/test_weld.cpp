@@ -2,6 +2,7 @@
 #include "base/mesh.h"
 #include "mesh/triangulate.h"
 #include "mesh/weld.h"
+#include "tests/unit/complaint.h"
 
 #include <gtest/gtest.h>
 
@@ -70,12 +71,7 @@ TEST(Mesh, CheckNamesTheFirstOffender) {
   const auto complaint = [&](auto spoil) {
     TriangleMesh mesh = good;
     spoil(mesh);
-    try {
-      check_mesh(mesh);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return test::complaint([&] { check_mesh(mesh); });
   };
   EXPECT_EQ(complaint([](TriangleMesh& m) { m.triangles[3][1] = 36; }),
             "triangle 3 has corner 36, expected an index below 36");
