@@ -358,6 +358,33 @@ TEST(WoundScenes, WallsOfACutMadeBeforeContactBeginApart) {
     }
 }
 
+/// Rounding puts the middles of edges of both sides of a cut at places that differ by a bit, where
+/// the body has been bent.
+TEST(WoundScenes, WallsOfAMovedQuadraticSolidBeginApart) {
+  TetMesh mesh = box_tetrahedra(4, 2, 2, 5);
+  for (Vec3& p : mesh.points) { // turned, so that no coordinate is a round number
+    p = {0.8 * p.x - 0.6 * p.y, 0.6 * p.x + 0.8 * p.y, p.z};
+    p = {p.x + 0.1, 0.28 * p.y - 0.96 * p.z, 0.96 * p.y + 0.28 * p.z};
+  }
+  SolidModelOptions options;
+  options.material.materials = {{"gel", 1e-3, 20000, 1, 0.2, 0.3}};
+  options.quadratic = true;
+  Simulation s(one_thread(), {});
+  s.add_object("bar", solid_model(mesh, options, {}), Method::ela);
+  s.apply(SetContact{0, 0, 0.3});
+  s.apply(SetForce{0, {0}, {7e3, -2e3, 1e3}});
+  for (int k = 0; k < 3; ++k)
+    s.step(1.0 / 60);
+  Vec3 middle;
+  for (const Node& node : s.model(0).nodes)
+    middle += node.position / static_cast<double>(s.model(0).nodes.size());
+  s.apply(CutObject{0, PlaneToCut{{middle, {0.93, -0.31, 0.47}}, {}}});
+  for (int k = 0; k < 3; ++k)
+    s.step(1.0 / 60);
+  ASSERT_EQ(s.object_count(), 2U);
+  EXPECT_GT(least_gap(s, 0, 1), 0);
+}
+
 TEST(WoundScenes, WhatComesOffLiesOnItsParent) {
   for (const bool meets : {true, false}) {
     Simulation s(one_thread(), {});

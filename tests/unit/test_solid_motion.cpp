@@ -22,6 +22,7 @@
 #include <cstdint>
 #include <numbers>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -229,6 +230,69 @@ TEST_P(SolidMotionOf, IsOfFirstOrderAndTheQuickWayGoesWhereTheReferenceDoes) {
   EXPECT_LT(test::largest_difference(a, end(8, true, 0.1)), 1e-5 * largest(a));
   EXPECT_LT(test::largest_difference(a, end(8, false, SolidMotionOptions().tolerance)),
             0.02 * largest(a));
+}
+
+/// A step in parts from afar: each round whose model holds has less energy than the last one, by
+/// tangents or the constant matrix, and rounds end where the reference does.
+TEST_P(SolidMotionOf, RoundsOfAStepInPartsLowerTheEnergyToItsLeast) {
+  const TetMesh m = mesh();
+  const std::size_t axes = 3 * m.points.size();
+  const double h = 0.01;
+  Numbers load(axes);
+  for (std::size_t i = 0; i < m.points.size(); ++i)
+    if (m.points[i].x == 15)
+      load[3 * i + 2] = -2.5e4; // bends it by more than its height in a step
+  const auto made = [&](bool reference) {
+    SolidMotionOptions options;
+    options.reference = reference;
+    SolidMotion moving = body(m, options);
+    moving.hold(held_end(m));
+    moving.set_load(load);
+    return moving;
+  };
+  SolidMotion reference = made(true);
+  (void)reference.step(h, {});
+  for (const bool sharp : {false, true}) {
+    SolidMotion moving = made(false);
+    moving.begin_step(h, {});
+    const auto energy = [&] {
+      double sum = 0;
+      const std::span<const double> at = moving.iterate();
+      SolidMotion there = made(false);
+      Numbers u(at.begin(), at.end());
+      for (std::size_t axis = 0; axis < axes; ++axis) {
+        u[axis] -= moving.places()[axis];
+        sum += moving.masses()[axis / 3] * u[axis] * u[axis] / (2 * h * h);
+      }
+      there.set_state(u, Numbers(axes));
+      return sum + there.potential_energy();
+    };
+    const Numbers none(axes);
+    Numbers step(axes);
+    double before = HUGE_VAL, first = 0, change = HUGE_VAL;
+    int rounds = 0, rejected = 0;
+    for (; rounds < 200 && change > 1e-6; ++rounds) {
+      if (sharp)
+        moving.sharpen();
+      moving.linearise_step(step, none, {});
+      moving.move_iterate(0, none, {});
+      if (!moving.model_holds(none, {})) {
+        moving.move_iterate(1, none, {});
+        ++rejected;
+        continue;
+      }
+      const double now = energy();
+      first = rounds == rejected ? std::abs(now) : first;
+      EXPECT_LE(now, before + 1e-9 * first) << rounds;
+      before = now;
+      change = largest(step);
+    }
+    EXPECT_LT(rounds, sharp ? 40 : 200);
+    (void)moving.end_step(none, {});
+    EXPECT_LT(test::largest_difference(moving.displacement(), reference.displacement()),
+              1e-4 * largest(reference.displacement()))
+        << sharp << " " << rounds << " rounds, " << rejected << " rejected";
+  }
 }
 
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
