@@ -201,6 +201,12 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
          stored(nodes);
 }
 
+bool Compliance::at_hand(std::span<const std::uint32_t> nodes) const {
+  return columns_pay(nodes) &&
+         (source_->blocks() == nullptr ||
+          std::ranges::all_of(nodes, [&](std::uint32_t node) { return cache_.resident(node); }));
+}
+
 bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int shapes) {
   if (source_->blocks() == nullptr)
     return true; // that is where blocks came from

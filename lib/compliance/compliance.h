@@ -93,6 +93,8 @@ public:
   /// Whether the sum of columns under forces at these nodes is cheaper than a solve. Does not
   /// depend on the number of threads, for the bits of the result do.
   bool columns_pay(std::span<const std::uint32_t> nodes) const;
+  /// Whether a sum of columns under forces at these nodes pays and has no effect on what pays later.
+  bool at_hand(std::span<const std::uint32_t> nodes) const;
   /// Whether the columns of nodes whose blocks were needed are at hand for the shape under forces
   /// there; they are brought where that pays. \param shapes how many were asked for with these
   /// nodes, this one among them

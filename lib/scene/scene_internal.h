@@ -139,6 +139,7 @@ struct Shown {
   std::vector<NodalContactForce> contact{}; ///< of an elastodynamic object means over the step
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
+  bool rough = false; // within SimulationOptions::tolerance: the scene goes on by the exact one
   std::shared_ptr<const DeferredShape>
       deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};

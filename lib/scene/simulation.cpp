@@ -228,6 +228,11 @@ std::span<const double> Simulation::surface_displacement(std::size_t object) con
   return *world_->now.objects[object].shown.displacement;
 }
 
+std::span<const double> Simulation::known_surface(std::size_t object) const {
+  const Shown& shown = world_->now.objects.at(object).shown;
+  return shown.shaped ? std::span<const double>(*shown.displacement) : std::span<const double>();
+}
+
 std::size_t Simulation::surface_nodes(std::size_t object) const {
   const Model& now = model(object);
   if (now.tetrahedra.empty())
@@ -301,7 +306,7 @@ SimulationState Simulation::state() const {
   for (std::size_t i = 0; i < object_count(); ++i) {
     if (!object(i).known)
       continue;
-    if (!model(i).springs.empty())
+    if (!model(i).springs.empty() && this->object(i).shaped)
       state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)

@@ -127,6 +127,10 @@ void update_stages(World& w, Object& object, const Load& load);
 /// Whole, or of the nodes alone that the solver has rows for: all of the surface among them.
 std::span<const double> static_shape(Object& object);
 std::span<const double> static_surface(Object& object);
+/// As the surface, within the tolerance.
+std::span<const double> static_rough_surface(Object& object);
+/// Measures the shape that nobody has asked for.
+void verify_shape(Object& object);
 std::vector<NodeVector> static_forces(const Object& object);
 
 // bodies.cpp: what is tied together, or near and may touch, and moves as one
@@ -189,7 +193,11 @@ void end_showing(World& w, Object& object);
 /// What acts on it now will be shown.
 void load_shown(const World& w, Object& object);
 void warn_of_range(World& w, Object& object);
+/// To be shown: within the tolerance.
 void shape(World& w, Object& object);
+/// The same during a step, which may be taken back: the shape is then computed anew.
+void shape_to_show(World& w, Object& object);
+/// What the scene goes on by: exact.
 void shape_in_step(World& w, Object& object);
 /// Of all nodes, those inside a solid too.
 std::span<const double> whole_shape(World& w, Object& object);

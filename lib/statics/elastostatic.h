@@ -74,12 +74,14 @@ struct ElastostaticCounts {
 };
 
 struct ElastostaticOptions {
-  bool measure_error = false; ///< backward error, and effect of the tolerance, of every new shape
+  /// Backward error, and effect of the tolerance, of every new shape, and of those of verify().
+  /// Forces and shapes are the same to the bit with and without.
+  bool measure_error = false;
   /// Displaced nodes up to which the block C_cc is used; by default what is cheaper.
   std::size_t block_limit = SIZE_MAX;
-  /// How much of the largest displacement an entry of a shape may be wrong by, so that blocks of
-  /// rows need not be computed: the sum of what was left out of each row is bounded, not each part
-  /// alone. Forces and displaced nodes are exact.
+  /// How much of the largest displacement an entry of rough_surface() may be wrong by, so that
+  /// blocks of rows need not be computed: the sum of what was left out of each row is bounded, not
+  /// each part alone. All else is the same to the bit with any tolerance.
   double tolerance = 0;
 };
 
@@ -106,6 +108,10 @@ public:
   /// Where m is n the same as displacement(); else it doesn't depend on whether that was asked for.
   /// \throw as displacement
   std::span<const double> surface_displacement();
+  /// The same within the tolerance: what is shown, but not what a scene goes on by.
+  std::span<const double> rough_surface();
+  /// Measures the error of the shape, where nobody has asked for it; else nothing.
+  void verify();
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;

@@ -484,11 +484,19 @@ struct FuzzedRun {
   bool slow = false;  ///< it took too long and was ended
 };
 
-/// \param serve lines are acknowledged as well, and shapes shared \param record written if it is
-/// not empty
-inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
-                            const std::string& record, double seconds = 10) {
+struct FuzzedOptions {
+  bool serve = true; ///< lines are acknowledged as well
+  int threads = 1;
+  std::string record{}; ///< written if it is not empty
+  double seconds = 10;
+  bool shown = true; ///< there is a result, and with `serve` shapes are shared
+  bool measure = true, verify = false;
+  double tolerance = 0;
+};
+
+inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, const FuzzedOptions& how) {
   FuzzedRun out;
+  const bool serve = how.serve, shares = how.serve && how.shown;
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   CheckedResult result;
   SceneOptions options;
@@ -517,30 +525,32 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     return shape;
   };
   options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
-  const std::string shapes = serve ? ScratchFile(".shapes").path() : "";
+  const std::string shapes = shares ? ScratchFile(".shapes").path() : "";
   DoorCheck door(shapes);
   options.reply = [&](std::string_view text) {
     out.replies += text;
-    if (serve)
+    if (shares)
       door.reply(text);
   };
   options.serve = options.acknowledge = serve;
-  const auto shared = serve ? std::make_unique<SharedShapes>(shapes) : nullptr;
+  const auto shared = shares ? std::make_unique<SharedShapes>(shapes) : nullptr;
   options.shared = shared.get();
-  options.measure = true;
-  options.result = &result;
+  options.measure = how.measure;
+  options.measure_error = how.verify;
+  options.tolerance = how.tolerance;
+  options.result = how.shown ? &result : nullptr;
   options.warn = [](const std::string&) {};
   std::optional<SceneRecord> log;
-  if (!record.empty())
-    options.record = &log.emplace(record, Output::Options{}, "-");
+  if (!how.record.empty())
+    options.record = &log.emplace(how.record, Output::Options{}, "-");
   const ScratchFile table(".csv");
   EventLog events(table.path(), Output::Options{.binary = false});
   options.events = &events;
   Context context;
-  context.threads = threads;
+  context.threads = how.threads;
   // Of the processor, for others may be at work.
   const std::clock_t begin = std::clock();
-  const auto end = begin + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC);
+  const auto end = begin + static_cast<std::clock_t>(how.seconds * CLOCKS_PER_SEC);
   std::atomic<unsigned> asked = 0; // that clock is slow to read
   context.cancelled = [&, end] {
     return asked.fetch_add(1, std::memory_order_relaxed) % 32 == 0 && std::clock() > end;
@@ -552,9 +562,10 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
         break;
       if (line == next_client)
         run.next_client();
-      door.line(line);
+      if (shares)
+        door.line(line);
       run.line(line);
-      if (serve)
+      if (shares)
         door.line_done();
     }
     if (run.simulation().object_count() > 0) // else each was refused
@@ -568,13 +579,19 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     log->commit();
   if (out.fault.empty())
     out.fault = result.fault.empty() ? door.fault : result.fault;
-  out.answers = serve ? door.answers : out.replies;
+  out.answers = shares ? door.answers : out.replies;
   out.errors = run.counts().errors;
   out.steps = run.simulation().counts().steps;
   out.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   out.digest = run.counts().digest;
   out.result = result.hex() + " " + std::to_string(result.frames);
   return out;
+}
+
+inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
+                            const std::string& record, double seconds = 10) {
+  return run_fuzzed(lines,
+                    {.serve = serve, .threads = threads, .record = record, .seconds = seconds});
 }
 
 inline std::vector<std::string> lines_in(std::istream& text) {

@@ -372,6 +372,54 @@ TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
   }
 }
 
+/// Answers of forces and instruments alone.
+std::string forces_in(const std::string& replies) {
+  std::istringstream text(replies);
+  std::string kept;
+  bool in_shape = false;
+  for (const std::string& line : test::lines_in(text)) {
+    const bool begins = !line.empty() && line[0] >= 'a' && line[0] <= 'z';
+    in_shape = begins ? line.starts_with("shapes ") || line.starts_with("nodes ") ||
+                            line.starts_with("stress ") || line.starts_with("jump ")
+                      : in_shape;
+    if (!in_shape)
+      kept += line + "\n";
+  }
+  return kept;
+}
+
+// What is measured and how exactly shapes are shown has no effect on how a scene goes on.
+TEST(SceneServe, WhatIsMeasuredAndShownChangesNothing) {
+  const std::uint64_t scenes = 260;
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
+    std::vector<std::string> lines = test::FuzzedScene(seed).lines();
+    lines.insert(lines.begin(), {"emit forces", "emit instruments"});
+    if (seed % 2 == 0)
+      lines.insert(lines.begin(), "emit surfaces");
+    for (std::string& line : lines) // all are elastostatic as long as it goes
+      if (const std::size_t at = line.find(" method=ela"); at != std::string::npos)
+        line.replace(at, 11, " method=ffe");
+    const auto run = [&](bool measure, bool verify, double tolerance) {
+      return test::run_fuzzed(
+          lines, {.shown = false, .measure = measure, .verify = verify, .tolerance = tolerance});
+    };
+    const test::FuzzedRun plain = run(false, false, 0);
+    const auto compare = [&](const test::FuzzedRun& one, const test::FuzzedRun& other,
+                             const std::string& what, auto&& part) {
+      if (!one.slow && !other.slow) {
+        EXPECT_EQ(test::first_difference(part(one.replies), part(other.replies)), "nowhere")
+            << what << ", seed " << seed;
+      }
+    };
+    const auto whole = [](const std::string& replies) { return replies; };
+    compare(plain, run(true, false, 0), "stats", whole);
+    compare(plain, run(true, true, 0), "verify", whole);
+    const test::FuzzedRun rough = run(false, false, 0.05);
+    compare(plain, rough, "tolerance", forces_in);
+    compare(rough, run(true, true, 0.05), "all at once", whole);
+  }
+}
+
 TEST(SceneServe, NodeListsAreInTheRecordByNumber) {
   const ScratchFile record(".scene");
   const Served live = serve({"object a m", "force a \"@x.list or @'y z' and z>1\" 0 0 1 # @no",
