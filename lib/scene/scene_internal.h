@@ -190,6 +190,7 @@ struct Object {
   Method method = Method::ela;
   Integration integration = Integration::semi_implicit; // of a net; automatic: it has no body yet
   CopyOnWrite<Load> load{};
+  CopyOnWrite<std::map<std::uint32_t, double>> hung{}; // g by node, beside the model's masses
   Stages stages;
   bool warp = false;                          // large rotations
   bool meets = false;                         // one of the scene's contacts is of it

@@ -232,8 +232,16 @@ void begin_showing(World& w, Object& object) {
   shown.box.reset();
 }
 
+Load acting_at(const Object& object, double time) {
+  Load load = load_at(*object.load, object.model(), time);
+  if (load.gravity != Vec3{})
+    for (const auto& [node, mass] : *object.hung)
+      load.force[node] += mass * load.gravity;
+  return load;
+}
+
 void load_shown(const World& w, Object& object) {
-  object.shown.load = load_at(*object.load, object.model(), w.now.clock.time);
+  object.shown.load = acting_at(object, w.now.clock.time);
 }
 
 void end_showing(World& w, Object& object) {

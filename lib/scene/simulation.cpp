@@ -103,6 +103,11 @@ const Model& Simulation::first_model(std::size_t object) const {
   return first ? *first : now;
 }
 
+Model Simulation::weighed_model(std::size_t object) const {
+  need_model(world_->now.objects.at(object));
+  return simulation::weighed_model(world_->now.objects[object]);
+}
+
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
   const Shown& shown = one.shown;
@@ -319,6 +324,8 @@ SimulationState Simulation::state() const {
     }
     const std::span<const NodeMotion> motion = motion_of(object);
     state.kinetic_energy += kinetic_energy(object.model(), motion);
+    for (const auto& [node, mass] : *object.hung)
+      state.kinetic_energy += mass * dot(motion[node].velocity, motion[node].velocity) / 2;
     state.elastic_energy += elastic_energy(object.model(), motion);
     state.safe_step = std::min(state.safe_step, object.body->safe);
   }

@@ -178,6 +178,8 @@ public:
   const Model& model(std::size_t object) const;
   /// The model as it came. \throw as its source
   const Model& first_model(std::size_t object) const;
+  /// The model as it is now, with the masses that hang on it. \throw as its source
+  Model weighed_model(std::size_t object) const;
   /// Valid until something is cut.
   ObjectFacts object(std::size_t object) const;
 

@@ -31,7 +31,8 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
   object.statics->solver.emplace(object.model(), std::move(source), w.context,
                                  ElastostaticOptions{.measure_error = w.options.measure_error,
-                                                     .tolerance = w.options.tolerance});
+                                                     .tolerance = w.options.tolerance,
+                                                     .may_be_free = true});
 }
 
 namespace {

@@ -141,6 +141,10 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
                    std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
+/// With what hangs on its nodes.
+Model weighed_model(const Object& object);
+/// The body of an object goes on with other masses.
+void make_body_again(World& w, std::size_t object);
 /// The same body by implicit steps.
 void make_implicit(World& w, std::shared_ptr<Body>& body);
 double integration_step(World& w, Body& body);
@@ -190,6 +194,8 @@ void show(World& w, Object& object);
 void show_in_motion(World& w, Object& object);
 void begin_showing(World& w, Object& object);
 void end_showing(World& w, Object& object);
+/// What acts on it at a time, with the weight of what hangs on it. \pre its model is known
+Load acting_at(const Object& object, double time);
 /// What acts on it now will be shown.
 void load_shown(const World& w, Object& object);
 void warn_of_range(World& w, Object& object);

@@ -47,8 +47,11 @@ struct Elastostatic::State {
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
       : model(m), context(without_progress(c)), options(o),
-        compliance(m, std::move(s), c, o.tolerance > 0), answer(m, compliance),
-        block(m, compliance, answer), held(m, context), u(compliance.rows()) {}
+        compliance(m, std::move(s), c, o.tolerance > 0, o.may_be_free), answer(m, compliance),
+        block(m, compliance, answer), held(m, context, compliance.is_free()), u(compliance.rows()) {
+    if (compliance.is_free())
+      stand_still({});
+  }
 
   static Context without_progress(Context c) {
     c.progress = nullptr;
@@ -233,7 +236,7 @@ struct Elastostatic::State {
 
   void measure(const std::vector<double>& shape) {
     measured = true;
-    if (options.tolerance > 0)
+    if (options.tolerance > 0 && !compliance.is_free())
       counts.shape_error = std::max(counts.shape_error, distance(shape, make_aside(0)));
     ShapeError error;
     if (!all_rows())
@@ -279,6 +282,8 @@ struct Elastostatic::State {
     try {
       if (!now.displacement.empty())
         meet(now);
+      else if (compliance.is_free())
+        stand_still(now);
       double sum = 0;
       for (const NodeVector& f : forces)
         sum += std::abs(f.value.x) + std::abs(f.value.y) + std::abs(f.value.z);
@@ -297,8 +302,17 @@ struct Elastostatic::State {
     }
   }
 
+  /// Free, and nothing acts on it.
+  void stand_still(const Load& now) {
+    if (!now.empty())
+      compliance.require_held();
+    u.assign(compliance.rows(), 0);
+    whole.assign(all_rows() ? 0 : compliance.axes(), 0);
+    shape_known = whole_known = true;
+  }
+
   void meet(const Load& now) {
-    if (block.cheaper(now, options.block_limit) && block.meet(now)) {
+    if (!compliance.is_free() && block.cheaper(now, options.block_limit) && block.meet(now)) {
       forces = block.forces();
       by_block = true;
       return;
@@ -340,6 +354,8 @@ struct Elastostatic::State {
                          std::span<std::array<double, 9>> blocks) {
     if (!now.displacement.empty())
       update(now);
+    else
+      compliance.require_held();
     if (now.displacement.empty() || by_block)
       need_columns(now, std::span(&node, 1));
     const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
@@ -381,6 +397,8 @@ struct Elastostatic::State {
   DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
     update(now);
     const bool held_by_factor = !now.displacement.empty() && !by_block;
+    if (!held_by_factor)
+      compliance.require_held();
     if (!held_by_factor)
       need_columns(now, nodes); // rows of nodes inside, too
     DelassusOperator delassus{{nodes.begin(), nodes.end()}, {}, {}};
@@ -462,11 +480,16 @@ DelassusOperator Elastostatic::delassus_operator(const Load& load,
 }
 
 void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {
+  state_->compliance.require_held();
   state_->compliance.prepare(nodes);
 }
 
 void Elastostatic::read_compressed() {
   state_->compliance.read_compressed();
+}
+
+bool Elastostatic::is_free() const noexcept {
+  return state_->compliance.is_free();
 }
 
 ElastostaticCounts Elastostatic::counts() const noexcept {

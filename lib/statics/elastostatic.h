@@ -83,13 +83,15 @@ struct ElastostaticOptions {
   /// blocks of rows need not be computed: the sum of what was left out of each row is bounded, not
   /// each part alone. All else is the same to the bit with any tolerance.
   double tolerance = 0;
+  /// K may be singular: loads whose displacements hold the model have answers nevertheless.
+  bool may_be_free = false;
 };
 
 class Elastostatic {
 public:
   /// Keeps a reference to the model. \param source of its compliance; null: K is factorised
   /// \pre check_model(model) passes; the source belongs to it
-  /// \throw Error as the factor: K singular, memory
+  /// \throw Error as the factor: K singular (but for `may_be_free`), memory
   Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
                const ElastostaticOptions& options = {});
   ~Elastostatic();
@@ -98,7 +100,8 @@ public:
   /// The forces under `load`; nothing is done if it is the last one. Only what changed is computed
   /// again. \pre nodes exist, no displacement along an axis that the model holds
   /// \throw Error if columns can't be read, memory does not suffice, forces are not finite, or
-  /// displacements are not met within 1e-6 of the largest; the load is the one before then
+  /// displacements are not met within 1e-6 of the largest; SingularStiffness if nothing holds the
+  /// model; the load is the one before then
   void update(const Load& load);
 
   /// The shape: 3 n numbers, mm; exactly the prescribed ones at displaced nodes. Computed by the
@@ -135,6 +138,8 @@ public:
   /// need not; else as prepare.
   void read_compressed();
 
+  /// K is singular, see ElastostaticOptions::may_be_free.
+  bool is_free() const noexcept;
   ElastostaticCounts counts() const noexcept;
 
 private:

@@ -85,7 +85,7 @@ inline const std::map<std::string, Model>& fuzzed_models() {
 /// The lines of a random scene; the same for the same seed.
 class FuzzedScene {
 public:
-  explicit FuzzedScene(std::uint64_t seed) : random_(seed), contacts_(seed) {
+  explicit FuzzedScene(std::uint64_t seed) : random_(seed), contacts_(seed), masses_(~seed) {
     const std::size_t count = 1 + below(3);
     for (std::size_t k = 0; k < count; ++k)
       add_object();
@@ -352,7 +352,18 @@ private:
                 ? " friction " + number_text(static_cast<double>(contacts_() % 100) / 50)
                 : "");
   }
+  /// As well.
+  std::string mass() {
+    const Known& o = objects_[masses_() % objects_.size()];
+    const auto node = [&] { return std::to_string(masses_() % o.model->nodes.size()); };
+    const std::string grams =
+        masses_() % 40 == 0 ? "1e30" : number_text(static_cast<double>(masses_() % 2000) / 1000);
+    return "mass " + o.name + " " + node() + "," + node() + " " + grams +
+           (masses_() % 3 == 0 ? " each" : "");
+  }
   void command() {
+    if (masses_() % 16 == 0)
+      line((masses_() % 4 == 0 ? "at " + number_text(now_ + 0.0015) + " " : "") + mass());
     if (contacts_() % 8 == 0)
       line(contact());
     if (one_in(6))
@@ -392,12 +403,79 @@ private:
     }
   }
 
-  std::mt19937_64 random_, contacts_;
+  std::mt19937_64 random_, contacts_, masses_;
   std::vector<Known> objects_;
   std::vector<std::string> instruments_; ///< that were put somewhere
   std::vector<std::string> lines_;
   double now_ = 0;
 };
+
+/// A random scene with lines and steps that fail in between, of all methods and laws; solids turn
+/// as they like where they can.
+inline std::vector<std::string> failing_scene(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 2654435761U + 1);
+  const auto one_in = [&](std::uint64_t n) { return random() % n == 0; };
+  std::vector<std::string> lines, objects;
+  const FuzzedScene calm(seed);
+  for (std::string line : calm.lines()) {
+    std::istringstream words(line);
+    std::string verb, name, model;
+    words >> verb >> name >> model;
+    if (verb == "object") {
+      objects.push_back(name);
+      if (!one_in(3) && line.find("bulk=") == std::string::npos) { // most are solids
+        const std::string other = one_in(4) ? "loaf" : "gel";
+        if (const std::size_t store = line.find("store=" + model); store != std::string::npos)
+          line.replace(store + 6, model.size(), other);
+        line.replace(verb.size() + name.size() + 2, model.size(), other);
+        model = other;
+      }
+      const bool solid = model == "gel" || model == "loaf";
+      if (solid && line.find(" law=") == std::string::npos && one_in(2))
+        line +=
+            line.find(" method=") == std::string::npos && line.find(" store=") == std::string::npos
+                ? " method=ffe rotation=warp"
+            : line.find(" method=ela") == std::string::npos ? " rotation=warp"
+                                                            : "";
+    }
+    lines.push_back(line);
+    if (verb != "step" || !one_in(2))
+      continue;
+    const std::string& o = objects[random() % objects.size()];
+    const std::string node = std::to_string(random() % 12);
+    switch (random() % 6) {
+    case 0: // no number that a step can hold
+      lines.insert(lines.end(), {"force " + o + " " + node + " 0 1e300 0", "step 0.001",
+                                 "release " + o + " " + node, "step 0.001"});
+      break;
+    case 1: // squeezed through itself
+      lines.insert(lines.end(),
+                   {"contact " + o + " self", "displace " + o + " x<8 40 3 1 over 0.001",
+                    "step 0.001", "release " + o + " all", "step 0.002"});
+      break;
+    case 2: // an instrument through the body
+      lines.insert(lines.end(),
+                   {"instrument z sphere 3 60 60 60", "step 0", "move z -30 -30 -30 over 0.001",
+                    "step 0.001", "withdraw z", "step 0.001"});
+      break;
+    case 3: // a cut that can't be, now and in a step
+      lines.insert(lines.end(),
+                   {"cut " + o + " plane 900 0 0 1 0 0",
+                    "at " + number_text(1e-9) + " cut " + o + " plane 900 0 0 1 0 0",
+                    "at every 0.0005 cut " + o + " plane 900 0 0 1 0 0", "step 0.001"});
+      break;
+    case 4: // lines that are none
+      lines.insert(lines.end(), {"displace " + o + " " + node + " 1 2", "squeeze " + o,
+                                 "method " + o + (one_in(2) ? " ffe" : " ela"), "step -1"});
+      break;
+    default:
+      lines.insert(lines.end(), {"displace " + o + " " + node + " 2 -3 4 over 0.003", "step 0.001",
+                                 "gravity 0 1e39 0", "step 0.001", "gravity 0 -900 0", "step 0.001",
+                                 "gravity 0 0 0"});
+    }
+  }
+  return lines;
+}
 
 /// Digests what a result is told, and notes what no result may be told.
 class CheckedResult final : public ResultWriter {
