@@ -250,8 +250,7 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
 void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
-  renew(w.now.objects.at(c.object));
-  object.warped = nullptr;
+  renew(object); // as where a step is taken back: the last answer of large rotations stays
   touch(object);
 }
 
