@@ -5,7 +5,7 @@
 #include "formats/stream/removal.h"
 #include "tools/run/event_log.h"
 #include "tools/run/failed_run.h"
-#include "tools/run/result_choice.h"
+#include "tools/run/run_arguments.h"
 #include "tools/run/run_report.h"
 #include "tools/run/scene_answers.h"
 #include "tools/run/scene_progress.h"
@@ -27,17 +27,7 @@ using namespace gewebe;
 
 namespace {
 
-struct Arguments {
-  std::string scene = "-";
-  bool serve = false, acknowledge = false, awake = false, binary = false, verify = false;
-  bool no_partial = false;
-  std::optional<double> rate;
-  double tolerance = 0;
-  std::string listen, shapes, events, record, latencies, recover;
-  ResultChoice result;
-};
-
-void work(cli::Run& run, const Arguments& in) {
+void work(cli::Run& run, const RunArguments& in) {
   if (!in.recover.empty())
     return report_recovered(run, recover_result(in.recover));
   const Kind kind = in.result.kind(run);
@@ -129,34 +119,8 @@ void work(cli::Run& run, const Arguments& in) {
 
 int main(int argc, char** argv) {
   cli::Program p("ffe-run", "Runs a scene of deformable objects, command by command.");
-  Arguments in;
-  in.result.declare(p);
-  p.flag("--serve", in.serve, "answer a wrong line and go on");
-  p.flag("--ack", in.acknowledge, "with --serve, answer each line by its number at last");
-  p.option("--listen", in.listen, "PATH", "with --serve, a socket for clients, one at a time");
-  p.option("--shapes-in", in.shapes, "FILE", "with --serve, where others map all shapes");
-  p.flag("--busy-wait", in.awake, "with --serve, wait for lines without sleep");
-  p.flag("--binary", in.binary, "answer in binary frames of float32");
-  p.option("--events", in.events, "FILE", "who touched what when, as CSV");
-  p.option("--record", in.record, "FILE", "what was accepted, as a scene that does it again");
-  p.option("--tolerance", in.tolerance, "E",
-           "error that shapes may have, of their largest displacement")
-      .range(0, 0.1);
-  p.flag("--verify", in.verify, "fail unless every shape is as exact as it should be");
-  p.option("--rate", in.rate, "HZ", "steps a second that are wanted").positive();
-  p.option("--latencies", in.latencies, "FILE", "how long each step took to answer, as CSV");
-  p.flag("--no-partial", in.no_partial, "keep no frames of a run that fails or is interrupted");
-  p.option("--recover", in.recover, "FILE", "keep the frames that a killed run has left of FILE");
-  p.operand("SCENE", in.scene, "the scene");
-  p.check([&] {
-    for (const auto& [given, option] : {std::pair{in.acknowledge, "--ack"},
-                                        {!in.listen.empty(), "--listen"},
-                                        {in.awake, "--busy-wait"},
-                                        {!in.shapes.empty(), "--shapes-in"}})
-      if (given && !in.serve)
-        throw UsageError(std::string(option) + " without --serve, expected both");
-    in.result.check(p);
-  });
+  RunArguments in;
+  in.declare(p);
   const int status = p.run(argc, argv, [&](cli::Run& run) { work(run, in); });
   if (deferred_signal() != 0)
     end_by_deferred_signal();

@@ -4,13 +4,14 @@
 #include "base/nearest_word.h"
 #include "formats/stream/stream.h"
 #include "tools/shared/messages.h"
+#include "tools/shared/tool_list.h"
 #include "tools/shared/version.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,22 +23,6 @@ using namespace gewebe;
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Tool {
-  std::string_view name, what; ///< as its page has them
-};
-constexpr std::array tools{
-    Tool{"metaball2vol", "turn particles into a volume of their density"},
-    Tool{"voxelize", "turn a closed triangle mesh, labels or a scan into a volume"},
-    Tool{"csg", "combine volumes"},
-    Tool{"mc-opt",
-         "turn a volume into a closed triangle mesh of its isosurface, or into tetrahedra"},
-    Tool{"exp2ela", "turn a mesh into a deformable model of springs or of finite elements"},
-    Tool{"ffe-precompute", "factorise the stiffness of a model and store it"},
-    Tool{"ffe-run", "simulate deformable objects, command by command"},
-    Tool{"emboss-render",
-         "draw a mesh, tetrahedra, a model or a result with embossed textures, or a volume"},
-};
 
 constexpr std::string_view usage = R"(Starts the programs of Gewebe.
 Usage: gewebe PROGRAM [ARGUMENT...]
@@ -72,10 +57,6 @@ fs::path here() {
   become((here() / tool).string(), std::move(words));
 }
 
-bool is_tool(std::string_view name) {
-  return std::ranges::find(tools, name, &Tool::name) != tools.end();
-}
-
 /// The file of a manual page: NAME, gewebe-NAME or gewebe_NAME; where the programs are installed.
 /// What is no program's page is also looked for in the tree that they are built in.
 std::optional<std::string> page_file(const std::string& name) {
@@ -91,24 +72,6 @@ std::optional<std::string> page_file(const std::string& name) {
     }
   return std::nullopt;
 }
-
-/// What a word that names no program is done by.
-struct Task {
-  std::string_view word, how;
-};
-constexpr std::array tasks{
-    Task{"convert", "exp2ela --to KIND writes a mesh or a model in another format"},
-    Task{"mesh", "mc-opt makes a mesh of a volume"},
-    Task{"tets", "mc-opt --tets and exp2ela --solid make tetrahedra"},
-    Task{"volume", "voxelize and metaball2vol make volumes"},
-    Task{"segment", "voxelize --label and --threshold make volumes of scans"},
-    Task{"model", "exp2ela makes a model of a mesh"},
-    Task{"simulate", "ffe-run simulates"},
-    Task{"run", "ffe-run simulates"},
-    Task{"render", "emboss-render draws"},
-    Task{"view", "emboss-render draws"},
-    Task{"draw", "emboss-render draws"},
-};
 
 void write_text(const std::string& text) {
   Output output("-", {.binary = false});
@@ -131,13 +94,6 @@ void show_help(const std::string& page) {
   start(page, {"", "--help"});
 }
 
-std::string list() {
-  std::string text;
-  for (const Tool& tool : tools)
-    (((text += tool.name) += std::string(16 - tool.name.size(), ' ')) += tool.what) += "\n";
-  return text;
-}
-
 void work(const std::vector<std::string>& words) {
   const std::string word = words.size() > 1 ? words[1] : "";
   if (is_tool(word))
@@ -146,20 +102,18 @@ void work(const std::vector<std::string>& words) {
     throw UsageError("expected a program, see gewebe --list");
   if (word == "help" && words.size() == 3)
     return show_help(words[2]);
-  if (const auto* const task = std::ranges::find(tasks, word, &Task::word); task != tasks.end())
-    throw UsageError("no program '" + word + "', but " + std::string(task->how) +
-                     ", see gewebe --list");
+  if (const std::string_view how = way_to(word); !how.empty())
+    throw UsageError("no program '" + word + "', but " + std::string(how) + ", see gewebe --list");
   if (words.size() > 2)
     throw UsageError("unexpected '" + words[2] + "' after " + word + ", see gewebe --help");
   if (word == "-h" || word == "--help" || word == "help")
-    return write_text(std::string(usage) + list());
+    return write_text(std::string(usage) + tool_list());
   if (word == "--list")
-    return write_text(list());
+    return write_text(tool_list());
   if (word == "--version")
     return write_text(cli::version_text("gewebe"));
   std::vector<std::string> known{"help", "--help", "--list", "--version"};
-  for (const Tool& tool : tools)
-    known.emplace_back(tool.name);
+  std::ranges::copy(tool_names(), std::back_inserter(known));
   throw UsageError("no program '" + word + "'" + suggestion(word, known) + ", see gewebe --list");
 }
 

@@ -23,7 +23,7 @@ struct ChangeCommand {
   Change change;
   std::string object{}, other{}, instrument{};
   std::optional<Selector> nodes{}, others{};
-  bool total = false;  ///< a force is divided among the nodes
+  bool total = false;  ///< a force or mass is divided among the nodes
   std::string stage{}; ///< file of the second stage's model; none: ""
   std::string mesh{};  ///< file of an instrument's mesh; none: ""
 };

@@ -118,6 +118,17 @@ What parse_pressure(Words& in) {
   return c;
 }
 
+What parse_mass(Words& in) {
+  ChangeCommand c = parse_about(in, {});
+  SetMass set;
+  set.mass = in.number("mass");
+  if (!(set.mass >= 0))
+    in.fail("a negative mass");
+  c.total = !in.take("each");
+  c.change = set;
+  return c;
+}
+
 What parse_attach(Words& in) {
   ChangeCommand c = parse_about(in, {});
   c.other = in.name();
@@ -397,8 +408,8 @@ struct Verb {
   std::function<What(Words&)> parse;
 };
 
-const std::array<Verb, 30>& verbs() {
-  static const std::array<Verb, 30> all{{
+const std::array<Verb, 31>& verbs() {
+  static const std::array<Verb, 31> all{{
       {"object",
        "object NAME MODEL.ela [store=FILE.h5] [method=ffe|ela] [integration=implicit|auto] "
        "[rotation=warp] [law=corotational|neo-hookean] [damping=RATIO@HZ] [tolerance=E] "
@@ -406,6 +417,7 @@ const std::array<Verb, 30>& verbs() {
        false, parse_object},
       {"force", "force NAME NODES fx fy fz [total] [period T]", true, parse_force},
       {"pressure", "pressure NAME NODES p [period T]", true, parse_pressure},
+      {"mass", "mass NAME NODES m [each], m 0 or more", true, parse_mass},
       {"displace", "displace NAME NODES dx dy dz [over T]", true, parse_displace},
       {"attach", "attach A NODES B NODES k, k positive", true, parse_attach},
       {"contact", "contact A B [friction MU] or contact A self [friction MU], MU 0 or more", true,

@@ -38,6 +38,12 @@ struct Names {
       if (said.total)
         c.force = c.force / static_cast<double>(c.nodes.size());
   }
+  void find(SetMass& c) const {
+    c.object = find_object(simulation, said.object);
+    c.nodes = nodes(c.object, *said.nodes);
+    if (said.total)
+      c.mass /= static_cast<double>(c.nodes.size());
+  }
   void find(SetContact& c) const {
     c.object = find_object(simulation, said.object);
     c.other = said.other == "self" ? c.object : find_object(simulation, said.other);

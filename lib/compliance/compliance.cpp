@@ -46,7 +46,7 @@ std::size_t row_nodes_of(const Model& model, const ComplianceSource& source) {
 } // namespace
 
 Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> source,
-                       const Context& context, bool bounded)
+                       const Context& context, bool bounded, bool may_be_free)
     : axes_(3 * model.nodes.size()), source_(source ? std::move(source) : compliance_of_model()),
       compressed_(source_->columns() != nullptr ? source_->columns()->compressed() : nullptr),
       rows_(3 * row_nodes_of(model, *source_)), context_(context),
@@ -54,7 +54,18 @@ Compliance::Compliance(const Model& model, std::shared_ptr<ComplianceSource> sou
   context_.progress = nullptr;
   if (rows_ < axes_)
     inside_.emplace(axes_ / 3, nullptr, columns_of(axes_), column_bytes(context) / 2, false);
-  source_->open(model, context_);
+  try {
+    source_->open(model, context_);
+  } catch (const SingularStiffness& error) {
+    if (!may_be_free)
+      throw;
+    free_ = error;
+  }
+}
+
+void Compliance::require_held() const {
+  if (free_)
+    throw SingularStiffness(*free_);
 }
 
 /// Solves for columns, and keeps so many rows of them.
@@ -75,6 +86,7 @@ ColumnSolve Compliance::columns_of(std::size_t rows) {
 }
 
 void Compliance::solve(std::span<double> over_axes, std::size_t columns) {
+  require_held();
   source_->solve(over_axes, columns);
   solves_ += columns;
 }
@@ -199,6 +211,12 @@ bool Compliance::columns_pay(std::span<const std::uint32_t> nodes) const {
   return nodes.size() <= std::min(max, capacity()) &&
          std::all_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return outer(node); }) &&
          stored(nodes);
+}
+
+bool Compliance::at_hand(std::span<const std::uint32_t> nodes) const {
+  return columns_pay(nodes) &&
+         (source_->blocks() == nullptr ||
+          std::ranges::all_of(nodes, [&](std::uint32_t node) { return cache_.resident(node); }));
 }
 
 bool Compliance::columns_for_shape(std::span<const std::uint32_t> nodes, int shapes) {

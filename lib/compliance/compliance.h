@@ -13,6 +13,7 @@
 #include "compliance/compliance_source.h"
 #include "contact/load.h"
 #include "model/model.h"
+#include "solve/condition.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -26,14 +27,19 @@ namespace gewebe {
 class Compliance {
 public:
   /// Keeps a reference to the model. \param source null: K is factorised \param bounded whether add
-  /// may be asked to leave something out
+  /// may be asked to leave something out \param may_be_free whether K may be singular: then
+  /// is_free() holds, and nothing may be asked for
   /// \pre check_model(model) passes; the source belongs to it   \throw Error as ComplianceSource,
   /// and if columns of the source have other rows than for the surface or for all nodes
   Compliance(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
-             bool bounded);
+             bool bounded, bool may_be_free = false);
   Compliance(const Compliance&) = delete;
   Compliance& operator=(const Compliance&) = delete;
 
+  /// K is singular: the model can move freely unless nodes are displaced.
+  bool is_free() const noexcept { return free_.has_value(); }
+  /// \throw SingularStiffness if is_free()
+  void require_held() const;
   std::size_t axes() const noexcept { return axes_; } ///< 3 n
   std::size_t rows() const noexcept { return rows_; } ///< 3 m, which sums have
 
@@ -93,6 +99,9 @@ public:
   /// Whether the sum of columns under forces at these nodes is cheaper than a solve. Does not
   /// depend on the number of threads, for the bits of the result do.
   bool columns_pay(std::span<const std::uint32_t> nodes) const;
+  /// Whether a sum of columns under forces at these nodes pays and has no effect on what pays
+  /// later.
+  bool at_hand(std::span<const std::uint32_t> nodes) const;
   /// Whether the columns of nodes whose blocks were needed are at hand for the shape under forces
   /// there; they are brought where that pays. \param shapes how many were asked for with these
   /// nodes, this one among them
@@ -118,6 +127,7 @@ private:
   ColumnCache cache_;
   std::optional<ColumnCache> inside_; ///< of the nodes behind the first m, if there are any
   std::uint64_t solves_ = 0;
+  std::optional<SingularStiffness> free_;
 };
 
 } // namespace gewebe

@@ -148,6 +148,7 @@ bool ForcesAt::meet(const Load& now) {
     return false;
   miss_ = std::max(miss_, miss);
   question_ = std::move(wanted);
+  counted_ = false;
   force_ = std::move(f);
   return true;
 }

@@ -33,8 +33,12 @@ public:
   /// The first rows() of the shape under that load by what a rigid motion of these nodes did
   /// before, if this is one. \return whether it was
   bool shape(const Load& now, std::vector<double>& u);
-  /// How many shapes were asked for with this set otherwise, one more now.
-  int count_shape() { return ++shapes_; }
+  /// Loads with this set whose shapes were asked for otherwise, this one among them.
+  int shapes() {
+    shapes_ += counted_ ? 0 : 1;
+    counted_ = true;
+    return shapes_;
+  }
 
   /// The rows of C_cc, x = C_cc⁻¹ x, and the forces by row.
   std::vector<std::size_t> axes() const;
@@ -61,7 +65,8 @@ private:
   std::uint64_t changes_ = 0;    ///< of the block
   std::vector<double> question_; ///< what they have to be moved by, beyond other loads
   std::vector<double> force_;    ///< by axis of the block
-  int shapes_ = 0;               ///< that were asked for with this set
+  int shapes_ = 0;               ///< see shapes()
+  bool counted_ = false;         ///< the last load among them
   ShapeModes modes_;             ///< of this set: question to shape
   double miss_ = 0;
 };

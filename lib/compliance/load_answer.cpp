@@ -87,27 +87,43 @@ bool LoadAnswer::follows(const Load& load, std::size_t changed) const {
   return load.gravity == gravity_ && changed < load.force.size() && increments_ < max_increments;
 }
 
-const std::vector<double>& LoadAnswer::whole(const Load& load) {
+void LoadAnswer::note(const Load& load) {
   if (known(load))
-    return answer_;
-  (void)weight(load.gravity);
-  const std::vector<NodeVector> changed =
+    return;
+  std::vector<NodeVector> changed =
       load.gravity == gravity_ ? changed_forces(load.force) : std::vector<NodeVector>{};
-  std::vector<double> fresh;
   if (follows(load, changed.size())) {
-    fresh = std::move(answer_);
-    forget(); // should the sum fail
-    compliance_.add(changed, 0, fresh);
+    pending_.push_back(std::move(changed));
     ++increments_;
   } else {
-    fresh = weight_;
-    fresh.resize(compliance_.rows(), 0);
-    compliance_.add(as_vectors(load.force), 0, fresh);
+    pending_.clear();
+    fresh_ = as_vectors(load.force);
     increments_ = 0;
   }
-  answer_ = std::move(fresh);
   gravity_ = load.gravity;
   force_ = load.force;
+}
+
+/// Makes the answer that of the load noted last.
+void LoadAnswer::settle() {
+  if (!fresh_ && pending_.empty())
+    return;
+  const Vec3 gravity = gravity_;
+  forget(); // should a sum fail
+  if (fresh_) {
+    answer_ = weight(gravity);
+    answer_.resize(compliance_.rows(), 0);
+    compliance_.add(*fresh_, 0, answer_);
+    fresh_.reset();
+  }
+  for (const std::vector<NodeVector>& changed : std::exchange(pending_, {}))
+    compliance_.add(changed, 0, answer_);
+  gravity_ = gravity;
+}
+
+const std::vector<double>& LoadAnswer::whole(const Load& load) {
+  note(load);
+  settle();
   return answer_;
 }
 

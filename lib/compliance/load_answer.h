@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,9 @@ public:
   bool known(const Load& load) const { return load.gravity == gravity_ && load.force == force_; }
   /// The answer at the first rows() of the compliance.
   const std::vector<double>& whole(const Load& load);
+  /// Answers to come are to the bit what they are behind whole(load), which is put off until one is
+  /// asked for.
+  void note(const Load& load);
   /// That to the weight alone; empty for none.
   const std::vector<double>& weight(const Vec3& gravity);
   /// Rows of the answer at all axes. The same bits whatever answers were asked for.
@@ -44,17 +48,21 @@ private:
   std::vector<NodeVector> changed_forces(const std::map<std::uint32_t, Vec3>& now) const;
   const std::vector<double>& everywhere(const Load& load);
   bool follows(const Load& load, std::size_t changed) const;
+  void settle();
   void forget() { gravity_ = {HUGE_VAL, HUGE_VAL, HUGE_VAL}; }
 
   const Model& model_;
   Compliance& compliance_;
   Vec3 weight_gravity_;
   std::vector<double> weight_;
-  std::map<std::uint32_t, Vec3> force_; ///< that the answer is to
+  std::map<std::uint32_t, Vec3> force_; ///< that the answer is to, once it is settled
   Vec3 gravity_;
   std::vector<double> answer_;
   std::uint64_t increments_ = 0; ///< by which it came to be
-  Load solved_;                  ///< whose answer over all axes is known
+  // What it lacks: all of these forces first, then increments.
+  std::optional<std::vector<NodeVector>> fresh_;
+  std::vector<std::vector<NodeVector>> pending_;
+  Load solved_; ///< whose answer over all axes is known
   std::vector<double> everywhere_;
   Load carried_; ///< whose answer is known at some nodes
   std::map<std::uint32_t, Vec3> carried_at_;

@@ -60,12 +60,13 @@ Net net_of(const Model& model) {
     const std::string name = "node " + std::to_string(i);
     if (!(masses[i] > 0) && tied[i] == 0 && !model.tetrahedra.empty())
       throw Error(name + " is in no tetrahedron, expected none such of a solid that moves");
-    if (masses[i] > 0 && !about(node.mass, masses[i]))
+    const bool of_elements = masses[i] > 0 && about(node.mass, masses[i]);
+    if (masses[i] > 0 && !of_elements && !(node.mass > masses[i]))
       throw Error(name + " has a mass of " + number_text(node.mass) +
-                  " g, expected that of its tetrahedra, " + number_text(masses[i]) +
+                  " g, expected at least that of its tetrahedra, " + number_text(masses[i]) +
                   " g, of a solid that moves");
     const bool massless = node.mass == 0; // and stays where it is: any mass will do
-    net.masses.push_back(massless ? 1 : node.mass);
+    net.masses.push_back(massless ? 1 : of_elements ? masses[i] : node.mass);
     net.drag.push_back(massless ? 0 : node.drag / node.mass);
   }
   require_masses(model);

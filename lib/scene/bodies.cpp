@@ -28,6 +28,8 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
     const auto base = static_cast<std::uint32_t>(all.nodes.size());
     offset.push_back(base);
     all.nodes.insert(all.nodes.end(), from.nodes.begin(), from.nodes.end());
+    for (const auto& [node, mass] : *w.now.objects[part].hung)
+      all.nodes[base + node].mass += mass;
     for (Spring s : from.springs) {
       s.i += base;
       s.j += base;
@@ -52,6 +54,13 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
       all.nodes[i].material += materials;
   }
   return all;
+}
+
+Model weighed_model(const Object& object) {
+  Model model = object.model();
+  for (const auto& [node, mass] : *object.hung)
+    model.nodes[node].mass += mass;
+  return model;
 }
 
 namespace {
@@ -223,7 +232,9 @@ std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts, const 
     body->model = std::make_shared<const Model>(std::move(all));
   } else {
     offset.push_back(0);
-    body->model = w.now.objects[parts[0]].matter->model;
+    const Object& object = w.now.objects[parts[0]];
+    body->model = object.hung->empty() ? object.matter->model
+                                       : std::make_shared<const Model>(weighed_model(object));
   }
   std::vector<NodeMotion> motion;
   for (const std::size_t part : parts) {
@@ -268,6 +279,16 @@ void add_counts(SolidStepCounts& sum, const SolidStepCounts& more) {
 
 void drop_body(World& w, const Body* body) {
   std::erase_if(w.now.bodies, [&](const auto& one) { return one.get() == body; });
+}
+
+void make_body_again(World& w, std::size_t object) {
+  const std::shared_ptr<Body> before = w.now.objects[object].body;
+  Motions motions;
+  for (const std::size_t part : before->parts) {
+    const std::span<const NodeMotion> motion = motion_of(w.now.objects[part]);
+    motions[part].assign(motion.begin(), motion.end());
+  }
+  std::ranges::replace(w.now.bodies, before, make_body(w, before->parts, &motions));
 }
 
 void make_implicit(World& w, std::shared_ptr<Body>& body) {

@@ -41,6 +41,11 @@ struct SetPressure {
   std::vector<std::uint32_t> nodes;
   NodePressure pressure; ///< 0 takes it away
 };
+struct SetMass {
+  std::size_t object = 0;
+  std::vector<std::uint32_t> nodes;
+  double mass = 0; ///< g, on each beside its own; 0 takes it away
+};
 struct SetDisplacement {
   std::size_t object = 0;
   std::vector<std::uint32_t> nodes;
@@ -159,7 +164,7 @@ struct Restore {
   std::size_t object = 0;
 };
 using Change =
-    std::variant<SetForce, SetPressure, SetDisplacement, Attach, Release, SetInstrument,
+    std::variant<SetForce, SetPressure, SetMass, SetDisplacement, Attach, Release, SetInstrument,
                  MoveInstrument, SetCoupling, Grasp, Withdraw, SetContact, SetGravity, SetTimestep,
                  SetTwoStep, SetWarp, Emit, SetMethod, Renew, Prepare, CutObject, SetTear, Restore>;
 

@@ -145,6 +145,31 @@ void Rule<SetPressure>::log(const World&, const SetPressure& c, ChangeRow& row) 
   row.duration = c.pressure.period;
 }
 
+void Rule<SetMass>::check(World& w, const SetMass& c) {
+  need_model(w.now.objects.at(c.object));
+  if (!(c.mass >= 0 && c.mass <= largest_number))
+    throw Error("a mass of " + number_text(c.mass) + " g, expected one from 0 to 1e38 g");
+}
+void Rule<SetMass>::apply(World& w, const SetMass& c) {
+  Object& object = w.now.objects.at(c.object);
+  std::map<std::uint32_t, double>& hung = object.hung.write();
+  const std::map<std::uint32_t, double> before = hung;
+  for (const std::uint32_t node : c.nodes)
+    if (c.mass == 0)
+      hung.erase(node);
+    else
+      hung[node] = c.mass;
+  if (hung == before)
+    return;
+  if (object.body != nullptr)
+    make_body_again(w, c.object);
+  touch(object);
+}
+void Rule<SetMass>::log(const World&, const SetMass& c, ChangeRow& row) {
+  row.what = "mass";
+  row.value = c.mass;
+}
+
 void Rule<SetDisplacement>::check(World& w, const SetDisplacement& c) {
   Object& object = w.now.objects.at(c.object);
   need_model(object);
@@ -225,8 +250,7 @@ void Rule<Emit>::log(const World&, const Emit& c, ChangeRow& row) {
 void Rule<Renew>::apply(World& w, const Renew& c) {
   Object& object = w.now.objects.at(c.object);
   object.statics->ahead = true;
-  renew(w.now.objects.at(c.object));
-  object.warped = nullptr;
+  renew(object); // as where a step is taken back: the last answer of large rotations stays
   touch(object);
 }
 

@@ -326,18 +326,37 @@ void sweep_blades(World& w) {
 
 // ---- what hangs together but can move freely
 
+namespace {
+
+/// That what displaces an object with a singular stiffness holds it. \throw SingularStiffness
+void require_held(World& w, Object& object) {
+  try {
+    update_solver(w, object, acting_at(object, w.now.clock.time));
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const SingularStiffness&) {
+    throw;
+  } catch (const Error& error) { // of the factor with these nodes held
+    throw SingularStiffness(error.what());
+  }
+}
+
+} // namespace
+
 /// A cut object that an elastostatic shape is asked of may have none: then it goes on
 /// elastodynamic.
 void find_free_motion(World& w, std::size_t index) {
   Object& object = w.now.objects[index];
-  if (!object.cut.first || object.method != Method::ffe || object.statics->made() ||
+  const Statics& statics = *object.statics;
+  if (!object.cut.first || object.method != Method::ffe ||
+      (statics.made() && !(statics.solver && statics.solver->is_free())) ||
       (object.load->empty() && !instruments_there(w)))
     return;
   try {
     if (object.warp)
       (void)warped_of(w, object);
-    else
-      (void)solver_of(w, object);
+    else if (solver_of(w, object).is_free())
+      require_held(w, object);
     return;
   } catch (const SingularStiffness& error) {
     w.now.news.cuttings.push_back({.kind = Cutting::Kind::loose,

@@ -109,9 +109,8 @@ void StaticMember::follow_load(double start, double end) {
   if (!object.load->force_period.empty() ||
       std::ranges::any_of(object.load->pressure, [](const auto& p) { return p.second.period > 0; }))
     return;
-  way_ = Way{w_.now.clock.shown < start ? load_at(*object.load, object.model(), start)
-                                        : *object.shown.load,
-             load_at(*object.load, object.model(), end), stood_shape(w_, object), start, end};
+  way_ = Way{w_.now.clock.shown < start ? acting_at(object, start) : *object.shown.load,
+             acting_at(object, end), stood_shape(w_, object), start, end};
 }
 
 contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Context& /*context*/) {
@@ -128,7 +127,7 @@ contact::ContactBody& StaticMember::begin(double /*from*/, double to, const Cont
     load_ = load_between(way_->from, way_->to, way_->stood,
                          (to - way_->start) / (way_->end - way_->start));
   else
-    load_ = given_ ? *given_ : load_at(*object.load, object.model(), to);
+    load_ = given_ ? *given_ : acting_at(object, to);
   StaticContactState state{&object.model(),
                            &surface_.node,
                            &load_,

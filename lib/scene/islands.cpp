@@ -79,7 +79,7 @@ struct Ways {
                        (object.statics->made() || !object.load->empty());
     if (!moves)
       return of_object(index).box;
-    Load load = load_at(*object.load, object.model(), to);
+    Load load = acting_at(object, to);
     for (const NodalContactForce& f : shown.contact)
       if (!load.displacement.contains(f.node))
         load.force[f.node] += f.force;

@@ -16,7 +16,7 @@ namespace {
 std::span<const double> shape_now(World& w, Object& object) {
   std::span<const double> u;
   if (object.statics->made() || (!object.load->empty() && !is_held_altogether(object))) {
-    update_solver(w, object, load_at(*object.load, object.model(), w.now.clock.time));
+    update_solver(w, object, acting_at(object, w.now.clock.time));
     u = static_shape(object);
     require_bounded(object, u);
   }

@@ -46,6 +46,7 @@ Object renumbered(const Object& old, std::shared_ptr<const Model> model) {
   next.statics = std::make_shared<Statics>();
   next.warped = nullptr;
   next.load = gravity_of(*old.load);
+  next.hung = {};
   next.body = nullptr;
   next.offset = 0;
   next.shown = {.displacement = std::vector<double>(3 * next.model().nodes.size(), 0.0),
@@ -203,6 +204,10 @@ void move_shown(const Object& old, const Moves& moves, std::deque<Object>& piece
   piece.follow_load(*old.load, [](Object& o) -> Load& { return o.load.write(); });
   piece.follow_load(*old.shown.load, [](Object& o) -> Load& { return o.shown.load.write(); });
   piece.follow_load(*old.came.load, [](Object& o) -> Load& { return o.came.load.write(); });
+  for (const auto& [node, mass] : *old.hung)
+    for (const Moves::To& to : moves.of(node))
+      if (to.share > 0)
+        piece(to).hung.write()[to.node] += to.share * mass;
   piece.follow(old.came.touched, [](Object& o) -> auto& { return o.came.touched; });
   std::map<std::size_t, std::map<std::uint32_t, Vec3>> forces;
   for (const NodeVector& f : *old.shown.forces)

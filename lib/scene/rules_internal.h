@@ -49,6 +49,14 @@ struct Rule<SetPressure> : Plain<SetPressure> {
   static void log(const World& w, const SetPressure& c, ChangeRow& row);
 };
 template <>
+struct Rule<SetMass> : Plain<SetMass> {
+  static void check(World& w, const SetMass& c);
+  static constexpr bool may_fail = true;
+  static void apply(World& w, const SetMass& c);
+  static void log(const World& w, const SetMass& c, ChangeRow& row);
+  static constexpr bool copies = false;
+};
+template <>
 struct Rule<SetDisplacement> : Plain<SetDisplacement> {
   static void check(World& w, const SetDisplacement& c);
   static void apply(World& w, const SetDisplacement& c);

@@ -139,6 +139,7 @@ struct Shown {
   std::vector<NodalContactForce> contact{}; ///< of an elastodynamic object means over the step
   bool valid = true;  // forces are those of the present state, and of ela the displacement
   bool shaped = true; // of ffe the displacement too, under this load
+  bool rough = false; // within SimulationOptions::tolerance: the scene goes on by the exact one
   std::shared_ptr<const DeferredShape>
       deferred{}; // what the displacement is, where it is not shaped
   CopyOnWrite<Load> load{};
@@ -189,6 +190,7 @@ struct Object {
   Method method = Method::ela;
   Integration integration = Integration::semi_implicit; // of a net; automatic: it has no body yet
   CopyOnWrite<Load> load{};
+  CopyOnWrite<std::map<std::uint32_t, double>> hung{}; // g by node, beside the model's masses
   Stages stages;
   bool warp = false;                          // large rotations
   bool meets = false;                         // one of the scene's contacts is of it

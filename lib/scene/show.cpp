@@ -136,6 +136,23 @@ void warn_of_range(World& w, Object& object) {
        ", the shape is not to be trusted there");
 }
 
+namespace {
+
+void find_shape(World& w, Object& object, std::span<const double> (*surface)(Object&)) {
+  Shown& shown = object.shown;
+  at_object(w, object, [&] {
+    // As it is, but where a change of method looked ahead.
+    update_stages(w, object, acting_load(shown));
+    const std::span<const double> u = surface(object);
+    require_bounded(object, u);
+    shown.displacement.replace().assign(u.begin(), u.end());
+  });
+  shown.box.reset();
+  shown.shaped = true;
+}
+
+} // namespace
+
 void shape(World& w, Object& object) {
   Shown& shown = object.shown;
   if (shown.shaped)
@@ -144,23 +161,30 @@ void shape(World& w, Object& object) {
     at_object(w, object, [&] { find_deferred_shape(w, object); });
     return;
   }
-  at_object(w, object, [&] {
-    // As it is, but where a change of method looked ahead.
-    update_stages(w, object, acting_load(shown));
-    const std::span<const double> u = static_surface(object);
-    require_bounded(object, u);
-    shown.displacement.replace().assign(u.begin(), u.end());
-  });
-  shown.box.reset();
-  shown.shaped = true;
+  find_shape(w, object, static_rough_surface);
+  shown.rough = w.options.tolerance > 0 && !object.warp;
   warn_of_range(w, object);
 }
 
-/// During a step, which may be taken back: the shape is then computed anew.
-void shape_in_step(World& w, Object& object) {
+void shape_to_show(World& w, Object& object) {
   if (!object.shown.shaped)
     object.statics->ahead = true;
   shape(w, object);
+}
+
+void shape_in_step(World& w, Object& object) {
+  Shown& shown = object.shown;
+  if (shown.shaped && !shown.rough)
+    return;
+  if (shown.deferred)
+    return shape_to_show(w, object);
+  if (!shown.shaped)
+    object.statics->ahead = true;
+  const bool known = shown.shaped;
+  shown.rough = false;
+  find_shape(w, object, static_surface);
+  if (!known)
+    warn_of_range(w, object);
 }
 
 Load acting_load(const Shown& shown) {
@@ -202,13 +226,22 @@ void begin_showing(World& w, Object& object) {
   Shown& shown = object.shown;
   shown.deferred = nullptr;
   leave_shown(w, object);
+  shown.rough = false; // it is left
   shown.whole = {};
   shown.forces = {};
   shown.box.reset();
 }
 
+Load acting_at(const Object& object, double time) {
+  Load load = load_at(*object.load, object.model(), time);
+  if (load.gravity != Vec3{})
+    for (const auto& [node, mass] : *object.hung)
+      load.force[node] += mass * load.gravity;
+  return load;
+}
+
 void load_shown(const World& w, Object& object) {
-  object.shown.load = load_at(*object.load, object.model(), w.now.clock.time);
+  object.shown.load = acting_at(object, w.now.clock.time);
 }
 
 void end_showing(World& w, Object& object) {

@@ -103,6 +103,11 @@ const Model& Simulation::first_model(std::size_t object) const {
   return first ? *first : now;
 }
 
+Model Simulation::weighed_model(std::size_t object) const {
+  need_model(world_->now.objects.at(object));
+  return simulation::weighed_model(world_->now.objects[object]);
+}
+
 ObjectFacts Simulation::object(std::size_t object) const {
   const Object& one = world_->now.objects.at(object);
   const Shown& shown = one.shown;
@@ -228,6 +233,11 @@ std::span<const double> Simulation::surface_displacement(std::size_t object) con
   return *world_->now.objects[object].shown.displacement;
 }
 
+std::span<const double> Simulation::known_surface(std::size_t object) const {
+  const Shown& shown = world_->now.objects.at(object).shown;
+  return shown.shaped ? std::span<const double>(*shown.displacement) : std::span<const double>();
+}
+
 std::size_t Simulation::surface_nodes(std::size_t object) const {
   const Model& now = model(object);
   if (now.tetrahedra.empty())
@@ -301,7 +311,7 @@ SimulationState Simulation::state() const {
   for (std::size_t i = 0; i < object_count(); ++i) {
     if (!object(i).known)
       continue;
-    if (!model(i).springs.empty())
+    if (!model(i).springs.empty() && this->object(i).shaped)
       state.strain = std::max(state.strain, linear_range(model(i), displacement(i)).strain);
     const Object& object = world_->now.objects[i];
     if (object.body == nullptr)
@@ -314,6 +324,8 @@ SimulationState Simulation::state() const {
     }
     const std::span<const NodeMotion> motion = motion_of(object);
     state.kinetic_energy += kinetic_energy(object.model(), motion);
+    for (const auto& [node, mass] : *object.hung)
+      state.kinetic_energy += mass * dot(motion[node].velocity, motion[node].velocity) / 2;
     state.elastic_energy += elastic_energy(object.model(), motion);
     state.safe_step = std::min(state.safe_step, object.body->safe);
   }

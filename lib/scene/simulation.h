@@ -39,9 +39,9 @@ struct ObjectSource {
 
 struct SimulationOptions {
   bool measure_error = false;                     ///< see ElastostaticOptions
-  double tolerance = 0;                           ///< as well
+  bool verify_shapes = false;                     ///< with it: of shapes that nobody asks for, too
+  double tolerance = 0;                           ///< of shapes that are shown, as there
   bool shapes = false;                            ///< shapes are wanted of each step, as if emitted
-  bool surfaces = false;                          ///< as surface_displacement has them
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
   /// Told in its place of shapes that are not to be trusted; without it `warn` is.
   std::function<void(const std::string&)> distrust{};
@@ -178,6 +178,8 @@ public:
   const Model& model(std::size_t object) const;
   /// The model as it came. \throw as its source
   const Model& first_model(std::size_t object) const;
+  /// The model as it is now, with the masses that hang on it. \throw as its source
+  Model weighed_model(std::size_t object) const;
   /// Valid until something is cut.
   ObjectFacts object(std::size_t object) const;
 
@@ -219,6 +221,8 @@ public:
   /// As displacement, of the first nodes: at least those of the surface. Where stored columns of a
   /// solid have rows for these alone, it takes nothing of what is inside.
   std::span<const double> surface_displacement(std::size_t object) const;
+  /// The same where it is known already, else nothing.
+  std::span<const double> known_surface(std::size_t object) const;
   /// surface_count of its model where that has tetrahedra, else all nodes.
   std::size_t surface_nodes(std::size_t object) const;
   /// Of its model, counted once.

@@ -31,7 +31,8 @@ void add_counts(ElastostaticCounts& sum, const ElastostaticCounts& more) {
 void make_solver(const World& w, Object& object, std::shared_ptr<ComplianceSource> source) {
   object.statics->solver.emplace(object.model(), std::move(source), w.context,
                                  ElastostaticOptions{.measure_error = w.options.measure_error,
-                                                     .tolerance = w.options.tolerance});
+                                                     .tolerance = w.options.tolerance,
+                                                     .may_be_free = true});
 }
 
 namespace {
@@ -91,6 +92,8 @@ ElastostaticCounts static_counts(const Object& object) {
 }
 
 void update_solver(World& w, Object& object, const Load& load) {
+  if (object.shown.rough)
+    shape_in_step(w, object); // while the solver is at that load
   object.statics->ahead = true;
   update_stages(w, object, load);
 }
@@ -150,6 +153,22 @@ std::span<const double> static_surface(Object& object) {
     return statics.warped->surface_displacement();
   return statics.two_step ? statics.two_step->surface_displacement(*statics.solver)
                           : statics.solver->surface_displacement();
+}
+
+std::span<const double> static_rough_surface(Object& object) {
+  Statics& statics = *object.statics;
+  if (statics.warped)
+    return statics.warped->surface_displacement();
+  return statics.two_step ? statics.two_step->rough_surface(*statics.solver)
+                          : statics.solver->rough_surface();
+}
+
+void verify_shape(Object& object) {
+  Statics& statics = *object.statics;
+  if (statics.two_step)
+    statics.two_step->verify(*statics.solver);
+  else if (statics.solver)
+    statics.solver->verify();
 }
 
 std::vector<NodeVector> static_forces(const Object& object) {

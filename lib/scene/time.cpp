@@ -70,10 +70,18 @@ bool needs_showing(const Object& object) {
 
 /// Now, so that a failure is one of this step.
 void find_shapes(World& w, Object& object) {
-  if (w.now.settings.emits.any_shapes() || w.options.shapes || w.options.surfaces)
-    shape_in_step(w, object);
+  if (w.now.settings.emits.any_shapes() || w.options.shapes)
+    shape_to_show(w, object);
   if (w.now.settings.emits.shapes || w.options.shapes)
     (void)whole_shape(w, object);
+}
+
+void verify_shapes(World& w) {
+  if (!w.options.verify_shapes)
+    return;
+  for (Object& object : w.now.objects)
+    if (object.method == Method::ffe && !object.warp && !object.shown.deferred)
+      verify_shape(object);
 }
 
 void show_all(World& w) {
@@ -113,6 +121,7 @@ void advance(World& w, double to) {
   for (std::size_t i = 0; i < w.now.objects.size(); ++i)
     at_object(w, w.now.objects[i], [&] { find_free_motion(w, i); });
   show_all(w);
+  verify_shapes(w);
   if (w.now.poses.size() > 1)
     w.now.poses.erase(w.now.poses.begin(), w.now.poses.end() - 1);
   clock.shown = clock.time;

@@ -127,6 +127,10 @@ void update_stages(World& w, Object& object, const Load& load);
 /// Whole, or of the nodes alone that the solver has rows for: all of the surface among them.
 std::span<const double> static_shape(Object& object);
 std::span<const double> static_surface(Object& object);
+/// As the surface, within the tolerance.
+std::span<const double> static_rough_surface(Object& object);
+/// Measures the shape that nobody has asked for.
+void verify_shape(Object& object);
 std::vector<NodeVector> static_forces(const Object& object);
 
 // bodies.cpp: what is tied together, or near and may touch, and moves as one
@@ -137,6 +141,10 @@ Model joined_model(const World& w, std::span<const std::size_t> parts,
                    std::vector<std::size_t>& offset);
 std::shared_ptr<Body> make_body(World& w, std::vector<std::size_t> parts,
                                 const Motions* motions = nullptr);
+/// With what hangs on its nodes.
+Model weighed_model(const Object& object);
+/// The body of an object goes on with other masses.
+void make_body_again(World& w, std::size_t object);
 /// The same body by implicit steps.
 void make_implicit(World& w, std::shared_ptr<Body>& body);
 double integration_step(World& w, Body& body);
@@ -186,10 +194,16 @@ void show(World& w, Object& object);
 void show_in_motion(World& w, Object& object);
 void begin_showing(World& w, Object& object);
 void end_showing(World& w, Object& object);
+/// What acts on it at a time, with the weight of what hangs on it. \pre its model is known
+Load acting_at(const Object& object, double time);
 /// What acts on it now will be shown.
 void load_shown(const World& w, Object& object);
 void warn_of_range(World& w, Object& object);
+/// To be shown: within the tolerance.
 void shape(World& w, Object& object);
+/// The same during a step, which may be taken back: the shape is then computed anew.
+void shape_to_show(World& w, Object& object);
+/// What the scene goes on by: exact.
 void shape_in_step(World& w, Object& object);
 /// Of all nodes, those inside a solid too.
 std::span<const double> whole_shape(World& w, Object& object);

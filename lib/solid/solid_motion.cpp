@@ -38,8 +38,8 @@ MotionBody body_of(const TetMesh& mesh, std::span<const SolidMaterial> materials
     for (std::size_t a = 0; a < solid_nodes(mesh); ++a)
       body.in_elements[solid_node(mesh, t, a)] = 1;
   for (std::size_t i = 0; i < std::min(body.nodes(), net.masses.size()); ++i)
-    if (body.in_elements[i] == 0)
-      body.masses[i] = net.masses[i];
+    body.masses[i] =
+        body.in_elements[i] == 0 ? net.masses[i] : std::max(body.masses[i], net.masses[i]);
   return body;
 }
 

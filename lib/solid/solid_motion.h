@@ -81,7 +81,7 @@ struct SolidSpring {
 /// What moves along with the elements: springs, and nodes of their own.
 struct SolidNet {
   std::span<const SolidSpring> springs{};
-  /// By node: of those in no tetrahedron, what is read; else the mass of its tetrahedra counts.
+  /// By node, with what hangs there; those in tetrahedra have the mass of these at least.
   std::span<const double> masses{};
   std::span<const double> drag{}; ///< by node, per mass, 1/s, in place of the options'; or none
   /// A closed surface, counter-clockwise from outside, whose parts keep their volumes, and the bulk

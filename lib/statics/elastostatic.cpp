@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -39,13 +40,18 @@ struct Elastostatic::State {
   std::vector<NodeVector> forces;
   std::vector<double> u;     // of the rows that sums have
   std::vector<double> whole; // over all axes, where these are more
-  bool shape_known = true, whole_known = false;
+  std::vector<double> rough; // as u, within the tolerance
+  bool shape_known = true, whole_known = false, rough_known = false;
+  bool measured = true; // a shape under this load
 
   State(const Model& m, std::shared_ptr<ComplianceSource> s, const Context& c,
         const ElastostaticOptions& o)
       : model(m), context(without_progress(c)), options(o),
-        compliance(m, std::move(s), c, o.tolerance > 0), answer(m, compliance),
-        block(m, compliance, answer), held(m, context), u(compliance.rows()) {}
+        compliance(m, std::move(s), c, o.tolerance > 0, o.may_be_free), answer(m, compliance),
+        block(m, compliance, answer), held(m, context, compliance.is_free()), u(compliance.rows()) {
+    if (compliance.is_free())
+      stand_still({});
+  }
 
   static Context without_progress(Context c) {
     c.progress = nullptr;
@@ -55,48 +61,63 @@ struct Elastostatic::State {
   // ---- the shape
 
   /// Less than the largest size of an entry of the shape.
-  double min_size(const Load& now) {
+  double min_size() {
     double size = 0;
-    for (const auto& entry : now.displacement)
+    for (const auto& entry : load.displacement)
       for (int a = 0; a < 3; ++a)
         size = std::max(size, std::abs(entry.second[a]));
-    if (size > 0 || now.force.empty())
+    if (size > 0 || load.force.empty())
       return size;
+    if (!compliance.columns_pay(nodes_of(load.force)))
+      return 0;
     std::vector<std::size_t> where;
-    for (const auto& entry : now.force)
+    for (const auto& entry : load.force)
       for (int a = 0; a < 3; ++a)
         where.push_back(axis_of(entry.first, a));
-    const double max = largest_size(answer.at(now, where));
+    const double max = largest_size(answer.at(load, where));
     return std::isfinite(max) ? max : 0;
   }
 
-  void make_shape(double tolerance) {
-    const Load& now = load;
-    if (now.displacement.empty()) {
+  /// \return whether nothing was left out
+  bool make_shape(double tolerance, std::vector<double>& shape) {
+    if (load.displacement.empty()) {
       // Where sums may leave something out, they are made for this load alone.
-      if (tolerance > 0 && !answer.known(now) && compliance.columns_pay(nodes_of(now.force))) {
-        const double allowed = tolerance * min_size(now);
-        u = answer.weight(now.gravity);
-        u.resize(compliance.rows(), 0);
-        compliance.add(as_vectors(now.force), allowed, u);
-        return;
+      if (tolerance > 0 && !answer.known(load) && compliance.columns_pay(nodes_of(load.force))) {
+        add_outer(tolerance, shape);
+        answer.note(load);
+        return false;
       }
-      u = answer.whole(now);
-      return;
+      shape = answer.whole(load);
+      return true;
     }
-    if (!block.shape(now, u)) {
-      const std::vector<std::uint32_t> nodes = nodes_of(now.displacement);
-      const bool columns = !by_block || compliance.columns_for_shape(nodes, block.count_shape());
-      if (columns && (answer.known(now) || compliance.columns_pay(nodes))) {
-        u = answer.whole(now);
-        compliance.add(forces, tolerance * min_size(now), u);
+    bool exact = true;
+    if (!block.shape(load, shape)) {
+      const std::vector<std::uint32_t> nodes = nodes_of(load.displacement);
+      const bool columns = !by_block || compliance.columns_for_shape(nodes, block.shapes());
+      if (columns && (answer.known(load) || compliance.columns_pay(nodes))) {
+        shape = answer.whole(load);
+        compliance.add(forces, tolerance * min_size(), shape);
+        exact = tolerance == 0;
       } else {
-        u = all_forces();
-        compliance.solve(u);
-        u.resize(compliance.rows());
+        solve_all(shape);
       }
     }
-    place_displaced(u);
+    place_displaced(shape);
+    return exact;
+  }
+
+  /// Under weight and given forces.
+  void add_outer(double tolerance, std::vector<double>& shape) {
+    const double allowed = tolerance > 0 ? tolerance * min_size() : 0;
+    shape = answer.weight(load.gravity);
+    shape.resize(compliance.rows(), 0);
+    compliance.add(as_vectors(load.force), allowed, shape);
+  }
+
+  void solve_all(std::vector<double>& shape) {
+    shape = all_forces();
+    compliance.solve(shape);
+    shape.resize(compliance.rows());
   }
 
   /// Displaced nodes stand where they must.
@@ -146,43 +167,88 @@ struct Elastostatic::State {
   }
 
   void need_shape() {
-    if (shape_known)
-      return;
-    make_shape(options.tolerance);
-    ++counts.shapes;
-    require_finite(u);
-    if (options.measure_error)
-      measure();
+    if (!shape_known)
+      (void)make_new(0, u);
     shape_known = true;
   }
 
-  /// How far the shape is from another one at its rows, over the largest entry of that.
-  double distance_from(const std::vector<double>& other) const {
+  const std::vector<double>& need_rough() {
+    if (options.tolerance > 0 && !shape_known && !rough_known) {
+      rough_known = true;
+      if (make_new(options.tolerance, rough)) {
+        u.swap(rough);
+        shape_known = true;
+      }
+    }
+    if (rough_known && !shape_known)
+      return rough;
+    need_shape();
+    return u;
+  }
+
+  bool make_new(double tolerance, std::vector<double>& shape) {
+    const bool exact = make_shape(tolerance, shape);
+    ++counts.shapes;
+    require_finite(shape);
+    if (options.measure_error)
+      measure(shape);
+    return exact;
+  }
+
+  /// How far a shape is from another one at its rows, over the largest entry of that.
+  static double distance(const std::vector<double>& shape, const std::vector<double>& other) {
     double worst = 0;
-    for (std::size_t r = 0; r < u.size(); ++r)
-      worst = std::max(worst, std::abs(other[r] - u[r]));
+    for (std::size_t r = 0; r < shape.size(); ++r)
+      worst = std::max(worst, std::abs(other[r] - shape[r]));
     const double size = largest_size(other);
     return size > 0 ? worst / size : 0;
   }
 
-  void measure() {
-    if (options.tolerance > 0) {
-      std::vector<double> taken = u;
-      make_shape(0);
-      std::swap(taken, u);
-      counts.shape_error = std::max(counts.shape_error, distance_from(taken));
+  /// The shape in another place: nothing that other answers come from changes.
+  std::vector<double> make_aside(double tolerance) {
+    std::vector<double> shape;
+    if (compliance.at_hand(nodes_of(load.force)) &&
+        compliance.at_hand(nodes_of(load.displacement))) {
+      add_outer(load.displacement.empty() ? tolerance : 0, shape);
+      if (!load.displacement.empty())
+        compliance.add(forces, tolerance > 0 ? tolerance * min_size() : 0, shape);
+    } else {
+      solve_all(shape);
     }
-    const std::vector<double>& shape = all_rows() ? u : need_whole();
+    place_displaced(shape);
+    require_finite(shape);
+    return shape;
+  }
+
+  /// A shape that can't be made is one that is wrong.
+  void verify() {
+    if (measured || !options.measure_error)
+      return;
+    try {
+      measure(shape_known ? u : rough_known ? rough : make_aside(options.tolerance));
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error&) {
+      measured = true;
+      counts.worst_shape.error = counts.backward_error = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+
+  void measure(const std::vector<double>& shape) {
+    measured = true;
+    if (options.tolerance > 0 && !compliance.is_free())
+      counts.shape_error = std::max(counts.shape_error, distance(shape, make_aside(0)));
     ShapeError error;
     if (!all_rows())
-      error.error = distance_from(shape);
+      error.error = distance(shape, need_whole());
+    const std::vector<double>& over_axes = all_rows() ? shape : whole;
     if (!norm) {
       norm = stiffness_norm(stiffness_matrix(model));
       stiffness.emplace(model);
     }
-    std::vector<double> product(shape.size(), 0);
+    std::vector<double> product(over_axes.size(), 0);
     const std::vector<double> f = all_forces();
-    stiffness->multiply(shape, product);
+    stiffness->multiply(over_axes, product);
     double residual = 0, load_size = 0;
     for (std::uint32_t i = 0; i < model.nodes.size(); ++i)
       for (int a = 0; a < 3; ++a)
@@ -190,7 +256,7 @@ struct Elastostatic::State {
           residual = std::max(residual, std::abs(product[axis_of(i, a)] - f[axis_of(i, a)]));
           load_size = std::max(load_size, std::abs(f[axis_of(i, a)]));
         }
-    const double size = largest_size(shape), scale = *norm * size + load_size;
+    const double size = largest_size(over_axes), scale = *norm * size + load_size;
     if (scale > 0)
       error.error = std::max(error.error, residual / scale);
     if (size > 0) {
@@ -210,12 +276,14 @@ struct Elastostatic::State {
       ++counts.unchanged;
       return;
     }
-    shape_known = whole_known = false;
+    shape_known = whole_known = rough_known = measured = false;
     std::vector<NodeVector> before = std::move(forces);
     forces.clear();
     try {
       if (!now.displacement.empty())
         meet(now);
+      else if (compliance.is_free())
+        stand_still(now);
       double sum = 0;
       for (const NodeVector& f : forces)
         sum += std::abs(f.value.x) + std::abs(f.value.y) + std::abs(f.value.z);
@@ -223,19 +291,28 @@ struct Elastostatic::State {
         throw Error("the contact forces are not finite, expected a smaller load");
     } catch (...) {
       forces = std::move(before);
-      shape_known = whole_known = false;
+      shape_known = whole_known = rough_known = measured = false;
       throw;
     }
     load = now;
     if (shape_known) {
       ++counts.shapes;
       if (options.measure_error)
-        measure();
+        measure(u);
     }
   }
 
+  /// Free, and nothing acts on it.
+  void stand_still(const Load& now) {
+    if (!now.empty())
+      compliance.require_held();
+    u.assign(compliance.rows(), 0);
+    whole.assign(all_rows() ? 0 : compliance.axes(), 0);
+    shape_known = whole_known = true;
+  }
+
   void meet(const Load& now) {
-    if (block.cheaper(now, options.block_limit) && block.meet(now)) {
+    if (!compliance.is_free() && block.cheaper(now, options.block_limit) && block.meet(now)) {
       forces = block.forces();
       by_block = true;
       return;
@@ -277,6 +354,8 @@ struct Elastostatic::State {
                          std::span<std::array<double, 9>> blocks) {
     if (!now.displacement.empty())
       update(now);
+    else
+      compliance.require_held();
     if (now.displacement.empty() || by_block)
       need_columns(now, std::span(&node, 1));
     const auto put = [](const ComplianceBlock& from, std::array<double, 9>& to) {
@@ -318,6 +397,8 @@ struct Elastostatic::State {
   DelassusOperator delassus_operator(const Load& now, std::span<const std::uint32_t> nodes) {
     update(now);
     const bool held_by_factor = !now.displacement.empty() && !by_block;
+    if (!held_by_factor)
+      compliance.require_held();
     if (!held_by_factor)
       need_columns(now, nodes); // rows of nodes inside, too
     DelassusOperator delassus{{nodes.begin(), nodes.end()}, {}, {}};
@@ -371,6 +452,14 @@ std::span<const double> Elastostatic::surface_displacement() {
   return state_->u;
 }
 
+std::span<const double> Elastostatic::rough_surface() {
+  return state_->need_rough();
+}
+
+void Elastostatic::verify() {
+  state_->verify();
+}
+
 const std::vector<NodeVector>& Elastostatic::contact_forces() const noexcept {
   return state_->forces;
 }
@@ -391,11 +480,16 @@ DelassusOperator Elastostatic::delassus_operator(const Load& load,
 }
 
 void Elastostatic::prepare(std::span<const std::uint32_t> nodes) {
+  state_->compliance.require_held();
   state_->compliance.prepare(nodes);
 }
 
 void Elastostatic::read_compressed() {
   state_->compliance.read_compressed();
+}
+
+bool Elastostatic::is_free() const noexcept {
+  return state_->compliance.is_free();
 }
 
 ElastostaticCounts Elastostatic::counts() const noexcept {

@@ -74,20 +74,24 @@ struct ElastostaticCounts {
 };
 
 struct ElastostaticOptions {
-  bool measure_error = false; ///< backward error, and effect of the tolerance, of every new shape
+  /// Backward error, and effect of the tolerance, of every new shape, and of those of verify().
+  /// Forces and shapes are the same to the bit with and without.
+  bool measure_error = false;
   /// Displaced nodes up to which the block C_cc is used; by default what is cheaper.
   std::size_t block_limit = SIZE_MAX;
-  /// How much of the largest displacement an entry of a shape may be wrong by, so that blocks of
-  /// rows need not be computed: the sum of what was left out of each row is bounded, not each part
-  /// alone. Forces and displaced nodes are exact.
+  /// How much of the largest displacement an entry of rough_surface() may be wrong by, so that
+  /// blocks of rows need not be computed: the sum of what was left out of each row is bounded, not
+  /// each part alone. All else is the same to the bit with any tolerance.
   double tolerance = 0;
+  /// K may be singular: loads whose displacements hold the model have answers nevertheless.
+  bool may_be_free = false;
 };
 
 class Elastostatic {
 public:
   /// Keeps a reference to the model. \param source of its compliance; null: K is factorised
   /// \pre check_model(model) passes; the source belongs to it
-  /// \throw Error as the factor: K singular, memory
+  /// \throw Error as the factor: K singular (but for `may_be_free`), memory
   Elastostatic(const Model& model, std::shared_ptr<ComplianceSource> source, const Context& context,
                const ElastostaticOptions& options = {});
   ~Elastostatic();
@@ -96,7 +100,8 @@ public:
   /// The forces under `load`; nothing is done if it is the last one. Only what changed is computed
   /// again. \pre nodes exist, no displacement along an axis that the model holds
   /// \throw Error if columns can't be read, memory does not suffice, forces are not finite, or
-  /// displacements are not met within 1e-6 of the largest; the load is the one before then
+  /// displacements are not met within 1e-6 of the largest; SingularStiffness if nothing holds the
+  /// model; the load is the one before then
   void update(const Load& load);
 
   /// The shape: 3 n numbers, mm; exactly the prescribed ones at displaced nodes. Computed by the
@@ -106,6 +111,10 @@ public:
   /// Where m is n the same as displacement(); else it doesn't depend on whether that was asked for.
   /// \throw as displacement
   std::span<const double> surface_displacement();
+  /// The same within the tolerance: what is shown, but not what a scene goes on by.
+  std::span<const double> rough_surface();
+  /// Measures the error of the shape, where nobody has asked for it; else nothing.
+  void verify();
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
   const std::vector<NodeVector>& contact_forces() const noexcept;
@@ -129,6 +138,8 @@ public:
   /// need not; else as prepare.
   void read_compressed();
 
+  /// K is singular, see ElastostaticOptions::may_be_free.
+  bool is_free() const noexcept;
   ElastostaticCounts counts() const noexcept;
 
 private:

@@ -39,7 +39,14 @@ void HeldContacts::refactor(const Load& now) {
       any_free = any_free || (fixed[axis_of(i, a)] == 0 && !is_fixed(model_, i, a));
   if (any_free) {
     ++factors_;
-    held_.emplace(factorise_axes(model_, fixed, context_));
+    if (free_) {
+      Model held = model_;
+      for (const auto& entry : now.displacement)
+        held.nodes[entry.first].fixed = fixed_all;
+      held_.emplace(factorise_axes(held, context_));
+    } else {
+      held_.emplace(factorise_axes(model_, fixed, context_));
+    }
   }
   nodes_ = now.displacement;
 }

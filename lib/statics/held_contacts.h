@@ -20,14 +20,15 @@ namespace gewebe {
 
 class HeldContacts {
 public:
-  /// Keeps a reference to the model.
-  HeldContacts(const Model& model, const Context& context)
-      : model_(model), context_(context), axes_(3 * model.nodes.size()) {}
+  /// Keeps a reference to the model. \param free whether K is singular: displacements may not hold
+  /// the model then
+  HeldContacts(const Model& model, const Context& context, bool free)
+      : model_(model), context_(context), free_(free), axes_(3 * model.nodes.size()) {}
   HeldContacts(const HeldContacts&) = delete;
   HeldContacts& operator=(const HeldContacts&) = delete;
 
   /// The shape under a load. \return what holds its displaced nodes, by ascending node
-  /// \throw Error as the factor
+  /// \throw Error as the factor; of a free model SingularStiffness, if it can move nevertheless
   std::vector<NodeVector> meet(const Load& now, std::vector<double>& u);
   /// Columns of the compliance with the nodes of the last load held. \pre a load was met
   const ColumnCache& columns(std::span<const std::uint32_t> nodes);
@@ -43,6 +44,7 @@ private:
 
   const Model& model_;
   const Context& context_;
+  bool free_;
   std::size_t axes_; ///< 3 n
   std::optional<StiffnessOperator> stiffness_;
   std::map<std::uint32_t, Vec3> nodes_;

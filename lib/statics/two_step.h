@@ -97,6 +97,9 @@ public:
   std::span<const double> displacement(Elastostatic& first);
   /// As Elastostatic's, of the rows that both stages have.
   std::span<const double> surface_displacement(Elastostatic& first);
+  std::span<const double> rough_surface(Elastostatic& first);
+  /// Of the first stage, as Elastostatic.
+  void verify(Elastostatic& first);
   const std::vector<NodeVector>& contact_forces() const noexcept;
 
   /// As Elastostatic::compliance_blocks, of the second stage.

@@ -202,6 +202,7 @@ test_stats_compute_no_residuals() {
   pull method=ffe
   ffe-run pull.scene >plain.txt
   ffe-run --stats=stats.json pull.scene >stats.txt
+  grep -q '"shapes":0,' stats.json || fail 'shapes for --stats alone' "$(<stats.json)"
   ffe-run --verify --stats=verified.json pull.scene >verified.txt
   cmp plain.txt stats.txt
   cmp plain.txt verified.txt

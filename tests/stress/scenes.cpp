@@ -33,14 +33,18 @@ void tell_seed(int signal_number) {
   (void)std::raise(signal_number);
 }
 
+/// Every other one fails in between.
+std::vector<std::string> lines_of(std::uint64_t seed) {
+  return seed % 2 == 0 ? test::failing_scene(seed / 2) : test::FuzzedScene(seed).lines();
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
   const std::uint64_t count = argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 10000;
   const std::uint64_t first = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   if (argc > 3) {
-    const test::FuzzedScene scene(first);
-    for (const std::string& line : scene.lines())
+    for (const std::string& line : lines_of(first))
       std::puts(line.c_str());
     return 0;
   }
@@ -51,7 +55,7 @@ int main(int argc, char** argv) {
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     seed_now = seed;
     const std::uint64_t slow = seen.slow;
-    const std::string fault = test::fault_of_scene(test::FuzzedScene(seed).lines(), seen);
+    const std::string fault = test::fault_of_scene(lines_of(seed), seen);
     if (seen.slow > slow) {
       std::printf("slow: seed %llu\n", static_cast<unsigned long long>(seed));
       std::fflush(stdout);

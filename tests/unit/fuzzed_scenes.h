@@ -85,7 +85,7 @@ inline const std::map<std::string, Model>& fuzzed_models() {
 /// The lines of a random scene; the same for the same seed.
 class FuzzedScene {
 public:
-  explicit FuzzedScene(std::uint64_t seed) : random_(seed), contacts_(seed) {
+  explicit FuzzedScene(std::uint64_t seed) : random_(seed), contacts_(seed), masses_(~seed) {
     const std::size_t count = 1 + below(3);
     for (std::size_t k = 0; k < count; ++k)
       add_object();
@@ -352,7 +352,18 @@ private:
                 ? " friction " + number_text(static_cast<double>(contacts_() % 100) / 50)
                 : "");
   }
+  /// As well.
+  std::string mass() {
+    const Known& o = objects_[masses_() % objects_.size()];
+    const auto node = [&] { return std::to_string(masses_() % o.model->nodes.size()); };
+    const std::string grams =
+        masses_() % 40 == 0 ? "1e30" : number_text(static_cast<double>(masses_() % 2000) / 1000);
+    return "mass " + o.name + " " + node() + "," + node() + " " + grams +
+           (masses_() % 3 == 0 ? " each" : "");
+  }
   void command() {
+    if (masses_() % 16 == 0)
+      line((masses_() % 4 == 0 ? "at " + number_text(now_ + 0.0015) + " " : "") + mass());
     if (contacts_() % 8 == 0)
       line(contact());
     if (one_in(6))
@@ -392,12 +403,79 @@ private:
     }
   }
 
-  std::mt19937_64 random_, contacts_;
+  std::mt19937_64 random_, contacts_, masses_;
   std::vector<Known> objects_;
   std::vector<std::string> instruments_; ///< that were put somewhere
   std::vector<std::string> lines_;
   double now_ = 0;
 };
+
+/// A random scene with lines and steps that fail in between, of all methods and laws; solids turn
+/// as they like where they can.
+inline std::vector<std::string> failing_scene(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 2654435761U + 1);
+  const auto one_in = [&](std::uint64_t n) { return random() % n == 0; };
+  std::vector<std::string> lines, objects;
+  const FuzzedScene calm(seed);
+  for (std::string line : calm.lines()) {
+    std::istringstream words(line);
+    std::string verb, name, model;
+    words >> verb >> name >> model;
+    if (verb == "object") {
+      objects.push_back(name);
+      if (!one_in(3) && line.find("bulk=") == std::string::npos) { // most are solids
+        const std::string other = one_in(4) ? "loaf" : "gel";
+        if (const std::size_t store = line.find("store=" + model); store != std::string::npos)
+          line.replace(store + 6, model.size(), other);
+        line.replace(verb.size() + name.size() + 2, model.size(), other);
+        model = other;
+      }
+      const bool solid = model == "gel" || model == "loaf";
+      if (solid && line.find(" law=") == std::string::npos && one_in(2))
+        line +=
+            line.find(" method=") == std::string::npos && line.find(" store=") == std::string::npos
+                ? " method=ffe rotation=warp"
+            : line.find(" method=ela") == std::string::npos ? " rotation=warp"
+                                                            : "";
+    }
+    lines.push_back(line);
+    if (verb != "step" || !one_in(2))
+      continue;
+    const std::string& o = objects[random() % objects.size()];
+    const std::string node = std::to_string(random() % 12);
+    switch (random() % 6) {
+    case 0: // no number that a step can hold
+      lines.insert(lines.end(), {"force " + o + " " + node + " 0 1e300 0", "step 0.001",
+                                 "release " + o + " " + node, "step 0.001"});
+      break;
+    case 1: // squeezed through itself
+      lines.insert(lines.end(),
+                   {"contact " + o + " self", "displace " + o + " x<8 40 3 1 over 0.001",
+                    "step 0.001", "release " + o + " all", "step 0.002"});
+      break;
+    case 2: // an instrument through the body
+      lines.insert(lines.end(),
+                   {"instrument z sphere 3 60 60 60", "step 0", "move z -30 -30 -30 over 0.001",
+                    "step 0.001", "withdraw z", "step 0.001"});
+      break;
+    case 3: // a cut that can't be, now and in a step
+      lines.insert(lines.end(),
+                   {"cut " + o + " plane 900 0 0 1 0 0",
+                    "at " + number_text(1e-9) + " cut " + o + " plane 900 0 0 1 0 0",
+                    "at every 0.0005 cut " + o + " plane 900 0 0 1 0 0", "step 0.001"});
+      break;
+    case 4: // lines that are none
+      lines.insert(lines.end(), {"displace " + o + " " + node + " 1 2", "squeeze " + o,
+                                 "method " + o + (one_in(2) ? " ffe" : " ela"), "step -1"});
+      break;
+    default:
+      lines.insert(lines.end(), {"displace " + o + " " + node + " 2 -3 4 over 0.003", "step 0.001",
+                                 "gravity 0 1e39 0", "step 0.001", "gravity 0 -900 0", "step 0.001",
+                                 "gravity 0 0 0"});
+    }
+  }
+  return lines;
+}
 
 /// Digests what a result is told, and notes what no result may be told.
 class CheckedResult final : public ResultWriter {
@@ -484,11 +562,19 @@ struct FuzzedRun {
   bool slow = false;  ///< it took too long and was ended
 };
 
-/// \param serve lines are acknowledged as well, and shapes shared \param record written if it is
-/// not empty
-inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
-                            const std::string& record, double seconds = 10) {
+struct FuzzedOptions {
+  bool serve = true; ///< lines are acknowledged as well
+  int threads = 1;
+  std::string record{}; ///< written if it is not empty
+  double seconds = 10;
+  bool shown = true; ///< there is a result, and with `serve` shapes are shared
+  bool measure = true, verify = false;
+  double tolerance = 0;
+};
+
+inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, const FuzzedOptions& how) {
   FuzzedRun out;
+  const bool serve = how.serve, shares = how.serve && how.shown;
   const auto base = [](const std::string& name) { return name.substr(name.find_last_of('/') + 1); };
   CheckedResult result;
   SceneOptions options;
@@ -517,30 +603,32 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     return shape;
   };
   options.files.node_list = [](const std::string&) { return std::string("0 3-5\n"); };
-  const std::string shapes = serve ? ScratchFile(".shapes").path() : "";
+  const std::string shapes = shares ? ScratchFile(".shapes").path() : "";
   DoorCheck door(shapes);
   options.reply = [&](std::string_view text) {
     out.replies += text;
-    if (serve)
+    if (shares)
       door.reply(text);
   };
   options.serve = options.acknowledge = serve;
-  const auto shared = serve ? std::make_unique<SharedShapes>(shapes) : nullptr;
+  const auto shared = shares ? std::make_unique<SharedShapes>(shapes) : nullptr;
   options.shared = shared.get();
-  options.measure = true;
-  options.result = &result;
+  options.measure = how.measure;
+  options.measure_error = how.verify;
+  options.tolerance = how.tolerance;
+  options.result = how.shown ? &result : nullptr;
   options.warn = [](const std::string&) {};
   std::optional<SceneRecord> log;
-  if (!record.empty())
-    options.record = &log.emplace(record, Output::Options{}, "-");
+  if (!how.record.empty())
+    options.record = &log.emplace(how.record, Output::Options{}, "-");
   const ScratchFile table(".csv");
   EventLog events(table.path(), Output::Options{.binary = false});
   options.events = &events;
   Context context;
-  context.threads = threads;
+  context.threads = how.threads;
   // Of the processor, for others may be at work.
   const std::clock_t begin = std::clock();
-  const auto end = begin + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC);
+  const auto end = begin + static_cast<std::clock_t>(how.seconds * CLOCKS_PER_SEC);
   std::atomic<unsigned> asked = 0; // that clock is slow to read
   context.cancelled = [&, end] {
     return asked.fetch_add(1, std::memory_order_relaxed) % 32 == 0 && std::clock() > end;
@@ -552,9 +640,10 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
         break;
       if (line == next_client)
         run.next_client();
-      door.line(line);
+      if (shares)
+        door.line(line);
       run.line(line);
-      if (serve)
+      if (shares)
         door.line_done();
     }
     if (run.simulation().object_count() > 0) // else each was refused
@@ -568,13 +657,19 @@ inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, i
     log->commit();
   if (out.fault.empty())
     out.fault = result.fault.empty() ? door.fault : result.fault;
-  out.answers = serve ? door.answers : out.replies;
+  out.answers = shares ? door.answers : out.replies;
   out.errors = run.counts().errors;
   out.steps = run.simulation().counts().steps;
   out.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   out.digest = run.counts().digest;
   out.result = result.hex() + " " + std::to_string(result.frames);
   return out;
+}
+
+inline FuzzedRun run_fuzzed(const std::vector<std::string>& lines, bool serve, int threads,
+                            const std::string& record, double seconds = 10) {
+  return run_fuzzed(lines,
+                    {.serve = serve, .threads = threads, .record = record, .seconds = seconds});
 }
 
 inline std::vector<std::string> lines_in(std::istream& text) {

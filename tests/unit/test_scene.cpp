@@ -88,6 +88,9 @@ TEST(SceneLine, CommandsWithTheirNumbers) {
   EXPECT_EQ(change<SetForce>("force a 1 1 2 3 total period 0.8").period, 0.8);
   EXPECT_EQ(change<SetPressure>("pressure a all -20").pressure.pressure, -20);
   EXPECT_EQ(change<SetPressure>("pressure a all -20 period 2").pressure.period, 2);
+  EXPECT_EQ(change<SetMass>("mass a 3,4 102").mass, 102);
+  EXPECT_TRUE(said("mass a 3,4 102").total);
+  EXPECT_FALSE(said("at 1 mass a 3,4 102 each").total);
   EXPECT_EQ(change<SetDisplacement>("displace a 1 0 0 1 over 0.25").duration, 0.25);
   EXPECT_EQ(change<Attach>("attach a 1 b z<3 500").stiffness, 500);
   EXPECT_EQ(said("attach a 1 b z<3 500").other, "b");
@@ -150,7 +153,7 @@ TEST(SceneLine, WordsMakeALineThatHasTheseWords) {
 
 TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
   const std::string known =
-      "expected one of object, force, pressure, displace, attach, contact, release, "
+      "expected one of object, force, pressure, mass, displace, attach, contact, release, "
       "instrument, move, couple, grasp, withdraw, cut, tear, restore, gravity, method, timestep, "
       "two-step, emit, step, run, renew, prepare, sync, end, nodes, select, objects, instruments, "
       "at";
@@ -219,6 +222,8 @@ TEST(SceneLine, EveryBadLineSaysWhatWasExpected) {
       {"at every 0 emit shapes", "a period that is not positive"},
       {"force a 1 0 0 1 period 0", "a time that is not positive"},
       {"pressure a 1", "expected pressure NAME NODES p [period T]"},
+      {"mass a 1", "expected mass NAME NODES m [each], m 0 or more"},
+      {"mass a 1 -1", "expected mass NAME NODES m [each], m 0 or more"},
       {"displace a 1 0 0 1 over -1", "a time that is not positive"},
       {"attach a 1 b 2 0", "a stiffness that is not positive"},
       {"method a", "no method, expected method NAME ffe|ela"},

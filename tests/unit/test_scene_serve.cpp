@@ -303,6 +303,15 @@ TEST(SceneServe, AnyScenePlaysAgainToTheLastByte) {
   EXPECT_LE(seen.slow, may_be_slow);
 }
 
+TEST(SceneServe, AnySceneWithStepsThatFailPlaysAgain) {
+  constexpr std::uint64_t scenes = 30;
+  test::FuzzedCounts seen;
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed)
+    EXPECT_EQ(test::fault_of_scene(test::failing_scene(seed), seen), "") << "seed " << seed;
+  EXPECT_GT(seen.errors, 4 * scenes); // or nothing failed
+  EXPECT_LE(seen.slow, scenes / 6);
+}
+
 TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> scenes{
       {"an instrument that a failed step brought pushes a body that moves",
@@ -369,6 +378,54 @@ TEST(SceneServe, ShortScenesPlayAgainBehindAFailedStep) {
     test::FuzzedCounts seen;
     EXPECT_EQ(test::fault_of_scene(lines, seen), "") << what;
     EXPECT_GT(seen.errors + (lines[1].starts_with("emit") ? 1 : 0), 0U) << what; // or none failed
+  }
+}
+
+/// Answers of forces and instruments alone.
+std::string forces_in(const std::string& replies) {
+  std::istringstream text(replies);
+  std::string kept;
+  bool in_shape = false;
+  for (const std::string& line : test::lines_in(text)) {
+    const bool begins = !line.empty() && line[0] >= 'a' && line[0] <= 'z';
+    in_shape = begins ? line.starts_with("shapes ") || line.starts_with("nodes ") ||
+                            line.starts_with("stress ") || line.starts_with("jump ")
+                      : in_shape;
+    if (!in_shape)
+      kept += line + "\n";
+  }
+  return kept;
+}
+
+// What is measured and how exactly shapes are shown has no effect on how a scene goes on.
+TEST(SceneServe, WhatIsMeasuredAndShownChangesNothing) {
+  const std::uint64_t scenes = 40;
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
+    std::vector<std::string> lines = test::FuzzedScene(seed).lines();
+    lines.insert(lines.begin(), {"emit forces", "emit instruments"});
+    if (seed % 2 == 0)
+      lines.insert(lines.begin(), "emit surfaces");
+    for (std::string& line : lines) // all are elastostatic as long as it goes
+      if (const std::size_t at = line.find(" method=ela"); at != std::string::npos)
+        line.replace(at, 11, " method=ffe");
+    const auto run = [&](bool measure, bool verify, double tolerance) {
+      return test::run_fuzzed(
+          lines, {.shown = false, .measure = measure, .verify = verify, .tolerance = tolerance});
+    };
+    const test::FuzzedRun plain = run(false, false, 0);
+    const auto compare = [&](const test::FuzzedRun& one, const test::FuzzedRun& other,
+                             const std::string& what, auto&& part) {
+      if (!one.slow && !other.slow) {
+        EXPECT_EQ(test::first_difference(part(one.replies), part(other.replies)), "nowhere")
+            << what << ", seed " << seed;
+      }
+    };
+    const auto whole = [](const std::string& replies) { return replies; };
+    compare(plain, run(true, false, 0), "stats", whole);
+    compare(plain, run(true, true, 0), "verify", whole);
+    const test::FuzzedRun rough = run(false, false, 0.05);
+    compare(plain, rough, "tolerance", forces_in);
+    compare(rough, run(true, true, 0.05), "all at once", whole);
   }
 }
 

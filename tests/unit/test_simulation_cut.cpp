@@ -243,6 +243,29 @@ TEST(SimulationCut, WhatHangsLooselyGoesOnElastodynamic) {
     EXPECT_TRUE(std::isfinite(u));
 }
 
+TEST(SimulationCut, WhatHangsLooselyIsHeldByWhatDisplacesIt) {
+  const Model model = test::shell();
+  Simulation s(one_thread(), {.guard = true});
+  s.add_object("organ", model, Method::ffe);
+  s.apply(SetGravity{{0, 0, -1}});
+  s.step(0.01);
+  s.apply(CutObject{0, test::all_but_one(model, highest(model))});
+  std::vector<std::uint32_t> all(surface_count(s.model(0)));
+  for (std::uint32_t i = 0; i < all.size(); ++i)
+    all[i] = i;
+  std::erase_if(all, [&](std::uint32_t i) { return s.model(0).nodes[i].fixed != fixed_none; });
+  s.apply(SetDisplacement{0, all, {0, 0, 0.25}});
+  s.step(0.01);
+  EXPECT_EQ(count(s, Cutting::Kind::loose), 0U);
+  EXPECT_EQ(s.object(0).method, Method::ffe);
+  for (const std::uint32_t node : all)
+    EXPECT_EQ(shape(s, 0)[3 * node + 2], 0.25);
+  s.apply(Release{0, all});
+  s.step(0.01);
+  EXPECT_EQ(count(s, Cutting::Kind::loose), 1U);
+  EXPECT_EQ(s.object(0).method, Method::ela);
+}
+
 TEST(SimulationCut, RestoreMakesItWholeAgain) {
   for (const Method method : {Method::ffe, Method::ela}) {
     Simulation s(one_thread(), {}), never(one_thread(), {});

@@ -98,7 +98,7 @@ void SceneRun::State::write(const EmitModelCommand& c) {
     throw Error("models can't be written here");
   if (std::find(models.begin(), models.end(), c.file) != models.end())
     throw Error(c.file + " is the model of an object of this scene, expected another file");
-  options.files.write_model(c.file, simulation.model(object));
+  options.files.write_model(c.file, simulation.weighed_model(object));
   if (options.events != nullptr)
     options.events->model(simulation.time(), c.object, c.file);
 }

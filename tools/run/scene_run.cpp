@@ -34,13 +34,12 @@ SceneRun::State::State(std::string n, const Context& context, SceneOptions o)
 
 SimulationOptions SceneRun::State::simulation_options() {
   SimulationOptions s;
-  s.measure_error = options.measure_error;
+  s.measure_error = s.verify_shapes = options.measure_error;
   s.tolerance = options.tolerance;
   s.guard = options.serve;
   // Now, so that one that can't be made is the fault of its step.
-  s.shapes = options.measure_error || options.shared != nullptr ||
-             (options.result != nullptr && options.result->wants_models());
-  s.surfaces = options.serve && options.measure;
+  s.shapes =
+      options.shared != nullptr || (options.result != nullptr && options.result->wants_models());
   s.rate = options.rate;
   if (options.warn)
     s.warn = [this](const std::string& text) { warn(text); };
@@ -96,8 +95,7 @@ void SceneRun::State::require_object() const {
 void SceneRun::State::answer() {
   ++steps;
   checks.look(
-      simulation,
-      simulation.settings().emits.any_shapes() || options.result != nullptr || options.measure,
+      simulation, simulation.settings().emits.any_shapes() || options.result != nullptr,
       [this](const std::string& text) { warn(text); },
       [this](const std::string& text) { distrust(text); });
   stress.find(simulation, gravity);
@@ -130,8 +128,8 @@ void SceneRun::State::answer() {
 void SceneRun::State::measure() {
   digest.add(simulation.time());
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-    // Not whole, for to measure a solid must not cost what is inside.
-    const std::span<const double> u = simulation.surface_displacement(i);
+    // Where somebody has asked for it: to measure must not cost a shape.
+    const std::span<const double> u = simulation.known_surface(i);
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
     // Whether an object was read must not matter.
     if (forces.empty() && std::all_of(u.begin(), u.end(), [](double x) { return x == 0; }))
