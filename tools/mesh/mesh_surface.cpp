@@ -70,9 +70,8 @@ void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
     run.say("points stay at " + std::to_string(snapped.report.kept_corners) +
             " voxel centres, where the surface would cut itself");
   if (snapped.report.cutting_faces > 0)
-    run.warn("the surface cuts itself in " + std::to_string(snapped.report.cutting_faces) +
-             " triangles, since it touches itself where values equal the isovalue; "
-             "another --iso may part it");
+    run.say(std::to_string(snapped.report.cutting_faces) +
+            " triangles cut or touch each other, as where values equal the isovalue");
   warn_if_empty(run, snapped.mesh.triangles.empty());
   if (!snapped.mesh.triangles.empty() && prepared.before)
     cli::compare_topology(run, "mc-opt", "", "--resample", *prepared.before, topology(snapped.mesh),
