@@ -472,14 +472,16 @@ SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOpt
                      triangles * sizeof(Triangle),
                  "snapping");
   std::vector<Int3> kept;
-  for (;;) { // ends, since each time more corners are kept
-    const std::size_t before = kept.size();
-    SnapResult result = snap_but_at(context, surface, options, kept);
+  SnapResult best = snap_but_at(context, surface, options, kept);
+  while (best.report.cutting_faces > 0) {
     std::ranges::sort(kept);
     kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
-    if (kept.size() == before)
-      return result;
+    SnapResult next = snap_but_at(context, surface, options, kept);
+    if (next.report.cutting_faces >= best.report.cutting_faces)
+      break; // these faces touch without snapping, too
+    best = std::move(next);
   }
+  return best;
 }
 
 } // namespace gewebe

@@ -55,10 +55,9 @@ struct SnapResult {
 /// flip helps, for they coincide, go where Place::mean has them. What is still flat is counted.
 /// Where faces of the result would cut each other, as across a wall thinner than a voxel, the
 /// corners to which their points went draw only points that lie on them, and all is done again
-/// until no face does or no corner is left. Only faces are compared that have a point of a corner
+/// while that leaves fewer of such faces. Only faces are compared that have a point of a corner
 /// that keeps several points (with Place::corner: where the surface isn't a single sheet), that are
-/// turned out of their cell's direction, or that lie beside one of these; no other face was seen to
-/// cut.
+/// turned out of their cell's direction, or that lie beside one of these; no other was seen to cut.
 ///
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
