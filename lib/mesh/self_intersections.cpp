@@ -41,84 +41,92 @@ bool segment_meets(const Corners& t, const Vec3& p, const Vec3& q) {
   return collision::edge_meets_triangle(p, q, t[0], t[1], t[2]);
 }
 
-class Tester {
-public:
-  explicit Tester(const TriangleMesh& mesh) : mesh_(mesh), points_(mesh.points) {
-    // To a magnitude that the predicates take; a power of two changes no digit.
-    double largest = 0;
-    for (const Vec3& p : points_)
-      largest =
-          std::fmax(largest, std::fmax(std::fabs(p.x), std::fmax(std::fabs(p.y), std::fabs(p.z))));
-    int exponent = 0;
-    std::frexp(largest, &exponent);
-    for (Vec3& p : points_)
-      for (int a = 0; a < 3; ++a)
-        p[a] = predicate_coordinate(std::ldexp(p[a], -exponent));
-  }
-
-  const std::vector<Vec3>& points() const { return points_; }
-  bool degenerate(std::size_t face) const { return open_axis(corners(face)) < 0; }
-
-  /// \pre neither is degenerate
-  bool meet(std::size_t f, std::size_t g) const {
-    const Triangle &s = mesh_.triangles[f], &t = mesh_.triangles[g];
-    std::array<std::size_t, 3> in_s{}, in_t{};
-    std::size_t shared = 0;
-    for (std::size_t n = 0; n < 3; ++n)
-      for (std::size_t m = 0; m < 3; ++m)
-        if (s[n] == t[m]) {
-          in_s[shared] = n;
-          in_t[shared++] = m;
-        }
-    const Corners a = corners(f), b = corners(g);
-    if (shared == 3)
-      return true;
-    if (shared == 2) {
-      // A fold: coplanar, and both third corners on one side of the edge.
-      const Vec3 &p = a[in_s[0]], &q = a[in_s[1]];
-      const Vec3 &c = a[3 - in_s[0] - in_s[1]], &d = b[3 - in_t[0] - in_t[1]];
-      if (side(a, d) != 0)
+/// Do all corners of b but one lie on one side of a's plane? \param but  or 3
+bool lies_apart(const Corners& a, const Corners& b, std::size_t but) {
+  int sides = 0, count = 0;
+  for (std::size_t n = 0; n < 3; ++n)
+    if (n != but) {
+      const int s = side(a, b[n]);
+      if (s == 0)
         return false;
-      const int axis = open_axis(a);
-      return turn(p, q, c, axis) == turn(p, q, d, axis);
+      sides += s;
+      ++count;
     }
-    if (shared == 1) {
-      const std::size_t n = in_s[0], m = in_t[0];
-      return segment_meets(b, a[(n + 1) % 3], a[(n + 2) % 3]) ||
-             segment_meets(a, b[(m + 1) % 3], b[(m + 2) % 3]);
-    }
-    for (std::size_t n = 0; n < 3; ++n)
-      if (segment_meets(b, a[n], a[(n + 1) % 3]) || segment_meets(a, b[n], b[(n + 1) % 3]))
-        return true;
-    return false;
-  }
-
-private:
-  Corners corners(std::size_t face) const {
-    const Triangle& t = mesh_.triangles[face];
-    return {points_[t[0]], points_[t[1]], points_[t[2]]};
-  }
-  const TriangleMesh& mesh_;
-  std::vector<Vec3> points_;
-};
+  return sides == count || sides == -count;
+}
 
 } // namespace
 
+FaceIntersections::FaceIntersections(const TriangleMesh& mesh) : mesh_(mesh) {
+  // To a magnitude that the predicates take; a power of two changes no digit.
+  double largest = 0;
+  for (const Vec3& p : mesh.points)
+    largest =
+        std::fmax(largest, std::fmax(std::fabs(p.x), std::fmax(std::fabs(p.y), std::fabs(p.z))));
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  scale_ = std::ldexp(1.0, -std::max(exponent, -1000));
+}
+
+std::array<Vec3, 3> FaceIntersections::corners(std::size_t face) const {
+  Corners corners;
+  for (std::size_t n = 0; n < 3; ++n)
+    for (int a = 0; a < 3; ++a)
+      corners[n][a] = predicate_coordinate(mesh_.points[mesh_.triangles[face][n]][a] * scale_);
+  return corners;
+}
+
+bool FaceIntersections::degenerate(std::size_t face) const {
+  return open_axis(corners(face)) < 0;
+}
+
+bool FaceIntersections::meet(std::size_t f, std::size_t g) const {
+  const Triangle &s = mesh_.triangles[f], &t = mesh_.triangles[g];
+  std::array<std::size_t, 3> in_s{}, in_t{};
+  std::size_t shared = 0;
+  for (std::size_t n = 0; n < 3; ++n)
+    for (std::size_t m = 0; m < 3; ++m)
+      if (s[n] == t[m]) {
+        in_s[shared] = n;
+        in_t[shared++] = m;
+      }
+  const Corners a = corners(f), b = corners(g);
+  if (shared == 3)
+    return true;
+  if (shared == 2) {
+    // A fold: coplanar, and both third corners on one side of the edge.
+    const Vec3 &p = a[in_s[0]], &q = a[in_s[1]];
+    const Vec3 &c = a[3 - in_s[0] - in_s[1]], &d = b[3 - in_t[0] - in_t[1]];
+    if (side(a, d) != 0)
+      return false;
+    const int axis = open_axis(a);
+    return turn(p, q, c, axis) == turn(p, q, d, axis);
+  }
+  if (lies_apart(a, b, shared == 1 ? in_t[0] : 3) || lies_apart(b, a, shared == 1 ? in_s[0] : 3))
+    return false;
+  if (shared == 1) {
+    const std::size_t n = in_s[0], m = in_t[0];
+    return segment_meets(b, a[(n + 1) % 3], a[(n + 2) % 3]) ||
+           segment_meets(a, b[(m + 1) % 3], b[(m + 2) % 3]);
+  }
+  for (std::size_t n = 0; n < 3; ++n)
+    if (segment_meets(b, a[n], a[(n + 1) % 3]) || segment_meets(a, b[n], b[(n + 1) % 3]))
+      return true;
+  return false;
+}
+
 SelfIntersections self_intersections(const Context& context, const TriangleMesh& mesh) {
   const std::size_t count = mesh.triangles.size();
-  require_memory(context,
-                 static_cast<double>(count) * 200 +
-                     static_cast<double>(mesh.points.size()) * sizeof(Vec3),
-                 "the search for self-intersections");
+  require_memory(context, static_cast<double>(count) * 200, "the search for self-intersections");
   SelfIntersections result;
   if (count == 0)
     return result;
-  const Tester tester(mesh);
+  const FaceIntersections tester(mesh);
   std::vector<Box3> boxes(count);
   std::vector<std::uint8_t> degenerate(count);
   for (std::size_t f = 0; f < count; ++f) {
     for (const std::uint32_t p : mesh.triangles[f])
-      boxes[f].add(tester.points()[p]);
+      boxes[f].add(mesh.points[p]);
     degenerate[f] = tester.degenerate(f) ? 1 : 0;
     result.degenerate_faces += degenerate[f];
   }

@@ -4,6 +4,8 @@
 #include "base/context.h"
 #include "base/mesh.h"
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -21,5 +23,19 @@ struct SelfIntersections {
 /// exact predicates on the points as they are, so never wrong. Time n log n for ordinary meshes.
 /// \pre check_mesh(mesh) passes
 SelfIntersections self_intersections(const Context& context, const TriangleMesh& mesh);
+
+/// What the search asks of two faces, for those who choose the pairs. Refers to the mesh.
+class FaceIntersections {
+public:
+  explicit FaceIntersections(const TriangleMesh& mesh);
+  bool degenerate(std::size_t face) const;
+  /// \pre the faces differ and neither is degenerate
+  bool meet(std::size_t f, std::size_t g) const;
+
+private:
+  std::array<Vec3, 3> corners(std::size_t face) const; ///< scaled for the predicates
+  const TriangleMesh& mesh_;
+  double scale_ = 1;
+};
 
 } // namespace gewebe

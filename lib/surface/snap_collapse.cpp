@@ -37,6 +37,10 @@ void mark(std::uint64_t& word, unsigned bit) {
   std::atomic_ref(word).fetch_or(std::uint64_t{1} << bit, std::memory_order_relaxed);
 }
 
+void mark_crowded(SnapLattice& lattice, const LatticeSpot& at, unsigned axis) {
+  mark(lattice.snaps(at.block).crowded[at.word(axis)], at.bit);
+}
+
 void drop_faces(SnapMerges& merges, std::uint32_t block, unsigned count) {
   std::atomic_ref(merges.dropped[block]).fetch_add(count, std::memory_order_relaxed);
 }
@@ -104,6 +108,16 @@ public:
     dropped_ = {};
   }
   bool take(unsigned slice, unsigned bit, std::vector<SnapMerges::Place>& places);
+  /// Marks the points that move to a corner where the surface isn't a single sheet.
+  void mark_moved(unsigned slice, unsigned bit) const {
+    if (patches_.is_single_sheet(slice, bit))
+      return;
+    const Int3 corner{static_cast<int>(slice), static_cast<int>(bit >> 3),
+                      static_cast<int>(bit & 7)};
+    scene_.lattice.for_members(block_, corner, [&](const LatticeEdge& edge) {
+      mark_crowded(scene_.lattice, scene_.lattice.spot(block_, edge.start), edge.axis);
+    });
+  }
   void leave() {
     for (unsigned back = 0; back < 8; ++back)
       if (dropped_[back] != 0)
@@ -136,6 +150,10 @@ bool BitCollapse::take(unsigned slice, unsigned bit, std::vector<SnapMerges::Pla
     }
     store_group(scene_, block_, corner, {group.data(), found_.groups[g].count}, places);
   }
+  if (found_.left > 1)
+    scene_.lattice.for_members(block_, corner, [&](const LatticeEdge& edge) {
+      mark_crowded(scene_.lattice, scene_.lattice.spot(block_, edge.start), edge.axis);
+    });
   const unsigned begins =
       (slice == 0 ? 1U : 0U) | (bit >> 3 == 0 ? 2U : 0U) | ((bit & 7) == 0 ? 4U : 0U);
   for (unsigned side = 0; side < 8; ++side)
@@ -381,6 +399,12 @@ void Collapse::collapse(int p, int q) {
 
 void Collapse::store(const Scene& scene, const Cluster& cluster,
                      std::vector<SnapMerges::Place>& places) {
+  std::size_t left = 0;
+  for (std::size_t m = 0; m < members_.size(); ++m)
+    left += target_[m] == static_cast<int>(m) ? 1 : 0;
+  if (left > 1)
+    for (const Member& member : members_)
+      mark_crowded(scene.lattice, member.at, member.edge.axis);
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const auto member = static_cast<int>(m);
     for (const Face& face : star(member)) {
@@ -422,16 +446,20 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
         for (std::size_t n = begin; n < end; ++n) {
           SnapLattice::Corners corners = lattice.corners(n);
           CornerWords& several = corners.several;
+          const CornerWords& entered = place == SnapOptions::Place::corner ? corners.some : several;
           unsigned slices = 0;
           for (unsigned i = 0; i < leaf_dim; ++i) {
             part.corners += count_bits(corners.some[i]);
             part.clusters += count_bits(several[i]);
-            slices |= several[i] != 0 ? 1U << i : 0U;
+            slices |= (several[i] | entered[i]) != 0 ? 1U << i : 0U;
           }
           if (slices == 0)
             continue;
-          if (!always_careful)
-            bits.enter(n, slices);
+          bits.enter(n, slices);
+          if (place == SnapOptions::Place::corner)
+            for (unsigned i = 0; i < leaf_dim; ++i)
+              for (std::uint64_t left = corners.some[i]; left != 0; left &= left - 1)
+                bits.mark_moved(i, static_cast<unsigned>(std::countr_zero(left)));
           for (unsigned i = 0; i < leaf_dim; ++i)
             for (; several[i] != 0; several[i] &= several[i] - 1) {
               const auto bit = static_cast<unsigned>(std::countr_zero(several[i]));
@@ -447,8 +475,7 @@ SnapMerges merge_snap_clusters(const Context& context, SnapLattice& lattice,
               cluster.first_member = lattice.first_member(n, cluster.corner);
               part.rest.push_back(cluster);
             }
-          if (!always_careful)
-            bits.leave();
+          bits.leave();
         }
       });
   std::vector<Cluster> rest;

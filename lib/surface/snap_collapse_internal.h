@@ -11,7 +11,9 @@
 namespace gewebe {
 
 /// Steps of `snap` leave their marks in the lattice's SnapBlocks: `merged` where a point was merged
-/// into another, `looked_at` where it is what others were merged into.
+/// into another, `looked_at` where it is what others were merged into, `crowded` where another
+/// point of the same corner is left or, at Place::corner, where the surface isn't a single sheet
+/// there.
 struct SnapMerges {
   struct Place {
     std::uint32_t point = 0;

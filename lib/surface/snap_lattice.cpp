@@ -91,11 +91,12 @@ LatticeEdge edge_of(const Int3& cell, std::size_t edge) {
 } // namespace
 
 SnapLattice::SnapLattice(const Context& context, const SurfaceBlocks& surface, double epsilon,
-                         bool mirrored)
+                         bool mirrored, std::span<const Int3> kept)
     : surface_(surface), mirrored_(mirrored) {
   Context quiet = context;
   quiet.progress = nullptr;
   classify(quiet, epsilon);
+  keep(kept);
   apply_fin_rule(quiet);
 }
 
@@ -128,6 +129,28 @@ void SnapLattice::classify(const Context& context, double epsilon) {
   for (const std::vector<Missing>& part : missing)
     all.insert(all.end(), part.begin(), part.end());
   add_further_blocks(std::move(all));
+}
+
+/// Lets points of these corners stay where they are, unless they lie in the corner.
+void SnapLattice::keep(std::span<const Int3> corners) {
+  for (const Int3& corner : corners)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const int back : {0, 1}) {
+        Int3 start = corner;
+        start.at(axis) -= back;
+        const Int3 origin = leaf_origin(start);
+        const auto found = std::ranges::lower_bound(
+            surface_.blocks, origin, {}, [](const SurfaceBlock* block) { return block->origin; });
+        if (found == surface_.blocks.end() || (*found)->origin != origin)
+          continue;
+        const std::size_t w = 3 * static_cast<std::size_t>(start[0] - origin[0]) + axis;
+        const auto bit = static_cast<unsigned>(8 * (start[1] - origin[1]) + start[2] - origin[2]);
+        if (((*found)->crossed.at(w) >> bit & 1) == 0 ||
+            fraction((*found)->point(w, bit)) == static_cast<double>(back))
+          continue;
+        SnapBlock& snaps = snaps_[static_cast<std::size_t>(found - surface_.blocks.begin())];
+        (back != 0 ? snaps.high : snaps.low).at(w) &= ~(std::uint64_t{1} << bit);
+      }
 }
 
 /// Blocks that no surface crosses, but with a corner that draws points of blocks before them.

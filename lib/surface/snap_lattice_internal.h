@@ -19,6 +19,7 @@ struct SnapBlock {
   EdgeWords low, high; ///< they snap to the corner where their edge starts, where it ends
   EdgeWords merged;    ///< into another point
   EdgeWords looked_at; ///< faces here may have no area
+  EdgeWords crowded;   ///< their faces may cut others
 };
 
 /// A corner or an edge by its place relative to the origin of some block; -8 … 15 along each axis.
@@ -52,7 +53,9 @@ struct StarFace {
 class SnapLattice {
 public:
   /// Blocks are those of the surface in their order, then others with a corner that draws points.
-  SnapLattice(const Context& context, const SurfaceBlocks& surface, double epsilon, bool mirrored);
+  /// \param kept  corners, ascending, that draw only points that lie on them
+  SnapLattice(const Context& context, const SurfaceBlocks& surface, double epsilon, bool mirrored,
+              std::span<const Int3> kept = {});
 
   const SurfaceBlocks& surface() const { return surface_; }
   std::size_t count() const { return surface_.blocks.size() + further_.size(); }
@@ -110,6 +113,7 @@ public:
 
 private:
   void classify(const Context& context, double epsilon);
+  void keep(std::span<const Int3> corners);
   /// Found from a block of the surface along an axis.
   struct Missing {
     Int3 origin{};

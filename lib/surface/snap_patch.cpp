@@ -336,6 +336,23 @@ void SnapPatches::enter(std::size_t n, unsigned slices) {
   }
 }
 
+bool SnapPatches::is_single_sheet(unsigned slice, unsigned bit) const {
+  // The corners of a patch with a next one along each axis.
+  static constexpr std::array<PatchCorners, 3> starts{0x0fc7e3f, 0x003ffff, 0x36db6db};
+  const PatchCorners corners = window(rows_[inside].data(), slice, bit >> 3, bit & 7);
+  bool found = false;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const PatchCorners next = corners >> stride[axis];
+    const bool leads_out = (corners >> (centre - stride[axis]) & 1) != 0,
+               leads_in = (next >> centre & 1) != 0;
+    if (leads_out == leads_in && leads_in != ((corners >> centre & 1) != 0))
+      return false;
+    found = found || (leads_out != leads_in &&
+                      ((leads_out ? ~corners & next : corners & ~next) & starts[axis]) == 0);
+  }
+  return found;
+}
+
 bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
   const Tables& table = tables();
   const unsigned j = bit >> 3, k = bit & 7;
@@ -368,6 +385,7 @@ bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
         return false;
   }
   result.count = 0;
+  result.left = 0;
   result.vanished = {};
   for (std::size_t p = 0; p < c.count; ++p) {
     while (c.target[p] == p && any(c.near[p] & snaps.own)) {
@@ -383,7 +401,10 @@ bool SnapPatches::take(unsigned slice, unsigned bit, PatchMerges& result) {
         return false;
       collapse(c, p, q);
     }
-    if (c.chain[p].count < 2 || c.target[p] != p)
+    if (c.target[p] != p)
+      continue;
+    ++result.left;
+    if (c.chain[p].count < 2)
       continue;
     PatchMerges::Group& group = result.groups[result.count++];
     group = c.chain[p];

@@ -32,6 +32,7 @@ struct PatchMerges {
   };
   std::size_t count = 0;
   std::array<Group, 3> groups{};
+  std::size_t left = 0;                   ///< points of the cluster that are left
   std::array<std::uint8_t, 8> vanished{}; ///< faces of the cell on the side (n & 1, n >> 1 & 1,
                                           ///< n >> 2) of the corner; 1 is the far side
 };
@@ -45,6 +46,10 @@ public:
   /// Merges the cluster at a corner of the block if it satisfies the conditions of
   /// merge_snap_clusters; else answers false. \pre it draws no fin
   bool take(unsigned slice, unsigned bit, PatchMerges& result);
+  /// Is the surface in the cells round the corner a single sheet? It is if lines along one axis
+  /// lead through it once at most, all in the same sense and one at the corner, and if the corner
+  /// has no two opposite neighbours on the other side. \pre enter(n, slices) with this slice
+  bool is_single_sheet(unsigned slice, unsigned bit) const;
 
   static constexpr std::size_t padded = 10;
 

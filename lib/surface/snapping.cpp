@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "surface/flat_faces_internal.h"
 #include "surface/snap_collapse_internal.h"
+#include "surface/snap_cuts_internal.h"
 #include "surface/snap_lattice_internal.h"
 
 #include <algorithm>
@@ -21,9 +22,9 @@
 namespace gewebe {
 namespace {
 
-/// A quick test. \pre enough is the square of what the area may be at least, for sides of 1
-bool has_much_area(const Vec3& a, const Vec3& b, const Vec3& c, double enough) {
-  const Vec3 u = b - a, v = c - a, normal = cross(u, v);
+/// A quick test. \param normal  cross(u, v)
+/// \pre enough is the square of what the area may be at least, for sides of 1
+bool has_much_area(const Vec3& u, const Vec3& v, const Vec3& normal, double enough) {
   const double longest = 2 * (dot(u, u) + dot(v, v)); // of three squares: (v - u)² isn't more
   return dot(normal, normal) > enough * longest * longest;
 }
@@ -74,6 +75,18 @@ public:
     result.report.zero_area = flat.size();
   }
 
+  /// Faces that cut others, ascending. \pre make(result)
+  std::vector<std::uint32_t> find_cuts(const TriangleMesh& mesh) const {
+    std::vector<SuspectFace> suspects;
+    for (const std::vector<SuspectFace>& part : suspects_)
+      suspects.insert(suspects.end(), part.begin(), part.end());
+    return find_cutting_faces(context_, {mesh, surface_, transform_, first_triangle_},
+                              std::move(suspects));
+  }
+  /// Appends the corners, absolute, where points of these faces have moved.
+  void append_corners(const TriangleMesh& mesh, std::span<const std::uint32_t> faces,
+                      std::vector<Int3>& corners) const;
+
 private:
   static constexpr std::size_t blocks_at_once = 64;
 
@@ -87,8 +100,8 @@ private:
   struct SmallFace {
     std::uint32_t block = 0, face = 0, triangle = 0;
   };
-  /// Of the places of a block's edges: the point's new number, and bit 32 where a face of it may
-  /// have no area.
+  /// Of the places of a block's edges: the point's new number, bit 32 where a face of it may have
+  /// no area, and bit 33 where it is crowded.
   using PlaceNumbers = std::array<std::uint64_t, edge_places>;
 
   void count(TriangleMesh& mesh);
@@ -114,6 +127,7 @@ private:
   CellPlans plans_;
   std::vector<std::uint32_t> first_point_, first_triangle_; // of each block, after snapping
   std::vector<std::vector<SmallFace>> small_;
+  std::vector<std::vector<SuspectFace>> suspects_; // that may cut another one
 };
 
 void SnappedMesh::count(TriangleMesh& mesh) {
@@ -180,11 +194,14 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
   EdgeWords looked_at;
   for (std::size_t w = 0; w < looked_at.size(); ++w)
     looked_at[w] = is_doubtful(snaps, w);
+  const auto marks = [](std::uint64_t looked_at_word, std::uint64_t crowded_word, unsigned bit) {
+    return (looked_at_word >> bit & 1) << 32 | (crowded_word >> bit & 1) << 33;
+  };
   for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
     const BlockEdge edge = surface_.edges[p];
     const unsigned w = edge.word(), bit = edge.bit();
     const std::uint32_t last = (merged[w] >> bit & 1) != 0 ? target[p] : p;
-    numbers[edge.place()] = target[last] | (looked_at[w] >> bit & 1) << 32;
+    numbers[edge.place()] = target[last] | marks(looked_at[w], snaps.crowded[w], bit);
   }
   for_far_edges(
       surface_, block,
@@ -192,7 +209,7 @@ void SnappedMesh::note_points(std::size_t n, PlaceNumbers& numbers) const {
         const SnapBlock& far_snaps = lattice_.snaps(number);
         const std::uint32_t p = far.point(w, bit),
                             last = (far_snaps.merged[w] >> bit & 1) != 0 ? target[p] : p;
-        numbers[place] = target[last] | (is_doubtful(far_snaps, w) >> bit & 1) << 32;
+        numbers[place] = target[last] | marks(is_doubtful(far_snaps, w), far_snaps.crowded[w], bit);
       });
 }
 
@@ -201,6 +218,7 @@ struct BlockFaces {
   static constexpr std::size_t max_made = std::size_t{max_cell_triangles} * leaf_voxels;
   std::array<Triangle, max_made + 1> made;
   std::array<std::uint16_t, max_made + 1> picked, picked_from; ///< of `made`; of the block's faces
+  std::array<std::uint8_t, max_made + 1> picked_case, crowded; ///< of its cell; has such a point
   std::size_t made_count = 0, picked_count = 0;
 };
 
@@ -215,7 +233,8 @@ void make_faces(const SurfaceBlock& block, const std::uint64_t* numbers, const C
     for (std::uint64_t active = block.active[i]; active != 0; active &= active - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(active));
       const std::uint64_t* const at = numbers + edge_place(i, bit >> 3, bit & 7);
-      const CellPlan& plan = plans[*cell++];
+      const std::uint8_t cell_case = *cell++;
+      const CellPlan& plan = plans[cell_case];
       const std::uint16_t* corner = plan.corner.data();
       for (unsigned t = 0; t < plan.triangles; ++t, corner += 3) {
         const std::uint64_t a = at[corner[0]], b = at[corner[1]], c = at[corner[2]];
@@ -229,6 +248,8 @@ void make_faces(const SurfaceBlock& block, const std::uint64_t* numbers, const C
         faces.made[made] = next;
         faces.picked[picked] = static_cast<std::uint16_t>(made);
         faces.picked_from[picked] = face++;
+        faces.picked_case[picked] = cell_case;
+        faces.crowded[picked] = static_cast<std::uint8_t>((a | b | c) >> 33);
         made += stays;
         picked += stays & (a | b | c) >> 32;
       }
@@ -242,6 +263,8 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
   const double enough = enough_area(transform_);
   const std::size_t blocks = surface_.blocks.size();
   small_.resize((blocks + blocks_at_once - 1) / blocks_at_once);
+  suspects_.resize(small_.size());
+  const CellDirections directions = make_directions(transform_);
   // Faces between points that stayed in place at 0.001 or more from the ends of their edges have an
   // area (see the test of the table): three edges of a cell that lie in no face of it in common.
   parallel_blocks(context_, blocks, blocks_at_once, [&](std::size_t begin, std::size_t end) {
@@ -253,10 +276,16 @@ void SnappedMesh::write_triangles(const std::vector<Vec3>& points,
       std::copy_n(faces->made.data(), faces->made_count, triangles.data() + first_triangle_[n]);
       for (std::size_t p = 0; p < faces->picked_count; ++p) {
         const Triangle& t = faces->made[faces->picked[p]];
-        if (!has_much_area(points[t[0]], points[t[1]], points[t[2]], enough))
-          small_[begin / blocks_at_once].push_back({static_cast<std::uint32_t>(n),
-                                                    faces->picked_from[p],
-                                                    first_triangle_[n] + faces->picked[p]});
+        const std::uint32_t number = first_triangle_[n] + faces->picked[p];
+        const Vec3 u = points[t[1]] - points[t[0]], v = points[t[2]] - points[t[0]],
+                   normal = cross(u, v);
+        if (!has_much_area(u, v, normal, enough))
+          small_[begin / blocks_at_once].push_back(
+              {static_cast<std::uint32_t>(n), faces->picked_from[p], number});
+        const bool turned = is_turned(normal, directions[faces->picked_case[p]]);
+        if (faces->crowded[p] != 0 || turned)
+          suspects_[begin / blocks_at_once].push_back(
+              {static_cast<std::uint32_t>(n), number, turned});
       }
     }
   });
@@ -374,26 +403,41 @@ void SnappedMesh::move_back(TriangleMesh& mesh, std::span<const std::uint32_t> f
     mesh.points[point] = world_position(transform_.m, mean.sum / mean.weights);
 }
 
-} // namespace
+void SnappedMesh::append_corners(const TriangleMesh& mesh, std::span<const std::uint32_t> faces,
+                                 std::vector<Int3>& corners) const {
+  std::vector<std::uint32_t> points;
+  for (const std::uint32_t n : faces)
+    points.insert(points.end(), mesh.triangles[n].begin(), mesh.triangles[n].end());
+  std::ranges::sort(points);
+  for (std::size_t n = 0; n < surface_.blocks.size(); ++n) {
+    const SurfaceBlock& block = *surface_.blocks[n];
+    const SnapBlock& snaps = lattice_.snaps(n);
+    for (std::uint32_t p = block.first_point; p < block.first_point + block.points; ++p) {
+      const BlockEdge at = surface_.edges[p];
+      const bool merged = (snaps.merged.at(at.word()) >> at.bit() & 1) != 0;
+      if (!std::ranges::binary_search(points, merges_.target[merged ? merges_.target[p] : p]))
+        continue;
+      const LatticeEdge edge{
+          {static_cast<int>(at.i()), static_cast<int>(at.j()), static_cast<int>(at.k())},
+          at.axis()};
+      Int3 corner;
+      if (lattice_.is_fin(n, edge))
+        corners.push_back(lattice_.fin_of(p).corner);
+      else if (lattice_.snap_corner(n, edge, corner))
+        corners.push_back(lattice_.absolute(n, corner));
+    }
+  }
+}
 
-SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options) {
-  if (!(options.epsilon >= 0 && options.epsilon <= 0.5))
-    throw Error("epsilon must lie within 0 ... 0.5");
-  SnapResult result;
-  if (surface.lattice == nullptr)
-    return result;
+/// Snaps but at these corners, ascending, and appends those where faces cut each other then.
+SnapResult snap_but_at(const Context& context, const IsoSurface& surface,
+                       const SnapOptions& options, std::vector<Int3>& kept) {
   const SurfaceBlocks& blocks = *surface.lattice;
-  const double points = static_cast<double>(blocks.points),
-               triangles = static_cast<double>(blocks.triangles);
-  require_memory(context,
-                 static_cast<double>(blocks.blocks.size()) * sizeof(SnapBlock) +
-                     points * (2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3)) +
-                     triangles * sizeof(Triangle),
-                 "snapping");
-
-  SnapLattice lattice(context, blocks, options.epsilon, surface.transform.determinant() < 0);
+  SnapResult result;
+  SnapLattice lattice(context, blocks, options.epsilon, surface.transform.determinant() < 0, kept);
   SnapMerges merges = merge_snap_clusters(context, lattice, options.place);
-  SnappedMesh(context, surface, lattice, merges, options.place).make(result);
+  SnappedMesh snapped(context, surface, lattice, merges, options.place);
+  snapped.make(result);
   SnapReport& report = result.report;
   report.corners = merges.corners;
   report.fins = lattice.fins().size();
@@ -402,7 +446,42 @@ SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOpt
   report.points_after = result.mesh.points.size();
   report.triangles_before = blocks.triangles;
   report.triangles_after = result.mesh.triangles.size();
+  report.kept_corners = kept.size();
+  if (options.epsilon > 0 && !options.may_cut) {
+    const std::vector<std::uint32_t> cutting = snapped.find_cuts(result.mesh);
+    report.cutting_faces = cutting.size();
+    if (!cutting.empty())
+      snapped.append_corners(result.mesh, cutting, kept);
+  }
   return result;
+}
+
+} // namespace
+
+SnapResult snap(const Context& context, const IsoSurface& surface, const SnapOptions& options) {
+  if (!(options.epsilon >= 0 && options.epsilon <= 0.5))
+    throw Error("epsilon must lie within 0 ... 0.5");
+  if (surface.lattice == nullptr)
+    return {};
+  const SurfaceBlocks& blocks = *surface.lattice;
+  const double points = static_cast<double>(blocks.points),
+               triangles = static_cast<double>(blocks.triangles);
+  require_memory(context,
+                 static_cast<double>(blocks.blocks.size()) * sizeof(SnapBlock) +
+                     points * (2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3)) +
+                     triangles * sizeof(Triangle),
+                 "snapping");
+  std::vector<Int3> kept;
+  SnapResult best = snap_but_at(context, surface, options, kept);
+  while (best.report.cutting_faces > 0) {
+    std::ranges::sort(kept);
+    kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+    SnapResult next = snap_but_at(context, surface, options, kept);
+    if (next.report.cutting_faces >= best.report.cutting_faces)
+      break; // these faces touch without snapping, too
+    best = std::move(next);
+  }
+  return best;
 }
 
 } // namespace gewebe

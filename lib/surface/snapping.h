@@ -17,15 +17,18 @@ struct SnapOptions {
   enum class Place { mean, corner };
   double epsilon = 0.15; ///< 0 … 0.5, fraction of the lattice edge
   Place place = Place::mean;
+  bool may_cut = false; ///< leaves faces that cut each other, see `snap`
 };
 
 struct SnapReport {
   std::uint64_t points_before = 0, points_after = 0;
   std::uint64_t triangles_before = 0, triangles_after = 0;
-  std::uint64_t corners = 0;   ///< lattice corners that drew a crossing
-  std::uint64_t fins = 0;      ///< points that snapped by the fin rule
-  std::uint64_t refused = 0;   ///< edges inside a cluster that the link condition kept
-  std::uint64_t zero_area = 0; ///< faces left whose area is 0, relative to their longest edge
+  std::uint64_t corners = 0;       ///< lattice corners that drew a crossing
+  std::uint64_t fins = 0;          ///< points that snapped by the fin rule
+  std::uint64_t refused = 0;       ///< edges inside a cluster that the link condition kept
+  std::uint64_t zero_area = 0;     ///< faces left whose area is 0, relative to their longest edge
+  std::uint64_t kept_corners = 0;  ///< whose points stay, since faces cut each other there
+  std::uint64_t cutting_faces = 0; ///< left that cut each other
 };
 
 struct SnapResult {
@@ -50,6 +53,12 @@ struct SnapResult {
 /// cluster (but no point of a fin on its own). With Place::corner faces between corners in one line
 /// have no area: their longest edge is flipped (flip_flat_faces), and the points of faces that no
 /// flip helps, for they coincide, go where Place::mean has them. What is still flat is counted.
+/// Where faces of the result would cut each other, as across a wall thinner than a voxel, the
+/// corners to which their points went draw only points that lie on them, and all is done again
+/// while that leaves fewer of such faces. Only faces are compared that have a point of a corner
+/// that keeps several points (with Place::corner: where the surface isn't a single sheet), that are
+/// turned out of their cell's direction, or that lie beside one of these; no other was seen to cut.
+///
 /// Points and triangles keep the order of their first member; unused points vanish. Linear time.
 ///
 /// What is snapped is surface.lattice as marching_cubes or marching_cubes_to_snap made it; the mesh

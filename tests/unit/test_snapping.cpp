@@ -1,6 +1,7 @@
 #include "surface/snapping.h"
 
 #include "base/error.h"
+#include "mesh/self_intersections.h"
 #include "tests/unit/larger.h"
 #include "tests/unit/surface_scenes.h"
 
@@ -25,7 +26,7 @@ void check_scene(const Grid& grid, const std::string& name) {
   const IsoSurface surface = marching_cubes({}, grid);
   const MeshReport before = examine_mesh(surface.mesh);
   for (const double epsilon : epsilons) {
-    const SnapResult result = snap({}, surface, {epsilon, Place::mean});
+    const SnapResult result = snap({}, surface, {epsilon, Place::mean, true});
     const MeshReport after = examine_mesh(result.mesh);
     EXPECT_TRUE(keeps_topology(before, after)) << name << ", epsilon " << epsilon;
     EXPECT_EQ(result.report.points_after, after.points);
@@ -34,13 +35,49 @@ void check_scene(const Grid& grid, const std::string& name) {
     EXPECT_EQ(result.report.triangles_before, before.triangles);
     EXPECT_EQ(result.report.zero_area, after.zero_area_faces);
     // With points in corners more faces are flat; what edges can be flipped takes them away.
-    const SnapResult corner = snap({}, surface, {epsilon, Place::corner});
+    const SnapResult corner = snap({}, surface, {epsilon, Place::corner, true});
     EXPECT_TRUE(keeps_topology(before, examine_mesh(corner.mesh)))
         << name << ", corner " << epsilon;
     EXPECT_EQ(corner.mesh.triangles.size(), result.mesh.triangles.size());
     EXPECT_LE(corner.report.zero_area, result.report.zero_area + 1)
         << name << ", corner " << epsilon;
   }
+}
+
+/// No face may cut another; answers how many corners had to be kept for that.
+std::uint64_t check_cuts(const Grid& grid, const std::string& name) {
+  const IsoSurface surface = marching_cubes({}, grid);
+  const MeshReport before = examine_mesh(surface.mesh);
+  std::uint64_t kept = 0;
+  for (const double epsilon : {0.05, 0.15, 0.3, 0.5})
+    for (const Place place : {Place::mean, Place::corner}) {
+      const SnapResult result = snap({}, surface, {epsilon, place});
+      EXPECT_EQ(self_intersections({}, result.mesh).pairs, 0U) << name << ' ' << epsilon;
+      EXPECT_EQ(result.report.cutting_faces, 0U);
+      EXPECT_TRUE(keeps_topology(before, examine_mesh(result.mesh))) << name << ' ' << epsilon;
+      kept += result.report.kept_corners;
+      if (result.report.kept_corners == 0) {
+        const SnapResult unchecked = snap({}, surface, {epsilon, place, true});
+        EXPECT_TRUE(unchecked.mesh.points == result.mesh.points &&
+                    unchecked.mesh.triangles == result.mesh.triangles);
+      }
+    }
+  return kept;
+}
+
+TEST(Snapping, NoFaceCutsAnother) {
+  std::uint64_t kept = 0;
+  for (std::uint32_t seed = 0; seed < 3; ++seed) {
+    check_cuts(metaballs(24, seed), "metaballs " + std::to_string(seed));
+    kept += check_cuts(noise(10, seed), "noise " + std::to_string(seed));
+  }
+  // A shell of half a voxel, which both of its sides may snap across.
+  kept += check_cuts(sample({}, {-12, -12, -12}, {12, 12, 12},
+                            [](int i, int j, int k) {
+                              return 0.5 + 0.6 - std::abs(std::sqrt(i * i + j * j + k * k) - 9.3);
+                            }),
+                     "shell");
+  EXPECT_GT(kept, 100U);
 }
 
 TEST(Snapping, KeepsTopologyOfMetaballs) {
@@ -210,7 +247,7 @@ TEST(Snapping, CornerLeavesNoFlatFaces) {
     for (std::uint32_t seed = 0; seed < 6; ++seed) {
       const IsoSurface surface = marching_cubes({}, metaballs(48, seed));
       const MeshReport before = examine_mesh(surface.mesh);
-      const SnapResult result = snap({}, surface, {epsilon, Place::corner});
+      const SnapResult result = snap({}, surface, {epsilon, Place::corner, true});
       const MeshReport after = examine_mesh(result.mesh);
       EXPECT_EQ(after.zero_area_faces, 0U) << epsilon << ' ' << seed;
       EXPECT_EQ(result.report.zero_area, 0U);
@@ -218,7 +255,7 @@ TEST(Snapping, CornerLeavesNoFlatFaces) {
       EXPECT_NEAR(signed_volume(result.mesh), signed_volume(surface.mesh),
                   0.05 * signed_volume(surface.mesh));
       TriangleMesh unflipped = result.mesh; // the faces are those of Place::mean
-      unflipped.triangles = snap({}, surface, {epsilon, Place::mean}).mesh.triangles;
+      unflipped.triangles = snap({}, surface, {epsilon, Place::mean, true}).mesh.triangles;
       without_flips += examine_mesh(unflipped).zero_area_faces;
     }
   EXPECT_GT(without_flips, 20U);

@@ -66,6 +66,12 @@ void mesh_surface(cli::Run& run, const MeshArguments& arguments) {
   cli::report_meshing(run.stats(), prepared.grid, surface, snapped.report);
   run.say(std::to_string(snapped.report.points_before) + " points, " +
           std::to_string(snapped.report.points_after) + " after snapping");
+  if (snapped.report.kept_corners > 0)
+    run.say("points stay at " + std::to_string(snapped.report.kept_corners) +
+            " voxel centres, where the surface would cut itself");
+  if (snapped.report.cutting_faces > 0)
+    run.say(std::to_string(snapped.report.cutting_faces) +
+            " triangles cut or touch each other, as where values equal the isovalue");
   warn_if_empty(run, snapped.mesh.triangles.empty());
   if (!snapped.mesh.triangles.empty() && prepared.before)
     cli::compare_topology(run, "mc-opt", "", "--resample", *prepared.before, topology(snapped.mesh),

@@ -35,6 +35,7 @@ void report_meshing(Stats& stats, const Grid& grid, const IsoSurface& surface,
   stats.set("triangle_reduction", reduction(snapped.triangles_before, snapped.triangles_after));
   stats.set("fins", snapped.fins);
   stats.set("refused_collapses", snapped.refused);
+  stats.set("corners_kept", snapped.kept_corners);
 }
 
 void report_surface(Run& run, const TriangleMesh& mesh, bool self_intersections) {

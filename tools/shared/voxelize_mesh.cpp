@@ -11,6 +11,7 @@
 #include "tools/shared/topology_change.h"
 #include "tools/shared/transform_option.h"
 #include "volume/lattice.h"
+#include "voxelize/lost_parts.h"
 
 #include <cmath>
 
@@ -51,6 +52,22 @@ void report(cli::Run& run, const MeshToVoxelize& a, const CoverageReport& r) {
   stats.set("samples_summed", r.mesh.samples_summed);
 }
 
+const char* lattice_option(const MeshToVoxelize& a) {
+  return a.voxel ? "--voxel" : a.dim ? "--dim" : "--like";
+}
+
+/// Warns where parts of the mesh vanish between the voxels, closed or not.
+void check_parts(cli::Run& run, const MeshToVoxelize& a, const std::string& place,
+                 const TriangleMesh& mesh, const Grid& grid) {
+  const LostParts found = find_lost_parts(mesh, grid);
+  run.stats().set("parts_lost", found.lost);
+  if (found.lost > 0)
+    cli::distrust(run, "voxelize",
+                  place + ": " + std::to_string(found.lost) + " of " + std::to_string(found.parts) +
+                      (found.lost == 1 ? " parts has" : " parts have") +
+                      " no voxel, expected a smaller voxel than by " + lattice_option(a));
+}
+
 /// Whether the topology is compared: with more leaves than this that takes too large a part of the
 /// run, so that only --stats is worth it.
 bool compares_topology(const cli::Run& run, const Grid& grid, const CoverageReport& r) {
@@ -73,8 +90,8 @@ void check_topology(cli::Run& run, const MeshToVoxelize& a, const std::string& p
   }
   if (before.topology != after && !cli::is_surface_of_volume(run.context(), before, a.options.rule))
     return;
-  const char* option = a.voxel ? "--voxel" : a.dim ? "--dim" : "--like";
-  cli::compare_topology(run, "voxelize", place, option, before.topology, after, "voxels");
+  cli::compare_topology(run, "voxelize", place, lattice_option(a), before.topology, after,
+                        "voxels");
 }
 
 } // namespace
@@ -114,6 +131,8 @@ void voxelize_mesh(cli::Run& run, const MeshToVoxelize& a) {
     cli::distrust(run, "voxelize", input.name() + ": no voxel centre lies inside the mesh");
   else if (a.unit.empty())
     cli::warn_of_size(run, input.name(), mesh, std::cbrt(std::fabs(transform.determinant())));
+  if (grid.active_voxels() > 0)
+    run.timed("parts", [&] { check_parts(run, a, input.name(), mesh, grid); });
   if (compares_topology(run, grid, counts))
     run.timed("topology", [&] { check_topology(run, a, input.name(), mesh, grid); });
   write(run, output, grid, to);
