@@ -190,8 +190,8 @@ double StepSolver::Work::longest_way() const {
 
 /// Scales the barrier by a typical contact force: that of the bodies, a part of the largest of the
 /// last step, or, where the bodies collide on their ways to `to`, a part of the force that stops a
-/// vertex within the step. What turns out larger makes it stiffer (raise_stiffness); one that is too
-/// stiff is a wall that Newton's steps bounce off.
+/// vertex within the step. What turns out larger makes it stiffer (raise_stiffness); one that is
+/// too stiff is a wall that Newton's steps bounce off.
 void StepSolver::Work::set_stiffness(std::span<const Vec3> to) {
   const Parameters& p = options_.parameters;
   double force = std::numeric_limits<double>::infinity();
