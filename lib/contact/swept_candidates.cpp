@@ -1,0 +1,90 @@
+#include "contact/swept_candidates.h"
+
+#include "collision/ccd.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace gewebe::contact {
+
+namespace {
+
+/// Iterations of conservative advancement.
+constexpr int max_advances = 1000;
+
+double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& way) {
+  const double square = dot(way, way);
+  const double t = square > 0 ? std::clamp(dot(p - a, way) / square, 0.0, 1.0) : 0;
+  return norm(p - a - t * way);
+}
+
+} // namespace
+
+void SweptCandidates::search(std::span<const Vec3> from, std::span<const Vec3> to, double reach,
+                             std::span<const std::uint32_t> also) {
+  const std::size_t count = from.size();
+  broad_phase_.find(island_.surface, from, to, reach, island_.allowed, candidates_);
+  ++searches_;
+  from_.assign(from.begin(), from.end());
+  way_.resize(count);
+  for (std::size_t v = 0; v < count; ++v)
+    way_[v] = to[v] - from[v];
+  std::vector<std::uint8_t> used(count);
+  const auto use = [&](const auto& lists) {
+    for (const auto& list : lists)
+      for (const std::uint32_t v : list)
+        used[v] = 1;
+  };
+  use(candidates_.point_point);
+  use(candidates_.point_edge);
+  use(candidates_.edge_edge);
+  use(candidates_.point_triangle);
+  for (const std::uint32_t v : also)
+    used[v] = 1;
+  vertices_.clear();
+  for (std::uint32_t v = 0; v < count; ++v)
+    if (used[v] != 0)
+      vertices_.push_back(v);
+  filter_.reset(candidates_, vertices_, from_);
+}
+
+double SweptCandidates::free_part(std::span<const Vec3> from, std::span<const Vec3> to,
+                                  double longest) {
+  const double d_hat = island_.activation_distance;
+  const collision::Separation separation{0, parameters_.kept_gap, d_hat, max_advances};
+  const auto part_of = [&](double range, double t_max) {
+    return collision::collision_free_step(island_.surface, near(from, range), from, to, separation,
+                                          t_max);
+  };
+  // Pairs in contact limit the way most. Behind them few others remain to be looked at.
+  const double most = part_of(d_hat, 1);
+  return part_of(d_hat + 2 * most * longest, most);
+}
+
+bool SweptCandidates::keep_gaps(std::span<const Vec3> from, std::span<const Vec3> to) const {
+  return collision::collision_free_step(
+             island_.surface, candidates_, from, to,
+             {0, parameters_.kept_gap, island_.activation_distance, max_advances}) >= 1;
+}
+
+bool SweptCandidates::are_free(std::span<const Vec3> from, std::span<const Vec3> to) const {
+  return collision::collision_free_step(island_.surface, candidates_, from, to,
+                                        {0, 0, island_.activation_distance, max_advances}) >= 1;
+}
+
+bool SweptCandidates::covers(std::uint32_t vertex, const Vec3& x, double room) const {
+  return distance_to_segment(x, from_[vertex], way_[vertex]) <= room;
+}
+
+bool SweptCandidates::cover(std::span<const Vec3> x, double room) const {
+  for (std::uint32_t v = 0; v < x.size(); ++v)
+    if (!covers(v, x[v], room))
+      return false;
+  return true;
+}
+
+bool SweptCandidates::cover_own(std::span<const Vec3> x, double room) const {
+  return std::ranges::all_of(vertices_, [&](std::uint32_t v) { return covers(v, x[v], room); });
+}
+
+} // namespace gewebe::contact
