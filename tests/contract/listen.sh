@@ -341,7 +341,7 @@ P
   python3 drive.py || fail 'a client fails' "$(<stderr.txt)"
   ended 1
   [[ $(<stderr.txt) == *'who asked for these steps has gone' ]] || fail "$(<stderr.txt)"
-  ! grep -q 3000 run.scene || fail 'half a line was carried out'
+  ! grep -q '^force .* 3000$' run.scene || fail 'half a line was carried out' # times may have these digits
   # What was done is what the record holds.
   ffe-run -q run.scene -o again.h5
   cmp run.h5 again.h5
