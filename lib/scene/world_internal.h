@@ -129,7 +129,7 @@ std::span<const double> static_shape(Object& object);
 std::span<const double> static_surface(Object& object);
 /// As the surface, within the tolerance.
 std::span<const double> static_rough_surface(Object& object);
-/// Measures the shape that nobody has asked for.
+/// Measures the shape that no caller has asked for.
 void verify_shape(Object& object);
 std::vector<NodeVector> static_forces(const Object& object);
 

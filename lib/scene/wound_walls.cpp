@@ -53,6 +53,9 @@ Vec3 displacement_of(const Object& object, const Motions& motions, std::size_t i
 /// edges of both sides.
 constexpr double same_place = 1e-9;
 
+/// Unit vector along which nodes are swept: of no mesh's axes, so that few share a coordinate.
+constexpr Vec3 sweep_direction{0.36, 0.48, 0.8};
+
 /// Nodes at one place, and the median edge of all surfaces.
 class SharedPlaces {
 public:
@@ -64,11 +67,12 @@ public:
   /// Each with nodes of ascending object and number.
   std::vector<std::vector<SurfaceNode>> groups() {
     const double room = same_place * median_edge();
-    std::ranges::stable_sort(nodes_, {}, [](const SurfaceNode& node) { return node.place.x; });
+    const auto along = [](const SurfaceNode& node) { return dot(sweep_direction, node.place); };
+    std::ranges::stable_sort(nodes_, {}, along);
     std::vector<std::vector<SurfaceNode>> all;
-    std::size_t first = 0; // of the groups that are near along x
+    std::size_t first = 0; // of the groups that are near along the direction
     for (const SurfaceNode& node : nodes_) {
-      while (first < all.size() && all[first].back().place.x < node.place.x - room)
+      while (first < all.size() && along(all[first].back()) < along(node) - room)
         ++first;
       const auto found = std::find_if(all.begin() + static_cast<std::ptrdiff_t>(first), all.end(),
                                       [&](const std::vector<SurfaceNode>& group) {

@@ -113,7 +113,7 @@ public:
   std::span<const double> surface_displacement();
   /// The same within the tolerance: what is shown, but not what a scene goes on by.
   std::span<const double> rough_surface();
-  /// Measures the error of the shape, where nobody has asked for it; else nothing.
+  /// Measures the error of the shape, where no caller has asked for it; else nothing.
   void verify();
 
   /// What holds the displaced nodes, as Elastodynamic::contact_forces.
