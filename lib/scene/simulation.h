@@ -38,10 +38,10 @@ struct ObjectSource {
 };
 
 struct SimulationOptions {
-  bool measure_error = false;                     ///< see ElastostaticOptions
-  bool verify_shapes = false;                     ///< with it: also of shapes that no caller asks for
-  double tolerance = 0;                           ///< of shapes that are shown, as there
-  bool shapes = false;                            ///< shapes are wanted of each step, as if emitted
+  bool measure_error = false; ///< see ElastostaticOptions
+  bool verify_shapes = false; ///< with it: also of shapes that no caller asks for
+  double tolerance = 0;       ///< of shapes that are shown, as there
+  bool shapes = false;        ///< shapes are wanted of each step, as if emitted
   std::function<void(const std::string&)> warn{}; ///< told of each trouble once per object
   /// Told in its place of shapes that are not to be trusted; without it `warn` is.
   std::function<void(const std::string&)> distrust{};
