@@ -358,6 +358,13 @@ std::size_t CondensedSystem::unknowns() const {
 
 void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
   State& s = *state_;
+  std::vector<std::vector<std::uint32_t>> added(s.parts.size());
+  for (const std::uint32_t vertex : vertices)
+    if (const Node& n = s.nodes[s.node_of[s.place_of_vertex[vertex]]]; n.active == none)
+      added[n.body].push_back(n.vertex);
+  for (std::size_t b = 0; b < added.size(); ++b)
+    if (!added[b].empty())
+      s.table.bodies[b]->prepare(added[b]);
   std::vector<std::uint8_t> changed(s.parts.size());
   for (const std::uint32_t vertex : vertices) {
     const std::uint32_t node = s.node_of[s.place_of_vertex[vertex]];

@@ -49,6 +49,9 @@ public:
   virtual double linearise(std::span<const VertexForce> forces, std::span<Vec3> step) = 0;
   /// Contact forces at the end of the last step, by ascending vertex.
   virtual std::vector<VertexForce> last_forces() const { return {}; }
+  /// Columns of these vertices are about to be asked for: what is solved together costs less.
+  /// \pre linearised
+  virtual void prepare(std::span<const std::uint32_t> /*vertices*/) {}
   /// Compliance between `vertex` and each vertex of `rows` in their frames:
   /// W(row, vertex) = frame(row) block frame(vertex)^T, mm per 1e-6 N. Zero along axes that cannot
   /// move. \pre linearised

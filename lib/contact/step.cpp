@@ -482,9 +482,11 @@ void StepSolver::Work::sharpen(double change) {
   // Rounds may alternate.
   const double rate = std::sqrt(change / changes_[changes_.size() - 3]);
   const double rounds = std::log(p.round_tolerance * d_hat_ / change) / std::log(rate);
-  if (!(rate < 1) || rounds > p.slow_rounds)
-    for (ContactBody* const body : island_.table.bodies)
-      body->sharpen();
+  if (rate < 1 && rounds <= p.slow_rounds)
+    return;
+  for (ContactBody* const body : island_.table.bodies)
+    body->sharpen();
+  changes_.clear();
 }
 
 /// Undoes a round whose models did not hold.

@@ -43,9 +43,10 @@ double SolidContactBody::linearise(std::span<const VertexForce> forces, std::spa
   linearised_ = forces_;
   step_.resize(axes_);
   motion_.linearise_step(step_, forces_, context_);
-  if (motion_.matrix_version() != version_) {
-    columns_.clear();
-    version_ = motion_.matrix_version();
+  if (const std::uint64_t version = motion_.matrix_version(); version != columns_.version) {
+    std::swap(columns_, others_);
+    if (columns_.version != version)
+      columns_ = {version, {}};
   }
   for (std::size_t k = 0; k < vertices_.size(); ++k)
     step[k] = vector_at(std::span<const double>(step_), vertices_[k]);
@@ -55,23 +56,40 @@ double SolidContactBody::linearise(std::span<const VertexForce> forces, std::spa
   return energy / (h_ * h_);
 }
 
+void SolidContactBody::prepare(std::span<const std::uint32_t> vertices) {
+  constexpr std::size_t together = 8;
+  std::vector<std::uint32_t> missing;
+  for (const std::uint32_t vertex : vertices)
+    if (!columns_.of.contains(vertex))
+      missing.push_back(vertex);
+  std::vector<double> whole;
+  for (std::size_t first = 0; first < missing.size(); first += together) {
+    const std::span<const std::uint32_t> batch =
+        std::span(missing).subspan(first, std::min(together, missing.size() - first));
+    std::vector<std::uint32_t> nodes;
+    for (const std::uint32_t vertex : batch)
+      nodes.push_back(vertices_[vertex]);
+    whole.resize(3 * axes_ * nodes.size());
+    motion_.unit_responses(nodes, whole);
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      std::vector<double>& kept = columns_.of[batch[k]];
+      kept.reserve(9 * vertices_.size());
+      for (const std::uint32_t node : vertices_)
+        for (std::size_t a = 0; a < 3; ++a)
+          for (std::size_t column = 0; column < 3; ++column)
+            kept.push_back(whole[(3 * k + column) * axes_ + 3 * std::size_t{node} + a]);
+    }
+  }
+}
+
 void SolidContactBody::compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                                   std::span<Block3> blocks) {
-  auto found = columns_.find(vertex);
-  if (found == columns_.end()) {
-    std::vector<double> whole(3 * axes_);
-    motion_.unit_responses(vertices_[vertex], whole, context_);
-    std::vector<double> kept;
-    kept.reserve(9 * vertices_.size());
-    for (const std::uint32_t node : vertices_)
-      for (std::size_t a = 0; a < 3; ++a)
-        for (std::size_t column = 0; column < 3; ++column)
-          kept.push_back(whole[column * axes_ + 3 * std::size_t{node} + a]);
-    found = columns_.emplace(vertex, std::move(kept)).first;
-  }
+  if (!columns_.of.contains(vertex))
+    prepare({&vertex, 1});
+  const std::vector<double>& column = columns_.of.at(vertex);
   for (std::size_t k = 0; k < rows.size(); ++k)
     for (std::size_t a = 0; a < 9; ++a)
-      blocks[k][a] = motion_.relaxation() * found->second[9 * std::size_t{rows[k]} + a];
+      blocks[k][a] = motion_.relaxation() * column[9 * std::size_t{rows[k]} + a];
 }
 
 bool SolidContactBody::solve_alone() {

@@ -33,6 +33,7 @@ public:
   void positions(std::span<Vec3> x) override;
   double linearise(std::span<const contact::VertexForce> forces, std::span<Vec3> step) override;
   std::vector<contact::VertexForce> last_forces() const override { return last_; }
+  void prepare(std::span<const std::uint32_t> vertices) override;
   void compliance(std::uint32_t vertex, std::span<const std::uint32_t> rows,
                   std::span<contact::Block3> blocks) override;
   contact::Block3 frame(std::uint32_t vertex) const override {
@@ -63,9 +64,14 @@ private:
   std::vector<contact::VertexForce> last_;
   std::vector<double> step_, forces_;
   std::vector<double> linearised_; ///< forces of the quadratic model's state, 3 n
-  std::uint64_t version_ = 0;
-  /// By vertex: its unit responses at all vertices in their frames, three columns of 3 numbers.
-  std::map<std::uint32_t, std::vector<double>> columns_;
+  /// Unit responses with a matrix.
+  struct Columns {
+    std::uint64_t version = 0;
+    /// By vertex: at all vertices in their frames, three columns of 3 numbers.
+    std::map<std::uint32_t, std::vector<double>> of;
+  };
+  Columns columns_, others_; ///< of the present matrix, and of the one before: the constant matrix
+                             ///< serves again behind a tangent
 };
 
 } // namespace gewebe

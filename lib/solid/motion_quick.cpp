@@ -1,5 +1,6 @@
 #include "solid/motion_quick_internal.h"
 
+#include "base/unique_number.h"
 #include "solid/assembly.h"
 
 #include <algorithm>
@@ -71,6 +72,7 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   else
     factor_.emplace(a, context);
   single_.emplace(*factor_);
+  version_ = unique_number();
   step_ = h;
   held_ = held;
   tangent_.taken = false;
@@ -99,13 +101,16 @@ bool MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& spri
   tangent_.single.emplace(*tangent_.factor);
   tangent_.held = held_;
   tangent_.taken = true;
+  version_ = unique_number();
   forget();
   return true;
 }
 
 void MotionQuick::drop_tangent() noexcept {
-  if (std::exchange(tangent_.taken, false))
-    forget();
+  if (!std::exchange(tangent_.taken, false))
+    return;
+  version_ = unique_number();
+  forget();
 }
 
 void MotionQuick::turn(SolidEnergy& energy, const Context& context) {
@@ -163,6 +168,34 @@ void MotionQuick::fill(MotionVolumes& volumes, const Context& context) {
     return;
   volumes.linearise([&](Numbers& v) { solve_constant(v, context); });
   filled_ = &volumes;
+  version_ = unique_number();
+}
+
+void MotionQuick::unit_responses(std::span<const std::size_t> axes,
+                                 std::span<double> columns) const {
+  const std::size_t size = held_.size();
+  if (tangent_.taken) {
+    solve_unit_axes(tangent_.axes, *tangent_.factor, axes, columns);
+  } else if (alike_) {
+    std::vector<std::size_t> first(axes.begin(), axes.end()); // of their nodes
+    for (std::size_t& axis : first)
+      axis -= axis % 3;
+    solve_unit_axes(stiffness_, *factor_, first, columns);
+    for (std::size_t c = 0; c < axes.size(); ++c)
+      for (std::size_t axis = 0; axis < size && axes[c] % 3 != 0; axis += 3)
+        std::swap(columns[c * size + axis], columns[c * size + axis + axes[c] % 3]);
+  } else {
+    solve_unit_axes(stiffness_, *factor_, axes, columns);
+  }
+  if (filled_ == nullptr)
+    return;
+  Numbers column;
+  for (std::size_t c = 0; c < axes.size(); ++c) {
+    const std::span<double> at = columns.subspan(c * size, size);
+    column.assign(at.begin(), at.end());
+    filled_->correct(column);
+    std::ranges::copy(column, at.begin());
+  }
 }
 
 void MotionQuick::solve(Numbers& v, const Context& context) {

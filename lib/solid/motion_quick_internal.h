@@ -10,8 +10,10 @@
 #include "solve/stiffness.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace gewebe {
@@ -35,6 +37,8 @@ public:
   bool take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
                     const Context& context);
   void drop_tangent() noexcept;
+  /// Another number, see base/unique_number.h, whenever the matrix is another one.
+  std::uint64_t version() const noexcept { return version_; }
   /// A net without elements: the bound of its springs is a poor model.
   bool wants_tangent() const noexcept { return all_still_ && stiffness_is_bound_; }
   /// Rotation of a node's frame, row-major. \pre turned
@@ -46,6 +50,8 @@ public:
   // \pre turned
   void into_frames(Numbers& v, const Context& context) const;
   void out_of_frames(Numbers& v, const Context& context) const;
+  /// In frames: responses to unit forces along axes that are not held, columns of all axes.
+  void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
   /// In frames and in place, to single precision.
   void solve(Numbers& v, const Context& context);
   /// The volumes' part of the matrix joins at the places of the last evaluation. \pre turned
@@ -60,6 +66,7 @@ public:
   void set_rate(double rate) noexcept { rate_ = rate; }
 
 private:
+  std::uint64_t version_ = 0;
   double step_ = 0;
   std::vector<std::uint8_t> held_, still_; ///< axes; nodes whose frames don't turn
   bool all_still_ = false;

@@ -128,6 +128,11 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
   renewed_ = false;
 }
 
+void MotionTangent::unit_responses(std::span<const std::size_t> axes,
+                                   std::span<double> columns) const {
+  solve_unit_axes(tangent_, *factor_, axes, columns);
+}
+
 void MotionTangent::solve(Numbers& v) const {
   const Numbers f = v;
   solve_axes(tangent_, *factor_, f, v);

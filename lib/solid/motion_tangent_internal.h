@@ -6,7 +6,9 @@
 #include "solve/factor.h"
 #include "solve/stiffness.h"
 
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace gewebe {
@@ -17,6 +19,8 @@ public:
   void renew() noexcept { renewed_ = true; }
   /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
+  /// Responses to unit forces along axes, columns of all axes. \pre made
+  void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
   /// In place. \pre made
   void solve(Numbers& v) const;
 

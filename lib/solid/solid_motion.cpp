@@ -79,13 +79,19 @@ struct SolidMotion::State {
     Numbers base, step; ///< the iterate when it was linearised, and the model's step from there
     /// Nothing was linearised yet, now and when it was linearised last.
     bool fresh = true, was_fresh = true;
-    bool exact = false;    ///< the matrix is the tangent
+    bool exact = false;    ///< the matrix is a tangent
+    bool renews = false;   ///< ... and becomes that of the next round
+    bool is_new = false;   ///< ... and is that of the present round
+    bool was_kept = false; ///< ... and was made in an earlier step
     double relaxation = 1; ///< the matrix is over this
     double share = 1;      ///< of the step that the iterate lacks
     SolidStep counts{};
   };
   std::optional<Open> open;
-  std::uint64_t matrix_version = 0;
+  std::uint64_t matrix_version = 0, tangent_version = 0; ///< of the last model, of `tangent`
+  /// The tangent is that of the last step, where it has served to the end: the next one of
+  /// `last_step` begins with it.
+  bool keeps_tangent = false;
 
   State(const TetMesh& mesh, std::span<const SolidMaterial> materials, const SolidNet& net,
         const SolidMotionOptions& with, const Context& context)
@@ -145,32 +151,39 @@ void SolidMotion::State::limit(SolidStep& step) {
   step.limited = limit_energy(body, now, elastic, allowed, rounding);
 }
 
-/// The matrices of the open step are tangents from now on. \return whether there are any
+/// The matrix of the open step is the tangent of the next round from then on. \return whether there
+/// is any
 bool SolidMotion::State::take_tangent() {
   if (!energy.volumes().empty() || quick.wants_tangent())
     return false;
+  open->renews = true;
+  if (!open->is_new) // else it had to be so stiff
+    open->relaxation = 1;
   if (std::exchange(open->exact, true))
     return true;
   energy.note_frames();
   open->evaluated = false;
-  open->relaxation = 1;
   return true;
 }
 
 /// Makes the matrix of a model at the point of the last evaluation. \pre open
 void SolidMotion::State::renew_matrix(const Context& context) {
-  if (open->exact) {
+  open->is_new = std::exchange(open->renews, false);
+  if (open->is_new) {
     tangent.make(open->objective, open->point.at, context);
     ++open->counts.factorisations;
-    matrix_version = unique_number();
+    tangent_version = unique_number();
+    open->was_kept = false;
+  }
+  if (open->exact) {
+    matrix_version = tangent_version;
     return;
   }
-  if (quick.wants_tangent() && quick.take_tangent(body, energy.springs(), open->point.at, context))
-    matrix_version = unique_number();
+  if (quick.wants_tangent())
+    quick.take_tangent(body, energy.springs(), open->point.at, context);
   quick.turn(energy, context);
   quick.fill(energy.volumes(), context);
-  if (!energy.volumes().empty())
-    matrix_version = unique_number();
+  matrix_version = quick.version();
 }
 
 /// Solves with the matrix of the model, in place. \pre open, linearised
@@ -262,6 +275,7 @@ void SolidMotion::hold(std::span<const std::uint8_t> held) {
     s.forecast.hold(axis);
   }
   s.tangent.renew();
+  s.keeps_tangent = false;
   if (s.recovery.on())
     s.recovery.soft().hold(held);
 }
@@ -327,8 +341,6 @@ void SolidMotion::begin_step(double h, const Context& context) {
     return;
   }
   const int made = s.quick.prepare(s.body, s.energy.springs(), s.now.held, h, s.options, context);
-  if (made > 0)
-    s.matrix_version = unique_number();
   s.open.emplace(State::Open{.objective = MotionObjective(s.body, s.now, s.energy, h, s.options),
                              .point = {},
                              .found = {},
@@ -337,6 +349,7 @@ void SolidMotion::begin_step(double h, const Context& context) {
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
+  open.exact = open.was_kept = s.keeps_tangent && made == 0 && h == s.last_step;
 }
 
 void SolidMotion::linearise_step(std::span<double> step, std::span<const double> forces,
@@ -376,26 +389,21 @@ void SolidMotion::linearise_step(std::span<double> step, std::span<const double>
   std::ranges::copy(open.step, step.begin());
 }
 
-void SolidMotion::unit_responses(std::uint32_t node, std::span<double> columns,
-                                 const Context& context) {
+void SolidMotion::unit_responses(std::span<const std::uint32_t> nodes,
+                                 std::span<double> columns) const {
   State& s = *state_;
   if (s.recovery.on()) {
-    s.recovery.soft().unit_responses(node, columns, context);
+    s.recovery.soft().unit_responses(nodes, columns);
     return;
   }
-  Numbers column;
-  for (std::size_t a = 0; a < 3; ++a) {
-    column.assign(s.body.axes(), 0);
-    const std::size_t axis = 3 * std::size_t{node} + a;
-    if (s.now.held[axis] == 0) {
-      column[axis] = 1;
-      if (s.open->exact)
-        s.tangent.solve(column);
-      else
-        s.quick.solve(column, context);
-    }
-    std::ranges::copy(column, columns.begin() + static_cast<std::ptrdiff_t>(a * s.body.axes()));
-  }
+  std::vector<std::size_t> axes;
+  for (const std::uint32_t node : nodes)
+    for (std::size_t a = 0; a < 3; ++a)
+      axes.push_back(3 * std::size_t{node} + a);
+  if (s.open->exact)
+    s.tangent.unit_responses(axes, columns);
+  else
+    s.quick.unit_responses(axes, columns);
 }
 
 std::uint64_t SolidMotion::matrix_version() const noexcept {
@@ -457,7 +465,7 @@ bool SolidMotion::model_holds(std::span<const double> forces, const Context& con
   }
   const double off = open.found.value - model, unsure = open.found.unsure + open.point.unsure;
   const bool holds = off <= energy_excess * std::max(quadratic, 0.0) + unsure;
-  if (!holds && !open.exact && s.take_tangent())
+  if (!holds && !open.is_new && s.take_tangent())
     return false;
   // The matrix that would have had the energy along this way.
   const double factor = quadratic > unsure ? 1 / (1 + off / quadratic) : holds ? 1 : 0;
@@ -548,6 +556,8 @@ SolidStep SolidMotion::end_step(std::span<const double> forces, const Context& c
   }
   State::Open open = std::move(*s.open);
   s.open.reset();
+  // One that had to be renewed in every step would cost more than the constant matrix.
+  s.keeps_tangent = open.exact && (open.was_kept || !s.keeps_tangent);
   const double h = open.objective.step();
   open.objective.evaluate(open.found, context);
   if (!std::isfinite(open.found.value))
@@ -605,6 +615,7 @@ void SolidMotion::restore(std::span<const double> places, std::span<const double
                           const Context& context) {
   State& s = *state_;
   s.quick.forget();
+  s.keeps_tangent = false;
   s.recovery.end();
   std::ranges::copy(places, s.now.place.begin());
   std::ranges::copy(velocity, s.now.velocity.begin());

@@ -176,9 +176,10 @@ public:
   /// targets
   void linearise_step(std::span<double> step, std::span<const double> forces,
                       const Context& context);
-  /// Response of the model to unit forces on the three axes of a node, in the frame of each node:
-  /// three columns of 3 n numbers. They are the same until matrix_version() changes.
-  void unit_responses(std::uint32_t node, std::span<double> columns, const Context& context);
+  /// Responses of the model to unit forces on the three axes of each of these nodes, in the frame
+  /// of each node: three columns of 3 n numbers a node. They are the same until matrix_version()
+  /// changes. Costs less a node the more there are, up to 8.
+  void unit_responses(std::span<const std::uint32_t> nodes, std::span<double> columns) const;
   std::uint64_t matrix_version() const noexcept;
   /// Factor of these responses in the present round, at most 1: less where the matrix is too soft.
   double relaxation() const noexcept;

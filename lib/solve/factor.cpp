@@ -394,6 +394,35 @@ std::size_t Factor::solve_units(std::span<const std::int64_t> places,
   return width;
 }
 
+void solve_unit_axes(const StiffnessMatrix& matrix, const Factor& factor,
+                     std::span<const std::size_t> axes, std::span<double> u) {
+  const std::span<const std::int64_t> permutation = factor.view().permutation;
+  std::vector<std::int64_t> place_of_row(permutation.size());
+  for (std::size_t k = 0; k < permutation.size(); ++k)
+    place_of_row[static_cast<std::size_t>(permutation[k])] = static_cast<std::int64_t>(k);
+  std::ranges::fill(u, 0.0);
+  const std::size_t size = matrix.row_of_axis.size();
+  std::vector<double> x;
+  for (std::size_t first = 0; first < axes.size(); first += Factor::max_units) {
+    std::vector<std::int64_t> places;
+    std::vector<double*> columns;
+    for (std::size_t c = first; c < std::min(first + Factor::max_units, axes.size()); ++c)
+      if (const std::int64_t row = matrix.row_of_axis[axes[c]]; row >= 0) {
+        places.push_back(place_of_row[static_cast<std::size_t>(row)]);
+        columns.push_back(u.data() + c * size);
+      }
+    if (places.empty())
+      continue;
+    const std::size_t width = factor.solve_units(places, x);
+    for (std::size_t k = 0; k < permutation.size(); ++k) {
+      const auto axis = static_cast<std::size_t>(
+          matrix.axis_of_row[static_cast<std::size_t>(permutation[k])]);
+      for (std::size_t c = 0; c < columns.size(); ++c)
+        columns[c][axis] = x[k * width + c];
+    }
+  }
+}
+
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,
                 std::span<double> u) {
   std::vector<double> rows(matrix.order()), solved(matrix.order());

@@ -91,6 +91,11 @@ private:
   std::unique_ptr<State> state_;
 };
 
+/// Columns of C over all 3 n axes, one behind the other: responses to a force of 1 along each of
+/// these axes, 0 for fixed ones. \pre u.size() == axes.size() * matrix.row_of_axis.size()
+void solve_unit_axes(const StiffnessMatrix& matrix, const Factor& factor,
+                     std::span<const std::size_t> axes, std::span<double> u);
+
 /// u = C f over all 3 n axes: forces on fixed axes are ignored, displacements there are 0.
 /// \pre f.size() == u.size() == matrix.row_of_axis.size(), the factor is of this matrix
 void solve_axes(const StiffnessMatrix& matrix, const Factor& factor, std::span<const double> f,

@@ -96,8 +96,8 @@ TEST(Scrambled, ABodyThatFindsBackInOneStepAnswersForces) {
     Numbers step(axes), columns(3 * axes);
     body.begin_step(10, test::one_thread());
     body.linearise_step(step, Numbers(axes), test::one_thread());
-    body.unit_responses(static_cast<std::uint32_t>(m.points.size() - 1), columns,
-                        test::one_thread());
+    const auto last = static_cast<std::uint32_t>(m.points.size() - 1);
+    body.unit_responses({&last, 1}, columns);
     return Numbers(columns.end() - static_cast<std::ptrdiff_t>(axes), columns.end());
   };
   const Numbers right = answered(Numbers(axes), 0), found = answered(mirrored, 1);

@@ -20,6 +20,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <numbers>
 #include <random>
 #include <span>
@@ -293,6 +294,64 @@ TEST_P(SolidMotionOf, RoundsOfAStepInPartsLowerTheEnergyToItsLeast) {
               1e-4 * largest(reference.displacement()))
         << sharp << " " << rounds << " rounds, " << rejected << " rejected";
   }
+}
+
+/// As long as matrix_version() is the same, unit_responses() are: behind tangents, steps of another
+/// length, and steps without contact in which other nodes are held. And the iterate moves by them.
+TEST_P(SolidMotionOf, ResponsesAreTheSameUntilTheMatrixIsAnother) {
+  const TetMesh m = mesh();
+  const std::size_t axes = 3 * m.points.size();
+  SolidMotion moving = body(m, {});
+  moving.hold(held_end(m));
+  Numbers load(axes);
+  for (std::size_t i = 0; i < m.points.size(); ++i)
+    if (m.points[i].x == 15)
+      load[3 * i + 2] = -2e3;
+  moving.set_load(load);
+  const auto node = static_cast<std::uint32_t>(m.points.size() - 1);
+  std::map<std::uint64_t, Numbers> known;
+  int repeated = 0;
+  const auto round = [&](bool sharp) {
+    Numbers step(axes), responses(3 * axes), force(axes);
+    if (sharp)
+      moving.sharpen();
+    moving.linearise_step(step, force, {});
+    moving.unit_responses({&node, 1}, responses);
+    const auto [found, is_new] = known.emplace(moving.matrix_version(), responses);
+    repeated += is_new ? 0 : 1;
+    const double size = largest(responses);
+    EXPECT_LE(test::largest_difference(found->second, responses), 1e-12 * size);
+    // At the node alone, in the frame of space.
+    const Numbers before(moving.iterate().begin(), moving.iterate().end());
+    force[3 * node] = 1;
+    moving.move_iterate(1, force, {});
+    const std::array<double, 9> frame = moving.frame_of(node);
+    for (std::size_t a = 0; a < 3; ++a) {
+      double expected = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t c = 0; c < 3; ++c)
+          expected += frame[3 * a + k] * responses[c * axes + 3 * node + k] * frame[c];
+      EXPECT_NEAR(moving.iterate()[3 * node + a] - before[3 * node + a],
+                  moving.relaxation() * expected, 1e-4 * size);
+    }
+    moving.move_iterate(0, Numbers(axes), {});
+  };
+  for (const double h : {0.01, 0.01, 0.005, 0.01, 0.01}) {
+    moving.begin_step(h, {});
+    round(false);
+    round(true);
+    round(false);
+    (void)moving.end_step(Numbers(axes), {});
+  }
+  moving.hold(std::vector<std::uint8_t>(axes));
+  (void)moving.step(0.01, {});
+  for (int k = 0; k < 2; ++k) {
+    moving.begin_step(0.01, {});
+    round(false);
+    round(false);
+    (void)moving.end_step(Numbers(axes), {});
+  }
+  EXPECT_GE(repeated, 3);
 }
 
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
