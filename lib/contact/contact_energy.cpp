@@ -76,7 +76,7 @@ double ContactEnergy::add_gradient(std::span<const Vec3> x, std::span<Vec3> grad
 
 void ContactEnergy::assemble(std::span<const Vec3> x, HessianMode mode, CondensedSystem& system) {
   barrier_hessian(pairs_, x, kappa_, mode, blocks_);
-  friction_hessian(friction_, x, begin_, stick_, friction_blocks_);
+  friction_hessian(friction_, x, begin_, stick_, mode, friction_blocks_);
   std::vector<std::uint32_t> active;
   for (const auto* const list : {&blocks_, &friction_blocks_})
     for (const HessianBlock& block : *list)
@@ -89,6 +89,10 @@ void ContactEnergy::assemble(std::span<const Vec3> x, HessianMode mode, Condense
     for (const HessianBlock& block : *list)
       system.add_hessian(std::span(block.vertex).first(block.count),
                          std::span(block.entry).first(std::size_t{9} * block.count * block.count));
+}
+
+void ContactEnergy::advance_duals(std::span<const Vec3> x, std::span<const Vec3> to, double part) {
+  contact::advance_duals(friction_, x, to, begin_, stick_, part);
 }
 
 std::pair<double, Vec3> ContactEnergy::nearest(std::span<const Vec3> x) const {
@@ -122,10 +126,9 @@ void ContactEnergy::damp_lag(std::span<const FrictionPair> before) {
 void ContactEnergy::lag(std::span<const Vec3> x, bool damped) {
   if (!rough_)
     return;
-  std::vector<FrictionPair> before;
-  if (damped)
-    before = friction_;
+  const std::vector<FrictionPair> before = friction_;
   lag_friction(island_.surface, pairs_, x, kappa_, island_.friction, friction_);
+  keep_duals(before, friction_);
   ++lags_;
   if (damped)
     damp_lag(before);

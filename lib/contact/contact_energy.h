@@ -44,6 +44,8 @@ public:
   double add_gradient(std::span<const Vec3> x, std::span<Vec3> gradient) const;
   /// Makes the Hessian that of a system, with the vertices of the pairs active.
   void assemble(std::span<const Vec3> x, HessianMode mode, CondensedSystem& system);
+  /// A part of the step with the last such Hessian, from x to `to`, is taken.
+  void advance_duals(std::span<const Vec3> x, std::span<const Vec3> to, double part);
   /// Smallest gap of the pairs and where it is; infinite without pairs.
   std::pair<double, Vec3> nearest(std::span<const Vec3> x) const;
 

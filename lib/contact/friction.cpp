@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 namespace gewebe::contact {
 
@@ -111,7 +112,8 @@ void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> 
 }
 
 void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
-                      std::span<const Vec3> x_start, double e, std::vector<HessianBlock>& blocks) {
+                      std::span<const Vec3> x_start, double e, HessianMode mode,
+                      std::vector<HessianBlock>& blocks) {
   blocks.resize(pairs.size());
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const FrictionPair& pair = pairs[p];
@@ -120,23 +122,56 @@ void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3>
     block.vertex = pair.vertex;
     const Plane u = slip(pair, x, x_start);
     const FrictionValue f = smooth_friction(length(u), e);
-    // limit T (f0'/u 1 + second u u^T) T^T. Eigenvalues f0'/u across u and f0'' along it, 2/e -
-    // 2u/e^2 or 0: never negative.
-    std::array<double, 3> m{f.first_over_u + f.second * u[0] * u[0], f.second * u[0] * u[1],
-                            f.first_over_u + f.second * u[1] * u[1]};
+    // limit T (f0'/u 1 + second (v u^T + u v^T) / 2) T^T. With v = u its eigenvalues are f0'/u
+    // across u and f0'' along it, 2/e - 2u/e^2 or 0: never negative; nor are they with v the dual
+    // over f0'/u, at most as long.
+    Plane v = u;
+    if (mode != HessianMode::exact)
+      v = {dot(pair.tangent[0], pair.dual) / f.first_over_u,
+           dot(pair.tangent[1], pair.dual) / f.first_over_u};
+    const std::array<double, 3> m{f.first_over_u + f.second * v[0] * u[0],
+                                  f.second * (v[0] * u[1] + v[1] * u[0]) / 2,
+                                  f.first_over_u + f.second * v[1] * u[1]};
     std::array<std::array<double, 3>, 3> h{};
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         const double s = pair.tangent[0][i], t = pair.tangent[1][i];
-        const double v = pair.tangent[0][j], w = pair.tangent[1][j];
+        const double a = pair.tangent[0][j], b = pair.tangent[1][j];
         h[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
-            pair.limit * (m[0] * (s * v) + m[1] * (s * w + t * v) + m[2] * (t * w));
+            pair.limit * (m[0] * (s * a) + m[1] * (s * b + t * a) + m[2] * (t * b));
       }
     const std::size_t n = 3 * std::size_t{pair.count};
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = 0; j < n; ++j)
         block.entry[i * n + j] = pair.weight[i / 3] * pair.weight[j / 3] * h[i % 3][j % 3];
   }
+}
+
+void advance_duals(std::span<FrictionPair> pairs, std::span<const Vec3> x, std::span<const Vec3> to,
+                   std::span<const Vec3> x_start, double e, double part) {
+  for (FrictionPair& pair : pairs) {
+    const Plane u = slip(pair, x, x_start), step = slip(pair, to, x);
+    const FrictionValue f = smooth_friction(length(u), e);
+    const Plane dual{dot(pair.tangent[0], pair.dual), dot(pair.tangent[1], pair.dual)};
+    const double along = f.second / f.first_over_u * (u[0] * step[0] + u[1] * step[1]);
+    Plane next;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double full = f.first_over_u * (u[k] + step[k]) + along * dual[k];
+      next[k] = dual[k] + part * (full - dual[k]);
+    }
+    if (const double size = length(next); size > 1)
+      next = {next[0] / size, next[1] / size};
+    pair.dual = next[0] * pair.tangent[0] + next[1] * pair.tangent[1];
+  }
+}
+
+void keep_duals(std::span<const FrictionPair> before, std::span<FrictionPair> pairs) {
+  std::map<std::array<std::uint32_t, 4>, Vec3> duals;
+  for (const FrictionPair& pair : before)
+    duals[pair.vertex] = pair.dual;
+  for (FrictionPair& pair : pairs)
+    if (const auto found = duals.find(pair.vertex); found != duals.end())
+      pair.dual = found->second - dot(found->second, pair.normal) * pair.normal;
 }
 
 } // namespace gewebe::contact

@@ -28,6 +28,9 @@ struct FrictionPair {
   Vec3 normal;                    ///< unit, towards the vertices of positive weight
   double normal_force = 0;        ///< lambda with the pair's weight
   double limit = 0;               ///< mu times normal_force
+  /// Dual variable of primal-dual iterations: the friction force over the limit, as the last step
+  /// predicted it; at most 1 long, and 0 until then.
+  Vec3 dual;
 };
 
 /// Friction pairs of the active pairs at x. Left out: pairs without friction, and nearly parallel
@@ -57,8 +60,18 @@ void friction_forces(std::span<const FrictionPair> pairs, std::span<const Vec3> 
                      std::span<const Vec3> x_start, double e,
                      std::vector<std::array<Vec3, 4>>& forces);
 
-/// Blocks of the Hessian, which is positive semidefinite. \param blocks  overwritten
+/// Blocks of the Hessian, which is positive semidefinite. Where it is not to be exact, that of the
+/// primal-dual method (Chan, Golub, Mulet, SIAM J. Sci. Comput. 20(6), 1999): along the slip it has
+/// the dual in place of the force's direction, and so becomes soft only where the force has come to
+/// stay. Newton's steps with the exact one throw pairs to and fro. \param blocks  overwritten
 void friction_hessian(std::span<const FrictionPair> pairs, std::span<const Vec3> x,
-                      std::span<const Vec3> x_start, double e, std::vector<HessianBlock>& blocks);
+                      std::span<const Vec3> x_start, double e, HessianMode mode,
+                      std::vector<HessianBlock>& blocks);
+
+/// Takes a part of a step of the primal-dual method, from x to `to`, for the duals.
+void advance_duals(std::span<FrictionPair> pairs, std::span<const Vec3> x, std::span<const Vec3> to,
+                   std::span<const Vec3> x_start, double e, double part);
+/// Gives pairs the duals of those of the same vertices.
+void keep_duals(std::span<const FrictionPair> before, std::span<FrictionPair> pairs);
 
 } // namespace gewebe::contact

@@ -233,6 +233,7 @@ bool StepSolver::Work::follow_way(CondensedSystem& system, bool balanced) {
 
 /// Takes a part of the step that ends at trial_.
 void StepSolver::Work::take(CondensedSystem& system, const Step& step, double part) {
+  energy_.advance_duals(at_, trial_, part);
   for (const std::uint32_t v : system.vertices())
     at_[v] = part < 1 ? at_[v] + part * (trial_[v] - at_[v]) : trial_[v];
   system.advance(part);
@@ -321,7 +322,7 @@ bool StepSolver::Work::iterate(CondensedSystem& system, int iteration, bool& con
     contact = renew_gradient();
     residual = system.residual(gradient_);
   }
-  const bool near = last_step_ <= d_hat_, balanced = balances(p.way_tolerance);
+  const bool balanced = balances(p.way_tolerance), near = balanced && last_step_ <= d_hat_;
   last_step_ = std::numeric_limits<double>::infinity();
   // The exact Hessian converges fastest from near by; from afar it may be all but singular.
   const HessianMode from_afar =

@@ -23,7 +23,7 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "validate"))
 
-from scene_runs import Scene, ball, grid, mapped, norm, scale, sheet, words_of
+from scene_runs import Scene, ball, grid, norm, plate, scale, sheet, words_of
 
 
 def ellipsoid(counts, axes, centre=(0, 0, 0)):
@@ -42,16 +42,15 @@ def liver(folder, programs):
     s = Scene(folder, programs, 1, 1 / 60)
     s.solid("liver", ellipsoid((13, 13, 13), (70, 50, 35)), 5000, 0.45, fix="x<-60", words="damping=0.2@10")
     for name, z in (("lower", -40), ("upper", 40)):
-        s.line(f"instrument {name} capsule {words_of(4, (45, -12, z), (45, 12, z))} friction 0.8")
+        s.mesh_instrument(name, plate((24, 40, 4)), (40, 0, z), "friction 0.8")
     s.emit("forces", "instruments")
     steps = 60
     for k in range(steps):
         t = (k + 1) / steps
         close, pull = min(1, 2 * t), max(0, 2 * t - 1)
         for name, side in (("lower", -1), ("upper", 1)):
-            z = side * (40 - 22 * close)
-            x = 45 + 15 * pull
-            s.line(f"move {name} {words_of((x, -12, z))} over {1 / 60!r}")
+            z = side * (40 - 10 * close)
+            s.line(f"move {name} {words_of((40 + 15 * pull, 0, z))} over {1 / 60!r}")
         s.line(f"step {1 / 60!r}")
     return s, steps / 60
 
@@ -67,7 +66,7 @@ def gallbladder(folder, programs):
         t = (k + 1) / steps
         close, pull = min(1, 2 * t), max(0, 2 * t - 1)
         for name, side in (("lower", -1), ("upper", 1)):
-            z = side * (12.5 - 5 * close)
+            z = side * (12.5 - 3 * close)
             x = 8 + 12 * pull
             s.line(f"move {name} {words_of((x, -8, z))} over {1 / 60!r}")
         s.line(f"step {1 / 60!r}")
@@ -131,7 +130,7 @@ def served(s, threads, limit):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("names", nargs="*", choices=list(SCENES))
+    parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("-j", type=int, default=1)
     parser.add_argument("--keep")
     arguments = parser.parse_args()

@@ -71,7 +71,7 @@ TEST(Friction, GradientAndHessianAreThoseOfDifferences) {
       std::vector<Vec3> g(x.size()), up(x.size()), down(x.size());
       EXPECT_EQ(add_friction_gradient(one, x, start, e, g), friction_energy(one, x, start, e));
       std::vector<HessianBlock> blocks;
-      friction_hessian(one, x, start, e, blocks);
+      friction_hessian(one, x, start, e, HessianMode::exact, blocks);
       const std::size_t n = 3 * std::size_t{pair.count};
       double scale = 0;
       for (std::size_t k = 0; k < n * n; ++k)
@@ -107,6 +107,79 @@ TEST(Friction, GradientAndHessianAreThoseOfDifferences) {
         EXPECT_GE(form, -1e-12 * scale);
       }
     }
+  }
+}
+
+TEST(Friction, PrimalDualHessianIsPositiveAndBecomesTheExactOne) {
+  std::mt19937 random(4);
+  for (const double by : {0.001, 0.02, 0.5}) {
+    Lagged all = lagged(0.7, 1);
+    const std::vector<Vec3>& start = all.surface.rest;
+    const std::vector<Vec3> x = displaced(start, by, 2);
+    const double e = 0.02;
+    for (FrictionPair& pair : all.pairs) {
+      const std::span<FrictionPair> one(&pair, 1);
+      const std::size_t n = 3 * std::size_t{pair.count};
+      std::vector<HessianBlock> blocks, exact;
+      friction_hessian(one, x, start, e, HessianMode::exact, exact);
+      double scale = 0;
+      for (std::size_t k = 0; k < n * n; ++k)
+        scale = test::larger(scale, std::abs(exact[0].entry[k]));
+      for (int k = 0; k < 20; ++k) {
+        Vec3 dual = test::random_point(random, 1);
+        dual = dual - dot(dual, pair.normal) * pair.normal;
+        pair.dual = dual / std::max(1.0, norm(dual));
+        friction_hessian(one, x, start, e, HessianMode::gauss_newton, blocks);
+        double form = 0;
+        std::array<double, 12> v{};
+        for (double& c : v)
+          c = test::random_point(random, 1).x;
+        for (std::size_t i = 0; i < n; ++i)
+          for (std::size_t j = 0; j < n; ++j)
+            form += v[i] * blocks[0].entry[i * n + j] * v[j];
+        EXPECT_GE(form, -1e-12 * scale);
+      }
+      advance_duals(one, x, x, start, e, 1); // a step that moves nothing: the force itself
+      friction_hessian(one, x, start, e, HessianMode::gauss_newton, blocks);
+      for (std::size_t k = 0; k < n * n; ++k)
+        EXPECT_NEAR(blocks[0].entry[k], exact[0].entry[k], 1e-12 * scale);
+    }
+  }
+}
+
+/// A point on a rough plane is drawn by a spring whose end is far away, now here, now there. Whole
+/// steps of the primal-dual method end where force and friction balance, in few iterations.
+TEST(Friction, PrimalDualStepsFindTheBalanceFromAfar) {
+  const double e = 1e-3, limit = 2, spring = 5;
+  FrictionPair pair;
+  pair.count = 2;
+  pair.vertex = {0, 1, 0, 0};
+  pair.weight = {1, -1, 0, 0};
+  pair.tangent = {Vec3{1, 0, 0}, Vec3{0, 1, 0}};
+  pair.normal = {0, 0, 1};
+  pair.limit = limit;
+  const std::vector<Vec3> start(2);
+  std::vector<Vec3> x(2);
+  for (int n = 0; n < 12; ++n) {
+    const Vec3 end{2 * std::cos(2.4 * n), 2 * std::sin(2.4 * n), 0};
+    int k = 0;
+    for (; k < 200; ++k) {
+      std::vector<Vec3> gradient(2);
+      (void)add_friction_gradient({&pair, 1}, x, start, e, gradient);
+      const Vec3 g = gradient[0] + spring * (x[0] - end);
+      if (norm(g) <= 1e-9 * limit)
+        break;
+      std::vector<HessianBlock> blocks;
+      friction_hessian({&pair, 1}, x, start, e, HessianMode::gauss_newton, blocks);
+      const double a = blocks[0].entry[0] + spring, b = blocks[0].entry[1],
+                   c = blocks[0].entry[7] + spring, det = a * c - b * b;
+      std::vector<Vec3> to = x;
+      to[0] += Vec3{-(c * g.x - b * g.y) / det, -(a * g.y - b * g.x) / det, 0};
+      advance_duals({&pair, 1}, x, to, start, e, 1);
+      x = to;
+    }
+    EXPECT_LE(k, 15) << n;
+    EXPECT_NEAR(norm(x[0]), 2 - limit / spring, 1e-8) << n;
   }
 }
 

@@ -124,7 +124,8 @@ Differences compare(const Case& c) {
   contact::lag_friction(s, pairs, c.x, kappa, contact::FrictionTable(4, mu), lagged);
   const double friction =
       contact::add_friction_gradient(lagged, c.target, c.start, friction_e, slip);
-  contact::friction_hessian(lagged, c.target, c.start, friction_e, friction_blocks);
+  contact::friction_hessian(lagged, c.target, c.start, friction_e, contact::HessianMode::exact,
+                            friction_blocks);
   phase.find(s, c.x, c.target, d_hat, allowed, candidates);
   const double gap = contact::smallest_gap(pairs, c.x);
   const double kept = 0.5 * (gap < d_hat ? gap : d_hat);
