@@ -386,7 +386,8 @@ TEST(SimulationContact, AContactAtRestCostsNothing) {
   s.step(10);
   EXPECT_EQ(s.counts().integration, steps);
   EXPECT_EQ(s.counts().elastostatic.updates, updates);
-  EXPECT_EQ(s.instrument(0).force, force); // it still holds
+  // It still holds: the mean over a step, of the same forces.
+  EXPECT_LE(norm(s.instrument(0).force - force), 1e-15 * norm(force));
   s.apply(MoveInstrument{0, middle + Vec3{0.3, 0.2, 26.9}, {}, 0.01});
   s.step(0.02);
   EXPECT_GT(s.counts().integration, steps);
