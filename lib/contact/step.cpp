@@ -77,7 +77,7 @@ public:
         candidates_(island, broad_phase, options.parameters), energy_(island, options, begin_) {}
 
   StepReport run();
-  std::vector<ContactForce> forces() const { return energy_.forces(at_); }
+  const std::vector<ContactForce>& forces() const { return pair_forces_; }
 
 private:
   double typical_force(std::span<const Vec3> to) const;
@@ -140,6 +140,7 @@ private:
   SweptCandidates candidates_;
   ContactEnergy energy_;
   std::vector<std::vector<VertexForce>> force_; ///< by body
+  std::vector<ContactForce> pair_forces_;       ///< that bodies have moved by
   StepReport report_;
 };
 
@@ -574,6 +575,9 @@ StepReport StepSolver::Work::run() {
     }
     const double change = largest_distance(trial_, round_begin);
     if (models_hold_) {
+      // Not where momentum has been made exact: there they would be other ones.
+      find_pairs(at_);
+      pair_forces_ = energy_.forces(at_);
       at_.swap(trial_);
       if (settled_ && (linear || (number > 0 && exact && change <= p.round_tolerance * d_hat_)))
         break;

@@ -67,6 +67,39 @@ Vec3 momentum(Simulation& s, double h) {
   return sum;
 }
 
+/// Contact forces are those that a body moves by, in each step, at large steps too: mass times
+/// acceleration less weight.
+TEST(SimulationMeetings, ABlockSlidesByTheForcesThatAreShown) {
+  Simulation s(one_thread(), {});
+  add(s, "slope", block(9, 5, 2, {}, true));
+  Model above = block(3, 3, 2, {3.7, 4.1, 8.01});
+  for (Node& n : above.nodes)
+    n.drag = 0;
+  add(s, "block", above);
+  const double h = 1.0 / 60, weight = weight_of(s, 1), mass = weight / 9810;
+  const Vec3 gravity{9810 * std::sin(0.17), 0, -9810 * std::cos(0.17)};
+  s.apply(SetGravity{gravity});
+  s.apply(SetTimestep{h});
+  s.apply(SetContact{0, 1, 0});
+  std::vector<Vec3> at;
+  const auto centre = [&] {
+    Vec3 sum;
+    const std::vector<double> u = test::shape(s, 1);
+    for (std::size_t k = 0; k < above.nodes.size(); ++k)
+      sum += s.model(1).nodes[k].mass / mass * (above.nodes[k].position + vector_at(u, k));
+    return sum;
+  };
+  for (int k = 0; k < 9; ++k) {
+    s.step(h);
+    at.push_back(centre());
+    if (k < 2)
+      continue;
+    const Vec3 acceleration =
+        (at[at.size() - 1] - 2.0 * at[at.size() - 2] + at[at.size() - 3]) / (h * h);
+    EXPECT_LE(norm(sum_of_forces(s, 1) - mass * (acceleration - gravity)), 5e-4 * weight) << k;
+  }
+}
+
 TEST(SimulationMeetings, BodiesThatCollideKeepTheirMomentum) {
   Simulation s(one_thread(), {});
   Model fast = block(2, 2, 2, {}), slow = block(3, 2, 2, {14, 1.5, 2.5});
