@@ -37,6 +37,7 @@ public:
   bool take_tangent(const MotionBody& body, const MotionSprings& springs, const Numbers& at,
                     const Context& context);
   void drop_tangent() noexcept;
+  bool has_tangent() const noexcept { return tangent_.taken; }
   /// Another number, see base/unique_number.h, whenever the matrix is another one.
   std::uint64_t version() const noexcept { return version_; }
   /// A net without elements: the bound of its springs is a poor model.

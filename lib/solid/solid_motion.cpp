@@ -154,12 +154,12 @@ void SolidMotion::State::limit(SolidStep& step) {
 /// The matrix of the open step is the tangent of the next round from then on. \return whether there
 /// is any
 bool SolidMotion::State::take_tangent() {
-  if (!energy.volumes().empty() || quick.wants_tangent())
+  if (!energy.volumes().empty() && !quick.wants_tangent())
     return false;
   open->renews = true;
   if (!open->is_new) // else it had to be so stiff
     open->relaxation = 1;
-  if (std::exchange(open->exact, true))
+  if (quick.wants_tangent() || std::exchange(open->exact, true))
     return true;
   energy.note_frames();
   open->evaluated = false;
@@ -169,7 +169,11 @@ bool SolidMotion::State::take_tangent() {
 /// Makes the matrix of a model at the point of the last evaluation. \pre open
 void SolidMotion::State::renew_matrix(const Context& context) {
   open->is_new = std::exchange(open->renews, false);
-  if (open->is_new) {
+  if (quick.wants_tangent()) {
+    open->is_new = open->is_new || !quick.has_tangent();
+    if (open->is_new)
+      quick.take_tangent(body, energy.springs(), open->point.at, context);
+  } else if (open->is_new) {
     tangent.make(open->objective, open->point.at, context);
     ++open->counts.factorisations;
     tangent_version = unique_number();
@@ -179,8 +183,6 @@ void SolidMotion::State::renew_matrix(const Context& context) {
     matrix_version = tangent_version;
     return;
   }
-  if (quick.wants_tangent())
-    quick.take_tangent(body, energy.springs(), open->point.at, context);
   quick.turn(energy, context);
   quick.fill(energy.volumes(), context);
   matrix_version = quick.version();
@@ -614,6 +616,7 @@ void SolidMotion::set_state(std::span<const double> displacement, std::span<cons
 void SolidMotion::restore(std::span<const double> places, std::span<const double> velocity,
                           const Context& context) {
   State& s = *state_;
+  s.quick.drop_tangent();
   s.quick.forget();
   s.keeps_tangent = false;
   s.recovery.end();
