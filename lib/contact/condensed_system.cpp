@@ -1,7 +1,7 @@
 #include "contact/condensed_system.h"
 
 #include "base/error.h"
-#include "solve/dense_cholesky.h"
+#include "solve/block_cholesky.h"
 
 #include <Eigen/Core>
 
@@ -70,6 +70,9 @@ struct InverseCache::State {
     MatrixXd inverse;               ///< in the vertices' frames
   };
   std::list<Inverse> inverses; ///< last used first
+  // Memory of systems: that of a new one would be pages to be cleared.
+  std::vector<double> hessian, matrix;
+  BlockCholesky cholesky;
 };
 
 InverseCache::InverseCache() : state_(std::make_unique<State>()) {}
@@ -96,15 +99,22 @@ struct CondensedSystem::State {
   double reach = 1;                   ///< part of c that the step is to take
   double c = 1, way_energy = 0;
   CpuLevel cpu;
-  DenseCholesky cholesky;
-  MatrixXd hessian, matrix;
-  VectorXd carried; ///< H_af p_f of immovable vertices
+  std::vector<std::uint32_t> part_of; ///< by unknown
+  std::vector<std::uint8_t> coupled;  ///< table of parts that the Hessian couples
+  VectorXd carried;                   ///< H_af p_f of immovable vertices
   VectorXd p;
   // Of energy(): quadratic in c, F and q.
   double ff = 0, fq = 0, qq = 0, rf = 0, rq = 0;
 
   State(const BodyTable& of, double with_ridge, InverseCache& with_cache, CpuLevel with_cpu)
       : table(of), ridge(with_ridge), cache(with_cache), cpu(with_cpu) {}
+
+  Eigen::Map<MatrixXd> hessian() {
+    return {cache.state_->hessian.data(), matrix_order, matrix_order};
+  }
+  Eigen::Map<MatrixXd> matrix() {
+    return {cache.state_->matrix.data(), matrix_order, matrix_order};
+  }
 
   std::size_t size() const { return static_cast<std::size_t>(matrix_order); }
   Index matrix_order = 0;
@@ -161,7 +171,7 @@ struct CondensedSystem::State {
   /// q = -(F + c W^-1 R0 + W^-1 p).
   void finish(Direction& d, bool forces, bool moves) {
     if (matrix_order > 0)
-      cholesky.solve({d.p.data(), size()});
+      cache.state_->cholesky.solve({d.p.data(), size()});
     d.change.assign(active.size(), {});
     d.response.resize(nodes.size());
     for (const Part& part : parts) {
@@ -203,8 +213,10 @@ struct CondensedSystem::State {
           continue;
         axes.emplace_back(k, a);
         std::int32_t& unknown = node.unknown[static_cast<std::size_t>(a)];
-        if (unknown < 0)
+        if (unknown < 0) {
           unknown = static_cast<std::int32_t>(matrix_order++);
+          part_of.push_back(nodes[node.node].body);
+        }
       }
     }
     const auto order = static_cast<Index>(axes.size());
@@ -392,8 +404,9 @@ void CondensedSystem::activate(std::span<const std::uint32_t> vertices) {
 
 void CondensedSystem::clear_hessian() {
   State& s = *state_;
-  s.hessian.setZero(s.matrix_order, s.matrix_order);
+  s.cache.state_->hessian.assign(s.size() * s.size(), 0);
   s.carried.setZero(s.matrix_order);
+  s.coupled.assign(s.parts.size() * s.parts.size(), 0);
 }
 
 void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
@@ -405,12 +418,18 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
   for (std::size_t k = 0; k < of.size(); ++k) {
     const std::uint32_t place = s.place_of_vertex[of[k]];
     const Node& node = s.nodes[s.node_of[place]];
+    for (std::size_t j = 0; j < k; ++j) {
+      const std::uint32_t other = s.nodes[s.node_of[s.place_of_vertex[of[j]]]].body;
+      s.coupled[node.body * s.parts.size() + other] = 1;
+      s.coupled[other * s.parts.size() + node.body] = 1;
+    }
     const Vec3 carried = -s.c * s.start[place];
     for (std::size_t a = 0; a < 3; ++a) {
       unknown[3 * k + a] = node.active == none ? -1 : s.active[node.active].unknown[a];
       way[3 * k + a] = unknown[3 * k + a] < 0 ? carried[static_cast<int>(a)] : 0;
     }
   }
+  Eigen::Map<MatrixXd> hessian = s.hessian();
   for (std::size_t i = 0; i < order; ++i) {
     if (unknown[i] < 0)
       continue;
@@ -420,7 +439,7 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
       if (unknown[j] < 0)
         carried += h * way[j];
       else
-        s.hessian(unknown[i], unknown[j]) += h;
+        hessian(unknown[i], unknown[j]) += h;
     }
     s.carried[unknown[i]] += carried;
   }
@@ -429,8 +448,9 @@ void CondensedSystem::add_hessian(std::span<const std::uint32_t> of,
 bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
   State& s = *state_;
   const Index order = s.matrix_order;
-  s.matrix = s.hessian;
-  s.matrix.diagonal().array() += damping;
+  s.cache.state_->matrix = s.cache.state_->hessian;
+  Eigen::Map<MatrixXd> matrix = s.matrix();
+  matrix.diagonal().array() += damping;
   auto& [still, whole] = s.direction;
   whole.p = -s.carried;
   for (const Part& part : s.parts) {
@@ -439,7 +459,7 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
       const Index column = part.unknowns[static_cast<std::size_t>(j)];
       whole.p[column] -= s.c * part.start[j];
       for (Index i = 0; i < count; ++i)
-        s.matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
+        matrix(part.unknowns[static_cast<std::size_t>(i)], column) += part.inverse(i, j);
     }
   }
   still.p = -s.condensed(gradient);
@@ -447,8 +467,8 @@ bool CondensedSystem::solve(std::span<const Vec3> gradient, double damping) {
     for (int a = 0; a < 3; ++a)
       if (const std::int32_t u = active.unknown[static_cast<std::size_t>(a)]; u >= 0)
         still.p[u] -= s.force[s.nodes[active.node].active][a];
-  if (order > 0 && !s.cholesky.factor({s.matrix.data(), static_cast<std::size_t>(s.matrix.size())},
-                                      static_cast<std::size_t>(order), s.cpu))
+  if (order > 0 &&
+      !s.cache.state_->cholesky.factor(s.cache.state_->matrix, s.part_of, s.coupled, s.cpu))
     return false;
   s.finish(still, true, false);
   s.finish(whole, false, true);
@@ -509,7 +529,7 @@ double CondensedSystem::slope() const {
 void CondensedSystem::require_descent(double contact_slope) {
   State& s = *state_;
   // Newton's decrement that the step would have without the way.
-  const double descent = s.p.dot(s.hessian * s.p) + s.qq, total = slope() + contact_slope;
+  const double descent = s.p.dot(s.hessian() * s.p) + s.qq, total = slope() + contact_slope;
   if (s.c > 0 && s.reach > 0 && !(total <= -0.5 * descent))
     s.way_energy += (total + descent) / (s.c * s.c);
 }

@@ -33,7 +33,8 @@ struct BodyTable {
   std::uint32_t vertex_count() const { return first.empty() ? 0 : first.back(); }
 };
 
-/// Inverses of W_aa, by matrix and vertices: they serve from step to step where contact stays.
+/// Inverses of W_aa, by matrix and vertices: they serve from step to step where contact stays. And
+/// the memory of one system at a time.
 class InverseCache {
 public:
   InverseCache();

@@ -1,0 +1,103 @@
+// Cholesky factorisation of matrices of dense blocks, against Eigen's.
+
+#include "solve/block_cholesky.h"
+
+#include "base/cpu.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <span>
+#include <vector>
+
+namespace gewebe {
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+struct Blocks {
+  MatrixXd matrix;
+  std::vector<std::uint32_t> group;
+  std::vector<std::uint8_t> coupled;
+};
+
+/// Positive definite, of groups of these sizes with unknowns in any order, coupled where the table
+/// says.
+Blocks blocks(const std::vector<std::size_t>& sizes, const std::vector<std::uint8_t>& coupled,
+              unsigned seed) {
+  std::mt19937 random(seed);
+  Blocks all{{}, {}, coupled};
+  for (std::uint32_t g = 0; g < sizes.size(); ++g)
+    all.group.insert(all.group.end(), sizes[g], g);
+  std::ranges::shuffle(all.group, random);
+  const auto order = static_cast<Index>(all.group.size());
+  std::normal_distribution<double> number;
+  all.matrix = MatrixXd::Zero(order, order);
+  for (Index i = 0; i < order; ++i)
+    for (Index j = 0; j <= i; ++j) {
+      const std::size_t a = all.group[static_cast<std::size_t>(i)],
+                        b = all.group[static_cast<std::size_t>(j)];
+      if (a == b || coupled[a * sizes.size() + b] != 0)
+        all.matrix(i, j) = all.matrix(j, i) = number(random);
+    }
+  all.matrix.diagonal().array() += 4 * std::sqrt(static_cast<double>(order) + 1);
+  return all;
+}
+
+VectorXd solved(const Blocks& of, const VectorXd& f, CpuLevel cpu, BlockCholesky& factor) {
+  MatrixXd copy = of.matrix;
+  EXPECT_TRUE(factor.factor({copy.data(), static_cast<std::size_t>(copy.size())}, of.group,
+                            of.coupled, cpu));
+  VectorXd x = f;
+  factor.solve({x.data(), static_cast<std::size_t>(x.size())});
+  return x;
+}
+
+TEST(BlockCholesky, SolvesAnyGraphOfGroupsAsADenseFactorDoes) {
+  std::mt19937 random(5);
+  BlockCholesky factor; // one for all: it keeps memory
+  for (unsigned n = 0; n < 60; ++n) {
+    const std::size_t groups = 1 + random() % 7;
+    std::vector<std::size_t> sizes;
+    for (std::size_t g = 0; g < groups; ++g)
+      sizes.push_back(n % 10 == 9 ? random() % 200 : random() % 20); // some are empty
+    std::vector<std::uint8_t> coupled(groups * groups);
+    for (std::size_t a = 0; a < groups; ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        coupled[a * groups + b] = coupled[b * groups + a] =
+            n % 3 == 0 ? (a == b + 1) : random() % 3 == 0; // chains, and anything
+    const Blocks all = blocks(sizes, coupled, n);
+    const VectorXd f = VectorXd::Random(all.matrix.rows());
+    const VectorXd x = solved(all, f, best_cpu_level(), factor);
+    if (f.size() == 0)
+      continue;
+    const VectorXd expected = all.matrix.llt().solve(f);
+    EXPECT_LE((x - expected).norm(), 1e-13 * expected.norm()) << n;
+    EXPECT_EQ(x, solved(all, f, CpuLevel::baseline, factor)) << n;
+  }
+}
+
+TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
+  const std::vector<std::uint8_t> chain{0, 1, 0, 1, 0, 1, 0, 1, 0};
+  Blocks all = blocks({4, 5, 6}, chain, 1);
+  for (Index at = 0; at < all.matrix.rows(); ++at) {
+    MatrixXd wrong = all.matrix;
+    wrong(at, at) = -wrong(at, at);
+    BlockCholesky factor;
+    EXPECT_FALSE(factor.factor({wrong.data(), static_cast<std::size_t>(wrong.size())}, all.group,
+                               all.coupled, best_cpu_level()));
+    wrong(at, at) = NAN;
+    EXPECT_FALSE(factor.factor({wrong.data(), static_cast<std::size_t>(wrong.size())}, all.group,
+                               all.coupled, best_cpu_level()));
+  }
+}
+
+} // namespace
+} // namespace gewebe
