@@ -14,7 +14,10 @@ blocks_of_page() { # FILE
     /^\.Ed/ { block = 0; next }
     block { print > out }' "$1"
   # The escapes of mdoc that stand in examples.
-  sed -i -e 's/\\e/\\/g' -e 's/\\&//g' -e 's/\\-/-/g' -e "s/\\\\(aq/'/g" -e 's/\\(dq/"/g' block.[0-9]*
+  local file
+  for file in block.[0-9]* says.[0-9]*; do
+    [[ ! -e $file ]] || sed -i -e 's/\\e/\\/g' -e 's/\\&//g' -e 's/\\-/-/g' -e "s/\\\\(aq/'/g" -e 's/\\(dq/"/g' "$file"
+  done
 }
 # The same for README: paragraphs of its indented blocks that begin with one of our programs, or a shell's word before one.
 blocks_of_readme() { # FILE
