@@ -161,7 +161,7 @@ int main(int argc, char** argv) {
   declare_transform(p, a.transform);
   p.output_kinds(and_ela(writable_mesh_kinds()));
   p.input_kinds(all_inputs());
-  p.operand("MESH", a.mesh, "the mesh, or a model");
+  p.operand("MESH", a.mesh, "mesh, tetrahedra or model");
   p.check([&] { complete(a); });
   return p.run(argc, argv,
                [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });

@@ -72,10 +72,9 @@ std::uint8_t turned_axes(const Affine& map, std::uint8_t fixed) {
 } // namespace
 
 void declare_transform(cli::Program& program, std::string& transform) {
-  program.option(
-      "--transform", transform, "STEPS|FILE",
-      "move what is read: translate X Y Z; rotate AXIS DEGREES; scale S; mirror AXIS; or "
-      "a file of a 4 x 4 matrix");
+  program.option("--transform", transform, "STEPS|FILE",
+                 "move the input: translate X Y Z; rotate AXIS DEGREES; scale S; mirror AXIS; or a "
+                 "file with a 4 x 4 matrix");
 }
 
 Affine transform_from_text(const std::string& text) {
