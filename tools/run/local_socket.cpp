@@ -53,7 +53,7 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
   if (errno != ECONNREFUSED)
     fail(path, "is there and cannot be looked at");
   if (::unlink(path.c_str()) != 0 && errno != ENOENT)
-    fail(path, "nobody listens there, but it cannot be removed");
+    fail(path, "no process listens there, but it cannot be removed");
 }
 
 /// Renames a file and replaces none, where the file system can do that.
@@ -147,7 +147,7 @@ std::optional<std::string> foreign_peer(const Descriptor& client) {
   ucred peer{};
   socklen_t size = sizeof peer;
   if (::getsockopt(client.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
-    return "a user who is not known may not drive the scene";
+    return "an unknown user may not drive the scene";
   if (peer.uid == ::geteuid())
     return std::nullopt;
   return "user " + user_name(peer.uid) + " may not drive the scene, expected " +
