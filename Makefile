@@ -341,7 +341,7 @@ $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	  --alone $(filter $(addprefix tests/,bench/% stress/% fuzz/%),$(LINT_CXX) $(LINT_HEADERS))
 	@scripts/check-names $(filter-out tests/%,$(LINT_CXX) $(LINT_HEADERS)) $(filter tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
 
-$(WORDS_STAMP): $(filter lib/% formats/% tools/%,$(LINT_CXX) $(LINT_HEADERS)) $(MAN) $(wildcard *.md) $(wildcard scripts/words*) scripts/check-words | $(FIRST)
+$(WORDS_STAMP): $(filter lib/% formats/% tools/%,$(LINT_CXX) $(LINT_HEADERS)) $(MAN) $(wildcard *.md examples/*/README.md) $(wildcard scripts/words*) scripts/check-words | $(FIRST)
 	@mkdir -p $(@D)
 	@scripts/check-words && touch $@
 
