@@ -67,7 +67,7 @@ Model source(cli::Run& run, const ModelArguments& a, Space& space) {
   }
   Input input(a.mesh);
   const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
-  // Nothing that was asked for may be ignored.
+  // No given option may be ignored.
   refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
                                a.order != 2 || a.solid || a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");

@@ -14,7 +14,7 @@
 namespace gewebe {
 namespace {
 
-/// Of the surface that is asked for, on the volume as it came.
+/// Topology of the requested surface on the volume as read.
 Topology topology_of(const Context& context, const Grid& grid, const MeshArguments& arguments) {
   if (arguments.box.empty())
     return topology(marching_cubes(context, grid, arguments.isovalue).mesh);

@@ -24,7 +24,7 @@
 namespace gewebe::cli {
 namespace {
 
-/// What nobody can catch: thrown where a library is loaded or a thread of one begins.
+/// Exceptions that cannot be caught: thrown where a library is loaded or one of its threads begins.
 [[noreturn]] void end_suddenly() {
   remove_temporaries();
   std::string text = "a fault of this program, please report it";
@@ -45,7 +45,7 @@ void write_text(const std::string& path, const std::string& text) {
   output.commit();
 }
 
-/// Before the first constructor of any library: closed streams, and ends that nobody catches.
+/// Before the first constructor of any library: closed streams, and uncaught exceptions.
 void begin_program(int /*argc*/, char** /*argv*/, char** /*environment*/) {
   hold_standard_streams();
   std::set_terminate(end_suddenly);
@@ -286,7 +286,7 @@ void Program::prepare_run() {
 
 namespace {
 
-/// What -v tells at the end: sizes, and what was written.
+/// Final lines of -v: sizes, and what was written.
 void tell_result(Run& run, double seconds) {
   for (const std::string& line : run.stats().figures())
     run.say(line);
