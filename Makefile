@@ -77,7 +77,8 @@ PUBLIC := $(shell sed 's/\#.*//' lib/PUBLIC)
 MAN := $(wildcard man/*.[1-9])
 STRESS_SCRIPTS := tests/stress/kill
 STRESS_PYTHON := tests/stress/frames
-SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) $(wildcard scripts/* tests/contract/* tests/golden/in/*.sh)
+SCRIPTS := .ci/run .ci/sanitize tests/run tests/bare tests/golden/run $(STRESS_SCRIPTS) \
+  $(filter-out scripts/words%,$(wildcard scripts/* tests/contract/* tests/golden/in/*.sh))
 
 TOOLS := $(TOOL_SRC:tools/%.cpp=$(BUILD)/%)
 UNIT := $(if $(UNIT_SRC),$(BUILD)/unit)
@@ -330,8 +331,9 @@ SHELL_STAMPS := $(SCRIPTS:%=$(LINT)/%.shellcheck)
 INCLUDE_STAMPS := $(patsubst %,$(LINT)/%.includes,$(LINT_CXX) $(LINT_HEADERS))
 
 NAMES_STAMP := $(LINT)/names
+WORDS_STAMP := $(LINT)/words
 
-lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
+lint: $(FORMAT_STAMPS) $(INCLUDE_STAMPS) $(NAMES_STAMP) $(WORDS_STAMP) $(MAN_STAMPS) $(SHELL_STAMPS) $(TIDY_STAMPS)
 
 $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	@mkdir -p $(@D)
@@ -339,6 +341,10 @@ $(NAMES_STAMP): $(LINT_CXX) $(LINT_HEADERS) scripts/check-names | $(FIRST)
 	@scripts/check-names $(filter-out $(addprefix tests/,bench/% stress/% fuzz/% validate/%),$(LINT_CXX) $(LINT_HEADERS)) \
 	  --alone $(filter $(addprefix tests/,bench/% stress/% fuzz/%),$(LINT_CXX) $(LINT_HEADERS))
 	@scripts/check-names $(filter-out tests/%,$(LINT_CXX) $(LINT_HEADERS)) $(filter tests/validate/%,$(LINT_CXX) $(LINT_HEADERS)) && touch $@
+
+$(WORDS_STAMP): $(filter lib/% formats/% tools/%,$(LINT_CXX) $(LINT_HEADERS)) $(MAN) $(wildcard *.md examples/*/README.md) $(wildcard scripts/words*) scripts/check-words | $(FIRST)
+	@mkdir -p $(@D)
+	@scripts/check-words && touch $@
 
 $(FORMAT_STAMPS): $(LINT)/%.format: % .clang-format | $(FIRST)
 	@mkdir -p $(@D)

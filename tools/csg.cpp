@@ -101,11 +101,11 @@ void work(cli::Run& run, const Arguments& a) {
 int main(int argc, char** argv) {
   cli::Program p("csg", "Combines volumes: sums, differences and set operations, left to right.");
   Arguments a;
-  p.flag("--resample", a.options.resample, "bring the others to the first volume's lattice");
+  p.flag("--resample", a.options.resample, "resample other volumes to the lattice of the first");
   declare(p, a.output);
   p.operand("OPERATION", a.word, "add, subtract, union, intersect, difference, xor", true,
             csg_operation_names());
-  p.operands("VOLUME", a.volumes, "the volumes, - for standard input", 2);
+  p.operands("VOLUME", a.volumes, "volumes, - for standard input", 2);
   p.check([&] { complete(a); });
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
 }

@@ -145,6 +145,6 @@ int main(int argc, char** argv) {
   std::vector<Kind> kinds = readable_surface_kinds();
   kinds.push_back(Kind::vdb);
   p.input_kinds(kinds);
-  p.operand("SURFACE", a.surface, "the mesh, tetrahedra, model, result of a run, or volume");
+  p.operand("SURFACE", a.surface, "mesh, tetrahedra, model, result or volume");
   return p.run(argc, argv, [&](cli::Run& run) { work(run, a); });
 }

@@ -67,7 +67,7 @@ Model source(cli::Run& run, const ModelArguments& a, Space& space) {
   }
   Input input(a.mesh);
   const Kind from = input_kind(input.peek(4096), a.mesh, run.format());
-  // Nothing that was asked for may be ignored.
+  // No given option may be ignored.
   refuse(from == Kind::ela && (!a.unit.empty() || a.weld != "auto" || !a.repair.empty() ||
                                a.order != 2 || a.solid || a.build != BuildOptions{}),
          "the input is a model, expected a mesh for options that build one");
@@ -161,7 +161,7 @@ int main(int argc, char** argv) {
   declare_transform(p, a.transform);
   p.output_kinds(and_ela(writable_mesh_kinds()));
   p.input_kinds(all_inputs());
-  p.operand("MESH", a.mesh, "the mesh, or a model");
+  p.operand("MESH", a.mesh, "mesh, tetrahedra or model");
   p.check([&] { complete(a); });
   return p.run(argc, argv,
                [&](cli::Run& run) { a.list_materials ? list_materials(run, a) : work(run, a); });

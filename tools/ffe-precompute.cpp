@@ -25,7 +25,7 @@ void discard(Output& output, StiffnessStoreWriter& writer) {
   writer.remove_journal();
 }
 
-std::array<char, 4400> interrupted{}; ///< what a signal tells
+std::array<char, 4400> interrupted{}; ///< message of a signal
 std::array<struct sigaction, 64> before{};
 
 extern "C" void gewebe_tell_interrupted(int signal_number) {
@@ -34,7 +34,7 @@ extern "C" void gewebe_tell_interrupted(int signal_number) {
   before.at(static_cast<std::size_t>(signal_number)).sa_handler(signal_number);
 }
 
-/// From now on a signal that ends the program tells that nothing was in vain.
+/// From now on a signal that ends the program prints that finished work is kept.
 void tell_when_interrupted(const std::string& part) {
   const std::string text = "ffe-precompute: interrupted, " + part.substr(0, 4096) +
                            " keeps the columns so far: the same command goes on from there\n";

@@ -37,8 +37,8 @@ void work(cli::Run& run, const RunArguments& in) {
   const bool spoken = reads && (kind == Kind::unknown || (run.output() != "-" && !run.quiet()));
   if (!spoken && in.listen.empty() && (in.serve || in.binary))
     throw UsageError(std::string(in.serve ? "--serve" : "--binary") +
-                     " is about answers, of which there are none here, expected it without --to, "
-                     "and without -q beside -o");
+                     " needs answers, but this run prints none, expected it without --to, "
+                     "and without -q together with -o");
   const auto shared = // there when the first client comes
       in.shapes.empty() ? nullptr : std::make_unique<SharedShapes>(in.shapes);
   SceneAnswers answers(spoken, in.binary, in.listen, {.awake = in.awake, .warn = warn});

@@ -14,51 +14,48 @@ int main(int argc, char** argv) {
                        "fewer and better triangles than marching cubes alone; or into "
                        "tetrahedra that fill it.");
   MeshArguments arguments;
-  program.option("--iso", arguments.isovalue, "V",
-                 "inside is above V (in a level set: below); default: the volume's own");
+  program.option("--iso", arguments.isovalue, "V", "isovalue; default: that of the volume");
   program
       .option("--epsilon", arguments.epsilon, "E",
               "merge points within E voxel edges of a voxel centre (default 0.15)")
       .range(0, 0.5);
   program
       .option("--place", arguments.place, "WHERE",
-              "put merged points at their mean (default) or at the voxel centre (corner)")
+              "position of merged points: mean (default) or corner (voxel centre)")
       .one_of({"mean", "corner"});
-  program.option("--resample", arguments.voxel, "S", "first bring the volume to voxels of S mm")
+  program.option("--resample", arguments.voxel, "S", "first resample the volume to voxels of S mm")
       .positive();
   program
       .option("--bbox", arguments.box, "X0,Y0,Z0,X1,Y1,Z1",
-              "only what lies in this box of the world, closed by its faces")
+              "only what is in this box (mm), closed by its faces")
       .count(6);
   program
       .option("--components", arguments.components, "WHICH",
-              "keep only the largest components: largest, a number N, or min-volume:V mm3")
+              "components to keep: largest, a number N, or min-volume:V (mm3)")
       .such_as({"largest", "1", "min-volume:"});
   program
       .option("--regularize", arguments.rounds, "N",
-              "improve the triangles by N rounds of flips and sliding along the surface")
+              "improve triangles in N rounds of flips and sliding")
       .range(0, 1000);
-  program.flag("--normals", arguments.normals, "write normals, from the gradient of the volume");
+  program.flag("--normals", arguments.normals, "write normals from the gradient of the volume");
   program.flag("--self-intersections", arguments.self_intersections,
-               "let --stats count the pairs of faces that cut each other");
+               "let --stats count pairs of triangles that intersect");
   program.flag("--tets", arguments.tets, "fill the inside with tetrahedra");
   program
       .option("--cell", arguments.cell, "S",
               "with --tets: cells of S mm, each of 12 tetrahedra (default: the voxel)")
       .positive();
-  program
-      .option("--grade", arguments.grade, "G",
-              "with --tets: cells double inwards up to G times, the boundary stays")
+  program.option("--grade", arguments.grade, "G", "with --tets: cells double inwards up to G times")
       .range(0, stuffing_grade_max);
-  program.option("--materials", arguments.materials, "LABELS|VDB[,VDB...]",
-                 "with --tets: material by the label of a label volume; or 1, 2 … where a volume's "
-                 "inside is, else 0");
+  program.option(
+      "--materials", arguments.materials, "LABELS|VDB[,VDB...]",
+      "with --tets: materials by labels, or 1, 2 … inside these volumes and 0 elsewhere");
   program
       .option("--interface", arguments.interface, "HOW",
-              "with --materials: faces of the lattice (stair, default), or cut (follow)")
+              "with --materials: stair (default, faces of the lattice) or follow (smooth)")
       .one_of({"stair", "follow"});
   program.option("--label", arguments.labels, "L[-M][,L...]",
-                 "with --materials LABELS: these labels alone, each tetrahedron the nearest");
+                 "with --materials LABELS: use these labels alone, such as 1,4-7");
   declare_space(program, arguments.space);
   program.output_kinds(writable_kinds());
   program.operand("VOLUME", arguments.volume, "OpenVDB volume");

@@ -105,17 +105,20 @@ int main(int argc, char** argv) {
   program
       .option("--voxel", arguments.voxel, "S", "edge of a voxel in mm, centres at multiples of S")
       .positive();
-  program.option("--dim", arguments.dim, "N", "voxels along the longest side of the supports' box")
+  program
+      .option("--dim", arguments.dim, "N",
+              "number of voxels along the longest side of the supports' box")
       .range(1, 1 << 30);
   program.option("--like", arguments.like, "VDB", "take the lattice of this volume");
-  program.option("--bbox", arguments.bbox, "X0,Y0,Z0,X1,Y1,Z1", "only voxels inside this box, mm")
+  program
+      .option("--bbox", arguments.bbox, "X0,Y0,Z0,X1,Y1,Z1", "only voxels inside this box, in mm")
       .count(6);
   program.option("--band", arguments.band, "ISO",
-                 "keep only what the isosurface of ISO needs, for mc-opt");
+                 "keep only what mc-opt needs for the isosurface of ISO");
   program.option("--unit", arguments.unit, "UNIT", "unit of the particles: m, cm, mm")
       .one_of({"m", "cm", "mm"});
   declare(program, arguments.output);
-  program.operand("PARTICLES", arguments.particles, "lines of x y z R [weight]");
+  program.operand("PARTICLES", arguments.particles, "file with lines x y z R [weight]");
   program.check([&] { check(arguments); });
   return program.run(argc, argv, [&](cli::Run& run) { work(run, arguments); });
 }

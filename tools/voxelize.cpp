@@ -55,26 +55,25 @@ int main(int argc, char** argv) {
   Arguments a;
   p.option("--voxel", a.mesh.voxel, "S", "edge of a voxel in mm, centres at multiples of S")
       .positive();
-  p.option("--dim", a.mesh.dim, "N", "voxels along the longest side of the mesh's box")
+  p.option("--dim", a.mesh.dim, "N", "number of voxels along the longest side of the mesh's box")
       .range(1, 1 << 30);
   p.option("--like", a.mesh.like, "VDB", "take the lattice of this volume");
-  p.option(
-       "--label", a.labels, "L[-M][,L...]",
-       "the operand is a label volume (NIfTI, NRRD, MetaImage, INR): these labels together; list: "
-       "which there are")
+  p.option("--label", a.labels, "L[-M][,L...]",
+           "the input is a label volume (NIfTI, NRRD, MetaImage, INR): convert these labels; list: "
+           "print all")
       .such_as({"list"});
   p.option("--threshold", a.threshold, "LOW[,HIGH]",
-           "the operand is a scan (the same formats): its grey values above LOW and below HIGH");
+           "the input is a scan (same formats): convert grey values above LOW and below HIGH");
   p.option("--rule", a.rule, "RULE", "when a point is inside: parity, winding, zbuffer")
       .one_of({"parity", "winding", "zbuffer"});
   p.option("--antialias", a.mesh.antialias, "FILTER",
            "grey values: jones (for surfaces), exact (for volumes), sramek, lines:N, box:N, none")
       .such_as({"jones", "exact", "sramek", "lines:", "box:", "none"});
   p.option("--on-open", a.on_open, "WHAT",
-           "an open mesh: error, warn (odd rays stay empty), fill (close the holes)")
+           "open meshes: error, warn (odd rays stay empty), fill (close the holes)")
       .one_of({"error", "warn", "fill"});
   p.option("--unit", a.mesh.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
-  p.option("--weld", a.mesh.weld, "MODE", "points that become one: auto, all, part, none")
+  p.option("--weld", a.mesh.weld, "MODE", "points at one place to merge: auto, all, part, none")
       .one_of(weld_names());
   declare_space(p, a.space);
   declare_transform(p, a.mesh.transform);

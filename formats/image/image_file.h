@@ -11,7 +11,7 @@
 
 namespace gewebe {
 
-/// A PNG or PNM, told by its first bytes.
+/// Reads a PNG or PNM; the first bytes tell which.
 /// \throw Error with place: neither of them, damaged, or beyond context.max_memory
 Image read_image(Input& input, const Context& context);
 

@@ -697,7 +697,7 @@ std::unique_ptr<aiScene> make_scene(const TriangleMesh& mesh, Kind kind) {
   return scene;
 }
 
-// Collada files tell when and by whom they were made: the same for all of ours.
+// Collada files state time and author: constants here, for reproducible bytes.
 void replace_text(std::string& xml, const std::string& tag, const std::string& text) {
   const std::size_t open = xml.find("<" + tag + ">");
   if (open == std::string::npos)

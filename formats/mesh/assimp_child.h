@@ -1,7 +1,7 @@
 #pragma once
 // Meshes through assimp 5.2: read OBJ, STL, OFF, DXF, glTF 2, GLB, 3DS, Collada; write GLB, 3DS,
 // Collada. assimp holds single precision. It runs in a child process with limits on memory and
-// time, for broken files crash it; only the importer of the wanted kind is registered.
+// time, for broken files crash it; only the importer of the requested kind is registered.
 
 #include "base/mesh.h"
 #include "formats/stream/kind.h"

@@ -26,12 +26,12 @@ struct Cells {
   }
 };
 
-/// What such a file says of its piece. `bytes` and `name` outlive it.
+/// Description of the piece in such a file. `bytes` and `name` outlive it.
 class Piece {
 public:
   /// Reads tags, no numbers. \param type "UnstructuredGrid" or "PolyData" \param sections whose
-  /// arrays are wanted, such as "Points" \throw Error with place, unless the file is whole, of that
-  /// type and has one piece
+  /// arrays are requested, such as "Points" \throw Error with place, unless the file is whole, of
+  /// that type and has one piece
   Piece(std::string_view bytes, const std::string& name, const char* type,
         std::initializer_list<std::string_view> sections);
 

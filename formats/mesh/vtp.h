@@ -1,5 +1,5 @@
 #pragma once
-// VTK's surfaces in XML, .vtp: what gewebe_mesh(5) says of them.
+// Reader of VTK's surfaces in XML, .vtp, see gewebe_mesh(5).
 
 #include "base/mesh.h"
 

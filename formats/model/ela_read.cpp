@@ -126,7 +126,7 @@ PieceOfSection<T> piece_of_section(std::string_view text, const ElementOf& eleme
       piece.bytes = text.size();
     }
   } catch (const Error&) {
-    piece.wrong = true; // who reads line by line says what
+    piece.wrong = true; // reading line by line finds the error
   }
   return piece;
 }

@@ -64,7 +64,7 @@ struct Joined {
   std::vector<double> points; ///< at rest
   std::vector<std::int64_t> nodes, ends;
   std::vector<std::uint8_t> types;
-  /// Of the cells: the object's number, or of instruments -1, -2, …; a material, -1 of these.
+  /// Number of the object of each cell, or -1, -2, … for instruments; material, -1 for instruments.
   std::vector<std::int32_t> object, material;
 };
 

@@ -110,7 +110,7 @@ void InstrumentSets::show(Series& to, const FrameInstrument& of, std::uint64_t f
       corners.insert(corners.end(), t.begin(), t.end());
     group.write("triangles", std::span<const std::uint32_t>(corners), {made.triangles.size(), 3});
     const std::uint64_t points = made.points.size();
-    if (of.shape.core) { // which a reader can't make anew
+    if (of.shape.core) { // which a reader cannot rebuild
       std::vector<float> normals;
       for (const Vec3& n : made.normals)
         for (int a = 0; a < 3; ++a)

@@ -25,9 +25,9 @@ struct ResultIndex {
 ResultIndex read_result_index(const std::string& path);
 
 /// An object's surface in one frame, as cuts have left it, and where its points were at rest: its
-/// skin, where it has one and that is asked for, else the surface of its nodes. Texture coordinates
-/// where the model had them. \throw Error, place = path; if there is no such
-/// object or frame, naming what there is
+/// skin, if it has one and the caller requests it, else the surface of its nodes. Texture
+/// coordinates where the model had them. \throw Error, place = path; if there is no such object or
+/// frame, naming what there is
 struct ResultSurface {
   TriangleMesh mesh;                  ///< displaced points
   std::vector<Vec3> rest;             ///< as many
@@ -58,7 +58,7 @@ struct ResultInstrument {
   Vec3 place;
   Vec3 force, torque; ///< 1e-6 N, and 1e-9 N m about its place
   std::uint64_t touched = 0;
-  /// Of a mesh: what it is shown as, where it stands, and its normals in its own coordinates.
+  /// Surface of a mesh instrument at its pose, and its normals in its own coordinates.
   TriangleMesh surface{};
 };
 /// Those that are there then, in the order of the scene, and of a kind that is known here.

@@ -171,7 +171,7 @@ private:
     return options;
   }
 
-  /// Errors name the file that is asked for, not the temporary one.
+  /// Errors name the final file, not the temporary one.
   template <class Work>
   void in_place(Work&& work) {
     try {
@@ -192,7 +192,7 @@ private:
     node_count_->append(parts_.back().nodes);
     points_->append(all.points);
     nodes_->append(all.nodes);
-    std::vector<std::int64_t> ends{0}; // of each part anew
+    std::vector<std::int64_t> ends{0}; // restarts in each part
     ends.insert(ends.end(), all.ends.begin(), all.ends.end());
     ends_->append(ends);
     types_->append(all.types);

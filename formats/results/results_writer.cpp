@@ -314,7 +314,7 @@ private:
     return options;
   }
 
-  /// Errors name the file that is asked for, not the temporary one.
+  /// Errors name the final file, not the temporary one.
   template <class Work>
   void in_place(Work&& work) {
     try {

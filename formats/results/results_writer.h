@@ -24,7 +24,7 @@ namespace gewebe {
 struct FrameObject {
   std::span<const double> displacement; ///< 3 n numbers
   std::span<const NodeVector> forces;   ///< at displaced nodes
-  /// Of a solid, where they are asked for: from one frame on in all.
+  /// Stresses of a solid, if requested: from one frame on in all.
   const SolidFields* fields = nullptr;
 };
 
@@ -66,22 +66,22 @@ public:
   /// One that came off another, which is in no frame before.
   virtual void add_part(const std::string& name, const Model& model) { add_object(name, model); }
   /// The model of an object, in the order in which they were added, is another from the next frame
-  /// on, as after a cut. Nothing to who writes no shapes. \param origin by node: the node of its
+  /// on, as after a cut. Ignored by writers without shapes. \param origin by node: the node of its
   /// first model that it is, or is a copy of; empty: all as they came
   virtual void change_object(std::size_t /*object*/, const Model& /*model*/,
                              std::span<const std::uint32_t> /*origin*/) {}
-  /// All instruments, in an order that stays, as they are in the next frame alone. Nothing to who
-  /// writes none.
+  /// All instruments, in an order that stays, as they are in the next frame alone. Ignored by
+  /// writers without instruments.
   virtual void set_instruments(std::span<const FrameInstrument> /*instruments*/) {}
   /// \pre as many objects as were added, in their order
   virtual void add_frame(double time, std::span<const FrameObject> objects) = 0;
-  /// Nothing appears without it, but for the files of a series. \throw Error
+  /// Nothing appears without it, except the files of a series. \throw Error
   virtual void commit() = 0;
   /// From now on a signal or a crash leaves what is on the disk, see partial_result.h.
   virtual void outlive_signals() {}
   /// In place of `commit`, where the run or `commit` failed: the frames that were added stay, in a
   /// file whose name says that it isn't all (partial_name). Nothing but the frame at rest, or no
-  /// file: nothing is kept. The file tells why
+  /// file: nothing is kept. The file states why
   /// \throw Error if they can't be kept
   virtual std::optional<KeptResult> keep_partial(const std::string& /*why*/) {
     return std::nullopt;

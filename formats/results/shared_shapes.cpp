@@ -36,7 +36,7 @@ constexpr std::size_t rounded_up(std::size_t bytes, std::size_t to) {
 void remove_stale(const std::string& path) {
   struct stat info {};
   if (::lstat(path.c_str(), &info) != 0)
-    return; // to make it tells what is wrong
+    return; // creating it reports what is wrong
   const char* const foreign = "is there and no run has left it, expected another name";
   if (!S_ISREG(info.st_mode) || info.st_uid != ::geteuid())
     throw Error(path, foreign);

@@ -6,8 +6,9 @@
 // written. `begun` is S before anything of frame S is written, `sequence` is S when all of it is.
 // A reader
 //   1. loads `sequence` (acquire), S; 0: there is no frame yet;
-//   2. loads the place of buffer S mod 2; maps the file anew where that lies behind what it mapped;
-//   3. copies what it wants of the frame;
+//   2. loads the place of buffer S mod 2; maps the file again where that lies behind what it
+//   mapped;
+//   3. copies what it needs of the frame;
 //   4. loads `begun` (behind the copy). Below S + 2 the copy is whole; else begins again.
 // `sequence` in place of `begun` would not do: it is S + 1 while frame S + 2 overwrites S.
 //
@@ -45,7 +46,7 @@ static_assert(sizeof(SharedHead) == 64);
 /// names, then positions of their nodes, float64 x, y, z in mm. All offsets count from here.
 struct SharedFrame {
   std::uint64_t sequence = 0;
-  std::uint64_t step = 0; ///< of the answer that tells the same
+  std::uint64_t step = 0; ///< of the answer with the same shapes
   double time = 0;        ///< s
   /// Another one where objects, their numbers of nodes or their triangles are others than in the
   /// frame before.

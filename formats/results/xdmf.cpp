@@ -30,7 +30,7 @@ public:
                        std::uint64_t nodes) const;
 
 private:
-  std::string file_; ///< with what XML wants quoted
+  std::string file_; ///< with characters escaped for XML
 };
 
 XdmfText::XdmfText(const std::string& file) {

@@ -18,7 +18,7 @@ struct ObjectCommand {
   bool warp = false; ///< large rotations
   SolidChoice solid; ///< how a solid moves
 };
-/// A change, but for the numbers of what it names, which scene_change() finds.
+/// A change, without the numbers of named things, which scene_change() finds.
 struct ChangeCommand {
   Change change;
   std::string object{}, other{}, instrument{};
@@ -44,13 +44,13 @@ struct RunCommand {
   double until = 0, every = 0; ///< every > 0
 };
 
-/// Asks where the scene is, without a step.
+/// Requests the time of the scene, without a step.
 struct SyncCommand {};
 
-/// Asks what there is; nothing changes.
+/// Requests information; nothing changes.
 struct QueryCommand {
   enum class Kind {
-    nodes,      ///< of an object: how many, and where if that is asked for
+    nodes,      ///< of an object: number, and positions if requested
     select,     ///< of an object: those that a selector names
     objects,    ///< all of them
     instruments ///< that are there
@@ -66,7 +66,7 @@ struct QueryCommand {
 struct EndCommand {};
 
 struct Command {
-  std::optional<double> at; ///< when; absent: now. Of changes alone, but for renew
+  std::optional<double> at; ///< when; absent: now. For changes other than renew
   bool every = false;       ///< at every multiple of it
   std::variant<ObjectCommand, ChangeCommand, EmitModelCommand, EmitStressCommand, StepCommand,
                RunCommand, SyncCommand, QueryCommand, EndCommand>

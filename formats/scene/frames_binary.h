@@ -30,7 +30,7 @@ enum class FrameKind : std::uint32_t {
   stress =
       12,    ///< 7 float32 of each node: the tensor, von Mises's stress; those of the frame before
   ok = 13,   ///< one uint64: the line of this number is done
-  told = 14, ///< text, filled up with zero bytes: what a line asked for
+  told = 14, ///< text, padded with zero bytes: answer to a question
 };
 
 /// The head of each frame, without gaps: 28 bytes.
@@ -54,7 +54,7 @@ std::string binary_sync(const Simulation& simulation, std::uint64_t step);
 /// The frame that refuses a line, behind `step` answered steps; its text is text_error's.
 std::string binary_error(std::uint64_t step, std::string_view text);
 
-/// The frame that acknowledges a line, and the one of what text_query tells; behind so many steps.
+/// The frame that acknowledges a line, and the frame of text_query's answer; after so many steps.
 std::string binary_ok(std::uint64_t step, std::uint64_t line);
 std::string binary_told(std::uint64_t step, std::string_view text);
 

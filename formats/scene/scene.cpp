@@ -91,7 +91,7 @@ What parse_object(Words& in) {
   return c;
 }
 
-/// Whom a change is about: an object and its nodes.
+/// Subject of a change: an object and its nodes.
 ChangeCommand parse_about(Words& in, Change change) {
   ChangeCommand c{.change = std::move(change)};
   c.object = in.name();

@@ -19,7 +19,7 @@ std::string cutting_line(const Simulation& simulation, const Cutting& cutting);
 /// Whether its triangles are others since the last answer.
 bool topology_changed(const Simulation& simulation, std::size_t object);
 
-/// What `emit stress` tells of an object.
+/// Answer of `emit stress` for an object.
 struct StressAnswer {
   std::size_t object = 0;
   std::span<const std::uint32_t> nodes;   ///< ascending
@@ -43,7 +43,7 @@ void append_numbers(std::string& line, const Vec3& v);
 /// "ok LINE": it is done.
 std::string text_ok(std::uint64_t line);
 
-/// "sync T": where the scene is; and what a client is told that may drive it, "ready T".
+/// "sync T", the time of the scene, and "ready T", the greeting of a client.
 std::string text_sync(const Simulation& simulation);
 std::string text_ready(const Simulation& simulation);
 

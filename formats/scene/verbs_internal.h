@@ -1,5 +1,5 @@
 #pragma once
-// What follows the first word of a line, by that word: what asks for something.
+// Parsers of the words behind the first one of a line: questions.
 
 #include "formats/scene/command.h"
 #include "formats/scene/words.h"

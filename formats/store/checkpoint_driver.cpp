@@ -225,7 +225,7 @@ struct Driver : H5FD_t {
   bool written = false;    ///< since the last checkpoint
   bool discarding = false; ///< what is written
   /// errno of the first write that failed. HDF5 1.10 crashes where writes fail as it closes, so it
-  /// is told at the next checkpoint.
+  /// is reported at the next checkpoint.
   int failure = 0;
 
   /// Below this, changes wait for the checkpoint. Before the first one the superblock alone,

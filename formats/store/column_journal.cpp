@@ -120,7 +120,7 @@ void ColumnJournal::read_line(const std::string& line) {
   } else {
     throw Error(path_, "is damaged: '" + *text +
                            "', expected an object or columns; remove it and " + part_ +
-                           " to begin anew");
+                           " to start again");
   }
 }
 
@@ -139,7 +139,7 @@ std::vector<std::optional<ColumnRecord>> ColumnJournal::begin(const Object& obje
     return finished;
   }
   const Known& known = known_[index];
-  const std::string remedy = "; remove it to begin anew";
+  const std::string remedy = "; remove it to start again";
   if (known.object.hash != object.hash)
     throw Error(part_, "is unfinished work on another model: '" + known.object.name + "' (hash " +
                            digest_text(known.object.hash) + "), expected '" + object.name +

@@ -8,9 +8,9 @@
 //   object INDEX HASH WORK NAME          the model's hash, and a digest of all that columns depend
 //   on columns INDEX K CRC RESIDUAL         of the object's k-th node; the last one holds
 //
-// A line is written after the bytes it speaks of. It proves nothing by itself: whoever takes
-// columns up compares their checksum. The file is made before the first byte of the store, so that
-// a FILE.part without it is known to be somebody else's.
+// A line is written after the bytes it speaks of. It proves nothing by itself: the
+// reader of columns compares their checksum. The file is made before the first byte of the store,
+// so that a FILE.part without it belongs to another program.
 
 #include <cstddef>
 #include <cstdint>

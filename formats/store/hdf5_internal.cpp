@@ -574,7 +574,7 @@ File File::reopen_checkpoint(const std::string& path) {
 File File::create_by_link(const std::string& link, const std::string& name) {
   silence();
   Handle how = access();
-  // Its usual driver asks where a link leads to, which is nowhere.
+  // Its usual driver resolves a link that leads nowhere.
   if (H5Pset_fapl_stdio(how.id()) < 0)
     throw Error(name, "cannot be made as an HDF5 file");
   return create(link, name, std::move(how));

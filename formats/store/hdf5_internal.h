@@ -77,7 +77,7 @@ struct FileState {
   bool gone() const noexcept { return failed || closed; }
 };
 
-/// What groups and datasets share: attributes. Those read must be of the asked type and small.
+/// What groups and datasets share: attributes. Those read must be of the requested type and small.
 class Object {
 public:
   ~Object();

@@ -25,7 +25,7 @@ struct StiffnessMethod {
   bool operator==(const StiffnessMethod&) const = default;
 };
 
-/// What one says of an object's stiffness, beside the arrays.
+/// Attributes of an object's stiffness in a store.
 struct StiffnessFacts {
   std::string object;      ///< the model's name
   std::string group;       ///< what the store calls it
@@ -72,7 +72,7 @@ std::uint64_t rest_hash(const Model& model);
 /// Where a store keeps the second stage of an object: OBJECT/stage2.
 std::string second_stage_group(const std::string& group);
 
-/// Opens and checks a store for reading; factors and columns are read when asked for, and their
+/// Opens and checks a store for reading; factors and columns are read on demand, and their
 /// checksums compared. Not to be used from several threads at once, nor beside another HDF5 file.
 class StiffnessStore {
 public:

@@ -156,7 +156,7 @@ std::uint64_t digest_of(const void* data, std::size_t size) {
   return digest.value();
 }
 
-/// What is asked of columns when they are written, and when they are taken up.
+/// Checks of columns when they are written, and when they are resumed.
 struct ColumnSums {
   std::vector<std::uint32_t> crc;
   std::vector<std::uint64_t> digest;

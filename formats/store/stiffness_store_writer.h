@@ -19,7 +19,7 @@ namespace gewebe {
 /// Bytes of the columns of so many nodes with rows for `row_nodes`, and of their bounds.
 double stored_columns_bytes(std::size_t nodes, std::size_t row_nodes, bool single);
 
-/// Bytes of a store: what its arrays take. `nodes` columns are wanted, with rows for the first
+/// Bytes of a store: what its arrays take. `nodes` columns are requested, with rows for the first
 /// `row_nodes` nodes, or for all if there are fewer.
 double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor, std::size_t nodes,
                              bool single, std::size_t row_nodes = SIZE_MAX);
@@ -29,8 +29,8 @@ double stiffness_store_bytes(const StiffnessMatrix& matrix, const Factor& factor
 /// Where the output is a part (Output::Options::part) finished columns are kept whatever ends the
 /// program: they stand in FILE.part at the places that they will have in the store, and
 /// FILE.part.log says which. A writer that meets them takes up those whose checksums hold; all else
-/// is made anew in a nameless file beside, and copied to FILE.part by `close`, so that a store made
-/// in several goes has the bytes of one made in one.
+/// is made again in a nameless file beside, and copied to FILE.part by `close`, so that a store
+/// made in several goes has the bytes of one made in one.
 class StiffnessStoreWriter final : public ColumnSink {
 public:
   /// `output`, which must outlive this, is committed by the caller after `close`.

@@ -58,8 +58,8 @@ public:
     ::kill(pid_, SIGKILL);
     wait();
   }
-  /// The status as waitpid gives it, or -1 if nobody may know (SIGCHLD ignored by whoever started
-  /// us).
+  /// The status as waitpid gives it, or -1 if it is unknown (the parent ignores
+  /// SIGCHLD).
   int wait() {
     int status = -1;
     while (::waitpid(pid_, &status, 0) < 0) {

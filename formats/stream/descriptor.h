@@ -23,8 +23,8 @@ private:
   int fd_;
 };
 
-/// Of the folder that holds `path`: no other run makes or replaces a name there under such a lock
-/// as long as it lives. A folder that can't be read has none, which is an empty descriptor.
+/// Lock of the folder of `path`: while it exists, no other run with such a lock creates or replaces
+/// a name there. Empty for a folder that can't be read.
 Descriptor lock_folder_of(const std::string& path);
 
 } // namespace gewebe

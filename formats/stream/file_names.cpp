@@ -107,7 +107,7 @@ void note_read(const std::string& name, int descriptor) {
   Named file = named(name, descriptor);
   if (in_place && file.same(*in_place))
     return;
-  // Even if it is refused: whoever writes it must not replace it after all, see Output::commit.
+  // Even if it is refused: its writer must not replace it after all, see Output::commit.
   if (file.itself)
     read.insert(file);
   for (auto& [number, other] : written) {

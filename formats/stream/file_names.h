@@ -1,7 +1,7 @@
 #pragma once
 // Which files a program reads and writes, so that two names for one file are found before its
 // work: by device and inode, through links, and by folder and name for what is not there yet.
-// Input, Output and the HDF5 reader say what they open; a program that asks for it (`guard_files`)
+// Input, Output and the HDF5 reader say what they open; after `guard_files` a program
 // is refused a second use that would destroy the first. Regular files alone: a device or a FIFO may
 // be used as often as one likes.
 

@@ -1,5 +1,5 @@
 #pragma once
-// The kinds of data that travel between programs, and how one is told from another.
+// The kinds of data that travel between programs, and how they are detected.
 
 #include <string>
 #include <string_view>

@@ -13,7 +13,7 @@ public:
   /// `name` is what messages call it. \throw Error if it can't be opened for reading and writing
   RawFile(const std::string& path, std::string name);
   /// A new file without a name, on the disk of `beside` (a path in some folder), or in memory where
-  /// that disk knows no such files. It is gone with the last who has it open, however that ends.
+  /// that disk knows no such files. It is gone when its last descriptor is closed.
   /// \throw Error
   static RawFile nameless(const std::string& beside, std::string name);
   ~RawFile();

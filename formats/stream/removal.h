@@ -12,7 +12,7 @@ int remember_removal(const std::string& path);
 void forget_removal(int number) noexcept;
 
 /// From now on the first of these signals is only noted, so that the program can
-/// keep what it has computed. A second one ends it at once.
+/// keep its results. A second one ends it at once.
 void defer_signals();
 /// The noted signal; 0: none.
 int deferred_signal() noexcept;

@@ -512,7 +512,7 @@ void Output::outlive_signals() {
   State& state = *state_;
   if (state.temporary.empty() || state.fd < 0)
     return;
-  (void)::flock(state.fd, LOCK_EX | LOCK_NB); // tells --recover that it isn't left behind
+  (void)::flock(state.fd, LOCK_EX | LOCK_NB); // shows --recover that it is in use
   forget_removal(state.slot);
   state.slot = -1;
 }
@@ -612,7 +612,7 @@ void Output::commit() {
 }
 
 void hold_standard_streams() {
-  // Open in the wrong direction, so that whoever reads or writes them is told.
+  // Open in the wrong direction, so that readers and writers get an error.
   for (const int fd : {0, 1, 2})
     if (::fcntl(fd, F_GETFD) < 0 && errno == EBADF)
       (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);

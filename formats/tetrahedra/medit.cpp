@@ -7,7 +7,7 @@
 namespace gewebe::tet {
 namespace {
 
-/// Sections of elements: how many integers each has, of which the last is a reference.
+/// Sections of elements: number of integers of each; the last one is a reference.
 struct Section {
   std::string_view name;
   std::size_t words;

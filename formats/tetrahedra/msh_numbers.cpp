@@ -25,7 +25,7 @@ void MshNumbers::read_format() {
   const std::int32_t one = raw<std::int32_t>();
   swap_ = one == 0x01000000;
   if (!swap_ && one != 1)
-    fail("the order of bytes is not told, expected the integer 1");
+    fail("the integer that shows the byte order is missing, expected 1");
 }
 
 void MshNumbers::fail(const std::string& what) const {

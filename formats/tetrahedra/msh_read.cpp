@@ -155,7 +155,7 @@ private:
       in_.words().fail("expected " + end);
   }
 
-  /// In text always. Of the names one tells us something.
+  /// Always text. Only one of the names matters.
   void read_names() {
     const std::uint64_t names = in_.words().count("the number of names");
     in_.words().require(names, 3, "names");

@@ -36,7 +36,7 @@ struct TetReadStats {
 };
 
 /// The mesh of `input`, linear or quadratic, tetrahedra, corners and points in their order there,
-/// coordinates to the last bit (but for `scale`). Materials are those of gewebe_tetmesh(5); of
+/// coordinates to the last bit (except `scale`). Materials are those of gewebe_tetmesh(5); of
 /// formats that give each tetrahedron one in any case, none if all are 0. Nothing is mended: see
 /// tetrahedra/check.h. Of TetGen's two files either may be the input, the other is found beside it.
 /// \throw Error with place: anything missing, surplus, out of range, not finite; counts that the
@@ -45,7 +45,7 @@ struct TetReadStats {
 TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats* stats = nullptr);
 
 /// Writes the mesh, given in mm, as `kind`; the caller commits. Reading it gives the same mesh bit
-/// for bit, but for a material that is 0 everywhere, for which Medit has no other word than none.
+/// for bit, except a material that is 0 everywhere, for which Medit has no other word than none.
 /// TetGen's other file goes beside the output's, with the options `beside`, and is committed here
 /// once both are whole, so that only a rename that fails leaves one without the other.
 /// \pre check_mesh(mesh) passes   \throw Error with place: TetGen on a pipe, too many points for
@@ -53,7 +53,7 @@ TetMesh read_tet_mesh(Input& input, const TetReadOptions& options, TetReadStats*
 void write_tet_mesh(Output& output, const TetMesh& mesh, Kind kind,
                     const Output::Options& beside = {});
 
-/// The same from and to memory, but for TetGen. \throw Error, place `name` or `name:LINE`
+/// The same from and to memory, except TetGen. \throw Error, place `name` or `name:LINE`
 TetMesh tet_mesh_from_bytes(std::string_view bytes, const std::string& name, Kind kind,
                             TetReadStats* stats = nullptr);
 std::string tet_mesh_bytes(const TetMesh& mesh, Kind kind);

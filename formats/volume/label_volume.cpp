@@ -37,7 +37,7 @@ T swapped(T value) {
   return value;
 }
 
-/// Counts labels and says which are wanted: small ones from a table, others by hashing.
+/// Counts labels and looks up the requested ones: small ones from a table, others by hashing.
 class Counter {
 public:
   explicit Counter(const std::vector<LabelRange>& labels) : labels_(labels) {
@@ -181,7 +181,7 @@ void read_grey_rows(ByteSource& data, const std::string& name, const VoxelLayout
 
 // Both grow as the bytes come, so that a header's claim alone takes no memory.
 
-/// Appends a row of bits, of the labels that are wanted; returns how many.
+/// Appends a row of bits, of the requested labels; returns how many.
 std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter, LabelMask& mask) {
   mask.bits.resize(mask.bits.size() + mask.row_words());
   std::uint64_t* const words = mask.bits.data() + (mask.bits.size() - mask.row_words());
@@ -194,7 +194,7 @@ std::uint64_t append_bits(std::span<const std::int64_t> row, Counter& counter, L
   return set;
 }
 
-/// Appends a row of runs, of all labels or of those that are wanted.
+/// Appends a row of runs, of all labels or of the requested ones.
 void append_runs(const LabelRequest& request, std::span<const std::int64_t> row, Counter& counter,
                  LabelRuns& labels) {
   for (std::size_t i = 0; i < row.size(); ++i) {

@@ -1,12 +1,12 @@
 #pragma once
 // Label volumes of radiology: NIfTI-1 and -2 (.nii, .nii.gz, pairs .hdr/.img), NRRD (.nrrd, .nhdr;
 // raw and gzip), MetaImage (.mha, .mhd; raw and zlib) and INRIMAGE-4 (.inr, .inr.gz). What is read
-// is which voxels have one of the wanted labels, one bit a voxel, or the labels of all voxels as
+// is which voxels have one of the requested labels, one bit a voxel, or the labels of all voxels as
 // runs, and where they lie in the world: mm, RAS.
 //
 // A reader of our own on zlib. Debian 12 has three libraries. nifticlib 3 (1.8 MB) opens files by
 // name alone, so no pipe; it warns on standard error and reads a file that is cut off as zeros, and
-// for a header that claims 32000³ voxels asks for 1.6 GB, for its product overflows. teem (3.3 MB)
+// for a header that claims 32000³ voxels allocates 1.6 GB, for its product overflows. teem (3.3 MB)
 // reads NRRD only. ITK (126 MB, 38 packages) reads all three. All hold the whole volume in its own
 // type, eight to sixty-four times the bits that are needed here. The headers are a page of code
 // each; streamed through zlib (which libpng and HDF5 need anyway) a volume takes one bit a voxel,
@@ -32,13 +32,13 @@
 
 namespace gewebe {
 
-/// Labels that are wanted: one where both are equal, or those in between that the volume holds.
+/// Requested labels: one where both are equal, or those in between that the volume holds.
 struct LabelRange {
   std::int64_t first = 0, last = 0;
 };
 
 struct LabelVolume {
-  LabelMask mask;           ///< of the wanted labels
+  LabelMask mask;           ///< of the requested labels
   std::uint64_t voxels = 0; ///< that are set in it
   std::string format;       ///< "NIfTI-1", "NIfTI-2", "NRRD", "MetaImage", "INR"
   std::vector<std::pair<std::int64_t, std::uint64_t>>
@@ -46,16 +46,17 @@ struct LabelVolume {
   std::vector<std::string> warnings;
 };
 
-/// What the caller has against a mask of this size and place, asked before a voxel is unpacked: it
-/// throws.
+/// Check of the mask's size and place by the caller, before a voxel is unpacked: it throws to
+/// refuse.
 using LabelCheck = std::function<void(const LabelMask& without_bits)>;
 
 /// Reads forwards, from a pipe too; only files of two parts (.hdr, .nhdr, .mhd) need a name.
-/// Compression is told by its bytes. Values must be whole numbers, in whatever type they are kept.
-/// \throw Error with the place if it is none of these, is cut off or goes on beyond its end, if
-/// a value is no whole number, if the affine is singular, if none of a range of `labels` occurs
-/// (the message names those that do), if the mask or the voxels unpacked would need more than
-/// context.max_memory, or what `check` throws
+/// Compression is detected by its bytes. Values must be whole numbers, in whatever type they are
+/// kept.
+/// \throw Error with the place if it is none of these, is cut off, goes on beyond its end, or has a
+/// value that is no whole number; if the affine is singular; if none of a range of `labels` occurs
+/// (the message names those that do); if more than context.max_memory would be needed; or what
+/// `check` throws
 LabelVolume read_label_volume(Input& input, const std::vector<LabelRange>& labels,
                               const Context& context, const LabelCheck& check = {});
 
@@ -72,8 +73,8 @@ struct AllLabels {
 };
 
 /// Reads the same files for the labels of all voxels; those that `labels`, where there are any, do
-/// not want become 0. \throw Error as read_label_volume, and if a wanted label is below 0 or above
-/// 2^31 - 1, or the runs would need more than context.max_memory
+/// not want become 0. \throw Error as read_label_volume, and if a requested label is below 0 or
+/// above 2^31 - 1, or the runs would need more than context.max_memory
 AllLabels read_all_labels(Input& input, const std::vector<LabelRange>& labels,
                           const Context& context);
 AllLabels all_labels_from_bytes(std::string_view bytes, const std::string& name,

@@ -91,7 +91,7 @@ void BufferedBytes::skip(std::uint64_t count) {
 
 struct InflatedBytes::State {
   State(BufferedBytes& bytes, std::string n) : from(bytes), name(std::move(n)) {
-    if (inflateInit2(&stream, 15 + 32) != Z_OK) // zlib or gzip, told by their heads
+    if (inflateInit2(&stream, 15 + 32) != Z_OK) // zlib or gzip, detected by their heads
       throw Error(name, "zlib cannot start");
   }
   ~State() { (void)inflateEnd(&stream); }

@@ -97,19 +97,19 @@ struct VoxelLayout {
   double slope = 1, intercept = 0; ///< label = slope · stored + intercept
 };
 
-/// What a reader is asked.
+/// Request to a reader.
 struct LabelRequest {
   const std::vector<LabelRange>& labels;
   const Context& context;
   const LabelCheck& check;
   bool side_files; ///< whether the name is that of a file, beside which others may be opened
-  // One of these may receive what is wanted in place of the mask's bits.
+  // One of these may receive the result in place of the mask's bits.
   LabelRuns* all;
   GreyVolume* grey;
   VoxelLayout* layout = nullptr; ///< then no voxel is read
 };
 
-/// Reads a volume of any of the formats for what is asked.
+/// Reads a volume of any of the formats for a request.
 LabelVolume read_radiology(ByteSource& source, const std::string& name,
                            const LabelRequest& request);
 

@@ -155,7 +155,7 @@ double unit_of(const Header& header) {
   }
 }
 
-/// Rotation of a unit quaternion of which b, c, d are given (nifti1.h, method 2).
+/// Rotation of a unit quaternion with given b, c, d (nifti1.h, method 2).
 std::array<double, 9> rotation(const Header& header) {
   const Fields& f = header.f();
   const double b = header.real(f.quaternion, 0), c = header.real(f.quaternion, 1),

@@ -283,7 +283,7 @@ bool big_endian_of(const Fields& fields, ScalarType type) {
   return field.value == "big";
 }
 
-/// Reads the voxels of `bytes` after the skips that the header asks for.
+/// Reads the voxels of `bytes` after the skips of the header.
 LabelVolume read_data(BufferedBytes& bytes, const Fields& fields, const VoxelLayout& layout,
                       const LabelRequest& request) {
   const HeaderField& encoding = fields.need("encoding");

@@ -47,8 +47,8 @@ void initialize_openvdb() {
   std::call_once(once, [] {
     openvdb::logging::setLevel(openvdb::logging::Level::Fatal);
     openvdb::initialize();
-    // Tells where leaves stand, for readers that load on demand. Its lengths need a check, and
-    // nothing here asks for it: as metadata of an unknown type it is passed over.
+    // Lists the places of leaves, for readers that load on demand. Its lengths need a check, and
+    // nothing here needs it: as metadata of an unknown type it is ignored.
     openvdb::Metadata::unregisterType(openvdb::io::DelayedLoadMetadata::staticTypeName());
   });
 }
@@ -102,7 +102,7 @@ private:
 class MemoryBuffer final : public std::streambuf {
 public:
   MemoryBuffer(std::string_view bytes, const std::string& name) : name_(name) {
-    auto* const begin = const_cast<char*>(bytes.data()); // streambuf asks for it, nothing writes
+    auto* const begin = const_cast<char*>(bytes.data()); // streambuf requires it, nothing writes
     setg(begin, begin, begin + bytes.size());
   }
   [[noreturn]] void fail() const {
@@ -572,7 +572,7 @@ Grid parse_volume(std::string_view bytes, const std::string& name, const Context
   return grid;
 }
 
-/// What is wrong with a volume, by what OpenVDB says of it in an exception or a remark.
+/// Message for a damaged volume, from OpenVDB's exception or log.
 std::string fault_of(std::string_view remark) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 7> faults{{
       {"multi-buffer", "the grid's tree has several buffers, expected one"},

@@ -5,7 +5,7 @@
 
 namespace gewebe {
 
-/// Who knows how leaves stand in a stream.
+/// Layout of leaves in a stream.
 enum class StreamWay {
   parallel, ///< we: leaves are packed and unpacked by all threads (format 224, of OpenVDB 10)
   plain     ///< OpenVDB's own reader and writer, whatever their format is

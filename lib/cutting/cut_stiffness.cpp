@@ -269,7 +269,7 @@ CutWork CutStiffness::cut(std::shared_ptr<const Model> next, std::span<const std
 std::function<void()> CutStiffness::still_valid() const {
   return [generation = generation_, made = *generation_] {
     if (*generation != made)
-      throw Error("the object was cut since, expected its new stiffness to be asked");
+      throw Error("the object was cut since, expected a call for its new stiffness");
   };
 }
 

@@ -34,7 +34,7 @@ struct DensityOptions {
   GridInfo info;              ///< lattice and metadata of the result; the transform must be cubic
   std::optional<Box3> clip;   ///< voxel centres outside this world box stay background
   std::optional<double> band; ///< an isovalue: keep only what its isosurface needs
-  std::function<void(const DensityReport&)> planned; ///< told what is known before the work
+  std::function<void(const DensityReport&)> planned; ///< gets what is known before the work
 };
 
 /// Density in mm⁰ of `particles` on the lattice; sums in the order of the particles, so any thread

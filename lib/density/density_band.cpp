@@ -59,7 +59,7 @@ Int3 neighbour(const Int3& origin, unsigned face) {
   return other;
 }
 
-/// Puts evaluated leaves into the grid. `slots` tells where in `values` each leaf's lie.
+/// Puts evaluated leaves into the grid. `slots` are the places of each leaf in `values`.
 void store(const Context& context, GridBuilder& builder, std::span<const Int3> origins,
            std::span<const std::size_t> slots, const std::vector<float>& values) {
   const std::vector<LeafRef> refs = builder.add_leaves(context, origins);
@@ -272,7 +272,7 @@ void evaluate_in_batches(const Context& context, GridBuilder& builder,
   std::vector<std::uint64_t> pairs(plans.size());
 
   BlockTrees trees(context, clip, {});
-  // Evaluates the leaves of some blocks; `wanted` says which, all where it is empty.
+  // Evaluates the leaves of some blocks, all of them for an empty list.
   std::vector<float> values;
   std::vector<Int3> origins;
   std::vector<std::size_t> slots;

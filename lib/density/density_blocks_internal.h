@@ -77,10 +77,10 @@ public:
   void load(std::span<const IndexParticle> particles, const Blocks& blocks, std::size_t n);
   std::span<const IndexParticle> particles() const { return local_; }
 
-  /// All leaves in reach, less those proven to lie on one side; their lists where these are wanted
+  /// All leaves in reach, less those proven to lie on one side; their lists if requested
   /// and not too long. \throw Error if the leaves exceed context.max_memory
   void list_leaves(LeafLists& lists, bool with_particles);
-  /// Calls `visit` with the number and the list of each of `wanted`, leaves in octree order.
+  /// Calls `visit` with the number and the list of each leaf given, in octree order.
   using Visit = std::function<void(std::size_t number, std::span<const std::uint32_t> list)>;
   void visit_leaves(std::span<const Int3> wanted, const Visit& visit);
 
@@ -129,7 +129,7 @@ struct EvaluatedLeaves {
 };
 
 /// Adds all leaves of the plans to the grid and evaluates them there. Then, from the same thread,
-/// `done` is told the leaf's number.
+/// `done` gets the leaf's number.
 EvaluatedLeaves evaluate_plans(const Context& context, GridBuilder& builder,
                                std::span<const IndexParticle> particles, const Blocks& blocks,
                                const std::vector<LeafLists>& plans, const IndexBox& clip,

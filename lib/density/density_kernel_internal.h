@@ -45,7 +45,7 @@ struct ChildBounds {
   float upper[8];
 };
 
-/// Bit c of masks[n] tells whether particle list[n] may reach child c, enlarged on all sides by
+/// Bit c of masks[n] is set if particle list[n] may reach child c, enlarged on all sides by
 /// `margin` voxels; never too few.
 using ReachKernel = void (*)(const IndexParticle* particles, const std::uint32_t* list,
                              std::size_t count, const Children& children, float margin,

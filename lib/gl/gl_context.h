@@ -21,7 +21,7 @@ public:
   void make_current();
   const std::string& platform() const; ///< "surfaceless", "device", "software device"
   const std::string& renderer() const; ///< what OpenGL calls itself
-  bool is_software() const;            ///< no graphics card: as far as renderer() tells
+  bool is_software() const;            ///< no graphics card, by the name of renderer()
   int max_side() const;                ///< of pictures and textures
 
 private:

@@ -230,7 +230,7 @@ void GlRenderer::State::draw_geometry(const Context& context) {
   geometry->no_colors();
 }
 
-/// Half of f, then half of 1 - f' added, in two passes; `half` has 1/2 where it is wanted.
+/// Half of f, then half of 1 - f' added, in two passes; `half` has 1/2 where it is needed.
 void GlRenderer::State::draw_relief(const std::array<float, 4>& half, const Context& context) {
   use(0, now->structure, now->material->structure);
   set_env(GL_TEXTURE_ENV_MODE, GL_MODULATE);
@@ -480,7 +480,7 @@ void GlRenderer::draw(const Projection& projection, const Context& context) {
   State& s = *state_;
   s.target.bind();
   glViewport(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height));
-  // The fixed functions clamp each sum, as the composition wants it; blending into floats doesn't.
+  // The fixed functions clamp each sum, as the composition needs it; blending into floats doesn't.
   glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
   glClampColor(GL_CLAMP_FRAGMENT_COLOR, GL_TRUE);
   glClampColor(GL_CLAMP_VERTEX_COLOR, GL_FALSE);

@@ -28,7 +28,7 @@ struct GreyDensityReport {
   std::uint64_t voxels = 0;  ///< within the thresholds
   std::uint64_t missing = 0; ///< that are NaN; they count as outside
   double width = 0;          ///< W
-  double shear = 0;          ///< mm, as label_lattice tells it
+  double shear = 0;          ///< mm, from label_lattice
 };
 
 /// On label_lattice: cubes along the scan's axes, voxel (0, 0, 0) where that of the scan is. Where

@@ -1,7 +1,7 @@
 #pragma once
 // The smooth density of labelled voxels.
 //
-// A label volume says of each voxel's centre whether it lies in an organ, and no more. The boundary
+// A label volume states for each voxel's centre if it lies in an organ, and no more. The boundary
 // of its voxels is a stair; blurring it would shrink what is curved, lose what is thin, and keep
 // the wide terraces of slices that are nearly parallel to the surface. Here a function F is sought
 // whose zero surface passes between the labelled and the other centres and bends as little as that

@@ -212,7 +212,7 @@ void prolong(const Context& context, const LabelField& coarse, const Int3& strid
 }
 
 /// Minimises on one level, beginning with and drawn to field.value. The finest takes most of the
-/// time, so that its steps alone are told.
+/// time, so that only its steps are reported.
 void minimise(const Context& context, LabelField& field, LabelDensityReport& report,
               const std::function<void(double)>& progress) {
   const std::size_t blocks = field.band.size();

@@ -1,6 +1,6 @@
 #pragma once
 // Borders of triangle meshes: edges of one triangle, and, as the parity rule sees them, edges with
-// an odd number of triangles. By index unless told otherwise.
+// an odd number of triangles. By index unless stated otherwise.
 
 #include "base/disjoint_sets.h"
 #include "base/mesh.h"

@@ -43,7 +43,7 @@ struct MeshReport {
   bool outward() const { return closed() && oriented() && inverted_components == 0; }
 };
 
-/// Examines a mesh, and its quality where that is asked for, in two passes over what is in cache:
+/// Examines a mesh, and its quality if requested, in two passes over what is in cache:
 /// round the points, and over the faces. Time and memory grow with points and faces (sorting inside
 /// a point's list). The same figures for any number of threads.
 /// Whether a component lies in another is decided by the parity of the crossings along +z from its

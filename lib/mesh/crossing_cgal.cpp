@@ -93,7 +93,7 @@ struct Side {
   }
 };
 
-/// Tells parts of faces where they come from.
+/// Records the origin of parts of faces.
 struct Parts : pmp::Corefinement::Default_visitor<Surface> {
   Side *a = nullptr, *b = nullptr;
 

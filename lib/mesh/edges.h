@@ -1,7 +1,7 @@
 #pragma once
 // The edges of triangles, with the faces that meet in each and the way they run along it: what all
-// questions about neighbours, borders and orientation ask. Two forms of one sort: EdgeSides for who
-// walks over all edges once, EdgeTable for who comes back to them by number.
+// queries of neighbours, borders and orientation need. Two forms of one sort: EdgeSides for one
+// pass over all edges, EdgeTable for access by number.
 
 #include "base/context.h"
 #include "base/mesh.h"

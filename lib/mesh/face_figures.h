@@ -29,7 +29,7 @@ struct AngleFigures {
   double share_below_10 = 0;
   double at_1_percent = 0, at_5_percent = 0, median = 0;
 };
-/// The faces of a mesh, but for those with equal corners.
+/// The faces of a mesh, except those with equal corners.
 struct FaceFigures {
   std::uint64_t degenerate = 0; ///< with equal corners
   std::uint64_t zero_area = 0;  ///< area <= 1e-12 longest edge²

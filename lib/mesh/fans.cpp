@@ -24,7 +24,7 @@ struct FanFace {
   std::uint32_t next, previous;
 };
 
-/// The faces round each point of a range, but for those with equal corners.
+/// The faces round each point of a range, except those with equal corners.
 class Fans {
 public:
   /// Of points [begin, end).

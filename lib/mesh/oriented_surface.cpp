@@ -157,7 +157,7 @@ void turn_outward(std::span<const Vec3> points, Part part, OrientedSurface& surf
   }
 }
 
-/// Takes directed edges, of which as many end as begin in each point, apart into loops that meet no
+/// Divides directed edges, with as many ends as beginnings in each point, into loops that meet no
 /// point twice. Walks on until a point comes again, and prefers to close the shortest loop it can.
 std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::array<std::uint32_t, 2>> edges) {
   std::sort(edges.begin(), edges.end());

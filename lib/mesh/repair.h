@@ -1,5 +1,5 @@
 #pragma once
-// Repair of triangle meshes, as asked and counted.
+// Repair of triangle meshes by options, with counts.
 
 #include "base/context.h"
 #include "base/mesh.h"
@@ -47,12 +47,12 @@ struct RepairReport {
   std::uint64_t turned_faces = 0;     ///< whose corners run the other way now
   std::uint64_t degenerate_faces = 0; ///< without area before and not after
   std::uint64_t degenerate_left = 0;  ///< which could not be removed
-  /// Neighbours asked whether the ends of an edge may become one point: what this costs, a few for
+  /// Neighbours checked to decide if the ends of an edge may become one point: the cost, a few for
   /// each face whose edge goes, however many faces meet in a point.
   std::uint64_t neighbours_asked = 0;
   std::uint64_t holes = 0, hole_points = 0, hole_faces = 0; ///< filled, new, new
-  std::uint64_t holes_left = 0; ///< larger than asked, or the border meets itself, another sheet,
-                                ///< or is that of one face alone
+  std::uint64_t holes_left = 0; ///< larger than requested, or the border meets itself, another
+                                ///< sheet, or is that of one face alone
   std::uint64_t holes_bent = 0; ///< of those left: the search would take more than it may
 
   /// Each count under its name; `text` says what it means ("points were welded").
@@ -60,7 +60,7 @@ struct RepairReport {
     const char* key;
     std::uint64_t count;
     const char* text;
-    bool trouble; ///< what was asked for and not possible
+    bool trouble; ///< requested, but not possible
   };
   std::vector<Line> lines() const;
 };
@@ -78,7 +78,7 @@ struct RepairReport {
 ///   degenerate   short edges are collapsed, flat faces merged with the neighbour at their longest
 ///                edge (CGAL)
 ///   holes        borders of one loop are filled by triangles like those around (CGAL; Liepa,
-///                Filling Holes in Meshes, 2003), but for what searched_edges says
+///                Filling Holes in Meshes, 2003), except for searched_edges
 ///
 /// Edges of three faces or more stay as they are; degenerate and holes work on each sheet alone.
 /// \pre check_mesh(mesh) passes   \throw Error if the weld distance is below 1e-12 of the box;

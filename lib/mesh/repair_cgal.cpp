@@ -31,7 +31,7 @@ using Halfedge = Surface::Halfedge_index;
 /// By link_condition, of this thread's repair: CGAL calls it without an object.
 thread_local std::uint64_t neighbours_asked = 0;
 
-/// The points around one, but for `other`, ascending.
+/// The points around one, except `other`, ascending.
 std::vector<Vertex> neighbours(const Surface& surface, Vertex of, Vertex other) {
   std::vector<Vertex> around;
   for (const Halfedge h : CGAL::halfedges_around_target(of, surface))
@@ -107,9 +107,9 @@ public:
   }
 
 private:
-  /// Makes the mesh, but for faces with equal corners, sheets that agree, and gives them to CGAL.
-  /// Copies of points are undone in write_back(). The half-edges are linked here: CGAL's add_face()
-  /// goes round each corner's point, and would take hours where many faces meet.
+  /// Makes sheets with consistent orientation of the mesh, without faces with equal corners, for
+  /// CGAL. Copies of points are undone in write_back(). The half-edges are linked here: CGAL's
+  /// add_face() goes round each corner's point, and would take hours where many faces meet.
   void cut_into_sheets() {
     std::vector<Triangle> faces;
     std::vector<std::uint32_t> source;

@@ -24,7 +24,7 @@ struct SelfIntersections {
 /// \pre check_mesh(mesh) passes
 SelfIntersections self_intersections(const Context& context, const TriangleMesh& mesh);
 
-/// What the search asks of two faces, for those who choose the pairs. Refers to the mesh.
+/// The test of two faces, for callers that choose the pairs. Refers to the mesh.
 class FaceIntersections {
 public:
   explicit FaceIntersections(const TriangleMesh& mesh);

@@ -137,7 +137,7 @@ struct RasterKernels {
   /// Vertices of 10 floats from `begin` to `end`.
   void (*place)(const KernelView& view, const float* vertices, std::size_t begin, std::size_t end,
                 const KernelPlaces& to);
-  /// Adds those of `count` triangles that may be seen, the first of which has the given number.
+  /// Adds those of `count` triangles that may be visible; the first one has the given number.
   void (*sort)(const KernelSorting& sorting, const std::uint32_t* corners, std::size_t count,
                std::uint32_t number, KernelSorted& to);
   /// Draws one tile; returns how many samples are covered.

@@ -459,7 +459,7 @@ struct RestColors {
 
 // Below, `Rest` is whether there are such textures: without, not even a test is left.
 
-/// Fills eight slots for the pixels from (px, py) to the right, of which the caller keeps some.
+/// Fills eight slots for the pixels from (px, py) to the right; the caller keeps some.
 template <bool Rest>
 inline void interpolate(const KernelScene& scene, const Corners& c, std::int32_t px,
                         std::int32_t py, Slots& slots, std::size_t at) {

@@ -54,7 +54,7 @@ inline Floats part_of(Floats x) { // 0 … 1
   return larger(smaller(x, splat(1.0F)), splat(0.0F));
 }
 
-/// The unit vector to the light, taken back to rest.
+/// The unit vector to the light, rotated to the shape at rest.
 inline Vector light_at_rest(const KernelScene& scene, const Slots& slots, std::size_t at) {
   Vector light = splat(scene.light);
   if (!scene.directional)

@@ -1,5 +1,5 @@
 #pragma once
-// What our rasteriser's kernels are told of textures on the shape at rest.
+// Textures on the shape at rest, as input of the rasteriser's kernels.
 
 #include "raster/raster_kernel_internal.h"
 #include "shading/drawing.h"

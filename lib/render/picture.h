@@ -1,5 +1,5 @@
 #pragma once
-// A picture by whichever backend is wanted or there.
+// Draws a picture by the requested or available backend.
 
 #include "base/context.h"
 #include "gl/gl_renderer.h"
@@ -65,7 +65,7 @@ public:
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
 
-  /// Whether drawings should have frames: for the rasteriser and the shader, unless told otherwise.
+  /// Whether drawings should have frames: by default for the rasteriser and the shader.
   bool per_pixel() const;
   /// \pre the drawing has no more groups than the material; drawings with versions are one maker's
   /// The picture, three channels. All modes draw the same: of 255, values differ by 2 at most where

@@ -12,7 +12,7 @@ double tangent(double degrees);
 /// cos and sin of an angle in degrees, by tangent(). \pre finite
 std::array<double, 2> cos_sin(double degrees);
 
-/// The direction (x, y) as a part of the full turn from +x over +y, 0 … 1 (1 excluded but for
+/// The direction (x, y) as a part of the full turn from +x over +y, 0 … 1 (1 excluded except for
 /// rounding), error below 1e-15; 0 for (0, 0).
 double turn(double x, double y);
 

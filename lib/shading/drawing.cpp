@@ -334,7 +334,7 @@ const std::vector<std::string>& group_by_names() {
 GroupBy group_by_from_name(std::string_view name) {
   const auto found = std::ranges::find(group_by_names(), name);
   if (found == group_by_names().end())
-    throw Error("'" + std::string(name) + "' tells no groups apart");
+    throw Error("'" + std::string(name) + "' does not define groups");
   return static_cast<GroupBy>(found - group_by_names().begin());
 }
 

@@ -40,8 +40,8 @@ struct Drawing {
   Vec3 origin;
   double scale = 1; ///< > 0
   std::vector<DrawVertex> vertices;
-  std::vector<DrawFrame> frames; ///< one per vertex where asked for, else none
-  std::vector<DrawRest> rests;   ///< one per vertex where asked for, else none
+  std::vector<DrawFrame> frames; ///< one per vertex if requested, else none
+  std::vector<DrawRest> rests;   ///< one per vertex if requested, else none
   std::vector<DrawTurn> turns;   ///< likewise, where a point is not at rest
   Vec3 rest_origin;
   double rest_scale = 1; ///< > 0
@@ -72,7 +72,7 @@ struct Surface {
   bool inside = false;     ///< the other side of a surface: of the group behind those of tissue
 };
 
-/// What tells the groups of triangles apart: the mesh's materials or parts (all of a mesh without
+/// What defines the groups of triangles: the mesh's materials or parts (all of a mesh without
 /// them are 0), or the number of the surface.
 enum class GroupBy : std::uint8_t { material, part, surface };
 
@@ -111,7 +111,7 @@ struct DrawingOptions {
 /// F|), F of fill_direction(), for shares k and f; times 1 - o (1 - openness) for the share o of
 /// occlusion.h. L is 0 for a vertex at the light. Sphere maps are read as OpenGL's GL_SPHERE_MAP
 /// does: (x, y) / m + 1/2 for the view's mirror image (x, y, z) at the normal, in axes right, up,
-/// back, and m = 2 |(x, y, z + 1)|. Only what is asked for is computed. \pre check_mesh passes for
+/// back, and m = 2 |(x, y, z + 1)|. Only what is requested is computed. \pre check_mesh passes for
 /// every mesh; with `texcoords` all meshes have them \throw Error if a coordinate overflows or
 /// there are more than 2³² vertices; Cancelled
 Drawing make_drawing(std::span<const Surface> surfaces, const DrawingOptions& options,
@@ -134,8 +134,8 @@ struct DrawingCounts {
 struct DrawingParts {
   TexturedVertices vertices;
   std::vector<Vec3> normals;
-  std::vector<Vec3> rest_normals; ///< where places at rest are asked for
-  std::vector<float> openness;    ///< of its points, where occlusion is asked for
+  std::vector<Vec3> rest_normals; ///< if places at rest are requested
+  std::vector<float> openness;    ///< of its points, if occlusion is requested
   bool moved = false;             ///< whether its points are not at rest
 };
 

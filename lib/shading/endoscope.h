@@ -9,7 +9,7 @@ namespace gewebe {
 
 /// Of the light above the lens, mm.
 inline constexpr double endoscope_light_height = 3;
-/// The field of view that an endoscope has unless told otherwise, degrees.
+/// Default field of view of an endoscope, degrees.
 inline constexpr double endoscope_fov = 70;
 
 /// Where the fibre's end stands: above the lens.

@@ -1,5 +1,5 @@
 #pragma once
-// The body of facet_tree_*.cpp, each of which compiles it for its instruction set.
+// The body of facet_tree_*.cpp; each of them compiles it for its instruction set.
 
 #include "base/four_lanes.h"
 #include "shading/facet_tree.h"
@@ -27,7 +27,7 @@ struct Ray {
   Vec3 from, along;
 };
 
-/// What boxes are asked with.
+/// Query of boxes.
 struct Slabs {
   Four from[3], inverse[3];    ///< by axis: four equal numbers, infinite along an axis
   std::size_t near[3], far[3]; ///< numbers from the first of the node's to the sides met first
@@ -95,7 +95,7 @@ struct Later {
 inline double walk(const FacetTree& tree, const Ray& ray, const Slabs& slabs, double nearest) {
   const FacetTree::Node* const nodes = tree.nodes.data();
   const FacetTree::Leaf* const leaves = tree.leaves.data();
-  Later later[64]; // three a level, of which there are at most 16
+  Later later[64]; // three per level, at most 16 levels
   Later* end = later;
   std::uint32_t at = 0;
   for (;;) {

@@ -41,8 +41,8 @@ struct DrawRest {
   std::array<float, 3> normal{}; ///< at rest
 };
 
-/// The rotation of the surface from rest to now: where it takes the axes x and y. Light is taken
-/// back by it, so that all else happens at rest.
+/// The rotation of the surface from rest to now: where it takes the axes x and y. Light is
+/// rotated back by it, so that all else happens at rest.
 struct DrawTurn {
   std::array<float, 3> x{1, 0, 0}, y{0, 1, 0};
 };

@@ -55,8 +55,8 @@ struct SolidTexture {
 };
 
 /// "noise", "veins", or either with ":key=value,...": scale, octaves, seed, roughness,
-/// ground=R/G/B, color=R/G/B, contrast of noise, width of veins. Veins are dark on white unless
-/// told otherwise. \throw Error if a key or value is wrong
+/// ground=R/G/B, color=R/G/B, contrast of noise, width of veins. Veins are dark on white by
+/// default. \throw Error if a key or value is wrong
 SolidTexture solid_texture_from_text(std::string_view text);
 /// Whether a text names a solid texture rather than a file.
 bool is_solid_texture(std::string_view text);

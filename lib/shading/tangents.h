@@ -27,7 +27,7 @@ struct TexturedVertices {
   std::vector<std::uint32_t> point;     ///< of the mesh
   std::vector<std::array<float, 2>> st; ///< texture coordinates
   std::vector<Triangle> triangles;      ///< those of the mesh, over these vertices
-  std::vector<Vec3> tangent, bitangent; ///< only where asked for
+  std::vector<Vec3> tangent, bitangent; ///< only if requested
   // What frames are made from again when the points move.
   std::vector<std::size_t> first_corner; ///< of each vertex in `corner`, and the end
   std::vector<std::size_t> corner;       ///< 3 t + c
@@ -43,7 +43,7 @@ TexturedVertices split_vertices(const TriangleMesh& mesh,
                                 std::span<const std::array<float, 6>> texcoords,
                                 const std::vector<Vec3>* normals, const Context& context);
 
-/// Makes the frames anew where the points or normals of a mesh moved whose triangles and
+/// Computes the frames again after points or normals of a mesh moved; its triangles and
 /// coordinates are those that were split. \pre it was split with normals
 void renew_frames(TexturedVertices& vertices, const TriangleMesh& mesh,
                   std::span<const std::array<float, 6>> texcoords, const std::vector<Vec3>& normals,

@@ -1,5 +1,5 @@
 #pragma once
-// Colours of tissue for pictures that were told none.
+// Default colours of tissue in pictures.
 
 #include "base/mesh.h"
 #include "base/vec3.h"

@@ -48,8 +48,8 @@ struct UvOptions {
   std::optional<double> edge;       ///< of box, mm; nothing: half the longest side of the box
 };
 
-/// Gives the surfaces coordinates by one common frame around all of them at rest, and tells how
-/// many it gave them to; instruments get zeros and don't count.
+/// Gives the surfaces coordinates by one common frame around all of them at rest, and returns how
+/// many got them; instruments get zeros and don't count.
 std::uint64_t add_texcoords(std::vector<Surface>& surfaces, const UvOptions& options,
                             const Context& context);
 

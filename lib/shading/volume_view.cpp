@@ -139,7 +139,7 @@ bool clip(const Ray& ray, const Vec3& min, const Vec3& max, double& t0, double& 
 }
 
 /// Visits the cubes of edge `size` between min and max that the ray meets from t0 to t1, in order.
-/// Places are found anew from whole numbers at each step, so that nothing drifts.
+/// Places are computed from whole numbers at each step, so that nothing drifts.
 template <class Visit>
 void walk(const Ray& ray, double size, const Int3& min, const Int3& max, double t0, double t1,
           const Visit& visit) {

@@ -52,7 +52,7 @@ struct VolumeView {
 
 /// Sees `grid`, trilinear between its voxels' centres and its background beyond them, by parallel
 /// rays: a slice has the value where the ray meets the plane through the place, a maximum
-/// projection the greatest value on the ray. That one is exact but for rounding: between two planes
+/// projection the greatest value on the ray. It is exact to rounding: between two planes
 /// of the lattice the field is a cubic along the ray, whose extrema are found; blocks of 8³ voxels
 /// that hold nothing greater than what was met are stepped over. A translucent picture has emission
 /// and absorption (Max, Optical Models for Direct Volume Rendering, 1995): colors are the integral

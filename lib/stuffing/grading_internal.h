@@ -37,7 +37,7 @@ struct BlockLevels {
 /// side or another material have but leaves of one cell round them, so that what is warped or cut
 /// is as on a lattice that isn't graded.
 struct Grading {
-  unsigned levels = 0;             ///< of the largest leaf; 0: nothing here is asked for
+  unsigned levels = 0;             ///< of the largest leaf; 0: no grading here
   std::vector<BlockLevels> blocks; ///< empty where levels == 0
 
   bool none() const { return levels == 0; }

@@ -37,7 +37,7 @@ struct InterfacePoint {
   std::int32_t material = 0;
   bool free = false;         ///< no edge leads outside: it may be moved, and its edges may be cut
   bool on = false;           ///< on the interface: moved there, or the interface comes to it
-  bool refused = false;      ///< a warp of it was taken back
+  bool refused = false;      ///< a warp of it was undone
   std::uint8_t warp = stays; ///< the direction that it is moved along
   std::array<std::uint32_t, bcc::directions> neighbours{}; ///< interface points, or none
   /// By direction, where the neighbour is of another material: how far along the edge that begins.
@@ -53,7 +53,7 @@ struct InterfacePoint {
 /// along faces of the lattice: of the ends of such an edge the one nearer to the interface counts
 /// as on it, in its place. So no tetrahedron that the boundary cuts has two materials, and none has
 /// three. A free end nearer to a cut than alpha is moved there. A tetrahedron with four moved
-/// corners could be of any shape: warps are taken back until there is none, and cuts then keep
+/// corners could be of any shape: warps are undone until there is none, and cuts then keep
 /// alpha away from both ends.
 struct MaterialInterface {
   std::vector<InterfacePoint> points; ///< by block, word, bit

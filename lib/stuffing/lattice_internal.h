@@ -71,7 +71,7 @@ struct StuffingBlock {
   PointSet inside{};
   PointRanks surface; ///< points with an edge to the other side
   std::uint32_t first_surface = 0;
-  PointRanks interface; ///< points inside with an edge to another material, where that was asked
+  PointRanks interface; ///< points inside with an edge to another material, if requested
   std::uint32_t first_interface = 0;
 
   /// \pre it is in `surface`

@@ -24,8 +24,8 @@ struct StuffingNodes {
   std::vector<PointRanks> inner;   ///< by block: nodes inside
   std::vector<std::uint32_t> first_inner;
   std::uint32_t on_surface = 0, all = 0;
-  /// Of interface points: the first node of the cuts of which it is the end of the smaller
-  /// material.
+  /// For an interface point: the first node of the cuts at whose end of the smaller material it
+  /// is.
   std::vector<std::uint32_t> first_interface;
   std::vector<std::uint16_t> interface_cuts; ///< directions
 

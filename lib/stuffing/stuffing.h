@@ -70,7 +70,7 @@ struct StuffingReport {
 ///
 /// Every dihedral angle lies between stuffing_angle_min and stuffing_angle_max, every tetrahedron
 /// has a positive volume, the boundary is a closed 2-manifold (or several). To keep it one, a warp
-/// after which the tetrahedra at a point would not make a ball or half a ball is taken back, and
+/// after which the tetrahedra at a point would not make a ball or half a ball is undone, and
 /// cut points near that point are moved away from it along their edges, to alpha at most.
 ///
 /// With `grade` the inside is an octree whose leaves double inwards, of neighbours across a face or

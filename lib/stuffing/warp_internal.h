@@ -24,7 +24,7 @@ struct BoundaryLatticePoint {
   bool inside = false;
   /// Where no tetrahedron would be left flat or pinched: the direction that it is moved along.
   std::uint8_t warp = stays;
-  bool refused = false;                                    ///< a warp of it was taken back
+  bool refused = false;                                    ///< a warp of it was undone
   std::array<std::uint32_t, bcc::directions> neighbours{}; ///< surface points, or none: same side
   /// By direction, where the neighbour is on the other side: how far along the edge the surface is.
   std::array<double, bcc::directions> cuts{};
@@ -53,7 +53,7 @@ struct SurfacePoints {
 };
 
 /// The direction of the nearest cut of a point that is nearer than alpha, or
-/// BoundaryLatticePoint::stays. \param cuts tells which edges are cut: SurfacePoints,
+/// BoundaryLatticePoint::stays. \param cuts  which edges are cut: SurfacePoints,
 /// MaterialInterface
 template <class Cuts, class Point>
 std::uint8_t violated(const Cuts& cuts, const Point& point) {

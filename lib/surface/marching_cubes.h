@@ -39,7 +39,7 @@ struct IsoSurface {
 /// The lattice edges that the points of the mesh lie on, one per point in their order.
 std::vector<EdgeCrossing> edge_crossings(const IsoSurface& surface);
 
-/// The isovalue that `grid` asks for: info().isovalue, 0 for a level set.
+/// Default isovalue of `grid`: info().isovalue, 0 for a level set.
 double default_isovalue(const GridInfo& info);
 
 /// Triangulates the surface between inside and outside (Lorensen and Cline 1987; the table of

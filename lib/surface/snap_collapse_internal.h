@@ -51,11 +51,11 @@ struct SnapMerges {
 /// thus ends the same in any order, and such clusters are taken in parallel. The others follow one
 /// by one in their order, each in the mesh as the clusters before it leave it.
 ///
-/// Nearly all clusters have no fin, and none among their neighbours: these are told by bits (see
+/// Nearly all clusters have no fin, and none among their neighbours: bits detect these (see
 /// snap_patch_internal.h). There the label of a point is the corner that it snaps to, or itself
 /// where it snaps nowhere or to the cluster's own corner. That says the same: two points snap to
-/// one corner if and only if they are in one cluster. (2) is asked of all corners at once; for (3)
-/// the neighbours that have themselves as label are counted, and the different corners of the
+/// one corner if and only if they are in one cluster. (2) is tested for all corners at once; for
+/// (3) the neighbours that have themselves as label are counted, and the different corners of the
 /// others. The edges inside A are met in the order of faces, which a corner's place in its block
 /// decides.
 ///

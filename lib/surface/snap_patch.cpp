@@ -231,7 +231,7 @@ struct Cluster {
   std::size_t first_partner(std::size_t p) const;
 };
 
-/// The first of p's faces, in their order, whose next corner is in the cluster tells it.
+/// It is the first of p's faces, in their order, whose next corner is in the cluster.
 std::size_t Cluster::first_partner(std::size_t p) const {
   for (std::size_t n = 0; n < chain[p].count; ++n) {
     const std::size_t m = chain[p].members[n];

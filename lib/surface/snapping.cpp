@@ -29,9 +29,9 @@ bool has_much_area(const Vec3& u, const Vec3& v, const Vec3& normal, double enou
   return dot(normal, normal) > enough * longest * longest;
 }
 
-/// What has_no_area asks in index space, asked in the world: an affine map changes the ratio of an
+/// The test of has_no_area, but in the world: an affine map changes the ratio of an
 /// area to a square by no more than its condition, which is below the product of the norms of the
-/// matrix and its inverse; infinite where that tells nothing.
+/// matrix and its inverse; infinite if that is unknown.
 double enough_area(const GridTransform& transform) {
   const auto& m = transform.m;
   const Vec3 rows[3]{{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
@@ -151,7 +151,7 @@ void SnappedMesh::count(TriangleMesh& mesh) {
              resizing(mesh.triangles, first_triangle_.back()));
 }
 
-/// Numbers the points that are left, too: what merges_.target says of those.
+/// Numbers the remaining points, too: merges_.target of those.
 void SnappedMesh::write_points(std::vector<Vec3>& points) {
   const std::array<double, 12> transform = transform_.m;
   const auto write_block = [&](std::size_t n) {

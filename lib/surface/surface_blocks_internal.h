@@ -1,6 +1,6 @@
 #pragma once
 // Where an isosurface crosses its lattice, block by block: what marching cubes finds before it
-// makes a mesh, and all that snapping asks for; for surface/marching_cubes.cpp and
+// makes a mesh, and the input of snapping; for surface/marching_cubes.cpp and
 // surface/snapping.cpp.
 //
 // Blocks are of 8³ corners and of the 8³ cells that start there. A set of corners of a block is 8

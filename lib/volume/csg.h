@@ -49,7 +49,7 @@ struct CsgReport {
 /// first one's lattice, isovalue and name, and is active where its value isn't 0. Work follows the
 /// operands' leaves and tiles; the result is the same for any number of threads.
 ///
-/// Operands that nobody else holds (move them in) are used up: the largest one's tree becomes the
+/// Operands without other owners (move them in) are used up: the largest one's tree becomes the
 /// result's, and then the cost follows the other operands, not this one, where they leave it
 /// untouched. Leaves taken over from operands that live on are shared, never copied.
 ///

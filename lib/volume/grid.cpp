@@ -355,7 +355,7 @@ void GridBuilder::share_leaf(const Grid& from, const LeafView& leaf) {
   std::vector<std::shared_ptr<const void>>& lenders = state_->storage->lenders;
   if (lenders.empty() || lenders.back() != from.native())
     lenders.push_back(from.native());
-  // Nobody writes through the pointer: both grids are immutable.
+  // The pointer is not written through: both grids are immutable.
   BorrowingLeaf shared =
       borrowing_leaf(original->origin(), const_cast<float*>(original->buffer().data()));
   shared->setValueMask(original->getValueMask());

@@ -212,7 +212,7 @@ public:
   }
   /// \pre `values` outlive the tree
   void leaf(const Coord& origin, const float* values, const Leaf::NodeMaskType& mask) {
-    // Nobody writes through the pointer while it may be shared: grids are immutable.
+    // The pointer is not written through while it may be shared: grids are immutable.
     auto* const borrowed = const_cast<float*>(values);
     if (Leaf* const old = accessor_.probeLeaf(origin)) {
       borrow_values(*old, borrowed);
@@ -277,7 +277,7 @@ private:
   openvdb::tree::ValueAccessor<FloatTree> accessor_;
 };
 
-/// The largest of the grids that nobody else holds.
+/// The largest of the grids without other owners.
 std::optional<std::size_t> choose_base(std::span<const Grid> grids) {
   std::optional<std::size_t> base;
   openvdb::Index64 max = 0;

@@ -45,7 +45,7 @@ struct FoldReport {
   std::uint64_t tiles_combined = 0;  ///< constant regions, not all 0, decided in O(1) each
 };
 
-/// Combines `grids`; the result has `info`. A grid that nobody else holds is taken apart: if it is
+/// Combines `grids`; the result has `info`. A grid without other owners is taken apart: if it is
 /// the largest such one, its tree becomes the result's and only the blocks in which something
 /// happens are touched. Of the others the leaves that are taken are shared. The result's leaves and
 /// tiles are the same in each case and for any number of threads.

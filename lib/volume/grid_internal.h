@@ -20,7 +20,7 @@ using FloatTree = openvdb::FloatTree;
 /// Memory that leaves of a tree borrow their values from.
 struct LeafStorage {
   std::vector<ZeroPages> pages;
-  std::vector<std::shared_ptr<const void>> lenders; ///< whoever owns values that are shared
+  std::vector<std::shared_ptr<const void>> lenders; ///< owners of shared values
 };
 
 /// Leaves that borrow their values are marked (transientData) and let go of them before the tree
@@ -31,13 +31,13 @@ struct Grid::Native {
   std::once_flag summary_once;
   ValueSummary summary;
   std::mutex digest_mutex;
-  std::optional<std::pair<GridInfo, std::uint64_t>> digest; ///< the last one asked for
+  std::optional<std::pair<GridInfo, std::uint64_t>> digest; ///< the last one computed
 };
 
 /// An empty tree whose leaves may borrow from `storage`, which lives as long as the tree.
 FloatTree::Ptr make_tree(float background, const std::shared_ptr<LeafStorage>& storage);
 
-/// A Grid over a tree that nobody changes any more, from make_tree with `storage`.
+/// A Grid over a tree that no longer changes, from make_tree with `storage`.
 Grid make_grid(GridInfo info, FloatTree::Ptr tree, std::shared_ptr<LeafStorage> storage);
 
 using FloatLeaf = FloatTree::LeafNodeType;

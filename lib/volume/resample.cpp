@@ -243,7 +243,7 @@ struct Weights {
   std::vector<double> weight;
   double sum = 1; ///< of what is left; the rest falls on background
 
-  /// The tent about `center`, of which min … max is kept.
+  /// The tent about `center`, cut to min … max.
   void set(double center, double half_width, std::int32_t min, std::int32_t max) {
     const double whole = std::nearbyint(center);
     if (std::fabs(center - whole) <= 1e-9)

@@ -25,9 +25,9 @@ struct RampDistances {
 };
 
 /// Value ½ ∓ d/(2 half_width) in the band of voxels whose centre is nearer than half_width to the
-/// surface, 0 or 1 elsewhere. `prepare` sees the mesh (index space moved by ½, holes closed where
-/// asked) and gives the functions for d. By the winding rule voxels inside take the distance to the
-/// boundary of the solid (nearest_boundary). \pre options.samples == 1
+/// surface, 0 or 1 elsewhere. `prepare` sees the mesh (index space moved by ½, holes closed if
+/// requested) and gives the functions for d. By the winding rule voxels inside take the distance to
+/// the boundary of the solid (nearest_boundary). \pre options.samples == 1
 Grid ramp_density(const Context& context, const TriangleMesh& mesh, const GridTransform& transform,
                   const VoxelizeOptions& options, double half_width,
                   const std::function<RampDistances(const SlabbedMesh&)>& prepare,

@@ -14,7 +14,7 @@ struct LostParts {
 };
 
 /// Counts the parts of a mesh that left no voxel inside in a volume. A part has one if a place on
-/// its surface lies in a cell of eight voxels of which one is inside; places are at most half a
+/// its surface lies in a cell of eight voxels with one inside; places are at most half a
 /// voxel apart, and the search ends at the first. So a part that touches what another one filled is
 /// not lost. Faces without a finite size are left out.
 LostParts find_lost_parts(const TriangleMesh& mesh, const Grid& grid);

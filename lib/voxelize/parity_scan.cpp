@@ -1,6 +1,6 @@
 #include "voxelize/parity_scan_internal.h"
 // Based on: E.-A. Karabassi, G. Papaioannou, T. Theoharis, A Fast Depth-Buffer-Based Voxelization
-// Algorithm, 1999 (the report's method, of which the rays along one axis remain); the parity rule
+// Algorithm, 1999 (the report's method, reduced to rays along one axis); the parity rule
 // after F. S. Nooruddin, G. Turk, Simplification and Repair of Polygonal Models Using Volumetric
 // Techniques, 2003.
 

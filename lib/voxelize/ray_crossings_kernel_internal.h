@@ -20,7 +20,7 @@ struct TriangleList {
 inline constexpr std::int32_t small_triangle_rays = 1024;
 inline constexpr std::size_t crossing_capacity = 4096;
 
-/// Crossings (i, j, k) as cross_triangle emits them, and the triangles that it must be asked for.
+/// Crossings (i, j, k) as cross_triangle emits them, and the triangles to call it for.
 struct CrossingBuffer {
   std::size_t count, left_count;
   std::int32_t i[crossing_capacity], j[crossing_capacity], k[crossing_capacity];

@@ -13,7 +13,7 @@
 
 namespace gewebe {
 
-/// A mesh in the index space of the samples: coordinates as exact_predicates.h wants them,
+/// A mesh in the index space of the samples: coordinates as exact_predicates.h requires them,
 /// magnitudes below 2^30.
 struct SampleMesh {
   int samples = 1; ///< along the edge of a voxel

@@ -16,7 +16,7 @@ namespace gewebe {
 /// `points` gets the tips of the cones. Ties are decided as by the parity rule. Adds to the report
 /// what orientation found, triangles_skipped, crossings, exact_tests, and samples_summed.
 /// \param keep_windings  fills InsideScan::windings
-/// \pre points as SampleMesh wants them; part as orient_surface takes it
+/// \pre points as SampleMesh requires them; part as orient_surface takes it
 InsideScan winding_scan(const Context& context, std::vector<Vec3>& points,
                         std::span<const Triangle> triangles, std::span<const std::int32_t> part,
                         bool keep_windings, VoxelizeReport& report);

@@ -1,8 +1,8 @@
-"""What goes wrong."""
+"""Errors of programs, scenes and files."""
 
 
 class Error(Exception):
-    """What a program, a scene or a file says is wrong: one line. status is that of the program, else None."""
+    """Error of a program, a scene or a file: one line. status is the exit status of a program, else None."""
 
     def __init__(self, text, status=None):
         super().__init__(text)

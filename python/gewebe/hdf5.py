@@ -1,9 +1,9 @@
-"""Files of ours in HDF5, by h5py."""
+"""Gewebe's HDF5 files, read by h5py."""
 from .errors import Error
 
 
 class File:
-    """One of a kind, open for reading. A context manager."""
+    """A file of one format, open for reading. A context manager."""
 
     def __init__(self, path, kind, what):
         import h5py

@@ -1,4 +1,4 @@
-"""Programs, alone or chained by pipes."""
+"""Runs programs, alone or in pipes."""
 import json
 import os
 import re
@@ -21,7 +21,7 @@ _ESCAPE = '\x1b[K'
 
 
 def path_of(program):
-    """The file of a program: in the folder that GEWEBE_BIN names, of the wheel that this module came with, or in the PATH."""
+    """Path of a program: in the folder GEWEBE_BIN, else in the wheel of this module, else in the PATH."""
     folder = os.environ.get('GEWEBE_BIN')
     if folder:
         found = shutil.which(program, path=folder)
@@ -44,10 +44,10 @@ def path_of(program):
 
 
 class Outcome:
-    """What a pipe left.
+    """Result of a pipe.
 
-    output is what the last program wrote to standard output, bytes. stats holds what --stats told of each program, in
-    their order, if stats were asked for.
+    output is the standard output of the last program, as bytes. stats has the figures of --stats of each program, in order, if
+    requested.
     """
 
     def __init__(self, output, stats):
@@ -60,7 +60,7 @@ class Outcome:
 
 
 class _Listener(threading.Thread):
-    """Reads standard error of one program: hands on progress, keeps the rest."""
+    """Reads standard error of one program: forwards progress, keeps the rest."""
 
     def __init__(self, stream, progress):
         super().__init__(daemon=True)
@@ -122,7 +122,7 @@ def _feed(stream, data):
 
 
 def _judge(names, processes, listeners):
-    """Raises the first failure in the order of the pipe, warns of what was warned of."""
+    """Raises the first failure in the order of the pipe; forwards warnings."""
     for listener in listeners:
         if listener.failure is not None:
             raise listener.failure
@@ -145,12 +145,12 @@ def _judge(names, processes, listeners):
 
 
 def run(*stages, input=None, progress=None, stats=False, cwd=None):
-    """Runs programs, each reading what the one before it writes, and returns an Outcome.
+    """Runs programs in a pipe and returns an Outcome.
 
-    A stage is a program with its arguments: one text as a shell takes it ('mc-opt --resample 2'; no pipes, no globs)
-    or a list of words, which may be paths. input is what the first one reads: text, bytes or a Ply. progress is
-    called with a program's name and the done part of its work, 0 to 1, from threads of their own, one for each program.
-    What programs warn of comes as Python's warnings. Error: what the first one that failed says.
+    A stage is a program with its arguments: a string that is split as by a shell ('mc-opt --resample 2'; no pipes, no globs)
+    or a list of words, which may be paths. input of the first program is text, bytes or a Ply. progress is called with the
+    name of a program and its progress, 0 to 1, from one thread per program. Warnings are Python's. Raises Error with the
+    message of the first program that failed.
     """
     if not stages:
         raise ValueError('no program to run')

@@ -46,7 +46,7 @@ class Moved:
         return group, frame, frame - first
 
     def points(self, frame=0):
-        """Where nodes are at rest, [n, 3] in mm, of those that there are in the frame."""
+        """Rest positions of the nodes of the frame, [n, 3] in mm."""
         return self._at(frame)[0]['points'][:]
 
     def displacement(self, frame=-1):
@@ -55,19 +55,19 @@ class Moved:
         return group['displacement'][row]
 
     def shape(self, frame=-1):
-        """Where nodes are, [n, 3] in mm."""
+        """Positions of the nodes, [n, 3] in mm."""
         return self.points(frame) + self.displacement(frame)
 
     def triangles(self, frame=-1):
         return self._at(frame)[0]['triangles'][:]
 
     def tetrahedra(self, frame=-1):
-        """Of a solid, else None."""
+        """Nodes of each tetrahedron of a solid, else None."""
         group = self._at(frame)[0]
         return group['tetrahedra'][:] if 'tetrahedra' in group else None
 
     def field(self, name, frame=-1):
-        """stress, strain, von_mises and those of elements of a solid whose stress the scene emits, else None."""
+        """stress, strain, von_mises, or element_stress and so on, if the scene emits the stress of the solid, else None."""
         group, number, _ = self._at(frame)
         if 'fields' not in group or name not in group['fields']:
             return None

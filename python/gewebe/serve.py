@@ -14,7 +14,7 @@ from .programs import path_of
 
 
 class Scene:
-    """A client of ffe-run --serve --ack --listen PATH. time is that of the scene in s when the client came. A context
+    """A client of ffe-run --serve --ack --listen PATH. time is the time of the scene in s at the connection. A context
     manager."""
 
     def __init__(self, path, patience=10.0):
@@ -48,7 +48,7 @@ class Scene:
         self.socket.close()
 
     def close(self):
-        """Goes away; the scene stays as it is."""
+        """Disconnects; the scene stays as it is."""
         self._leave()
 
     def send(self, line):
@@ -58,8 +58,8 @@ class Scene:
         self.socket.sendall((line + '\n').encode())
 
     def ask(self, *lines):
-        """Sends all lines at once, then collects what they are answered until the last one is done: lists of words, one
-        for each line of the answers. Error: what the first line that is refused is told, once all are answered."""
+        """Sends all lines at once and returns the lines of their answers as lists of words. Raises Error with the message of the
+        first refused line, once all are answered."""
         if not lines:
             return []
         for line in lines:
@@ -100,7 +100,7 @@ class Shapes:
         self.file.close()
 
     def last(self):
-        """Coordinates of all nodes, [n, 3] in mm, by name of the object, of the last answer; none before the first."""
+        """Positions of all nodes, [n, 3] in mm, by object, of the last answer; empty before the first."""
         while True:
             sequence = self.words[3]
             if sequence == 0:
@@ -121,7 +121,7 @@ class Shapes:
 
 
 class Driven(Scene):
-    """A scene of a run of its own, which ends with it."""
+    """The scene of a run that `drive` started; closing it ends the run."""
 
     def __init__(self, *options, cwd=None):
         self.folder = tempfile.TemporaryDirectory(prefix='gewebe-')
@@ -152,7 +152,7 @@ class Driven(Scene):
         self.folder.cleanup()
 
     def shapes(self):
-        """Coordinates of all nodes, [n, 3] in mm, by name of the object, of the last answer."""
+        """Positions of all nodes, [n, 3] in mm, by object, of the last answer."""
         return self._shapes.last()
 
     def __exit__(self, kind, *_):
@@ -163,7 +163,7 @@ class Driven(Scene):
                 raise
 
     def close(self):
-        """Ends the run; what it records (-o, --record among options) is whole then. Error: what it complains of."""
+        """Ends the run and completes its files (-o, --record). Raises Error with the message of the run."""
         try:
             self.ask('end')
         except (Error, OSError):

@@ -22,7 +22,7 @@ class Store(File):
 
 
 class Stiffness:
-    """Of one object. group is the group of the file."""
+    """Stiffness of one object. group is its group in the file."""
 
     def __init__(self, group):
         self.group = group
@@ -34,7 +34,7 @@ class Stiffness:
         return k['p'][:], k['i'][:], k['x'][:], k['axis'][:]
 
     def nodes(self):
-        """Those that have columns, ascending."""
+        """Nodes with columns, ascending."""
         if 'compressed' in self.group:
             columns = self.group['compressed']
             touched = int(columns['first'][int(columns.attrs['chunks'])])
@@ -42,9 +42,9 @@ class Stiffness:
         return self.group['columns']['nodes'][:] if 'columns' in self.group else numpy.empty(0, int)
 
     def displacement(self, load):
-        """u = C f, [n, 3] in mm, under forces in 1e-6 N: a dictionary from nodes that have columns to x, y, z.
+        """u = C f, [n, 3] in mm, for forces in 1e-6 N: a dictionary from nodes with columns to x, y, z.
 
-        Of a solid whose columns have rows for its surface alone these are the surface's nodes.
+        n is the number of surface nodes if columns have rows for the surface alone.
         """
         missing = sorted(set(load) - set(self.nodes().tolist()))
         if missing:

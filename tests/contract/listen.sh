@@ -340,7 +340,7 @@ assert answers[1] == 'objects 1\no ela 12 12 0 awake\nok 2\n', answers
 P
   python3 drive.py || fail 'a client fails' "$(<stderr.txt)"
   ended 1
-  [[ $(<stderr.txt) == *'who asked for these steps has gone' ]] || fail "$(<stderr.txt)"
+  [[ $(<stderr.txt) == *'the client of these steps has disconnected' ]] || fail "$(<stderr.txt)"
   ! grep -q '^force .* 3000$' run.scene || fail 'half a line was carried out' # times may have these digits
   # What was done is what the record holds.
   ffe-run -q run.scene -o again.h5

@@ -1,7 +1,7 @@
 # What README and the pages show runs as it stands: pasted into a clean folder, in the order of the page.
 # shellcheck shell=bash
 
-# Splits the blocks of a page's EXAMPLES into files block.01, block.02 …
+# Splits the blocks of a page's EXAMPLES into files block.01, block.02 …; lines of .D1 are what the block before them prints: says.01 …
 blocks_of_page() { # FILE
   awk '
     function start() { close(out); out = sprintf("block.%02d", ++n) }
@@ -9,11 +9,15 @@ blocks_of_page() { # FILE
     !inside { next }
     /^\.Dl / { if (!line) start(); line = 1; print substr($0, 5) > out; next }
     { line = 0 }
+    /^\.D1 / { print substr($0, 5) > sprintf("says.%02d", n); next }
     /^\.Bd / { start(); block = 1; next }
     /^\.Ed/ { block = 0; next }
     block { print > out }' "$1"
   # The escapes of mdoc that stand in examples.
-  sed -i -e 's/\\e/\\/g' -e 's/\\&//g' -e 's/\\-/-/g' -e "s/\\\\(aq/'/g" -e 's/\\(dq/"/g' block.[0-9]*
+  local file
+  for file in block.[0-9]* says.[0-9]*; do
+    [[ ! -e $file ]] || sed -i -e 's/\\e/\\/g' -e 's/\\&//g' -e 's/\\-/-/g' -e "s/\\\\(aq/'/g" -e 's/\\(dq/"/g' "$file"
+  done
 }
 # The same for README: paragraphs of its indented blocks that begin with one of our programs, or a shell's word before one.
 blocks_of_readme() { # FILE
@@ -33,7 +37,7 @@ blocks_of_readme() { # FILE
 
 # Runs the blocks in order, all in one folder; they may warn. One that calls a program of another's which is not here is left out.
 paste_blocks() { # WHAT
-  local block other program
+  local block other program says
   set -- "$1" block.[0-9]*
   [[ -e ${2-} ]] || fail "$1 has no block to run"
   for block in "${@:2}"; do
@@ -48,6 +52,8 @@ paste_blocks() { # WHAT
     (cd paste && bash -euo pipefail "../$block" </dev/null) >out.txt 2>err.txt ||
       fail "$1: ends with status $?:" "$(<"$block")" "$(head -5 err.txt)"
     ! grep -v ': warning: ' err.txt >/dev/null || fail "$1: is not silent:" "$(<"$block")" "$(head -5 err.txt)"
+    says=says.${block#block.}
+    [[ ! -e $says ]] || cmp -s out.txt "$says" || fail "$1: does not print what the page says:" "$(<"$block")" "$(diff "$says" out.txt)"
   done
 }
 
@@ -78,6 +84,10 @@ test_gewebe() { for_release && page gewebe.7; }
 test_gewebe_contact() { for_release && page gewebe-contact.7; }
 test_gewebe_command() { for_release && page gewebe.1; }
 test_gewebe_serve() { for_release && page gewebe_serve.5; }
+test_gewebe_solids() { for_release && page gewebe-solids.7; }
+test_gewebe_nets() { for_release && page gewebe-nets.7; }
+test_gewebe_cutting() { for_release && page gewebe-cutting.7; }
+test_scene() { for_release && page scene.5; }
 
 test_each_page_of_a_program_is_pasted() {
   local tool
@@ -102,6 +112,11 @@ test_a_broken_example_is_seen() {
     grep -qF "$text" said.txt || fail 'another complaint:' "$(<said.txt)"
   done
   rm block.*
+  printf '%s\n' '.Sh EXAMPLES' '.Dl echo 3 mN' '.Pp' 'It prints' '.D1 4 mN' >page.1
+  blocks_of_page page.1
+  ! (paste_blocks page) >said.txt || fail 'passed: another output than the page says'
+  grep -q 'does not print' said.txt || fail 'another complaint:' "$(<said.txt)"
+  rm block.* says.*
   ! (paste_blocks page) >said.txt || fail 'a page without examples passed'
   printf '%s\n' 'Text' '' '    particles ─ metaball2vol' '' '    exp2ela nowhere.obj' '' '    make check' >readme.md
   blocks_of_readme readme.md

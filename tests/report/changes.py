@@ -45,9 +45,8 @@ def changes(w, page):
     results = [r["result"] for r in rows if r["result"] != ""]
     page.claim("results that are the same bytes", "–", f"{sum(said == 'equal' for said in results)} of {len(results)}")
     page.say(
-        "`tests/bench/two_builds.py` ran each case in turns, once with the programs of either build, seven times, and tells medians; "
-        "[two_builds.csv](two_builds.csv) holds them, the script says what each case runs. *Result*: the same bytes, or the largest difference of two numbers "
-        "over the largest of all, or nothing where formats differ. Memory is that of the largest process."
+        "`tests/bench/two_builds.py` ran each case in turns with the programs of both builds, seven times; "
+        "[two_builds.csv](two_builds.csv) has the medians, the script describes the cases. *Result*: the same bytes, or the largest relative difference of two numbers, or nothing where formats differ. Memory is that of the largest process."
     )
     head = ("case", "threads", "before, ms", "now, ms", "times", "processor before, ms", "now, ms", "before, MB", "now, MB", "result")
     table = []

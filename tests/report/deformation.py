@@ -63,7 +63,7 @@ def storage(w, page):
     page.claim("k objects of n/k nodes", "72 n²/k", f"{rows[0][3] / rows[-1][3]:.2f} times less with k = {rows[-1][0]}")
     page.claim(f"{10000 if not w.quick else nodes:,} nodes", "7.2 GB", f"{size:.1f} MB: the sparse factor, any column from it ({nodes:,} nodes)")
     page.claim("time of the preparation", "minutes to hours", f"{s['seconds']['total']:.2f} s for these {nodes:,} nodes")
-    page.say("A whole matrix is the inverse's columns for all nodes; a store needs them only where contacts are wanted soonest, its factor gives the rest.")
+    page.say("A whole matrix has the columns of the inverse for all nodes. A store needs them only for fast contacts; its factor gives the rest.")
     page.table(("objects k", "nodes", "72 Σ n², MB", "float64, MB", "float32, MB", "within 1e-4, MB", "factor alone, MB"), rows)
     data = [(name, [(r[0], r[c]) for r in rows]) for c, name in ((2, "72 n²/k"), (3, "float64"), (4, "float32"), (5, "within 1e-4"), (6, "factor alone"))]
     page.svg("size", plot.curves(f"Size of a store, {rows[0][1]:,} nodes in all", "objects k", "MB", data), "size of a store")
@@ -74,7 +74,7 @@ def storage(w, page):
         page.skip(f"columns by relaxation, {why}")
         return
     page.heading("Columns by relaxation, as in the report, and from a factor")
-    page.say("The report pulls at a node until all speeds are small (adaptive), or for a number of steps. A column from the factor has no such error.")
+    page.say("The report relaxes the system under a pull until all speeds are small (adaptive), or for a number of steps. A column from the factor does not have this error.")
     curves = {}
     for r in columns:
         if r["stage"].startswith("relaxation of "):
@@ -134,9 +134,7 @@ def cycles(w, page):
     except Skipped as why:
         page.skip(f"the DXF of figure 4-3, {why}")
     page.say(
-        "The report says “12 elastodynamic cycles, which is the frame rate”, on a Pentium III of 1 GHz; whether a cycle was one integration step "
-        "or more is not said. Both readings stand here: steps of integration, and pictures of 1/60 s. Each model has its bending springs besides, "
-        "gravity acts, nothing sleeps."
+        "The report says “12 elastodynamic cycles, which is the frame rate”, on a Pentium III of 1 GHz. It does not say if a cycle was one integration step or more, so both are shown: integration steps, and frames of 1/60 s. Each model also has bending springs, gravity acts, and nothing sleeps."
     )
     page.table(("model", "nodes", "springs along edges", "threads", "steps/s", "frames of 1/60 s per second", "safe step, ms", "report, cycles/s"), rows)
     w.run("make -s five-before.png five-after.png organ-before.png organ-after.png", folder=folder)
@@ -178,7 +176,7 @@ def hybrid(w, page):
     for what in dict.fromkeys(e[1] for e in even):
         mine = next(e for e in even if e[1] == what and e[2] == "hybrid float64")
         page.claim(f"break-even, {what}", "14 contacts", f"{mine[3]} contacts")
-    page.say("Left of the figure: cycles per second over the share of elastostatic nodes, nothing touched; the report found them proportional.")
+    page.say("Left of the figure: cycles per second over the share of elastostatic nodes without contact. The report found them proportional.")
     for n, stage in enumerate(dict.fromkeys(r["stage"] for r in rows)):
         if " over " not in stage:
             continue
@@ -209,5 +207,5 @@ def latency(w, page):
     page.claim("answers within a millisecond", "–", f"{1 - a['figure'] / a['answers']:.3%} of {a['answers']:,.0f}")
     page.claim("half, 99 %, 99.9 %, the largest, ms", "–", f"{a['p50_ms']:.3f}, {a['p99_ms']:.3f}, {a['p999_ms']:.3f}, {a['largest_ms']:.2f}")
     page.claim("processor's time of an answer: half, 99.9 %, ms", "–", f"{b['p50_ms']:.3f}, {b['p999_ms']:.3f}")
-    page.say(f"Three spheres slide over a net of {a['nodes']:,.0f} nodes; who asks does so by the clock through a pipe. {told.strip().splitlines()[-1]}.")
+    page.say(f"Three spheres slide over a net of {a['nodes']:,.0f} nodes; the client requests answers by the clock, through a pipe. {told.strip().splitlines()[-1]}.")
     page.svg("histogram", (w.folder / "latency/latency.svg").read_text(), "latencies")

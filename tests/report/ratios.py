@@ -136,8 +136,7 @@ def ratios(w, page):
     page.claim("middle of all, times as long as ours", "–", sorted(ratio for *_, ratio in peers)[len(peers) // 2])
     page.claim("fractions of limits", "–", f"{min(f for *_, f in limits):.2f} to {max(f for *_, f in limits):.2f}")
     page.say(
-        "Each line is one comparison that a page of work has, with its errors beside its times there; medians, most of seven. Who has one thread alone is measured on one. "
-        "This picture has times alone: what an error costs stands on the pages of work."
+        "Each line is one comparison of a page of work; times are medians, most of seven. Single-threaded peers are compared on one thread. Errors are on the pages of work."
     )
     page.table(("stage", "peer", "times as long as ours"), peers)
     page.table(("stage", "limit", "fraction"), limits)

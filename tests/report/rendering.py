@@ -63,14 +63,13 @@ def emboss(w, page):
     curves = [(name, sorted(points.items())) for name, points in fast.items()]
     page.svg("rates", plot.curves("Frames per second (figure 3-9)", "triangles", "frames/s", curves), "frames per second")
     sizes = sorted(next(iter(fast.values())))
-    page.say("512 × 512 pixels, a torus, the camera moves; errors are those of a picture against the formula in double precision, RMS of 255.")
+    page.say("A torus in 512 × 512 pixels with a moving camera. Errors compare a picture with the formula in double precision, as RMS of 255.")
     page.table(
         ("", *(f"frames/s, {n:,} triangles" for n in sizes), "error, RMS"),
         [[name, *(points.get(n) for n in sizes), error.get(name, {}).get(sizes[-1])] for name, points in fast.items()],
     )
     card, sizes_there = by_graphics_card()
-    page.say("Not of this run: the same benchmark where OpenGL is a graphics card, an NVIDIA H100 (driver 580.159.04) beside 16 cores, 2026-11-26. Its "
-             "filters weigh texels by 8 bits, hence the errors.")  # fmt: skip
+    page.say("The same benchmark on another machine, with OpenGL on a graphics card: an NVIDIA H100 (driver 580.159.04) beside 16 cores, 2026-11-26. Its texture filters have 8 bits, which causes the errors.")  # fmt: skip
     page.table(("", *(f"frames/s, {n:,} triangles" for n in sizes_there), "error, RMS"), card)
     three, one = fast.get("render-pass-3"), fast.get("render-pass-1")
     if three and one:
@@ -106,7 +105,7 @@ def lung(w, page):
     w.run(f"emboss-render --backend cpu --background 0.32,0.29,0.3 --orbit 15,8 --size {160 if w.quick else 320} {wet} lung.ply -o {picture}", folder=folder)
     together.append((picture, "a film of water instead"))
     page.claim("textures composed", "4: base, detail, reflection, structure", "the same 4")
-    page.say("Textures one by one (figure 4-7), and together (figure 4-8): lungs of particles, coordinates by three projections.")
+    page.say("Lungs made of particles, with textures one by one (figure 4-7) and together (figure 4-8), projected from three sides.")
     page.pictures(single)
     page.pictures(together)
     frames = 4 if w.quick else 24

@@ -48,9 +48,7 @@ def index(folder, machine_rows, peers, quick):
     """README.md: what all pages that are there claim."""
     lines = [
         "# The report's figures, measured again\n",
-        "`make report` wrote these pages: every figure of report FZKA 7190 that has something to measure, its numbers beside ours, and each stage "
-        "beside peers. The report's machines were a Pentium III of 1 GHz and two of 500 MHz, in 2005; what matters beside them is how results grow, "
-        "where lines cross, and what an error costs.\n",
+        "`make report` wrote these pages. They measure each figure of report FZKA 7190 again and compare each stage with peers. The report's machines were a Pentium III of 1 GHz and two of 500 MHz, in 2005, so growth, crossings and cost of accuracy matter more than absolute times.\n",
     ]
     if quick:
         lines.append("**Made by `QUICK=1`: sizes are small and no benchmark ran, so these numbers say nothing.**\n")

@@ -24,7 +24,7 @@ def measured(w, page, program, words=(), figures=lambda stage: True):
         if "skipped" in line or "absent" in line:
             page.skip(line)
     head = [c for c in rows[0] if c not in ("fastest_ms", "slowest_ms")][:10]
-    page.say(f"`bench_{program}`, medians; [{program}.csv]({program}.csv) holds all of it, `tests/bench/{program}.cpp` says what each row is.")
+    page.say(f"`bench_{program}`, medians; [{program}.csv]({program}.csv) has all rows, `tests/bench/{program}.cpp` describes them.")
     whole = lambda cell: int(cell) if isinstance(cell, float) and cell.is_integer() else cell
     page.table(head, [[whole(r[c]) for c in head] for r in rows])
     return rows

@@ -143,9 +143,9 @@ void plate(Section& section) {
 
 Section benchmarks() {
   Section section{"Benchmarks",
-                  "A beam of 200 × 10 × 10 mm under a force at its end; a tapered panel that is "
-                  "clamped and sheared, "
-                  "nearly incompressible; a thick elliptic plate under pressure.",
+                  "A beam of 200 × 10 × 10 mm under a force at its end; a tapered, nearly "
+                  "incompressible panel that is clamped and sheared (Cook's membrane); a thick "
+                  "elliptic plate under pressure (NAFEMS LE10).",
                   {},
                   {}};
   beams(section);

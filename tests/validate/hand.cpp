@@ -74,11 +74,10 @@ Held hold(const std::optional<Coupling>& coupling) {
 
 Section hand() {
   Section section{"A hand at one kilohertz",
-                  "A hand (50 g on 300 N/m and 1 N s/m) leads a sphere of 8 mm by 1.5 mm into a "
-                  "stiff net at rest and "
-                  "feels its force one sample of 1 ms late. Through a coupling of 500 N/m and 0.5 "
-                  "N s/m it comes to rest "
-                  "and stays so for ten seconds; led rigidly it does not.",
+                  "A hand (50 g on 300 N/m and 1 N s/m) pushes a sphere of 8 mm by 1.5 mm into a "
+                  "stiff net at rest and receives its force one sample of 1 ms late. Through a "
+                  "coupling of 500 N/m and 0.5 N s/m it comes to rest and stays there for ten "
+                  "seconds; with a rigid connection it does not.",
                   {},
                   {}};
   Plot plot{"hand.svg",

@@ -151,13 +151,12 @@ void over_depth(Block& block, double poisson, Section& section, Check&& check) {
 Section hertz() {
   Section section{
       "A ball pressed into a block",
-      "A rigid ball of 100 mm, pressed 0.04 mm into a quarter of a block that is 300 times as "
-      "large "
-      "as the touched circle, by the contact of `ffe-run`: the surface against the ball, without "
-      "friction, at an activation distance of 1e-4 cells (1e-3 is usual). The radius of the circle "
-      "is that of the pressure's second moment. Linear elements are beside it in the plots. Pieces "
-      "of surface that are flat touch the ball in their middles, so that their corners are pressed "
-      "in deeper: what that adds falls, as all of the error, by the square of their width, nearly.",
+      "Hertz contact: a rigid ball of 100 mm is pressed 0.04 mm into a quarter of a block, 300 "
+      "times as large as the contact circle, without friction, by the contact of `ffe-run` with an "
+      "activation distance of 1e-4 cells (1e-3 is usual). The radius of the circle comes from the "
+      "second moment of the pressure. The plots also show linear elements. Flat facets touch the "
+      "ball in their middles, so their corners are pressed in deeper; this error falls nearly with "
+      "the square of their width.",
       {},
       {}};
   const auto check = [&](const std::string& what, const std::string& reference, double figure,

@@ -298,20 +298,16 @@ void liver(Section& section) {
 
 Section organs() {
   Section section{"Organs under a load on a patch",
-                  "A spleen (190 cm³, ν = 0.45) whose lowest tenth is held, and a small liver (39 "
-                  "cm³, ν = 0.49) whose lowest "
-                  "quarter is, E = 5 kPa; 0.1 N presses on a patch. Surfaces become volumes "
-                  "(voxels of 1 mm), and these tetrahedra. "
-                  "Figures are the mean displacement of the patch along the force, mm.\n\n"
-                  "Everything is defined by places, since a load or a support that goes by nodes "
-                  "changes with the mesh: the load is "
-                  "a traction t (1 - (r/R)²)² on the surface within R = 6 mm of a point, "
-                  "integrated over triangles and scaled to 0.1 N; "
-                  "the mean is weighted by the same, so that it is the force's work over the "
-                  "force; and the tissue is still below a "
-                  "plane that cuts tetrahedra. Where nodes below the plane are held instead, lines "
-                  "show what that changes. Linear "
-                  "elements are shown beside.",
+                  "A spleen (190 cm³, ν = 0.45) is held at its lowest tenth, a small liver (39 "
+                  "cm³, ν = 0.49) at its lowest quarter; E = 5 kPa. 0.1 N presses on a patch. "
+                  "Surfaces become volumes with voxels of 1 mm, then tetrahedra. The figures are "
+                  "the mean displacement of the patch along the force in mm.\n\n"
+                  "Loads and supports are defined by positions, not by nodes, so that meshes can "
+                  "be compared. The load is a traction t (1 - (r/R)²)² on the surface within R = 6 "
+                  "mm of a point, integrated over triangles and scaled to 0.1 N. The mean has the "
+                  "same weights, so it is the work of the force over the force. Tissue is fixed "
+                  "below a plane that cuts tetrahedra; lines show the effect of holding nodes "
+                  "below the plane instead. Linear elements are shown for comparison.",
                   {},
                   {}};
   spleen(section);

@@ -193,12 +193,12 @@ void write_page(const std::string& folder, const std::vector<Section>& sections)
       throw Error(name + " can't be written into " + folder);
   };
   std::ostringstream page;
-  page << "# Do the finite elements compute what is right?\n\n"
-          "`make validate` wrote this page: the elements of `lib/solid` against theory, against "
-          "benchmarks with known answers, against another program and against an experiment. Each "
-          "line has its bound, and the command fails where one is not kept. Times are the "
-          "processor's on one thread: assembly, factor and solution; memory is that of the numbers "
-          "of the factor. Curves compare what an error costs.\n";
+  page
+      << "# Do the finite elements compute what is right?\n\n"
+         "`make validate` wrote this page. It compares the finite elements of `lib/solid` with "
+         "theory, benchmarks, another program and an experiment. Each line has a bound; the "
+         "command fails if one is exceeded. Times are processor times of assembly, factorisation "
+         "and solution on one thread; memory is that of the factor. Curves show error over time.\n";
   for (const Section& section : sections) {
     page << "\n## " << section.title << "\n\n" << section.text << "\n";
     if (!section.checks.empty())

@@ -89,13 +89,11 @@ std::string name_of(double friction) {
 Section passivity() {
   Section section{
       "Work over a closed path",
-      "A sphere of 5 mm is pressed 2 mm into a net (a ball of 20 mm, edges of 4 mm) that loses "
-      "nothing "
-      "by itself, led 4 mm aside, lifted, and led back, in 2 s. What the hand has given in the "
-      "end, "
-      "less the energy that the net has kept, over what it had given at most, is what contact "
-      "takes: without friction nothing, the smaller the steps, with friction as much in motion "
-      "as at rest. Static forces are those at the ends of steps, dynamic ones the means over them.",
+      "A sphere of 5 mm is pressed 2 mm into a net without damping (ball of 20 mm, edges of 4 mm), "
+      "moved 4 mm aside, lifted and moved back, in 2 s. The figure is the work of the hand less "
+      "the energy kept by the net, over the largest work. Without friction it vanishes with the "
+      "step; with friction it is the same in motion as at rest. Static forces are those at the "
+      "ends of steps, dynamic ones means over steps.",
       {},
       {}};
   Plot without{"passivity.svg",

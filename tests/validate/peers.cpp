@@ -201,16 +201,15 @@ void compare(Section& section, PeerElement element, const std::string& name) {
 } // namespace
 
 Section peers() {
-  Section section{
-      "Equal elements of another program",
-      "scikit-fem builds the same matrix on the same mesh: of linear elements, of plain "
-      "quadratic ones, and of ours, whose weak form (quadratic displacements and a bubble, "
-      "discontinuous linear pressure) is written down there anew and condensed. A box of "
-      "distorted tetrahedra of two materials, one of them nearly incompressible, held on "
-      "one side, under a traction on the other." +
-          (peer_name().empty() ? "" : " The peer on this page: " + peer_name() + "."),
-      {},
-      {}};
+  Section section{"Equal elements of another program",
+                  "scikit-fem builds the same matrix on the same mesh: of linear elements, of "
+                  "plain quadratic ones, and of ours, whose weak form (quadratic displacements and "
+                  "a bubble, discontinuous linear pressure) is written independently and "
+                  "condensed. The mesh is a box of distorted tetrahedra of two materials, one "
+                  "nearly incompressible, held on one side, under a traction on the other." +
+                      (peer_name().empty() ? "" : " The peer on this page: " + peer_name() + "."),
+                  {},
+                  {}};
   compare(section, PeerElement::linear, "linear");
   compare(section, PeerElement::plain, "plain quadratic");
   compare(section, PeerElement::mixed, "quadratic with bubble and pressure");

@@ -85,19 +85,14 @@ Section silicone() {
   constexpr std::uint32_t across = 6;
   Section section{
       "A silicone beam, measured",
-      "100 × 30 × 30 mm, clamped at one end, under its own weight, and with 52 g hung on the upper "
-      "edge of the other: "
-      "how far three markers come down, which stand 6 mm off the free end's edges and sides. E = "
-      "263,824 Pa was fitted to the "
-      "same beam's motion by those who measured it, ν = 0.499. Small strains leave out that the "
-      "beam turns and so are "
-      "judged under its weight alone; a Neo-Hookean solid (`lib/solid/hyperelastic_statics.h`) "
-      "turns, and carries the "
-      "markers with its end; so does the linear body with large rotations "
-      "(`lib/solid/rotation_warp.h`, `rotation=warp` of ffe-run), here with the one E = 270,000 Pa "
-      "that "
-      "fits the droops of both recordings. The reference is the mean of two "
-      "trials; these differ by up to 2.2 %.",
+      "A beam of 100 × 30 × 30 mm is clamped at one end, under its own weight and with 52 g at the "
+      "upper edge of the other. The figures are the droops of three markers, 6 mm off the edges "
+      "and sides of the free end. E = 263,824 Pa was fitted to the motion of the same beam by the "
+      "authors of the measurement; ν = 0.499. Small strains neglect rotation and have a bound "
+      "under weight alone. A Neo-Hookean solid (`lib/solid/hyperelastic_statics.h`) and the linear "
+      "solid with large rotations (`lib/solid/rotation_warp.h`, `rotation=warp` of ffe-run) "
+      "rotate; the latter has E = 270,000 Pa, which fits the droops of both recordings. The "
+      "reference is the mean of two trials, which differ by up to 2.2 %.",
       {},
       {}};
   const std::string source =

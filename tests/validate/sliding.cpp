@@ -193,12 +193,10 @@ Slide slide(const Body& body, double radius, double friction, double length, dou
 Section sliding() {
   Section section{
       "Instruments slid over a surface",
-      "Spheres, and capsules of three radii's length, pressed in by a third of their radius, then "
-      "slid "
-      "in steps of 0.04 mm over a net (a ball of 60 mm, 2,562 nodes), a ball of tetrahedra (30 mm) "
-      "and blocks of tetrahedra, over edges and nodes as they come, by the static contact of "
-      "`ffe-run`. A step changes the normal force by so much at most; the forces on each node are "
-      "judged at each step.",
+      "Spheres, and capsules three radii long, are pressed in by a third of their radius and slide "
+      "in steps of 0.04 mm over a net (ball of 60 mm, 2,562 nodes), a ball of tetrahedra (30 mm) "
+      "and blocks of tetrahedra, by the static contact of `ffe-run`. The figures are the largest "
+      "change of the normal force in a step; the forces on each node are checked at each step.",
       {},
       {}};
   const std::string source = "own bounds";

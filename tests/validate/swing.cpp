@@ -145,17 +145,15 @@ std::vector<double> half_swings(const Path& path, double middle) {
 Section swings() {
   Section section{
       "The silicone beam, let go",
-      "The same beam, held straight and let go: its free end falls and swings. 540 quadratic "
-      "tetrahedra, corotational, E = 270,000 Pa, ν = 0.499, steps of 1/3200 s, so short that they "
-      "damp little themselves, and one damping ratio, " +
+      "The same beam is held straight and released: its free end falls and swings. The model has "
+      "540 quadratic tetrahedra, corotational, E = 270,000 Pa, ν = 0.499. Steps of 1/3200 s damp "
+      "little themselves; the damping ratio is " +
           text_of(ratio) +
-          ", for both loads, of which the steps' own share is taken off. Frequencies and rest are "
-          "those of a swing that dies away, fitted to each path alike (`lib/solid/swing_fit.h`), "
-          "measured ones the mean of two trials. Decay: the way from each turning point to the "
-          "next, over the first such way of its own path, and the largest difference from what "
-          "was measured among the first 12, six swings; the hand that lets go is not as quick as "
-          "the simulation, so that measured swings begin smaller. Times count from where the end "
-          "is 1 mm down.",
+          " for both loads, less the share of the steps. Frequency and rest position come from a "
+          "decaying oscillation fitted to each path (`lib/solid/swing_fit.h`); measured ones are "
+          "the mean of two trials. Decay compares the distances between turning points, relative "
+          "to the first, over six swings. The release by hand is slower than in the simulation, "
+          "so measured swings begin smaller. Times count from a droop of 1 mm.",
       {},
       {}};
   for (const bool loaded : {false, true}) {

@@ -11,9 +11,8 @@ namespace gewebe::validate {
 Section constant_strain() {
   Section section{
       "Patch test",
-      "A box of distorted tetrahedra whose sides are displaced by a linear function: every node "
-      "inside "
-      "must follow it. The error is the largest deviation over the largest displacement.",
+      "The sides of a box of distorted tetrahedra are displaced by a linear function. Every inner "
+      "node must follow it. The error is the largest deviation over the largest displacement.",
       {},
       {}};
   for (const bool quadratic : {false, true})
@@ -31,14 +30,11 @@ Section constant_strain() {
 Section manufactured() {
   Section section{
       "Order of convergence",
-      "Displacements of two standing waves in a cube, one of shear and one of volume, "
-      "with the force per "
-      "volume that goes with them. The error is the L2 norm of the deviation over that "
-      "of the displacement; "
-      "theory has it fall with the square (linear) and the cube (quadratic) of the "
-      "edges' length, at every "
-      "ν < 1/2 only where nothing locks. The order is that of the two finest meshes, "
-      "and may be 0.2 lower; that of linear elements beyond ν = 0.3 is shown alone, for they lock.",
+      "Manufactured solution: two standing waves in a cube, one of shear and one of volume. The "
+      "error is the relative L2 norm. In theory it falls with the square (linear) or cube "
+      "(quadratic) of the edge length, at every ν < 1/2 if the elements do not lock. The order is "
+      "that of the two finest meshes and may be 0.2 lower. Linear elements beyond ν = 0.3 are "
+      "shown without a bound, because they lock.",
       {},
       {}};
   const std::string source =

@@ -18,7 +18,7 @@ namespace gewebe {
 struct MaterialVolumes {
   /// \throw UsageError, Error if they don't go together
   explicit MaterialVolumes(const MeshArguments& arguments);
-  /// \param space  of the places that source() is asked about
+  /// \param space  of the positions given to source()
   void read(cli::Run& run, Space space);
   /// Nothing where there are none. \pre read; `solid`, which is meshed at `isovalue`, outlives it
   MaterialSource source(const Grid& solid, double isovalue) const;

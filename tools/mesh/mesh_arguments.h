@@ -1,5 +1,5 @@
 #pragma once
-// What mc-opt is asked for.
+// Command line of mc-opt.
 
 #include "formats/stream/kind.h"
 

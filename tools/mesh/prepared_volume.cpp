@@ -14,7 +14,7 @@
 namespace gewebe {
 namespace {
 
-/// Of the surface that is asked for, on the volume as it came.
+/// Topology of the requested surface on the volume as read.
 Topology topology_of(const Context& context, const Grid& grid, const MeshArguments& arguments) {
   if (arguments.box.empty())
     return topology(marching_cubes(context, grid, arguments.isovalue).mesh);
@@ -43,7 +43,7 @@ void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
 void warn_of_components(cli::Run& run, std::uint64_t kept, std::uint64_t dropped) {
   run.say(std::to_string(dropped) + " components dropped, " + std::to_string(kept) + " kept");
   if (kept == 0 && dropped > 0)
-    run.warn("no component is as large as --components asks");
+    run.warn("no component is as large as --components requires");
 }
 
 PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input) {

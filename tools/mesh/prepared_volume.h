@@ -1,5 +1,5 @@
 #pragma once
-// The volume that mc-opt meshes, and what it says of its surface.
+// The volume that mc-opt meshes, and reports about its surface.
 
 #include "base/space.h"
 #include "formats/stream/stream.h"
@@ -24,7 +24,7 @@ struct PreparedVolume {
 
 PreparedVolume prepare(cli::Run& run, const MeshArguments& arguments, Input& input);
 
-/// Brings what was meshed to the space that --space asks for, and says which it is.
+/// Converts the mesh to the space of --space, and reports the space.
 void bring_to_space(cli::Run& run, Space from, const MeshArguments& arguments,
                     std::vector<Vec3>& points,
                     std::vector<std::array<float, 3>>* normals = nullptr);

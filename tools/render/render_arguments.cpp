@@ -186,33 +186,33 @@ void declare_textures(Program& p, RenderArguments& a) {
     return [&a, layer](std::int32_t n) -> std::string& { return (a.materials[n].*layer).path; };
   };
   p.option("--texture", a.base.path, "[N=]FILE",
-           "colours: PNG or PNM, noise[:key=value,...] or veins[:...]; N=: of material N")
+           "colours: PNG, PNM, noise[:key=value,...] or veins[:...]; N=: for material N")
       .numbered(path_of(&RenderMaterial::base));
-  p.option("--detail", a.detail.path, "[N=]FILE", "colours added to them, likewise")
+  p.option("--detail", a.detail.path, "[N=]FILE", "colours that are added")
       .numbered(path_of(&RenderMaterial::detail));
-  p.option("--reflection", a.reflection.path, "[N=]FILE", "what a moist surface mirrors, added too")
+  p.option("--reflection", a.reflection.path, "[N=]FILE", "colours that a moist surface mirrors")
       .numbered(path_of(&RenderMaterial::reflection));
   p.option("--structure", a.structure.path, "[N=]FILE",
-           "heights to emboss: brightness of a PNG or PNM; noise or veins")
+           "heights to emboss: brightness of an image, noise or veins")
       .numbered(path_of(&RenderMaterial::structure));
   p.option("--by", a.words.by, "WORD", "what N counts: material, part, object")
       .one_of(group_by_names());
   p.option("--sphere", a.words.sphere, "LIST",
-           "textures seen as in a mirror: texture, detail, reflection, structure; none");
+           "textures seen as in a mirror: texture, detail, reflection, structure, none");
   p.option("--filter", a.words.filter, "WORD", "nearest, linear, mipmap; or TEXTURE=WORD,...");
   p.option("--wrap", a.words.wrap, "WORD", "repeat, clamp, mirror; or TEXTURE=WORD,...");
   p.option("--offset", a.offset, "D", "shift of the heights in texture coordinates").range(-1, 1);
-  p.option("--offset-texels", a.offset_texels, "N", "the same in texels of the structure");
-  p.option("--light", a.light, "X,Y,Z", "place of the light in mm, else above the camera, left");
+  p.option("--offset-texels", a.offset_texels, "N", "the same in pixels of the structure");
+  p.option("--light", a.light, "X,Y,Z",
+           "position of the light in mm; default: above the camera, left");
   p.option("--light-direction", a.words.light_direction, "X,Y,Z", "vector to a light far away");
   p.option("--shade", a.words.shade, "K", "share of Lambert's law, 0 to 1 (default 0.75)")
       .range(0, 1);
-  p.option("--fill", a.words.fill, "F", "of a second light in the shade, 0 to 1 (default 0.35)")
+  p.option("--fill", a.words.fill, "F", "strength of the second light, 0 to 1 (default 0.35)")
       .range(0, 1);
-  p.flag("--plain", a.words.plain,
-         "the relief alone: no shade, white on white, a sample a pixel, unless told otherwise");
+  p.flag("--plain", a.words.plain, "relief alone: no shade, white on white, one sample per pixel");
   p.option("--color", a.words.color, "[N=]R,G,B",
-           "factor of the colours, 0 to 1, else the material's colour where there is no image")
+           "colour, 0 to 1 each; default: that of the material, 1,1,1 with an image")
       .range(0, 1)
       .numbered([&a](std::int32_t n) -> std::optional<Vec3>& { return a.materials[n].color; });
   p.option("--background", a.words.background, "R,G,B", "0 to 1 (default 0.8,0.8,0.8)").range(0, 1);
@@ -220,10 +220,10 @@ void declare_textures(Program& p, RenderArguments& a) {
            "auto (the mesh's coordinates, else box), box, sphere, cylinder, triplanar")
       .one_of({"auto", "box", "sphere", "cylinder", "triplanar"});
   p.option("--uv-scale", a.mapping.edge, "MM",
-           "edge of the texture for box and triplanar, else half the mesh")
+           "edge of the texture for box and triplanar; default: half the mesh")
       .positive();
   p.option("--uv-sharpness", a.words.uv_sharpness, "P",
-           "of triplanar: the power that blends its projections, else 4")
+           "power that blends triplanar projections; default: 4")
       .range(1, 64);
 }
 
@@ -239,30 +239,33 @@ void declare(Program& p, RenderArguments& a) {
   declare_camera(p, a);
   p.option("--backend", a.words.backend, "NAME", "gl, cpu; auto: gl on a graphics card")
       .one_of(backend_names());
-  p.option("--passes", a.words.passes, "N", "with OpenGL: 3, 2, 1, or shader")
+  p.option("--passes", a.words.passes, "N", "algorithm of OpenGL: 3, 2, 1 or shader")
       .one_of(gl_mode_names());
-  p.option("--gl-target", a.words.target, "KIND", "of OpenGL's colours: float, 8bit")
+  p.option("--gl-target", a.words.target, "KIND", "precision of OpenGL's colours: float, 8bit")
       .one_of({"float", "8bit"});
-  p.option("--rgb-scale", a.words.rgb_scale, "S", "of --passes 1: 2, or 1 (darker)").range(1, 2);
-  p.option("--tbn", a.words.tbn, "WHERE",
-           "frame of the light: vertex, pixel; auto: as the mode can")
+  p.option("--rgb-scale", a.words.rgb_scale, "S",
+           "factor of colours with --passes 1: 2, or 1 (darker)")
+      .range(1, 2);
+  p.option("--tbn", a.words.tbn, "WHERE", "where the light is transformed: vertex, pixel, auto")
       .one_of({"auto", "vertex", "pixel"});
-  p.option("--compare", a.words.compare, "MODES", "side by side, such as 3,2,1,shader,cpu");
+  p.option("--compare", a.words.compare, "MODES", "modes side by side, such as 3,2,1,shader,cpu");
   p.option("--clip", a.words.clip, "X,Y,Z,NX,NY,NZ",
-           "of tetrahedra, solids: cut them open; what lies on that side of a point goes")
+           "cut solids open by a plane; remove the side that the direction points to")
       .count(6);
-  p.option("--object", a.reading.object, "NAME", "of a result: this object, else all");
-  p.flag("--no-instruments", a.no_instruments, "of a result: draw its objects alone");
+  p.option("--object", a.reading.object, "NAME", "draw this object of a result alone");
+  p.flag("--no-instruments", a.no_instruments, "draw no instruments of a result");
   p.option("--instrument-color", a.instrument_color, "R,G,B",
-           "of a result's instruments, 0 to 1 (default 0.75,0.77,0.8)")
+           "colour of instruments, 0 to 1 each (default 0.75,0.77,0.8)")
       .range(0, 1);
-  p.option("--frame", a.reading.frame, "K", "of a result, from 0; -1 is the last, the default")
+  p.option("--frame", a.reading.frame, "K",
+           "frame of a result from 0; -1, the default, is the last")
       .range(-1, 1e15);
-  p.option("--frames", a.frames, "A:B:STEP", "of a result: a picture for each, or all");
+  p.option("--frames", a.frames, "A:B:STEP", "a picture of each of these frames, or all");
   p.option("--turn", a.turn, "N", "the camera goes around once in N pictures").range(1, 100000);
   p.option("--turn-light", a.turn_light, "N", "the light goes around once in N pictures")
       .range(1, 100000);
-  p.option("--unit", a.reading.unit, "UNIT", "of the mesh: m, cm, mm").one_of(surface_unit_names());
+  p.option("--unit", a.reading.unit, "UNIT", "unit of the mesh: m, cm, mm")
+      .one_of(surface_unit_names());
   declare_field(p, a);
   declare_volume(p, a);
   p.check([&a] { complete(a); });

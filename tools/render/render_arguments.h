@@ -1,5 +1,5 @@
 #pragma once
-// What emboss-render is told.
+// Command line of emboss-render.
 
 #include "render/picture.h"
 #include "shading/camera.h"
@@ -33,7 +33,7 @@ struct RenderMaterial {
   std::optional<double> wet, wet_roughness;
 };
 
-/// What a volume alone is asked for, as words and as what they mean.
+/// Options of volumes, as words and as their meaning.
 struct RenderVolume {
   std::string slice, maximum, translucent, ramp;
   std::vector<double> range;
@@ -45,7 +45,7 @@ struct RenderArguments {
   RenderLayer base, detail, reflection, structure;
   std::map<std::int32_t, RenderMaterial> materials;
   SurfaceMaterial common;      ///< colours; its textures are read later
-  bool field_material = false; ///< --field material: the colours of materials, asked for
+  bool field_material = false; ///< --field material: colours of materials
   bool tissue_colors = false;  ///< what has neither colour nor texture has that of its material
   std::optional<Vec3> light;
   std::optional<double> wet, wet_roughness; ///< the film on all

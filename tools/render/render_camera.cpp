@@ -21,11 +21,12 @@ void declare_camera(Program& p, RenderArguments& a) {
       .one_of(view_names());
   p.option("--orbit", a.words.orbit, "AZ,EL", "degrees to walk around to the right, and up")
       .count(2);
-  p.option("--distance", a.camera.distance, "MM", "of the eye, else so that all is seen")
+  p.option("--distance", a.camera.distance, "MM", "distance of the camera; default: all is visible")
       .positive();
-  p.option("--eye", a.camera.eye, "X,Y,Z", "place of the camera in mm");
-  p.option("--target", a.camera.target, "X,Y,Z", "where it looks, else the middle at rest");
-  p.option("--up", a.camera.up, "X,Y,Z", "up in the picture, else z (top and bottom: y)");
+  p.option("--eye", a.camera.eye, "X,Y,Z", "position of the camera in mm");
+  p.option("--target", a.camera.target, "X,Y,Z",
+           "point in the middle of the picture; default: middle at rest");
+  p.option("--up", a.camera.up, "X,Y,Z", "direction up; default: z (top and bottom: y)");
   p.option("--fov", a.words.fov, "DEG",
            "angle across the shorter side, with --endoscope 70 (default 30)")
       .range(1, 170);

@@ -1,5 +1,5 @@
 #pragma once
-// Where the camera stands and how large the picture is, as emboss-render is told.
+// Camera and size of the picture, from the command line of emboss-render.
 
 #include "tools/render/render_arguments.h"
 

@@ -14,7 +14,7 @@ void declare_field(Program& p, RenderArguments& a) {
   std::vector<std::string> names = result_field_names();
   names.emplace_back("material");
   p.option("--field", a.reading.field, "NAME",
-           "colours by material, or of a result by a value at its nodes")
+           "colour by material; of results by displacement or von-mises")
       .one_of(names);
 }
 

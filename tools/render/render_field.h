@@ -14,7 +14,7 @@ void declare_field(Program& program, RenderArguments& arguments);
 /// \throw UsageError for what a field leaves no room for
 void complete_field(RenderArguments& arguments);
 
-/// Gives the surface the ramp as its base and the reading the field's range: as it was told, else
+/// Gives the surface the ramp as its base and the reading the field's range: that of --range, else
 /// that of the drawn objects in the frames. \throw Error with place
 void take_field(Run& run, RenderArguments& arguments, const Input& input,
                 const std::vector<std::int64_t>& frames);

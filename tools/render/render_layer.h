@@ -11,7 +11,7 @@ namespace gewebe::cli {
 /// Base, detail, reflection, structure.
 using RenderLayers = std::array<const RenderLayer*, 4>;
 
-/// Tells "noise" and "veins" from files, and the drawing what the texture needs. `word` is
+/// Distinguishes "noise" and "veins" from files, and sets what the texture needs. `word` is
 /// "texture", "detail", "reflection" or "structure". \throw UsageError
 void complete_layer(RenderArguments& arguments, const std::string& word, RenderLayer& layer);
 

@@ -20,25 +20,25 @@ bool is_wet(const RenderArguments& a) {
 } // namespace
 
 void declare_lighting(Program& p, RenderArguments& a) {
-  p.option("--wet", a.wet, "[N=]W", "a film of water that mirrors light and background, 0 to 1")
+  p.option("--wet", a.wet, "[N=]W", "film of water that mirrors light and background, 0 to 1")
       .range(0, 1)
       .numbered([&a](std::int32_t n) -> std::optional<double>& { return a.materials[n].wet; });
   p.option("--wet-roughness", a.wet_roughness, "[N=]R",
-           "of that film: 0.1, as a mirror, to 1 (default 0.3)")
+           "roughness of the film, 0.1 to 1 (default 0.3)")
       .range(0.1, 1)
       .numbered(
           [&a](std::int32_t n) -> std::optional<double>& { return a.materials[n].wet_roughness; });
-  p.option("--occlusion", a.drawing.occlusion, "O", "darken what near surfaces hide, 0 to 1")
+  p.option("--occlusion", a.drawing.occlusion, "O", "darken points hidden by near surfaces, 0 to 1")
       .range(0, 1);
   p.option("--occlusion-radius", a.occlusion_radius, "MM",
-           "how near, else a quarter of the longest side")
+           "distance up to which surfaces hide; default: a quarter of the longest side")
       .positive();
-  p.option("--inside", a.inside, "R,G,B", "colour of surfaces seen from within, else that outside")
+  p.option("--inside", a.inside, "R,G,B",
+           "colour of surfaces seen from within; default: as outside")
       .range(0, 1);
-  p.flag("--endoscope", a.endoscope,
-         "light at the camera that falls off, a round field, wide angle");
+  p.flag("--endoscope", a.endoscope, "light at the camera, round field, wide angle");
   p.option("--reach", a.reach, "MM",
-           "where an endoscope's light is full, else the target's distance")
+           "distance up to which an endoscope's light is full; default: the target")
       .positive();
 }
 

@@ -37,7 +37,7 @@ void add_instrument_material(SurfaceMaterial& common, const RenderArguments& arg
 
 /// Colours for materials that were given neither colour nor image, see tissue_color().
 /// Where no number was given there is a group for each colour, whatever `--by` says: the triangles'
-/// materials are numbered anew.
+/// materials are renumbered.
 class TissueColors {
 public:
   /// \param surfaces the first ones that are drawn

@@ -14,7 +14,7 @@
 namespace gewebe::cli {
 namespace {
 
-/// The material with its textures; one that was not asked for is not read.
+/// The material with its textures; textures that are not requested are not read.
 SurfaceMaterial material_of(const RenderArguments& a, const std::vector<Surface>& surfaces,
                             const Context& context) {
   SurfaceMaterial material = a.common;
@@ -192,7 +192,7 @@ const Image& Pictures::of(std::vector<Surface> surfaces) {
     mapped_ = run_.timed(
         "prepare", [&] { return add_texcoords(surfaces_, arguments_.mapping, run_.context()); });
   std::vector<Image> images;
-  std::array<const Drawing*, 2> drawings{}; // by what stands at the vertices
+  std::array<const Drawing*, 2> drawings{}; // by kind of vertex data
   for (Mode& mode : modes_) {
     drawing_.per_pixel = mode.painter->per_pixel();
     const Drawing*& drawing = drawings[drawing_.per_pixel ? 1 : 0];

@@ -1,5 +1,5 @@
 #pragma once
-// Pictures of surfaces as emboss-render was told to make them.
+// Draws the pictures of surfaces that emboss-render's options request.
 
 #include "render/picture.h"
 #include "shading/image.h"
@@ -15,7 +15,7 @@
 
 namespace gewebe::cli {
 
-/// Camera and light stand where the first surfaces at rest place them, and turn as they were told.
+/// Camera and light stand where the first surfaces at rest place them, and turn by the options.
 /// What a sequence keeps is kept: textures; coordinates and vertices as they are split while the
 /// triangles are the same; frames of tangents while no point moves; the picture while camera and
 /// light stand still too.

@@ -52,21 +52,20 @@ ColorRamp ramp_of(const std::string& word, const Context& context) {
 
 void declare_volume(Program& p, RenderArguments& a) {
   p.option("--slice", a.volume.slice, "AXIS=MM",
-           "of a volume: across x, y, z or view, at a place or in the middle")
+           "slice of a volume across x, y, z or view; default: in the middle")
       .such_as({"x", "y", "z", "view"});
   p.option("--maximum", a.volume.maximum, "AXIS",
-           "of a volume: the greatest values along x, y, z, or view (the default)")
+           "greatest values of a volume along x, y, z or view (the default)")
       .such_as({"x", "y", "z", "view"});
   p.option("--translucent", a.volume.translucent, "AXIS",
-           "of a volume: its light, and what it hides, along x, y, z or view")
+           "emission and absorption of a volume along x, y, z or view")
       .such_as({"x", "y", "z", "view"});
   p.option("--extinction", a.volume.view.transfer.extinction, "K",
-           "of translucent volumes, 1/mm at the last colour, else 8 over its longest side")
+           "extinction per mm at the last colour; default: 8 over the longest side")
       .positive();
-  p.option("--ramp", a.volume.ramp, "RAMP",
-           "colours of its values or a field's: gray, heat, rainbow, or an image")
+  p.option("--ramp", a.volume.ramp, "RAMP", "colours of values: gray, heat, rainbow, or an image")
       .such_as({"gray", "heat", "rainbow"});
-  p.option("--range", a.volume.range, "A,B", "values with the first and last colour, else all")
+  p.option("--range", a.volume.range, "A,B", "values of the first and last colour; default: all")
       .count(2);
 }
 

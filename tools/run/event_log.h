@@ -1,5 +1,5 @@
 #pragma once
-// Who touched what when, as CSV: gewebe_results(5). One row for each change of a scene as it took
+// Event log as CSV: gewebe_results(5). One row for each change of a scene as it took
 // effect, and for what was refused or warned of.
 
 #include "formats/stream/stream.h"
@@ -20,7 +20,7 @@ public:
   void object(double time, const std::string& name, const std::string& model, Method method);
   /// An object's model was written to this file.
   void model(double time, const std::string& name, const std::string& file);
-  /// Its stress at some nodes is told from now on.
+  /// Its stress at some nodes is emitted from now on.
   void stress(double time, const std::string& name, const std::vector<std::uint32_t>& nodes);
   void change(double time, const ChangeRow& row);
   /// What cutting did to an object.
@@ -30,7 +30,7 @@ public:
   /// `what` is "error" or "warning".
   void message(double time, const char* what, std::string_view text);
 
-  /// What was told since the last keep or drop happened, or did not.
+  /// Confirms or discards the events since the last keep or drop.
   void keep();
   void drop() { rows_.clear(); }
   /// From now on a signal or a crash leaves what was kept, see Output.

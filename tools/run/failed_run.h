@@ -36,13 +36,13 @@ private:
 void outlive_failures(ResultWriter* result, RunLogs& logs);
 
 /// Keeps logs and, if `result` is there, frames. The error's message, or "interrupted" behind a
-/// signal, is completed by what was kept. Where the reader of answers has gone (SIGPIPE), the
-/// program ends by the signal without a message, and logs stay FILE.part.
-/// \param time  of the scene, s
+/// signal, is completed by a note of the kept files. Where the reader of answers has gone
+/// (SIGPIPE), the program ends by the signal without a message, and logs stay FILE.part. \param
+/// time  of the scene, s
 [[noreturn]] void end_failed_run(const Error& error, ResultWriter* result, RunLogs& logs,
                                  double time);
 
-/// Tells with -v and in --stats what `recover_result` found.
+/// Reports with -v and in --stats what `recover_result` found.
 void report_recovered(cli::Run& run, const KeptResult& kept);
 
 } // namespace gewebe

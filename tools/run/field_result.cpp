@@ -72,7 +72,7 @@ public:
     if (frames_ < 2 || !output_.has_temporary())
       return std::nullopt;
     output_.start_over();
-    context_.cancelled = nullptr; // by what has ended the run
+    context_.cancelled = nullptr; // by the end of the run
     write();
     return KeptResult{"the field", time_, false, "", output_.commit_partial()};
   }

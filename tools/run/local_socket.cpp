@@ -35,11 +35,11 @@ sockaddr_un address_of(const std::string& path) {
   throw Error(path, std::string(what) + ": " + std::strerror(errno));
 }
 
-/// Removes a socket that nobody listens on. \throw Error if somebody does, or it is none
+/// Removes a socket without a listener. \throw Error if there is one, or it is no socket
 void remove_stale(const std::string& path, const sockaddr_un& address) {
   struct stat info {};
   if (::lstat(path.c_str(), &info) != 0)
-    return; // bind tells what is wrong
+    return; // bind reports what is wrong
   if (!S_ISSOCK(info.st_mode))
     throw Error(path, "is there and is no socket, expected another name");
   const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -53,7 +53,7 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
   if (errno != ECONNREFUSED)
     fail(path, "is there and cannot be looked at");
   if (::unlink(path.c_str()) != 0 && errno != ENOENT)
-    fail(path, "nobody listens there, but it cannot be removed");
+    fail(path, "no process listens there, but it cannot be removed");
 }
 
 /// Renames a file and replaces none, where the file system can do that.
@@ -138,7 +138,7 @@ LocalListener::Arrival LocalListener::accept() {
   arrival.client = next();
   if (!arrival.client && errno != EAGAIN)
     fail(path_, "no file descriptor is left to turn a client away");
-  if (!arrival.client) // nobody waits, which is seen with a descriptor alone
+  if (!arrival.client) // no client waits, which is seen with a descriptor alone
     spare_ = spare_descriptor();
   return arrival;
 }
@@ -147,7 +147,7 @@ std::optional<std::string> foreign_peer(const Descriptor& client) {
   ucred peer{};
   socklen_t size = sizeof peer;
   if (::getsockopt(client.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
-    return "a user who is not known may not drive the scene";
+    return "an unknown user may not drive the scene";
   if (peer.uid == ::geteuid())
     return std::nullopt;
   return "user " + user_name(peer.uid) + " may not drive the scene, expected " +

@@ -1,5 +1,5 @@
 #pragma once
-// A Unix stream socket by name: who listens, who may connect, and what is between them.
+// A Unix stream socket by name: listening, permissions, and connections.
 
 #include "formats/stream/descriptor.h"
 
@@ -15,8 +15,8 @@ namespace gewebe {
 /// formats/stream/removal.h has it.
 class LocalListener {
 public:
-  /// In place of a socket that nobody listens on any more. \throw Error (place = path) if somebody
-  /// does, something else is there, the name is too long or the folder can't be written
+  /// Replaces a socket without a listener. \throw Error (place = path) if there is a
+  /// listener, something else is there, the name is too long or the folder can't be written
   explicit LocalListener(const std::string& path);
   ~LocalListener();
   LocalListener(const LocalListener&) = delete;
@@ -36,7 +36,7 @@ public:
 private:
   std::string path_;
   Descriptor socket_;
-  Descriptor spare_;                    ///< makes room for who is turned away for want of one
+  Descriptor spare_;                    ///< reserve, to refuse a client when descriptors run out
   std::uint64_t device_ = 0, file_ = 0; ///< of the path
   int removal_ = -1;
 };

@@ -20,13 +20,13 @@ std::vector<Kind> kinds_written() {
 void ResultChoice::declare(cli::Program& program) {
   program.output_kinds(kinds_written());
   program.option("--field", field_, "IMAGE",
-                 "with a result of kind nii: the image whose voxels the displacement field has");
+                 "for results of kind nii: image whose voxels the field has");
   program
       .option("--field-at", field_at_, "STATE",
-              "where its vectors stand: deformed, and lead back to rest; rest, and lead from there")
+              "vectors of the field: deformed (point back to rest) or rest (point to the tissue)")
       .one_of({"deformed", "rest"});
   program
-      .option("--field-outside", field_outside_, "VALUE", "vectors where no element is: zero, nan")
+      .option("--field-outside", field_outside_, "VALUE", "vectors outside all elements: zero, nan")
       .one_of({"zero", "nan"});
 }
 

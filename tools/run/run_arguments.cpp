@@ -8,23 +8,26 @@ namespace gewebe {
 
 void RunArguments::declare(cli::Program& p) {
   result.declare(p);
-  p.flag("--serve", serve, "answer a wrong line and go on");
-  p.flag("--ack", acknowledge, "with --serve, answer each line by its number at last");
-  p.option("--listen", listen, "PATH", "with --serve, a socket for clients, one at a time");
-  p.option("--shapes-in", shapes, "FILE", "with --serve, where others map all shapes");
-  p.flag("--busy-wait", awake, "with --serve, wait for lines without sleep");
+  p.flag("--serve", serve, "answer a wrong line by an error and go on");
+  p.flag("--ack", acknowledge, "with --serve: end the answer to each line by ok or error");
+  p.option("--listen", listen, "PATH", "with --serve: Unix socket whose clients drive the scene");
+  p.option("--shapes-in", shapes, "FILE",
+           "with --serve: file with all shapes, for other programs to map");
+  p.flag("--busy-wait", awake, "with --serve: poll for lines instead of sleeping");
   p.flag("--binary", binary, "answer in binary frames of float32");
-  p.option("--events", events, "FILE", "who touched what when, as CSV");
-  p.option("--record", record, "FILE", "what was accepted, as a scene that does it again");
+  p.option("--events", events, "FILE",
+           "write contacts, instruments and commands over time, as CSV");
+  p.option("--record", record, "FILE", "write the accepted lines as a scene that replays the run");
   p.option("--tolerance", tolerance, "E",
-           "error that shapes may have, of their largest displacement")
+           "error allowed in shapes, relative to their largest displacement")
       .range(0, 0.1);
-  p.flag("--verify", verify, "fail unless every shape is as exact as it should be");
-  p.option("--rate", rate, "HZ", "steps a second that are wanted").positive();
-  p.option("--latencies", latencies, "FILE", "how long each step took to answer, as CSV");
+  p.flag("--verify", verify, "measure the error of every shape and fail if one is too large");
+  p.option("--rate", rate, "HZ", "steps per second that you need; late ones are counted")
+      .positive();
+  p.option("--latencies", latencies, "FILE", "write the time to answer each step, as CSV");
   p.flag("--no-partial", no_partial, "keep no frames of a run that fails or is interrupted");
-  p.option("--recover", recover, "FILE", "keep the frames that a killed run has left of FILE");
-  p.operand("SCENE", scene, "the scene");
+  p.option("--recover", recover, "FILE", "recover the frames of a killed run whose result is FILE");
+  p.operand("SCENE", scene, "scene, - for standard input");
   p.check([this, &p] {
     for (const auto& [given, option] : {std::pair{acknowledge, "--ack"},
                                         {!listen.empty(), "--listen"},

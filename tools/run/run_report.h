@@ -1,5 +1,5 @@
 #pragma once
-// What ffe-run tells of a scene.
+// Report of ffe-run about a scene.
 
 #include "tools/run/scene_run.h"
 #include "tools/run/step_latency.h"
@@ -8,7 +8,7 @@
 namespace gewebe {
 
 struct SceneReport {
-  double rate = 0;     ///< the one asked for; 0: none
+  double rate = 0;     ///< that of --rate; 0: none
   bool errors = false; ///< whether they were measured
 };
 void report_scene(cli::Run& run, const SceneRun& scene, const StepLatency& latency,

@@ -22,7 +22,7 @@ void SceneAnswers::run(Input* input, SceneRun& scene) {
     run_lines(*input, scene, awake_);
   if (clients_)
     clients_->serve(scene);
-  clients_.reset(); // nobody shall come any more
+  clients_.reset(); // no more clients
 }
 
 void SceneAnswers::write(std::string_view bytes) {
@@ -31,7 +31,7 @@ void SceneAnswers::write(std::string_view bytes) {
   if (!spoken_)
     return;
   spoken_->write(bytes);
-  spoken_->stream().flush(); // at once: who asked waits for it
+  spoken_->stream().flush(); // at once: the client waits for it
 }
 
 void SceneAnswers::commit() {

@@ -21,7 +21,7 @@ public:
   void run(Input* input, SceneRun& scene);
 
   bool any() const noexcept { return spoken_ || clients_; }
-  /// Whether who asked has gone.
+  /// Whether the client has disconnected.
   bool unheard() const noexcept { return clients_ && clients_->gone(); }
   void write(std::string_view bytes);
   /// \throw Error

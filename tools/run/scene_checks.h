@@ -1,5 +1,5 @@
 #pragma once
-// What a run tells of its objects, once of each, because their shapes are not to be trusted.
+// Warnings of shapes that cannot be trusted, once per object.
 
 #include "scene/simulation.h"
 #include "statics/shape_check.h"
@@ -17,11 +17,10 @@ class SceneChecks {
 public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// Behind a step. `distrust` is told of triangles turned over, of volumes that changed by more
-  /// than 10 % and of edges of elastodynamic objects strained by more than half, `warn` of a change
-  /// of method by which an object jumps by over a tenth of its displacement, and of solids whose
-  /// steps ran out of rounds. \param shapes whether shapes of elastostatic objects are computed
-  /// anyway
+  /// Call it after a step. `distrust` gets triangles turned over, volumes that changed by over 10
+  /// %, and edges of elastodynamic objects strained by over half. `warn` gets a change of method by
+  /// which an object jumps by over a tenth of its displacement, and of solids whose steps ran out
+  /// of rounds. \param shapes whether shapes of elastostatic objects are computed anyway
   void look(const Simulation& simulation, bool shapes, const Tell& warn, const Tell& distrust);
 
 private:
@@ -32,7 +31,7 @@ private:
     double looked_at = 0; ///< largest displacement when it was last looked at
     int not_looked = 0;
     bool turned = false, volume = false, strain = false, jump = false,
-         unfinished = false; ///< told
+         unfinished = false; ///< reported
   };
   void look_at(const Simulation& simulation, std::size_t number, bool shapes, const Tell& distrust);
   void look_at_shape(const Simulation& simulation, std::size_t number, const Tell& distrust);

@@ -95,13 +95,13 @@ void SceneClients::let_in(SceneRun& run) {
                         : text_ready(run.simulation()));
 }
 
-/// Who connects; but who waits until the client has gone must not wake us meanwhile.
+/// Connecting clients, except those that wait for the present one: they must not wake the thread.
 pollfd SceneClients::others() const {
   return {client_ && hung_up() ? -1 : listener_.descriptor(), POLLIN, 0};
 }
 
-/// Those that come while the scene has its client; not while that one is on its way out. Whoever
-/// came after it hung up is accepted after that, so it is asked anew behind each.
+/// Those that come while the scene has its client; not while that one is on its way out. A client
+/// that came after it hung up is accepted then, so the state is checked again after each.
 void SceneClients::turn_away() {
   while (!hung_up()) {
     LocalListener::Arrival other = listener_.accept();
@@ -116,7 +116,7 @@ void SceneClients::turn_away() {
   }
 }
 
-/// Tells a client that may not drive the scene why. \return false: it may
+/// Refuses a client that may not drive the scene, with the reason. \return false: it may
 bool SceneClients::refused(const LocalListener::Arrival& next) const {
   const std::string why =
       next.refusal.empty() ? foreign_peer(next.client).value_or("") : next.refusal;
@@ -128,7 +128,7 @@ bool SceneClients::refused(const LocalListener::Arrival& next) const {
   return true;
 }
 
-/// One line that fits into any buffer, to somebody who is not let in.
+/// One line that fits into any buffer, for a client that is refused.
 void SceneClients::say(const Descriptor& to, const std::string& text) const {
   std::string line = text_error(0, text);
   if (options_.binary)

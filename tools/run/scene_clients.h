@@ -24,7 +24,7 @@ struct SceneClientsOptions {
   std::function<void(const std::string&)> warn{};
 };
 
-/// One client at a time has the scene; others are told that it is busy. One that goes, in whatever
+/// One client at a time has the scene; others get the answer busy. One that goes, in whatever
 /// way, leaves the scene as its whole lines have made it.
 class SceneClients {
 public:

@@ -119,8 +119,7 @@ void SceneRun::State::schedule(const Command& command, const ChangeCommand& what
   if (auto* const two_step = std::get_if<SetTwoStep>(&change)) {
     if (stress.asked(two_step->object))
       throw Error("object " + what.object +
-                  " tells its stress, which would be that of no one material, expected no "
-                  "two-step");
+                  " emits its stress, which two stiffnesses do not define, expected no two-step");
     add_stage(*two_step, what.stage);
   }
   if (auto* const set = std::get_if<SetInstrument>(&change); set != nullptr && !what.mesh.empty())
@@ -147,7 +146,7 @@ void SceneRun::State::run(const RunCommand& c) {
     throw Error("over 1e9 steps, expected fewer");
   const auto sample = [&](double time) {
     if (options.gone && options.gone())
-      throw Error("who asked for these steps has gone");
+      throw Error("the client of these steps has disconnected");
     go_on([&] {
       simulation.step_to(time);
       under_way = RunCommand{time, c.every};

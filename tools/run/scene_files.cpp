@@ -32,7 +32,7 @@ namespace {
 constexpr std::size_t longest_list = 1U << 26U;    // of node numbers: some six millions
 constexpr std::uint64_t longest_piped = 1U << 30U; // model: some two million nodes
 
-/// A file or a pipe that is there: a device has no end, or nobody knows it.
+/// A file or a pipe that is there: a device has no known end.
 struct stat facts_of(const std::string& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0 || ::access(path.c_str(), R_OK) != 0)
@@ -128,7 +128,7 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
   };
   files.node_list = [resolve](const std::string& name) {
     const std::string path = resolve(name);
-    if (!S_ISREG(facts_of(path).st_mode)) // a pipe that nobody writes would be waited for
+    if (!S_ISREG(facts_of(path).st_mode)) // a pipe without a writer would block
       throw Error(path, "is no regular file, expected one");
     return list_text(Input(path, false));
   };
@@ -136,7 +136,7 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
     const std::string path = resolve(name);
     (void)facts_of(path);
     Input input(path, true);
-    // The readers of other formats would have to be loaded with this program, by all who start it.
+    // The readers of other formats would have to be loaded with this program, at every start.
     if (input_kind(input.peek(4096), path, "") != Kind::ply)
       throw Error(path, "is no PLY file, expected one, as exp2ela --to ply makes of any mesh");
     TriangleMesh mesh =

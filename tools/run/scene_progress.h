@@ -41,9 +41,9 @@ private:
   std::uint64_t frames_ = 0;
 };
 
-/// Begins to show progress, if a bar is wanted. A scene that is typed at a terminal shows none by
+/// Begins to show progress, if there is a bar. A scene that is typed at a terminal shows none by
 /// default: what is typed would stand behind the bar.
-/// \param bar  null: not wanted \param scene  path, or "-" \param listens  clients determine its
+/// \param bar  null: no bar \param scene  path, or "-" \param listens  clients determine its
 /// end
 void start_progress(std::optional<SceneProgress>& progress, cli::ProgressBar* bar,
                     const std::string& scene, bool listens);

@@ -1,5 +1,5 @@
 #pragma once
-// What a result is told of a scene that runs: objects as they come, models that were cut, frames.
+// Passes a running scene to a result: new objects, cut models, frames.
 
 #include "formats/results/results_writer.h"
 #include "scene/simulation.h"

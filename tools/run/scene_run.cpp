@@ -74,7 +74,7 @@ void SceneRun::State::sync() {
     });
 }
 
-/// Also where nobody hears it, so that a wrong question is one everywhere.
+/// Also without a reader, so that a wrong question is an error everywhere.
 void SceneRun::State::tell(const QueryCommand& query) {
   const std::string text = text_query(simulation, query, options.files.node_list);
   if (options.reply)
@@ -100,7 +100,7 @@ void SceneRun::State::answer() {
       [this](const std::string& text) { distrust(text); });
   stress.find(simulation, gravity);
   answered_gravity = gravity;
-  if (shared) // before who waits for the answer looks
+  if (shared) // before the reader of the answer looks
     shared->frame(simulation, steps);
   if (options.reply)
     deliver([&] {
@@ -128,7 +128,7 @@ void SceneRun::State::answer() {
 void SceneRun::State::measure() {
   digest.add(simulation.time());
   for (std::size_t i = 0; i < simulation.object_count(); ++i) {
-    // Where somebody has asked for it: to measure must not cost a shape.
+    // Only on request: measuring must not cost a shape.
     const std::span<const double> u = simulation.known_surface(i);
     const std::vector<NodeVector>& forces = simulation.contact_forces(i);
     // Whether an object was read must not matter.

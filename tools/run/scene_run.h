@@ -29,7 +29,7 @@ struct SceneFiles {
   std::function<Model(const std::string& name)> model;
   /// \throw Error, among others if the store is of another model
   std::function<StoredStiffness(const std::string& name, const Model& model)> store;
-  /// What the store has of the object's second stage, read when asked for.
+  /// Second stage of the object in the store, read on demand.
   /// \throw Error, among others if it has none
   std::function<std::function<std::shared_ptr<ComplianceSource>()>(const std::string& name,
                                                                    const Model& model)>
@@ -49,20 +49,20 @@ SceneFiles scene_files(const std::string& scene, const Context& context,
 
 struct SceneOptions {
   SceneFiles files;
-  std::function<void(std::string_view)> reply; ///< told each answer, whole; none: not answered
+  std::function<void(std::string_view)> reply; ///< gets each complete answer; none: no answers
   bool binary = false;                         ///< answers are frames_binary.h's, else text
   bool acknowledge = false;                    ///< each line is answered by its number, last of all
-  std::function<bool()> gone{}; ///< whether nobody waits for the steps of a run any more
+  std::function<bool()> gone{}; ///< whether no client waits for the steps of a run any more
   bool serve = false;           ///< a wrong line is answered, changes nothing, and the run goes on
   std::function<void(const std::string&)> warn;
-  /// Told, once of each object, why its shape is not to be trusted; without it `warn` is.
+  /// Gets, once per object, why its shape is not to be trusted; default: `warn`.
   std::function<void(const std::string&)> distrust{};
   double rate = 0;                ///< see SimulationOptions
   ResultWriter* result = nullptr; ///< gets objects and frames; none of these is committed
   EventLog* events = nullptr;
   SceneRecord* record = nullptr;
   StepLatency* latency = nullptr;
-  SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is told
+  SharedShapes* shared = nullptr; ///< gets the shapes of each answer before it is sent
   /// Called behind each answer with the scene's time in s and the frames so far: of the result, or
   /// answers if there is none. May be absent.
   std::function<void(double time, std::uint64_t frames)> progress{};
@@ -99,7 +99,7 @@ public:
   void overlong_line();
   /// Behind the last line. \throw Error, place NAME, if there was no command or no object
   void finish();
-  /// A line asked that no more follow.
+  /// A line ended the scene.
   bool ended() const noexcept;
   /// That were answered.
   std::uint64_t steps() const noexcept;

@@ -1,5 +1,5 @@
 #pragma once
-// What shared shapes are told of a scene that runs: ffe-run --shapes-in, gewebe_serve(5).
+// Passes a running scene to shared shapes: ffe-run --shapes-in, gewebe_serve(5).
 
 #include "formats/results/shared_shapes.h"
 #include "scene/simulation.h"
@@ -15,7 +15,7 @@ class SceneShapes {
 public:
   explicit SceneShapes(SharedShapes& file) : file_(file) {} ///< keeps a reference
 
-  /// Reads the models of the first objects, all of which have a shape.
+  /// Reads the models of the first objects; all of them have a shape.
   static void need_models(const Simulation& simulation, std::size_t objects);
   /// Behind a step, whose news were not taken yet: where all nodes of all objects stand.
   /// \pre shapes were made within the step

@@ -66,7 +66,7 @@ struct SceneRun::State {
   // One command, scene_commands.cpp. Each throws Error if it can't be carried out.
   void execute(const Command& command);
   void add(const ObjectCommand& c);
-  /// Two-step asks the object's store for its second stage, where it has no model.
+  /// Two-step takes the second stage from the object's store, unless it has a model.
   void add_stage(SetTwoStep& set, const std::string& file);
   void write(const EmitModelCommand& c);
   void tell_stress(const EmitStressCommand& c);
@@ -86,7 +86,7 @@ struct SceneRun::State {
   void measure();
   /// The line was carried out.
   void accept(std::string_view text, const Command& command);
-  /// The line was not carried out, or only in part if it asked for many steps.
+  /// The line was not carried out, or only in part if it has many steps.
   void refuse(const LinePlace& at, const std::string& text);
   /// How messages name it.
   std::string named(const LinePlace& at) const;

@@ -17,7 +17,7 @@ const std::vector<std::uint32_t>& SceneStress::ask(const Simulation& simulation,
   const Model& model = simulation.model(object);
   if (model.tetrahedra.empty())
     throw Error("object " + command.object +
-                " has no tetrahedra, expected a solid, whose stress can be told");
+                " has no tetrahedra, expected a solid for emit stress");
   if (simulation.object(object).staged)
     throw Error("object " + command.object +
                 " has a second stage, so that its stress is that of no one material, expected no "

@@ -1,5 +1,5 @@
 #pragma once
-// Stresses of solids in a scene that runs: of which objects they are asked for, and what they are.
+// Stresses of solids in a running scene: requests and values.
 
 #include "base/vec3.h"
 #include "formats/scene/command.h"
@@ -18,7 +18,7 @@ namespace gewebe {
 
 class SceneStress {
 public:
-  /// Asks for those of an object from now on, in place of what was asked of it before.
+  /// Requests those of an object from now on, replacing an earlier request.
   /// \return the nodes   \throw Error if there is no such object or node, it has no tetrahedra, or
   /// goes on by two steps, whose stress is that of no one material
   const std::vector<std::uint32_t>&
@@ -30,7 +30,7 @@ public:
   /// what was put nearest to one.
   /// \throw Error as Simulation::displacement
   void find(const Simulation& simulation, const Vec3& gravity);
-  /// Of the last find(), 0 before it; nothing where it was not asked for.
+  /// Of the last find(), 0 before it; nothing without a request.
   const SolidFields* fields(std::size_t object) const;
   std::vector<StressAnswer> answers() const;
 

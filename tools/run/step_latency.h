@@ -1,5 +1,5 @@
 #pragma once
-// How long those who drive a scene wait for the answer to a step.
+// Latencies: how long a client waits for the answer to a step.
 
 #include "formats/stream/stream.h"
 
@@ -10,11 +10,11 @@
 
 namespace gewebe {
 
-/// A latency is the time from the arrival of the line that asks for a step, or from the answer
+/// A latency is the time from the arrival of the line with a step, or from the answer
 /// before if that is later, until the answer has left.
 class StepLatency {
 public:
-  /// \param rate answers a second that are wanted; 0: any
+  /// \param rate answers per second that are required; 0: any
   explicit StepLatency(double rate) : rate_(rate), counts_(exponents * parts) {}
 
   /// Also writes each as CSV. \throw Error, UsageError as Output

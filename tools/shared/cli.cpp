@@ -24,7 +24,7 @@
 namespace gewebe::cli {
 namespace {
 
-/// What nobody can catch: thrown where a library is loaded or a thread of one begins.
+/// Exceptions that cannot be caught: thrown where a library is loaded or one of its threads begins.
 [[noreturn]] void end_suddenly() {
   remove_temporaries();
   std::string text = "a fault of this program, please report it";
@@ -45,7 +45,7 @@ void write_text(const std::string& path, const std::string& text) {
   output.commit();
 }
 
-/// Before the first constructor of any library: closed streams, and ends that nobody catches.
+/// Before the first constructor of any library: closed streams, and uncaught exceptions.
 void begin_program(int /*argc*/, char** /*argv*/, char** /*environment*/) {
   hold_standard_streams();
   std::set_terminate(end_suddenly);
@@ -91,7 +91,7 @@ struct Program::State {
   // the common options
   std::string to, format, output = "-", progress = "auto", stats_file, max_memory;
   std::int64_t threads = 0;
-  bool help = false, version = false;
+  bool help = false, help_json = false, version = false;
   bool quiet = false, verbose = false, keep_unchanged = false;
   bool stats = false;
 
@@ -110,8 +110,9 @@ Program::Program(std::string name, std::string description) : state_(std::make_u
 #endif
   state_->line.tool = std::move(name);
   state_->description = std::move(description);
-  flag("-h,--help", state_->help, "this text");
-  flag("--version", state_->version, "version, commit, libraries, kernels");
+  flag("-h,--help", state_->help, "print this text");
+  flag("--help-json", state_->help_json, "print options, examples and exit statuses as JSON");
+  flag("--version", state_->version, "print version, commit, libraries, kernels");
 }
 Program::~Program() = default;
 
@@ -132,6 +133,15 @@ template <class T> // a list, or what has no default
 std::string default_text(const T& /*value*/) {
   return "";
 }
+
+template <class T>
+std::string value_type() {
+  if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>>)
+    return "number";
+  if constexpr (std::is_same_v<T, std::int64_t> || std::is_same_v<T, std::optional<std::int64_t>>)
+    return "whole number";
+  return std::is_same_v<T, std::string> ? "text" : "numbers";
+}
 } // namespace
 
 template <class T>
@@ -139,6 +149,7 @@ OptionRef Program::option(const std::string& names, T& value, const std::string&
                           const std::string& help) {
   Spec& spec = state_->add(names, metavar, help);
   spec.default_text = default_text(value);
+  spec.value_type = value_type<T>();
   if constexpr (std::is_same_v<T, Vec3> || std::is_same_v<T, std::optional<Vec3>>)
     spec.list_count = 3;
   spec.set = [&spec, &value](std::string_view word) { spec.read(word, value); };
@@ -187,13 +198,14 @@ std::vector<std::string> kind_words(const std::vector<Kind>& kinds) {
 } // namespace
 
 void Program::output_kinds(const std::vector<Kind>& kinds) {
-  option("--to", state_->to, "KIND", "kind of the output, against its suffix: " + kind_list(kinds))
+  option("--to", state_->to, "KIND",
+         "kind of the output, overrides its suffix: " + kind_list(kinds))
       .one_of(kind_words(kinds));
 }
 
 void Program::input_kinds(const std::vector<Kind>& kinds) {
   option("--format", state_->format, "KIND",
-         "kind of an input without magic bytes or suffix: " + kind_list(kinds))
+         "kind of an input that has neither magic bytes nor suffix: " + kind_list(kinds))
       .one_of(kind_words(kinds));
 }
 
@@ -208,17 +220,17 @@ void Program::check(std::function<void()> check) {
 
 void Program::declare_common() {
   State& s = *state_;
-  option("-o,--output", s.output, "FILE", "where the result goes, - is standard output");
-  option("-j,--threads", s.threads, "N", "threads, 0 = all").range(0, 4096);
-  flag("-q,--quiet", s.quiet, "no warnings but of results that cannot be trusted");
-  flag("-v,--verbose", s.verbose, "say what is done");
+  option("-o,--output", s.output, "FILE", "output file, - is standard output");
+  option("-j,--threads", s.threads, "N", "number of threads, 0 = all").range(0, 4096);
+  flag("-q,--quiet", s.quiet, "suppress warnings, except of results that cannot be trusted");
+  flag("-v,--verbose", s.verbose, "print each step of the work");
   option("--progress", s.progress, "WHEN", "progress bar: auto, always, never")
       .one_of({"auto", "always", "never"});
   option("--stats", s.stats_file, "[=FILE]",
-         "one line of JSON about the work, on standard error or in FILE");
+         "write one line of JSON with figures, to standard error or FILE");
   s.line.specs.back()->flag = &s.stats; // alone it never takes the next word
   option("--max-memory", s.max_memory, "SIZE",
-         "refuse work that needs more, such as 4G (default: what is available)");
+         "refuse work that needs more memory, such as 4G (default: what is available)");
   flag("--keep-unchanged", s.keep_unchanged, "leave FILE alone if its bytes would be equal");
 }
 
@@ -232,8 +244,10 @@ bool Program::parse(const std::vector<std::string>& words) {
     return false;
   }
   s.line.take(words);
-  if (s.help || s.version) {
-    write_text("-", s.version ? version_text(s.line.tool) : s.line.help(s.description));
+  if (s.help || s.help_json || s.version) {
+    write_text("-", s.version     ? version_text(s.line.tool)
+                    : s.help_json ? s.line.help_json(s.description)
+                                  : s.line.help(s.description));
     return false;
   }
   s.line.check_complete();
@@ -272,7 +286,7 @@ void Program::prepare_run() {
 
 namespace {
 
-/// What -v tells at the end: sizes, and what was written.
+/// Final lines of -v: sizes, and what was written.
 void tell_result(Run& run, double seconds) {
   for (const std::string& line : run.stats().figures())
     run.say(line);

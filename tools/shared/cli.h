@@ -71,7 +71,7 @@ public:
   /// Whether --stats was given: figures that cost a pass over the result are worth it only then.
   bool stats_wanted() const { return stats_wanted_; }
   Stats& stats() { return stats_; }
-  /// Null if none is wanted. Most programs leave it to the context's progress.
+  /// Null without a bar. Most programs leave it to the context's progress.
   ProgressBar* progress_bar() const { return progress_bar_; }
   /// Runs `work`, adds its wall time under stats "seconds": {name: …}.
   template <class Work>

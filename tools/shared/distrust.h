@@ -8,7 +8,7 @@
 namespace gewebe::cli {
 
 /// `tool: warning: text` on standard error whatever -q says, for the result is not what was meant;
-/// --stats tells "distrusted": true.
+/// --stats has "distrusted": true.
 void distrust(Run& run, const std::string& tool, const std::string& text);
 
 } // namespace gewebe::cli

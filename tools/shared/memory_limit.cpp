@@ -17,13 +17,13 @@ std::uint64_t read_number(const std::string& path) {
   return file >> value ? value : unlimited;
 }
 
-/// The number that follows `wanted` in a file of keys and numbers.
-std::uint64_t read_key(const std::string& path, const std::string& wanted, std::uint64_t absent) {
+/// The number that follows `name` in a file of keys and numbers.
+std::uint64_t read_key(const std::string& path, const std::string& name, std::uint64_t absent) {
   std::ifstream file(path);
   std::string key;
   std::uint64_t value = 0;
   for (std::string rest; file >> key >> value; std::getline(file, rest))
-    if (key == wanted)
+    if (key == name)
       return value;
   return absent;
 }

@@ -44,60 +44,63 @@ std::string checked_table(const std::string& file) {
 
 void declare(cli::Program& p, ModelArguments& a) {
   BuildOptions& b = a.build;
-  p.option("--fix", a.fix, "SELECTOR", "nodes that can't move, or none");
-  p.option("--fix-axes", a.axes, "AXES", "axes along which they can't move")
+  p.option("--fix", a.fix, "SELECTOR", "nodes that cannot move, or none");
+  p.option("--fix-axes", a.axes, "AXES", "axes along which --fix holds nodes")
       .one_of({"x", "y", "z", "xy", "xz", "yz", "xyz"});
   p.option("--centrals", b.centrals, "K", "central nodes per component").range(0, 1000);
   p.option("--central-stiffness", b.central_factor, "F",
-           "their springs' stiffness over edge springs'")
+           "stiffness of c springs over that of e springs")
       .range(0, 1e9);
   p.flag("--centrals-free", b.centrals_free, "central nodes can move");
   p.flag("--bend", b.bend, "add bending springs across edges");
-  p.option("--bend-stiffness", b.bend_factor, "F", "their stiffness over that of the edge")
+  p.option("--bend-stiffness", b.bend_factor, "F", "stiffness of b springs over that of the edge")
       .range(0, 1e9);
-  p.option("--material", a.material, "NAME", "of --list-materials; PART=NAME for a part")
+  p.option("--material", a.material, "NAME",
+           "material, or PART=NAME for a part; see --list-materials")
       .such_as(preset_names());
-  p.option("--materials", a.materials, "FILE", "a table of materials, beside the presets");
+  p.option("--materials", a.materials, "FILE", "table of materials that adds to the presets");
   p.flag("--list-materials", a.list_materials, "write the table of materials instead of a model");
-  p.option("--density", a.values.density, "D", "g/mm3, instead of the material's").positive();
+  p.option("--density", a.values.density, "D", "density in g/mm3, instead of the material's")
+      .positive();
   p.option("--young", a.values.young, "E", "Young's modulus in Pa, instead of the material's")
       .positive();
   p.flag("--solid", a.solid, "fill a closed surface with tetrahedra");
-  p.option("--cell", a.cell, "S", "edge of the cells that fill it, in mm").positive();
+  p.option("--cell", a.cell, "S", "with --solid: edge of the cells in mm").positive();
   p.option("--rule", a.rule, "RULE", "with --solid: when a point is inside: parity, winding")
       .one_of({"parity", "winding"});
   p.option("--on-open", a.on_open, "WHAT",
            "with --solid, an open surface: error, warn (odd rays stay empty), fill (close the "
            "holes)")
       .one_of({"error", "warn", "fill"});
-  p.flag("--no-skin", a.no_skin, "leave the surface out of the solid that fills it");
+  p.flag("--no-skin", a.no_skin, "with --solid: leave out the skin");
   p.option("--poisson", a.values.poisson, "NU",
-           "of tetrahedra: Poisson's ratio, instead of the material's")
+           "Poisson's ratio of tetrahedra, instead of the material's")
       .range(0, 0.4999999);
-  p.option("--order", a.order, "N", "of tetrahedra: linear elements (1) or quadratic ones")
-      .range(1, 2);
-  p.option("--thickness", a.values.thickness, "H", "of the wall in mm, instead of the material's")
+  p.option("--order", a.order, "N", "elements: 1 linear, 2 quadratic").range(1, 2);
+  p.option("--thickness", a.values.thickness, "H",
+           "thickness of a net in mm, instead of the material's")
       .positive();
-  p.option("--damping-ratio", a.values.damping_ratio, "Z", "of a spring, instead of the material's")
+  p.option("--damping-ratio", a.values.damping_ratio, "Z",
+           "damping ratio of springs, instead of the material's")
       .range(0, 1e6);
-  p.option("--stiffness", b.stiffness, "K", "of every edge spring in g/s2").positive();
-  p.option("--mass", b.mass, "M", "of every surface node in g").positive();
+  p.option("--stiffness", b.stiffness, "K", "stiffness of every e spring in g/s2").positive();
+  p.option("--mass", b.mass, "M", "mass of every surface node in g").positive();
   p.option("--drag", b.drag_rate, "RATE", "drag of a node per mass in 1/s").range(0, 1e9);
   p.flag("--normals", b.normals, "add vertex normals");
-  p.option("--dt", a.dt, "T", "refuse a model for which a step of T s is not safe").positive();
-  p.flag("--scale-mass", a.scale_mass, "raise masses until --dt is safe instead");
-  p.option("--fit", a.fit, "FILE",
-           "of tetrahedra: find Young's moduli from measured displacements");
+  p.option("--dt", a.dt, "T", "refuse a net for which an explicit step of T s is not safe")
+      .positive();
+  p.flag("--scale-mass", a.scale_mass, "with --dt: raise masses until the step is safe");
+  p.option("--fit", a.fit, "FILE", "find Young's moduli of a solid from measurements");
   p.option("--primitive", a.primitive, "KIND",
            "plane:MxN, tube:MxN or sphere:MxN instead of a mesh")
       .such_as({"plane:", "tube:", "sphere:"});
-  p.option("--size", a.size, "A,B", "its sides, radius and length or radius in mm");
-  p.option("--name", a.name, "NAME", "name of the model, else that of its first material");
+  p.option("--size", a.size, "A,B", "size of the primitive in mm");
+  p.option("--name", a.name, "NAME", "name of the model; default: that of its first material");
   p.option("--unit", a.unit, "UNIT", "unit of the mesh: m, cm, mm").one_of(mesh_unit_names());
-  p.option("--weld", a.weld, "MODE", "points that become one: auto, all, part, none")
+  p.option("--weld", a.weld, "MODE", "points at one place to merge: auto, all, part, none")
       .one_of(weld_names());
   p.option("--repair", a.repair, "LIST",
-           "weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all")
+           "repairs: weld[:MM], duplicates, orientation, degenerate, holes[:EDGES], all")
       .such_as({"weld", "duplicates", "orientation", "degenerate", "holes", "all"});
 }
 

@@ -29,7 +29,7 @@ struct ModelArguments {
   bool solid = false, no_skin = false, scale_mass = false, list_materials = false;
 };
 
-/// The options of a program, to be told into `a`.
+/// Declares the options of a program, with their values in `a`.
 void declare(cli::Program& p, ModelArguments& a);
 
 /// Checks them against each other and reads their texts. \throw UsageError

@@ -10,7 +10,7 @@
 
 namespace gewebe::cli {
 
-/// Mends the surface as asked, tells what, and makes a net of it, or fills it.
+/// Repairs the surface by the options, reports that, and makes a net of it, or fills it.
 Model model_of_surface(Run& run, const std::string& name, TriangleMesh mesh,
                        const ModelArguments& a);
 

@@ -214,50 +214,6 @@ void CommandLine::check_complete() const {
       refuse("expected at least " + std::to_string(operand.min_count) + " " + operand.name);
 }
 
-std::string CommandLine::help(const std::string& description) const {
-  constexpr std::size_t column = 34;
-  std::string text = description + "\nUsage: " + tool + " [OPTIONS]";
-  for (const Operand& operand : operands) {
-    const std::string name = operand.name + (operand.values != nullptr ? "..." : "");
-    text += operand.min_count > 0 ? " " + name : " [" + name + "]";
-  }
-  const auto add_line = [&](const std::string& name, const std::string& help) {
-    const std::size_t width = name.size() + 2;
-    text += "  " + name + (width < column ? "" : "\n") +
-            std::string(width < column ? column - width : column, ' ') + help + "\n";
-  };
-  text += "\n\nPositionals:\n";
-  for (const Operand& operand : operands)
-    add_line(operand.name + (operand.values != nullptr ? " ..." : "") +
-                 (operand.min_count > 0 ? " REQUIRED" : ""),
-             operand.help);
-  text += "\nOptions:\n";
-  for (const auto& spec : specs)
-    add_line(spec->names + (spec->metavar.empty() ? "" : " " + spec->metavar) +
-                 (spec->set_numbered ? " ..." : ""),
-             spec->help +
-                 (spec->default_text.empty() ? "" : " (default " + spec->default_text + ")"));
-  return text + "\n";
-}
-
-std::string CommandLine::describe(const std::string& description) const {
-  std::string text = "program\t" + tool + "\t\t\t" + description + "\n";
-  const auto add = [&](const char* what, const std::string& names, const std::string& metavar,
-                       const std::vector<std::string>& words, const std::string& help) {
-    std::string list;
-    for (const std::string& word : words)
-      list += (list.empty() ? "" : " ") + word;
-    text += std::string(what) + "\t" + names + "\t" + metavar + "\t" + list + "\t" + help + "\n";
-  };
-  for (const auto& spec : specs)
-    add(spec->set ? "option" : "flag", spec->names, spec->metavar,
-        spec->choices.empty() ? spec->proposals : spec->choices, spec->help);
-  for (const Operand& operand : operands)
-    add(operand.values != nullptr ? "operands" : "operand", operand.name, operand.name,
-        operand.words, operand.help);
-  return text;
-}
-
 // ---- OptionRef
 
 namespace {

@@ -17,7 +17,9 @@ namespace gewebe::cli {
 struct Spec {
   std::string names, metavar, help; ///< "-s,--long" or "--long"
   std::string default_text;
-  bool* flag = nullptr;                      ///< what the name without a value sets
+  std::string
+      value_type;       ///< "number", "whole number", "numbers" (with commas) or "text"; flags: ""
+  bool* flag = nullptr; ///< what the name without a value sets
   std::function<void(std::string_view)> set; ///< parses and checks a word; none: takes no value
   std::function<void(std::int32_t, std::string_view)> set_numbered; ///< of N=WORD
   bool must_be_positive = false;
@@ -70,8 +72,10 @@ struct CommandLine {
   Spec* find(std::string_view name) const; ///< or nullptr
   /// \throw UsageError for words that are unknown, operands that are missing
   void check_complete() const;
-  /// The text of --help.
+  /// The text of --help: usage, operands, options, examples, exit statuses.
   std::string help(const std::string& description) const;
+  /// The text of --help-json: one JSON object. gewebe(7) lists its members.
+  std::string help_json(const std::string& description) const;
   /// The same for programs: a line for the tool, each option and each operand, of words between
   /// tabs: what it is (`program`, `flag`, `option`, `operand`, `operands`), its names, its value's
   /// name, what that may be (words between blanks, or nothing), the help.

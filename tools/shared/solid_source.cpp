@@ -45,7 +45,7 @@ void refuse_surfaces(const ModelArguments& a) {
          "the input holds tetrahedra, expected --repair orientation, duplicates or degenerate");
 }
 
-/// Turns and drops what was asked for, and tells what.
+/// Turns and drops tetrahedra by the options, and reports that.
 void repair(Run& run, const std::string& name, TetMesh& mesh, const RepairOptions& asked) {
   const TetRepair done = repair_tetrahedra(
       mesh, {.turn = asked.orientation, .flat = asked.degenerate, .duplicates = asked.duplicates});

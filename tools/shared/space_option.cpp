@@ -3,10 +3,7 @@
 namespace gewebe {
 
 void declare_space(cli::Program& program, std::string& space) {
-  program
-      .option("--space", space, "SPACE",
-              "of the result's coordinates: ras or lps; input that does not state its space is in "
-              "it")
+  program.option("--space", space, "SPACE", "space of the result: ras or lps")
       .one_of({"ras", "lps"});
 }
 

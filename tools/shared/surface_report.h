@@ -1,5 +1,5 @@
 #pragma once
-// What mc-opt tells of the mesh it made.
+// Report of mc-opt about its mesh.
 
 #include "base/mesh.h"
 #include "surface/marching_cubes.h"

@@ -1,5 +1,5 @@
 #pragma once
-// What is told of a tetrahedral mesh.
+// Report about a tetrahedral mesh.
 
 #include "base/mesh.h"
 #include "tetrahedra/tet_mesh.h"

@@ -40,7 +40,7 @@ void turn_over(std::vector<Tetrahedron>& tetrahedra, std::vector<EdgeMiddles>& m
   }
 }
 
-/// A normal: by the inverse of the transpose, but for its length.
+/// A normal: by the inverse of the transpose, up to its length.
 Vec3 normal_of(const Affine& map, const Vec3& n) {
   const std::array<double, 12>& m = map.m;
   const Vec3 x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]}; // columns
@@ -72,10 +72,9 @@ std::uint8_t turned_axes(const Affine& map, std::uint8_t fixed) {
 } // namespace
 
 void declare_transform(cli::Program& program, std::string& transform) {
-  program.option(
-      "--transform", transform, "STEPS|FILE",
-      "move what is read: translate X Y Z; rotate AXIS DEGREES; scale S; mirror AXIS; or "
-      "a file of a 4 x 4 matrix");
+  program.option("--transform", transform, "STEPS|FILE",
+                 "move the input: translate X Y Z; rotate AXIS DEGREES; scale S; mirror AXIS; or a "
+                 "file with a 4 x 4 matrix");
 }
 
 Affine transform_from_text(const std::string& text) {

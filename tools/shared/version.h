@@ -1,5 +1,5 @@
 #pragma once
-// What --version tells.
+// Text of --version.
 
 #include <string>
 

@@ -7,8 +7,7 @@ namespace gewebe {
 
 void declare(cli::Program& program, VolumeOutput& options) {
   program.output_kinds({Kind::vdb});
-  program.flag("-u,--uncompressed", options.uncompressed,
-               "pack nothing: for a pipe, whose other end would only unpack it");
+  program.flag("-u,--uncompressed", options.uncompressed, "do not compress; faster in pipes");
 }
 
 Output open_volume(const cli::Run& run) {

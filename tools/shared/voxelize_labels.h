@@ -11,7 +11,7 @@
 
 namespace gewebe {
 
-/// The numbers and ranges of --label, "3,5-7"; `expected` is what a message asks for. \throw
+/// The numbers and ranges of --label, "3,5-7"; `expected` is the expectation in a message. \throw
 /// UsageError if one is no whole number, or a range goes downwards
 std::vector<LabelRange> labels_from_text(const std::string& text,
                                          const char* expected = "whole numbers, or list");

@@ -53,31 +53,30 @@ void check_method(const StoreArguments& a) {
 } // namespace
 
 void declare(cli::Program& p, StoreArguments& a) {
-  p.option("--columns", a.columns, "SELECTOR", "nodes whose columns are stored, all or none")
+  p.option("--columns", a.columns, "SELECTOR",
+           "nodes whose columns are stored: all, none or a selector")
       .such_as({"all", "none"});
   p.option("--rows", a.rows, "NODES",
-           "whose displacements columns hold: surface, all; of solids surface by default")
+           "displacements in a column: surface (default for solids) or all nodes")
       .one_of({"surface", "all"});
-  p.option("--precision", a.precision, "TYPE", "of the columns: float64, float32")
+  p.option("--precision", a.precision, "TYPE", "type of the columns: float64, float32")
       .one_of({"float64", "float32"});
-  p.option("--compress", a.compress, "E", "keep columns within E of the largest displacement")
+  p.option("--compress", a.compress, "E",
+           "compress columns with errors below E of the largest entry")
       .range(min_relative, 0.1);
-  p.option("--method", a.method, "METHOD", "of the columns: direct, relax, relax-fixed")
+  p.option("--method", a.method, "METHOD", "how columns are computed: direct, relax, relax-fixed")
       .one_of({"direct", "relax", "relax-fixed"});
-  p.option("--force", a.force, "F", "that pulls at a node in a relaxation, 1e-6 N").positive();
-  p.option("--velocity-threshold", a.threshold, "T", "below which relax takes speeds for rest")
-      .positive();
-  p.option("--steps", a.steps, "N", "of each pull with relax-fixed").range(1, 1e12);
-  p.option("--stage", a.stage, "S", "2: add models to a store as second stage of its objects")
-      .range(1, 2);
-  p.option("--shard", a.shard_text, "I/N", "compute the I-th of N parts");
-  p.flag("--merge", a.merge, "join parts, which stand in the place of models");
-  p.option("--update", a.update, "STORE",
-           "make the store of a cut model from that of the one before");
-  p.option("--before", a.before, "MODEL", "the model before the cut, for --update");
+  p.option("--force", a.force, "F", "force of a relaxation, 1e-6 N").positive();
+  p.option("--velocity-threshold", a.threshold, "T", "speed at which relax ends").positive();
+  p.option("--steps", a.steps, "N", "steps of each pull with relax-fixed").range(1, 1e12);
+  p.option("--stage", a.stage, "S", "2: add the models as second stage for two-step").range(1, 2);
+  p.option("--shard", a.shard_text, "I/N", "compute part I of N");
+  p.flag("--merge", a.merge, "join parts given instead of models");
+  p.option("--update", a.update, "STORE", "make the store of a cut model from this store");
+  p.option("--before", a.before, "MODEL", "with --update: model before the cut");
   p.option("--jobs", a.jobs, "N", "models read and factorised ahead").range(1, 1024);
-  p.flag("--verify", a.verify, "read the store back and recompute some columns another way");
-  p.flag("--info", a.info, "say what is in a store, which stands in the place of MODEL");
+  p.flag("--verify", a.verify, "read the store back and recompute some columns");
+  p.flag("--info", a.info, "print what is in a store given instead of MODEL");
   p.operands("MODEL", a.inputs, "the models, one object each; standard input if there are none", 0);
 }
 

@@ -26,7 +26,7 @@ struct StoreArguments {
   StoreShard shard{};
 };
 
-/// The options of a program, to be told into `a`.
+/// Declares the options of a program, with their values in `a`.
 void declare(cli::Program& p, StoreArguments& a);
 
 /// Checks them against each other and reads their texts. \throw UsageError

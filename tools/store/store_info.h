@@ -15,11 +15,11 @@ namespace gewebe {
 /// \throw Error naming the store and what is wrong with it
 void print_store(cli::Run& run, const std::string& path, bool verify);
 
-/// Reads every object of a store back and recomputes the columns of some nodes, which --stats
-/// tells. \throw Error, place = `name`
+/// Reads every object of a store back and recomputes the columns of some nodes, for --stats.
+/// \throw Error, place = `name`
 void verify_store(cli::Run& run, const StiffnessStore& store, const std::string& name);
 
-/// Says of the object just begun what of an earlier run is kept, and warns of what was damaged.
+/// Reports what is kept of an earlier run for the object just begun, and warns of damage.
 void report_kept(cli::Run& run, const StiffnessStoreWriter& writer);
 
 /// Sums over the objects of a store that was made, and the worst of each.
@@ -28,7 +28,7 @@ struct StoreTotals {
   double norm = 0, condition = 0, residual = 0;
 };
 
-/// What --stats says of a store that stands under its name, `path`.
+/// Figures of --stats for a finished store at `path`.
 void report_store(cli::Run& run, const std::string& path, const StoreTotals& totals,
                   const StiffnessStoreWriter& writer);
 

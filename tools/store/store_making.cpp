@@ -185,7 +185,7 @@ std::string second_stage_of(const StiffnessStore& store, const StiffnessFacts& s
       continue;
     if (first.rest != second.rest || first.order != second.order)
       throw Error("'" + second.object + "' has other nodes or constraints than in " + store.path() +
-                  ", expected the same but for springs");
+                  ", expected the same except springs");
     return second_stage_group(group);
   }
   throw Error("no object '" + second.object + "' in " + store.path() + ", which holds " +

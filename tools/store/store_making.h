@@ -8,7 +8,7 @@
 
 namespace gewebe {
 
-/// Every model becomes an object, of which the arguments' shard takes its part. `store` is the one
+/// Every model becomes an object; a shard computes its part of it. `store` is the one
 /// whose objects they are second stages of, or null.
 /// \throw Error naming the model and what is wrong
 void add_models(cli::Run& run, const StoreArguments& a, const StiffnessStore* store,

@@ -23,7 +23,7 @@ CompressedMade chunks_of(const CompressedColumns& columns) {
   return made;
 }
 
-/// One object of one or several stores, of which each holds some columns.
+/// One object of one or several stores; each holds some columns.
 void join_object(const std::vector<const StiffnessStore*>& stores, const std::string& group,
                  StiffnessStoreWriter& writer, StoreTotals& totals) {
   std::vector<StiffnessFacts> facts;
