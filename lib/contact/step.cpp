@@ -347,10 +347,8 @@ bool StepSolver::Work::move_bodies(const CondensedSystem& system, bool ends) {
     ContactBody& body = *island_.table.bodies[b];
     force_[b] = system.forces(b);
     body.move(system.share(), force_[b]);
-    if (!ends)
-      continue;
-    models_hold_ = body.model_holds() && models_hold_;
-    exact = body.keep_momentum(room) && exact;
+    if (ends)
+      exact = body.keep_momentum(room) && exact;
   }
   return exact;
 }
@@ -470,9 +468,13 @@ bool StepSolver::Work::solve_round(const Round& round, double margin, bool& exac
   }
   report_.iterations += static_cast<std::uint64_t>(iteration);
   report_.vertices = std::max(report_.vertices, system->unknowns() / 3);
-  models_hold_ = true;
   exact = move_bodies(*system, true);
-  return follow_bodies(margin);
+  if (!follow_bodies(margin))
+    return false; // with these models again
+  models_hold_ = true;
+  for (ContactBody* const body : island_.table.bodies)
+    models_hold_ = body->model_holds() && models_hold_;
+  return true;
 }
 
 /// Takes better models where rounds converge slowly. \param change  of positions by the last round

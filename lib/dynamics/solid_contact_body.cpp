@@ -56,12 +56,32 @@ double SolidContactBody::linearise(std::span<const VertexForce> forces, std::spa
   return energy / (h_ * h_);
 }
 
+/// Drops columns that no call asks for now, where more would not fit into a quarter of the memory.
+void SolidContactBody::make_room(std::span<const std::uint32_t> vertices, std::size_t more) {
+  const double each = 9 * sizeof(double) * static_cast<double>(vertices_.size());
+  const auto bytes = [&](std::size_t others) {
+    return each * static_cast<double>(columns_.of.size() + more + others);
+  };
+  const double room = static_cast<double>(context_.max_memory) / 4;
+  if (!(bytes(others_.of.size()) > room))
+    return;
+  others_ = {};
+  if (!(bytes(0) > room))
+    return;
+  std::erase_if(columns_.of, [&](const auto& one) {
+    return std::ranges::find(vertices, one.first) == vertices.end();
+  });
+  if (bytes(0) > room)
+    require_memory(context_, 4 * bytes(0), "the compliance of nodes in contact");
+}
+
 void SolidContactBody::prepare(std::span<const std::uint32_t> vertices) {
   constexpr std::size_t together = 8;
   std::vector<std::uint32_t> missing;
   for (const std::uint32_t vertex : vertices)
     if (!columns_.of.contains(vertex))
       missing.push_back(vertex);
+  make_room(vertices, missing.size());
   std::vector<double> whole;
   for (std::size_t first = 0; first < missing.size(); first += together) {
     const std::span<const std::uint32_t> batch =

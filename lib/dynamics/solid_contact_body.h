@@ -54,6 +54,7 @@ public:
   double vertex_stiffness() const override { return stiffness_; }
 
 private:
+  void make_room(std::span<const std::uint32_t> vertices, std::size_t more);
   void spread(std::span<const contact::VertexForce> forces);
 
   SolidMotion& motion_;

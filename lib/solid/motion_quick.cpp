@@ -67,6 +67,7 @@ int MotionQuick::prepare(const MotionBody& body, const MotionSprings& springs,
   if (!springs.empty())
     a = springs.with_bound(a, 1 / h);
   add_masses(body, h, a);
+  step_ = 0; // of no use if this throws
   if (same_pattern)
     factor_->refactor(a, context);
   else
@@ -94,6 +95,7 @@ bool MotionQuick::take_tangent(const MotionBody& body, const MotionSprings& spri
     tangent_.axes = solid_stiffness(body.mesh, body.elements, held_, context);
   StiffnessMatrix a = springs.with_tangent(tangent_.axes, at, 1 / step_);
   add_masses(body, step_, a);
+  drop_tangent();
   if (same_pattern)
     tangent_.factor->refactor(a, context);
   else

@@ -89,6 +89,7 @@ std::vector<Numbers> hyperelastic_tangents(const MotionBody& body, const SolidEn
 
 void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
                          const Context& context) {
+  made_ = false;
   const MotionBody& body = objective.body();
   const SolidEnergy& energy = objective.energy();
   const std::size_t count = solid_nodes(body.mesh);
@@ -126,6 +127,7 @@ void MotionTangent::make(const MotionObjective& objective, const Numbers& at,
   else
     factor_.emplace(tangent_, context);
   renewed_ = false;
+  made_ = true;
 }
 
 void MotionTangent::unit_responses(std::span<const std::size_t> axes,

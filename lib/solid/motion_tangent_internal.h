@@ -17,7 +17,9 @@ class MotionTangent {
 public:
   /// Other axes are held.
   void renew() noexcept { renewed_ = true; }
-  /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor
+  bool is_made() const noexcept { return made_; }
+  /// Its factor, positive definite, where the last evaluation was, at `at`. \throw as Factor: then
+  /// it isn't made
   void make(const MotionObjective& objective, const Numbers& at, const Context& context);
   /// Responses to unit forces along axes, columns of all axes. \pre made
   void unit_responses(std::span<const std::size_t> axes, std::span<double> columns) const;
@@ -25,7 +27,7 @@ public:
   void solve(Numbers& v) const;
 
 private:
-  bool renewed_ = true;
+  bool renewed_ = true, made_ = false;
   StiffnessMatrix tangent_;
   std::optional<Factor> factor_;
 };

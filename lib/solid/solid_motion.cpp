@@ -79,12 +79,12 @@ struct SolidMotion::State {
     Numbers base, step; ///< the iterate when it was linearised, and the model's step from there
     /// Nothing was linearised yet, now and when it was linearised last.
     bool fresh = true, was_fresh = true;
-    bool exact = false;    ///< the matrix is a tangent
-    bool renews = false;   ///< ... and becomes that of the next round
-    bool is_new = false;   ///< ... and is that of the present round
-    bool was_kept = false; ///< ... and was made in an earlier step
-    double relaxation = 1; ///< the matrix is over this
-    double share = 1;      ///< of the step that the iterate lacks
+    bool exact = false;                         ///< the matrix is a tangent
+    bool renews = false;                        ///< ... that of the next round
+    bool is_new = false;                        ///< ... and is that of the present round
+    bool was_kept = false;                      ///< ... and was made in an earlier step
+    double relaxation = 1, next_relaxation = 1; ///< the matrix is over this
+    double share = 1;                           ///< of the step that the iterate lacks
     SolidStep counts{};
   };
   std::optional<Open> open;
@@ -158,8 +158,8 @@ bool SolidMotion::State::take_tangent() {
     return false;
   open->renews = true;
   if (!open->is_new) // else it had to be so stiff
-    open->relaxation = 1;
-  if (quick.wants_tangent() || std::exchange(open->exact, true))
+    open->next_relaxation = 1;
+  if (quick.wants_tangent() || open->exact)
     return true;
   energy.note_frames();
   open->evaluated = false;
@@ -168,6 +168,7 @@ bool SolidMotion::State::take_tangent() {
 
 /// Makes the matrix of a model at the point of the last evaluation. \pre open
 void SolidMotion::State::renew_matrix(const Context& context) {
+  open->relaxation = open->next_relaxation;
   open->is_new = std::exchange(open->renews, false);
   if (quick.wants_tangent()) {
     open->is_new = open->is_new || !quick.has_tangent();
@@ -177,6 +178,7 @@ void SolidMotion::State::renew_matrix(const Context& context) {
     tangent.make(open->objective, open->point.at, context);
     ++open->counts.factorisations;
     tangent_version = unique_number();
+    open->exact = true;
     open->was_kept = false;
   }
   if (open->exact) {
@@ -351,7 +353,8 @@ void SolidMotion::begin_step(double h, const Context& context) {
   State::Open& open = *s.open;
   open.found.at = s.now.place;
   open.counts.factorisations = made;
-  open.exact = open.was_kept = s.keeps_tangent && made == 0 && h == s.last_step;
+  open.exact = open.was_kept =
+      s.keeps_tangent && s.tangent.is_made() && made == 0 && h == s.last_step;
 }
 
 void SolidMotion::linearise_step(std::span<double> step, std::span<const double> forces,
@@ -471,8 +474,9 @@ bool SolidMotion::model_holds(std::span<const double> forces, const Context& con
     return false;
   // The matrix that would have had the energy along this way.
   const double factor = quadratic > unsure ? 1 / (1 + off / quadratic) : holds ? 1 : 0;
-  open.relaxation *= holds ? std::max(factor, least_factor) : std::clamp(factor, least_factor, 0.5);
-  open.relaxation = std::min(open.relaxation, 1.0);
+  open.next_relaxation *=
+      holds ? std::max(factor, least_factor) : std::clamp(factor, least_factor, 0.5);
+  open.next_relaxation = std::min(open.next_relaxation, 1.0);
   return holds;
 }
 

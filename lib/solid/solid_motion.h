@@ -189,7 +189,8 @@ public:
   /// \param change  f - f_0, 3 n
   void move_iterate(double share, std::span<const double> change, const Context& context);
   /// Whether the energy at the iterate is what the model has there, but for half of the model's
-  /// quadratic part; else the next model is of the tangent, or stiffer. \param forces  f, 3 n
+  /// quadratic part; else the next model is of the tangent, or stiffer. The present one stays until
+  /// it is built. \param forces  f, 3 n
   bool model_holds(std::span<const double> forces, const Context& context);
   /// Models of this step are of the tangent from now on, where there is one.
   void sharpen();

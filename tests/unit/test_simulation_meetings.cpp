@@ -67,6 +67,26 @@ Vec3 momentum(Simulation& s, double h) {
   return sum;
 }
 
+/// Columns of compliance are dropped where memory is short: the same bytes; where not even those of
+/// one system have room, the step is refused.
+TEST(SimulationMeetings, ColumnsOfComplianceStayWithinTheMemory) {
+  const auto shape_after = [](std::uint64_t memory) {
+    Context context = one_thread();
+    context.max_memory = memory;
+    Simulation s(context, {});
+    add(s, "below", block(5, 5, 2, {}, true));
+    add(s, "above", block(3, 3, 2, {3.7, 4.1, 8.02}));
+    s.apply(SetGravity{{3000, 0, -9810}});
+    s.apply(SetTimestep{1.0 / 200});
+    s.apply(SetContact{0, 1, 0.1});
+    for (int k = 0; k < 12; ++k)
+      s.step(1.0 / 200);
+    return test::shape(s, 1);
+  };
+  EXPECT_EQ(shape_after(900'000), shape_after(UINT64_MAX));
+  EXPECT_THROW((void)shape_after(400'000), Error);
+}
+
 /// Contact forces are those that a body moves by, in each step, at large steps too: mass times
 /// acceleration less weight.
 TEST(SimulationMeetings, ABlockSlidesByTheForcesThatAreShown) {

@@ -352,6 +352,15 @@ TEST_P(SolidMotionOf, ResponsesAreTheSameUntilTheMatrixIsAnother) {
     (void)moving.end_step(Numbers(axes), {});
   }
   EXPECT_GE(repeated, 3);
+
+  // The model stays until the next one is built.
+  Numbers step(axes), before(3 * axes), behind(3 * axes);
+  moving.begin_step(0.005, {});
+  moving.linearise_step(step, Numbers(axes), {});
+  moving.unit_responses({&node, 1}, before);
+  moving.sharpen();
+  moving.unit_responses({&node, 1}, behind);
+  EXPECT_EQ(before, behind);
 }
 
 /// Nodes anywhere, elements inside out: all of them turn right again, and lose their energy.
