@@ -56,7 +56,7 @@ double SolidContactBody::linearise(std::span<const VertexForce> forces, std::spa
   return energy / (h_ * h_);
 }
 
-/// Drops columns that no call asks for now, where more would not fit into a quarter of the memory.
+/// Drops columns beside those of `vertices`, where more would exceed a quarter of the memory.
 void SolidContactBody::make_room(std::span<const std::uint32_t> vertices, std::size_t more) {
   const double each = 9 * sizeof(double) * static_cast<double>(vertices_.size());
   const auto bytes = [&](std::size_t others) {
