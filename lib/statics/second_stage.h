@@ -12,8 +12,8 @@ namespace gewebe {
 /// triangles join the same nodes.
 bool same_but_stiffness(const Model& first, const Model& second);
 
-/// Cut model of the second stage, from that of the first stage. The ratio of the stiffnesses of
-/// each spring is that of the springs that it comes from.
+/// Cut model of the second stage, from that of the first stage. The stiffness of each spring is
+/// multiplied by the ratio of second to first stage of the springs that it comes from.
 /// \param origin  by node of `cut`: the node before
 /// \pre same_but_stiffness(first, second); `cut` was made from `first`
 Model cut_second_stage(const Model& cut, std::span<const std::uint32_t> origin, const Model& first,
