@@ -1,11 +1,11 @@
 #pragma once
-// Low-rank approximation of a block of a matrix by few quantised rank-one terms ("crosses") scale u
-// vᵀ, whose numbers are small integers.
+// Low-rank approximation of a block of a matrix by few quantised rank-one terms ("crosses"): each
+// is scale u vᵀ, where u and v are small integers.
 //
 // Greedy algorithm: the largest entry of the remainder starts a term. Power iterations turn the
 // term towards the dominant one. The term is rounded, and the remainder is computed with the
 // rounded term, so that later terms correct the rounding. It ends when every entry of the remainder
-// is within the bound: this is checked, not estimated. Terms of which a 127th is below the bound
+// is within the bound: this is checked, not estimated. Terms whose 127th part is below the bound
 // are of int8, others of int16.
 //
 // A symmetric block, such as that of a cluster with itself, is no sum of few terms. It is stored as

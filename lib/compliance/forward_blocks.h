@@ -19,7 +19,8 @@ public:
   /// \param check  called before the factor is read; throws if it is no longer that of the model
   ForwardBlocks(std::shared_ptr<FrontalFactor> factor, std::function<void()> check);
 
-  /// Prepares blocks between these nodes. Blocks of nodes that were needed before may be dropped.
+  /// Prepares blocks between these nodes, and between these and nodes that were needed before.
+  /// Earlier nodes may be dropped.
   void need(std::span<const std::uint32_t> nodes);
   /// \pre both nodes were in the last call of need()
   ComplianceBlock block(std::uint32_t node, std::uint32_t other) const;
