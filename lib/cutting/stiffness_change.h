@@ -7,10 +7,9 @@
 // between copies then pull as before. Let c be a column of C, the displacements under a load. The
 // part of this load that K' E c does not balance is W w:
 //
-//   w = Σ Qᵀ c,   so   C' P = E C - C' W Σ Qᵀ C   on columns, with P c's loads at the kept copies.
-//   (1)
+//   w = Σ Qᵀ c,   so   C' P = E C - C' W Σ Qᵀ C   on columns,   (1)
 //
-// W, Q and Σ have a column, or an entry, for
+// with P c's loads at the kept copies. W, Q and Σ have a column, or an entry, for
 //   - each axis of each copy: it and the kept copy of its origin pull apart with what the copy's
 //     springs pull at it, W = e_copy - e_kept, Q = the copy's row of K' E, Σ = 1;
 //   - each spring whose stiffness, summed over copies, has changed (by -k where it was removed):
