@@ -22,7 +22,7 @@ namespace gewebe {
 
 namespace {
 
-/// Number of threads, at most `wanted`, that the system grants beside this one.
+/// Number of threads that the system grants beside this one, at most the given number.
 int threads_to_be_had(int wanted) {
   std::mutex mutex;
   std::condition_variable ready;
