@@ -50,7 +50,7 @@ struct SimulationOptions {
   /// A step or change that throws leaves the state as it was. This costs a copy of what moves.
   bool guard = false;
   double rate =
-      0; ///< required steps per second; 0: any. Contact sets too large for it cause a warning
+      0; ///< required steps per second; 0: any. More displaced nodes than it allows cause a warning
   /// Called for each change as it takes effect, at time(); `log` gets the row for a log.
   std::function<void(const Change&)> applied{};
   std::function<void(const ChangeRow&)> log{};
