@@ -49,8 +49,8 @@ struct SimulationOptions {
   std::function<void(const std::string&)> distrust{};
   /// A step or change that throws leaves the state as it was. This costs a copy of what moves.
   bool guard = false;
-  double rate =
-      0; ///< required steps per second; 0: any. More displaced nodes than it allows cause a warning
+  /// Required steps per second; 0: any. Too many displaced nodes for it cause a warning.
+  double rate = 0;
   /// Called for each change as it takes effect, at time(); `log` gets the row for a log.
   std::function<void(const Change&)> applied{};
   std::function<void(const ChangeRow&)> log{};
