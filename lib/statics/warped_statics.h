@@ -37,8 +37,7 @@ struct WarpedCounts {
   std::uint64_t updates = 0, unchanged = 0, shapes = 0; ///< as ElastostaticCounts
   std::uint64_t solves = 0, factors = 0, columns_read = 0;
   std::uint64_t rounds = 0; ///< iterations
-  double change =
-      0; ///< largest change by a last iteration, over the largest displacement: as WarpState
+  double change = 0;        ///< largest change by a last iteration, relative: as WarpState
 };
 
 /// Corotational elastostatic solver of one solid.
